@@ -1,0 +1,112 @@
+//! What can go wrong (`Error`: cannot go on) and what must be said (`Finding`: go on, but say so).
+
+use serde::{Deserialize, Serialize};
+
+/// `Result` with this crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Why the mathematics cannot go on. Every message names the culprit, the number and the remedy.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The robot description is not a physical tree of rigid bodies.
+    #[error("model: {culprit}: {problem}; {remedy}")]
+    Model {
+        /// Link or joint, with its kind: "link `forearm`".
+        culprit: String,
+        /// What is wrong, with the number.
+        problem: String,
+        /// How to mend it.
+        remedy: String,
+    },
+    /// The log cannot be turned into trajectories.
+    #[error("log `{log}`: {problem}; {remedy}")]
+    Log {
+        /// Name of the log as given by the user.
+        log: String,
+        /// What is wrong, with channel, row or time.
+        problem: String,
+        /// How to mend it.
+        remedy: String,
+    },
+    /// A term of the library cannot be built.
+    #[error("term `{term}`, column {column}: {problem}; {remedy}")]
+    Term {
+        /// The expression as written.
+        term: String,
+        /// 1-based character position in the expression.
+        column: usize,
+        /// What is wrong.
+        problem: String,
+        /// How to mend it.
+        remedy: String,
+    },
+    /// A setting is out of its range.
+    #[error("setting `{key}`: {problem}; {remedy}")]
+    Setting {
+        /// Dotted key as in `twincal.toml`.
+        key: String,
+        /// What is wrong, with the value.
+        problem: String,
+        /// How to mend it.
+        remedy: String,
+    },
+    /// The data cannot answer the question (exit code 4).
+    #[error("refused: {problem}; {remedy}")]
+    Refused {
+        /// What is missing, with the counts.
+        problem: String,
+        /// How to mend it.
+        remedy: String,
+    },
+    /// A number that must be finite is not; names the column.
+    #[error("{what} is not finite for column `{column}`; {remedy}")]
+    NotFinite {
+        /// Which quantity.
+        what: String,
+        /// Name of the column (term or `torque`).
+        column: String,
+        /// How to mend it.
+        remedy: String,
+    },
+}
+
+/// How much a [`Finding`] matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// Good to know.
+    Note,
+    /// Read this before you trust the numbers.
+    Warning,
+    /// Data was lost or degraded beyond the stated limit: the program ends with exit code 3.
+    Degraded,
+}
+
+/// Something was dropped, changed, assumed or looks wrong. Shown in terminal, JSON and report; never silent.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Finding {
+    /// Stable machine name in snake_case, e.g. `duplicate_stamps`.
+    pub code: String,
+    /// How much it matters.
+    pub severity: Severity,
+    /// What it is about: log, joint, term or link, by name. Empty when it is about the whole run.
+    pub subject: String,
+    /// One sentence: culprit, number, remedy.
+    pub message: String,
+    /// How many samples, rows or elements it concerns; 0 when it does not count anything.
+    pub count: u64,
+}
+
+impl Finding {
+    /// A finding of the given severity about `subject`, counting `count` items.
+    pub fn new(
+        severity: Severity,
+        code: &str,
+        subject: impl Into<String>,
+        message: impl Into<String>,
+        count: u64,
+    ) -> Self {
+        Self { code: code.into(), severity, subject: subject.into(), message: message.into(), count }
+    }
+}

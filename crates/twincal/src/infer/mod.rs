@@ -1,0 +1,42 @@
+//! From a [`Problem`] to a [`Posterior`]: every model (exact) or a Markov chain over models (Gibbs).
+
+use crate::error::Result;
+use crate::posterior::{Posterior, Problem};
+
+/// `[inference] method`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Choice {
+    /// Exact up to [`EXACT_LIMIT`] columns, Gibbs beyond.
+    Auto,
+    /// All 2^K models.
+    Exact,
+    /// Collapsed Gibbs.
+    Gibbs,
+}
+
+/// Largest K for which `auto` enumerates.
+pub const EXACT_LIMIT: usize = 28;
+
+/// `[inference]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InferenceSettings {
+    /// Method.
+    pub method: Choice,
+    /// Chains.
+    pub chains: usize,
+    /// Draws per chain after warm-up.
+    pub draws: usize,
+    /// Seed.
+    pub seed: u64,
+    /// Report disagreeing chains instead of refusing them (exit code 4).
+    pub allow_disagreement: bool,
+}
+
+/// The posterior of `problem` by the chosen method.
+///
+/// # Errors
+/// [`crate::Error::Setting`] for an impossible setting, [`crate::Error::NotFinite`] naming the column,
+/// [`crate::Error::Refused`] when chains disagree.
+pub fn infer(_problem: &Problem, _settings: &InferenceSettings) -> Result<Posterior> {
+    todo!()
+}

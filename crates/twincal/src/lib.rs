@@ -1,0 +1,28 @@
+//! The mathematics of twincal: a sparse residual Lagrangian that explains the torque a robot model misses.
+//!
+//! ```text
+//! τ_measured − τ_nominal = Σ_k β_k D(φ_k)(q, q̇, q̈) + ε          (paper eq. 1–5)
+//! ```
+//!
+//! The modules stand in reading order, which is also the only direction in which one may use another: a module sees
+//! what stands above it and nothing below (`tests/layers.rs` holds this). This crate opens no file, reads no clock and
+//! prints nothing.
+
+pub mod error;
+pub mod lanes;
+pub mod linear_algebra;
+pub mod robot;
+pub mod signal;
+pub mod term;
+pub mod rows;
+pub mod gram;
+pub mod prior;
+pub mod likelihood;
+pub mod posterior;
+pub mod infer;
+pub mod diagnostics;
+pub mod twin;
+pub mod validate;
+pub mod calibrate;
+
+pub use error::{Error, Finding, Result, Severity};

@@ -1,0 +1,91 @@
+//! What is known after the data: models, inclusion probabilities, coefficients, draws (method section 7).
+
+use crate::prior::Prior;
+use serde::{Deserialize, Serialize};
+
+/// The only input of inference: weighted statistics, and the prior. Both methods target exactly this posterior:
+///
+/// ```text
+/// ln p(y, z) = ln p(z) + log_constant − n/2 ln 2π + a0 ln b0 − lnΓ(a0) + lnΓ(a0+n/2)
+///              − ½Σ_{k∈z} ln v_k − ½ ln|A_z| − (a0+n/2) ln(b0 + RSS_z/2)
+/// A_z = G_zz + V_z⁻¹,  RSS_z = yy − r_zᵀ A_z⁻¹ r_z
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Problem {
+    /// G, K × K row-major.
+    pub gram: Vec<f64>,
+    /// r = Φᵀy, K.
+    pub xy: Vec<f64>,
+    /// yᵀy.
+    pub yy: f64,
+    /// n (tempered where the likelihood is tempered).
+    pub n: f64,
+    /// `½Σ n_j ln w_j + ½Σ starts_j ln(1−ρ_j²)`.
+    pub log_constant: f64,
+    /// The prior.
+    pub prior: Prior,
+    /// Names of the K columns, for messages.
+    pub names: Vec<String>,
+}
+
+/// One model z with its conditional posterior: `β_z | φ ~ N(μ_z, φ A_z⁻¹)`, `φ ~ InvGamma(a_n, b_n)`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Model {
+    /// Columns in z, ascending.
+    pub members: Vec<u32>,
+    /// Posterior probability.
+    pub weight: f64,
+    /// b_n = b0 + RSS_z/2.
+    pub scale: f64,
+    /// μ_z, same order as `members`.
+    pub mean: Vec<f64>,
+    /// Lower Cholesky factor L of A_z = L Lᵀ, row-major, m × m.
+    pub factor: Vec<f64>,
+}
+
+/// How the posterior was computed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "method", rename_all = "snake_case")]
+pub enum Method {
+    /// Every model was summed.
+    Exact {
+        /// 2^K.
+        models: u64,
+    },
+    /// Collapsed Gibbs sampling of the structure.
+    Gibbs {
+        /// Chains.
+        chains: usize,
+        /// Draws per chain after warm-up.
+        draws: usize,
+        /// Largest rank-normalised split R̂ over terms.
+        r_hat: f64,
+        /// Smallest bulk ESS over terms.
+        ess: f64,
+    },
+}
+
+/// The posterior over models, coefficients and noise.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Posterior {
+    /// P(z_k = 1 | y), K.
+    pub inclusion: Vec<f64>,
+    /// Monte Carlo standard error of `inclusion`; 0 when exact.
+    pub inclusion_mcse: Vec<f64>,
+    /// E[β_k | y], unconditional, K.
+    pub mean: Vec<f64>,
+    /// sd of β_k | y, unconditional, K.
+    pub sd: Vec<f64>,
+    /// a_n = a0 + n/2.
+    pub shape: f64,
+    /// E[φ | y].
+    pub noise: f64,
+    /// Heaviest models, descending weight (ties: members ascending); weights are renormalised to sum to 1.
+    pub models: Vec<Model>,
+    /// Posterior mass of `models` before renormalising.
+    pub models_mass: f64,
+    /// ln of the sum over all models of p(y, z); `None` with Gibbs.
+    pub log_evidence: Option<f64>,
+    /// How it was computed.
+    pub method: Method,
+}
