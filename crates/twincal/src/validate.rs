@@ -1,1 +1,91 @@
-//! (to be written)
+//! Held-out scores: how good the twin's torque is on data it has not seen (method section 8).
+
+use serde::{Deserialize, Serialize};
+
+/// Scores of one joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct JointScore {
+    /// Joint name.
+    pub joint: String,
+    /// Rows.
+    pub rows: u64,
+    /// RMSE of the nominal torque, N·m.
+    pub rmse_nominal: f64,
+    /// RMSE of the calibrated torque (model average), N·m.
+    pub rmse_calibrated: f64,
+    /// Share of rows inside the 95 % interval.
+    pub coverage95: f64,
+    /// Mean width of that interval, N·m.
+    pub mean_width95: f64,
+}
+
+/// Scores over a set of rows: pooled over all rows of all joints, and per joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Scores {
+    /// RMSE of the nominal torque over all rows of all joints.
+    pub rmse_nominal: f64,
+    /// RMSE of the calibrated torque.
+    pub rmse_calibrated: f64,
+    /// Share of rows inside the 95 % interval.
+    pub coverage95: f64,
+    /// Per joint.
+    pub joints: Vec<JointScore>,
+}
+
+/// How training and held-out data were separated.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Split {
+    /// Logs given with `--heldout`.
+    HeldoutLogs,
+    /// Each log predicted from the others.
+    LeaveOneLogOut,
+    /// The last 30 % of each log after a gap.
+    LastThirty,
+}
+
+/// One held-out stretch for figures: rows of one joint in one trajectory.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Trace {
+    /// Log name.
+    pub log: String,
+    /// Joint name.
+    pub joint: String,
+    /// Row times, s.
+    pub time: Vec<f64>,
+    /// Position, velocity at the rows.
+    pub q: Vec<f64>,
+    /// Velocity.
+    pub qd: Vec<f64>,
+    /// Measured torque, filtered like the rows.
+    pub measured: Vec<f64>,
+    /// Nominal torque.
+    pub nominal: Vec<f64>,
+    /// Calibrated torque.
+    pub calibrated: Vec<f64>,
+    /// Lower end of the 95 % interval.
+    pub low: Vec<f64>,
+    /// Upper end.
+    pub high: Vec<f64>,
+    /// Standstill rows.
+    pub standstill: Vec<bool>,
+    /// Measured value's probability under the predictive distribution (PIT), for calibration plots.
+    pub pit: Vec<f64>,
+}
+
+/// Everything held-out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Validation {
+    /// How the data were split.
+    pub split: Split,
+    /// All rows.
+    pub filtered: Scores,
+    /// Rows of moving joints only.
+    pub moving: Scores,
+    /// Unfiltered torque.
+    pub raw: Scores,
+    /// Coverage at 50, 80, 90 and 95 % of the filtered rows, pooled.
+    pub coverage_levels: Vec<(f64, f64)>,
+    /// For figures.
+    pub traces: Vec<Trace>,
+}

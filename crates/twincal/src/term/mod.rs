@@ -49,7 +49,7 @@ pub struct Term {
 }
 
 /// `[library]`.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct LibrarySettings {
     /// User expressions.
     pub terms: Vec<String>,
