@@ -1,1 +1,5 @@
-//! stub
+//! Files in, files and reports out: robot models, logs, settings, results. No mathematics here.
+
+pub mod error;
+
+pub use error::{Error, Place, Result};
