@@ -1,0 +1,16 @@
+//! Eight samples at a time: elementary functions on lanes and the run-time choice of instruction set.
+//!
+//! No unsafe code here: [`pulp`] holds the dispatch. A kernel is a type whose work sits in `#[inline(always)]` functions
+//! over `[f64; 8]`; `pulp::Arch::new().dispatch(kernel)` runs the copy of it that was compiled for this machine's
+//! widest vectors. The functions below use only + − × and bit operations, each rounded once: every instruction set
+//! gives the same bytes.
+
+mod trig;
+
+pub use trig::sin_cos;
+
+/// Samples per lane group.
+pub const LANES: usize = 8;
+
+/// Eight consecutive samples.
+pub type Lane = [f64; LANES];
