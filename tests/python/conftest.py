@@ -1,0 +1,55 @@
+"""What all Python tests share: where things are, the study's modules, and the program run as a user runs it."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+STUDY = ROOT / "studies" / "planar_arm"
+ASSETS = STUDY / "assets"
+SHARED = ROOT.parent / "shared" / "data"
+sys.path.insert(0, str(STUDY))
+
+
+def program(name):
+    """A built program; `TWINCAL_BIN_DIR` overrides `target/release`."""
+    folder = Path(os.environ.get("TWINCAL_BIN_DIR", ROOT / "target" / "release"))
+    path = folder / name
+    assert path.exists(), f"{path} is not built; run cargo build --release --workspace --bins --examples"
+    return str(path)
+
+
+def twincal(*arguments, expect=0):
+    """Runs `twincal` and checks its exit code; returns the finished process."""
+    command = [program("twincal"), *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    assert done.returncode == expect, f"{' '.join(command)}\nexit {done.returncode}\n{done.stdout}\n{done.stderr}"
+    return done
+
+
+def fit(folder, logs, config, *arguments, model=ASSETS / "arm.urdf", expect=0):
+    """`twincal fit` with a twincal.toml of this text; returns result.json."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "twincal.toml").write_text(config)
+    out = folder / "out"
+    twincal("fit", *logs, "--model", model, "--config", folder / "twincal.toml", "-o", out, "--force", *arguments,
+            expect=expect)  # fmt: skip
+    return json.loads((out / "result.json").read_text())
+
+
+@pytest.fixture(scope="session")
+def carried():
+    """The carried truth.json."""
+    return json.loads((ASSETS / "truth.json").read_text())
+
+
+@pytest.fixture(scope="session")
+def study():
+    """The demo's study, simulated anew."""
+    import simulate
+
+    return simulate.simulate()
