@@ -1,1 +1,202 @@
 //! Dense linear algebra: the one module that knows the linear-algebra crate (faer). Slices in, slices out, row-major.
+
+use faer::{MatRef, Side};
+
+/// A symmetric matrix has no Cholesky factor: the first pivot that is not a positive number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("pivot {pivot} is not positive")]
+pub struct NotPositiveDefinite {
+    /// 0-based row of the pivot; the caller knows which column of the regression this is.
+    pub pivot: usize,
+}
+
+/// `A = L Lᵀ` of a symmetric positive definite matrix.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cholesky {
+    size: usize,
+    lower: Vec<f64>,
+}
+
+impl Cholesky {
+    /// Factors `matrix` (size × size, row-major; only its lower triangle is read).
+    ///
+    /// # Errors
+    /// [`NotPositiveDefinite`] with the first pivot that is zero, negative or not a number.
+    ///
+    /// # Panics
+    /// If `matrix` does not hold size × size numbers.
+    pub fn new(matrix: &[f64], size: usize) -> Result<Self, NotPositiveDefinite> {
+        assert_eq!(matrix.len(), size * size, "a square matrix of order {size}");
+        if size == 0 {
+            return Ok(Self {
+                size,
+                lower: Vec::new(),
+            });
+        }
+        let factored = MatRef::from_row_major_slice(matrix, size, size)
+            .llt(Side::Lower)
+            .map_err(|error| {
+                let faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot { index } =
+                    error;
+                NotPositiveDefinite { pivot: index }
+            })?;
+        let factor = factored.L();
+        let mut lower = vec![0.0; size * size];
+        for i in 0..size {
+            for j in 0..=i {
+                lower[i * size + j] = factor[(i, j)];
+            }
+        }
+        match (0..size).find(|&i| !(lower[i * size + i] > 0.0 && lower[i * size + i].is_finite())) {
+            Some(pivot) => Err(NotPositiveDefinite { pivot }),
+            None => Ok(Self { size, lower }),
+        }
+    }
+
+    /// Takes a lower factor that is already there (row-major, positive diagonal), e.g. of a stored model.
+    pub fn from_lower(lower: Vec<f64>, size: usize) -> Self {
+        assert_eq!(lower.len(), size * size, "a square factor of order {size}");
+        Self { size, lower }
+    }
+
+    /// L, row-major, zeros above the diagonal.
+    pub fn lower(&self) -> &[f64] {
+        &self.lower
+    }
+
+    /// L, row-major, given away.
+    pub fn into_lower(self) -> Vec<f64> {
+        self.lower
+    }
+
+    /// `ln |A|`.
+    pub fn log_determinant(&self) -> f64 {
+        2.0 * (0..self.size)
+            .map(|i| self.lower[i * self.size + i].ln())
+            .sum::<f64>()
+    }
+
+    /// Replaces `x` by `L⁻¹ x`. `|L⁻¹x|² = xᵀA⁻¹x`.
+    pub fn solve_lower(&self, x: &mut [f64]) {
+        let n = self.size;
+        for i in 0..n {
+            let row = &self.lower[i * n..i * n + i];
+            let sum: f64 = row.iter().zip(&*x).map(|(l, x)| l * x).sum();
+            x[i] = (x[i] - sum) / self.lower[i * n + i];
+        }
+    }
+
+    /// Replaces `x` by `L⁻ᵀ x`; a standard normal `x` becomes a draw from `N(0, A⁻¹)`.
+    pub fn solve_upper(&self, x: &mut [f64]) {
+        let n = self.size;
+        for i in (0..n).rev() {
+            x[i] /= self.lower[i * n + i];
+            let xi = x[i];
+            for j in 0..i {
+                x[j] -= self.lower[i * n + j] * xi;
+            }
+        }
+    }
+
+    /// Replaces `x` by `A⁻¹ x`.
+    pub fn solve(&self, x: &mut [f64]) {
+        self.solve_lower(x);
+        self.solve_upper(x);
+    }
+
+    /// `A⁻¹`, row-major.
+    pub fn inverse(&self) -> Vec<f64> {
+        let n = self.size;
+        let mut inverse = vec![0.0; n * n];
+        let mut x = vec![0.0; n];
+        for k in 0..n {
+            x.fill(0.0);
+            x[k] = 1.0;
+            self.solve(&mut x);
+            for i in 0..n {
+                inverse[i * n + k] = x[i];
+            }
+        }
+        // The two halves differ by rounding only; callers may rely on exact symmetry.
+        for i in 0..n {
+            for j in 0..i {
+                inverse[j * n + i] = inverse[i * n + j];
+            }
+        }
+        inverse
+    }
+}
+
+/// Eigenvalues (ascending) and eigenvectors of a symmetric matrix: `vectors[k * size + i]` is component i of vector k.
+/// `None` if the iteration does not converge (only for numbers that are not finite).
+pub fn symmetric_eigen(matrix: &[f64], size: usize) -> Option<(Vec<f64>, Vec<f64>)> {
+    assert_eq!(matrix.len(), size * size, "a square matrix of order {size}");
+    if matrix.iter().any(|x| !x.is_finite()) {
+        return None;
+    }
+    if size == 0 {
+        return Some((Vec::new(), Vec::new()));
+    }
+    let eigen = MatRef::from_row_major_slice(matrix, size, size)
+        .self_adjoint_eigen(Side::Lower)
+        .ok()?;
+    let values = (0..size).map(|k| eigen.S()[k]).collect();
+    let vectors = (0..size)
+        .flat_map(|k| (0..size).map(move |i| (i, k)))
+        .map(|(i, k)| eigen.U()[(i, k)])
+        .collect();
+    Some((values, vectors))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 3 × 3 with a known factor: L = [[2,0,0],[1,3,0],[-1,0.5,1]].
+    const A: [f64; 9] = [4.0, 2.0, -2.0, 2.0, 10.0, 0.5, -2.0, 0.5, 2.25];
+
+    #[test]
+    fn factor_solve_and_determinant_match_the_closed_form() {
+        let factor = Cholesky::new(&A, 3).unwrap();
+        let expected = [2.0, 0.0, 0.0, 1.0, 3.0, 0.0, -1.0, 0.5, 1.0];
+        for (x, y) in factor.lower().iter().zip(expected) {
+            assert!((x - y).abs() < 1e-14);
+        }
+        assert!((factor.log_determinant() - 36f64.ln()).abs() < 1e-14);
+        let mut x = [4.0 + 4.0 - 6.0, 2.0 + 20.0 + 1.5, -2.0 + 1.0 + 6.75];
+        factor.solve(&mut x);
+        for (x, y) in x.iter().zip([1.0, 2.0, 3.0]) {
+            assert!((x - y).abs() < 1e-14);
+        }
+        let inverse = factor.inverse();
+        for i in 0..3 {
+            for j in 0..3 {
+                let product: f64 = (0..3).map(|k| A[3 * i + k] * inverse[3 * k + j]).sum();
+                assert!((product - f64::from(i == j)).abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn a_failing_pivot_is_named() {
+        let mut bad = A;
+        bad[8] = 1.25; // the last Schur complement becomes 0
+        assert_eq!(Cholesky::new(&bad, 3).unwrap_err().pivot, 2);
+        bad[4] = -1.0;
+        assert_eq!(Cholesky::new(&bad, 3).unwrap_err().pivot, 1);
+        bad[0] = f64::NAN;
+        assert_eq!(Cholesky::new(&bad, 3).unwrap_err().pivot, 0);
+        assert!(Cholesky::new(&[], 0).unwrap().lower().is_empty());
+    }
+
+    #[test]
+    fn eigenvalues_of_a_two_by_two() {
+        let (values, vectors) = symmetric_eigen(&[2.0, 1.0, 1.0, 2.0], 2).unwrap();
+        assert!((values[0] - 1.0).abs() < 1e-14 && (values[1] - 3.0).abs() < 1e-14);
+        assert!(
+            (vectors[2] - vectors[3]).abs() < 1e-14
+                && (vectors[2].abs() - 0.5f64.sqrt()).abs() < 1e-14
+        );
+        assert!(symmetric_eigen(&[f64::NAN], 1).is_none());
+    }
+}

@@ -1,0 +1,174 @@
+//! Sufficient statistics: the narrow waist (method section 4). Left of it cost grows with the log, right of it not.
+
+mod accumulate;
+mod products;
+
+pub use accumulate::{JointAccumulator, OpenRun};
+
+use serde::{Deserialize, Serialize};
+use std::ops::AddAssign;
+
+/// A symmetric matrix of order `size`, stored full and row-major.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Symmetric {
+    /// Order.
+    pub size: usize,
+    /// `values[i * size + j]`.
+    pub values: Vec<f64>,
+}
+
+impl Symmetric {
+    /// All zeros.
+    pub fn zeros(size: usize) -> Self {
+        Self {
+            size,
+            values: vec![0.0; size * size],
+        }
+    }
+
+    /// Entry (i, j).
+    pub fn at(&self, i: usize, j: usize) -> f64 {
+        self.values[i * self.size + j]
+    }
+
+    /// Adds `x xᵀ`.
+    pub fn add_outer(&mut self, x: &[f64]) {
+        for (i, row) in self.values.chunks_exact_mut(self.size.max(1)).enumerate() {
+            for (value, xj) in row.iter_mut().zip(x) {
+                *value += x[i] * xj;
+            }
+        }
+    }
+}
+
+impl AddAssign<&Symmetric> for Symmetric {
+    fn add_assign(&mut self, other: &Symmetric) {
+        for (a, b) in self.values.iter_mut().zip(&other.values) {
+            *a += b;
+        }
+    }
+}
+
+/// Statistics of ONE joint over one block of rows, on the augmented row `x = [columns of the joint, y]`.
+///
+/// ```text
+/// S0 = Σ x xᵀ    D = Σ_{t≥2} (x_t − x_{t−1})(x_t − x_{t−1})ᵀ    F, L = Σ over runs of first, last row's x xᵀ
+/// ```
+///
+/// Statistics add: those of a log are the sum of those of its parts, wherever it was cut (a part that goes on from
+/// another one's last row carries the difference over the cut, see [`JointAccumulator::cut`]).
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct JointGram {
+    /// Library columns that are structurally non-zero on this joint, ascending; y is the last row and column.
+    pub columns: Vec<u32>,
+    /// Rows.
+    pub n: f64,
+    /// Runs of consecutive rows (each starts an AR(1) process).
+    pub starts: f64,
+    /// Σ x xᵀ.
+    pub s0: Symmetric,
+    /// Gram of first differences.
+    pub d: Symmetric,
+    /// Σ over runs of the first row's x xᵀ.
+    pub first: Symmetric,
+    /// Σ over runs of the last row's x xᵀ.
+    pub last: Symmetric,
+}
+
+impl JointGram {
+    /// No rows yet.
+    pub fn empty(columns: Vec<u32>) -> Self {
+        let zeros = Symmetric::zeros(columns.len() + 1);
+        Self {
+            columns,
+            n: 0.0,
+            starts: 0.0,
+            s0: zeros.clone(),
+            d: zeros.clone(),
+            first: zeros.clone(),
+            last: zeros,
+        }
+    }
+
+    /// The quadratic form of the exact stationary AR(1) likelihood with unit innovation variance,
+    ///
+    /// ```text
+    /// G(ρ) = Xᵀ C⁻¹ X = (1−ρ)² S0 + ρ D + ρ(1−ρ)(F + L),      C_st = ρ^|s−t| / (1−ρ²)
+    /// ```
+    ///
+    /// whose log-determinant is `−½ ln|C| = ½ Σ starts ln(1−ρ²)`. ρ = 0 gives `S0`.
+    ///
+    /// # Source
+    /// method section 4; no term is a difference of large numbers as ρ → 1.
+    pub fn stationary(&self, rho: f64) -> Symmetric {
+        let (a, b, c) = ((1.0 - rho) * (1.0 - rho), rho, rho * (1.0 - rho));
+        let values = self
+            .s0
+            .values
+            .iter()
+            .zip(&self.d.values)
+            .zip(self.first.values.iter().zip(&self.last.values))
+            .map(|((s0, d), (first, last))| a * s0 + b * d + c * (first + last))
+            .collect();
+        Symmetric {
+            size: self.s0.size,
+            values,
+        }
+    }
+}
+
+impl AddAssign<&JointGram> for JointGram {
+    /// # Panics
+    /// If the two belong to different columns (an empty default adopts the other's).
+    fn add_assign(&mut self, other: &JointGram) {
+        if other.s0.size == 0 {
+            return;
+        }
+        if self.s0.size == 0 {
+            *self = other.clone();
+            return;
+        }
+        assert_eq!(
+            self.columns, other.columns,
+            "statistics of different columns do not add"
+        );
+        self.n += other.n;
+        self.starts += other.starts;
+        self.s0 += &other.s0;
+        self.d += &other.d;
+        self.first += &other.first;
+        self.last += &other.last;
+    }
+}
+
+/// Statistics of one block of rows, joint by joint. A log is a list of them.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Gram {
+    /// One per moving joint.
+    pub joints: Vec<JointGram>,
+}
+
+impl AddAssign<&Gram> for Gram {
+    /// # Panics
+    /// If the two belong to different robots or libraries (an empty default adopts the other's).
+    fn add_assign(&mut self, other: &Gram) {
+        if other.joints.is_empty() {
+            return;
+        }
+        if self.joints.is_empty() {
+            *self = other.clone();
+            return;
+        }
+        assert_eq!(
+            self.joints.len(),
+            other.joints.len(),
+            "statistics of different robots do not add"
+        );
+        for (a, b) in self.joints.iter_mut().zip(&other.joints) {
+            *a += b;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
