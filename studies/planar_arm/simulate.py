@@ -15,6 +15,7 @@ and every recorded (q, qd, qdd, tau) satisfies M qdd + bias + D(phi) + f = tau t
 import argparse
 import json
 from dataclasses import asdict, dataclass, field, replace
+from functools import lru_cache
 from math import exp, pi, tanh
 from pathlib import Path
 
@@ -156,8 +157,24 @@ class _Plant:
         data.qfrc_applied[:] = -(h11 * a1 + h12 * a2 + c1), -(h12 * a1 + h22 * a2 + c2)
 
 
-def _run(settings, model, role, index):
-    """Integrates one trajectory and records motion and actuator torque at the log's rate."""
+class _MotionKey:
+    """Settings as a cache key: equal when everything they hold is (the hidden terms are a dict)."""
+
+    def __init__(self, settings):
+        self.settings, self.text = settings, repr(settings)
+
+    def __hash__(self):
+        return hash(self.text)
+
+    def __eq__(self, other):
+        return self.text == other.text
+
+
+@lru_cache(maxsize=64)
+def _motion(key, role, index):
+    """Integrates one trajectory and records time, motion and actuator torque at the log's rate."""
+    settings = key.settings
+    model = mujoco_model(settings.real)
     reference = excitation(settings, role, index)
     rows = int(round(settings.duration * settings.rate_hz))
     t, (q, qd, qdd, tau) = np.arange(rows) / settings.rate_hz, np.empty((4, rows, 2))
@@ -171,8 +188,15 @@ def _run(settings, model, role, index):
             mujoco.mj_step(model, data, settings.stride)
     finally:
         mujoco.set_mjcb_control(None)
+    return t, q, qd, qdd, tau
+
+
+def _run(settings, role, index):
+    """One log: the motion, which is kept for worlds that differ in noise only, and the noise."""
+    silent = replace(settings, noise_sd=0.0, noise_time=0.0, encoder_sd=0.0)
+    t, q, qd, qdd, tau = _motion(_MotionKey(silent), role, index)
     rng = np.random.default_rng([settings.seed, 1 if role == "heldout" else 0, index, 1])
-    noise = _noise(settings, rng, rows)
+    noise = _noise(settings, rng, len(t))
     q_logged = q + settings.encoder_sd * rng.standard_normal(q.shape) if settings.encoder_sd > 0 else q
     return Log(f"{role}{index + 1}", role, t, q, qd, qdd, tau, noise, q_logged, settings.encoder_sd > 0)
 
@@ -206,9 +230,8 @@ def truth(settings):
 def simulate(settings=None, **changes):
     """Runs the study; `simulate(noise_time=0.02, rate_hz=1000)` changes the default `Settings`."""
     settings = replace(settings or Settings(), **changes)
-    model = mujoco_model(settings.real)
     runs = [("train", i) for i in range(settings.train)] + [("heldout", i) for i in range(settings.heldout)]
-    logs = [_run(settings, model, role, index) for role, index in runs]
+    logs = [_run(settings, role, index) for role, index in runs]
     return Study(settings, logs, truth(settings))
 
 
