@@ -1,5 +1,11 @@
 //! What is known after the data: models, inclusion probabilities, coefficients, draws (method section 7).
 
+pub mod draws;
+pub mod mixture;
+pub mod random;
+pub mod student;
+pub mod summary;
+
 use crate::prior::Prior;
 use serde::{Deserialize, Serialize};
 

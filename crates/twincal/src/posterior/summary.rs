@@ -1,0 +1,268 @@
+//! One line per candidate: inclusion probability, mean, sd and interval, all averaged over models (method section 7).
+
+use super::mixture::{Level, Mixture};
+use super::student::StudentT;
+use super::{Model, Posterior};
+
+/// What is known about the coefficient β_k of one column, in its own unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ColumnSummary {
+    /// Posterior inclusion probability P(z_k = 1 | y).
+    pub pip: f64,
+    /// Monte Carlo standard error of `pip`; 0 when exact.
+    pub pip_mcse: f64,
+    /// E[β_k | y], unconditional.
+    pub mean: f64,
+    /// sd of β_k | y, unconditional.
+    pub sd: f64,
+    /// Central 95 % interval of β_k | y, unconditional: a spike of 1 − pip at 0 and a mixture of Student-t.
+    pub interval95: [f64; 2],
+    /// E[β_k | y, z_k = 1]; `None` if pip is 0.
+    pub conditional_mean: Option<f64>,
+    /// sd of β_k | y, z_k = 1; `None` if pip is 0.
+    pub conditional_sd: Option<f64>,
+    /// pip ≥ 0.5: a member of the median-probability model (Barbieri & Berger 2004).
+    pub selected: bool,
+}
+
+impl ColumnSummary {
+    fn of(
+        posterior: &Posterior,
+        student: &StudentT,
+        column: usize,
+        components: &Components,
+    ) -> Self {
+        let pip = posterior.inclusion[column].clamp(0.0, 1.0);
+        let (mean, sd) = (posterior.mean[column], posterior.sd[column]);
+        let conditional = (pip > 0.0).then(|| {
+            // E[β² | y] = pip · E[β² | y, z = 1], and the same for the mean.
+            let conditional_mean = mean / pip;
+            // sd² = pip·s² + pip(1 − pip)·m², solved for s² without the cancellation of raw second moments.
+            let variance = sd * (sd / pip) - (1.0 - pip) * conditional_mean * conditional_mean;
+            (conditional_mean, variance.max(0.0).sqrt())
+        });
+        Self {
+            pip,
+            pip_mcse: posterior.inclusion_mcse[column],
+            mean,
+            sd,
+            interval95: components.interval95(student, 1.0 - pip),
+            conditional_mean: conditional.map(|pair| pair.0),
+            conditional_sd: conditional.map(|pair| pair.1),
+            selected: pip >= 0.5,
+        }
+    }
+}
+
+/// Summaries of all K columns, in their order.
+///
+/// Inclusion, mean and sd are the posterior's (all models); the shape of the intervals comes from the stored models that
+/// hold the column. Scaling a column by c scales mean, sd and interval by 1/c and changes nothing else.
+#[must_use]
+pub fn summarise(posterior: &Posterior) -> Vec<ColumnSummary> {
+    let student = StudentT::new(2.0 * posterior.shape);
+    let mut components = vec![Components::default(); posterior.inclusion.len()];
+    for model in &posterior.models {
+        let variances = inverse_diagonal(&model.factor, model.members.len());
+        for (place, &column) in model.members.iter().enumerate() {
+            components[column as usize].push(
+                model,
+                model.mean[place],
+                variances[place],
+                posterior.shape,
+            );
+        }
+    }
+    (0..posterior.inclusion.len())
+        .map(|k| ColumnSummary::of(posterior, &student, k, &components[k]))
+        .collect()
+}
+
+/// The t components of one coefficient given that it is included.
+#[derive(Debug, Clone, Default)]
+struct Components {
+    weights: Vec<f64>,
+    locations: Vec<f64>,
+    scales: Vec<f64>,
+}
+
+impl Components {
+    /// β_k | z, y ~ t_{2 a_n}(μ_k, (b_n/a_n) (A⁻¹)_kk).
+    fn push(&mut self, model: &Model, location: f64, variance: f64, shape: f64) {
+        if model.weight > 0.0 {
+            self.weights.push(model.weight);
+            self.locations.push(location);
+            self.scales.push((model.scale / shape * variance).sqrt());
+        }
+    }
+
+    fn interval95(&self, student: &StudentT, spike: f64) -> [f64; 2] {
+        let mass: f64 = self.weights.iter().sum();
+        if mass <= 0.0 {
+            // Only models too light to be stored hold the column: the spike has more than 95 %.
+            return [0.0; 2];
+        }
+        let weights: Vec<f64> = self.weights.iter().map(|w| w / mass).collect();
+        let mixture = Mixture {
+            weights: &weights,
+            locations: &self.locations,
+            scales: &self.scales,
+            spike,
+        };
+        Level::central(student, 0.95).map(|level| mixture.quantile(student, level))
+    }
+}
+
+/// Diagonal of `(L Lᵀ)⁻¹` for a lower triangular `factor`, row-major, `size × size`: squared column norms of L⁻¹.
+#[must_use]
+pub fn inverse_diagonal(factor: &[f64], size: usize) -> Vec<f64> {
+    let mut column = vec![0.0; size];
+    (0..size)
+        .map(|k| {
+            // L x = e_k, forward substitution from row k.
+            let mut sum = 0.0;
+            for row in k..size {
+                let mut value = if row == k { 1.0 } else { 0.0 };
+                for earlier in k..row {
+                    value -= factor[row * size + earlier] * column[earlier];
+                }
+                column[row] = value / factor[row * size + row];
+                sum += column[row] * column[row];
+            }
+            sum
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::posterior::Method;
+
+    /// Two columns, three models, numbers chosen so that everything has a closed form.
+    fn posterior(unit: f64) -> Posterior {
+        // A = diag(4, 25) in unit columns; β's unit is 1/unit of the column's.
+        let (m1, m2) = (2.0 / unit, -0.5);
+        let factor = |members: &[u32]| -> Vec<f64> {
+            let diagonal: Vec<f64> = members
+                .iter()
+                .map(|&k| if k == 0 { 2.0 * unit } else { 5.0 })
+                .collect();
+            let size = diagonal.len();
+            (0..size * size)
+                .map(|i| {
+                    if i / size == i % size {
+                        diagonal[i / size]
+                    } else {
+                        0.0
+                    }
+                })
+                .collect()
+        };
+        let model = |members: &[u32], weight: f64| Model {
+            members: members.to_vec(),
+            weight,
+            scale: 3.0,
+            mean: members
+                .iter()
+                .map(|&k| if k == 0 { m1 } else { m2 })
+                .collect(),
+            factor: factor(members),
+        };
+        let shape: f64 = 11.0;
+        let phi = 3.0 / (shape - 1.0);
+        let pips = [0.8, 0.3];
+        let moments = |pip: f64, mean: f64, variance: f64| {
+            let first: f64 = pip * mean;
+            (
+                first,
+                (pip * (variance + mean * mean) - first * first).sqrt(),
+            )
+        };
+        let (mean0, sd0) = moments(pips[0], m1, phi / (4.0 * unit * unit));
+        let (mean1, sd1) = moments(pips[1], m2, phi / 25.0);
+        Posterior {
+            inclusion: pips.to_vec(),
+            inclusion_mcse: vec![0.0; 2],
+            mean: vec![mean0, mean1],
+            sd: vec![sd0, sd1],
+            shape,
+            noise: phi,
+            models: vec![
+                model(&[0], 0.6),
+                model(&[0, 1], 0.2),
+                model(&[1], 0.1),
+                model(&[], 0.1),
+            ],
+            models_mass: 1.0,
+            log_evidence: Some(0.0),
+            method: Method::Exact { models: 4 },
+        }
+    }
+
+    #[test]
+    fn conditional_moments_are_those_of_the_models() {
+        let rows = summarise(&posterior(1.0));
+        let phi: f64 = 0.3;
+        assert!((rows[0].conditional_mean.unwrap() - 2.0).abs() < 1e-14);
+        assert!((rows[0].conditional_sd.unwrap() - (phi / 4.0).sqrt()).abs() < 1e-13);
+        assert!((rows[1].conditional_mean.unwrap() + 0.5).abs() < 1e-14);
+        assert!((rows[1].conditional_sd.unwrap() - (phi / 25.0).sqrt()).abs() < 1e-13);
+        assert!(rows[0].selected && !rows[1].selected);
+    }
+
+    #[test]
+    fn the_interval_is_the_closed_form_of_spike_plus_one_t() {
+        let rows = summarise(&posterior(1.0));
+        let student = StudentT::new(22.0);
+        // Column 0: spike 0.2 at 0 and 0.8 of t(2, √(3/11/4)); 2.5 % falls left of the t's bulk, into the spike's left edge.
+        let scale = (3.0_f64 / 11.0 / 4.0).sqrt();
+        assert_eq!(rows[0].interval95[0], 0.0);
+        let wanted = 2.0 + scale * student.quantile(1.0 - 0.025 / 0.8);
+        assert!((rows[0].interval95[1] - wanted).abs() < 1e-11);
+        // Column 1: spike 0.7, the t left of 0.
+        let scale = (3.0_f64 / 11.0 / 25.0).sqrt();
+        assert!(
+            (rows[1].interval95[0] - (-0.5 + scale * student.quantile(0.025 / 0.3))).abs() < 1e-11
+        );
+        assert_eq!(rows[1].interval95[1], 0.0);
+    }
+
+    #[test]
+    fn scaling_a_column_scales_its_coefficient_and_nothing_else() {
+        let (one, other) = (summarise(&posterior(1.0)), summarise(&posterior(1e6)));
+        assert_eq!(one[1], other[1]);
+        assert_eq!(one[0].pip, other[0].pip);
+        let close = |a: f64, b: f64| (a * 1e-6 - b).abs() <= 1e-11 * b.abs();
+        assert!(close(one[0].mean, other[0].mean) && close(one[0].sd, other[0].sd));
+        assert!(close(one[0].interval95[1], other[0].interval95[1]));
+        assert!(close(
+            one[0].conditional_sd.unwrap(),
+            other[0].conditional_sd.unwrap()
+        ));
+    }
+
+    #[test]
+    fn a_column_that_is_never_included_has_no_conditional_numbers() {
+        let mut posterior = posterior(1.0);
+        posterior.inclusion[1] = 0.0;
+        posterior.mean[1] = 0.0;
+        posterior.sd[1] = 0.0;
+        posterior.models.truncate(1);
+        let row = summarise(&posterior)[1];
+        assert_eq!(
+            (row.conditional_mean, row.conditional_sd, row.interval95),
+            (None, None, [0.0; 2])
+        );
+        assert!(!row.selected);
+    }
+
+    #[test]
+    fn inverse_diagonal_of_a_full_factor() {
+        // A = L Lᵀ with L = [[2, 0], [1, 3]]: A = [[4, 2], [2, 10]], A⁻¹ = [[10, −2], [−2, 4]]/36.
+        let diagonal = inverse_diagonal(&[2.0, 0.0, 1.0, 3.0], 2);
+        assert!(
+            (diagonal[0] - 10.0 / 36.0).abs() < 1e-15 && (diagonal[1] - 4.0 / 36.0).abs() < 1e-15
+        );
+    }
+}
