@@ -95,6 +95,14 @@ pub enum Error {
         /// How to mend it.
         remedy: String,
     },
+    /// A mistake in this program, not in its input.
+    #[error("{what}: {problem}; this is a mistake in twincal, please report it")]
+    Internal {
+        /// Which part of the program.
+        what: String,
+        /// What went wrong there.
+        problem: String,
+    },
     /// The mathematics refused what the files say; the exit code follows from `source`.
     #[error(transparent)]
     Core(#[from] twincal::Error),

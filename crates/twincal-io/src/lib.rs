@@ -1,5 +1,6 @@
 //! Files in, files and reports out: robot models, logs, settings, results. No mathematics here.
 
 pub mod error;
+pub mod report;
 
 pub use error::{Error, Place, Result};

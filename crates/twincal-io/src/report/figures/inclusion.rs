@@ -1,0 +1,192 @@
+//! Inclusion probabilities of all candidates with the line at one half (paper fig. 2).
+
+use crate::report::figure::{Figure, Image, Legend};
+use crate::report::scale::Scale;
+use crate::report::svg::{Anchor, Svg};
+use crate::report::text::{count, probability, shorten};
+use twincal::calibrate::TermSummary;
+use twincal::term::Family;
+
+/// Above this many candidates only those that stand out are drawn one by one.
+const MOST: usize = 60;
+/// "Stands out" means at least this inclusion probability.
+const LEAST: f64 = 0.05;
+const ROW: f64 = 18.0;
+
+enum Row<'a> {
+    Family(&'static str),
+    Term(&'a TermSummary, f64),
+    Rest(usize),
+}
+
+/// The figure; `None` without candidates.
+pub(in crate::report) fn figure(terms: &[TermSummary]) -> Option<Figure> {
+    let live = terms.iter().filter(|t| t.pip.is_some()).count();
+    if live == 0 {
+        return None;
+    }
+    let rows = rows(terms, live);
+    let selected = terms.iter().filter(|t| t.selected).count();
+    let label = format!(
+        "Bar chart of the inclusion probabilities of {live} candidate terms; {selected} reach one half and are kept."
+    );
+    Some(Figure {
+        title: "Which effects the data support".into(),
+        read: "Each bar is the probability that the effect is really there, given this log and the prior; bars that reach \
+               the line at 0.5 are kept in the twin."
+            .into(),
+        legend: vec![
+            Legend { mark: "area", class: "kept", label: "kept" },
+            Legend { mark: "area", class: "left", label: "not kept" },
+            Legend { mark: "line", class: "half", label: "0.5" },
+        ],
+        images: vec![Image::full("", |width| draw(&rows, width, &label))],
+    })
+}
+
+fn rows<'a>(terms: &'a [TermSummary], live: usize) -> Vec<Row<'a>> {
+    let mut rows = Vec::new();
+    let mut families: Vec<Family> = terms
+        .iter()
+        .filter(|t| t.pip.is_some())
+        .map(|t| t.term.family)
+        .collect();
+    families.sort();
+    families.dedup();
+    for family in families {
+        rows.push(Row::Family(family_name(family)));
+        let members = terms
+            .iter()
+            .filter(|t| t.term.family == family)
+            .filter_map(|t| Some((t, t.pip?)));
+        let mut rest = 0;
+        for (term, pip) in members {
+            if live <= MOST || pip >= LEAST || term.selected {
+                rows.push(Row::Term(term, pip))
+            } else {
+                rest += 1
+            }
+        }
+        if rest > 0 {
+            rows.push(Row::Rest(rest));
+        }
+    }
+    rows
+}
+
+fn draw(rows: &[Row<'_>], width: f64, label: &str) -> String {
+    let left = if width > 600.0 { 250.0 } else { 138.0 };
+    let (right, top) = (width - 52.0, 6.0);
+    let bottom = top + ROW * rows.len() as f64 + 4.0;
+    let mut svg = Svg::new(width, bottom + 38.0);
+    let x = Scale::new((0.0, 1.0), (left, right));
+    for (value, text) in x.ticks(if width > 600.0 { 10 } else { 5 }) {
+        svg.line("g", (x.at(value), top), (x.at(value), bottom));
+        svg.text("t", (x.at(value), bottom + 15.0), Anchor::Middle, &text);
+    }
+    for (i, row) in rows.iter().enumerate() {
+        let y = top + ROW * i as f64;
+        let base = y + 13.5;
+        match row {
+            Row::Family(name) => {
+                svg.rect("strip", (0.0, y + 2.0), (width, ROW - 2.0), None);
+                svg.text(
+                    "l strong",
+                    (4.0, base),
+                    Anchor::Start,
+                    &shorten(name, left, 11.0),
+                );
+            }
+            Row::Rest(n) => {
+                let text = format!("{} more, each below {LEAST}", count(*n as u64));
+                svg.text("t", (left + 4.0, base), Anchor::Start, &text);
+            }
+            Row::Term(term, pip) => {
+                let class = if term.selected { "kept" } else { "left" };
+                let hint = format!("{}: {}", term.term.name, probability(*pip));
+                svg.text(
+                    "name",
+                    (left - 6.0, base),
+                    Anchor::End,
+                    &shorten(&term.term.name, left - 12.0, 12.0),
+                );
+                // A bar of one pixel shows that there is a candidate.
+                svg.rect(
+                    class,
+                    (left, y + 4.0),
+                    ((x.at(*pip) - left).max(1.0), ROW - 6.0),
+                    Some(&hint),
+                );
+                if let Some(error) = term.pip_mcse.filter(|e| *e > 0.0) {
+                    let ends = [(pip - 1.96 * error).max(0.0), (pip + 1.96 * error).min(1.0)];
+                    svg.line(
+                        "whisker",
+                        (x.at(ends[0]), y + 10.0),
+                        (x.at(ends[1]), y + 10.0),
+                    );
+                }
+                svg.text("t", (right + 6.0, base), Anchor::Start, &probability(*pip));
+            }
+        }
+    }
+    svg.line("half", (x.at(0.5), top), (x.at(0.5), bottom));
+    svg.line("a", (left, top), (left, bottom));
+    svg.text(
+        "l",
+        (0.5 * (left + right), bottom + 32.0),
+        Anchor::Middle,
+        "inclusion probability",
+    );
+    svg.finish(label)
+}
+
+/// A family in words.
+pub(in crate::report) fn family_name(family: Family) -> &'static str {
+    match family {
+        Family::User => "own expressions",
+        Family::Generic => "generic energy terms",
+        Family::Viscous => "viscous friction",
+        Family::Coulomb => "Coulomb friction",
+        Family::Offset => "torque offset",
+        Family::MotorInertia => "motor inertia",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::fixture;
+
+    #[test]
+    fn bars_are_as_long_as_their_probability() {
+        let mut term = fixture::two_joints().terms[0].clone();
+        term.pip = Some(0.25);
+        let svg = draw(&[Row::Term(&term, 0.25)], 880.0, "");
+        // From 250 to 880 − 52.
+        assert!(
+            svg.contains(&format!(r#"width="{}""#, 0.25 * (880.0 - 52.0 - 250.0))),
+            "{svg}"
+        );
+    }
+
+    #[test]
+    fn many_absent_terms_are_counted_instead_of_drawn() {
+        let calibration = fixture::two_joints();
+        let mut terms = calibration.terms.clone();
+        let mut absent = terms
+            .iter()
+            .find(|t| t.pip.is_some_and(|p| p < LEAST))
+            .unwrap()
+            .clone();
+        absent.term.family = Family::Generic;
+        terms.extend(std::iter::repeat_n(absent, 100));
+        let figure = figure(&terms).unwrap();
+        assert!(figure.images[0].wide.matches("<rect").count() < 40);
+        assert!(figure.images[0].wide.contains("more, each below 0.05"));
+    }
+
+    #[test]
+    fn no_candidates_no_figure() {
+        assert_eq!(figure(&[]), None);
+    }
+}

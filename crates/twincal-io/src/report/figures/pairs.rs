@@ -1,0 +1,336 @@
+//! Joint and marginal posterior distributions of the kept coefficients (paper fig. 3).
+
+use crate::report::figure::{Figure, Image};
+use crate::report::scale::Scale;
+use crate::report::svg::{Anchor, Path, Svg};
+use crate::report::text::{fixed, shorten, text_width};
+use std::collections::BTreeMap;
+use twincal::calibrate::{Draws, TermSummary};
+
+/// Radius of a hexagon, px.
+const HEX: f64 = 3.6;
+/// Shades of the hexagons, light to dark.
+const SHADES: [&str; 5] = ["h1", "h2", "h3", "h4", "h5"];
+const BARS: usize = 18;
+
+/// The figure; `None` without kept coefficients or draws.
+pub(in crate::report) fn figure(draws: &Draws, terms: &[TermSummary]) -> Option<Figure> {
+    let variables: Vec<Variable<'_>> = draws
+        .terms
+        .iter()
+        .zip(&draws.values)
+        .filter(|(_, values)| values.iter().filter(|v| v.is_finite()).count() > 1)
+        .map(|(name, values)| Variable {
+            name,
+            values,
+            unit: terms
+                .iter()
+                .find(|t| t.term.name == *name)
+                .map_or("", |t| &t.term.unit),
+        })
+        .collect();
+    if variables.is_empty() {
+        return None;
+    }
+    let names: Vec<_> = variables.iter().map(|v| v.name).collect();
+    let label = format!(
+        "Matrix of joint and marginal posterior distributions of {}.",
+        names.join(", ")
+    );
+    Some(Figure {
+        title: "Posterior distributions".into(),
+        read: "On the diagonal each coefficient on its own, below it every pair (the stronger the colour, the more probable), above it their \
+               correlation: a slanted cloud means that the data know a combination of the two better than each of them. \
+               The outermost 1 % of the draws is not drawn."
+            .into(),
+        legend: Vec::new(),
+        images: vec![Image::fixed(draw(&variables, &label))],
+    })
+}
+
+struct Variable<'a> {
+    name: &'a str,
+    unit: &'a str,
+    values: &'a [f64],
+}
+
+fn draw(variables: &[Variable<'_>], label: &str) -> String {
+    let k = variables.len();
+    let cell = match k {
+        1 => 240.0,
+        2 => 190.0,
+        3..=4 => 150.0,
+        5..=6 => 120.0,
+        _ => 94.0,
+    };
+    let (left, top, gap) = (64.0, 26.0, 8.0);
+    let at = |i: usize| i as f64 * (cell + gap);
+    let size = at(k) - gap;
+    let mut svg = Svg::new(left + size + 12.0, top + size + 52.0);
+    let scales: Vec<Scale> = variables
+        .iter()
+        .map(|v| Scale::over(bulk(v.values), (0.0, cell)))
+        .collect();
+    for (row, y) in variables.iter().enumerate() {
+        for (column, x) in variables.iter().enumerate() {
+            let corner = (left + at(column), top + at(row));
+            if column <= row {
+                svg.rect("cell", corner, (cell, cell), None);
+            }
+            let place = |scale: &Scale, range| Scale { range, ..*scale };
+            // Hexagons at the edge of the data stay inside the cell.
+            let inset = HEX + 2.0;
+            let x_scale = place(&scales[column], (corner.0 + inset, corner.0 + cell - inset));
+            let y_scale = place(&scales[row], (corner.1 + cell - inset, corner.1 + inset));
+            match column.cmp(&row) {
+                std::cmp::Ordering::Less => {
+                    hexagons(&mut svg, x.values, y.values, x_scale, y_scale)
+                }
+                std::cmp::Ordering::Equal => {
+                    histogram(&mut svg, x.values, x_scale, (corner.1, corner.1 + cell))
+                }
+                std::cmp::Ordering::Greater => {
+                    let r = correlation(x.values, y.values);
+                    let class = if r.abs() >= 0.8 {
+                        "number strong"
+                    } else {
+                        "number"
+                    };
+                    let middle = (corner.0 + 0.5 * cell, corner.1 + 0.5 * cell + 5.0);
+                    svg.text(class, middle, Anchor::Middle, &fixed(r, 2));
+                }
+            }
+            if row + 1 == k {
+                for (value, text) in x_scale.ticks(3) {
+                    let (x, half) = (x_scale.at(value), 0.5 * text_width(&text, 11.0));
+                    if x - half >= corner.0 - 2.0 && x + half <= corner.0 + cell + 2.0 {
+                        svg.text("t", (x, corner.1 + cell + 15.0), Anchor::Middle, &text);
+                    }
+                }
+            }
+            if column == 0 && row > 0 {
+                for (value, text) in y_scale.ticks(3) {
+                    svg.text(
+                        "t",
+                        (corner.0 - 5.0, y_scale.at(value) + 3.8),
+                        Anchor::End,
+                        &text,
+                    );
+                }
+            }
+        }
+        let middle = at(row) + 0.5 * cell;
+        svg.text(
+            "name",
+            (
+                left + middle,
+                top + at(row) - if row == 0 { 9.0 } else { 2.0 },
+            ),
+            Anchor::Middle,
+            &shorten(y.name, cell + 6.0, 11.5),
+        );
+        svg.text(
+            "l",
+            (left + middle, top + size + 32.0),
+            Anchor::Middle,
+            &shorten(y.name, cell + 4.0, 11.0),
+        );
+        if !y.unit.is_empty() {
+            svg.text(
+                "l",
+                (left + middle, top + size + 46.0),
+                Anchor::Middle,
+                &shorten(&format!("({})", y.unit), cell + 4.0, 11.0),
+            );
+        }
+        if row > 0 {
+            svg.text_up(
+                "l",
+                (12.0, top + middle),
+                Anchor::Middle,
+                &shorten(y.name, cell + 4.0, 11.0),
+            );
+        }
+    }
+    svg.finish(label)
+}
+
+/// The ends of the middle 99 % of the draws: a handful at exactly zero (models without the term) must not squeeze the rest.
+fn bulk(values: &[f64]) -> [f64; 2] {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let cut = sorted.len() / 200;
+    match sorted.get(cut..sorted.len() - cut) {
+        Some([first, .., last]) => [*first, *last],
+        _ => [sorted.first().copied().unwrap_or(f64::NAN); 2],
+    }
+}
+
+fn histogram(svg: &mut Svg, values: &[f64], x: Scale, (top, bottom): (f64, f64)) {
+    let [low, high] = bulk(values);
+    let width = (high - low) / BARS as f64;
+    let mut counts = [0usize; BARS];
+    for v in values.iter().filter(|v| (low..=high).contains(*v)) {
+        let bin = if width > 0.0 {
+            ((v - low) / width) as usize
+        } else {
+            BARS / 2
+        };
+        counts[bin.min(BARS - 1)] += 1;
+    }
+    let most = counts.iter().copied().max().unwrap_or(1).max(1) as f64;
+    for (i, n) in counts.into_iter().enumerate().filter(|(_, n)| *n > 0) {
+        // All draws equal: one bar in the middle.
+        let ends = if width > 0.0 {
+            (
+                x.at(low + width * i as f64),
+                x.at(low + width * (i + 1) as f64),
+            )
+        } else {
+            (x.at(low) - 3.0, x.at(low) + 3.0)
+        };
+        let height = 0.82 * (bottom - top) * n as f64 / most;
+        svg.rect(
+            "bar",
+            (ends.0, bottom - height),
+            (ends.1 - ends.0 - 0.6, height),
+            None,
+        );
+    }
+}
+
+fn hexagons(svg: &mut Svg, x: &[f64], y: &[f64], x_scale: Scale, y_scale: Scale) {
+    let inside = |scale: &Scale, v: f64| v >= scale.domain.0 && v <= scale.domain.1;
+    let points = x
+        .iter()
+        .zip(y)
+        .filter(|(x, y)| inside(&x_scale, **x) && inside(&y_scale, **y));
+    let bins = hexbin(points.map(|(x, y)| (x_scale.at(*x), y_scale.at(*y))));
+    let most = bins.values().copied().max().unwrap_or(1);
+    for (shade, class) in SHADES.into_iter().enumerate() {
+        let mut path = Path::new();
+        for (&(column, row), &n) in &bins {
+            if shade_of(n, most) == shade {
+                let (cx, cy) = hex_centre(column, row);
+                path = path.polygon((0..6).map(|corner| {
+                    let angle = std::f64::consts::FRAC_PI_3 * f64::from(corner)
+                        + std::f64::consts::FRAC_PI_6;
+                    (cx + HEX * angle.cos(), cy + HEX * angle.sin())
+                }));
+            }
+        }
+        svg.path(class, path);
+    }
+}
+
+/// Counts per hexagon of a grid with pointy tops, key (column, row).
+fn hexbin(points: impl Iterator<Item = (f64, f64)>) -> BTreeMap<(i32, i32), usize> {
+    let mut bins = BTreeMap::new();
+    for (x, y) in points {
+        // The nearest centre is in one of the two rows around y.
+        let below = (y / (1.5 * HEX)).floor() as i32;
+        let nearest = [below, below + 1].map(|row| {
+            let shift = 0.5 * f64::from(row.rem_euclid(2));
+            let column = (x / (3f64.sqrt() * HEX) - shift).round() as i32;
+            let (cx, cy) = hex_centre(column, row);
+            ((x - cx).powi(2) + (y - cy).powi(2), (column, row))
+        });
+        let key = if nearest[0].0 <= nearest[1].0 {
+            nearest[0].1
+        } else {
+            nearest[1].1
+        };
+        *bins.entry(key).or_insert(0) += 1;
+    }
+    bins
+}
+
+fn hex_centre(column: i32, row: i32) -> (f64, f64) {
+    let shift = 0.5 * f64::from(row.rem_euclid(2));
+    (
+        3f64.sqrt() * HEX * (f64::from(column) + shift),
+        1.5 * HEX * f64::from(row),
+    )
+}
+
+fn shade_of(n: usize, most: usize) -> usize {
+    ((n as f64 / most as f64).sqrt() * SHADES.len() as f64).ceil() as usize - 1
+}
+
+/// Pearson's r of the finite pairs; NaN where one of them does not vary.
+fn correlation(x: &[f64], y: &[f64]) -> f64 {
+    let pairs = || {
+        x.iter()
+            .zip(y)
+            .filter(|(x, y)| x.is_finite() && y.is_finite())
+    };
+    let n = pairs().count() as f64;
+    let (sum_x, sum_y) = pairs().fold((0.0, 0.0), |m, (x, y)| (m.0 + x, m.1 + y));
+    let (mean_x, mean_y) = (sum_x / n, sum_y / n);
+    let (xx, yy, xy) = pairs().fold((0.0, 0.0, 0.0), |(xx, yy, xy), (x, y)| {
+        let (dx, dy) = (x - mean_x, y - mean_y);
+        (xx + dx * dx, yy + dy * dy, xy + dx * dy)
+    });
+    // What is left of a constant after rounding is not a variation.
+    let varies = |sum: f64, mean: f64| sum > 1e-24 * n * mean * mean;
+    if varies(xx, mean_x) && varies(yy, mean_y) {
+        xy / (xx * yy).sqrt()
+    } else {
+        f64::NAN
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hexagons_partition_the_plane_by_nearest_centre() {
+        for i in 0..400 {
+            let point = (
+                f64::from(i * 37 % 101) * 0.31 - 7.0,
+                f64::from(i * 53 % 89) * 0.29 - 6.0,
+            );
+            let bins = hexbin(std::iter::once(point));
+            let (&(column, row), _) = bins.first_key_value().unwrap();
+            let distance = |c, r| {
+                let (cx, cy) = hex_centre(c, r);
+                (point.0 - cx).hypot(point.1 - cy)
+            };
+            let best = (-10..10)
+                .flat_map(|r| (-10..10).map(move |c| (c, r)))
+                .map(|(c, r)| distance(c, r))
+                .fold(f64::INFINITY, f64::min);
+            assert!((distance(column, row) - best).abs() < 1e-9, "{point:?}");
+        }
+    }
+
+    #[test]
+    fn correlation_of_closed_forms() {
+        let x: Vec<f64> = (0..100).map(f64::from).collect();
+        let line: Vec<f64> = x.iter().map(|x| 3.0 - 2.0 * x).collect();
+        let parabola: Vec<f64> = x.iter().map(|x| (x - 49.5).powi(2)).collect();
+        assert!((correlation(&x, &line) + 1.0).abs() < 1e-12);
+        assert!(correlation(&x, &parabola).abs() < 1e-12);
+        assert!(correlation(&x, &[0.1; 100]).is_nan());
+    }
+
+    #[test]
+    fn a_handful_of_zeros_does_not_squeeze_the_rest() {
+        let mut values: Vec<f64> = (0..1000).map(|i| 5.0 + f64::from(i) / 1000.0).collect();
+        values[..4].fill(0.0);
+        assert!(bulk(&values)[0] > 4.9, "{:?}", bulk(&values));
+        values[..40].fill(0.0);
+        assert_eq!(bulk(&values)[0], 0.0);
+        assert!(bulk(&[f64::NAN])[0].is_nan());
+        assert_eq!(bulk(&[2.0]), [2.0; 2]);
+    }
+
+    #[test]
+    fn shades_span_their_range() {
+        assert_eq!(
+            (shade_of(1, 1000), shade_of(1000, 1000), shade_of(1, 1)),
+            (0, 4, 4)
+        );
+    }
+}

@@ -1,0 +1,61 @@
+//! `report.html`: one self-contained page that says whether a twin can be used, what was found, and how sure it is.
+//!
+//! The page needs no network, no script and no file beside it. Every string that came from a model, a log or a command
+//! line is stripped of control characters and escaped on its way into the page, by the template's formatter and by the
+//! SVG builder; a content security policy forbids scripts as a second lock. The same calibration gives the same bytes.
+
+mod effects;
+mod figure;
+mod figures;
+#[cfg(test)]
+mod fixture;
+mod page;
+mod plot;
+mod scale;
+mod svg;
+mod tables;
+#[cfg(test)]
+mod tests;
+mod text;
+mod verdict;
+mod view;
+
+use crate::error::{Error, Result};
+use twincal::calibrate::Calibration;
+
+/// What the report says about the run beside its result: only things that are the same when the run is repeated.
+#[derive(Debug, Clone, PartialEq, Eq, Default, serde::Serialize)]
+pub struct ReportContext {
+    /// Version of the program.
+    pub version: String,
+    /// File name of the robot model, without its folder.
+    pub model: String,
+    /// Command line that repeats the run, with paths as given.
+    pub command: String,
+    /// Settings in force, as TOML.
+    pub settings: String,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Input files, in the order given.
+    pub files: Vec<FileHash>,
+}
+
+/// An input file and what it held.
+#[derive(Debug, Clone, PartialEq, Eq, Default, serde::Serialize)]
+pub struct FileHash {
+    /// File name as given.
+    pub name: String,
+    /// SHA-256, hexadecimal.
+    pub sha256: String,
+}
+
+/// The report as HTML.
+///
+/// # Errors
+/// [`Error::Internal`] if the template and the values that fill it do not fit together.
+pub fn render(calibration: &Calibration, context: &ReportContext) -> Result<String> {
+    page::fill(calibration, context).map_err(|error| Error::Internal {
+        what: "report template".into(),
+        problem: format!("{error:#}"),
+    })
+}

@@ -1,0 +1,133 @@
+//! Gathers what the template shows and fills it; the one place where values become HTML.
+
+use super::ReportContext;
+use super::effects::{self, Effects};
+use super::figure::Figure;
+use super::figures;
+use super::tables::{self, Said, Table};
+use super::text;
+use super::verdict::{self, Verdict};
+use super::view::{self, Joint};
+use minijinja::syntax::SyntaxConfig;
+use minijinja::value::{Serde, Value};
+use minijinja::{Environment, UndefinedBehavior, escape_formatter};
+use serde::Serialize;
+use twincal::calibrate::Calibration;
+
+/// Traces drawn beyond the first of each joint, over all joints: the page stays below two megabytes.
+const OTHER_TRACES: usize = 16;
+
+/// The names that the template knows.
+#[derive(Debug, Serialize)]
+struct Page<'a> {
+    run: &'a ReportContext,
+    joints: Vec<&'a str>,
+    verdict: Verdict,
+    effects: Effects,
+    inclusion: Option<Figure>,
+    pairs: Option<Figure>,
+    torque: Vec<Figure>,
+    other_torque: Vec<Figure>,
+    residual_time: Option<Figure>,
+    residual_state: Option<Figure>,
+    autocorrelation: Option<Figure>,
+    coverage: Option<Figure>,
+    pit: Option<Figure>,
+    sensitivity: Option<Figure>,
+    /// Terms whose selection depends on the prior, in one phrase; may be empty.
+    sensitive: String,
+    scores: Table,
+    moving: Table,
+    raw: Table,
+    noise: Table,
+    motion: Table,
+    logs: Table,
+    findings: Vec<Said>,
+    convergence: Vec<String>,
+    pipeline: Vec<String>,
+    /// c of the tempered likelihood; empty without.
+    tempering: String,
+}
+
+/// The page as HTML.
+pub(super) fn fill(
+    calibration: &Calibration,
+    run: &ReportContext,
+) -> Result<String, minijinja::Error> {
+    let mut environment = Environment::new();
+    environment.set_undefined_behavior(UndefinedBehavior::Strict);
+    environment.set_syntax(
+        SyntaxConfig::builder()
+            .trim_blocks(true)
+            .lstrip_blocks(true)
+            .build()?,
+    );
+    // Autoescape goes by the template's name; the formatter cleans each string before it is escaped.
+    environment.set_formatter(|out, state, value| match value.as_str() {
+        Some(string) if !value.is_safe() => {
+            escape_formatter(out, state, &Value::from(text::clean(string)))
+        }
+        _ => escape_formatter(out, state, value),
+    });
+    environment.add_template("report.html", include_str!("report.html"))?;
+    environment.add_template("report.css", include_str!("report.css"))?;
+    let joints = view::joints(calibration);
+    let page = gather(calibration, run, &joints);
+    environment
+        .get_template("report.html")?
+        .render(Serde(&page))
+}
+
+fn gather<'a>(
+    calibration: &'a Calibration,
+    run: &'a ReportContext,
+    joints: &[Joint<'a>],
+) -> Page<'a> {
+    let validation = &calibration.validation;
+    let terms = &calibration.terms;
+    let independent = view::independent_rows(calibration, joints);
+    let pit: Vec<f64> = joints
+        .iter()
+        .flat_map(|j| &j.traces)
+        .flat_map(|t| t.pit.iter().copied())
+        .collect();
+    let others = OTHER_TRACES / joints.len().max(1);
+    let sensitive = terms
+        .iter()
+        .filter(|t| figures::sensitivity::depends_on_prior(t))
+        .map(|t| t.term.name.as_str());
+    Page {
+        run,
+        joints: joints.iter().map(|j| j.name).collect(),
+        verdict: verdict::judge(calibration, joints),
+        effects: effects::sort(calibration),
+        inclusion: figures::inclusion::figure(terms),
+        pairs: figures::pairs::figure(&calibration.draws, terms),
+        torque: joints.iter().filter_map(figures::torque::figure).collect(),
+        other_torque: joints
+            .iter()
+            .filter_map(|j| figures::torque::others(j, others))
+            .collect(),
+        residual_time: figures::residual_time::figure(joints),
+        residual_state: figures::residual_state::figure(joints),
+        autocorrelation: figures::autocorrelation::figure(calibration, joints),
+        coverage: figures::coverage::figure(&validation.coverage_levels, independent),
+        pit: figures::pit::figure(&pit, independent),
+        sensitivity: figures::sensitivity::figure(terms),
+        sensitive: text::list(&sensitive.collect::<Vec<_>>()),
+        scores: tables::scores(&validation.filtered, joints),
+        moving: tables::scores(&validation.moving, joints),
+        raw: tables::scores(&validation.raw, joints),
+        noise: tables::noise(joints),
+        motion: tables::motion(calibration, joints),
+        logs: tables::logs(calibration),
+        findings: tables::findings(calibration),
+        convergence: tables::convergence(calibration),
+        pipeline: tables::pipeline(calibration),
+        tempering: if calibration.tempering == 1.0 {
+            String::new()
+        } else {
+            calibration.tempering.to_string()
+        },
+    }
+}

@@ -1,0 +1,331 @@
+//! The report's tables besides the effects: scores, noise, motion, logs, findings, convergence, pipeline.
+
+use super::text::{count, list, number, percent, probability};
+use super::verdict::{converged, torque_deviation};
+use super::view::Joint;
+use serde::Serialize;
+use twincal::Severity;
+use twincal::calibrate::Calibration;
+use twincal::posterior::Method;
+use twincal::validate::Scores;
+
+/// A table: heads and rows of cells; the first column names the row.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub(super) struct Table {
+    pub(super) heads: Vec<String>,
+    pub(super) rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    fn new<const N: usize>(heads: [&str; N]) -> Self {
+        Self {
+            heads: heads.map(String::from).to_vec(),
+            rows: Vec::new(),
+        }
+    }
+}
+
+/// Held-out scores per joint and pooled.
+pub(super) fn scores(scores: &Scores, joints: &[Joint<'_>]) -> Table {
+    let mut table = Table::new([
+        "joint",
+        "rows",
+        "RMSE nominal",
+        "RMSE calibrated",
+        "change",
+        "of torque's sd",
+        "95 % coverage",
+        "mean width",
+    ]);
+    for score in scores.joints.iter() {
+        let joint = joints.iter().find(|j| j.name == score.joint);
+        let unit = joint.map_or("", |j| j.units.torque);
+        let share = joint.map_or(f64::NAN, |j| score.rmse_calibrated / torque_deviation(j));
+        table.rows.push(vec![
+            score.joint.clone(),
+            count(score.rows),
+            with_unit(score.rmse_nominal, unit),
+            with_unit(score.rmse_calibrated, unit),
+            change(score.rmse_nominal, score.rmse_calibrated),
+            percent(share),
+            percent(score.coverage95),
+            with_unit(score.mean_width95, unit),
+        ]);
+    }
+    if scores.joints.len() > 1 {
+        let unit = super::view::pooled_unit(joints);
+        table.rows.push(vec![
+            "all joints".into(),
+            count(scores.joints.iter().map(|j| j.rows).sum()),
+            with_unit(scores.rmse_nominal, unit),
+            with_unit(scores.rmse_calibrated, unit),
+            change(scores.rmse_nominal, scores.rmse_calibrated),
+            String::new(),
+            percent(scores.coverage95),
+            String::new(),
+        ]);
+    }
+    table
+}
+
+/// Noise per joint as it was used.
+pub(super) fn noise(joints: &[Joint<'_>]) -> Table {
+    let mut table = Table::new([
+        "joint",
+        "noise sd",
+        "AR(1) ρ",
+        "weight",
+        "rows",
+        "effective rows",
+        "memory (rows)",
+        "interval factor",
+        "out-of-band sd",
+    ]);
+    for joint in joints {
+        let noise = joint.noise;
+        table.rows.push(vec![
+            joint.name.into(),
+            with_unit(noise.sigma, joint.units.torque),
+            number(noise.rho, 3),
+            number(noise.weight, 3),
+            count(noise.n.max(0.0).round() as u64),
+            number(noise.n_eff, 3),
+            number(noise.autocorrelation_time, 3),
+            number(noise.interval_factor, 3),
+            with_unit(noise.out_of_band, joint.units.torque),
+        ]);
+    }
+    table
+}
+
+/// The motion that the twin knows, per joint.
+pub(super) fn motion(calibration: &Calibration, joints: &[Joint<'_>]) -> Table {
+    let mut table = Table::new([
+        "joint",
+        "position",
+        "velocity",
+        "acceleration",
+        "stood still",
+    ]);
+    for (j, (joint, hull)) in joints.iter().zip(&calibration.twin.hull).enumerate() {
+        let range = |low: f64, high: f64, unit: &str| {
+            format!("{} … {} {unit}", number(low, 3), number(high, 3))
+        };
+        let sum = |pick: &dyn Fn(&twincal::calibrate::LogSummary) -> u64| {
+            calibration
+                .logs
+                .iter()
+                .filter(|l| l.role == "fit")
+                .map(pick)
+                .sum::<u64>() as f64
+        };
+        let moved = sum(&|log| log.rows.get(j).copied().unwrap_or(0));
+        let stood = sum(&|log| log.standstill.get(j).copied().unwrap_or(0));
+        table.rows.push(vec![
+            joint.name.into(),
+            range(hull[0], hull[1], joint.units.position),
+            range(hull[2], hull[3], joint.units.velocity),
+            range(hull[4], hull[5], joint.units.acceleration),
+            percent(stood / (moved + stood)),
+        ]);
+    }
+    table
+}
+
+/// What became of each log.
+pub(super) fn logs(calibration: &Calibration) -> Table {
+    let mut table = Table::new([
+        "log",
+        "used for",
+        "samples",
+        "duration",
+        "rate",
+        "segments",
+        "rows kept",
+        "rows at standstill",
+    ]);
+    for log in &calibration.logs {
+        let per_joint = |values: &[u64]| match values {
+            [first, rest @ ..] if rest.iter().all(|v| v == first) => count(*first),
+            [] | [_] | [_, _] | [_, _, _] => values
+                .iter()
+                .map(|v| count(*v))
+                .collect::<Vec<_>>()
+                .join(" / "),
+            [first, ..] => {
+                let range = values.iter().fold((*first, *first), |(low, high), v| {
+                    (low.min(*v), high.max(*v))
+                });
+                format!("{} … {}", count(range.0), count(range.1))
+            }
+        };
+        table.rows.push(vec![
+            log.name.clone(),
+            if log.role == "heldout" {
+                "test".into()
+            } else {
+                log.role.clone()
+            },
+            count(log.samples),
+            with_unit(log.duration, "s"),
+            with_unit(log.rate_hz, "Hz"),
+            count(log.segments),
+            per_joint(&log.rows),
+            per_joint(&log.standstill),
+        ]);
+    }
+    table
+}
+
+/// One finding, as the page shows it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Said {
+    pub(super) class: &'static str,
+    pub(super) severity: &'static str,
+    pub(super) code: String,
+    pub(super) subject: String,
+    pub(super) message: String,
+    pub(super) count: String,
+}
+
+/// All findings, the gravest first.
+pub(super) fn findings(calibration: &Calibration) -> Vec<Said> {
+    let mut findings: Vec<_> = calibration.findings.iter().collect();
+    findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
+    findings
+        .into_iter()
+        .map(|f| {
+            let (class, severity) = match f.severity {
+                Severity::Note => ("note", "note"),
+                Severity::Warning => ("care", "warning"),
+                Severity::Degraded => ("bad", "data lost"),
+            };
+            Said {
+                class,
+                severity,
+                code: f.code.clone(),
+                subject: f.subject.clone(),
+                message: f.message.clone(),
+                count: if f.count > 0 {
+                    count(f.count)
+                } else {
+                    String::new()
+                },
+            }
+        })
+        .collect()
+}
+
+/// How the posterior was computed and whether to trust the computation.
+pub(super) fn convergence(calibration: &Calibration) -> Vec<String> {
+    let posterior = &calibration.twin.posterior;
+    let mut out = Vec::new();
+    match posterior.method {
+        Method::Exact { models } => out.push(format!(
+            "Exact: all {} models were summed. The probabilities carry no Monte Carlo error.",
+            count(models)
+        )),
+        Method::Gibbs {
+            chains,
+            draws,
+            r_hat,
+            ess,
+        } => {
+            out.push(format!(
+                "Gibbs sampling: {} chains of {} draws; largest R̂ {} (at most 1.01 is good), smallest effective sample size {} \
+                 (at least 400 is good).",
+                count(chains as u64),
+                count(draws as u64),
+                if r_hat.is_finite() { format!("{r_hat:.3}") } else { "–".into() },
+                number(ess.round(), 6),
+            ));
+            out.push(if converged(calibration) {
+                "The chains agree.".into()
+            } else {
+                "The chains have not converged: raise [inference] draws, or use fewer candidates and method = \"exact\".".into()
+            });
+            let worst = posterior.inclusion_mcse.iter().copied().fold(0.0, f64::max);
+            out.push(format!(
+                "Largest Monte Carlo standard error of a probability: {}.",
+                number(worst, 2)
+            ));
+            let undecided: Vec<_> = calibration
+                .terms
+                .iter()
+                .filter(|t| {
+                    t.pip
+                        .zip(t.pip_mcse)
+                        .is_some_and(|(p, e)| e > 0.0 && (p - 0.5).abs() < 3.0 * e)
+                })
+                .map(|t| t.term.name.as_str())
+                .collect();
+            if !undecided.is_empty() {
+                out.push(format!(
+                    "Too close to 0.5 to decide with these draws: {}.",
+                    list(&undecided)
+                ));
+            }
+        }
+    }
+    if let Some(first) = posterior.models.first() {
+        out.push(format!(
+            "The most probable model has probability {} and {}; intervals use the most probable models ({}), which leave out {} of \
+             the probability.",
+            probability(first.weight * posterior.models_mass),
+            match first.members.len() {
+                1 => "one term".into(),
+                n => format!("{n} terms"),
+            },
+            count(posterior.models.len() as u64),
+            number((1.0 - posterior.models_mass).max(0.0), 2),
+        ));
+    }
+    if let Some(evidence) = posterior.log_evidence {
+        out.push(format!(
+            "Log evidence of the whole library: {}.",
+            number(evidence, 8)
+        ));
+    }
+    out
+}
+
+/// The signal pipeline as used.
+pub(super) fn pipeline(calibration: &Calibration) -> Vec<String> {
+    let pipeline = &calibration.twin.pipeline;
+    if pipeline.cutoff_hz == 0.0 {
+        return vec!["Filter off: every input row is one row of the regression.".into()];
+    }
+    vec![
+        format!(
+            "Motion is smoothed below {} and differentiated by the same kernel; torque and every candidate are low-passed at {} \
+             by the same filter, which keeps the regression exactly linear.",
+            with_unit(pipeline.motion_cutoff_hz, "Hz"),
+            with_unit(pipeline.cutoff_hz, "Hz")
+        ),
+        format!("Rows are kept at {}.", with_unit(pipeline.rate_hz, "Hz")),
+        format!(
+            "A joint stands still below {} (rad/s or m/s); such rows are left out of its fit.",
+            match pipeline.standstill_velocity.as_slice() {
+                [first, rest @ ..] if rest.iter().all(|v| v == first) => number(*first, 2),
+                each => list(&each.iter().map(|v| number(*v, 2)).collect::<Vec<_>>()),
+            }
+        ),
+    ]
+}
+
+fn with_unit(x: f64, unit: &str) -> String {
+    if x.is_finite() {
+        format!("{}\u{a0}{unit}", number(x, 3))
+    } else {
+        "–".into()
+    }
+}
+
+fn change(before: f64, after: f64) -> String {
+    let change = after / before - 1.0;
+    if change > 0.0 {
+        format!("+{}", percent(change))
+    } else {
+        percent(change)
+    }
+}

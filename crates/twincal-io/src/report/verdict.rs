@@ -1,0 +1,356 @@
+//! Can this twin be used, and where not: the first thing the report says, derived from held-out data alone.
+
+use super::text::{list, number, percent, with_sd};
+use super::view::{Joint, independent_rows, pooled_unit, standard_deviation};
+use serde::Serialize;
+use twincal::Severity;
+use twincal::calibrate::Calibration;
+use twincal::posterior::Method;
+use twincal::validate::{JointScore, Split};
+
+/// A 95 % interval is honest if it holds this share of the held-out rows (the range that `check` accepts).
+const COVERAGE: (f64, f64) = (0.90, 0.99);
+/// Ratio of errors from which calibration counts as an improvement.
+const BETTER: f64 = 0.95;
+/// Ratio of errors from which it counts as harm.
+const WORSE: f64 = 1.02;
+/// Held-out rows, in independent ones, below which nothing is promised.
+const FEW: f64 = 20.0;
+/// Share of the torque's standard deviation from which the remaining error is called large.
+const LARGE: f64 = 0.5;
+
+/// How the answer is coloured; the words carry the meaning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Grade {
+    Good,
+    Care,
+    Bad,
+}
+
+/// The verdict in words.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Verdict {
+    pub(super) grade: Grade,
+    /// One sentence.
+    pub(super) headline: String,
+    /// What the headline rests on.
+    pub(super) grounds: Vec<String>,
+    /// Where it does not hold.
+    pub(super) limits: Vec<String>,
+}
+
+/// Judges `calibration`.
+pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict {
+    let scores = &calibration.validation.filtered;
+    let found = calibration.terms.iter().filter(|t| t.selected).count();
+    let rows: u64 = scores.joints.iter().map(|j| j.rows).sum();
+    if rows == 0 || !(scores.rmse_nominal.is_finite() && scores.rmse_calibrated.is_finite()) {
+        return Verdict {
+            grade: Grade::Bad,
+            headline: "Not yet: there are no held-out rows to judge this twin by.".into(),
+            grounds: vec![effects_found(found)],
+            limits: vec![
+                "Record another motion and give it with --heldout, or fit at least three logs."
+                    .into(),
+            ],
+        };
+    }
+    let ratio = scores.rmse_calibrated / scores.rmse_nominal;
+    let worse = names(
+        scores
+            .joints
+            .iter()
+            .filter(|j| j.rmse_calibrated > WORSE * j.rmse_nominal),
+    );
+    let honest = (COVERAGE.0..=COVERAGE.1).contains(&scores.coverage95);
+    let limits = limits(calibration, joints, &worse);
+    let serious = calibration
+        .findings
+        .iter()
+        .any(|f| f.severity == Severity::Degraded)
+        || !converged(calibration);
+    let (grade, headline) = if independent_rows(calibration, joints) < FEW {
+        (
+            Grade::Care,
+            "Hard to say: there are too few held-out rows to judge this twin by.",
+        )
+    } else if ratio > WORSE {
+        (
+            Grade::Bad,
+            "No: on held-out data the calibrated torque is worse than the nominal one.",
+        )
+    } else if found == 0 && ratio > BETTER {
+        (
+            Grade::Care,
+            "The log shows no missing effect: the nominal model stands as it is.",
+        )
+    } else if ratio > BETTER {
+        (
+            Grade::Care,
+            "Hardly: on held-out data the calibrated torque is no better than the nominal one.",
+        )
+    } else if worse.is_empty() && honest && !serious {
+        (
+            Grade::Good,
+            "Yes, on motions like the ones it was tested on.",
+        )
+    } else if honest {
+        (Grade::Care, "Yes, with the exceptions below.")
+    } else if scores.coverage95 < COVERAGE.0 {
+        (
+            Grade::Care,
+            "The torque yes, its intervals not: they are too narrow.",
+        )
+    } else {
+        (
+            Grade::Care,
+            "Yes; its intervals are wider than they need to be.",
+        )
+    };
+    Verdict {
+        grade,
+        headline: headline.into(),
+        grounds: grounds(calibration, joints, found),
+        limits,
+    }
+}
+
+fn grounds(calibration: &Calibration, joints: &[Joint<'_>], found: usize) -> Vec<String> {
+    let scores = &calibration.validation.filtered;
+    let change = scores.rmse_calibrated / scores.rmse_nominal - 1.0;
+    let way = if change <= 0.0 { "less" } else { "more" };
+    let rows: u64 = scores.joints.iter().map(|j| j.rows).sum();
+    vec![
+        format!(
+            "Torque error (RMSE) on {}: {} → {} {}, {} {way}.",
+            match calibration.validation.split {
+                Split::HeldoutLogs => "held-out logs",
+                Split::LeaveOneLogOut => "logs left out one at a time",
+                Split::LastThirty => "the last 30 % of each log",
+            },
+            number(scores.rmse_nominal, 3),
+            number(scores.rmse_calibrated, 3),
+            pooled_unit(joints),
+            percent(change.abs()),
+        ),
+        format!(
+            "The 95 % intervals contain {} of the {} held-out values.",
+            percent(scores.coverage95),
+            super::text::count(rows)
+        ),
+        effects_found(found),
+    ]
+}
+
+fn effects_found(found: usize) -> String {
+    match found {
+        0 => "No missing effect is more likely than not.".into(),
+        1 => "One missing effect found.".into(),
+        n => format!("{n} missing effects found."),
+    }
+}
+
+fn limits(calibration: &Calibration, joints: &[Joint<'_>], worse: &[String]) -> Vec<String> {
+    let scores = &calibration.validation.filtered;
+    let mut out = Vec::new();
+    let mut say = |joints: &[String], one: &str, many: &str| {
+        if !joints.is_empty() {
+            out.push(format!(
+                "{} {}: {}.",
+                if joints.len() == 1 { "Joint" } else { "Joints" },
+                list(joints),
+                if joints.len() == 1 { one } else { many }
+            ));
+        }
+    };
+    say(
+        worse,
+        "its torque got worse by calibration",
+        "their torque got worse by calibration",
+    );
+    let narrow = names(scores.joints.iter().filter(|j| j.coverage95 < COVERAGE.0));
+    say(
+        &narrow,
+        "its intervals are too narrow",
+        "their intervals are too narrow",
+    );
+    let wide = names(scores.joints.iter().filter(|j| j.coverage95 > COVERAGE.1));
+    say(
+        &wide,
+        "its intervals are wider than they need to be",
+        "their intervals are wider than they need to be",
+    );
+    let large: Vec<String> = joints
+        .iter()
+        .filter(|joint| {
+            let score = scores.joints.iter().find(|s| s.joint == joint.name);
+            let deviation = torque_deviation(joint);
+            score.is_some_and(|s| deviation > 0.0 && s.rmse_calibrated > LARGE * deviation)
+        })
+        .map(|j| j.name.to_owned())
+        .collect();
+    say(
+        &large,
+        "the error left is more than half of the torque's standard deviation",
+        "the error left is more than half of the torque's standard deviation",
+    );
+    if calibration.validation.split == Split::LastThirty {
+        out.push(
+            "It was tested on later parts of the same motions only; another motion was not tried."
+                .into(),
+        );
+    }
+    if !converged(calibration) {
+        out.push("The sampler has not converged: run it with more draws before relying on the probabilities.".into());
+    }
+    let degraded = calibration
+        .findings
+        .iter()
+        .filter(|f| f.severity == Severity::Degraded);
+    out.extend(degraded.map(|f| f.message.clone()));
+    match calibration
+        .findings
+        .iter()
+        .filter(|f| f.severity == Severity::Warning)
+        .count()
+    {
+        0 => {}
+        1 => out.push(
+            "There is one warning to read (see “What was read, dropped and filtered”).".into(),
+        ),
+        n => out.push(format!(
+            "There are {n} warnings to read (see “What was read, dropped and filtered”)."
+        )),
+    }
+    out.push("Outside the motion listed under “What the data cannot tell” it extrapolates.".into());
+    out
+}
+
+/// R̂ and effective sample size as Vehtari et al. (2021) ask for.
+pub(super) fn converged(calibration: &Calibration) -> bool {
+    match calibration.twin.posterior.method {
+        Method::Exact { .. } => true,
+        Method::Gibbs { r_hat, ess, .. } => r_hat <= 1.01 && ess >= 400.0,
+    }
+}
+
+/// Standard deviation of the measured held-out torque.
+pub(super) fn torque_deviation(joint: &Joint<'_>) -> f64 {
+    standard_deviation(joint.traces.iter().flat_map(|t| t.measured.iter().copied()))
+}
+
+fn names<'a>(scores: impl Iterator<Item = &'a JointScore>) -> Vec<String> {
+    scores
+        .filter(|s| s.rows > 0)
+        .map(|s| s.joint.clone())
+        .collect()
+}
+
+/// "mean ± sd" with matching digits.
+pub(super) fn plus_minus(mean: f64, sd: f64) -> String {
+    let (mean, sd) = with_sd(mean, sd);
+    format!("{mean} ± {sd}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::fixture;
+    use crate::report::view;
+
+    fn judged(change: impl Fn(&mut Calibration)) -> Verdict {
+        let mut calibration = fixture::two_joints();
+        calibration.findings.clear();
+        change(&mut calibration);
+        judge(&calibration, &view::joints(&calibration))
+    }
+
+    #[test]
+    fn the_grade_follows_error_coverage_findings_and_convergence() {
+        assert_eq!(judged(|_| ()).grade, Grade::Good);
+        let cases: [(fn(&mut Calibration), Grade, &str); 8] = [
+            (
+                |c| {
+                    c.validation
+                        .filtered
+                        .joints
+                        .iter_mut()
+                        .for_each(|j| j.rows = 20)
+                },
+                Grade::Care,
+                "too few",
+            ),
+            (
+                |c| {
+                    c.validation.filtered.rmse_calibrated = 2.0 * c.validation.filtered.rmse_nominal
+                },
+                Grade::Bad,
+                "No:",
+            ),
+            (
+                |c| c.validation.filtered.coverage95 = 0.7,
+                Grade::Care,
+                "too narrow",
+            ),
+            (
+                |c| c.validation.filtered.coverage95 = 1.0,
+                Grade::Care,
+                "wider",
+            ),
+            (
+                |c| c.validation.filtered.joints[1].rmse_calibrated = 9.0,
+                Grade::Care,
+                "exceptions",
+            ),
+            (
+                |c| {
+                    c.twin.posterior.method = Method::Gibbs {
+                        chains: 4,
+                        draws: 10,
+                        r_hat: 1.2,
+                        ess: 30.0,
+                    }
+                },
+                Grade::Care,
+                "exceptions",
+            ),
+            (
+                |c| {
+                    c.validation
+                        .filtered
+                        .joints
+                        .iter_mut()
+                        .for_each(|j| j.rows = 0)
+                },
+                Grade::Bad,
+                "Not yet",
+            ),
+            (
+                |c| {
+                    c.validation.filtered.rmse_calibrated = c.validation.filtered.rmse_nominal;
+                    c.terms.iter_mut().for_each(|t| t.selected = false);
+                },
+                Grade::Care,
+                "no missing effect",
+            ),
+        ];
+        for (change, grade, words) in cases {
+            let verdict = judged(change);
+            assert_eq!(verdict.grade, grade, "{verdict:?}");
+            assert!(verdict.headline.contains(words), "{verdict:?}");
+        }
+    }
+
+    #[test]
+    fn limits_name_the_joints() {
+        let verdict = judged(|c| c.validation.filtered.joints[1].rmse_calibrated = 9.0);
+        assert!(
+            verdict
+                .limits
+                .iter()
+                .any(|l| l.contains("elbow") && l.contains("got worse")),
+            "{verdict:?}"
+        );
+    }
+}

@@ -1,0 +1,152 @@
+//! A calibration seen joint by joint: names, units and held-out traces, as every section needs them.
+
+use serde::Serialize;
+use twincal::calibrate::Calibration;
+use twincal::likelihood::JointNoise;
+use twincal::robot::JointKind;
+use twincal::validate::Trace;
+
+/// Units of one joint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub(super) struct Units {
+    pub(super) position: &'static str,
+    pub(super) velocity: &'static str,
+    pub(super) acceleration: &'static str,
+    pub(super) torque: &'static str,
+}
+
+impl Units {
+    fn of(kind: JointKind) -> Self {
+        match kind {
+            JointKind::Prismatic => Self {
+                position: "m",
+                velocity: "m/s",
+                acceleration: "m/s²",
+                torque: "N",
+            },
+            _ => Self {
+                position: "rad",
+                velocity: "rad/s",
+                acceleration: "rad/s²",
+                torque: "N·m",
+            },
+        }
+    }
+}
+
+/// One moving joint with everything that the report says about it.
+#[derive(Debug)]
+pub(super) struct Joint<'a> {
+    pub(super) name: &'a str,
+    pub(super) units: Units,
+    pub(super) noise: &'a JointNoise,
+    /// Held-out traces with at least one row, the one that the calibrated twin predicts worst first.
+    pub(super) traces: Vec<&'a Trace>,
+}
+
+/// The moving joints in the model's order.
+pub(super) fn joints(calibration: &Calibration) -> Vec<Joint<'_>> {
+    calibration
+        .noise
+        .iter()
+        .enumerate()
+        .map(|(index, noise)| {
+            let mut traces: Vec<&Trace> = calibration
+                .validation
+                .traces
+                .iter()
+                .filter(|t| t.joint == noise.joint && rows(t) > 0)
+                .collect();
+            traces.sort_by(|a, b| {
+                rmse(b, &b.calibrated)
+                    .total_cmp(&rmse(a, &a.calibrated))
+                    .then(a.log.cmp(&b.log))
+            });
+            let kind = calibration.twin.robot.joint_kind(index);
+            Joint {
+                name: &noise.joint,
+                units: Units::of(kind),
+                noise,
+                traces,
+            }
+        })
+        .collect()
+}
+
+/// The unit of torque, if all joints share one; the pooled numbers mix N·m and N otherwise.
+pub(super) fn pooled_unit(joints: &[Joint<'_>]) -> &'static str {
+    match joints.split_first() {
+        Some((first, rest)) if rest.iter().all(|j| j.units == first.units) => first.units.torque,
+        _ => "N·m and N",
+    }
+}
+
+/// Rows that every array of the trace has.
+pub(super) fn rows(trace: &Trace) -> usize {
+    trace
+        .time
+        .len()
+        .min(trace.measured.len())
+        .min(trace.nominal.len())
+        .min(trace.calibrated.len())
+}
+
+/// Root mean square of measured − predicted over the rows where both are finite; NaN without any.
+pub(super) fn rmse(trace: &Trace, predicted: &[f64]) -> f64 {
+    root_mean_square(trace.measured.iter().zip(predicted).map(|(m, p)| m - p))
+}
+
+/// Root mean square of the finite values; NaN without any.
+pub(super) fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
+    let (n, sum) = values
+        .filter(|x| x.is_finite())
+        .fold((0.0, 0.0), |(n, sum), x| (n + 1.0, sum + x * x));
+    f64::sqrt(sum / n)
+}
+
+/// Standard deviation of the finite values; NaN without any.
+pub(super) fn standard_deviation(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let finite = values.filter(|x| x.is_finite());
+    let (n, sum) = finite
+        .clone()
+        .fold((0.0, 0.0), |(n, sum), x| (n + 1.0, sum + x));
+    root_mean_square(finite.map(|x| x - sum / n))
+}
+
+/// Held-out rows divided by each joint's residual memory: how many independent ones they are worth.
+pub(super) fn independent_rows(calibration: &Calibration, joints: &[Joint<'_>]) -> f64 {
+    let scores = &calibration.validation.filtered.joints;
+    scores
+        .iter()
+        .map(|score| {
+            let memory = joints
+                .iter()
+                .find(|j| j.name == score.joint)
+                .map_or(1.0, |j| j.noise.autocorrelation_time);
+            score.rows as f64
+                / if memory.is_finite() {
+                    memory.max(1.0)
+                } else {
+                    1.0
+                }
+        })
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_ignore_what_is_not_finite() {
+        assert_eq!(root_mean_square([3.0, f64::NAN, -3.0].into_iter()), 3.0);
+        assert_eq!(
+            standard_deviation([1.0, 3.0, f64::INFINITY].into_iter()),
+            1.0
+        );
+        assert!(
+            root_mean_square(std::iter::empty()).is_nan()
+                && standard_deviation([].into_iter()).is_nan()
+        );
+    }
+}
