@@ -1,6 +1,9 @@
 //! Files in, files and reports out: robot models, logs, settings, results. No mathematics here.
 
 pub mod error;
+pub mod memory;
+pub mod config;
+pub mod artifact;
 pub mod report;
 
 pub use error::{Error, Place, Result};

@@ -1,0 +1,44 @@
+//! The artefact: the folder that holds a calibration, written complete or not at all and verified when read.
+//!
+//! ```text
+//! DIR/result.json       the answer, for programs
+//! DIR/report.html       the answer, for people
+//! DIR/twin.json         what check and predict need
+//! DIR/calibration.json  what the report is made from
+//! DIR/run.log           when, where, how long (not reproducible, hence apart)
+//! DIR/manifest.json     format, who wrote it, SHA-256 of every other file
+//! ```
+//!
+//! A new artefact is staged in a hidden folder beside DIR and takes its place in one atomic exchange, so that a
+//! program killed at any moment leaves the old artefact or the new one. A lock beside DIR keeps a second writer out;
+//! what a killed writer left behind is removed by the next one.
+
+mod beside;
+mod manifest;
+mod output_file;
+mod read;
+mod write;
+
+pub use manifest::{FORMAT, FileEntry, Maker, Manifest};
+pub use output_file::OutputFile;
+pub use read::Artifact;
+pub use write::{Claim, Replace};
+
+/// The answer, for programs.
+pub const RESULT: &str = "result.json";
+/// The answer, for people.
+pub const REPORT: &str = "report.html";
+/// What `check` and `predict` need.
+pub const TWIN: &str = "twin.json";
+/// What the report is made from.
+pub const CALIBRATION: &str = "calibration.json";
+/// When, where and how long.
+pub const RUN_LOG: &str = "run.log";
+/// Format, writer and checksums.
+pub const MANIFEST: &str = "manifest.json";
+
+/// All names that an artefact may hold.
+const NAMES: [&str; 6] = [RESULT, REPORT, TWIN, CALIBRATION, RUN_LOG, MANIFEST];
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,84 @@
+//! One output file (predictions): written beside its place and renamed into it, complete or absent.
+
+use super::beside::{Beside, Lock};
+use super::write::sync_folder;
+use crate::error::{Error, Place, Result};
+use std::fs::{self, File};
+use std::io;
+use std::path::Path;
+
+/// A file that appears under its name only when it is complete.
+#[derive(Debug)]
+pub struct OutputFile {
+    beside: Beside,
+    shown: String,
+    file: Option<File>,
+    _lock: Lock,
+}
+
+impl OutputFile {
+    /// Checks and locks `target`, and opens the file to write.
+    ///
+    /// # Errors
+    /// A target that exists (unless `force`), is a folder or a symbolic link, or cannot be written.
+    pub fn create(target: &Path, force: bool) -> Result<Self> {
+        let shown = target.to_string_lossy().into_owned();
+        let refuse =
+            |problem: &str, remedy: &str| Err(Error::content(Place::file(&shown), problem, remedy));
+        let beside = Beside::new(target)?;
+        beside.check_parent()?;
+        match fs::symlink_metadata(&beside.target) {
+            Ok(metadata) if metadata.is_symlink() => {
+                return refuse("is a symbolic link", "give the file itself");
+            }
+            Ok(metadata) if !metadata.is_file() => {
+                return refuse("is not a file", "give another output with -o");
+            }
+            Ok(_) if !force => {
+                return refuse(
+                    "exists already",
+                    "replace it with --force or give another output with -o",
+                );
+            }
+            _ => {}
+        }
+        let lock = Lock::take(&beside)?;
+        let remedy = "give an output that you may write with -o";
+        let file = File::create(&beside.staging)
+            .map_err(|e| Error::system(&shown, "write", &e, remedy))?;
+        Ok(Self {
+            beside,
+            shown,
+            file: Some(file),
+            _lock: lock,
+        })
+    }
+
+    /// The open file.
+    pub fn file(&mut self) -> Option<&mut File> {
+        self.file.as_mut()
+    }
+
+    /// Syncs the file and gives it its name; `written` is what became of the writing.
+    ///
+    /// # Errors
+    /// The system's refusal; then nothing is left behind.
+    pub fn commit(mut self, written: io::Result<()>) -> Result<()> {
+        let done = written.and_then(|()| {
+            if let Some(file) = self.file.take() {
+                file.sync_all()?;
+            }
+            fs::rename(&self.beside.staging, &self.beside.target)?;
+            sync_folder(&self.beside.parent)
+        });
+        let remedy = "free space or give another output with -o; nothing was written";
+        done.map_err(|e| Error::system(&self.shown, "write", &e, remedy))
+    }
+}
+
+impl Drop for OutputFile {
+    fn drop(&mut self) {
+        // After a commit there is nothing under this name any more.
+        let _ = fs::remove_file(&self.beside.staging);
+    }
+}

@@ -1,0 +1,296 @@
+//! The keys of `twincal.toml`, as written: the one source of their names, their documentation and the JSON Schema.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Settings of twincal. Every key is optional; a flag on the command line overrides its key.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields, title = "twincal.toml")]
+pub struct ConfigFile {
+    /// The robot model.
+    pub model: ModelTable,
+    /// The logs.
+    pub log: LogTable,
+    /// Which column of a log is which channel; needed only where the column names do not say it.
+    pub columns: ColumnsTable,
+    /// The candidates.
+    pub library: LibraryTable,
+    /// Filters and rates.
+    pub signal: SignalTable,
+    /// What is believed before the data.
+    pub prior: PriorTable,
+    /// The likelihood.
+    pub noise: NoiseTable,
+    /// How the posterior is computed.
+    pub inference: InferenceTable,
+    /// Gates of `twincal check`.
+    pub check: CheckTable,
+    /// Where the result goes.
+    pub output: OutputTable,
+}
+
+/// `[model]`
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
+pub struct ModelTable {
+    /// URDF or MJCF file, relative to this config (flag `--model`).
+    pub file: Option<PathBuf>,
+    /// Gravity in the base frame, m/s²; default: the file's, else [0, 0, -9.81].
+    pub gravity: Option<[f64; 3]>,
+    /// Moving joints that the log does not have, and where they stand (rad or m).
+    pub locked: BTreeMap<String, f64>,
+    /// Count `<dynamics damping="…">` of a URDF as nominal torque. Vendors put solver values there: default false.
+    pub use_urdf_friction: Option<bool>,
+    /// What is accepted with a warning instead of being refused (flag `--allow`).
+    pub allow: Option<Vec<Allow>>,
+}
+
+/// What may be accepted with a warning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Allow {
+    /// Inertia tensors that no rigid body can have.
+    UnphysicalInertia,
+    /// Gibbs chains that disagree (R̂ > 1.01): their numbers are reported and labelled.
+    DisagreeingChains,
+}
+
+/// `[log]`
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
+pub struct LogTable {
+    /// Logs to score on instead of a split of the fitted ones, relative to this config (flag `--heldout`).
+    pub heldout: Option<Vec<PathBuf>>,
+    /// Sampling rate, Hz: replaces time stamps that are missing or wrong (flag `--rate`).
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub rate_hz: Option<f64>,
+    /// Drop and count rows that cannot be read instead of refusing the file (flag `--lenient`).
+    pub lenient: Option<bool>,
+    /// Refuse a log (exit code 2) where data was lost or degraded beyond the stated limit (flag `--strict`).
+    pub strict: Option<bool>,
+}
+
+/// `[columns]`
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
+pub struct ColumnsTable {
+    /// Column of the time stamps, s.
+    pub time: Option<String>,
+    /// Position column of each joint, by joint name; rad or m.
+    pub q: BTreeMap<String, String>,
+    /// Velocity column of each joint; rad/s or m/s.
+    pub qd: BTreeMap<String, String>,
+    /// Acceleration column of each joint; rad/s² or m/s².
+    pub qdd: BTreeMap<String, String>,
+    /// Torque column of each joint, joint side; N·m or N.
+    pub tau: BTreeMap<String, String>,
+}
+
+/// `[library]`
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
+pub struct LibraryTable {
+    /// Expressions in ΔL of q1…qn, qd1…qdn: the moving joints in the model's order. Example: "qd1*qd2*cos(q2)".
+    pub terms: Vec<String>,
+    /// The built-in trigonometric and polynomial family; default: on up to 3 joints.
+    pub generic: Option<bool>,
+    /// Friction per joint; default ["viscous", "coulomb"]; [] for none.
+    pub friction: Option<Vec<Friction>>,
+    /// A constant torque offset per joint; default true.
+    pub offset: Option<bool>,
+    /// Reflected motor inertia per joint; default true.
+    pub motor_inertia: Option<bool>,
+    /// v_s of Coulomb friction tanh(q̇/v_s), rad/s or m/s; 0 is sign(q̇). Default: 0 with cutoff_hz = 0, else 0.02.
+    #[schemars(extend("minimum" = 0))]
+    pub coulomb_velocity: Option<f64>,
+}
+
+/// A kind of joint friction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Friction {
+    /// Proportional to velocity.
+    Viscous,
+    /// Constant against the motion.
+    Coulomb,
+}
+
+/// The word "auto".
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum AutoWord {
+    /// Chosen from the data and stated in the result.
+    #[serde(rename = "auto")]
+    Auto,
+}
+
+/// A number or "auto".
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected a number or \"auto\"")]
+pub enum NumberOrAuto {
+    /// As given.
+    Number(f64),
+    /// Chosen from the data.
+    Auto(AutoWord),
+}
+
+/// `[signal]`
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
+pub struct SignalTable {
+    /// Cut-off of the low-pass on torque and columns, Hz; default "auto". 0: every input row is one row, no filter,
+    /// decimation, resampling, trimming or standstill mask.
+    pub cutoff_hz: Option<NumberOrAuto>,
+    /// Rate of the kept rows, Hz; default "auto" = 2.5 × cut-off.
+    pub rate_hz: Option<NumberOrAuto>,
+}
+
+/// `[prior]`
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
+pub struct PriorTable {
+    /// Slab: { scaled_variance = v } for β_k·rms(column k) ~ N(0, v φ); default "auto": learned.
+    pub slab: Option<Slab>,
+    /// { expected_terms = m } (default) or { probability = p }.
+    pub inclusion: Option<InclusionTable>,
+    /// { shape = a0, scale = b0 } of φ ~ InvGamma(a0, b0), scale in (N·m)²; default "auto".
+    pub noise: Option<NoisePrior>,
+}
+
+/// The slab or "auto".
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "expected { scaled_variance = number } or \"auto\""
+)]
+pub enum Slab {
+    /// As given.
+    Given {
+        /// v in β_k·rms(column k) ~ N(0, v φ).
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        scaled_variance: f64,
+    },
+    /// Learned by evidence.
+    Auto(AutoWord),
+}
+
+/// How many terms are expected; exactly one of the keys.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields, extend("minProperties" = 1, "maxProperties" = 1))]
+pub struct InclusionTable {
+    /// Every column independently with this probability, in (0, 1).
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+    pub probability: Option<f64>,
+    /// Beta–Binomial per family so that this many terms are expected in total.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub expected_terms: Option<f64>,
+}
+
+/// The prior of the noise variance or "auto".
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "expected { shape = number, scale = number } or \"auto\""
+)]
+pub enum NoisePrior {
+    /// As given.
+    Given {
+        /// a0.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        shape: f64,
+        /// b0, (N·m)².
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        scale: f64,
+    },
+    /// (1e-3, 1e-3 · mean(y²)).
+    Auto(AutoWord),
+}
+
+/// `[noise]`
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
+pub struct NoiseTable {
+    /// Likelihood; default "tempered".
+    pub model: Option<NoiseWord>,
+    /// A variance per joint (default); false: one for all joints.
+    pub per_joint: Option<bool>,
+}
+
+/// A likelihood.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NoiseWord {
+    /// Independent rows, statistics divided by the residual's autocorrelation time.
+    Tempered,
+    /// First-order autoregression per joint.
+    Ar1,
+    /// Independent rows (the paper's).
+    Iid,
+}
+
+/// `[inference]`
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
+pub struct InferenceTable {
+    /// Default "auto": exact where every model can be summed, else Gibbs.
+    pub method: Option<MethodWord>,
+    /// Gibbs chains; default 4.
+    #[schemars(extend("minimum" = 2))]
+    pub chains: Option<u64>,
+    /// Draws per chain after warm-up; default 5000.
+    #[schemars(extend("minimum" = 4))]
+    pub draws: Option<u64>,
+    /// Seed of all random numbers; default 1 (flag `--seed`).
+    pub seed: Option<u64>,
+    /// Threads; the result is the same for any number; default: one per core (flag `--threads`).
+    #[schemars(extend("minimum" = 1))]
+    pub threads: Option<u64>,
+}
+
+/// A method of inference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MethodWord {
+    /// Exact where possible.
+    Auto,
+    /// Every model is summed.
+    Exact,
+    /// Collapsed Gibbs sampling.
+    Gibbs,
+}
+
+/// `[check]`
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
+pub struct CheckTable {
+    /// Largest allowed RMSE of a joint relative to the RMSE stored in the twin; default 1.2.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub rmse_ratio: Option<f64>,
+    /// Smallest and largest allowed coverage of the 95 % interval of a joint; default [0.90, 0.99].
+    pub coverage: Option<[f64; 2]>,
+}
+
+/// `[output]`
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
+pub struct OutputTable {
+    /// Folder of the result, relative to this config (flag `-o`); default `twincal-out` in the working folder.
+    pub directory: Option<PathBuf>,
+    /// Replace an earlier result (flag `--force`).
+    pub force: Option<bool>,
+    /// Print the result as JSON (flag `--json`).
+    pub json: Option<bool>,
+}

@@ -1,0 +1,190 @@
+//! `twincal.toml`: reading, checking, and the settings that follow from it.
+//!
+//! [`ConfigFile`] is the file as written, [`Config::read`] refuses unknown keys and wrong types with their place in the
+//! file, [`Config::settings`] fills in defaults and checks ranges. Flags of the program are written into
+//! [`Config::file`] before that: a flag overrides its key.
+
+mod file;
+mod settings;
+mod suggest;
+mod unknown_keys;
+
+pub use file::{
+    Allow, AutoWord, CheckTable, ColumnsTable, ConfigFile, Friction, InclusionTable,
+    InferenceTable, LibraryTable, LogTable, MethodWord, ModelTable, NoisePrior, NoiseTable,
+    NoiseWord, NumberOrAuto, OutputTable, PriorTable, SignalTable, Slab,
+};
+pub use settings::{Gates, LogSettings, ModelSettings, Settings};
+pub use suggest::nearest;
+
+use crate::error::{Error, Place, Result};
+use std::path::{Path, PathBuf};
+use toml::de::{DeTable, DeValue};
+
+/// Largest config that is read, bytes.
+pub const SIZE_LIMIT: u64 = 1 << 20;
+
+/// A config and where it came from.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Config {
+    /// The keys; flags may be written into it.
+    pub file: ConfigFile,
+    source: Option<Source>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Source {
+    name: String,
+    text: String,
+}
+
+impl Config {
+    /// Reads a config. Paths in it are taken relative to its folder.
+    ///
+    /// # Errors
+    /// [`Error::System`] if it cannot be read, [`Error::Content`] for wrong TOML, an unknown key or a wrong type.
+    pub fn read(path: &Path) -> Result<Self> {
+        let name = path.to_string_lossy().into_owned();
+        let remedy = "give an existing file with --config";
+        let size = std::fs::metadata(path)
+            .map_err(|e| Error::system(&name, "read", &e, remedy))?
+            .len();
+        if size > SIZE_LIMIT {
+            return Err(Error::content(
+                Place::file(name),
+                format!("{size} bytes, the limit for a config is {SIZE_LIMIT}"),
+                "this is not a twincal.toml",
+            ));
+        }
+        let bytes = std::fs::read(path).map_err(|e| Error::system(&name, "read", &e, remedy))?;
+        let text = String::from_utf8(bytes).map_err(|e| {
+            let place = Place::of_offset(&name, e.as_bytes(), e.utf8_error().valid_up_to());
+            Error::content(place, "not UTF-8", "save the file as UTF-8")
+        })?;
+        let mut config = Self::parse(&name, &text)?;
+        config.relative_to(path.parent().unwrap_or(Path::new("")));
+        Ok(config)
+    }
+
+    /// Reads a config from its text; `name` is used in messages.
+    ///
+    /// # Errors
+    /// [`Error::Content`] for wrong TOML, an unknown key or a wrong type.
+    pub fn parse(name: &str, text: &str) -> Result<Self> {
+        let place = |span: Option<std::ops::Range<usize>>| match span {
+            Some(span) => Place::of_offset(name, text.as_bytes(), span.start),
+            None => Place::file(name),
+        };
+        let document = DeTable::parse(text).map_err(|e| {
+            Error::content(
+                place(e.span()),
+                one_line(e.message()),
+                "see https://toml.io for the syntax",
+            )
+        })?;
+        if let Some(error) =
+            unknown_keys::first_unknown(document.get_ref(), &schema_value(), name, text)
+        {
+            return Err(error);
+        }
+        let file = toml::from_str(text).map_err(|e| {
+            let key = e
+                .span()
+                .and_then(|span| key_of(document.get_ref(), span.start, ""));
+            let subject = key.map(|key| format!("key `{key}`: ")).unwrap_or_default();
+            let remedy = "`twincal schema` prints every key with its type";
+            Error::content(
+                place(e.span()),
+                format!("{subject}{}", one_line(e.message())),
+                remedy,
+            )
+        })?;
+        Ok(Self {
+            file,
+            source: Some(Source {
+                name: name.into(),
+                text: text.into(),
+            }),
+        })
+    }
+
+    fn relative_to(&mut self, folder: &Path) {
+        let join = |path: &mut PathBuf| *path = folder.join(&*path);
+        self.file.model.file.iter_mut().for_each(join);
+        self.file.output.directory.iter_mut().for_each(join);
+        self.file.log.heldout.iter_mut().flatten().for_each(join);
+    }
+
+    /// Place of a dotted key in the file, if it stands there.
+    fn place(&self, key: &str) -> Option<Place> {
+        let source = self.source.as_ref()?;
+        let document = DeTable::parse(&source.text).ok()?;
+        let offset = offset_of(document.get_ref(), key)?;
+        Some(Place::of_offset(
+            &source.name,
+            source.text.as_bytes(),
+            offset,
+        ))
+    }
+
+    /// The error for a value that is out of its range.
+    fn out_of_range(&self, key: &str, problem: String, remedy: &str) -> Error {
+        match self.place(key) {
+            Some(place) => Error::content(place, format!("key `{key}`: {problem}"), remedy),
+            None => twincal::Error::Setting {
+                key: key.into(),
+                problem,
+                remedy: remedy.into(),
+            }
+            .into(),
+        }
+    }
+}
+
+/// Dotted name of the innermost key whose value holds byte `offset`.
+fn key_of(table: &DeTable<'_>, offset: usize, path: &str) -> Option<String> {
+    table.iter().find_map(|(key, value)| {
+        let name = if path.is_empty() {
+            key.get_ref().to_string()
+        } else {
+            format!("{path}.{}", key.get_ref())
+        };
+        let inside = match value.get_ref() {
+            DeValue::Table(inner) => key_of(inner, offset, &name),
+            _ => None,
+        };
+        inside.or_else(|| {
+            (value.span().contains(&offset) || key.span().contains(&offset)).then_some(name)
+        })
+    })
+}
+
+/// Byte offset of the value of a dotted key.
+fn offset_of(table: &DeTable<'_>, key: &str) -> Option<usize> {
+    let (first, rest) = key
+        .split_once('.')
+        .map_or((key, None), |(first, rest)| (first, Some(rest)));
+    let value = table.iter().find(|(name, _)| name.get_ref() == first)?.1;
+    match (rest, value.get_ref()) {
+        (None, _) => Some(value.span().start),
+        (Some(rest), DeValue::Table(inner)) => offset_of(inner, rest).or(Some(value.span().start)),
+        (Some(_), _) => Some(value.span().start),
+    }
+}
+
+fn one_line(message: &str) -> String {
+    message.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn schema_value() -> serde_json::Value {
+    schemars::schema_for!(ConfigFile).to_value()
+}
+
+/// The JSON Schema of `twincal.toml`, as published in `schema/twincal.schema.json`.
+pub fn schema() -> String {
+    // A `Value` of our own making is always written.
+    format!("{:#}\n", schema_value())
+}
+
+#[cfg(test)]
+mod tests;

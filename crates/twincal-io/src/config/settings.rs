@@ -1,0 +1,379 @@
+//! From keys to settings: defaults filled in, ranges checked.
+
+use super::{Allow, Config, Friction, MethodWord, NoisePrior, NoiseWord, NumberOrAuto, Slab};
+use crate::error::Result;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use twincal::calibrate::CalibrationSettings;
+use twincal::infer::{Choice, InferenceSettings};
+use twincal::likelihood::{NoiseModel, NoiseSettings};
+use twincal::prior::{Inclusion, PriorSettings};
+use twincal::signal::{Auto, SignalSettings};
+use twincal::term::LibrarySettings;
+
+/// `[model]` with defaults.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelSettings {
+    /// Model file.
+    pub file: Option<PathBuf>,
+    /// Gravity in the base frame, m/s²; `None`: the file's.
+    pub gravity: Option<[f64; 3]>,
+    /// Joints that stand still, rad or m.
+    pub locked: BTreeMap<String, f64>,
+    /// Count the URDF's damping as nominal torque.
+    pub use_urdf_friction: bool,
+    /// Physically impossible inertias are a finding instead of an error.
+    pub allow_unphysical: bool,
+}
+
+/// `[log]` and `[columns]` with defaults.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LogSettings {
+    /// Held-out logs.
+    pub heldout: Vec<PathBuf>,
+    /// Sampling rate that replaces the time stamps, Hz.
+    pub rate_hz: Option<f64>,
+    /// Drop and count unreadable rows.
+    pub lenient: bool,
+    /// Refuse degraded logs.
+    pub strict: bool,
+    /// Column names by channel and joint.
+    pub columns: super::ColumnsTable,
+}
+
+/// `[check]` with defaults; stored in the twin.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Gates {
+    /// Largest RMSE of a joint relative to the one stored in the twin.
+    pub rmse_ratio: f64,
+    /// Smallest and largest coverage of the 95 % interval of a joint.
+    pub coverage: [f64; 2],
+}
+
+/// Everything a run can be told, complete and in range.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Model.
+    pub model: ModelSettings,
+    /// Logs.
+    pub log: LogSettings,
+    /// Mathematics.
+    pub calibration: CalibrationSettings,
+    /// Gates of `check`.
+    pub gates: Gates,
+    /// Threads; `None`: one per core.
+    pub threads: Option<usize>,
+    /// Folder of the result.
+    pub output: PathBuf,
+    /// Replace an earlier result.
+    pub force: bool,
+    /// Print JSON.
+    pub json: bool,
+}
+
+impl Config {
+    /// Defaults filled in, ranges checked.
+    ///
+    /// # Errors
+    /// [`crate::Error::Content`] at the key's place in the file, or a setting error where a flag set it.
+    pub fn settings(&self) -> Result<Settings> {
+        let file = &self.file;
+        let (model, log, check) = (self.model()?, self.log()?, self.gates()?);
+        let threads = self.count("inference.threads", file.inference.threads, 1, 4096)?;
+        Ok(Settings {
+            model,
+            log,
+            calibration: self.calibration()?,
+            gates: check,
+            threads,
+            output: file
+                .output
+                .directory
+                .clone()
+                .unwrap_or_else(|| PathBuf::from("twincal-out")),
+            force: file.output.force.unwrap_or(false),
+            json: file.output.json.unwrap_or(false),
+        })
+    }
+
+    fn model(&self) -> Result<ModelSettings> {
+        let table = &self.file.model;
+        for value in table.gravity.iter().flatten() {
+            self.number("model.gravity", *value, |_| true, "finite numbers in m/s²")?;
+        }
+        for (joint, position) in &table.locked {
+            self.number(
+                &format!("model.locked.{joint}"),
+                *position,
+                |_| true,
+                "a finite position in rad or m",
+            )?;
+        }
+        Ok(ModelSettings {
+            file: table.file.clone(),
+            gravity: table.gravity,
+            locked: table.locked.clone(),
+            use_urdf_friction: table.use_urdf_friction.unwrap_or(false),
+            allow_unphysical: self.allows(Allow::UnphysicalInertia),
+        })
+    }
+
+    fn allows(&self, what: Allow) -> bool {
+        self.file
+            .model
+            .allow
+            .as_deref()
+            .unwrap_or(&[])
+            .contains(&what)
+    }
+
+    fn log(&self) -> Result<LogSettings> {
+        let table = &self.file.log;
+        if let Some(rate) = table.rate_hz {
+            self.number(
+                "log.rate_hz",
+                rate,
+                |rate| rate > 0.0,
+                "a positive number of Hz",
+            )?;
+        }
+        Ok(LogSettings {
+            heldout: table.heldout.clone().unwrap_or_default(),
+            rate_hz: table.rate_hz,
+            lenient: table.lenient.unwrap_or(false),
+            strict: table.strict.unwrap_or(false),
+            columns: self.file.columns.clone(),
+        })
+    }
+
+    fn gates(&self) -> Result<Gates> {
+        let table = &self.file.check;
+        let rmse_ratio = table.rmse_ratio.unwrap_or(1.2);
+        self.number(
+            "check.rmse_ratio",
+            rmse_ratio,
+            |ratio| ratio > 0.0,
+            "a positive number",
+        )?;
+        let coverage = table.coverage.unwrap_or([0.90, 0.99]);
+        let [low, high] = coverage;
+        if !(0.0 <= low && low <= high && high <= 1.0) {
+            let problem = format!("[{low}, {high}] is not an interval inside [0, 1]");
+            return Err(self.out_of_range(
+                "check.coverage",
+                problem,
+                "give [lowest, highest], such as [0.90, 0.99]",
+            ));
+        }
+        Ok(Gates {
+            rmse_ratio,
+            coverage,
+        })
+    }
+
+    fn calibration(&self) -> Result<CalibrationSettings> {
+        let signal = self.signal()?;
+        Ok(CalibrationSettings {
+            library: self.library(&signal)?,
+            signal,
+            prior: self.prior()?,
+            noise: self.noise(),
+            inference: self.inference()?,
+        })
+    }
+
+    fn signal(&self) -> Result<SignalSettings> {
+        let table = &self.file.signal;
+        let (at_least_zero, positive) = (|hz: f64| hz >= 0.0, |hz: f64| hz > 0.0);
+        Ok(SignalSettings {
+            cutoff_hz: self.auto(
+                "signal.cutoff_hz",
+                table.cutoff_hz,
+                at_least_zero,
+                "\"auto\", 0 or a positive Hz",
+            )?,
+            rate_hz: self.auto(
+                "signal.rate_hz",
+                table.rate_hz,
+                positive,
+                "\"auto\" or a positive Hz",
+            )?,
+            coulomb_velocity: self.coulomb_velocity()?,
+        })
+    }
+
+    fn coulomb_velocity(&self) -> Result<Option<f64>> {
+        let Some(v) = self.file.library.coulomb_velocity else {
+            return Ok(None);
+        };
+        self.number(
+            "library.coulomb_velocity",
+            v,
+            |v| v >= 0.0,
+            "0 or a positive velocity in rad/s or m/s",
+        )?;
+        Ok(Some(v))
+    }
+
+    fn library(&self, signal: &SignalSettings) -> Result<LibrarySettings> {
+        let table = &self.file.library;
+        let both = [Friction::Viscous, Friction::Coulomb];
+        let friction = table.friction.as_deref().unwrap_or(&both);
+        let default_velocity = if signal.cutoff_hz == Auto::Value(0.0) {
+            0.0
+        } else {
+            0.02
+        };
+        Ok(LibrarySettings {
+            terms: table.terms.clone(),
+            generic: table.generic,
+            viscous: friction.contains(&Friction::Viscous),
+            coulomb: friction.contains(&Friction::Coulomb),
+            coulomb_velocity: signal.coulomb_velocity.unwrap_or(default_velocity),
+            offset: table.offset.unwrap_or(true),
+            motor_inertia: table.motor_inertia.unwrap_or(true),
+        })
+    }
+
+    fn prior(&self) -> Result<PriorSettings> {
+        let table = &self.file.prior;
+        let scaled_variance = match table.slab {
+            None | Some(Slab::Auto(_)) => Auto::Auto,
+            Some(Slab::Given { scaled_variance: v }) => Auto::Value(self.number(
+                "prior.slab.scaled_variance",
+                v,
+                |v| v > 0.0,
+                "a positive number",
+            )?),
+        };
+        let noise = match table.noise {
+            None | Some(NoisePrior::Auto(_)) => None,
+            Some(NoisePrior::Given { shape, scale }) => Some((
+                self.number("prior.noise.shape", shape, |a| a > 0.0, "a positive number")?,
+                self.number(
+                    "prior.noise.scale",
+                    scale,
+                    |b| b > 0.0,
+                    "a positive number in (N·m)²",
+                )?,
+            )),
+        };
+        Ok(PriorSettings {
+            scaled_variance,
+            inclusion: self.inclusion()?,
+            noise,
+        })
+    }
+
+    fn inclusion(&self) -> Result<Option<Inclusion>> {
+        let Some(table) = self.file.prior.inclusion else {
+            return Ok(None);
+        };
+        match (table.probability, table.expected_terms) {
+            (Some(p), None) => {
+                let range = "a probability between 0 and 1, both excluded";
+                let p = self.number(
+                    "prior.inclusion.probability",
+                    p,
+                    |p| p > 0.0 && p < 1.0,
+                    range,
+                )?;
+                Ok(Some(Inclusion::Probability(p)))
+            }
+            (None, Some(m)) => {
+                let m = self.number(
+                    "prior.inclusion.expected_terms",
+                    m,
+                    |m| m > 0.0,
+                    "a positive number of terms",
+                )?;
+                Ok(Some(Inclusion::ExpectedTerms(m)))
+            }
+            (given, _) => {
+                let problem = if given.is_some() {
+                    "both keys are given"
+                } else {
+                    "neither key is given"
+                };
+                let remedy = "give either { expected_terms = 5 } or { probability = 0.2 }";
+                Err(self.out_of_range("prior.inclusion", problem.into(), remedy))
+            }
+        }
+    }
+
+    fn noise(&self) -> NoiseSettings {
+        let table = &self.file.noise;
+        let model = match table.model {
+            None | Some(NoiseWord::Tempered) => NoiseModel::Tempered,
+            Some(NoiseWord::Ar1) => NoiseModel::Ar1,
+            Some(NoiseWord::Iid) => NoiseModel::Iid,
+        };
+        NoiseSettings {
+            model,
+            per_joint: table.per_joint.unwrap_or(true),
+        }
+    }
+
+    fn inference(&self) -> Result<InferenceSettings> {
+        let table = &self.file.inference;
+        Ok(InferenceSettings {
+            method: match table.method {
+                None | Some(MethodWord::Auto) => Choice::Auto,
+                Some(MethodWord::Exact) => Choice::Exact,
+                Some(MethodWord::Gibbs) => Choice::Gibbs,
+            },
+            chains: self
+                .count("inference.chains", table.chains, 2, 1024)?
+                .unwrap_or(4),
+            draws: self
+                .count("inference.draws", table.draws, 4, 10_000_000)?
+                .unwrap_or(5000),
+            seed: table.seed.unwrap_or(1),
+            allow_disagreement: self.allows(Allow::DisagreeingChains),
+        })
+    }
+
+    fn number(
+        &self,
+        key: &str,
+        value: f64,
+        good: impl Fn(f64) -> bool,
+        expected: &str,
+    ) -> Result<f64> {
+        if value.is_finite() && good(value) {
+            return Ok(value);
+        }
+        Err(self.out_of_range(
+            key,
+            format!("{value} is out of range"),
+            &format!("give {expected}"),
+        ))
+    }
+
+    fn auto(
+        &self,
+        key: &str,
+        value: Option<NumberOrAuto>,
+        good: impl Fn(f64) -> bool,
+        expected: &str,
+    ) -> Result<Auto> {
+        match value {
+            None | Some(NumberOrAuto::Auto(_)) => Ok(Auto::Auto),
+            Some(NumberOrAuto::Number(value)) => {
+                self.number(key, value, good, expected).map(Auto::Value)
+            }
+        }
+    }
+
+    fn count(&self, key: &str, value: Option<u64>, least: u64, most: u64) -> Result<Option<usize>> {
+        match value {
+            Some(n) if n < least || n > most => {
+                let remedy = format!("give a whole number from {least} to {most}");
+                Err(self.out_of_range(key, format!("{n} is out of range"), &remedy))
+            }
+            // `most` fits any usize.
+            other => Ok(other.map(|n| n as usize)),
+        }
+    }
+}

@@ -1,0 +1,289 @@
+//! What `twincal.toml` accepts, and how it refuses the rest.
+
+use super::*;
+use twincal::prior::Inclusion;
+use twincal::signal::Auto;
+
+fn message(text: &str) -> String {
+    match Config::parse("twincal.toml", text).and_then(|config| config.settings()) {
+        Ok(_) => "accepted".into(),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[test]
+fn empty_config_gives_the_documented_defaults() {
+    let settings = Config::parse("x", "").unwrap().settings().unwrap();
+    assert_eq!(settings.calibration.signal.cutoff_hz, Auto::Auto);
+    assert_eq!(settings.calibration.library.coulomb_velocity, 0.02);
+    assert!(settings.calibration.library.viscous && settings.calibration.library.coulomb);
+    assert_eq!(
+        (
+            settings.calibration.inference.chains,
+            settings.calibration.inference.draws
+        ),
+        (4, 5000)
+    );
+    assert_eq!(
+        (settings.gates.rmse_ratio, settings.gates.coverage),
+        (1.2, [0.90, 0.99])
+    );
+    assert_eq!(settings.output, PathBuf::from("twincal-out"));
+    assert_eq!(settings, Config::default().settings().unwrap());
+}
+
+/// The example of the contract, word for word.
+const CONTRACT: &str = r#"
+[model]
+gravity = [0.0, 0.0, -9.81]
+locked = { finger = 0.0 }
+use_urdf_friction = false
+[library]
+terms = ["qd1^2", "qd1*qd2*cos(q2)", "sin(q1+q2)", "q2^2"]
+generic = true
+friction = ["viscous", "coulomb"]
+offset = true
+motor_inertia = true
+[signal]
+cutoff_hz = "auto"
+rate_hz = "auto"
+[prior]
+slab = { scaled_variance = 1000.0 }
+inclusion = { probability = 0.2 }
+noise = { shape = 0.001, scale = 0.001 }
+[noise]
+model = "tempered"
+per_joint = true
+[inference]
+method = "auto"
+chains = 4
+draws = 5000
+seed = 1
+[check]
+rmse_ratio = 1.2
+coverage = [0.90, 0.99]
+"#;
+
+#[test]
+fn contract_example_is_accepted_and_means_what_it_says() {
+    let settings = Config::parse("x", CONTRACT).unwrap().settings().unwrap();
+    assert_eq!(settings.model.gravity, Some([0.0, 0.0, -9.81]));
+    assert_eq!(settings.model.locked["finger"], 0.0);
+    assert_eq!(settings.calibration.library.terms[1], "qd1*qd2*cos(q2)");
+    assert_eq!(
+        settings.calibration.prior.scaled_variance,
+        Auto::Value(1000.0)
+    );
+    assert_eq!(
+        settings.calibration.prior.inclusion,
+        Some(Inclusion::Probability(0.2))
+    );
+    assert_eq!(settings.calibration.prior.noise, Some((0.001, 0.001)));
+}
+
+#[test]
+fn zero_cutoff_makes_coulomb_the_sign_function() {
+    let settings = Config::parse("x", "[signal]\ncutoff_hz = 0")
+        .unwrap()
+        .settings()
+        .unwrap();
+    assert_eq!(settings.calibration.signal.cutoff_hz, Auto::Value(0.0));
+    assert_eq!(settings.calibration.library.coulomb_velocity, 0.0);
+    let text = "[signal]\ncutoff_hz = 0\n[library]\ncoulomb_velocity = 0.1";
+    assert_eq!(
+        Config::parse("x", text)
+            .unwrap()
+            .settings()
+            .unwrap()
+            .calibration
+            .library
+            .coulomb_velocity,
+        0.1
+    );
+}
+
+#[test]
+fn case_111_unknown_key_did_you_mean() {
+    for (text, expected) in [
+        (
+            "[signal]\ncutof_hz = 3\n",
+            "twincal.toml:2:1: unknown key `cutof_hz` in [signal]; did you mean `cutoff_hz`?",
+        ),
+        (
+            "[libary]\n",
+            "twincal.toml:1:2: unknown key `libary`; did you mean `library`?",
+        ),
+        (
+            "[prior]\nslab = { scaled_varance = 3.0 }\n",
+            "twincal.toml:2:10: unknown key `scaled_varance` in [prior.slab]; did you mean `scaled_variance`?",
+        ),
+        (
+            "[check]\nbanana = 1\n",
+            "twincal.toml:2:1: unknown key `banana` in [check]; known keys: coverage, rmse_ratio",
+        ),
+        (
+            "prior.inclusion.propability = 0.2",
+            "twincal.toml:1:17: unknown key `propability` in [prior.inclusion]; did you mean `probability`?",
+        ),
+        ("[model]\nlocked = { any_joint = 0.0 }", "accepted"),
+    ] {
+        assert_eq!(message(text), expected);
+    }
+}
+
+#[test]
+fn wrong_types_and_ranges_name_key_and_place() {
+    for (text, place, words) in [
+        (
+            "[signal]\ncutoff_hz = true",
+            "twincal.toml:2:13",
+            "key `signal.cutoff_hz`: expected a number or \"auto\"",
+        ),
+        (
+            "[signal]\ncutoff_hz = \"fast\"",
+            "twincal.toml:2:13",
+            "a number or \"auto\"",
+        ),
+        (
+            "[signal]\ncutoff_hz = -1.0",
+            "twincal.toml:2:13",
+            "key `signal.cutoff_hz`: -1 is out of range",
+        ),
+        (
+            "[signal]\nrate_hz = 0",
+            "twincal.toml:2:11",
+            "key `signal.rate_hz`: 0 is out of range",
+        ),
+        (
+            "[library]\ncoulomb_velocity = nan",
+            "twincal.toml:2:20",
+            "NaN is out of range",
+        ),
+        (
+            "[inference]\nchains = -4",
+            "twincal.toml:2:10",
+            "key `inference.chains`",
+        ),
+        (
+            "[inference]\nchains = 1",
+            "twincal.toml:2:10",
+            "key `inference.chains`: 1 is out of range",
+        ),
+        (
+            "[inference]\nmethod = \"exakt\"",
+            "twincal.toml:2:10",
+            "`exact`",
+        ),
+        (
+            "[library]\nfriction = [\"viscos\"]",
+            "twincal.toml:2:13",
+            "`viscous`",
+        ),
+        (
+            "[library]\nterms = \"q1\"",
+            "twincal.toml:2:9",
+            "key `library.terms`",
+        ),
+        (
+            "[prior]\nslab = 3",
+            "twincal.toml:2:8",
+            "expected { scaled_variance = number } or \"auto\"",
+        ),
+        (
+            "[prior]\ninclusion = {}",
+            "twincal.toml:2:13",
+            "neither key",
+        ),
+        (
+            "[prior]\ninclusion = { probability = 0.2, expected_terms = 5 }",
+            "twincal.toml:2:13",
+            "both keys",
+        ),
+        (
+            "[prior.inclusion]\nprobability = 1.0",
+            "twincal.toml:2:15",
+            "1 is out of range",
+        ),
+        (
+            "[check]\ncoverage = [0.99, 0.9]",
+            "twincal.toml:2:12",
+            "not an interval",
+        ),
+        (
+            "[model]\ngravity = [0.0, 1.0]",
+            "twincal.toml:2:11",
+            "key `model.gravity`",
+        ),
+        (
+            "[model]\nlocked = { finger = inf }",
+            "twincal.toml:2:21",
+            "key `model.locked.finger`",
+        ),
+        ("[model\n", "twincal.toml:1:7", ""),
+        (
+            "[noise]\nmodel = \"iid\"\nmodel = \"ar1\"",
+            "twincal.toml:3:1",
+            "duplicate key",
+        ),
+    ] {
+        let message = message(text);
+        assert!(message.starts_with(place), "{text}\n{message}");
+        assert!(message.contains(words), "{text}\n{message}");
+    }
+}
+
+#[test]
+fn paths_in_a_config_are_relative_to_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("twincal.toml");
+    std::fs::write(
+        &path,
+        "[model]\nfile = \"arm.urdf\"\n[log]\nheldout = [\"b.csv\"]\n",
+    )
+    .unwrap();
+    let config = Config::read(&path).unwrap();
+    assert_eq!(config.file.model.file, Some(folder.path().join("arm.urdf")));
+    assert_eq!(
+        config.file.log.heldout,
+        Some(vec![folder.path().join("b.csv")])
+    );
+}
+
+#[test]
+fn published_schema_is_current() {
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../schema/twincal.schema.json"
+    );
+    let published = std::fs::read_to_string(path).unwrap_or_default();
+    assert!(
+        published == schema(),
+        "schema/twincal.schema.json is stale: write it anew with `twincal schema`"
+    );
+}
+
+#[test]
+fn not_utf8_and_too_large_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("c.toml");
+    std::fs::write(&path, b"[model]\nfile = \"\xff\"\n").unwrap();
+    assert!(
+        Config::read(&path)
+            .unwrap_err()
+            .to_string()
+            .contains("c.toml:2:9: not UTF-8")
+    );
+    std::fs::write(&path, vec![b'#'; SIZE_LIMIT as usize + 1]).unwrap();
+    assert!(
+        Config::read(&path)
+            .unwrap_err()
+            .to_string()
+            .contains("the limit for a config")
+    );
+    assert!(
+        Config::read(&folder.path().join("absent.toml"))
+            .unwrap_err()
+            .to_string()
+            .contains("cannot read")
+    );
+}
