@@ -2,6 +2,7 @@
 
 use super::Posterior;
 use super::random::Random;
+use crate::linear_algebra::Cholesky;
 
 /// Independent draws from p(z, φ, β | y).
 #[derive(Debug, Clone, PartialEq)]
@@ -42,6 +43,11 @@ pub fn draw(posterior: &Posterior, count: usize, seed: u64, stream: u64) -> Coef
         })
         .collect();
     draws.beta = vec![0.0; count * columns];
+    let factors: Vec<Cholesky> = posterior
+        .models
+        .iter()
+        .map(|model| Cholesky::from_lower(model.factor.clone(), model.members.len()))
+        .collect();
     let mut direction = Vec::new();
     for row in 0..count {
         let level = random.uniform() * cumulative[last];
@@ -51,13 +57,7 @@ pub fn draw(posterior: &Posterior, count: usize, seed: u64, stream: u64) -> Coef
         let size = model.members.len();
         direction.clear();
         direction.extend((0..size).map(|_| random.normal()));
-        // Lᵀ x = ε, backward.
-        for i in (0..size).rev() {
-            for later in i + 1..size {
-                direction[i] -= model.factor[later * size + i] * direction[later];
-            }
-            direction[i] /= model.factor[i * size + i];
-        }
+        factors[index].solve_upper(&mut direction);
         for ((&column, mean), x) in model.members.iter().zip(&model.mean).zip(&direction) {
             draws.beta[row * columns + column as usize] = mean + phi.sqrt() * x;
         }

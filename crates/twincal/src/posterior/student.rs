@@ -4,6 +4,8 @@
 //! them share their degrees of freedom. So the upper tail S(a) = P(T > a) is tabulated once and then costs a quintic
 //! polynomial.
 
+use crate::lanes::{LANES, Lane};
+
 /// Cells of the table.
 const CELLS: usize = 384;
 /// Cells per unit of `min(1, √ν)`; the table ends at 12 of them, where a closed series takes over.
@@ -20,14 +22,20 @@ const NODES: [(f64, f64); 6] = [
 
 /// Upper tail, density and slope of the density at one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Tail {
+pub(crate) struct Tail {
     /// P(T ≤ t) for t < 0, P(T > t) for t ≥ 0: whichever is the smaller, so that it keeps its relative accuracy.
-    pub(super) probability: f64,
+    pub(crate) probability: f64,
     /// f(t).
-    pub(super) density: f64,
+    pub(crate) density: f64,
     /// f'(t).
-    pub(super) slope: f64,
+    pub(crate) slope: f64,
 }
+
+const NOTHING: Tail = Tail {
+    probability: 0.0,
+    density: 0.0,
+    slope: 0.0,
+};
 
 /// Standard Student-t with ν degrees of freedom, any finite ν > 0; CDF accurate to 1e-12, tail with relative accuracy 1e-9.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,6 +47,8 @@ pub struct StudentT {
     per_unit: f64,
     /// End of the table.
     end: f64,
+    /// The tail beyond the table is below 1e-17: lanes that lie there need no series.
+    ends_at_zero: bool,
     /// Quintic coefficients of S in the cell's own coordinate in [0, 1), lowest power first.
     cells: Vec<[f64; 6]>,
 }
@@ -58,9 +68,11 @@ impl StudentT {
             peak: gamma_ratio(0.5 * dof) / (dof * std::f64::consts::PI).sqrt(),
             per_unit,
             end: CELLS as f64 * width,
+            ends_at_zero: false,
             cells: vec![[0.0; 6]; CELLS],
         };
         let mut upper = table.series(table.end);
+        table.ends_at_zero = upper < 1e-17;
         for cell in (0..CELLS).rev() {
             let (left, right) = (cell as f64 * width, (cell + 1) as f64 * width);
             let integral: f64 = NODES
@@ -147,7 +159,7 @@ impl StudentT {
 
     /// Smaller tail, density and slope at `t`.
     #[inline(always)]
-    pub(super) fn tail(&self, t: f64) -> Tail {
+    pub(crate) fn tail(&self, t: f64) -> Tail {
         let at = t.abs();
         let position = at * self.per_unit;
         let cell = position as usize;
@@ -170,6 +182,60 @@ impl StudentT {
                 slope: self.slope(t),
             }
         }
+    }
+
+    /// CDF, density and slope at eight points; the lanes agree with [`StudentT::tail`] to rounding.
+    #[inline(always)]
+    pub(crate) fn lanes(&self, t: &Lane) -> [Lane; 3] {
+        let mut fraction = [0.0; LANES];
+        let mut coefficients = [[0.0; LANES]; 6];
+        let mut outside = false;
+        for lane in 0..LANES {
+            let position = t[lane].abs() * self.per_unit;
+            outside |= position >= CELLS as f64;
+            let cell = position.min((CELLS - 1) as f64) as i32;
+            fraction[lane] = position - f64::from(cell);
+            let row = &self.cells[cell as usize];
+            for power in 0..6 {
+                coefficients[power][lane] = row[power];
+            }
+        }
+        let [c0, c1, c2, c3, c4, c5] = coefficients;
+        let (mut cdf, mut density, mut slope) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            let u = fraction[lane];
+            let value = c0[lane]
+                + u * (c1[lane] + u * (c2[lane] + u * (c3[lane] + u * (c4[lane] + u * c5[lane]))));
+            let first = c1[lane]
+                + u * (2.0 * c2[lane]
+                    + u * (3.0 * c3[lane] + u * (4.0 * c4[lane] + u * (5.0 * c5[lane]))));
+            let second = 2.0 * c2[lane]
+                + u * (6.0 * c3[lane] + u * (12.0 * c4[lane] + u * (20.0 * c5[lane])));
+            let bend = second * self.per_unit * self.per_unit;
+            cdf[lane] = if t[lane] < 0.0 { value } else { 1.0 - value };
+            density[lane] = -first * self.per_unit;
+            slope[lane] = if t[lane] < 0.0 { bend } else { -bend };
+        }
+        if outside {
+            for lane in 0..LANES {
+                if t[lane].abs() * self.per_unit < CELLS as f64 {
+                    continue;
+                }
+                let tail = if self.ends_at_zero {
+                    NOTHING
+                } else {
+                    self.tail(t[lane])
+                };
+                cdf[lane] = if t[lane] < 0.0 {
+                    tail.probability
+                } else {
+                    1.0 - tail.probability
+                };
+                density[lane] = tail.density;
+                slope[lane] = tail.slope;
+            }
+        }
+        [cdf, density, slope]
     }
 
     /// f(t) = peak · (1 + t²/ν)^(−(ν+1)/2).

@@ -3,6 +3,7 @@
 use super::mixture::{Level, Mixture};
 use super::student::StudentT;
 use super::{Model, Posterior};
+use crate::linear_algebra::Cholesky;
 
 /// What is known about the coefficient β_k of one column, in its own unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,12 +64,13 @@ pub fn summarise(posterior: &Posterior) -> Vec<ColumnSummary> {
     let student = StudentT::new(2.0 * posterior.shape);
     let mut components = vec![Components::default(); posterior.inclusion.len()];
     for model in &posterior.models {
-        let variances = inverse_diagonal(&model.factor, model.members.len());
+        let size = model.members.len();
+        let inverse = Cholesky::from_lower(model.factor.clone(), size).inverse();
         for (place, &column) in model.members.iter().enumerate() {
             components[column as usize].push(
                 model,
                 model.mean[place],
-                variances[place],
+                inverse[place * size + place],
                 posterior.shape,
             );
         }
@@ -111,27 +113,6 @@ impl Components {
         };
         Level::central(student, 0.95).map(|level| mixture.quantile(student, level))
     }
-}
-
-/// Diagonal of `(L Lᵀ)⁻¹` for a lower triangular `factor`, row-major, `size × size`: squared column norms of L⁻¹.
-#[must_use]
-pub fn inverse_diagonal(factor: &[f64], size: usize) -> Vec<f64> {
-    let mut column = vec![0.0; size];
-    (0..size)
-        .map(|k| {
-            // L x = e_k, forward substitution from row k.
-            let mut sum = 0.0;
-            for row in k..size {
-                let mut value = if row == k { 1.0 } else { 0.0 };
-                for earlier in k..row {
-                    value -= factor[row * size + earlier] * column[earlier];
-                }
-                column[row] = value / factor[row * size + row];
-                sum += column[row] * column[row];
-            }
-            sum
-        })
-        .collect()
 }
 
 #[cfg(test)]
@@ -255,14 +236,5 @@ mod tests {
             (None, None, [0.0; 2])
         );
         assert!(!row.selected);
-    }
-
-    #[test]
-    fn inverse_diagonal_of_a_full_factor() {
-        // A = L Lᵀ with L = [[2, 0], [1, 3]]: A = [[4, 2], [2, 10]], A⁻¹ = [[10, −2], [−2, 4]]/36.
-        let diagonal = inverse_diagonal(&[2.0, 0.0, 1.0, 3.0], 2);
-        assert!(
-            (diagonal[0] - 10.0 / 36.0).abs() < 1e-15 && (diagonal[1] - 4.0 / 36.0).abs() < 1e-15
-        );
     }
 }

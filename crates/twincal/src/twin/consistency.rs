@@ -1,0 +1,91 @@
+//! Whether a posterior and the joints it is for fit each other, before anything indexes into them.
+
+use super::JointSetting;
+use crate::error::{Error, Result};
+use crate::likelihood::JointNoise;
+use crate::posterior::Posterior;
+
+/// A posterior read from a file may have been cut or edited: nothing below may index out of range.
+pub(super) fn check(posterior: &Posterior, joints: &[JointSetting<'_>]) -> Result<()> {
+    let columns = posterior.inclusion.len();
+    let damaged = |problem: String| Error::Setting {
+        key: "twin".into(),
+        problem,
+        remedy: "the twin's file is damaged or from another version: fit again".into(),
+    };
+    if posterior.mean.len() != columns || posterior.sd.len() != columns {
+        return Err(damaged(format!(
+            "{} means for {columns} columns",
+            posterior.mean.len()
+        )));
+    }
+    if posterior
+        .models
+        .iter()
+        .all(|model| model.weight.is_nan() || model.weight <= 0.0)
+    {
+        return Err(damaged(
+            "the posterior holds no model with positive weight".into(),
+        ));
+    }
+    if !posterior.shape.is_finite() || posterior.shape <= 0.0 {
+        return Err(damaged(format!(
+            "shape of the noise is {}",
+            posterior.shape
+        )));
+    }
+    for (number, model) in posterior.models.iter().enumerate() {
+        let size = model.members.len();
+        let ascending = model.members.windows(2).all(|pair| pair[0] < pair[1]);
+        let inside = model
+            .members
+            .last()
+            .is_none_or(|&last| (last as usize) < columns);
+        let finite = model
+            .mean
+            .iter()
+            .chain(&model.factor)
+            .chain([&model.weight, &model.scale])
+            .all(|v| v.is_finite());
+        let positive = (0..size).all(|i| {
+            model
+                .factor
+                .get(i * size + i)
+                .is_some_and(|&pivot| pivot > 0.0)
+        });
+        if !(ascending
+            && inside
+            && finite
+            && positive
+            && model.mean.len() == size
+            && model.factor.len() == size * size)
+        {
+            return Err(damaged(format!(
+                "model {number} of {} is not consistent",
+                posterior.models.len()
+            )));
+        }
+    }
+    for (number, joint) in joints.iter().enumerate() {
+        let JointNoise {
+            weight,
+            rho,
+            interval_factor,
+            out_of_band,
+            ..
+        } = *joint.noise;
+        let sound = weight > 0.0 && rho.abs() < 1.0 && interval_factor > 0.0 && out_of_band >= 0.0;
+        let known = joint
+            .columns
+            .iter()
+            .chain(&joint.coulomb)
+            .all(|&k| k < columns);
+        if !(sound && known && joint.columns.windows(2).all(|pair| pair[0] < pair[1])) {
+            return Err(damaged(format!(
+                "joint {number} (`{}`) is not consistent",
+                joint.noise.joint
+            )));
+        }
+    }
+    Ok(())
+}
