@@ -72,7 +72,7 @@ pub(super) fn sort(calibration: &Calibration) -> Effects {
     Effects {
         found: pick(&|t, _| t.selected),
         possible: pick(&|t, p| !t.selected && p >= ABSENT),
-        absent: pick(&|t, p| !t.selected && !(p >= ABSENT)),
+        absent: pick(&|t, p| !t.selected && (p < ABSENT || p.is_nan())),
         dropped: calibration.terms.iter().filter_map(dropped).collect(),
     }
 }

@@ -175,7 +175,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
             scale: 7.5,
         }],
         models_mass: 0.999_999_4,
-        log_evidence: Some(-1234.567_89),
+        log_evidence: Some(-1_234.567_89),
         method: Method::Exact {
             models: 1 << live.len().min(28),
         },

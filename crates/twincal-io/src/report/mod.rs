@@ -4,6 +4,7 @@
 //! line is stripped of control characters and escaped on its way into the page, by the template's formatter and by the
 //! SVG builder; a content security policy forbids scripts as a second lock. The same calibration gives the same bytes.
 
+mod ambiguity;
 mod effects;
 mod figure;
 mod figures;
@@ -30,7 +31,7 @@ pub struct ReportContext {
     pub version: String,
     /// File name of the robot model, without its folder.
     pub model: String,
-    /// Command line that repeats the run, with paths as given.
+    /// Command line that repeats the run, with paths as given; the caller leaves out the folders of absolute ones.
     pub command: String,
     /// Settings in force, as TOML.
     pub settings: String,
@@ -43,7 +44,7 @@ pub struct ReportContext {
 /// An input file and what it held.
 #[derive(Debug, Clone, PartialEq, Eq, Default, serde::Serialize)]
 pub struct FileHash {
-    /// File name as given.
+    /// File name as given; the caller leaves out the folder of an absolute one.
     pub name: String,
     /// SHA-256, hexadecimal.
     pub sha256: String,

@@ -1,6 +1,7 @@
 //! Gathers what the template shows and fills it; the one place where values become HTML.
 
 use super::ReportContext;
+use super::ambiguity;
 use super::effects::{self, Effects};
 use super::figure::Figure;
 use super::figures;
@@ -40,6 +41,8 @@ struct Page<'a> {
     moving: Table,
     raw: Table,
     noise: Table,
+    /// What the data leave open, a sentence each.
+    open: Vec<String>,
     motion: Table,
     logs: Table,
     findings: Vec<Said>,
@@ -119,6 +122,7 @@ fn gather<'a>(
         moving: tables::scores(&validation.moving, joints),
         raw: tables::scores(&validation.raw, joints),
         noise: tables::noise(joints),
+        open: ambiguity::sentences(calibration, joints),
         motion: tables::motion(calibration, joints),
         logs: tables::logs(calibration),
         findings: tables::findings(calibration),

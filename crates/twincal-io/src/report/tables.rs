@@ -111,22 +111,12 @@ pub(super) fn motion(calibration: &Calibration, joints: &[Joint<'_>]) -> Table {
         let range = |low: f64, high: f64, unit: &str| {
             format!("{} … {} {unit}", number(low, 3), number(high, 3))
         };
-        let sum = |pick: &dyn Fn(&twincal::calibrate::LogSummary) -> u64| {
-            calibration
-                .logs
-                .iter()
-                .filter(|l| l.role == "fit")
-                .map(pick)
-                .sum::<u64>() as f64
-        };
-        let moved = sum(&|log| log.rows.get(j).copied().unwrap_or(0));
-        let stood = sum(&|log| log.standstill.get(j).copied().unwrap_or(0));
         table.rows.push(vec![
             joint.name.into(),
             range(hull[0], hull[1], joint.units.position),
             range(hull[2], hull[3], joint.units.velocity),
             range(hull[4], hull[5], joint.units.acceleration),
-            percent(stood / (moved + stood)),
+            percent(super::ambiguity::standstill(calibration, j)),
         ]);
     }
     table

@@ -269,7 +269,8 @@ mod tests {
     #[test]
     fn the_grade_follows_error_coverage_findings_and_convergence() {
         assert_eq!(judged(|_| ()).grade, Grade::Good);
-        let cases: [(fn(&mut Calibration), Grade, &str); 8] = [
+        type Case = (fn(&mut Calibration), Grade, &'static str);
+        let cases: [Case; 8] = [
             (
                 |c| {
                     c.validation

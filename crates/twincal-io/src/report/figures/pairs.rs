@@ -101,15 +101,12 @@ fn draw(variables: &[Variable<'_>], label: &str) -> String {
                 }
             }
             if row + 1 == k {
-                for (value, text) in x_scale.ticks(3) {
-                    let (x, half) = (x_scale.at(value), 0.5 * text_width(&text, 11.0));
-                    if x - half >= corner.0 - 2.0 && x + half <= corner.0 + cell + 2.0 {
-                        svg.text("t", (x, corner.1 + cell + 15.0), Anchor::Middle, &text);
-                    }
+                for (x, text) in labels_inside(&x_scale) {
+                    svg.text("t", (x, corner.1 + cell + 15.0), Anchor::Middle, &text);
                 }
             }
             if column == 0 && row > 0 {
-                for (value, text) in y_scale.ticks(3) {
+                for (value, text) in y_scale.ticks(4) {
                     svg.text(
                         "t",
                         (corner.0 - 5.0, y_scale.at(value) + 3.8),
@@ -127,7 +124,7 @@ fn draw(variables: &[Variable<'_>], label: &str) -> String {
                 top + at(row) - if row == 0 { 9.0 } else { 2.0 },
             ),
             Anchor::Middle,
-            &shorten(y.name, cell + 6.0, 11.5),
+            &shorten(y.name, cell + 12.0, 11.5),
         );
         svg.text(
             "l",
@@ -164,6 +161,29 @@ fn bulk(values: &[f64]) -> [f64; 2] {
         Some([first, .., last]) => [*first, *last],
         _ => [sorted.first().copied().unwrap_or(f64::NAN); 2],
     }
+}
+
+/// Pixel and label of the most ticks whose labels neither touch each other nor leave the cell.
+fn labels_inside(x: &Scale) -> Vec<(f64, String)> {
+    let fits = |target: usize| -> Vec<(f64, String)> {
+        let mut end = x.range.0 - 8.0;
+        let mut out = Vec::new();
+        for (value, text) in x.ticks(target) {
+            let (middle, half) = (x.at(value), 0.5 * text_width(&text, 11.0));
+            if middle - half >= end && middle + half <= x.range.1 + 8.0 {
+                end = middle + half + 5.0;
+                out.push((middle, text));
+            }
+        }
+        out
+    };
+    // Fewer candidates may leave more of them: 0.2 and 0.4 where 0.1, 0.2, 0.3 … would keep 0.1 and 0.4.
+    let tries = [2, 3, 4].map(|target| (fits(target), x.ticks(target).len()));
+    let whole = tries
+        .iter()
+        .filter(|(kept, all)| kept.len() == *all)
+        .max_by_key(|(kept, _)| kept.len());
+    whole.map_or_else(|| tries[0].0.clone(), |(kept, _)| kept.clone())
 }
 
 fn histogram(svg: &mut Svg, values: &[f64], x: Scale, (top, bottom): (f64, f64)) {
@@ -255,6 +275,14 @@ fn hex_centre(column: i32, row: i32) -> (f64, f64) {
 
 fn shade_of(n: usize, most: usize) -> usize {
     ((n as f64 / most as f64).sqrt() * SHADES.len() as f64).ceil() as usize - 1
+}
+
+/// Correlation of every pair (i < j) of sets of draws.
+pub(in crate::report) fn correlations(values: &[Vec<f64>]) -> Vec<(usize, usize, f64)> {
+    let pairs = (0..values.len()).flat_map(|i| (i + 1..values.len()).map(move |j| (i, j)));
+    pairs
+        .map(|(i, j)| (i, j, correlation(&values[i], &values[j])))
+        .collect()
 }
 
 /// Pearson's r of the finite pairs; NaN where one of them does not vary.

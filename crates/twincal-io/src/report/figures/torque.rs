@@ -117,7 +117,7 @@ fn worst_window(trace: &Trace) -> Range<usize> {
     let total = seconds(trace, &(0..n));
     let length = (total / 5.0).clamp(2.0, 10.0);
     let size = (length / total * n as f64).round() as usize;
-    if !(total > 1.5 * length) || size < 20 || size >= n {
+    if total.is_nan() || total <= 1.5 * length || size < 20 || size >= n {
         return 0..n;
     }
     let error = |i: usize| {
