@@ -1,148 +1,205 @@
 //! The robot: a tree of joints, links and inertias that never changes once built.
 //!
 //! [`RobotDescription`] is what a model file says (readers fill it, see `twincal-io`); [`Robot::new`] checks it and
-//! lays it out for the algorithms. If a [`Robot`] exists, it is valid.
+//! lays it out for the algorithms: what does not move is merged, one body per moving joint remains. If a [`Robot`]
+//! exists, it is valid.
 
-use crate::error::{Finding, Result};
+mod description;
+mod names;
+pub mod spatial;
+mod inertia;
+mod tree;
+mod coordinates;
+mod bodies;
+mod recursion;
+mod dynamics;
+mod energy;
+
+pub use description::{
+    Inertia, JointDescription, JointKind, Limits, LinkDescription, Mimic, Placement,
+    RobotDescription,
+};
+pub use dynamics::{Motion, Workspace, inverse_dynamics, mass_matrix, nominal_torque};
+pub use energy::{kinetic_energy, potential_energy};
+pub use inertia::principal_moments;
+pub use names::{did_you_mean, nearest_names};
+
+use crate::error::{Error, Finding, Result, Severity};
+use bodies::Body;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Position of a frame in its parent: `x_parent = rotation · x + translation`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Placement {
-    /// Rotation matrix, row-major.
-    pub rotation: [[f64; 3]; 3],
-    /// Origin of the frame in the parent, m.
-    pub translation: [f64; 3],
-}
-
-/// What a joint lets its child do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum JointKind {
-    /// Turns about the axis, with limits.
-    Revolute,
-    /// Turns about the axis without limits.
-    Continuous,
-    /// Slides along the axis.
-    Prismatic,
-    /// Does not move.
-    Fixed,
-}
-
-/// Mass, centre of mass and rotational inertia of a link, as in the model file.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Inertia {
-    /// kg.
-    pub mass: f64,
-    /// Centre of mass in the link frame, m.
-    pub com: [f64; 3],
-    /// Rotational inertia about the CENTRE OF MASS, axes parallel to the link frame, kg·m²; symmetric.
-    pub tensor: [[f64; 3]; 3],
-}
-
-/// One link of a [`RobotDescription`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LinkDescription {
-    /// Unique name.
-    pub name: String,
-    /// None: no inertia (a frame).
-    pub inertia: Option<Inertia>,
-}
-
-/// One joint of a [`RobotDescription`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct JointDescription {
-    /// Unique name.
-    pub name: String,
-    /// What it lets move.
-    pub kind: JointKind,
-    /// Name of the parent link.
-    pub parent: String,
-    /// Name of the child link.
-    pub child: String,
-    /// Joint frame (= child link frame at q = 0) in the parent link frame.
-    pub placement: Placement,
-    /// Axis in the joint frame; need not be normalised.
-    pub axis: [f64; 3],
-    /// Reflected motor inertia that the file states (MJCF `armature`), kg·m² or kg.
-    pub armature: f64,
-    /// Viscous damping that counts as nominal torque, N·m·s/rad or N·s/m.
-    pub damping: f64,
-    /// Spring stiffness that counts as nominal torque, N·m/rad or N/m.
-    pub stiffness: f64,
-    /// Rest position of that spring, rad or m.
-    pub spring_reference: f64,
-    /// `(joint, multiplier, offset)` when the joint mimics another.
-    pub mimic: Option<(String, f64, f64)>,
-    /// `(lower, upper, effort, velocity)` limits where the file states them; NaN where it does not.
-    pub limits: Option<[f64; 4]>,
-}
-
-/// What a model file says, before it is checked.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RobotDescription {
-    /// Name of the robot.
-    pub name: String,
-    /// Gravity in the base frame, m/s².
-    pub gravity: [f64; 3],
-    /// Links in the file's order.
-    pub links: Vec<LinkDescription>,
-    /// Joints in the file's order; the moving ones in this order are q1…qn.
-    pub joints: Vec<JointDescription>,
-    /// Physically impossible inertias are a [`Finding`] instead of an error.
-    pub allow_unphysical: bool,
-}
-
 /// A valid robot: immutable, cheap to share between threads.
+///
+/// It is written to files as its description and its locked joints, and read back through [`Robot::new`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Parts", into = "Parts")]
 pub struct Robot {
     description: RobotDescription,
     locked: BTreeMap<String, f64>,
-    // the dynamics helper adds the laid-out bodies here
+    /// Index in `description.joints` of q1…qn.
+    coordinates: Vec<usize>,
+    /// Moving bodies, parents first.
+    bodies: Vec<Body>,
+    planar: bool,
+}
+
+/// What is written of a [`Robot`].
+#[derive(Clone, Serialize, Deserialize)]
+struct Parts {
+    description: RobotDescription,
+    locked: BTreeMap<String, f64>,
+}
+
+impl From<Robot> for Parts {
+    fn from(robot: Robot) -> Self {
+        Self {
+            description: robot.description,
+            locked: robot.locked,
+        }
+    }
+}
+
+impl TryFrom<Parts> for Robot {
+    type Error = Error;
+
+    fn try_from(parts: Parts) -> Result<Self> {
+        Self::new(parts.description, &parts.locked).map(|(robot, _)| robot)
+    }
 }
 
 impl Robot {
     /// Checks a description and lays it out. `locked` fixes moving joints at a position (rad or m).
     ///
+    /// Findings: `axis_normalised`, `point_mass`, `unphysical_inertia`, `locked_fixed_joint`, `locked_beyond_limits`,
+    /// `moves_no_mass`.
+    ///
     /// # Errors
-    /// [`crate::Error::Model`] for cycles, two roots, orphans, duplicate names, zero axes, impossible masses or inertias.
-    pub fn new(_description: RobotDescription, _locked: &BTreeMap<String, f64>) -> Result<(Self, Vec<Finding>)> {
-        todo!()
+    /// [`Error::Model`] for cycles, two roots, orphans, duplicate names, zero axes, impossible masses or inertias,
+    /// locked or mimicked joints that do not exist, a robot without a moving joint.
+    pub fn new(
+        description: RobotDescription,
+        locked: &BTreeMap<String, f64>,
+    ) -> Result<(Self, Vec<Finding>)> {
+        let mut findings = Vec::new();
+        if !description.gravity.iter().all(|v| v.is_finite()) {
+            return Err(Error::Model {
+                culprit: format!("robot `{}`", description.name),
+                problem: format!("gravity is {:?}", description.gravity),
+                remedy: "give three finite numbers in m/s²".into(),
+            });
+        }
+        let tree = tree::plant(&description)?;
+        let (sources, coordinates) = coordinates::assign(&description, locked, &mut findings)?;
+        let bodies = bodies::lay_out(&description, &tree, &sources, &mut findings)?;
+        report_massless(&description, &coordinates, &bodies, &mut findings);
+        let planar = axes_parallel(&bodies);
+        Ok((
+            Self {
+                description,
+                locked: locked.clone(),
+                coordinates,
+                bodies,
+                planar,
+            },
+            findings,
+        ))
     }
+
     /// Number of moving joints n.
     pub fn dof(&self) -> usize {
-        todo!()
+        self.coordinates.len()
     }
-    /// Names of the moving joints, q1…qn.
+
+    /// Names of the moving joints, q1…qn: in the model's order, without fixed, locked and mimicking ones.
     pub fn joint_names(&self) -> Vec<&str> {
-        todo!()
+        self.coordinates
+            .iter()
+            .map(|&j| self.description.joints[j].name.as_str())
+            .collect()
     }
+
+    /// Moving joint `joint` (0-based) as the model states it.
+    ///
+    /// # Panics
+    /// If `joint` ≥ [`Robot::dof`].
+    pub fn joint(&self, joint: usize) -> &JointDescription {
+        &self.description.joints[self.coordinates[joint]]
+    }
+
     /// Kind of moving joint `joint` (0-based).
-    pub fn joint_kind(&self, _joint: usize) -> JointKind {
-        todo!()
+    ///
+    /// # Panics
+    /// If `joint` ≥ [`Robot::dof`].
+    pub fn joint_kind(&self, joint: usize) -> JointKind {
+        self.joint(joint).kind
     }
+
     /// True if the axes of all moving joints are parallel at q = 0 (a planar arm).
     pub fn is_planar(&self) -> bool {
-        todo!()
+        self.planar
+    }
+
+    /// What the model file says.
+    pub fn description(&self) -> &RobotDescription {
+        &self.description
+    }
+
+    /// Positions of the joints that were locked, rad or m.
+    pub fn locked(&self) -> &BTreeMap<String, f64> {
+        &self.locked
     }
 }
 
-/// Motion of `len` samples in structure-of-arrays form: `q[joint * len + sample]`. SI units.
-#[derive(Debug, Clone, Copy)]
-pub struct Motion<'a> {
-    /// Number of samples.
-    pub len: usize,
-    /// Positions, dof × len, rad or m.
-    pub q: &'a [f64],
-    /// Velocities, dof × len.
-    pub qd: &'a [f64],
-    /// Accelerations, dof × len.
-    pub qdd: &'a [f64],
+/// Says which coordinates move neither mass nor motor inertia: their nominal torque is 0 by construction.
+fn report_massless(
+    description: &RobotDescription,
+    coordinates: &[usize],
+    bodies: &[Body],
+    findings: &mut Vec<Finding>,
+) {
+    let mut carries: Vec<bool> = bodies
+        .iter()
+        .map(|b| b.moments.mass > 0.0 || b.armature > 0.0)
+        .collect();
+    let mut moves_mass = vec![false; coordinates.len()];
+    for i in (0..bodies.len()).rev() {
+        if carries[i] {
+            moves_mass[bodies[i].coordinate] = true;
+            if let Some(parent) = bodies[i].parent {
+                carries[parent] = true;
+            }
+        }
+    }
+    for (&j, _) in coordinates
+        .iter()
+        .zip(&moves_mass)
+        .filter(|&(_, &moves)| !moves)
+    {
+        let name = &description.joints[j].name;
+        let message =
+            format!("joint `{name}`: nothing beyond it has mass; its nominal torque is 0");
+        findings.push(Finding::new(
+            Severity::Warning,
+            "moves_no_mass",
+            name,
+            message,
+            1,
+        ));
+    }
 }
 
-/// Nominal torque of a batch: `M q̈ + bias + armature q̈ + damping q̇ + stiffness (q − q_ref)`; written to
-/// `tau[joint * len + sample]`, N·m or N.
-pub fn nominal_torque(_robot: &Robot, _motion: Motion<'_>, _tau: &mut [f64]) {
-    todo!()
+/// Are all joint axes parallel at q = 0? (Then they are at any q.)
+fn axes_parallel(bodies: &[Body]) -> bool {
+    let mut frames: Vec<spatial::Matrix> = Vec::with_capacity(bodies.len());
+    for body in bodies {
+        frames.push(match body.parent {
+            Some(parent) => spatial::multiply(&frames[parent], &body.rotation),
+            None => body.rotation,
+        });
+    }
+    let axis = |r: &spatial::Matrix| [r[0][2], r[1][2], r[2][2]];
+    frames
+        .iter()
+        .all(|r| spatial::norm(spatial::cross(axis(r), axis(&frames[0]))) < 1e-4)
 }

@@ -1,0 +1,150 @@
+//! Robot models: URDF and MJCF files into a [`RobotDescription`]; the root element decides which of the two it is.
+//!
+//! Only kinematics, inertias and what makes nominal torque are read. Meshes are never opened.
+
+mod xml;
+mod urdf;
+
+use crate::error::{Error, Place, Result};
+use std::path::Path;
+use twincal::Finding;
+use twincal::robot::RobotDescription;
+use xml::Document;
+
+/// What the user may say about a model.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ModelSettings {
+    /// Gravity in the base frame, m/s², instead of the file's (URDF has none: 0, 0, −9.81).
+    pub gravity: Option<[f64; 3]>,
+    /// Count the `damping` of URDF `<dynamics>` as nominal torque.
+    pub use_urdf_friction: bool,
+    /// Physically impossible inertias are a finding instead of an error.
+    pub allow_unphysical: bool,
+}
+
+/// A model file as read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    /// What it says; [`twincal::robot::Robot::new`] checks it.
+    pub description: RobotDescription,
+    /// The bytes of the file (of the main file, where there are includes).
+    pub bytes: Vec<u8>,
+    /// What had to be assumed or was not used.
+    pub findings: Vec<Finding>,
+}
+
+/// Reads a URDF or MJCF file; MJCF includes are followed inside the file's folder only.
+///
+/// # Errors
+/// [`Error`] with file, line and column: not readable, too large, not XML, a kind of joint that twincal does not
+/// support, a number that is none, a format that must be converted first.
+pub fn read_model(path: &Path, settings: &ModelSettings) -> Result<Model> {
+    let name = path.display().to_string();
+    refuse_by_extension(&name, path)?;
+    let bytes = read_limited(path, &name)?;
+    parse(&name, bytes, Some(path), settings)
+}
+
+/// Reads a model from memory; `name` stands in messages. MJCF includes are refused.
+///
+/// # Errors
+/// As [`read_model`].
+pub fn parse_model(name: &str, bytes: &[u8], settings: &ModelSettings) -> Result<Model> {
+    refuse_by_extension(name, Path::new(name))?;
+    parse(name, bytes.to_vec(), None, settings)
+}
+
+fn parse(
+    name: &str,
+    bytes: Vec<u8>,
+    path: Option<&Path>,
+    settings: &ModelSettings,
+) -> Result<Model> {
+    refuse_usd(name, &bytes)?;
+    let mut document = Document::default();
+    document.parse(name, &bytes)?;
+    let root = &document.elements[0];
+    let _ = path;
+    let (mut description, findings) = match root.name.as_str() {
+        "robot" => urdf::read(&document, settings)?,
+        "sdf" => {
+            return Err(document.error(
+                root,
+                "this is an SDF file, twincal reads URDF and MJCF",
+                "convert it: in ROS 2 the package `sdformat_urdf` publishes it as URDF, or `pip install pysdf` and \
+                 `sdf2urdf model.sdf model.urdf`",
+            ));
+        }
+        other => {
+            return Err(document.error(
+                root,
+                format!("the root element is <{}>", xml::shorten(other)),
+                "a URDF begins with <robot>, an MJCF with <mujoco>",
+            ));
+        }
+    };
+    if let Some(gravity) = settings.gravity {
+        description.gravity = gravity;
+    }
+    description.allow_unphysical = settings.allow_unphysical;
+    Ok(Model {
+        description,
+        bytes,
+        findings,
+    })
+}
+
+/// A file's bytes, never more than the limit (a device or a pipe may have no end).
+fn read_limited(path: &Path, name: &str) -> Result<Vec<u8>> {
+    use std::io::Read;
+    let fail =
+        |error: &std::io::Error| Error::system(name, "read", error, "give a URDF or MJCF file");
+    let file = std::fs::File::open(path).map_err(|e| fail(&e))?;
+    let metadata = file.metadata().map_err(|e| fail(&e))?;
+    if metadata.is_file() && metadata.len() > xml::MAX_BYTES as u64 {
+        return xml::too_large(name, metadata.len());
+    }
+    let mut bytes = Vec::new();
+    file.take(xml::MAX_BYTES as u64 + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|e| fail(&e))?;
+    Ok(bytes)
+}
+
+/// Files that must be turned into URDF or MJCF first, by their name.
+fn refuse_by_extension(name: &str, path: &Path) -> Result<()> {
+    let extension = path
+        .extension()
+        .map(|e| e.to_string_lossy().to_ascii_lowercase())
+        .unwrap_or_default();
+    let stem = path
+        .file_stem()
+        .map(|s| s.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    let stem = stem.strip_suffix(".urdf").unwrap_or(&stem);
+    match extension.as_str() {
+        "xacro" => Err(Error::content(
+            Place::file(name),
+            "this is a xacro template, not a URDF",
+            format!("expand it: xacro '{name}' > '{stem}.urdf'"),
+        )),
+        "usd" | "usda" | "usdc" | "usdz" => usd_error(name),
+        _ => Ok(()),
+    }
+}
+
+fn refuse_usd(name: &str, bytes: &[u8]) -> Result<()> {
+    if bytes.starts_with(b"PXR-USDC") || bytes.starts_with(b"#usda") {
+        usd_error(name)
+    } else {
+        Ok(())
+    }
+}
+
+fn usd_error(name: &str) -> Result<()> {
+    Err(Error::content(
+        Place::file(name),
+        "this is a USD file, twincal reads URDF and MJCF",
+        "convert it: Isaac Sim exports URDF (File > Export to URDF), MuJoCo built with USD saves MJCF (mj_saveLastXML)",
+    ))
+}

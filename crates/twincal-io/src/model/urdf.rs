@@ -1,0 +1,276 @@
+//! URDF: `<robot>` with links and joints.
+
+use super::ModelSettings;
+use super::xml::{Document, Element, shorten};
+use crate::error::Result;
+use twincal::robot::spatial::{IDENTITY, roll_pitch_yaw, rotate_tensor};
+use twincal::robot::{
+    Inertia, JointDescription, JointKind, Limits, LinkDescription, Mimic, Placement,
+    RobotDescription,
+};
+use twincal::{Finding, Severity};
+
+/// Gravity that URDF takes for granted, m/s².
+const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
+
+/// Reads the document's root element.
+///
+/// # Errors
+/// With the place of the element or attribute.
+pub(super) fn read(
+    document: &Document,
+    settings: &ModelSettings,
+) -> Result<(RobotDescription, Vec<Finding>)> {
+    let root = &document.elements[0];
+    refuse_xacro(document)?;
+    let mut findings = Vec::new();
+    let mut links = Vec::new();
+    let mut joints = Vec::new();
+    for &child in &root.children {
+        let element = &document.elements[child];
+        match element.name.as_str() {
+            "link" => links.push(link(document, element)?),
+            "joint" => joints.push(joint(document, element, settings, &mut findings)?),
+            _ => {}
+        }
+    }
+    define_world(&mut links, &joints, &mut findings);
+    let name = root.text("name").unwrap_or("robot").to_string();
+    Ok((
+        RobotDescription {
+            name,
+            gravity: GRAVITY,
+            links,
+            joints,
+            allow_unphysical: false,
+        },
+        findings,
+    ))
+}
+
+/// A template that nobody expanded has `xacro:` elements or `${…}` in its values.
+fn refuse_xacro(document: &Document) -> Result<()> {
+    let template = |element: &&Element| {
+        element.name.starts_with("xacro:")
+            || element.attributes.iter().any(|a| a.value.contains("${"))
+    };
+    match document.elements.iter().find(template) {
+        Some(element) => {
+            let file = &document.files[element.file].name;
+            Err(document.error(
+                element,
+                format!(
+                    "<{}> belongs to a xacro template, not to a URDF",
+                    shorten(&element.name)
+                ),
+                format!("expand it: xacro '{file}' > expanded.urdf"),
+            ))
+        }
+        None => Ok(()),
+    }
+}
+
+fn link(document: &Document, element: &Element) -> Result<LinkDescription> {
+    let name = name(document, element)?;
+    let Some(inertial) = document.child(element, "inertial") else {
+        return Ok(LinkDescription {
+            name,
+            inertia: None,
+        });
+    };
+    let Some(mass) = document.child(inertial, "mass") else {
+        return Err(document.error(
+            inertial,
+            format!("link `{name}`: <inertial> has no <mass>"),
+            "add <mass value=\"…\"/> in kg",
+        ));
+    };
+    let mass = required(document, mass, "value")?;
+    let frame = origin(document, inertial)?;
+    let tensor = match document.child(inertial, "inertia") {
+        Some(inertia) => {
+            let entry = |key: &str, needed: bool| match document.number(inertia, key)? {
+                None if needed => required(document, inertia, key),
+                value => Ok(value.unwrap_or(0.0)),
+            };
+            let (xx, yy, zz) = (
+                entry("ixx", true)?,
+                entry("iyy", true)?,
+                entry("izz", true)?,
+            );
+            let (xy, xz, yz) = (
+                entry("ixy", false)?,
+                entry("ixz", false)?,
+                entry("iyz", false)?,
+            );
+            [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+        }
+        None => [[0.0; 3]; 3],
+    };
+    // Not rotated when there is nothing to rotate: the file's own digits stay.
+    let tensor = if frame.rotation == IDENTITY {
+        tensor
+    } else {
+        rotate_tensor(&frame.rotation, &tensor)
+    };
+    Ok(LinkDescription {
+        name,
+        inertia: Some(Inertia {
+            mass,
+            com: frame.translation,
+            tensor,
+        }),
+    })
+}
+
+fn joint(
+    document: &Document,
+    element: &Element,
+    settings: &ModelSettings,
+    findings: &mut Vec<Finding>,
+) -> Result<JointDescription> {
+    let name = name(document, element)?;
+    let kind = match element.text("type") {
+        Some("revolute") => JointKind::Revolute,
+        Some("continuous") => JointKind::Continuous,
+        Some("prismatic") => JointKind::Prismatic,
+        Some("fixed") => JointKind::Fixed,
+        other => {
+            return Err(document.error(
+                element,
+                format!("joint `{name}` has type `{}`", shorten(other.unwrap_or(""))),
+                "twincal supports revolute, continuous, prismatic and fixed joints",
+            ));
+        }
+    };
+    let end = |role: &str| match document.child(element, role).and_then(|e| e.text("link")) {
+        Some(link) => Ok(link.to_string()),
+        None => Err(document.error(
+            element,
+            format!("joint `{name}` has no {role} link"),
+            format!("add <{role} link=\"…\"/>"),
+        )),
+    };
+    let mut joint = JointDescription::new(&name, kind, &end("parent")?, &end("child")?);
+    joint.placement = origin(document, element)?;
+    if kind == JointKind::Fixed {
+        return Ok(joint);
+    }
+    joint.axis = match document.child(element, "axis") {
+        Some(axis) => document.numbers(axis, "xyz")?.unwrap_or([1.0, 0.0, 0.0]),
+        None => [1.0, 0.0, 0.0],
+    };
+    if let Some(limit) = document.child(element, "limit") {
+        joint.limits = Limits {
+            lower: document.number(limit, "lower")?,
+            upper: document.number(limit, "upper")?,
+            effort: document.number(limit, "effort")?,
+            velocity: document.number(limit, "velocity")?,
+        };
+    }
+    if let Some(mimic) = document.child(element, "mimic") {
+        let Some(other) = mimic.text("joint") else {
+            return Err(document.error(
+                mimic,
+                format!("joint `{name}` mimics nothing"),
+                "name the other joint: <mimic joint=\"…\"/>",
+            ));
+        };
+        joint.mimic = Some(Mimic {
+            joint: other.into(),
+            multiplier: document.number(mimic, "multiplier")?.unwrap_or(1.0),
+            offset: document.number(mimic, "offset")?.unwrap_or(0.0),
+        });
+    }
+    if let Some(dynamics) = document.child(element, "dynamics") {
+        let damping = document.number(dynamics, "damping")?.unwrap_or(0.0);
+        let friction = document.number(dynamics, "friction")?.unwrap_or(0.0);
+        if settings.use_urdf_friction {
+            joint.damping = damping;
+        }
+        if damping != 0.0 || friction != 0.0 {
+            let used = if settings.use_urdf_friction {
+                "its damping counts as nominal torque, its dry friction does not"
+            } else {
+                "not part of the nominal torque (vendors put solver values there; use_urdf_friction = true counts \
+                 the damping)"
+            };
+            let message = format!(
+                "joint `{name}`: <dynamics> states damping {damping} and friction {friction}: {used}"
+            );
+            findings.push(Finding::new(
+                Severity::Note,
+                "urdf_dynamics",
+                &name,
+                message,
+                1,
+            ));
+        }
+    }
+    Ok(joint)
+}
+
+/// Drake's convention: a link `world` that is used and not defined is the fixed base.
+fn define_world(
+    links: &mut Vec<LinkDescription>,
+    joints: &[JointDescription],
+    findings: &mut Vec<Finding>,
+) {
+    let used = joints.iter().any(|j| j.parent == "world");
+    if used && !links.iter().any(|l| l.name == "world") {
+        links.insert(
+            0,
+            LinkDescription {
+                name: "world".into(),
+                inertia: None,
+            },
+        );
+        findings.push(Finding::new(
+            Severity::Note,
+            "undefined_world_link",
+            "world",
+            "link `world` is used but not defined: taken as the fixed base (Drake's convention; Pinocchio refuses it)",
+            1,
+        ));
+    }
+}
+
+/// `<origin xyz rpy>` of an element; the identity without one.
+fn origin(document: &Document, element: &Element) -> Result<Placement> {
+    let Some(origin) = document.child(element, "origin") else {
+        return Ok(Placement::IDENTITY);
+    };
+    let translation = document.numbers(origin, "xyz")?.unwrap_or([0.0; 3]);
+    let rotation = match document.numbers::<3>(origin, "rpy")? {
+        Some(angles) if angles == [0.0; 3] => IDENTITY,
+        Some(angles) => roll_pitch_yaw(angles),
+        None => IDENTITY,
+    };
+    Ok(Placement {
+        rotation,
+        translation,
+    })
+}
+
+fn name(document: &Document, element: &Element) -> Result<String> {
+    match element.text("name") {
+        Some(name) if !name.is_empty() => Ok(name.into()),
+        _ => Err(document.error(
+            element,
+            format!("<{}> has no name", element.name),
+            "give it a unique name",
+        )),
+    }
+}
+
+/// A number that must be there.
+fn required(document: &Document, element: &Element, key: &str) -> Result<f64> {
+    match document.number(element, key)? {
+        Some(value) => Ok(value),
+        None => Err(document.error(
+            element,
+            format!("<{}> has no attribute `{key}`", element.name),
+            format!("add {key}=\"…\""),
+        )),
+    }
+}

@@ -1,0 +1,215 @@
+//! Torque that a motion needs: one sample, batches over lanes, and the mass matrix.
+
+use super::Robot;
+use super::recursion::{State, newton_euler};
+use crate::lanes::{LANES, Lane, sin_cos};
+use pulp::{Scalar, Simd};
+
+/// Samples whose sines and cosines are computed at once: small enough to stay in the first-level cache.
+const BLOCK: usize = 64;
+
+/// Scratch memory of the one-sample algorithms for one robot; one per thread.
+#[derive(Debug, Clone)]
+pub struct Workspace {
+    states: Vec<State<f64>>,
+}
+
+impl Workspace {
+    /// Scratch memory for `robot`.
+    pub fn new(robot: &Robot) -> Self {
+        Self {
+            states: vec![State::new(0.0); robot.bodies.len()],
+        }
+    }
+}
+
+/// Motion of `len` samples in structure-of-arrays form: `q[joint * len + sample]`. SI units.
+#[derive(Debug, Clone, Copy)]
+pub struct Motion<'a> {
+    /// Number of samples.
+    pub len: usize,
+    /// Positions, dof × len, rad or m.
+    pub q: &'a [f64],
+    /// Velocities, dof × len.
+    pub qd: &'a [f64],
+    /// Accelerations, dof × len.
+    pub qdd: &'a [f64],
+}
+
+/// Nominal torque of one sample, by the recursive Newton–Euler equations.
+///
+/// ```text
+/// τ = M(q) q̈ + bias(q, q̇) + armature·q̈ + damping·q̇ + stiffness·(q − q_ref)
+/// ```
+/// | value | shape | unit |
+/// |---|---|---|
+/// | `q`, `qd`, `qdd` | dof | rad, rad/s, rad/s² (m for a slider) |
+/// | `tau` (written) | dof | N·m (N for a slider) |
+///
+/// A joint that mimics coordinate k adds its torque times its multiplier to `tau[k]`.
+///
+/// # Panics
+/// If a slice is shorter than dof or the workspace belongs to a robot with fewer bodies.
+/// # Source
+/// method section 1; `recursion.rs`.
+pub fn inverse_dynamics(
+    robot: &Robot,
+    workspace: &mut Workspace,
+    q: &[f64],
+    qd: &[f64],
+    qdd: &[f64],
+    tau: &mut [f64],
+) {
+    run_one(robot, workspace, robot.description.gravity, [q, qd, qdd]);
+    tau[..robot.dof()].fill(0.0);
+    for (body, state) in robot.bodies.iter().zip(&workspace.states) {
+        let passive = body.armature * state.acceleration
+            + body.damping * state.velocity
+            + body.stiffness * (state.position - body.spring_reference);
+        tau[body.coordinate] += body.multiplier * (state.torque + passive);
+    }
+}
+
+/// Mass matrix M(q), motor inertia included: `M[i * dof + j]`, kg·m² (kg, kg·m where sliders are involved).
+///
+/// By unit accelerations: column j is the torque of q̈ = e_j at rest without gravity. O(dof²).
+///
+/// # Panics
+/// If `q` is shorter than dof or `mass` than dof².
+pub fn mass_matrix(robot: &Robot, workspace: &mut Workspace, q: &[f64], mass: &mut [f64]) {
+    let n = robot.dof();
+    let still = vec![0.0; n];
+    let mut unit = vec![0.0; n];
+    mass[..n * n].fill(0.0);
+    for j in 0..n {
+        unit[j] = 1.0;
+        run_one(robot, workspace, [0.0; 3], [q, &still, &unit]);
+        unit[j] = 0.0;
+        for (body, state) in robot.bodies.iter().zip(&workspace.states) {
+            let torque = state.torque + body.armature * state.acceleration;
+            mass[body.coordinate * n + j] += body.multiplier * torque;
+        }
+    }
+}
+
+/// Fills the workspace's joint states from one sample and runs the recursion.
+fn run_one(robot: &Robot, workspace: &mut Workspace, gravity: [f64; 3], [q, qd, qdd]: [&[f64]; 3]) {
+    for (body, state) in robot.bodies.iter().zip(&mut workspace.states) {
+        let k = body.coordinate;
+        state.position = body.multiplier * q[k] + body.offset;
+        state.velocity = body.multiplier * qd[k];
+        state.acceleration = body.multiplier * qdd[k];
+        (state.sin, state.cos) = if body.prismatic {
+            (0.0, 1.0)
+        } else {
+            state.position.sin_cos()
+        };
+    }
+    newton_euler(Scalar, &robot.bodies, gravity, &mut workspace.states);
+}
+
+/// Nominal torque of a batch: `M q̈ + bias + armature q̈ + damping q̇ + stiffness (q − q_ref)`; written to
+/// `tau[joint * len + sample]`, N·m or N.
+///
+/// The same equations as [`inverse_dynamics`], as many samples at a time as the processor's vectors hold; a sample's
+/// result does not depend on its place in the batch.
+///
+/// # Panics
+/// If a slice is shorter than dof × len.
+pub fn nominal_torque(robot: &Robot, motion: Motion<'_>, tau: &mut [f64]) {
+    let total = robot.dof() * motion.len;
+    let motion = Motion {
+        len: motion.len,
+        q: &motion.q[..total],
+        qd: &motion.qd[..total],
+        qdd: &motion.qdd[..total],
+    };
+    pulp::Arch::new().dispatch(Batch {
+        robot,
+        motion,
+        tau: &mut tau[..total],
+    });
+}
+
+struct Batch<'a> {
+    robot: &'a Robot,
+    motion: Motion<'a>,
+    tau: &'a mut [f64],
+}
+
+impl pulp::WithSimd for Batch<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, s: S) {
+        let Self { robot, motion, tau } = self;
+        let bodies = &robot.bodies[..];
+        let mut states = vec![State::new(s.splat_f64s(0.0)); bodies.len()];
+        let mut sines = vec![[0.0; BLOCK]; bodies.len()];
+        let mut cosines = vec![[1.0; BLOCK]; bodies.len()];
+        tau.fill(0.0);
+        let mut start = 0;
+        while start < motion.len {
+            let end = motion.len.min(start + BLOCK);
+            for i in 0..bodies.len() {
+                let body = &bodies[i];
+                if !body.prismatic {
+                    let row = body.coordinate * motion.len;
+                    let q = &motion.q[row + start..row + end];
+                    let mut angles = [0.0; BLOCK];
+                    for k in 0..q.len() {
+                        angles[k] = body.multiplier * q[k] + body.offset;
+                    }
+                    for k in 0..q.len().div_ceil(LANES) {
+                        let group = k * LANES..(k + 1) * LANES;
+                        let mut lane: Lane = [0.0; LANES];
+                        lane.copy_from_slice(&angles[group.clone()]);
+                        let (sine, cosine) = sin_cos(&lane);
+                        sines[i][group.clone()].copy_from_slice(&sine);
+                        cosines[i][group].copy_from_slice(&cosine);
+                    }
+                }
+            }
+            let mut first = start;
+            while first < end {
+                let last = end.min(first + S::F64_LANES);
+                let local = first - start..last - start;
+                for i in 0..bodies.len() {
+                    let body = &bodies[i];
+                    let state = &mut states[i];
+                    let row = body.coordinate * motion.len;
+                    let (m, c) = (s.splat_f64s(body.multiplier), s.splat_f64s(body.offset));
+                    let q = s.partial_load_f64s(&motion.q[row + first..row + last]);
+                    let qd = s.partial_load_f64s(&motion.qd[row + first..row + last]);
+                    let qdd = s.partial_load_f64s(&motion.qdd[row + first..row + last]);
+                    state.position = s.mul_add_e_f64s(m, q, c);
+                    state.velocity = s.mul_f64s(m, qd);
+                    state.acceleration = s.mul_f64s(m, qdd);
+                    state.sin = s.partial_load_f64s(&sines[i][local.clone()]);
+                    state.cos = s.partial_load_f64s(&cosines[i][local.clone()]);
+                }
+                newton_euler(s, bodies, robot.description.gravity, &mut states);
+                for i in 0..bodies.len() {
+                    let body = &bodies[i];
+                    let state = &states[i];
+                    let row = body.coordinate * motion.len;
+                    let cell = &mut tau[row + first..row + last];
+                    let stretch = s.sub_f64s(state.position, s.splat_f64s(body.spring_reference));
+                    let mut torque = state.torque;
+                    torque =
+                        s.mul_add_e_f64s(s.splat_f64s(body.armature), state.acceleration, torque);
+                    torque = s.mul_add_e_f64s(s.splat_f64s(body.damping), state.velocity, torque);
+                    torque = s.mul_add_e_f64s(s.splat_f64s(body.stiffness), stretch, torque);
+                    let sum = s.mul_add_e_f64s(
+                        s.splat_f64s(body.multiplier),
+                        torque,
+                        s.partial_load_f64s(cell),
+                    );
+                    s.partial_store_f64s(cell, sum);
+                }
+                first = last;
+            }
+            start = end;
+        }
+    }
+}
