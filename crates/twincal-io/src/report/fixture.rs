@@ -1,10 +1,13 @@
 //! Calibrations made up for the tests of the report: realistic in shape, closed-form signals, own noise generator.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use twincal::calibrate::{Calibration, Draws, LogSummary, TermSummary};
 use twincal::likelihood::JointNoise;
 use twincal::posterior::{Method, Model, Posterior};
-use twincal::robot::Robot;
+use twincal::robot::{
+    Inertia, JointDescription, JointKind, LinkDescription, Robot, RobotDescription,
+};
 use twincal::signal::Pipeline;
 use twincal::term::{Family, LibrarySettings, Status, Term};
 use twincal::twin::Twin;
@@ -265,28 +268,36 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
     }
 }
 
+/// A chain of equal links, each turning about y; a joint named `rail` slides.
 fn robot(names: &[&str]) -> Robot {
-    let identity = serde_json::json!({"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [0, 0, 0.3]});
-    let inertia = serde_json::json!({"mass": 1, "com": [0, 0, 0.1], "tensor": [[0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]]});
-    let links: Vec<_> = (0..=names.len())
-        .map(|i| serde_json::json!({"name": format!("link{i}"), "inertia": inertia}))
-        .collect();
-    let joints: Vec<_> = names
-        .iter()
-        .enumerate()
-        .map(|(i, name)| {
-            serde_json::json!({
-                "name": name, "kind": if *name == "rail" { "prismatic" } else { "continuous" },
-                "parent": format!("link{i}"), "child": format!("link{}", i + 1), "placement": identity, "axis": [0, 1, 0],
-                "armature": 0, "damping": 0, "stiffness": 0, "spring_reference": 0, "mimic": null, "limits": null
-            })
-        })
-        .collect();
-    serde_json::from_value(serde_json::json!({
-        "description": {"name": "arm", "gravity": [0, 0, -9.81], "links": links, "joints": joints, "allow_unphysical": false},
-        "locked": {}
-    }))
-    .unwrap()
+    let inertia = Inertia {
+        mass: 1.0,
+        com: [0.0, 0.0, 0.1],
+        tensor: [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]],
+    };
+    let link = |i: usize| LinkDescription {
+        name: format!("link{i}"),
+        inertia: Some(inertia),
+    };
+    let joint = |(i, name): (usize, &&str)| {
+        let kind = if *name == "rail" {
+            JointKind::Prismatic
+        } else {
+            JointKind::Continuous
+        };
+        JointDescription {
+            axis: [0.0, 1.0, 0.0],
+            ..JointDescription::new(name, kind, &format!("link{i}"), &format!("link{}", i + 1))
+        }
+    };
+    let description = RobotDescription {
+        name: "arm".into(),
+        gravity: [0.0, 0.0, -9.81],
+        links: (0..=names.len()).map(link).collect(),
+        joints: names.iter().enumerate().map(joint).collect(),
+        allow_unphysical: false,
+    };
+    Robot::new(description, &BTreeMap::new()).unwrap().0
 }
 
 /// Motion is a sum of three sines; the effects missing from the nominal torque are friction and a payload.
