@@ -1,8 +1,14 @@
 //! Held-out scores: how good the twin's torque is on data it has not seen (method section 8).
 
-use serde::{Deserialize, Serialize};
+mod scores;
+mod trace;
 
-/// Scores of one joint.
+pub use scores::{CoverageKeeper, ScoreKeeper};
+pub use trace::{MAX_POINTS, TraceRows};
+
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// Scores of one joint. Without rows the numbers are NaN here and `null` in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct JointScore {
     /// Joint name.
@@ -10,23 +16,31 @@ pub struct JointScore {
     /// Rows.
     pub rows: u64,
     /// RMSE of the nominal torque, N·m.
+    #[serde(deserialize_with = "nan_if_null")]
     pub rmse_nominal: f64,
     /// RMSE of the calibrated torque (model average), N·m.
+    #[serde(deserialize_with = "nan_if_null")]
     pub rmse_calibrated: f64,
     /// Share of rows inside the 95 % interval.
+    #[serde(deserialize_with = "nan_if_null")]
     pub coverage95: f64,
     /// Mean width of that interval, N·m.
+    #[serde(deserialize_with = "nan_if_null")]
     pub mean_width95: f64,
 }
 
-/// Scores over a set of rows: pooled over all rows of all joints, and per joint.
+/// Scores over a set of rows: pooled over all rows of all joints, and per joint. Without rows the numbers are NaN here and
+/// `null` in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scores {
     /// RMSE of the nominal torque over all rows of all joints.
+    #[serde(deserialize_with = "nan_if_null")]
     pub rmse_nominal: f64,
     /// RMSE of the calibrated torque.
+    #[serde(deserialize_with = "nan_if_null")]
     pub rmse_calibrated: f64,
     /// Share of rows inside the 95 % interval.
+    #[serde(deserialize_with = "nan_if_null")]
     pub coverage95: f64,
     /// Per joint.
     pub joints: Vec<JointScore>,
@@ -44,13 +58,15 @@ pub enum Split {
     LastThirty,
 }
 
-/// One held-out stretch for figures: rows of one joint in one trajectory.
+/// One held-out stretch for figures: rows of one joint in one trajectory, at most [`MAX_POINTS`] of them.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Trace {
     /// Log name.
     pub log: String,
     /// Joint name.
     pub joint: String,
+    /// Every `step`-th row is kept; 1: all of them.
+    pub step: usize,
     /// Row times, s.
     pub time: Vec<f64>,
     /// Position, velocity at the rows.
@@ -88,4 +104,9 @@ pub struct Validation {
     pub coverage_levels: Vec<(f64, f64)>,
     /// For figures.
     pub traces: Vec<Trace>,
+}
+
+/// JSON has no NaN: a score without rows is written as `null` and read back as NaN.
+fn nan_if_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }

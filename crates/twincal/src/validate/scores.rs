@@ -1,0 +1,256 @@
+//! Scores as running sums: rows come in any blocks, joints in any order, nothing is kept but the sums.
+
+use super::{JointScore, Scores};
+use crate::twin::JointTorque;
+use std::ops::AddAssign;
+
+/// Sums of one joint.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Sums {
+    rows: u64,
+    square_nominal: f64,
+    square_calibrated: f64,
+    inside: u64,
+    width: f64,
+}
+
+impl AddAssign for Sums {
+    fn add_assign(&mut self, other: Self) {
+        self.rows += other.rows;
+        self.square_nominal += other.square_nominal;
+        self.square_calibrated += other.square_calibrated;
+        self.inside += other.inside;
+        self.width += other.width;
+    }
+}
+
+impl Sums {
+    /// `sum / rows`; NaN without rows.
+    fn mean(&self, sum: f64) -> f64 {
+        sum / self.rows as f64
+    }
+
+    fn score(&self, joint: &str) -> JointScore {
+        JointScore {
+            joint: joint.into(),
+            rows: self.rows,
+            rmse_nominal: self.mean(self.square_nominal).sqrt(),
+            rmse_calibrated: self.mean(self.square_calibrated).sqrt(),
+            coverage95: self.mean(self.inside as f64),
+            mean_width95: self.mean(self.width),
+        }
+    }
+}
+
+/// Collects predictions and measurements, gives [`Scores`]. Adding two keepers equals pushing all their rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScoreKeeper {
+    names: Vec<String>,
+    joints: Vec<Sums>,
+}
+
+impl ScoreKeeper {
+    /// No rows yet, for joints of these names.
+    pub fn new(joints: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        let names: Vec<String> = joints.into_iter().map(Into::into).collect();
+        let joints = vec![Sums::default(); names.len()];
+        Self { names, joints }
+    }
+
+    /// Adds the rows of a block of `joint`; `measured` in N·m, as long as the torque's slices.
+    pub fn push(&mut self, joint: usize, measured: &[f64], torque: &JointTorque) {
+        self.push_where(joint, measured, torque, |_| true);
+    }
+
+    /// Adds those rows of the block for which `keep(row)` holds, e.g. the moving ones.
+    ///
+    /// # Panics
+    /// If there is no such joint or the slices differ in length.
+    pub fn push_where(
+        &mut self,
+        joint: usize,
+        measured: &[f64],
+        torque: &JointTorque,
+        keep: impl Fn(usize) -> bool,
+    ) {
+        assert_eq!(
+            measured.len(),
+            torque.nominal.len(),
+            "one measured torque per predicted one"
+        );
+        let sums = &mut self.joints[joint];
+        for (row, &measured) in measured.iter().enumerate().filter(|(row, _)| keep(*row)) {
+            let (low, high) = (torque.low[row], torque.high[row]);
+            *sums += Sums {
+                rows: 1,
+                square_nominal: (measured - torque.nominal[row]).powi(2),
+                square_calibrated: (measured - torque.calibrated[row]).powi(2),
+                inside: u64::from(measured >= low && measured <= high),
+                width: high - low,
+            };
+        }
+    }
+
+    /// The scores of everything pushed so far.
+    #[must_use]
+    pub fn scores(&self) -> Scores {
+        let mut pooled = Sums::default();
+        for sums in &self.joints {
+            pooled += *sums;
+        }
+        let JointScore {
+            rmse_nominal,
+            rmse_calibrated,
+            coverage95,
+            ..
+        } = pooled.score("");
+        let joints = self
+            .names
+            .iter()
+            .zip(&self.joints)
+            .map(|(name, sums)| sums.score(name))
+            .collect();
+        Scores {
+            rmse_nominal,
+            rmse_calibrated,
+            coverage95,
+            joints,
+        }
+    }
+}
+
+impl AddAssign<&ScoreKeeper> for ScoreKeeper {
+    /// # Panics
+    /// If the joints differ.
+    fn add_assign(&mut self, other: &ScoreKeeper) {
+        assert_eq!(self.names, other.names, "scores of different robots");
+        for (own, more) in self.joints.iter_mut().zip(&other.joints) {
+            *own += *more;
+        }
+    }
+}
+
+/// How often measurements lie inside central intervals of several levels, from their PIT.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct CoverageKeeper {
+    rows: u64,
+    inside: [u64; CoverageKeeper::LEVELS.len()],
+}
+
+impl CoverageKeeper {
+    /// Levels of the central intervals.
+    pub const LEVELS: [f64; 4] = [0.5, 0.8, 0.9, 0.95];
+
+    /// Adds predictive probabilities of measured torques ([`JointTorque::pit`]). A central interval of level L holds a
+    /// measurement when `|pit − ½| ≤ L/2`.
+    pub fn push(&mut self, pit: &[f64]) {
+        self.rows += pit.len() as u64;
+        for (inside, level) in self.inside.iter_mut().zip(Self::LEVELS) {
+            *inside += pit
+                .iter()
+                .filter(|&&p| (p - 0.5).abs() <= 0.5 * level)
+                .count() as u64;
+        }
+    }
+
+    /// `(level, share of rows inside)`; empty without rows.
+    #[must_use]
+    pub fn levels(&self) -> Vec<(f64, f64)> {
+        if self.rows == 0 {
+            return Vec::new();
+        }
+        Self::LEVELS
+            .iter()
+            .zip(self.inside)
+            .map(|(&level, inside)| (level, inside as f64 / self.rows as f64))
+            .collect()
+    }
+}
+
+impl AddAssign<&CoverageKeeper> for CoverageKeeper {
+    fn add_assign(&mut self, other: &CoverageKeeper) {
+        self.rows += other.rows;
+        for (own, more) in self.inside.iter_mut().zip(other.inside) {
+            *own += more;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nominal 0, calibrated 1, interval 0 … 2.
+    fn torque(rows: usize) -> JointTorque {
+        JointTorque {
+            nominal: vec![0.0; rows],
+            calibrated: vec![1.0; rows],
+            low: vec![0.0; rows],
+            high: vec![2.0; rows],
+            ..JointTorque::default()
+        }
+    }
+
+    #[test]
+    fn scores_are_those_of_the_definition() {
+        let mut keeper = ScoreKeeper::new(["shoulder", "elbow"]);
+        keeper.push(0, &[3.0, 4.0], &torque(2));
+        keeper.push(1, &[1.0, 2.0, 0.0], &torque(3));
+        let scores = keeper.scores();
+        let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-15, "{a} {b}");
+        close(scores.joints[0].rmse_nominal, (25.0_f64 / 2.0).sqrt());
+        close(scores.joints[0].rmse_calibrated, (13.0_f64 / 2.0).sqrt());
+        close(scores.joints[0].coverage95, 0.0);
+        close(scores.joints[1].rmse_nominal, (5.0_f64 / 3.0).sqrt());
+        // Both ends belong to the interval.
+        close(scores.joints[1].coverage95, 1.0);
+        close(scores.joints[1].mean_width95, 2.0);
+        // Pooled over rows, not over joints.
+        close(scores.rmse_nominal, (30.0_f64 / 5.0).sqrt());
+        close(scores.rmse_calibrated, (15.0_f64 / 5.0).sqrt());
+        close(scores.coverage95, 0.6);
+        assert_eq!((scores.joints[0].rows, scores.joints[1].rows), (2, 3));
+    }
+
+    #[test]
+    fn parts_add_up_to_the_whole() {
+        let measured = [0.5, 1.5, 2.5, -1.0];
+        let mut whole = ScoreKeeper::new(["a"]);
+        whole.push(0, &measured, &torque(4));
+        let mut first = ScoreKeeper::new(["a"]);
+        first.push_where(0, &measured, &torque(4), |row| row % 2 == 0);
+        let mut second = ScoreKeeper::new(["a"]);
+        second.push_where(0, &measured, &torque(4), |row| row % 2 == 1);
+        first += &second;
+        assert_eq!(first, whole);
+    }
+
+    #[test]
+    fn a_joint_without_rows_is_null_in_json_and_comes_back() {
+        let mut keeper = ScoreKeeper::new(["shoulder", "elbow"]);
+        keeper.push(0, &[3.0], &torque(1));
+        let scores = keeper.scores();
+        assert!(scores.joints[1].rmse_nominal.is_nan() && scores.joints[1].rows == 0);
+        assert!(scores.rmse_nominal == 3.0);
+        let text = serde_json::to_string(&scores).unwrap();
+        assert!(
+            text.contains(r#""joint":"elbow","rows":0,"rmse_nominal":null"#),
+            "{text}"
+        );
+        let again: Scores = serde_json::from_str(&text).unwrap();
+        assert!(again.joints[1].coverage95.is_nan());
+        assert_eq!(again.joints[0], scores.joints[0]);
+    }
+
+    #[test]
+    fn levels_count_both_ends_of_the_pit() {
+        let mut keeper = CoverageKeeper::default();
+        assert!(keeper.levels().is_empty());
+        keeper.push(&[0.5, 0.74, 0.76, 0.24, 0.91]);
+        keeper.push(&[0.04, 0.024, 0.976, 0.03, 1.0]);
+        assert_eq!(
+            keeper.levels(),
+            [(0.5, 0.2), (0.8, 0.4), (0.9, 0.5), (0.95, 0.7)]
+        );
+    }
+}
