@@ -97,7 +97,7 @@ pub struct Calibration {
     pub scaled_variance: f64,
     /// Held-out scores.
     pub validation: Validation,
-    /// Normalised residual autocorrelation per joint before and after calibration at lags 0..=20 rows.
+    /// Normalised residual autocorrelation at lags 0..=20 rows: entries 2j and 2j+1 are joint j before and after calibration.
     pub autocorrelation: Vec<Vec<f64>>,
     /// Draws for figures.
     pub draws: Draws,

@@ -83,7 +83,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     } else if found == 0 && ratio > BETTER {
         (
             Grade::Care,
-            "The log shows no missing effect: the nominal model stands as it is.",
+            "Nothing to correct was found: none of the candidate effects is in this log.",
         )
     } else if ratio > BETTER {
         (
@@ -119,11 +119,15 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
 fn grounds(calibration: &Calibration, joints: &[Joint<'_>], found: usize) -> Vec<String> {
     let scores = &calibration.validation.filtered;
     let change = scores.rmse_calibrated / scores.rmse_nominal - 1.0;
-    let way = if change <= 0.0 { "less" } else { "more" };
+    let way = match change {
+        c if c.abs() < 5e-4 => "unchanged".into(),
+        c if c < 0.0 => format!("{} less", percent(-c)),
+        c => format!("{} more", percent(c)),
+    };
     let rows: u64 = scores.joints.iter().map(|j| j.rows).sum();
     vec![
         format!(
-            "Torque error (RMSE) on {}: {} → {} {}, {} {way}.",
+            "Torque error (RMSE) on {}: {} → {} {}, {way}.",
             match calibration.validation.split {
                 Split::HeldoutLogs => "held-out logs",
                 Split::LeaveOneLogOut => "logs left out one at a time",
@@ -132,7 +136,6 @@ fn grounds(calibration: &Calibration, joints: &[Joint<'_>], found: usize) -> Vec
             number(scores.rmse_nominal, 3),
             number(scores.rmse_calibrated, 3),
             pooled_unit(joints),
-            percent(change.abs()),
         ),
         format!(
             "The 95 % intervals contain {} of the {} held-out values.",
@@ -333,7 +336,7 @@ mod tests {
                     c.terms.iter_mut().for_each(|t| t.selected = false);
                 },
                 Grade::Care,
-                "no missing effect",
+                "Nothing to correct",
             ),
         ];
         for (change, grade, words) in cases {
