@@ -1,1 +1,138 @@
-//! (to be written)
+//! From a trajectory and a library to rows of the regression, streamed (method section 1, steps 2 to 4).
+//!
+//! ```text
+//! F τ_meas − F τ_nom = (F Φ) β + F ε
+//! ```
+//! One symmetric filter F goes over torque, nominal torque and every column, so the relation stays exactly linear. Φ is
+//! never held: columns are evaluated at the log's rate in chunks, and F only at the samples that are kept.
+
+mod evaluate;
+mod filtered;
+mod unfiltered;
+
+use crate::error::Result;
+use crate::robot::Robot;
+use crate::signal::{Pipeline, Trajectory};
+use crate::term::Library;
+
+/// Which rows [`visit_rows`] gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RowSignal {
+    /// Torque and columns through F, at the kept rate: the rows of the regression.
+    Filtered,
+    /// Every logged sample within the borders of the motion filter, torque as logged.
+    Raw,
+}
+
+/// The rows of one joint in a [`RowBlock`].
+#[derive(Debug, Clone, Copy)]
+pub struct JointRows<'a> {
+    /// Library columns that are structurally non-zero on this joint, ascending.
+    pub columns: &'a [usize],
+    /// Distance between columns in `x`.
+    pub stride: usize,
+    /// Column `columns[i]` of row r is `x[i * stride + r]`, N·m (N) per unit of β.
+    pub x: &'a [f64],
+    /// Measured torque, one per row; empty if the log has no torque.
+    pub measured: &'a [f64],
+    /// Nominal torque, one per row.
+    pub nominal: &'a [f64],
+    /// Whether the joint stands still at the row's centre.
+    pub standstill: &'a [bool],
+}
+
+/// Consecutive rows of one segment.
+#[derive(Debug, Clone)]
+pub struct RowBlock<'a> {
+    /// Index of the segment in the trajectory.
+    pub segment: usize,
+    /// True if the first row starts the segment's rows.
+    pub first: bool,
+    /// Rows.
+    pub len: usize,
+    /// Time of each row, s.
+    pub time: &'a [f64],
+    /// Row of the recording nearest in time to each row; with [`RowSignal::Raw`] and pipeline off the row itself.
+    pub input_rows: &'a [usize],
+    /// Position at the rows, `joint * len + row`.
+    pub q: &'a [f64],
+    /// Velocity at the rows.
+    pub qd: &'a [f64],
+    /// Acceleration at the rows.
+    pub qdd: &'a [f64],
+    /// Per moving joint.
+    pub joints: Vec<JointRows<'a>>,
+}
+
+/// Most rows in one block.
+pub const MAX_BLOCK: usize = 256;
+
+/// Visits all rows of a trajectory in order, in blocks of at most [`MAX_BLOCK`] rows.
+///
+/// With the pipeline off both signals are the input rows. Otherwise [`RowSignal::Filtered`] keeps every m-th sample of
+/// the segment's inner part, m = max(1, round(log rate / `rate_hz`)), from the first sample where F fits; a segment shorter than
+/// F gives none. Memory is that of one chunk; the values do not depend on how the work was cut.
+///
+/// # Errors
+/// What `visit` returns; visiting stops there.
+pub fn visit_rows(
+    robot: &Robot,
+    library: &Library,
+    pipeline: &Pipeline,
+    trajectory: &Trajectory,
+    signal: RowSignal,
+    visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
+) -> Result<()> {
+    let columns: Vec<&[usize]> = (0..trajectory.dof)
+        .map(|joint| library.columns_of_joint(joint))
+        .collect();
+    let mut model = evaluate::Model {
+        columns,
+        evaluate: &mut |motion, nominal, out| {
+            crate::robot::nominal_torque(robot, motion, nominal);
+            library.evaluate(motion, out);
+        },
+    };
+    visit_model(&mut model, pipeline, trajectory, signal, visit)
+}
+
+/// [`visit_rows`] for any way to evaluate columns.
+fn visit_model(
+    model: &mut evaluate::Model<'_, '_>,
+    pipeline: &Pipeline,
+    trajectory: &Trajectory,
+    signal: RowSignal,
+    visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
+) -> Result<()> {
+    for (index, segment) in trajectory.segments.iter().enumerate() {
+        if signal == RowSignal::Raw || pipeline.is_off() {
+            unfiltered::visit(model, index, segment, trajectory.dof, visit)?;
+        } else {
+            filtered::visit(
+                model,
+                pipeline,
+                index,
+                segment,
+                trajectory.dof,
+                filtered::CHUNK,
+                visit,
+            )?;
+        }
+    }
+    Ok(())
+}
+
+/// Number of rows that [`visit_rows`] will give for a trajectory, without evaluating anything.
+pub fn count_rows(pipeline: &Pipeline, trajectory: &Trajectory, signal: RowSignal) -> usize {
+    let rows = |segment: &crate::signal::Segment| match &segment.logged {
+        _ if signal == RowSignal::Filtered && !pipeline.is_off() => {
+            filtered::Plan::new(pipeline, segment).rows
+        }
+        Some(logged) => logged.time.len(),
+        None => segment.time.len(),
+    };
+    trajectory.segments.iter().map(rows).sum()
+}
+
+#[cfg(test)]
+mod tests;

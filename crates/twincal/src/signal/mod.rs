@@ -1,5 +1,20 @@
 //! From a recording to uniform, finite, filtered motion and torque (method section 1).
 
+mod align;
+mod choose;
+mod clock;
+pub(crate) mod convolve;
+mod cutoff;
+mod describe;
+pub(crate) mod fir;
+mod prepare;
+mod spectrum;
+pub(crate) mod spline;
+mod standstill;
+mod unwrap;
+
+pub use describe::{JointOverview, LogOverview, describe, hardly_driven};
+
 use crate::error::{Finding, Result};
 use crate::robot::Robot;
 use serde::{Deserialize, Serialize};
@@ -70,18 +85,31 @@ pub struct Segment {
     pub time: Vec<f64>,
     /// Index of each sample's input row in the recording when the clock was uniform already; otherwise empty.
     pub input_rows: Vec<usize>,
+    /// The samples as logged within the segment, when the clock was uneven; `None` when `time` are the stamps.
+    pub logged: Option<LoggedSamples>,
     /// Filtered motion (f_q) at the log's rate; as logged with the pipeline off.
     pub q: Vec<f64>,
     /// Velocity.
     pub qd: Vec<f64>,
     /// Acceleration.
     pub qdd: Vec<f64>,
-    /// Torque as logged (resampled if needed), unfiltered.
+    /// Torque as logged (resampled if needed), unfiltered; empty if the log has none.
     pub tau: Vec<f64>,
     /// Standstill per joint and sample.
     pub standstill: Vec<bool>,
     /// Sampling interval, s.
     pub interval: f64,
+}
+
+/// Rows of an uneven log that lie within a resampled segment, untouched.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoggedSamples {
+    /// Stamps, s.
+    pub time: Vec<f64>,
+    /// Rows of the recording, one per stamp.
+    pub input_rows: Vec<usize>,
+    /// `joint * len + sample`, N·m or N; empty if the log has no torque.
+    pub tau: Vec<f64>,
 }
 
 /// One log, ready: segments of filtered motion and raw torque.
@@ -95,12 +123,88 @@ pub struct Trajectory {
     pub segments: Vec<Segment>,
 }
 
-/// Chooses cut-off, rates and thresholds from the training recordings.
-pub fn choose_pipeline(_r: &Robot, _logs: &[Recording], _s: &SignalSettings) -> Result<(Pipeline, Vec<Finding>)> {
-    todo!()
+impl Pipeline {
+    /// The pipeline that changes nothing: every input row is one row.
+    pub fn off(dof: usize) -> Self {
+        Self {
+            cutoff_hz: 0.0,
+            motion_cutoff_hz: 0.0,
+            rate_hz: 0.0,
+            coulomb_velocity: 0.0,
+            standstill_velocity: vec![0.0; dof],
+        }
+    }
+
+    /// True with cut-off 0.
+    pub fn is_off(&self) -> bool {
+        self.cutoff_hz == 0.0
+    }
+
+    /// Half length of the column filter F, s; 0 when off. A row at t uses torque and columns from t − half to t + half.
+    pub fn filter_half_length(&self) -> f64 {
+        if self.is_off() {
+            0.0
+        } else {
+            fir::column_half_seconds(self.cutoff_hz)
+        }
+    }
+
+    /// Half length of the motion filter, s; 0 when off.
+    pub fn motion_half_length(&self) -> f64 {
+        if self.is_off() {
+            0.0
+        } else {
+            fir::motion_half_seconds(self.motion_cutoff_hz)
+        }
+    }
+
+    /// Whole length of what one row sees, s: two rows further apart share no sample. 0 when off.
+    pub fn kernel_length(&self) -> f64 {
+        2.0 * (self.filter_half_length() + self.motion_half_length())
+    }
+
+    /// sd of white torque noise of sd 1 after F, for a log at `rate_hz`; 1 when off.
+    pub fn noise_gain(&self, rate_hz: f64) -> f64 {
+        if self.is_off() {
+            1.0
+        } else {
+            fir::noise_gain(&fir::column_kernel(self.cutoff_hz, 1.0 / rate_hz))
+        }
+    }
 }
 
-/// One recording through steps 1 and 2 of method section 1: cut, resample, smooth, differentiate, mask.
-pub fn align(_r: &Robot, _log: &Recording, _p: &Pipeline) -> Result<(Trajectory, Vec<Finding>)> {
-    todo!()
+/// Chooses cut-off, rates and thresholds from the training recordings; the same pipeline then serves every log.
+///
+/// | value | rule for "auto" |
+/// |---|---|
+/// | `cutoff_hz` | max(5 Hz, 2 f_m), f_m the frequency below which 99 % of the velocity's power lies; lower where encoder noise in q̈ asks for it (`signal/cutoff.rs` states the whole rule) |
+/// | `motion_cutoff_hz` | 4 f_c, at most 0.45 of the slowest log's rate |
+/// | `rate_hz` | 2.5 f_c |
+/// | `standstill_velocity` | the largest of v_s, three standard deviations of the velocity noise after the motion filter, and two encoder steps per period of f_q |
+///
+/// # Errors
+/// [`crate::Error::Setting`] for numbers out of range or a cut-off above 0.4 of a log's rate; [`crate::Error::Log`] for logs that
+/// are too short or have a broken clock, and with cut-off 0 for logs without q̇ or q̈; [`crate::Error::Refused`] if every joint stands still.
+pub fn choose_pipeline(
+    robot: &Robot,
+    logs: &[Recording],
+    settings: &SignalSettings,
+) -> Result<(Pipeline, Vec<Finding>)> {
+    choose::choose(&prepare::joint_facts(robot), logs, settings)
+}
+
+/// One recording through steps 1 and 2 of method section 1: cut, unfold, resample, smooth, differentiate, mask.
+///
+/// Rows that are NaN or infinite are dropped and cut the log; so do steps back and gaps of more than five median steps.
+/// Uneven clocks are resampled at the median step by a cubic spline. With the pipeline off all rows stay as they are
+/// (rows that are not finite excepted).
+///
+/// # Errors
+/// [`crate::Error::Log`] if nothing usable is left or the clock is broken; the message says what to do.
+pub fn align(
+    robot: &Robot,
+    log: &Recording,
+    pipeline: &Pipeline,
+) -> Result<(Trajectory, Vec<Finding>)> {
+    align::align(&prepare::joint_facts(robot), log, pipeline)
 }

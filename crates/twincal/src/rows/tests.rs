@@ -1,0 +1,288 @@
+//! Rows against brute force: a stand-in model whose columns are known functions of the motion.
+
+use super::evaluate::Model;
+use super::*;
+use crate::robot::Motion;
+use crate::signal::fir::column_kernel;
+use crate::signal::{LoggedSamples, Segment};
+
+const COLUMNS: [&[usize]; 2] = [&[0, 2, 3], &[1, 2]];
+const BETA: [f64; 4] = [0.7, -1.3, 0.25, 2.0];
+
+/// Value of a column at one sample.
+fn column(column: usize, q: f64, qd: f64, qdd: f64) -> f64 {
+    match column {
+        0 => qdd,
+        1 => q.sin(),
+        2 => qd * qd * q.cos(),
+        _ => qd.signum(),
+    }
+}
+
+fn stand_in(motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]) {
+    for joint in 0..2 {
+        for s in 0..motion.len {
+            let i = joint * motion.len + s;
+            nominal[i] = motion.q[i] * 3.0 - motion.qdd[i];
+            for (c, &k) in COLUMNS[joint].iter().enumerate() {
+                out[joint][c * motion.len + s] =
+                    column(k, motion.q[i], motion.qd[i], motion.qdd[i]);
+            }
+        }
+    }
+}
+
+fn pipeline(cutoff_hz: f64) -> Pipeline {
+    Pipeline {
+        cutoff_hz,
+        motion_cutoff_hz: 4.0 * cutoff_hz,
+        rate_hz: 2.5 * cutoff_hz,
+        coulomb_velocity: 0.02,
+        standstill_velocity: vec![0.02; 2],
+    }
+}
+
+/// Motion whose torque is exactly nominal + Φβ.
+fn trajectory(samples: usize, interval: f64) -> Trajectory {
+    let time: Vec<f64> = (0..samples).map(|i| i as f64 * interval).collect();
+    let wave = |f: fn(f64, f64) -> f64| -> Vec<f64> {
+        (0..2)
+            .flat_map(|j| time.iter().map(move |&t| f(t, 1.0 + f64::from(j))))
+            .collect()
+    };
+    let q = wave(|t, a| (a * t).sin() + 0.3 * (4.1 * t).cos());
+    let qd = wave(|t, a| a * (a * t).cos() - 1.23 * (4.1 * t).sin());
+    let qdd = wave(|t, a| -a * a * (a * t).sin() - 5.043 * (4.1 * t).cos());
+    let mut tau = Vec::new();
+    for joint in 0..2 {
+        for s in 0..samples {
+            let i = joint * samples + s;
+            let correction: f64 = COLUMNS[joint]
+                .iter()
+                .map(|&k| BETA[k] * column(k, q[i], qd[i], qdd[i]))
+                .sum();
+            tau.push(q[i] * 3.0 - qdd[i] + correction);
+        }
+    }
+    let standstill = (0..2 * samples).map(|i| i % 700 < 100).collect();
+    let segment = Segment {
+        time,
+        input_rows: (5..5 + samples).collect(),
+        logged: None,
+        q,
+        qd,
+        qdd,
+        tau,
+        standstill,
+        interval,
+    };
+    Trajectory {
+        name: "stand-in".into(),
+        dof: 2,
+        segments: vec![segment],
+    }
+}
+
+/// All rows of joint `joint`: (time, input row, columns…, measured, nominal, standstill).
+fn collect(
+    trajectory: &Trajectory,
+    pipeline: &Pipeline,
+    signal: RowSignal,
+    chunk: Option<usize>,
+) -> Vec<Vec<Vec<f64>>> {
+    let mut rows = vec![Vec::new(); 2];
+    let mut seen_first = false;
+    let mut gather = |block: &RowBlock<'_>| {
+        assert_eq!(block.first, !seen_first);
+        seen_first = true;
+        assert!(block.len <= MAX_BLOCK && block.len == block.time.len());
+        for (joint, data) in block.joints.iter().enumerate() {
+            for r in 0..block.len {
+                let mut row = vec![block.time[r], block.input_rows[r] as f64];
+                row.extend((0..data.columns.len()).map(|c| data.x[c * data.stride + r]));
+                row.extend([
+                    data.measured[r],
+                    data.nominal[r],
+                    f64::from(u8::from(data.standstill[r])),
+                ]);
+                rows[joint].push(row);
+            }
+        }
+        Ok(())
+    };
+    let mut model = Model {
+        columns: COLUMNS.to_vec(),
+        evaluate: &mut stand_in,
+    };
+    match chunk {
+        Some(chunk) => filtered::visit(
+            &mut model,
+            pipeline,
+            0,
+            &trajectory.segments[0],
+            2,
+            chunk,
+            &mut gather,
+        )
+        .unwrap(),
+        None => visit_model(&mut model, pipeline, trajectory, signal, &mut gather).unwrap(),
+    }
+    rows
+}
+
+#[test]
+fn filtered_rows_are_the_brute_force_convolution_at_kept_samples() {
+    let (trajectory, pipeline) = (trajectory(3000, 0.002), pipeline(5.0));
+    let rows = collect(&trajectory, &pipeline, RowSignal::Filtered, None);
+    let segment = &trajectory.segments[0];
+    let kernel = column_kernel(5.0, 0.002);
+    let half = kernel.len() / 2;
+    // 500 Hz over 12.5 Hz: every 40th sample
+    assert_eq!(rows[0].len(), (3000 - kernel.len()) / 40 + 1);
+    assert_eq!(
+        count_rows(&pipeline, &trajectory, RowSignal::Filtered),
+        rows[0].len()
+    );
+    for (joint, columns) in COLUMNS.iter().enumerate() {
+        for (r, row) in rows[joint].iter().enumerate() {
+            let centre = half + 40 * r;
+            assert_eq!(row[0], segment.time[centre]);
+            assert_eq!(row[1], (5 + centre) as f64);
+            let convolve = |f: &dyn Fn(usize) -> f64| -> f64 {
+                (0..kernel.len())
+                    .map(|k| kernel[k] * f(joint * 3000 + centre - half + k))
+                    .sum()
+            };
+            for (c, &k) in columns.iter().enumerate() {
+                let expected =
+                    convolve(&|i| column(k, segment.q[i], segment.qd[i], segment.qdd[i]));
+                assert!(
+                    (row[2 + c] - expected).abs() < 1e-13,
+                    "joint {joint} row {r} column {k}"
+                );
+            }
+            let measured = row[2 + columns.len()];
+            assert!((measured - convolve(&|i| segment.tau[i])).abs() < 1e-13);
+            assert_eq!(
+                row[4 + columns.len()] != 0.0,
+                segment.standstill[joint * 3000 + centre]
+            );
+        }
+    }
+}
+
+#[test]
+fn filtering_keeps_the_regression_exact() {
+    // τ = τ_nom + Φβ sample by sample, so F τ − F τ_nom = (F Φ) β row by row, to rounding.
+    let rows = collect(
+        &trajectory(4000, 0.001),
+        &pipeline(8.0),
+        RowSignal::Filtered,
+        None,
+    );
+    for (joint, columns) in COLUMNS.iter().enumerate() {
+        assert!(rows[joint].len() > 50);
+        for row in &rows[joint] {
+            let fitted: f64 = columns
+                .iter()
+                .enumerate()
+                .map(|(c, &k)| BETA[k] * row[2 + c])
+                .sum();
+            let residual = row[2 + columns.len()] - row[3 + columns.len()];
+            assert!((residual - fitted).abs() < 1e-12, "{residual} {fitted}");
+        }
+    }
+}
+
+#[test]
+fn chunks_do_not_change_a_bit() {
+    let (trajectory, mut pipeline) = (trajectory(5000, 0.001), pipeline(5.0));
+    for rate in [12.5, 1000.0, 0.9] {
+        pipeline.rate_hz = rate;
+        let whole = collect(&trajectory, &pipeline, RowSignal::Filtered, None);
+        for chunk in [1, 7, 64, 1000, 100_000] {
+            assert!(
+                collect(&trajectory, &pipeline, RowSignal::Filtered, Some(chunk)) == whole,
+                "chunk {chunk} at {rate} Hz"
+            );
+        }
+    }
+}
+
+#[test]
+fn raw_rows_are_every_sample_and_off_is_the_same() {
+    let trajectory = trajectory(1000, 0.001);
+    let raw = collect(&trajectory, &pipeline(5.0), RowSignal::Raw, None);
+    let off = collect(&trajectory, &Pipeline::off(2), RowSignal::Filtered, None);
+    assert!(raw == off);
+    assert_eq!(raw[0].len(), 1000);
+    let segment = &trajectory.segments[0];
+    for (i, row) in raw[1].iter().enumerate() {
+        assert_eq!(row[1], (5 + i) as f64);
+        assert_eq!(row[2], segment.q[1000 + i].sin());
+        assert_eq!(row[4], segment.tau[1000 + i]);
+    }
+}
+
+#[test]
+fn raw_rows_of_an_uneven_log_are_its_own_samples() {
+    let mut trajectory = trajectory(2000, 0.001);
+    let segment = &mut trajectory.segments[0];
+    let stamps: Vec<f64> = (0..900)
+        .map(|i| 0.3 + 0.001 * (f64::from(i) + 0.4 * f64::from(i).sin()))
+        .collect();
+    segment.input_rows.clear();
+    segment.logged = Some(LoggedSamples {
+        input_rows: (300..1200).collect(),
+        tau: (0..1800).map(f64::from).collect(),
+        time: stamps.clone(),
+    });
+    let raw = collect(&trajectory, &pipeline(5.0), RowSignal::Raw, None);
+    assert_eq!(raw[0].len(), 900);
+    for (i, row) in raw[0].iter().enumerate() {
+        let t = stamps[i];
+        assert_eq!((row[0], row[1], row[5]), (t, 300.0 + i as f64, i as f64));
+        // column 0 of joint 0 is q̈
+        let qdd = -(t.sin()) - 5.043 * (4.1 * t).cos();
+        assert!((row[2] - qdd).abs() < 1e-9, "{}", row[2] - qdd);
+    }
+    // Filtered rows name the nearest logged row.
+    let filtered = collect(&trajectory, &pipeline(5.0), RowSignal::Filtered, None);
+    for row in &filtered[0] {
+        let nearest = (0..900)
+            .min_by(|&a, &b| {
+                (stamps[a] - row[0])
+                    .abs()
+                    .total_cmp(&(stamps[b] - row[0]).abs())
+            })
+            .unwrap();
+        assert_eq!(row[1], 300.0 + nearest as f64);
+    }
+}
+
+#[test]
+fn an_error_of_the_visitor_ends_the_visit() {
+    let mut blocks = 0;
+    let mut stop = |_: &RowBlock<'_>| {
+        blocks += 1;
+        Err(crate::Error::Refused {
+            problem: "enough".into(),
+            remedy: String::new(),
+        })
+    };
+    let mut model = Model {
+        columns: COLUMNS.to_vec(),
+        evaluate: &mut stand_in,
+    };
+    assert!(
+        visit_model(
+            &mut model,
+            &pipeline(5.0),
+            &trajectory(3000, 0.001),
+            RowSignal::Raw,
+            &mut stop
+        )
+        .is_err()
+    );
+    assert_eq!(blocks, 1);
+}

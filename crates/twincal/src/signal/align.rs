@@ -1,0 +1,271 @@
+//! One recording through the motion filter: segments of smooth motion, raw torque and standstill flags.
+
+use super::choose::{COLUMN_LIMIT, MOTION_LIMIT, require_derivatives};
+use super::convolve::correlate;
+use super::fir::{MotionKernels, column_half_seconds, motion_half_seconds};
+use super::prepare::{JointFacts, Piece, prepare, report_short};
+use super::standstill::standstill;
+use super::{Channels, LoggedSamples, Pipeline, Recording, Segment, Trajectory};
+use crate::error::{Error, Finding, Result, Severity};
+
+/// Standstill has to last for this many periods of the cut-off.
+const STANDSTILL_PERIODS: f64 = 3.0;
+
+/// See [`super::align`].
+pub(crate) fn align(
+    joints: &[JointFacts],
+    log: &Recording,
+    pipeline: &Pipeline,
+) -> Result<(Trajectory, Vec<Finding>)> {
+    let mut findings = Vec::new();
+    let every_row = pipeline.is_off();
+    if every_row {
+        require_derivatives(joints, log)?;
+    }
+    let prepared = prepare(joints, log, every_row, &mut findings)?;
+    let with_tau = log.joints.iter().all(|c| c.tau.is_some());
+    let mut trajectory = Trajectory {
+        name: log.name.clone(),
+        dof: joints.len(),
+        segments: Vec::with_capacity(prepared.pieces.len()),
+    };
+    if every_row {
+        trajectory.segments = prepared
+            .pieces
+            .iter()
+            .map(|piece| as_logged(piece, with_tau))
+            .collect();
+        return Ok((trajectory, findings));
+    }
+    let rate = 1.0 / prepared.interval;
+    if pipeline.cutoff_hz > COLUMN_LIMIT * rate {
+        return Err(Error::Log {
+            log: log.name.clone(),
+            problem: format!(
+                "its rate of {rate:.3} Hz is too low for the cut-off of {} Hz",
+                pipeline.cutoff_hz
+            ),
+            remedy: format!(
+                "record at {:.3} Hz or more, or lower [signal] cutoff_hz",
+                pipeline.cutoff_hz / COLUMN_LIMIT
+            ),
+        });
+    }
+    let cutoff = pipeline.motion_cutoff_hz.min(MOTION_LIMIT * rate);
+    if cutoff < pipeline.motion_cutoff_hz {
+        findings.push(Finding::new(
+            Severity::Warning,
+            "motion_filter_capped",
+            &log.name,
+            format!(
+                "the motion filter's cut-off is {cutoff:.3} Hz here instead of {:.3} Hz: the log has only {rate:.3} Hz",
+                pipeline.motion_cutoff_hz
+            ),
+            0,
+        ));
+    }
+    let (mut short, mut short_rows, mut total, mut used) = (0, 0, 0.0, 0.0);
+    for piece in &prepared.pieces {
+        total += piece.time.len() as f64 * piece.interval;
+        match smoothed(piece, pipeline, cutoff, log, with_tau) {
+            Some(segment) => {
+                let border = 2.0 * column_half_seconds(pipeline.cutoff_hz);
+                used += (segment.time.len() as f64 * piece.interval - border).max(0.0);
+                trajectory.segments.push(segment);
+            }
+            None => {
+                short += 1;
+                short_rows += piece.rows.len() as u64;
+            }
+        }
+    }
+    report_short(log, short, short_rows, &mut findings);
+    if trajectory.segments.is_empty() {
+        return Err(Error::Log {
+            log: log.name.clone(),
+            problem: format!(
+                "no stretch between cuts is longer than the motion filter ({:.3} s)",
+                2.0 * motion_half_seconds(cutoff)
+            ),
+            remedy: "mend the gaps and NaN rows, or raise [signal] cutoff_hz".into(),
+        });
+    }
+    findings.push(Finding::new(
+        Severity::Note,
+        "borders",
+        &log.name,
+        format!(
+            "the filters need {:.3} s at either end of each segment: {used:.3} of {total:.3} s become rows",
+            column_half_seconds(pipeline.cutoff_hz) + motion_half_seconds(cutoff)
+        ),
+        0,
+    ));
+    report_standstill(joints, log, &trajectory, &mut findings);
+    Ok((trajectory, findings))
+}
+
+/// Channels one after the other: `joint * len + sample`.
+fn stacked<'a>(
+    joints: &'a [Channels],
+    channel: impl Fn(&'a Channels) -> Option<&'a Vec<f64>>,
+) -> Vec<f64> {
+    joints
+        .iter()
+        .filter_map(channel)
+        .flatten()
+        .copied()
+        .collect()
+}
+
+/// Pipeline off: the rows as they are.
+fn as_logged(piece: &Piece, with_tau: bool) -> Segment {
+    Segment {
+        time: piece.time.clone(),
+        input_rows: piece.rows.clone(),
+        logged: None,
+        q: stacked(&piece.joints, |c| Some(&c.q)),
+        qd: stacked(&piece.joints, |c| c.qd.as_ref()),
+        qdd: stacked(&piece.joints, |c| c.qdd.as_ref()),
+        tau: if with_tau {
+            stacked(&piece.joints, |c| c.tau.as_ref())
+        } else {
+            Vec::new()
+        },
+        standstill: vec![false; piece.joints.len() * piece.time.len()],
+        interval: piece.interval,
+    }
+}
+
+/// Step 2 of method section 1; `None` if the piece does not hold the kernel and a few samples more.
+fn smoothed(
+    piece: &Piece,
+    pipeline: &Pipeline,
+    cutoff: f64,
+    log: &Recording,
+    with_tau: bool,
+) -> Option<Segment> {
+    let kernels = MotionKernels::new(cutoff, piece.interval);
+    let half = kernels.half;
+    let len = piece
+        .time
+        .len()
+        .checked_sub(2 * half)
+        .filter(|len| *len >= 2)?;
+    let dof = piece.joints.len();
+    let inner = half..half + len;
+    let (mut q, mut qd, mut qdd) = (
+        vec![0.0; dof * len],
+        vec![0.0; dof * len],
+        vec![0.0; dof * len],
+    );
+    let (mut tau, mut still) = (Vec::new(), Vec::with_capacity(dof * len));
+    for (joint, channels) in piece.joints.iter().enumerate() {
+        let range = joint * len..(joint + 1) * len;
+        correlate(&kernels.smooth, &channels.q, 1, &mut q[range.clone()]);
+        match &channels.qd {
+            Some(logged) => correlate(&kernels.smooth, logged, 1, &mut qd[range.clone()]),
+            None => correlate(&kernels.first, &channels.q, 1, &mut qd[range.clone()]),
+        }
+        match (&channels.qdd, &channels.qd) {
+            (Some(logged), _) => correlate(&kernels.smooth, logged, 1, &mut qdd[range.clone()]),
+            (None, Some(logged)) => correlate(&kernels.first, logged, 1, &mut qdd[range.clone()]),
+            (None, None) => correlate(&kernels.second, &channels.q, 1, &mut qdd[range.clone()]),
+        }
+        if let Some(logged) = channels.tau.as_ref().filter(|_| with_tau) {
+            tau.extend_from_slice(&logged[inner.clone()]);
+        }
+        still.extend(standstill(
+            &qd[range],
+            pipeline.standstill_velocity[joint],
+            STANDSTILL_PERIODS / pipeline.cutoff_hz,
+            piece.interval,
+        ));
+    }
+    let time = piece.time[inner.clone()].to_vec();
+    let (input_rows, logged) = if piece.resampled {
+        (
+            Vec::new(),
+            Some(logged_samples(&time, &piece.rows, log, with_tau)),
+        )
+    } else {
+        (piece.rows[inner].to_vec(), None)
+    };
+    Some(Segment {
+        time,
+        input_rows,
+        logged,
+        q,
+        qd,
+        qdd,
+        tau,
+        standstill: still,
+        interval: piece.interval,
+    })
+}
+
+/// The rows as logged that lie within the borders of a resampled segment.
+fn logged_samples(time: &[f64], rows: &[usize], log: &Recording, with_tau: bool) -> LoggedSamples {
+    let (first, last) = (time[0], time[time.len() - 1]);
+    let rows: Vec<usize> = rows
+        .iter()
+        .copied()
+        .filter(|&row| (first..=last).contains(&log.time[row]))
+        .collect();
+    let tau = log
+        .joints
+        .iter()
+        .filter_map(|c| c.tau.as_ref().filter(|_| with_tau));
+    LoggedSamples {
+        time: rows.iter().map(|&row| log.time[row]).collect(),
+        tau: tau
+            .flat_map(|tau| rows.iter().map(|&row| tau[row]))
+            .collect(),
+        input_rows: rows,
+    }
+}
+
+fn report_standstill(
+    joints: &[JointFacts],
+    log: &Recording,
+    trajectory: &Trajectory,
+    findings: &mut Vec<Finding>,
+) {
+    for (joint, facts) in joints.iter().enumerate() {
+        let (mut still, mut all) = (0_usize, 0_usize);
+        for segment in &trajectory.segments {
+            let len = segment.time.len();
+            all += len;
+            still += segment.standstill[joint * len..(joint + 1) * len]
+                .iter()
+                .filter(|s| **s)
+                .count();
+        }
+        if still == 0 {
+            continue;
+        }
+        let share = 100.0 * still as f64 / all as f64;
+        let (severity, code, text) = if still == all {
+            (
+                Severity::Warning,
+                "joint_stands_still",
+                "does not move in this log".to_owned(),
+            )
+        } else {
+            (
+                Severity::Note,
+                "standstill",
+                format!("stands still in {share:.1} % of this log"),
+            )
+        };
+        findings.push(Finding::new(
+            severity,
+            code,
+            &log.name,
+            format!(
+                "joint `{}` {text}; its torque there is not used",
+                facts.name
+            ),
+            still as u64,
+        ));
+    }
+}

@@ -1,0 +1,409 @@
+//! Replaces every "auto" of the signal settings by a number that the training logs justify.
+
+use super::clock::even_interval;
+use super::cutoff::{JointSpectra, automatic, motion_band, spectra};
+use super::fir::{
+    MotionKernels, column_half_seconds, column_kernel, motion_half_seconds, noise_gain,
+};
+use super::prepare::{JointFacts, Prepared, prepare};
+use super::standstill::quantum;
+use super::{Auto, Pipeline, Recording, SignalSettings};
+use crate::error::{Error, Finding, Result, Severity};
+
+/// v_s where the pipeline is on and nothing is said, rad/s or m/s.
+const COULOMB_VELOCITY: f64 = 0.02;
+/// Motion filter's highest cut-off as a share of the log's rate.
+pub(crate) const MOTION_LIMIT: f64 = 0.45;
+/// Column filter's highest cut-off as a share of the log's rate: 2.5 f_c is then the rate itself.
+pub(crate) const COLUMN_LIMIT: f64 = 0.4;
+/// Kept rows that the longest segment must give at least.
+const FEWEST_ROWS: f64 = 10.0;
+
+fn setting(key: &str, problem: String, remedy: &str) -> Error {
+    Error::Setting {
+        key: key.into(),
+        problem,
+        remedy: remedy.into(),
+    }
+}
+
+/// See [`super::choose_pipeline`].
+pub(crate) fn choose(
+    joints: &[JointFacts],
+    logs: &[Recording],
+    settings: &SignalSettings,
+) -> Result<(Pipeline, Vec<Finding>)> {
+    check_settings(settings)?;
+    if logs.is_empty() {
+        return Err(Error::Refused {
+            problem: "no training log".into(),
+            remedy: "give at least one log".into(),
+        });
+    }
+    // What is wrong with single logs is said when they are aligned.
+    let mut unsaid = Vec::new();
+    if settings.cutoff_hz == Auto::Value(0.0) {
+        for log in logs {
+            prepare(joints, log, true, &mut unsaid)?;
+        }
+        return off(joints, logs, settings);
+    }
+    let mut prepared = Vec::with_capacity(logs.len());
+    for log in logs {
+        prepared.push(prepare(joints, log, false, &mut unsaid)?);
+    }
+    on(joints, logs, &prepared, settings)
+}
+
+fn check_settings(settings: &SignalSettings) -> Result<()> {
+    let positive = |key: &str, value: f64, zero: bool| {
+        if value.is_finite() && (value > 0.0 || zero && value == 0.0) {
+            return Ok(());
+        }
+        Err(setting(
+            key,
+            format!("{value} is out of range"),
+            "give a number above 0",
+        ))
+    };
+    if let Auto::Value(value) = settings.cutoff_hz {
+        positive("signal.cutoff_hz", value, true)?;
+    }
+    if let Auto::Value(value) = settings.rate_hz {
+        positive("signal.rate_hz", value, false)?;
+    }
+    settings.coulomb_velocity.map_or(Ok(()), |value| {
+        positive("library.coulomb_velocity", value, true)
+    })
+}
+
+fn unexcited(joints: &[JointFacts], still: &[bool]) -> Result<Vec<Finding>> {
+    let names = |wanted: bool| -> Vec<String> {
+        joints
+            .iter()
+            .zip(still)
+            .filter(|(_, s)| **s == wanted)
+            .map(|(j, _)| format!("`{}`", j.name))
+            .collect()
+    };
+    if names(false).is_empty() {
+        return Err(Error::Refused {
+            problem: format!(
+                "no excitation: every joint stands still in all training logs ({})",
+                names(true).join(", ")
+            ),
+            remedy: "record logs in which the joints move".into(),
+        });
+    }
+    Ok(joints
+        .iter()
+        .zip(still)
+        .filter(|(_, still)| **still)
+        .map(|(joint, _)| {
+            Finding::new(
+                Severity::Warning,
+                "joint_not_excited",
+                &joint.name,
+                format!(
+                    "joint `{}` stands still in all training logs: its own effects cannot be seen",
+                    joint.name
+                ),
+                0,
+            )
+        })
+        .collect())
+}
+
+/// Pipeline off: rows are the input rows, so motion has to be complete.
+fn off(
+    joints: &[JointFacts],
+    logs: &[Recording],
+    settings: &SignalSettings,
+) -> Result<(Pipeline, Vec<Finding>)> {
+    let mut still = vec![true; joints.len()];
+    for log in logs {
+        require_derivatives(joints, log)?;
+        for (joint, still) in still.iter_mut().enumerate() {
+            let moves = |values: &[f64]| values.iter().any(|v| v.is_finite() && *v != 0.0);
+            *still &= !log.joints[joint].qd.as_deref().is_some_and(moves);
+        }
+    }
+    // Poses without motion still tell gravity: only a log without any change is without excitation.
+    for log in logs {
+        for (joint, still) in still.iter_mut().enumerate() {
+            let q = &log.joints[joint].q;
+            *still &= q.iter().all(|v| !v.is_finite() || *v == q[0]);
+        }
+    }
+    let findings = unexcited(joints, &still)?;
+    let intervals: Vec<f64> = logs
+        .iter()
+        .filter_map(|log| even_interval(&log.time))
+        .collect();
+    let rate = intervals.iter().copied().fold(f64::NAN, f64::min);
+    let pipeline = Pipeline {
+        cutoff_hz: 0.0,
+        motion_cutoff_hz: 0.0,
+        rate_hz: if rate.is_finite() { 1.0 / rate } else { 0.0 },
+        coulomb_velocity: settings.coulomb_velocity.unwrap_or(0.0),
+        standstill_velocity: vec![0.0; joints.len()],
+    };
+    Ok((pipeline, findings))
+}
+
+/// With the filter off nothing is differentiated.
+pub(crate) fn require_derivatives(joints: &[JointFacts], log: &Recording) -> Result<()> {
+    for (channels, joint) in log.joints.iter().zip(joints) {
+        for (missing, what) in [
+            (channels.qd.is_none(), "velocity"),
+            (channels.qdd.is_none(), "acceleration"),
+        ] {
+            if missing {
+                return Err(Error::Log {
+                    log: log.name.clone(),
+                    problem: format!(
+                        "joint `{}` has no {what} and cutoff_hz = 0 differentiates nothing",
+                        joint.name
+                    ),
+                    remedy: "log it, or set [signal] cutoff_hz to \"auto\" or a number".into(),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Pipeline on.
+fn on(
+    joints: &[JointFacts],
+    logs: &[Recording],
+    prepared: &[Prepared],
+    settings: &SignalSettings,
+) -> Result<(Pipeline, Vec<Finding>)> {
+    let coulomb_velocity = settings.coulomb_velocity.unwrap_or(COULOMB_VELOCITY);
+    let lowest_rate = prepared
+        .iter()
+        .map(|p| 1.0 / p.interval)
+        .fold(f64::INFINITY, f64::min);
+    let seconds = |p: &Prepared| {
+        p.pieces
+            .iter()
+            .map(|piece| piece.time.len() as f64 * piece.interval)
+            .fold(0.0, f64::max)
+    };
+    let longest = prepared.iter().map(seconds).fold(0.0, f64::max);
+    let all: Vec<Vec<JointSpectra>> = prepared.iter().filter_map(spectra).collect();
+    if all.is_empty() {
+        return Err(Error::Log {
+            log: logs[0].name.clone(),
+            problem: format!(
+                "the longest stretch without a cut is {longest:.3} s, too short for a spectrum"
+            ),
+            remedy: "record at least some seconds without gaps, or set [signal] cutoff_hz = 0"
+                .into(),
+        });
+    }
+    let of_joint =
+        |joint: usize| -> Vec<&JointSpectra> { all.iter().map(|log| &log[joint]).collect() };
+    // A joint that only trembles must not choose the cut-off.
+    let mut moving: Vec<Vec<&JointSpectra>> = (0..joints.len())
+        .map(of_joint)
+        .filter(|logs| motion_band(logs).1 > COULOMB_VELOCITY)
+        .collect();
+    if moving.is_empty() {
+        moving = (0..joints.len()).map(of_joint).collect();
+    }
+    let cutoff = match settings.cutoff_hz {
+        Auto::Value(value) => value,
+        Auto::Auto => automatic(&moving, longest, lowest_rate),
+    };
+    let (rate, mut findings) = limits(logs, cutoff, longest, lowest_rate, settings)?;
+    let motion_cutoff = (4.0 * cutoff).min(MOTION_LIMIT * lowest_rate);
+    if motion_cutoff < 4.0 * cutoff {
+        findings.push(Finding::new(
+            Severity::Note,
+            "motion_filter_capped",
+            "",
+            format!(
+                "the motion filter's cut-off is {motion_cutoff:.3} Hz instead of 4 x {cutoff} Hz: the slowest log has only {lowest_rate:.3} Hz"
+            ),
+            0,
+        ));
+    }
+    let mut pipeline = Pipeline {
+        cutoff_hz: cutoff,
+        motion_cutoff_hz: motion_cutoff,
+        rate_hz: rate,
+        coulomb_velocity,
+        standstill_velocity: Vec::with_capacity(joints.len()),
+    };
+    let mut still = Vec::with_capacity(joints.len());
+    for (joint, facts) in joints.iter().enumerate() {
+        let resolved = velocity_resolution(
+            joint,
+            facts,
+            prepared,
+            &of_joint(joint),
+            &pipeline,
+            &mut findings,
+        );
+        let threshold = coulomb_velocity.max(resolved);
+        still.push(!moves(joint, prepared, threshold, cutoff));
+        pipeline.standstill_velocity.push(threshold);
+    }
+    findings.extend(unexcited(joints, &still)?);
+    let taps = column_kernel(cutoff, 1.0 / lowest_rate);
+    findings.push(Finding::new(
+        Severity::Note,
+        "pipeline",
+        "",
+        format!(
+            "columns and torque: symmetric FIR at {cutoff} Hz, {:.3} s to either side, white-noise gain {:.3}; motion: FIR at {motion_cutoff:.3} Hz, {:.3} s; rows at {rate} Hz",
+            column_half_seconds(cutoff),
+            noise_gain(&taps),
+            motion_half_seconds(motion_cutoff)
+        ),
+        0,
+    ));
+    Ok((pipeline, findings))
+}
+
+/// Whether a joint is anywhere displaced by more than `threshold` times half a period of the cut-off in that time.
+fn moves(joint: usize, prepared: &[Prepared], threshold: f64, cutoff: f64) -> bool {
+    prepared.iter().flat_map(|p| &p.pieces).any(|piece| {
+        let lag = ((0.5 / cutoff / piece.interval).round() as usize).max(1);
+        let least = threshold * lag as f64 * piece.interval;
+        let q = &piece.joints[joint].q;
+        q.iter()
+            .zip(q.iter().skip(lag))
+            .any(|(a, b)| (b - a).abs() > least)
+    })
+}
+
+/// Rate of kept rows, after checking that the filters fit the logs.
+fn limits(
+    logs: &[Recording],
+    cutoff: f64,
+    longest: f64,
+    lowest_rate: f64,
+    settings: &SignalSettings,
+) -> Result<(f64, Vec<Finding>)> {
+    let mut findings = Vec::new();
+    if cutoff > COLUMN_LIMIT * lowest_rate {
+        return Err(setting(
+            "signal.cutoff_hz",
+            format!(
+                "{cutoff} Hz is above {COLUMN_LIMIT} of the slowest log's rate of {lowest_rate:.3} Hz"
+            ),
+            &format!(
+                "give at most {:.3}, \"auto\", or 0 for no filter",
+                COLUMN_LIMIT * lowest_rate
+            ),
+        ));
+    }
+    let mut rate = match settings.rate_hz {
+        Auto::Value(value) => value,
+        Auto::Auto => 2.5 * cutoff,
+    };
+    if rate > lowest_rate * 1.001 {
+        findings.push(Finding::new(
+            Severity::Note,
+            "rate_capped",
+            "",
+            format!("rows are kept at the slowest log's rate of {lowest_rate:.3} Hz instead of {rate} Hz"),
+            0,
+        ));
+        rate = lowest_rate;
+    }
+    if rate < 2.0 * cutoff {
+        findings.push(Finding::new(
+            Severity::Warning,
+            "rows_alias",
+            "",
+            format!("rows at {rate} Hz are below twice the cut-off of {cutoff} Hz: torque between them folds into the estimates as noise"),
+            0,
+        ));
+    }
+    let needed = 2.0
+        * (column_half_seconds(cutoff)
+            + motion_half_seconds((4.0 * cutoff).min(MOTION_LIMIT * lowest_rate)))
+        + FEWEST_ROWS / rate;
+    if longest < needed {
+        return Err(Error::Log {
+            log: logs[0].name.clone(),
+            problem: format!(
+                "the longest stretch without a cut is {longest:.3} s; filters at {cutoff} Hz need {needed:.3} s for {FEWEST_ROWS} rows"
+            ),
+            remedy: "record longer, mend the gaps, raise [signal] cutoff_hz, or set it to 0".into(),
+        });
+    }
+    Ok((rate, findings))
+}
+
+/// Velocity that the encoder resolves after the motion filter; says what noise the derivatives carry.
+fn velocity_resolution(
+    joint: usize,
+    facts: &JointFacts,
+    prepared: &[Prepared],
+    spectra: &[&JointSpectra],
+    pipeline: &Pipeline,
+    findings: &mut Vec<Finding>,
+) -> f64 {
+    let pieces = || {
+        prepared
+            .iter()
+            .flat_map(|p| &p.pieces)
+            .map(move |piece| &piece.joints[joint])
+    };
+    let has_qd = pieces().all(|c| c.qd.is_some());
+    let has_qdd = pieces().all(|c| c.qdd.is_some());
+    let (mut velocity, mut acceleration, mut position) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for log in spectra {
+        let kernels = MotionKernels::new(pipeline.motion_cutoff_hz, 1.0 / log.rate);
+        let sd = log.source.0.noise_sd(log.rate);
+        let q_sd = log.position.noise_sd(log.rate);
+        position = position.max(q_sd);
+        velocity = velocity.max(match (has_qd, log.source.1) {
+            (true, 1) => sd * noise_gain(&kernels.smooth),
+            (true, _) => 0.0,
+            _ => q_sd * noise_gain(&kernels.first),
+        });
+        acceleration = acceleration.max(match log.source.1 {
+            0 => sd * noise_gain(&kernels.smooth),
+            1 => sd * noise_gain(&kernels.first),
+            _ => sd * noise_gain(&kernels.second),
+        });
+    }
+    if !has_qdd {
+        let source = if has_qd {
+            "the logged velocity"
+        } else {
+            "position, twice"
+        };
+        findings.push(Finding::new(
+            Severity::Note,
+            "derived_acceleration",
+            &facts.name,
+            format!(
+                "joint `{}`: acceleration is not logged and was derived from {source}, by the motion filter at {:.3} Hz; encoder noise of {position:.2e} leaves a noise of {velocity:.2e} in velocity and {acceleration:.2e} in acceleration (SI units, per sample)",
+                facts.name, pipeline.motion_cutoff_hz
+            ),
+            0,
+        ));
+    }
+    let step = quantum(pieces().map(|c| c.q.as_slice()));
+    let stepping = step.map_or(0.0, |step| 2.0 * pipeline.motion_cutoff_hz * step);
+    if let Some(step) = step.filter(|_| stepping > pipeline.coulomb_velocity) {
+        findings.push(Finding::new(
+            Severity::Warning,
+            "quantised_encoder",
+            &facts.name,
+            format!(
+                "joint `{}`: the encoder steps by {step:.3e}, so velocities below {stepping:.3e} per s cannot be told from standstill",
+                facts.name
+            ),
+            0,
+        ));
+    }
+    stepping.max(3.0 * velocity)
+}

@@ -1,0 +1,402 @@
+//! The clock of one log: which rows go on, where time is cut, and whether what is left ticks evenly.
+
+use super::Recording;
+use crate::error::{Error, Finding, Result, Severity};
+
+/// A step longer than this many median intervals is a gap: the log is cut there.
+const GAP: f64 = 5.0;
+/// Share of intervals' deviation (99 % of them) beyond which a jitter warning is given.
+const JITTER: f64 = 0.2;
+/// Stamps closer than this share of the median interval are one sample, seen twice.
+const CROWDED: f64 = 0.1;
+/// Share of NaN or infinite rows beyond which the log counts as degraded.
+const NOT_FINITE_LIMIT: f64 = 0.01;
+/// Share of contradicting duplicates beyond which the log counts as degraded.
+const CONTRADICTION_LIMIT: f64 = 0.001;
+/// Largest distance from an even grid, in intervals, that still counts as even.
+const EVEN: f64 = 1e-3;
+
+/// Rows of a log without a cut between them.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Run {
+    /// Ascending indices into the recording.
+    pub(crate) rows: Vec<usize>,
+}
+
+/// What [`read_clock`] found.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Clock {
+    /// In the log's order, none empty.
+    pub(crate) runs: Vec<Run>,
+    /// Median step, s.
+    pub(crate) interval: f64,
+}
+
+fn log_error(log: &Recording, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
+    Error::Log {
+        log: log.name.clone(),
+        problem: problem.into(),
+        remedy: remedy.into(),
+    }
+}
+
+/// All channels of a log with a name for messages.
+fn channels<'a>(log: &'a Recording, names: &[String]) -> Vec<(String, &'a [f64])> {
+    let mut all = vec![("time".to_owned(), log.time.as_slice())];
+    for (joint, name) in log.joints.iter().zip(names) {
+        all.push((format!("position of joint `{name}`"), &joint.q));
+        for (what, channel) in [
+            ("velocity", &joint.qd),
+            ("acceleration", &joint.qdd),
+            ("torque", &joint.tau),
+        ] {
+            if let Some(values) = channel {
+                all.push((format!("{what} of joint `{name}`"), values));
+            }
+        }
+    }
+    all
+}
+
+/// Checks shapes, drops rows that are not finite or repeated, cuts at steps back, gaps and dropped rows.
+///
+/// With `every_row` (pipeline off) repeated stamps stay and the unit of time is only doubted, not refused.
+///
+/// # Errors
+/// [`Error::Log`] if the log is shorter than `minimum` rows, a channel has another length or no finite value, no
+/// time passes, or the median step says that time is not in seconds.
+pub(crate) fn read_clock(
+    log: &Recording,
+    names: &[String],
+    minimum: usize,
+    every_row: bool,
+    findings: &mut Vec<Finding>,
+) -> Result<Clock> {
+    let samples = log.time.len();
+    let channels = channels(log, names);
+    for (name, values) in &channels {
+        if values.len() != samples {
+            return Err(log_error(
+                log,
+                format!("{name} has {} values, time has {samples}", values.len()),
+                "give every channel one value per row",
+            ));
+        }
+    }
+    if samples < minimum {
+        let word = if samples == 1 { "sample" } else { "samples" };
+        return Err(log_error(
+            log,
+            format!("{samples} {word}, needs at least {minimum}"),
+            "record a longer motion",
+        ));
+    }
+    for (name, values) in &channels {
+        if values.iter().all(|v| !v.is_finite()) {
+            return Err(log_error(
+                log,
+                format!("{name} is NaN or infinite in all {samples} rows"),
+                "map the channel to a column that has values, or leave it out",
+            ));
+        }
+    }
+    let (kept, dropped) = finite_rows(log, &channels, findings);
+    let interval = median_interval(log, &kept, every_row, findings)?;
+    let runs = cut(
+        log, &channels, &kept, &dropped, interval, every_row, findings,
+    );
+    Ok(Clock { runs, interval })
+}
+
+/// Rows whose every channel is finite, and for each whether rows were dropped right before it.
+fn finite_rows(
+    log: &Recording,
+    channels: &[(String, &[f64])],
+    findings: &mut Vec<Finding>,
+) -> (Vec<usize>, Vec<bool>) {
+    let samples = log.time.len();
+    let (mut kept, mut cut_before) = (Vec::with_capacity(samples), Vec::with_capacity(samples));
+    let mut per_channel = vec![0_usize; channels.len()];
+    let mut cut = false;
+    for row in 0..samples {
+        let mut finite = true;
+        for (count, (_, values)) in per_channel.iter_mut().zip(channels) {
+            if !values[row].is_finite() {
+                *count += 1;
+                finite = false;
+            }
+        }
+        if finite {
+            kept.push(row);
+            cut_before.push(cut);
+        }
+        cut = !finite;
+    }
+    let lost = samples - kept.len();
+    if lost > 0 {
+        let worst: Vec<String> = channels
+            .iter()
+            .zip(&per_channel)
+            .filter(|(_, count)| **count > 0)
+            .take(4)
+            .map(|((name, _), count)| format!("{name}: {count}"))
+            .collect();
+        let share = lost as f64 / samples as f64;
+        let severity = if share > NOT_FINITE_LIMIT {
+            Severity::Degraded
+        } else {
+            Severity::Warning
+        };
+        findings.push(Finding::new(
+            severity,
+            "not_finite_rows",
+            &log.name,
+            format!(
+                "{lost} of {samples} rows ({:.2} %) have NaN or infinite values ({}) and were dropped; the log is cut there",
+                100.0 * share,
+                worst.join(", ")
+            ),
+            lost as u64,
+        ));
+    }
+    (kept, cut_before)
+}
+
+/// Median of the steps that go forward.
+fn median_interval(
+    log: &Recording,
+    kept: &[usize],
+    every_row: bool,
+    findings: &mut Vec<Finding>,
+) -> Result<f64> {
+    let mut steps: Vec<f64> = kept
+        .windows(2)
+        .map(|pair| log.time[pair[1]] - log.time[pair[0]])
+        .filter(|step| *step > 0.0)
+        .collect();
+    if steps.is_empty() {
+        let stamp = kept.first().map_or(f64::NAN, |&row| log.time[row]);
+        return Err(log_error(
+            log,
+            format!("no time passes: every time stamp is {stamp}"),
+            "map the right time column, or give the sampling rate with --rate HZ",
+        ));
+    }
+    let middle = steps.len() / 2;
+    let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+    let interval = *median;
+    if (1e-5..0.5).contains(&interval) {
+        return Ok(interval);
+    }
+    let guess = [
+        ("milliseconds", 1e-3),
+        ("microseconds", 1e-6),
+        ("nanoseconds", 1e-9),
+    ]
+    .into_iter()
+    .find(|(_, unit)| (10.0..=1e5).contains(&(1.0 / (interval * unit))));
+    let (problem, remedy) = match guess {
+        Some((unit, size)) => (
+            format!(
+                "the median time step is {interval} s; the stamps look like {unit} ({:.6} Hz)",
+                1.0 / (interval * size)
+            ),
+            format!(
+                "convert the time column to seconds (divide by {:.0}), or give --rate HZ",
+                1.0 / size
+            ),
+        ),
+        None => (
+            format!(
+                "the median time step of {interval} s is implausible for a robot log (0.01 ms to 0.5 s)"
+            ),
+            "give time in seconds, or the sampling rate with --rate HZ".to_owned(),
+        ),
+    };
+    if every_row {
+        findings.push(Finding::new(
+            Severity::Warning,
+            "implausible_time_step",
+            &log.name,
+            format!("{problem}; {remedy}. With the filter off time is only copied"),
+            0,
+        ));
+        return Ok(interval);
+    }
+    Err(log_error(log, problem, remedy))
+}
+
+/// Cuts the kept rows into runs.
+fn cut(
+    log: &Recording,
+    channels: &[(String, &[f64])],
+    kept: &[usize],
+    cut_before: &[bool],
+    interval: f64,
+    every_row: bool,
+    findings: &mut Vec<Finding>,
+) -> Vec<Run> {
+    let (mut same, mut contradicting, mut crowded) = (0_u64, 0_u64, 0_u64);
+    let (mut back, mut gaps, mut longest) = (0_u64, 0_u64, 0.0_f64);
+    let mut runs = Vec::new();
+    let mut run = Run::default();
+    for (&row, &cut) in kept.iter().zip(cut_before) {
+        let Some(&last) = run.rows.last() else {
+            run.rows.push(row);
+            continue;
+        };
+        let step = log.time[row] - log.time[last];
+        if step == 0.0 && !every_row {
+            if channels
+                .iter()
+                .all(|(_, values)| values[row] == values[last])
+            {
+                same += 1;
+            } else {
+                contradicting += 1;
+            }
+            continue;
+        }
+        if step > 0.0 && step < CROWDED * interval && !every_row {
+            crowded += 1;
+            continue;
+        }
+        back += u64::from(step < 0.0);
+        let gap = step > GAP * interval;
+        if gap && !cut {
+            gaps += 1;
+            longest = longest.max(step);
+        }
+        if step < 0.0 || gap || cut {
+            runs.push(std::mem::take(&mut run));
+        }
+        run.rows.push(row);
+    }
+    runs.push(run);
+    runs.retain(|run| !run.rows.is_empty());
+
+    let mut say = |severity, code: &str, message: String, count| {
+        findings.push(Finding::new(severity, code, &log.name, message, count));
+    };
+    if same > 0 {
+        let text = format!(
+            "{same} rows repeat the stamp and all values of the row before and were dropped"
+        );
+        say(Severity::Note, "duplicate_rows", text, same);
+    }
+    if contradicting > 0 {
+        let share = contradicting as f64 / log.time.len() as f64;
+        let severity = if share > CONTRADICTION_LIMIT {
+            Severity::Degraded
+        } else {
+            Severity::Warning
+        };
+        let text = format!(
+            "{contradicting} rows ({:.3} %) repeat a stamp with other values; the first of each was kept: look at how the log was joined",
+            100.0 * share
+        );
+        say(severity, "contradicting_duplicates", text, contradicting);
+    }
+    if crowded > 0 {
+        let text = format!(
+            "{crowded} rows follow the row before by less than {:.0} % of the median step and were dropped: stamp at the source, not at arrival",
+            100.0 * CROWDED
+        );
+        say(Severity::Warning, "crowded_stamps", text, crowded);
+    }
+    if back > 0 {
+        let text = format!("time steps back {back} times; the log is cut there");
+        say(Severity::Warning, "time_steps_back", text, back);
+    }
+    if gaps > 0 {
+        let text = format!(
+            "{gaps} gaps longer than {GAP} median steps ({:.6} s), the longest {longest:.6} s; the log is cut there",
+            interval
+        );
+        say(Severity::Note, "gaps", text, gaps);
+    }
+    runs
+}
+
+/// The interval if the stamps are an even grid, or one that was rounded to decimals; else `None`.
+pub(crate) fn even_interval(time: &[f64]) -> Option<f64> {
+    let n = time.len();
+    if n < 2 {
+        return None;
+    }
+    let (mut interval, mut offset) = ((time[n - 1] - time[0]) / (n - 1) as f64, 0.0);
+    // Least-squares line through the stamps, in two rounds for rounding's sake.
+    let middle = (n - 1) as f64 / 2.0;
+    let spread = (n as f64) * ((n as f64).powi(2) - 1.0) / 12.0;
+    for _ in 0..2 {
+        let (mut sum, mut moment) = (0.0, 0.0);
+        for (i, t) in time.iter().enumerate() {
+            let rest = t - time[0] - offset - interval * i as f64;
+            sum += rest;
+            moment += rest * (i as f64 - middle);
+        }
+        interval += moment / spread;
+        offset += sum / n as f64 - moment / spread * middle;
+    }
+    let worst = time
+        .iter()
+        .enumerate()
+        .map(|(i, t)| (t - time[0] - offset - interval * i as f64).abs())
+        .fold(0.0, f64::max);
+    if worst <= EVEN * interval {
+        return Some(interval);
+    }
+    // Stamps printed with few decimals: the whole deviation is less than half a unit of the last one.
+    let quantum = (0..=9)
+        .map(|digits| 10.0_f64.powi(-digits))
+        .find(|quantum| {
+            time.iter().all(|t| {
+                let units = t / quantum;
+                (units - units.round()).abs() < 1e-6 * units.abs().max(1.0).sqrt()
+            })
+        })?;
+    (worst <= 0.51 * quantum && interval > 1.5 * quantum).then_some(interval)
+}
+
+/// Says how uneven a resampled run is.
+pub(crate) fn report_jitter(
+    log: &Recording,
+    runs: &[Run],
+    interval: f64,
+    resampled: u64,
+    findings: &mut Vec<Finding>,
+) {
+    let mut deviations: Vec<f64> = runs
+        .iter()
+        .flat_map(|run| run.rows.windows(2))
+        .map(|pair| ((log.time[pair[1]] - log.time[pair[0]]) / interval - 1.0).abs())
+        .collect();
+    if deviations.is_empty() || resampled == 0 {
+        return;
+    }
+    let beyond = deviations.iter().filter(|d| **d > JITTER).count();
+    let rank = (deviations.len() - 1) * 99 / 100;
+    let (_, &mut typical, _) = deviations.select_nth_unstable_by(rank, f64::total_cmp);
+    let largest = deviations.iter().copied().fold(0.0, f64::max);
+    let (severity, advice) = if typical > JITTER {
+        (
+            Severity::Warning,
+            "; stamp at the source for a better estimate",
+        )
+    } else {
+        (Severity::Note, "")
+    };
+    findings.push(Finding::new(
+        severity,
+        "resampled",
+        &log.name,
+        format!(
+            "the clock is uneven: 99 % of the steps are within {:.1} % of the median ({:.3} Hz), the largest is off by {:.0} %, {beyond} by more than {:.0} %; resampled by a cubic spline{advice}",
+            100.0 * typical,
+            1.0 / interval,
+            100.0 * largest,
+            100.0 * JITTER
+        ),
+        resampled,
+    ));
+}

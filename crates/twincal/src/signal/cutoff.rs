@@ -1,0 +1,137 @@
+//! The automatic cut-off: from the spectrum of the motion, with the encoder's noise in mind.
+//!
+//! 1. `f_m`, the frequency below which 99 % of the power of q̇ lies that stands clearly (10 times) above the noise floor of
+//!    q; per joint over all training logs, then the largest of the joints that move.
+//! 2. `f_c = max(5 Hz, 2 f_m)`. Inertial and gravity torques are products of motion, so they reach to 2 f_m and beyond;
+//!    below 5 Hz friction reversals of arms blur, and experts chose 5 Hz for slow machines too.
+//! 3. Lowered (not below 1.5 f_m) while the noise in q̈ would bias coefficients by more than a third of their standard
+//!    deviation. A regressor with noise-to-signal ratio r shrinks its coefficient by r² and gives it the relative
+//!    standard deviation r/√n, so the rule is `r √n ≤ 0.3` with n = 2.5 f_c T rows and r² = noise power of q̈ below f_c over power of q̈.
+//! 4. Raised so that the kernels' ends take at most a third of the longest segment; at most 0.11 of the log's rate, so that the
+//!    motion filter at 4 f_c fits below 0.45 of it.
+
+use super::prepare::Prepared;
+use super::spectrum::Spectrum;
+use std::f64::consts::PI;
+
+/// What f_c never falls below without reason, Hz.
+const USUAL_CUTOFF: f64 = 5.0;
+/// A bin counts as motion from this multiple of the noise floor.
+const CLEARLY: f64 = 10.0;
+/// Share of the velocity power below f_m.
+const SHARE: f64 = 0.99;
+/// r √n that is allowed.
+const ALLOWED_BIAS: f64 = 0.3;
+
+/// Spectra of one joint in one log.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct JointSpectra {
+    /// Position.
+    pub(crate) position: Spectrum,
+    /// What q̈ is made from: the spectrum of q, q̇ or q̈ and how often it is differentiated (2, 1, 0).
+    pub(crate) source: (Spectrum, i32),
+    /// Sampling rate, Hz.
+    pub(crate) rate: f64,
+    /// Seconds of data.
+    pub(crate) duration: f64,
+}
+
+/// Spectra of every joint of a log; `None` if the log is too short.
+pub(crate) fn spectra(prepared: &Prepared) -> Option<Vec<JointSpectra>> {
+    let pieces = &prepared.pieces;
+    let interval = prepared.interval;
+    let dof = pieces.first()?.joints.len();
+    let duration = pieces.iter().map(|p| p.time.len()).sum::<usize>() as f64 * interval;
+    (0..dof)
+        .map(|joint| {
+            let channels = || pieces.iter().map(move |p| &p.joints[joint]);
+            let position = Spectrum::welch(channels().map(|c| c.q.as_slice()), interval)?;
+            let qd = || channels().filter_map(|c| c.qd.as_deref());
+            let qdd = || channels().filter_map(|c| c.qdd.as_deref());
+            let source = match (
+                Spectrum::welch(qdd(), interval),
+                Spectrum::welch(qd(), interval),
+            ) {
+                (Some(spectrum), _) => (spectrum, 0),
+                (None, Some(spectrum)) => (spectrum, 1),
+                (None, None) => (position.clone(), 2),
+            };
+            Some(JointSpectra {
+                position,
+                source,
+                rate: 1.0 / interval,
+                duration,
+            })
+        })
+        .collect()
+}
+
+/// Frequency f_m and rms velocity of one joint over all logs.
+pub(crate) fn motion_band(logs: &[&JointSpectra]) -> (f64, f64) {
+    let mut bins: Vec<(f64, f64)> = Vec::new();
+    let total_time: f64 = logs.iter().map(|l| l.duration).sum();
+    for log in logs {
+        let spectrum = &log.position;
+        for (i, &density) in spectrum.density.iter().enumerate() {
+            // A running mean over five bins decides, so that single noise peaks do not.
+            let near = &spectrum.density[i.saturating_sub(2)..(i + 3).min(spectrum.density.len())];
+            if near.iter().sum::<f64>() > CLEARLY * spectrum.floor * near.len() as f64 {
+                let omega = 2.0 * PI * spectrum.frequency(i);
+                let power = (density - spectrum.floor).max(0.0) * omega * omega * spectrum.width;
+                bins.push((spectrum.frequency(i), power * log.duration / total_time));
+            }
+        }
+    }
+    bins.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = bins.iter().map(|b| b.1).sum();
+    let mut sum = 0.0;
+    let band = bins.iter().find(|(_, power)| {
+        sum += power;
+        sum >= SHARE * total
+    });
+    (band.map_or(0.0, |b| b.0), total.sqrt())
+}
+
+/// Noise power over signal power of q̈ below `cutoff`, pooled over logs; the signal is what lies below 3 f_m.
+fn noise_ratio(logs: &[&JointSpectra], cutoff: f64, band: f64) -> f64 {
+    let (mut noise, mut signal) = (0.0, 0.0);
+    for log in logs {
+        let (spectrum, order) = &log.source;
+        let power = 2 * order;
+        noise += log.duration * spectrum.floor * (2.0 * PI).powi(power) * cutoff.powi(power + 1)
+            / f64::from(power + 1);
+        let below = spectrum
+            .density
+            .iter()
+            .enumerate()
+            .take_while(|(i, _)| spectrum.frequency(*i) <= 3.0 * band)
+            .map(|(i, d)| {
+                (d - spectrum.floor).max(0.0) * (2.0 * PI * spectrum.frequency(i)).powi(power)
+            })
+            .sum::<f64>();
+        signal += log.duration * below * spectrum.width;
+    }
+    noise / signal
+}
+
+/// The rule at the top of this file. `moving[j]` lists the spectra of a joint that moves; the longest segment is in s.
+pub(crate) fn automatic(moving: &[Vec<&JointSpectra>], longest: f64, lowest_rate: f64) -> f64 {
+    let bands: Vec<f64> = moving.iter().map(|logs| motion_band(logs).0).collect();
+    let band = bands.iter().copied().fold(0.0, f64::max);
+    let mut cutoff = (2.0 * band).max(USUAL_CUTOFF);
+    let least = (1.5 * band).max(0.5);
+    let biased = |cutoff: f64| {
+        moving.iter().zip(&bands).any(|(logs, &band)| {
+            let rows = 2.5 * cutoff * logs.iter().map(|l| l.duration).sum::<f64>();
+            (noise_ratio(logs, cutoff, band) * rows).sqrt() > ALLOWED_BIAS
+        })
+    };
+    while cutoff > least && biased(cutoff) {
+        cutoff *= 0.95;
+    }
+    // 2 · (2.44 + 3.02/4) / f_c of borders in at most a third of the segment.
+    let cutoff = cutoff.max(19.2 / longest).min(0.11 * lowest_rate);
+    // Two digits are enough and make the same choice for logs that differ in the last bit.
+    let digits = 10.0_f64.powf(1.0 - cutoff.log10().floor());
+    (cutoff * digits).round() / digits
+}
