@@ -1,0 +1,321 @@
+//! Arrows go one way: a module of the core uses only modules whose `mod` line stands above its own in lib.rs, and no part
+//! of the core touches files, clocks, the environment or the terminal.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What the core may not name outside tests.
+const FORBIDDEN: [&str; 14] = [
+    "std::fs",
+    "std::io",
+    "std::env",
+    "std::net",
+    "std::process",
+    "std::time",
+    "std::thread::sleep",
+    "Instant::now",
+    "SystemTime",
+    "println!",
+    "print!",
+    "eprintln!",
+    "eprint!",
+    "dbg!",
+];
+
+/// One source file with comments and literals blanked out.
+struct Source {
+    path: PathBuf,
+    /// Top-level module that it belongs to; `lib` for lib.rs itself.
+    module: String,
+    /// How many `super::` lead from its top to the crate's root.
+    depth: usize,
+    code: String,
+    /// The same without `#[cfg(test)]` items; empty for files that are tests as a whole.
+    shipped: String,
+}
+
+#[test]
+fn modules_use_only_what_stands_above_them() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let order = module_order(&blanked(&fs::read_to_string(root.join("lib.rs")).unwrap()));
+    assert!(order.len() > 10, "lib.rs lists {} modules", order.len());
+    let sources = sources(&root);
+    assert!(sources.len() > order.len(), "{} files", sources.len());
+    let mut arrows = Vec::new();
+    for source in sources.iter().filter(|source| source.module != "lib") {
+        let own = order.iter().position(|name| *name == source.module);
+        let own =
+            own.unwrap_or_else(|| panic!("{}: its module is not in lib.rs", source.path.display()));
+        for used in uses(&source.code, source.depth) {
+            if order
+                .iter()
+                .position(|name| *name == used)
+                .is_some_and(|place| place > own)
+            {
+                arrows.push(format!(
+                    "{}: `{}` uses `{used}`, which stands below it",
+                    source.path.display(),
+                    source.module
+                ));
+            }
+        }
+    }
+    assert!(
+        arrows.is_empty(),
+        "{} arrows against the order of lib.rs:\n{}",
+        arrows.len(),
+        arrows.join("\n")
+    );
+}
+
+#[test]
+fn the_core_touches_no_outside_world() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut found = Vec::new();
+    for source in sources(&root) {
+        for name in forbidden(&source.shipped) {
+            found.push(format!("{}: {name}", source.path.display()));
+        }
+    }
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+fn the_reader_of_sources_sees_what_it_should() {
+    let text = r##"
+        // crate::comment is no use, println! neither
+        use crate::first::{Thing, Other};
+        use crate::{second, third::Deep, fourth::{A, crate_b}};
+        fn f<'a>(x: &'a str) -> char { let s = "crate::string \" println!"; let r = r#"crate::raw"#; '"' }
+        /* crate::block /* nested */ */
+        fn g() { super::fifth::call(); super::super::sixth::call(); super::no(); }
+        #[cfg(test)]
+        mod tests { use crate::seventh; fn h() { println!("}"); } }
+        fn after() { std::fs::read("x"); }
+    "##;
+    let code = blanked(text);
+    assert_eq!(
+        uses(&code, 1),
+        [
+            "fifth", "first", "fourth", "no", "second", "seventh", "sixth", "third"
+        ]
+    );
+    assert_eq!(
+        uses(&code, 2),
+        ["first", "fourth", "second", "seventh", "sixth", "third"]
+    );
+    assert_eq!(forbidden(&without_tests(&code)), ["std::fs"]);
+    assert_eq!(forbidden(&code), ["std::fs", "println!"]);
+    assert_eq!(
+        module_order("pub mod a;\nmod b;\npub(crate) mod c;\n"),
+        ["a", "b", "c"]
+    );
+}
+
+/// Every file below `root`; a file that is declared under `#[cfg(test)]` ships nothing.
+fn sources(root: &Path) -> Vec<Source> {
+    let mut folders = vec![root.to_path_buf()];
+    let mut sources = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                let inside = path.strip_prefix(root).unwrap().with_extension("");
+                let mut parts: Vec<String> = inside
+                    .components()
+                    .map(|part| part.as_os_str().to_string_lossy().into_owned())
+                    .collect();
+                parts.retain(|part| part != "mod");
+                let code = blanked(&fs::read_to_string(&path).unwrap());
+                let is_test = parts.iter().any(|part| part.ends_with("tests"));
+                let shipped = if is_test {
+                    String::new()
+                } else {
+                    without_tests(&code)
+                };
+                sources.push(Source {
+                    path,
+                    module: parts[0].clone(),
+                    depth: parts.len(),
+                    code,
+                    shipped,
+                });
+            }
+        }
+    }
+    sources.sort_by(|a, b| a.path.cmp(&b.path));
+    sources
+}
+
+fn module_order(lib: &str) -> Vec<String> {
+    let declared = |line: &str| {
+        let line = line.trim().strip_suffix(';')?;
+        let name = line
+            .strip_prefix("mod ")
+            .or_else(|| line.split_once(") mod ").map(|pair| pair.1));
+        name.or_else(|| line.strip_prefix("pub mod "))
+            .map(str::to_owned)
+    };
+    lib.lines().filter_map(declared).collect()
+}
+
+fn forbidden(code: &str) -> Vec<&'static str> {
+    let whole = |name: &&str| {
+        let starts_word =
+            |at: usize| !code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_');
+        code.match_indices(*name).any(|(at, _)| starts_word(at))
+    };
+    FORBIDDEN.into_iter().filter(whole).collect()
+}
+
+/// Names that follow `crate::`, or as many `super::` as reach the crate's root; sorted.
+fn uses(code: &str, depth: usize) -> Vec<String> {
+    let mut names = Vec::new();
+    for (at, _) in code.match_indices("crate::") {
+        if !code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == '$') {
+            heads(&code[at + "crate::".len()..], &mut names);
+        }
+    }
+    let chain = "super::".repeat(depth);
+    for (at, _) in code.match_indices(&chain) {
+        heads(
+            code[at + chain.len()..].trim_start_matches("super::"),
+            &mut names,
+        );
+    }
+    names.sort();
+    names.dedup();
+    names
+}
+
+/// The first name of a path, or of each path in a `{…}` list.
+fn heads(rest: &str, names: &mut Vec<String>) {
+    let word = |text: &str| -> String {
+        text.chars()
+            .take_while(|c| c.is_alphanumeric() || *c == '_')
+            .collect()
+    };
+    let Some(list) = rest.strip_prefix('{') else {
+        names.push(word(rest));
+        return;
+    };
+    let (mut level, mut start) = (1, 0);
+    for (at, c) in list.char_indices() {
+        level += match c {
+            '{' => 1,
+            '}' => -1,
+            _ => 0,
+        };
+        if level == 0 || (level == 1 && c == ',') {
+            names.push(word(list[start..at].trim()));
+            start = at + 1;
+        }
+        if level == 0 {
+            break;
+        }
+    }
+    names.retain(|name| !name.is_empty());
+}
+
+/// Code without its `#[cfg(test)]` items (to the end of their block or their semicolon).
+fn without_tests(code: &str) -> String {
+    let mut kept = String::new();
+    let mut rest = code;
+    while let Some(at) = rest.find("#[cfg(test)]") {
+        kept.push_str(&rest[..at]);
+        let item = &rest[at..];
+        let mut level = 0;
+        let end = item.char_indices().find(|&(_, c)| {
+            level += match c {
+                '{' => 1,
+                '}' => -1,
+                _ => 0,
+            };
+            level == 0 && (c == '}' || c == ';')
+        });
+        rest = end.map_or("", |(end, c)| &item[end + c.len_utf8()..]);
+    }
+    kept + rest
+}
+
+/// The text with comments, strings and character literals replaced by nothing.
+fn blanked(text: &str) -> String {
+    let mut code = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(c) = rest.chars().next() {
+        let skip = if rest.starts_with("//") {
+            rest.find('\n').unwrap_or(rest.len())
+        } else if rest.starts_with("/*") {
+            block_comment(rest)
+        } else if c == '"' {
+            quoted(rest, '"')
+        } else if let Some(hashes) = raw_string(&code, rest) {
+            let close = format!("\"{}", "#".repeat(hashes));
+            let body = hashes + 2;
+            rest[body..]
+                .find(&close)
+                .map_or(rest.len(), |at| body + at + close.len())
+        } else if c == '\'' && is_character(rest) {
+            quoted(rest, '\'')
+        } else {
+            code.push(c);
+            rest = &rest[c.len_utf8()..];
+            continue;
+        };
+        rest = &rest[skip..];
+    }
+    code
+}
+
+/// Number of hashes if a raw string starts here.
+fn raw_string(before: &str, rest: &str) -> Option<usize> {
+    let body = rest.strip_prefix('r')?;
+    let hashes = body.len() - body.trim_start_matches('#').len();
+    let fresh = !before.ends_with(|c: char| c.is_alphanumeric() || c == '_');
+    (fresh && body[hashes..].starts_with('"')).then_some(hashes)
+}
+
+/// A character literal and not a lifetime.
+fn is_character(rest: &str) -> bool {
+    let mut after = rest.chars().skip(1);
+    let first = after.next();
+    first == Some('\\') || after.next() == Some('\'')
+}
+
+/// Length of a literal with escapes, both quotes included.
+fn quoted(rest: &str, quote: char) -> usize {
+    let mut escaped = false;
+    for (at, c) in rest.char_indices().skip(1) {
+        if escaped {
+            escaped = false;
+        } else if c == '\\' {
+            escaped = true;
+        } else if c == quote {
+            return at + 1;
+        }
+    }
+    rest.len()
+}
+
+/// Length of a comment that may hold others.
+fn block_comment(rest: &str) -> usize {
+    let mut level = 0;
+    let mut at = 0;
+    while at < rest.len() {
+        if rest[at..].starts_with("/*") {
+            level += 1;
+            at += 2;
+        } else if rest[at..].starts_with("*/") {
+            level -= 1;
+            at += 2;
+            if level == 0 {
+                return at;
+            }
+        } else {
+            at += rest[at..].chars().next().map_or(1, char::len_utf8);
+        }
+    }
+    rest.len()
+}
