@@ -1,7 +1,30 @@
 //! The candidates: one flat list of named columns (paper eq. 2–4, method sections 2 and 3).
+//!
+//! ```text
+//! text or family → φ(q, q̇) → D(φ) exactly → nulls and aliases out → one tape for all columns and joints
+//! ```
+//! One file per family: `viscous.rs` is the shortest, copy it to add one.
 
-use crate::error::{Finding, Result};
-use crate::robot::{Motion, Robot};
+mod expression;
+mod euler_lagrange;
+mod candidate;
+mod viscous;
+mod coulomb;
+mod offset;
+mod motor_inertia;
+mod user;
+mod generic;
+mod aliases;
+mod words;
+mod status;
+mod library;
+#[cfg(test)]
+mod tests;
+
+pub use expression::Scratch;
+pub use library::Library;
+pub use status::Status;
+
 use serde::{Deserialize, Serialize};
 
 /// Which family a term belongs to; each family has its own Beta–Binomial inclusion prior.
@@ -22,27 +45,15 @@ pub enum Family {
     MotorInertia,
 }
 
-/// Whether a term is a column, and if not, why.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Status {
-    /// It is a column of the regression.
-    Candidate,
-    /// Its torque image is a combination of the named terms.
-    AliasOf(String),
-    /// A total time derivative: torque image 0.
-    NullLagrangian,
-    /// Zero on all data.
-    ZeroColumn,
-}
-
 /// One candidate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Term {
-    /// Name as in result.json.
+    /// Name as in result.json: the user's expression verbatim, a generic expression, or `<joint>.viscous`,
+    /// `<joint>.coulomb`, `<joint>.offset`, `<joint>.motor_inertia`.
     pub name: String,
     /// Family.
     pub family: Family,
-    /// Unit of its coefficient, e.g. `kg·m²`.
+    /// Unit of its coefficient, e.g. `kg·m²`: J divided by the unit of the expression.
     pub unit: String,
     /// Column or not.
     pub status: Status,
@@ -51,7 +62,8 @@ pub struct Term {
 /// `[library]`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct LibrarySettings {
-    /// User expressions.
+    /// The user's expressions in ΔL: `+ - * / ^`, `sin cos tan exp log sqrt sinh cosh tanh atan`, `pi`, numbers,
+    /// q1…qn and qd1…qdn.
     pub terms: Vec<String>,
     /// Built-in generic family; `None`: on up to 3 joints.
     pub generic: Option<bool>,
@@ -65,39 +77,4 @@ pub struct LibrarySettings {
     pub offset: bool,
     /// Motor inertia per joint.
     pub motor_inertia: bool,
-}
-
-/// Ordered terms for one robot, ready to be evaluated. Column k of the regression is the k-th term whose status is
-/// [`Status::Candidate`].
-#[derive(Debug, Clone)]
-pub struct Library {
-    _private: (),
-}
-
-impl Library {
-    /// Config terms, generic, viscous, coulomb, offset, motor inertia; nulls and aliases marked.
-    pub fn propose(_robot: &Robot, _settings: &LibrarySettings) -> Result<(Self, Vec<Finding>)> {
-        todo!()
-    }
-    /// All terms, dropped ones included, in order.
-    pub fn terms(&self) -> &[Term] {
-        todo!()
-    }
-    /// Index in `terms()` of each column.
-    pub fn columns(&self) -> &[usize] {
-        todo!()
-    }
-    /// Columns that are structurally non-zero on `joint`, ascending.
-    pub fn columns_of_joint(&self, _joint: usize) -> &[usize] {
-        todo!()
-    }
-    /// Marks columns as [`Status::ZeroColumn`] (data-dependent) and drops them.
-    pub fn without_columns(&self, _columns: &[usize]) -> Self {
-        todo!()
-    }
-    /// Evaluates every column on every joint where it is structurally non-zero: for joint j and the i-th entry of
-    /// `columns_of_joint(j)`, `out[j][i * motion.len + sample]`. N·m per unit of β.
-    pub fn evaluate(&self, _motion: Motion<'_>, _out: &mut [Vec<f64>]) {
-        todo!()
-    }
 }

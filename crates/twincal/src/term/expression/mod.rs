@@ -1,0 +1,15 @@
+//! Expressions: text → hash-consed graph → derivatives → instructions over blocks of samples.
+
+mod bounds;
+mod derivative;
+mod dimension;
+mod graph;
+mod parse;
+mod tape;
+
+pub(crate) use bounds::{Bounded, bounded_values};
+pub(crate) use dimension::{Dimension, dimensions};
+pub(crate) use graph::{Function, Graph, Id, Node, Variable};
+pub(crate) use parse::parse;
+pub use tape::Scratch;
+pub(crate) use tape::{Slot, Tape};

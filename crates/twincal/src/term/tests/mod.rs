@@ -1,0 +1,57 @@
+//! Tests of the whole road from text to columns.
+
+mod action;
+mod columns;
+mod judgement;
+mod parser;
+mod sympy;
+
+use super::candidate::Joint;
+use super::{Library, LibrarySettings, Status};
+use crate::error::{Finding, Result};
+
+/// Joints `joint1`…; a slider where `slides` says so.
+fn joints(slides: &[bool]) -> Vec<Joint> {
+    let joint = |(index, &slides)| Joint {
+        index,
+        name: format!("joint{}", index + 1),
+        slides,
+    };
+    slides.iter().enumerate().map(joint).collect()
+}
+
+/// Only these expressions.
+fn only(terms: &[&str]) -> LibrarySettings {
+    LibrarySettings {
+        terms: terms.iter().map(|&term| term.to_owned()).collect(),
+        generic: Some(false),
+        ..LibrarySettings::default()
+    }
+}
+
+/// Every built-in family, and these expressions.
+fn all(terms: &[&str]) -> LibrarySettings {
+    let mut settings = only(terms);
+    settings.generic = Some(true);
+    (
+        settings.viscous,
+        settings.coulomb,
+        settings.offset,
+        settings.motor_inertia,
+    ) = (true, true, true, true);
+    settings
+}
+
+/// A library for `n` hinges with parallel axes.
+fn planar(n: usize, settings: &LibrarySettings) -> Result<(Library, Vec<Finding>)> {
+    Library::build(&joints(&vec![false; n]), true, settings)
+}
+
+fn status_of<'a>(library: &'a Library, name: &str) -> &'a Status {
+    &library
+        .terms()
+        .iter()
+        .find(|term| term.name == name)
+        .unwrap_or_else(|| panic!("no term {name}"))
+        .status
+}
