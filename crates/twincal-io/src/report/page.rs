@@ -115,7 +115,8 @@ fn gather<'a>(
         residual_state: figures::residual_state::figure(joints),
         autocorrelation: figures::autocorrelation::figure(calibration, joints),
         coverage: figures::coverage::figure(&validation.coverage_levels, independent),
-        pit: figures::pit::figure(&pit, independent),
+        // Traces may be thinned: then there are fewer values than rows.
+        pit: figures::pit::figure(&pit, independent.min(pit.len() as f64)),
         sensitivity: figures::sensitivity::figure(terms),
         sensitive: text::list(&sensitive.collect::<Vec<_>>()),
         scores: tables::scores(&validation.filtered, joints),

@@ -97,8 +97,12 @@ pub(in crate::report) fn others(joint: &Joint<'_>, most: usize) -> Option<Figure
 }
 
 fn scores(joint: &Joint<'_>, trace: &Trace) -> String {
+    let thinned = match trace.step {
+        0 | 1 => String::new(),
+        step => format!(", from one row in {step}"),
+    };
     format!(
-        "{} — error (RMSE) {} → {} {}",
+        "{} — error (RMSE) {} → {} {}{thinned}",
         trace.log,
         number(rmse(trace, &trace.nominal), 3),
         number(rmse(trace, &trace.calibrated), 3),
@@ -293,6 +297,16 @@ mod tests {
         for n in [0, 1, 2, 40] {
             assert_eq!(worst_window(&trace(n, 20.0)), 0..n);
         }
+    }
+
+    #[test]
+    fn a_thinned_trace_says_so() {
+        let calibration = crate::report::fixture::two_joints();
+        let joints = crate::report::view::joints(&calibration);
+        let mut trace = joints[0].traces[0].clone();
+        assert!(scores(&joints[0], &trace).ends_with("N·m"));
+        trace.step = 12;
+        assert!(scores(&joints[0], &trace).ends_with("N·m, from one row in 12"));
     }
 
     #[test]
