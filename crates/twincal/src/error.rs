@@ -107,6 +107,12 @@ impl Finding {
         message: impl Into<String>,
         count: u64,
     ) -> Self {
-        Self { code: code.into(), severity, subject: subject.into(), message: message.into(), count }
+        Self {
+            code: code.into(),
+            severity,
+            subject: subject.into(),
+            message: message.into(),
+            count,
+        }
     }
 }

@@ -17,6 +17,7 @@ pub mod signal;
 pub mod term;
 pub mod rows;
 pub mod gram;
+pub mod observations;
 pub mod prior;
 pub mod posterior;
 pub mod likelihood;

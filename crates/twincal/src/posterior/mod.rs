@@ -1,5 +1,6 @@
 //! What is known after the data: models, inclusion probabilities, coefficients, draws (method section 7).
 
+mod covariance;
 pub mod draws;
 pub mod mixture;
 pub mod random;

@@ -1,29 +1,12 @@
-//! The whole road in one function that reads like the paper.
+//! What a calibration returns: plain values that can be printed, compared and written.
 
 use crate::error::Finding;
-use crate::infer::InferenceSettings;
-use crate::likelihood::{JointNoise, NoiseSettings};
-use crate::prior::PriorSettings;
-use crate::signal::SignalSettings;
-use crate::term::{LibrarySettings, Term};
+use crate::likelihood::{JointNoise, NoiseModel};
+use crate::prior::Inclusion;
+use crate::term::{Family, Term};
 use crate::twin::Twin;
 use crate::validate::Validation;
 use serde::{Deserialize, Serialize};
-
-/// Everything a calibration can be told; each field is a table of `twincal.toml`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CalibrationSettings {
-    /// `[library]`.
-    pub library: LibrarySettings,
-    /// `[signal]`.
-    pub signal: SignalSettings,
-    /// `[prior]`.
-    pub prior: PriorSettings,
-    /// `[noise]`.
-    pub noise: NoiseSettings,
-    /// `[inference]`.
-    pub inference: InferenceSettings,
-}
 
 /// One row of `result.json` `terms[]`; numbers are `None` for dropped terms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -44,12 +27,76 @@ pub struct TermSummary {
     pub conditional_mean: Option<f64>,
     /// sd of β | y, included.
     pub conditional_sd: Option<f64>,
-    /// PIP ≥ 0.5.
+    /// PIP ≥ 0.5 and seen by the data.
     pub selected: bool,
+    /// What the data say about the term; `None` for dropped terms.
+    pub verdict: Option<Verdict>,
+    /// rms of the column over all rows (method section 6), N·m per unit of β.
+    pub column_rms: Option<f64>,
     /// PIP with the slab variance × 0.1, 1, 10 and expected terms × 0.5, 2 (method section 6).
     pub pip_sensitivity: Vec<f64>,
     /// One sentence in physical words, e.g. "viscous friction on elbow: +0.12 ± 0.01 N·m·s/rad".
     pub words: String,
+}
+
+/// What the data say about a candidate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// PIP ≥ 0.5, beyond Monte Carlo error.
+    Found,
+    /// PIP < 0.5, beyond Monte Carlo error.
+    Absent,
+    /// Between 0.2 and 0.8, or within 3 Monte Carlo standard errors of 0.5.
+    Undecided,
+    /// The data leave the coefficient as wide as the prior (posterior sd > 0.9 prior sd).
+    NotSeen,
+}
+
+/// Terms that these data cannot tell apart.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Group {
+    /// Names of the terms.
+    pub members: Vec<String>,
+    /// Probability that at least one of them is in.
+    pub pip: f64,
+}
+
+/// How an estimate moves when the cut-off does (method section 1).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SweepPoint {
+    /// Cut-off, Hz.
+    pub cutoff_hz: f64,
+    /// E[β | y] of every column at that cut-off.
+    pub mean: Vec<f64>,
+}
+
+/// The prior as used.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PriorUsed {
+    /// v per family, in the order of the library.
+    pub scaled_variance: Vec<(Family, f64)>,
+    /// True if v was learned.
+    pub learned: bool,
+    /// Inclusion.
+    pub inclusion: Inclusion,
+    /// a0.
+    pub shape: f64,
+    /// b0, (N·m)².
+    pub scale: f64,
+}
+
+/// The likelihood as used.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LikelihoodUsed {
+    /// Model.
+    pub model: NoiseModel,
+    /// c; 1 unless tempered.
+    pub tempering: f64,
+    /// `(c, left-out log score)` of every multiplier tried.
+    pub tempering_scores: Vec<(f64, f64)>,
+    /// Rounds of the plug-in iteration.
+    pub rounds: usize,
 }
 
 /// What became of one log.
@@ -91,10 +138,14 @@ pub struct Calibration {
     pub terms: Vec<TermSummary>,
     /// Noise per joint (also in the twin).
     pub noise: Vec<JointNoise>,
-    /// Multiplier c of the tempered likelihood; 1 otherwise.
-    pub tempering: f64,
-    /// v as used, per column family or one value.
-    pub scaled_variance: f64,
+    /// Prior as used.
+    pub prior: PriorUsed,
+    /// Likelihood as used.
+    pub likelihood: LikelihoodUsed,
+    /// Terms that these data cannot tell apart.
+    pub groups: Vec<Group>,
+    /// Estimates at 0.7, 1 and 1.4 times the cut-off; empty with the filter off.
+    pub sweep: Vec<SweepPoint>,
     /// Held-out scores.
     pub validation: Validation,
     /// Normalised residual autocorrelation at lags 0..=20 rows: entries 2j and 2j+1 are joint j before and after calibration.

@@ -1,0 +1,256 @@
+//! The logs of a calibration as rows, with what was read, dropped and masked.
+
+use super::refuse;
+use super::result::LogSummary;
+use crate::error::{Finding, Result, Severity};
+use crate::observations::{Observations, observe};
+use crate::robot::Robot;
+use crate::rows::{RowSignal, visit_rows};
+use crate::signal::{Pipeline, Recording, Trajectory, align};
+use crate::term::Library;
+
+/// A column whose root mean square is below this share of the largest of its joints' torque is zero on these data.
+const ZERO: f64 = 1e-12;
+/// Rows per column of the largest joint below which nothing is fitted (case 7).
+const ROWS_PER_COLUMN: usize = 3;
+
+/// One log, ready.
+pub(super) struct Log {
+    pub(super) trajectory: Trajectory,
+    pub(super) observations: Observations,
+    pub(super) summary: LogSummary,
+}
+
+/// All logs of a calibration.
+pub(super) struct Data {
+    pub(super) fit: Vec<Log>,
+    pub(super) heldout: Vec<Log>,
+    pub(super) findings: Vec<Finding>,
+}
+
+impl Data {
+    /// Aligns and filters every log.
+    pub(super) fn read(
+        robot: &Robot,
+        library: &Library,
+        pipeline: &Pipeline,
+        logs: &[Recording],
+        heldout: &[Recording],
+    ) -> Result<Self> {
+        let mut findings = Vec::new();
+        let mut read = |logs: &[Recording], role: &str| -> Result<Vec<Log>> {
+            logs.iter()
+                .map(|recording| {
+                    let (trajectory, mut more) = align(robot, recording, pipeline)?;
+                    findings.append(&mut more);
+                    let observations = observe(robot, library, pipeline, &trajectory)?;
+                    let summary = summary(robot, recording, role, &trajectory, &observations);
+                    Ok(Log {
+                        trajectory,
+                        observations,
+                        summary,
+                    })
+                })
+                .collect()
+        };
+        let fit = read(logs, "fit")?;
+        let heldout = read(heldout, "heldout")?;
+        Ok(Self {
+            fit,
+            heldout,
+            findings,
+        })
+    }
+
+    /// Drops the columns that are zero on all fit logs, e.g. of joints that never move; returns their indices.
+    pub(super) fn drop_zero_columns(&mut self, library: Library) -> (Library, Vec<usize>) {
+        let mut square = vec![0.0_f64; library.columns().len()];
+        for log in &self.fit {
+            let len = log.observations.len();
+            for joint in &log.observations.joints {
+                for (i, &column) in joint.columns.iter().enumerate() {
+                    let values = &joint.x[i * len..(i + 1) * len];
+                    square[column] += values
+                        .iter()
+                        .zip(&joint.standstill)
+                        .filter(|(_, still)| !**still)
+                        .map(|(x, _)| x * x)
+                        .sum::<f64>();
+                }
+            }
+        }
+        let largest = square.iter().copied().fold(0.0, f64::max);
+        let zero: Vec<usize> = (0..square.len())
+            .filter(|&k| square[k] <= ZERO * ZERO * largest)
+            .collect();
+        for &column in &zero {
+            let name = &library.terms()[library.columns()[column]].name;
+            self.findings.push(Finding::new(
+                Severity::Warning,
+                "zero_column",
+                name.clone(),
+                format!("term `{name}` has no torque on any row of these logs and was left out: its joints do not move"),
+                0,
+            ));
+        }
+        for log in self.fit.iter_mut().chain(&mut self.heldout) {
+            log.observations.drop_columns(&zero);
+        }
+        (library.without_columns(&zero), zero)
+    }
+
+    /// Refuses a question with fewer rows than it needs.
+    pub(super) fn require_enough(&self, robot: &Robot) -> Result<()> {
+        let names = robot.joint_names();
+        let (mut rows, mut columns, mut culprit) = (0, 0, 0);
+        for joint in 0..names.len() {
+            let kept: u64 = self.fit.iter().map(|log| log.summary.rows[joint]).sum();
+            rows = rows.max(kept as usize);
+            let count = self
+                .fit
+                .first()
+                .map_or(0, |log| log.observations.joints[joint].columns.len());
+            if count > columns {
+                (columns, culprit) = (count, joint);
+            }
+        }
+        if rows < ROWS_PER_COLUMN * columns.max(1) {
+            return Err(refuse(
+                format!(
+                    "the logs give {rows} rows, fewer than {ROWS_PER_COLUMN} × the {columns} candidate columns of joint `{}`",
+                    names[culprit]
+                ),
+                "log longer, raise signal.cutoff_hz, or ask for fewer candidates ([library])",
+            ));
+        }
+        Ok(())
+    }
+
+    /// sd per joint of the torque outside the filter's band, from the raw residual of the fit logs; 0 with the filter off.
+    pub(super) fn out_of_band(
+        &self,
+        robot: &Robot,
+        library: &Library,
+        pipeline: &Pipeline,
+        beta: &[f64],
+    ) -> Result<Vec<f64>> {
+        let dof = robot.dof();
+        if pipeline.cutoff_hz == 0.0 {
+            return Ok(vec![0.0; dof]);
+        }
+        let (mut raw, mut in_band) = (vec![(0.0, 0.0); dof], vec![(0.0, 0.0); dof]);
+        for log in &self.fit {
+            visit_rows(
+                robot,
+                library,
+                pipeline,
+                &log.trajectory,
+                RowSignal::Raw,
+                &mut |block| {
+                    for (joint, rows) in block.joints.iter().enumerate() {
+                        let mut residual: Vec<f64> = rows
+                            .measured
+                            .iter()
+                            .zip(rows.nominal)
+                            .map(|(m, n)| m - n)
+                            .collect();
+                        for (i, &column) in rows.columns.iter().enumerate() {
+                            let x = &rows.x[i * rows.stride..i * rows.stride + block.len];
+                            residual
+                                .iter_mut()
+                                .zip(x)
+                                .for_each(|(r, x)| *r -= beta[column] * x);
+                        }
+                        add_squares(&mut raw[joint], &residual, rows.standstill);
+                    }
+                    Ok(())
+                },
+            )?;
+            let whole = log.observations.whole();
+            for (joint, sum) in in_band.iter_mut().enumerate() {
+                let residual = whole.residual(joint, beta, 0..log.observations.len());
+                add_squares(sum, &residual, &log.observations.joints[joint].standstill);
+            }
+        }
+        let mean = |sum: (f64, f64)| if sum.1 > 0.0 { sum.0 / sum.1 } else { 0.0 };
+        Ok((0..dof)
+            .map(|j| (mean(raw[j]) - mean(in_band[j])).max(0.0).sqrt())
+            .collect())
+    }
+
+    /// Range of the training motion per joint: `[q_min, q_max, qd_min, qd_max, qdd_min, qdd_max]`.
+    pub(super) fn hull(&self, robot: &Robot) -> Vec<[f64; 6]> {
+        (0..robot.dof())
+            .map(|joint| {
+                let mut hull = [f64::INFINITY, f64::NEG_INFINITY].repeat(3);
+                for log in &self.fit {
+                    let motion = [
+                        &log.observations.q[joint],
+                        &log.observations.qd[joint],
+                        &log.observations.qdd[joint],
+                    ];
+                    for (i, values) in motion.into_iter().enumerate() {
+                        for &value in values {
+                            hull[2 * i] = hull[2 * i].min(value);
+                            hull[2 * i + 1] = hull[2 * i + 1].max(value);
+                        }
+                    }
+                }
+                [hull[0], hull[1], hull[2], hull[3], hull[4], hull[5]]
+            })
+            .collect()
+    }
+}
+
+/// Adds the squares of the moving rows to `(sum, count)`.
+fn add_squares(sum: &mut (f64, f64), values: &[f64], standstill: &[bool]) {
+    for (value, still) in values.iter().zip(standstill) {
+        if !still {
+            sum.0 += value * value;
+            sum.1 += 1.0;
+        }
+    }
+}
+
+fn summary(
+    robot: &Robot,
+    recording: &Recording,
+    role: &str,
+    trajectory: &Trajectory,
+    observations: &Observations,
+) -> LogSummary {
+    let mut intervals: Vec<f64> = recording
+        .time
+        .windows(2)
+        .map(|w| w[1] - w[0])
+        .filter(|d| *d > 0.0)
+        .collect();
+    intervals.sort_by(f64::total_cmp);
+    let median = intervals
+        .get(intervals.len() / 2)
+        .copied()
+        .unwrap_or(f64::INFINITY);
+    let ends = (
+        recording.time.first().copied().unwrap_or(0.0),
+        recording.time.last().copied().unwrap_or(0.0),
+    );
+    let still = |joint: usize| {
+        observations.joints[joint]
+            .standstill
+            .iter()
+            .filter(|s| **s)
+            .count() as u64
+    };
+    LogSummary {
+        name: recording.name.clone(),
+        role: role.into(),
+        samples: recording.time.len() as u64,
+        duration: ends.1 - ends.0,
+        rate_hz: 1.0 / median,
+        segments: trajectory.segments.len() as u64,
+        rows: (0..robot.dof())
+            .map(|joint| observations.len() as u64 - still(joint))
+            .collect(),
+        standstill: (0..robot.dof()).map(still).collect(),
+    }
+}

@@ -1,0 +1,266 @@
+//! The whole road, from a robot and its logs to a calibrated twin, in one function that reads like the paper.
+
+mod data;
+mod held_out;
+mod result;
+mod summary;
+mod sweep;
+
+pub use result::{
+    Calibration, Draws, Group, LikelihoodUsed, LogSummary, PriorUsed, SweepPoint, TermSummary,
+    Verdict,
+};
+
+use crate::error::{Error, Finding, Result, Severity};
+use crate::infer::InferenceSettings;
+use crate::likelihood::{Columns, JointNoise, NoiseModel, NoiseSettings};
+use crate::observations::Part;
+use crate::plug_in::{
+    Fit, FitSettings, LeftOut, Moving, fit, fit_tempered, residual_correlation_time, start,
+};
+use crate::prior::PriorSettings;
+use crate::robot::Robot;
+use crate::signal::{Recording, SignalSettings, choose_pipeline};
+use crate::term::{Library, LibrarySettings};
+use crate::twin::Twin;
+use data::Data;
+
+/// Everything a calibration can be told; each field is a table of `twincal.toml`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibrationSettings {
+    /// `[library]`.
+    pub library: LibrarySettings,
+    /// `[signal]`.
+    pub signal: SignalSettings,
+    /// `[prior]`.
+    pub prior: PriorSettings,
+    /// `[noise]`.
+    pub noise: NoiseSettings,
+    /// `[inference]`.
+    pub inference: InferenceSettings,
+}
+
+/// How far a calibration has come; for progress bars.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Cutting, resampling and filtering the logs.
+    Rows,
+    /// Inference on all fit logs.
+    Inference,
+    /// Predicting held-out data: (done, all) splits.
+    Validation(usize, usize),
+    /// Prior and cut-off sensitivity.
+    Sensitivity,
+}
+
+/// Finds what the nominal robot misses in `logs` and says how well the calibrated twin predicts.
+///
+/// With `heldout` recordings these are predicted; without, three or more logs are left out one by one, and otherwise
+/// the last 30 % of each log. The coefficients always come from all of `logs`.
+///
+/// # Errors
+/// [`Error::Log`] and [`Error::Setting`] for unusable input, [`Error::Refused`] where the data cannot answer.
+/// # Source
+/// paper eq. (1)–(5); method sections 1–8.
+pub fn calibrate(
+    robot: &Robot,
+    logs: &[Recording],
+    heldout: &[Recording],
+    settings: &CalibrationSettings,
+    progress: &dyn Fn(Stage),
+) -> Result<Calibration> {
+    // the same filters for every log, and candidates for this robot
+    progress(Stage::Rows);
+    let (pipeline, mut findings) = choose_pipeline(robot, logs, &settings.signal)?;
+    let library_settings = LibrarySettings {
+        coulomb_velocity: pipeline.coulomb_velocity,
+        ..settings.library.clone()
+    };
+    let (library, more) = Library::propose(robot, &library_settings)?;
+    findings.extend(more);
+
+    // eq. (1)–(4): residual torque and Euler–Lagrange columns, filtered alike
+    let mut data = Data::read(robot, &library, &pipeline, logs, heldout)?;
+    let (library, zero_columns) = data.drop_zero_columns(library);
+    data.require_enough(robot)?;
+    findings.append(&mut data.findings);
+
+    // eq. (5): sparse regression with everything that is plugged in at its fixed point
+    progress(Stage::Inference);
+    let columns = columns_of(&library);
+    let training: Vec<Part<'_>> = data
+        .fit
+        .iter()
+        .map(|log| log.observations.whole())
+        .collect();
+    let fitted = estimate(&training, &columns, settings)?;
+    findings.extend(findings_of_fit(robot, &fitted, settings, &training));
+
+    // τ_calib = τ_nom + Φβ̂ with intervals, and held-out truth
+    let out_of_band = data.out_of_band(robot, &library, &pipeline, &fitted.fit.posterior.mean)?;
+    let skeleton = Twin {
+        robot: robot.clone(),
+        library: library_settings,
+        zero_columns,
+        pipeline,
+        posterior: fitted.fit.posterior.clone(),
+        noise: noise_of(robot, &fitted, &training, &out_of_band),
+        hull: data.hull(robot),
+    };
+    let validation = held_out::validate(&skeleton, &library, &data, &columns, settings, progress)?;
+
+    progress(Stage::Sensitivity);
+    let sweep = sweep::cutoff(
+        robot,
+        &library,
+        &skeleton.pipeline,
+        logs,
+        &columns,
+        settings,
+        &fitted.fit,
+    )?;
+    findings.extend(sweep::findings(&sweep, &library, &fitted.fit.posterior));
+    summary::summarise(
+        skeleton, &library, &data, &columns, settings, fitted, validation, sweep, findings,
+    )
+}
+
+/// A fit together with what left-out training data said of it.
+struct Fitted {
+    fit: Fit,
+    left_out: Option<LeftOut>,
+}
+
+/// Fixed point, and for the tempered likelihood the choice of c.
+fn estimate(
+    training: &[Part<'_>],
+    columns: &Columns,
+    settings: &CalibrationSettings,
+) -> Result<Fitted> {
+    let fit_settings = FitSettings {
+        noise: settings.noise,
+        prior: &settings.prior,
+        inference: &settings.inference,
+    };
+    match settings.noise.model {
+        NoiseModel::Tempered => {
+            let (fit, left_out) = fit_tempered(training, columns, fit_settings)?;
+            Ok(Fitted {
+                fit,
+                left_out: Some(left_out),
+            })
+        }
+        NoiseModel::Iid | NoiseModel::Ar1 => {
+            let start = start(training, columns, &settings.prior);
+            Ok(Fitted {
+                fit: fit(training, columns, fit_settings, &start, Moving::All)?,
+                left_out: None,
+            })
+        }
+    }
+}
+
+/// Names and families of the live columns.
+fn columns_of(library: &Library) -> Columns {
+    let mut columns = Columns {
+        names: Vec::new(),
+        family: Vec::new(),
+        families: Vec::new(),
+    };
+    for &index in library.columns() {
+        let term = &library.terms()[index];
+        let family = columns
+            .families
+            .iter()
+            .position(|f| *f == term.family)
+            .unwrap_or_else(|| {
+                columns.families.push(term.family);
+                columns.families.len() - 1
+            });
+        columns.names.push(term.name.clone());
+        columns.family.push(family);
+    }
+    columns
+}
+
+/// Noise per joint as reported; σ_j = √E[φ/(w_j(1−ρ_j²)) | y].
+fn noise_of(
+    robot: &Robot,
+    fitted: &Fitted,
+    training: &[Part<'_>],
+    out_of_band: &[f64],
+) -> Vec<JointNoise> {
+    let (plug_in, posterior) = (&fitted.fit.plug_in, &fitted.fit.posterior);
+    let gram = crate::plug_in::total(training);
+    robot
+        .joint_names()
+        .into_iter()
+        .enumerate()
+        .map(|(j, name)| {
+            let (n, rho) = (gram.joints[j].n, plug_in.rho[j]);
+            JointNoise {
+                joint: name.to_owned(),
+                sigma: (posterior.noise / (plug_in.weight[j] * (1.0 - rho * rho))).sqrt(),
+                rho,
+                weight: plug_in.weight[j],
+                n,
+                n_eff: n * plug_in.temper(j) * (1.0 - rho) / (1.0 + rho),
+                autocorrelation_time: plug_in.autocorrelation_time[j],
+                interval_factor: fitted
+                    .left_out
+                    .as_ref()
+                    .map_or(1.0, |l| l.interval_factor[j]),
+                out_of_band: out_of_band[j],
+            }
+        })
+        .collect()
+}
+
+/// What the fit itself must say: residual correlation that the likelihood ignores, an iteration that did not settle.
+fn findings_of_fit(
+    robot: &Robot,
+    fitted: &Fitted,
+    settings: &CalibrationSettings,
+    training: &[Part<'_>],
+) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    if !fitted.fit.converged {
+        findings.push(Finding::new(
+            Severity::Warning,
+            "plug_ins_not_settled",
+            "",
+            format!(
+                "noise weights or slab scale still moved after {} rounds; probabilities near 0.5 may change in the second digit",
+                fitted.fit.rounds
+            ),
+            fitted.fit.rounds as u64,
+        ));
+    }
+    if settings.noise.model == NoiseModel::Iid {
+        for (joint, name) in robot.joint_names().into_iter().enumerate() {
+            let time = residual_correlation_time(training, joint, &fitted.fit.posterior.mean);
+            if time > 2.0 {
+                findings.push(Finding::new(
+                    Severity::Warning,
+                    "residual_correlated",
+                    name,
+                    format!(
+                        "joint `{name}`: the residual stays alike for {time:.1} rows, which noise.model = \"iid\" ignores: \
+                         sds are about {:.1} times too small; use \"tempered\"",
+                        time.sqrt()
+                    ),
+                    0,
+                ));
+            }
+        }
+    }
+    findings
+}
+
+/// The data cannot answer: fewer rows than the question needs (exit code 4).
+fn refuse(problem: String, remedy: &str) -> Error {
+    Error::Refused {
+        problem,
+        remedy: remedy.into(),
+    }
+}

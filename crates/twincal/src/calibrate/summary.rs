@@ -1,0 +1,393 @@
+//! From posterior to what people read: terms, verdicts, groups, sensitivity, autocorrelation.
+
+use super::data::Data;
+use super::result::{
+    Calibration, Draws, Group, LikelihoodUsed, PriorUsed, SweepPoint, TermSummary, Verdict,
+};
+use super::{CalibrationSettings, Fitted, refuse};
+use crate::error::{Finding, Result, Severity};
+use crate::infer::infer;
+use crate::likelihood::{Columns, mean_squares};
+use crate::observations::Part;
+use crate::plug_in::{residual_runs, total};
+use crate::posterior::draws::draw;
+use crate::posterior::summary::summarise as summarise_columns;
+use crate::posterior::{Posterior, Problem};
+use crate::prior::Inclusion;
+use crate::signal::Auto;
+use crate::term::Library;
+use crate::twin::Twin;
+use crate::validate::Validation;
+
+/// Effective rows below which nothing is concluded (case 7).
+const LEAST_EFFECTIVE_ROWS: f64 = 10.0;
+/// Columns whose cosine over the rows is above this are hard to tell apart.
+const ALIKE: f64 = 0.95;
+/// Lags of the residual autocorrelation, rows.
+const LAGS: usize = 20;
+/// Terms in the pair plot at most, and draws of each.
+const PAIR_PLOT: (usize, usize) = (8, 1000);
+/// Random stream of those draws.
+const DRAW_STREAM: u64 = 1 << 32;
+
+/// Everything a reader gets, from the pieces of [`super::calibrate`].
+#[expect(
+    clippy::too_many_arguments,
+    reason = "the last step joins every piece once"
+)]
+pub(super) fn summarise(
+    twin: Twin,
+    library: &Library,
+    data: &Data,
+    columns: &Columns,
+    settings: &CalibrationSettings,
+    fitted: Fitted,
+    validation: Validation,
+    sweep: Vec<SweepPoint>,
+    mut findings: Vec<Finding>,
+) -> Result<Calibration> {
+    let Fitted { fit, left_out } = fitted;
+    let effective = twin
+        .noise
+        .iter()
+        .map(|noise| noise.n_eff)
+        .fold(0.0, f64::max);
+    if effective < LEAST_EFFECTIVE_ROWS {
+        return Err(refuse(
+            format!(
+                "only {effective:.1} effective rows remain once the residual's autocorrelation is counted"
+            ),
+            "log longer or move faster",
+        ));
+    }
+    let training: Vec<Part<'_>> = data
+        .fit
+        .iter()
+        .map(|log| log.observations.whole())
+        .collect();
+    let gram = total(&training);
+    let rms: Vec<f64> = mean_squares(&gram, columns.names.len(), &fit.plug_in.weight)
+        .into_iter()
+        .map(f64::sqrt)
+        .collect();
+    let sensitivity = sensitivity(&fit.problem, settings)?;
+    let terms = terms(library, &fit.posterior, &fit.problem, &rms, &sensitivity);
+    let groups = groups(&fit.problem, &fit.posterior);
+    findings.extend(findings_of_posterior(&terms, &groups, &fit.problem, data));
+    let selected = pair_plot_columns(&fit.posterior);
+    let draws = draw(
+        &fit.posterior,
+        PAIR_PLOT.1,
+        settings.inference.seed,
+        DRAW_STREAM,
+    );
+    Ok(Calibration {
+        noise: twin.noise.clone(),
+        draws: Draws {
+            terms: selected.iter().map(|&k| columns.names[k].clone()).collect(),
+            values: selected
+                .iter()
+                .map(|&k| {
+                    draws
+                        .beta
+                        .iter()
+                        .skip(k)
+                        .step_by(draws.columns)
+                        .copied()
+                        .collect()
+                })
+                .collect(),
+        },
+        twin,
+        terms,
+        prior: PriorUsed {
+            scaled_variance: columns
+                .families
+                .iter()
+                .copied()
+                .zip(fit.plug_in.scaled_variance.iter().copied())
+                .collect(),
+            learned: settings.prior.scaled_variance == Auto::Auto,
+            inclusion: fit.problem.prior.inclusion,
+            shape: fit.problem.prior.shape,
+            scale: fit.problem.prior.scale,
+        },
+        likelihood: LikelihoodUsed {
+            model: settings.noise.model,
+            tempering: fit.plug_in.tempering,
+            tempering_scores: left_out.map_or_else(Vec::new, |l| l.scores),
+            rounds: fit.rounds,
+        },
+        groups,
+        sweep,
+        validation,
+        autocorrelation: autocorrelation(&training, &fit.posterior.mean),
+        logs: data
+            .fit
+            .iter()
+            .chain(&data.heldout)
+            .map(|log| log.summary.clone())
+            .collect(),
+        findings,
+    })
+}
+
+/// PIPs under slab variance × 0.1, 1, 10 and expected terms (or prior odds) × 0.5, 2: five values per column.
+fn sensitivity(problem: &Problem, settings: &CalibrationSettings) -> Result<Vec<Vec<f64>>> {
+    let mut variants = Vec::new();
+    for factor in [0.1, 1.0, 10.0] {
+        let mut variant = problem.clone();
+        variant.prior.slab.iter_mut().for_each(|v| *v *= factor);
+        variants.push(variant);
+    }
+    for factor in [0.5, 2.0] {
+        let mut variant = problem.clone();
+        variant.prior.inclusion = scaled(problem.prior.inclusion, factor, problem.names.len());
+        variants.push(variant);
+    }
+    let pips: Vec<Vec<f64>> = variants
+        .iter()
+        .map(|variant| infer(variant, &settings.inference).map(|posterior| posterior.inclusion))
+        .collect::<Result<_>>()?;
+    Ok((0..problem.names.len())
+        .map(|k| pips.iter().map(|p| p[k]).collect())
+        .collect())
+}
+
+/// The inclusion prior with its expected number of terms, or its odds, multiplied.
+fn scaled(inclusion: Inclusion, factor: f64, columns: usize) -> Inclusion {
+    match inclusion {
+        Inclusion::ExpectedTerms(m) => {
+            let m = factor * m;
+            Inclusion::ExpectedTerms(if m < columns as f64 {
+                m
+            } else {
+                0.5 * (m / factor + columns as f64)
+            })
+        }
+        Inclusion::Probability(p) => {
+            let odds = factor * p / (1.0 - p);
+            Inclusion::Probability(odds / (1.0 + odds))
+        }
+    }
+}
+
+fn terms(
+    library: &Library,
+    posterior: &Posterior,
+    problem: &Problem,
+    rms: &[f64],
+    sensitivity: &[Vec<f64>],
+) -> Vec<TermSummary> {
+    let summaries = summarise_columns(posterior);
+    library
+        .terms()
+        .iter()
+        .enumerate()
+        .map(|(index, term)| {
+            let Some(k) = library.columns().iter().position(|&c| c == index) else {
+                return dropped(term);
+            };
+            let s = &summaries[k];
+            let prior_sd = (posterior.noise * problem.prior.slab[k]).sqrt();
+            let verdict = verdict(s.pip, s.pip_mcse, s.conditional_sd, prior_sd);
+            TermSummary {
+                term: term.clone(),
+                pip: Some(s.pip),
+                pip_mcse: Some(s.pip_mcse),
+                mean: Some(s.mean),
+                sd: Some(s.sd),
+                interval95: Some(s.interval95),
+                conditional_mean: s.conditional_mean,
+                conditional_sd: s.conditional_sd,
+                selected: s.pip >= 0.5 && verdict != Verdict::NotSeen,
+                verdict: Some(verdict),
+                column_rms: Some(rms[k]),
+                pip_sensitivity: sensitivity[k].clone(),
+                words: library.words(
+                    index,
+                    s.conditional_mean.unwrap_or(0.0),
+                    s.conditional_sd.unwrap_or(0.0),
+                ),
+            }
+        })
+        .collect()
+}
+
+fn dropped(term: &crate::term::Term) -> TermSummary {
+    TermSummary {
+        term: term.clone(),
+        pip: None,
+        pip_mcse: None,
+        mean: None,
+        sd: None,
+        interval95: None,
+        conditional_mean: None,
+        conditional_sd: None,
+        selected: false,
+        verdict: None,
+        column_rms: None,
+        pip_sensitivity: Vec::new(),
+        words: String::new(),
+    }
+}
+
+fn verdict(pip: f64, mcse: f64, sd: Option<f64>, prior_sd: f64) -> Verdict {
+    if sd.is_some_and(|sd| sd > 0.9 * prior_sd) {
+        Verdict::NotSeen
+    } else if (0.2..0.8).contains(&pip) || (pip - 0.5).abs() < 3.0 * mcse {
+        Verdict::Undecided
+    } else if pip >= 0.5 {
+        Verdict::Found
+    } else {
+        Verdict::Absent
+    }
+}
+
+/// Sets of columns that are alike in these data (cosine above 0.95, chained), with the probability of any of them.
+/// Only sets whose members share posterior mass are told: at least two members with PIP above 0.02, none above 0.98.
+fn groups(problem: &Problem, posterior: &Posterior) -> Vec<Group> {
+    let count = problem.names.len();
+    let diagonal: Vec<f64> = (0..count).map(|k| problem.gram[k * count + k]).collect();
+    let mut label: Vec<usize> = (0..count).collect();
+    for a in 0..count {
+        for b in 0..a {
+            let cosine = problem.gram[a * count + b] / (diagonal[a] * diagonal[b]).sqrt();
+            if cosine.abs() > ALIKE {
+                let (from, to) = (label[a].max(label[b]), label[a].min(label[b]));
+                label
+                    .iter_mut()
+                    .filter(|l| **l == from)
+                    .for_each(|l| *l = to);
+            }
+        }
+    }
+    (0..count)
+        .filter_map(|first| {
+            let members: Vec<usize> = (first..count).filter(|&k| label[k] == first).collect();
+            let unsure = members
+                .iter()
+                .filter(|&&k| (0.02..0.98).contains(&posterior.inclusion[k]))
+                .count();
+            (members.len() > 1 && unsure > 1).then(|| Group {
+                members: members.iter().map(|&k| problem.names[k].clone()).collect(),
+                pip: posterior
+                    .models
+                    .iter()
+                    .filter(|model| {
+                        model
+                            .members
+                            .iter()
+                            .any(|m| members.contains(&(*m as usize)))
+                    })
+                    .map(|model| model.weight)
+                    .sum(),
+            })
+        })
+        .collect()
+}
+
+fn findings_of_posterior(
+    terms: &[TermSummary],
+    groups: &[Group],
+    problem: &Problem,
+    data: &Data,
+) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let measured: f64 = data
+        .fit
+        .iter()
+        .flat_map(|log| &log.observations.joints)
+        .flat_map(|joint| &joint.measured)
+        .map(|m| m * m)
+        .sum();
+    if problem.yy <= 1e-18 * measured {
+        findings.push(Finding::new(
+            Severity::Note,
+            "nothing_to_correct",
+            "",
+            "the nominal model explains the torque to rounding: nothing to correct",
+            0,
+        ));
+    }
+    for group in groups {
+        findings.push(Finding::new(
+            Severity::Warning,
+            "alike_in_data",
+            group.members.join(", "),
+            format!(
+                "these data cannot tell {} apart: at least one is in with probability {:.3}; another motion would separate them",
+                group.members.join(", "),
+                group.pip
+            ),
+            group.members.len() as u64,
+        ));
+    }
+    for term in terms {
+        match term.verdict {
+            Some(Verdict::Undecided) => findings.push(Finding::new(
+                Severity::Note,
+                "undecided",
+                term.term.name.clone(),
+                format!(
+                    "`{}` is undecided (inclusion probability {:.2}): more or richer motion would decide",
+                    term.term.name,
+                    term.pip.unwrap_or(f64::NAN)
+                ),
+                0,
+            )),
+            Some(Verdict::NotSeen) if term.pip.is_some_and(|p| p > 0.2) => findings.push(Finding::new(
+                Severity::Note,
+                "not_seen",
+                term.term.name.clone(),
+                format!("these data say nothing about `{}`: its coefficient is as wide as before", term.term.name),
+                0,
+            )),
+            _ => {}
+        }
+    }
+    findings
+}
+
+/// Columns of the pair plot: the selected ones, by |mean|/sd.
+fn pair_plot_columns(posterior: &Posterior) -> Vec<usize> {
+    let mut selected: Vec<usize> = (0..posterior.inclusion.len())
+        .filter(|&k| posterior.inclusion[k] >= 0.5)
+        .collect();
+    let strength = |k: usize| posterior.mean[k].abs() / posterior.sd[k].max(f64::MIN_POSITIVE);
+    selected.sort_by(|&a, &b| strength(b).total_cmp(&strength(a)).then(a.cmp(&b)));
+    selected.truncate(PAIR_PLOT.0);
+    selected.sort_unstable();
+    selected
+}
+
+/// Per joint: normalised autocorrelation of the residual before and after calibration, lags 0..=20 rows each.
+fn autocorrelation(training: &[Part<'_>], beta: &[f64]) -> Vec<Vec<f64>> {
+    let joints = training
+        .first()
+        .map_or(0, |part| part.observations.joints.len());
+    let nothing = vec![0.0; beta.len()];
+    let mut all = Vec::new();
+    for joint in 0..joints {
+        for coefficients in [&nothing[..], beta] {
+            let runs = residual_runs(training, joint, coefficients);
+            let sum = |lag: usize| {
+                runs.iter()
+                    .map(|r| {
+                        r.iter()
+                            .zip(r.iter().skip(lag))
+                            .map(|(a, b)| a * b)
+                            .sum::<f64>()
+                    })
+                    .sum::<f64>()
+            };
+            let zero = sum(0);
+            all.push(
+                (0..=LAGS)
+                    .map(|lag| if zero > 0.0 { sum(lag) / zero } else { 0.0 })
+                    .collect(),
+            );
+        }
+    }
+    all
+}

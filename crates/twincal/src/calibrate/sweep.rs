@@ -1,0 +1,104 @@
+//! Does an estimate depend on the cut-off? The same fit at 0.7 and 1.4 times f_c (method section 1).
+
+use super::CalibrationSettings;
+use super::data::Data;
+use super::result::SweepPoint;
+use crate::error::{Finding, Result, Severity};
+use crate::infer::infer;
+use crate::likelihood::{Columns, assemble};
+use crate::observations::Part;
+use crate::plug_in::{Fit, total};
+use crate::posterior::Posterior;
+use crate::robot::Robot;
+use crate::signal::{Pipeline, Recording};
+use crate::term::Library;
+
+/// Factors on the cut-off.
+const FACTORS: [f64; 2] = [0.7, 1.4];
+
+/// Posterior means at 0.7, 1 and 1.4 f_c with the plug-ins of the fit; empty with the filter off.
+///
+/// A cut-off at which the logs cannot be used (too short for the kernel) is left out.
+pub(super) fn cutoff(
+    robot: &Robot,
+    library: &Library,
+    pipeline: &Pipeline,
+    logs: &[Recording],
+    columns: &Columns,
+    settings: &CalibrationSettings,
+    fit: &Fit,
+) -> Result<Vec<SweepPoint>> {
+    if pipeline.cutoff_hz == 0.0 {
+        return Ok(Vec::new());
+    }
+    let mut points = vec![SweepPoint {
+        cutoff_hz: pipeline.cutoff_hz,
+        mean: fit.posterior.mean.clone(),
+    }];
+    for factor in FACTORS {
+        let scaled = Pipeline {
+            cutoff_hz: factor * pipeline.cutoff_hz,
+            motion_cutoff_hz: factor * pipeline.motion_cutoff_hz,
+            rate_hz: factor * pipeline.rate_hz,
+            ..pipeline.clone()
+        };
+        let Ok(data) = Data::read(robot, library, &scaled, logs, &[]) else {
+            continue;
+        };
+        let parts: Vec<Part<'_>> = data
+            .fit
+            .iter()
+            .map(|log| log.observations.whole())
+            .collect();
+        if parts.iter().all(|part| part.rows.is_empty()) {
+            continue;
+        }
+        let problem = assemble(&total(&parts), columns, &fit.plug_in, &settings.prior)?;
+        let posterior = infer(&problem, &settings.inference)?;
+        points.push(SweepPoint {
+            cutoff_hz: scaled.cutoff_hz,
+            mean: posterior.mean,
+        });
+    }
+    points.sort_by(|a, b| a.cutoff_hz.total_cmp(&b.cutoff_hz));
+    Ok(points)
+}
+
+/// Selected terms whose estimate moves by more than its sd over the sweep.
+pub(super) fn findings(
+    sweep: &[SweepPoint],
+    library: &Library,
+    posterior: &Posterior,
+) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for (k, &index) in library.columns().iter().enumerate() {
+        if posterior.inclusion[k] < 0.5 {
+            continue;
+        }
+        let largest = sweep
+            .iter()
+            .max_by(|a, b| {
+                let far = |p: &SweepPoint| (p.mean[k] - posterior.mean[k]).abs();
+                far(a).total_cmp(&far(b))
+            })
+            .filter(|p| (p.mean[k] - posterior.mean[k]).abs() > posterior.sd[k]);
+        if let Some(point) = largest {
+            let name = &library.terms()[index].name;
+            findings.push(Finding::new(
+                Severity::Warning,
+                "depends_on_cutoff",
+                name.clone(),
+                format!(
+                    "`{name}` moves by {:.1} sd (from {:.4} to {:.4}) when the cut-off becomes {:.3} Hz: \
+                     do not read its interval as the whole uncertainty",
+                    (point.mean[k] - posterior.mean[k]).abs() / posterior.sd[k].max(f64::MIN_POSITIVE),
+                    posterior.mean[k],
+                    point.mean[k],
+                    point.cutoff_hz
+                ),
+                0,
+            ));
+        }
+    }
+    findings
+}

@@ -1,0 +1,215 @@
+//! Which rows count how much: iid, tempered and AR(1) noise, plug-ins by fixed point (method section 5).
+
+use crate::error::{Error, Result};
+use crate::gram::Gram;
+use crate::posterior::Problem;
+use crate::prior::{Inclusion, Prior, PriorSettings};
+use crate::term::Family;
+use serde::{Deserialize, Serialize};
+
+/// `[noise] model`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoiseModel {
+    /// Independent rows (the paper's).
+    Iid,
+    /// Independent rows, statistics divided by c·τ_j.
+    Tempered,
+    /// First-order autoregression per joint.
+    Ar1,
+}
+
+/// `[noise]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NoiseSettings {
+    /// Likelihood.
+    pub model: NoiseModel,
+    /// One variance per joint; false: all w_j = 1.
+    pub per_joint: bool,
+}
+
+/// Plug-in noise of one joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct JointNoise {
+    /// Joint name.
+    pub joint: String,
+    /// √E[φ/(w_j(1−ρ_j²)) | y], N·m or N.
+    pub sigma: f64,
+    /// AR(1) coefficient; 0 unless `ar1`.
+    pub rho: f64,
+    /// w_j; n_j-weighted geometric mean 1.
+    pub weight: f64,
+    /// Rows.
+    pub n: f64,
+    /// Rows after tempering: n/(c·τ_j); with ar1 n(1−ρ)/(1+ρ).
+    pub n_eff: f64,
+    /// Integrated autocorrelation time τ_j of the residual, rows.
+    pub autocorrelation_time: f64,
+    /// Factor on the noise part of intervals from left-out blocks; 1 unless `tempered`.
+    pub interval_factor: f64,
+    /// sd of the torque outside the filter's band, measured on the training residual, N·m; 0 with the filter off.
+    pub out_of_band: f64,
+}
+
+/// Plug-in estimates of a likelihood: with these given, exact enumeration and Gibbs share one target.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlugIn {
+    /// w_j, n_j-weighted geometric mean 1.
+    pub weight: Vec<f64>,
+    /// ρ_j; 0 unless `ar1`.
+    pub rho: Vec<f64>,
+    /// τ_j ≥ 1 in rows; 1 unless `tempered`.
+    pub autocorrelation_time: Vec<f64>,
+    /// c; 1 unless `tempered`.
+    pub tempering: f64,
+    /// v of each family, in the order of [`Columns::families`].
+    pub scaled_variance: Vec<f64>,
+}
+
+/// The columns of a regression, as the likelihood needs them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Columns {
+    /// Names, K.
+    pub names: Vec<String>,
+    /// Index of each column's family, K.
+    pub family: Vec<usize>,
+    /// Families that occur.
+    pub families: Vec<Family>,
+}
+
+impl PlugIn {
+    /// Where the fixed point starts: equal weights, white noise, `v` for every family.
+    pub fn start(joints: usize, families: usize, v: f64) -> Self {
+        Self {
+            weight: vec![1.0; joints],
+            rho: vec![0.0; joints],
+            autocorrelation_time: vec![1.0; joints],
+            tempering: 1.0,
+            scaled_variance: vec![v; families],
+        }
+    }
+
+    /// What the statistics of a joint are multiplied with: w_j / (c τ_j).
+    pub fn factor(&self, joint: usize) -> f64 {
+        self.weight[joint] * self.temper(joint)
+    }
+
+    /// What the row count of a joint is multiplied with: 1 / (c τ_j).
+    pub fn temper(&self, joint: usize) -> f64 {
+        1.0 / (self.tempering * self.autocorrelation_time[joint])
+    }
+}
+
+/// Mean square of each column over all rows of all joints, zeros included, weighted by w (method section 6), K.
+///
+/// ```text
+/// rms_k² = Σ_j w_j S0_j[k,k] / Σ_j w_j n_j
+/// ```
+pub fn mean_squares(grams: &Gram, columns: usize, weight: &[f64]) -> Vec<f64> {
+    let mut sum = vec![0.0; columns];
+    let mut rows = 0.0;
+    for (joint, w) in grams.joints.iter().zip(weight) {
+        rows += w * joint.n;
+        for (i, &column) in joint.columns.iter().enumerate() {
+            sum[column as usize] += w * joint.s0.values[i * joint.s0.size + i];
+        }
+    }
+    sum.iter()
+        .map(|s| if rows > 0.0 { s / rows } else { 0.0 })
+        .collect()
+}
+
+/// The weighted regression and its prior: all that inference sees.
+///
+/// ```text
+/// G = Σ_j w_j/(c τ_j) G_j(ρ_j)    n = Σ_j n_j/(c τ_j)    v_k = v_family / rms_k²
+/// ```
+///
+/// # Errors
+/// [`crate::Error::Setting`] if the prior's numbers are impossible for K columns.
+pub fn assemble(
+    grams: &Gram,
+    columns: &Columns,
+    plug_in: &PlugIn,
+    settings: &PriorSettings,
+) -> Result<Problem> {
+    let count = columns.names.len();
+    let (mut gram, mut xy, mut yy) = (vec![0.0; count * count], vec![0.0; count], 0.0);
+    let (mut n, mut log_constant) = (0.0, 0.0);
+    for (j, joint) in grams.joints.iter().enumerate() {
+        let (factor, temper) = (plug_in.factor(j), plug_in.temper(j));
+        let rho = plug_in.rho[j];
+        let statistics = joint.stationary(rho);
+        let (size, values) = (statistics.size, &statistics.values);
+        let last = size - 1;
+        for (a, &row) in joint.columns.iter().enumerate() {
+            for (b, &column) in joint.columns.iter().enumerate() {
+                gram[row as usize * count + column as usize] += factor * values[a * size + b];
+            }
+            xy[row as usize] += factor * values[a * size + last];
+        }
+        yy += factor * values[last * size + last];
+        n += temper * joint.n;
+        log_constant += 0.5 * temper * joint.n * plug_in.weight[j].ln();
+        log_constant += 0.5 * temper * joint.starts * (-rho * rho).ln_1p();
+    }
+    let mean_square = mean_squares(grams, count, &plug_in.weight);
+    let slab = (0..count)
+        .map(|k| plug_in.scaled_variance[columns.family[k]] / mean_square[k])
+        .collect();
+    let (shape, scale) = match settings.noise {
+        Some(given) => given,
+        None => (
+            AUTO_SHAPE,
+            AUTO_SHAPE * scale_of_residual(grams, plug_in, yy / n.max(f64::MIN_POSITIVE)),
+        ),
+    };
+    Ok(Problem {
+        gram,
+        xy,
+        yy,
+        n,
+        log_constant,
+        prior: Prior {
+            slab,
+            family: columns.family.clone(),
+            inclusion: inclusion(settings.inclusion, count)?,
+            shape,
+            scale,
+        },
+        names: columns.names.clone(),
+    })
+}
+
+/// a0 of the automatic noise prior; b0 = a0 · mean(y²).
+pub const AUTO_SHAPE: f64 = 1e-3;
+
+/// Mean square of the residual torque, with a floor at rounding: an exactly perfect model must not make b0 zero.
+fn scale_of_residual(grams: &Gram, plug_in: &PlugIn, mean_square: f64) -> f64 {
+    let _ = (grams, plug_in);
+    mean_square.max(1e-24)
+}
+
+/// The inclusion prior in force: as given, or 5 expected terms (K/2 when there are fewer than 10 columns).
+///
+/// # Errors
+/// [`Error::Setting`] for a probability outside (0, 1) or an expected number that is not below K.
+pub fn inclusion(given: Option<Inclusion>, columns: usize) -> Result<Inclusion> {
+    match given {
+        None => Ok(Inclusion::ExpectedTerms((columns as f64 / 2.0).min(5.0))),
+        Some(Inclusion::Probability(p)) if p > 0.0 && p < 1.0 => Ok(Inclusion::Probability(p)),
+        Some(Inclusion::Probability(p)) => Err(Error::Setting {
+            key: "prior.inclusion.probability".into(),
+            problem: format!("{p} is not between 0 and 1"),
+            remedy: "give a probability above 0 and below 1, e.g. 0.2".into(),
+        }),
+        Some(Inclusion::ExpectedTerms(m)) if m > 0.0 && m < columns as f64 => {
+            Ok(Inclusion::ExpectedTerms(m))
+        }
+        Some(Inclusion::ExpectedTerms(m)) => Err(Error::Setting {
+            key: "prior.inclusion.expected_terms".into(),
+            problem: format!("{m} terms expected of {columns} candidate columns"),
+            remedy: format!("give a number above 0 and below {columns}, or leave it out"),
+        }),
+    }
+}

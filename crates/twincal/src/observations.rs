@@ -1,0 +1,245 @@
+//! The rows of one log, kept at the filtered rate: what residuals, blocks and held-out scores are computed from.
+
+use crate::error::Result;
+use crate::gram::{Gram, JointAccumulator};
+use crate::robot::Robot;
+use crate::rows::{RowSignal, visit_rows};
+use crate::signal::{Pipeline, Trajectory};
+use crate::term::Library;
+use std::ops::Range;
+
+/// Rows of one joint. A column lies contiguous over all rows: `x[i * len + row]`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct JointObservations {
+    /// Regression columns that are structurally non-zero on this joint, ascending.
+    pub columns: Vec<usize>,
+    /// Their values, columns × len, N·m per unit of β.
+    pub x: Vec<f64>,
+    /// Measured torque, len, N·m.
+    pub measured: Vec<f64>,
+    /// Nominal torque, len, N·m.
+    pub nominal: Vec<f64>,
+    /// Residual torque of eq. (1), len, N·m.
+    pub y: Vec<f64>,
+    /// Rows at which the joint stands still; they are no observations of anything but stiction.
+    pub standstill: Vec<bool>,
+}
+
+/// Rows of one log.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Observations {
+    /// Name of the log.
+    pub log: String,
+    /// Row times, s.
+    pub time: Vec<f64>,
+    /// First row of each segment, ascending, starting with 0.
+    pub starts: Vec<usize>,
+    /// Positions, joint × len.
+    pub q: Vec<Vec<f64>>,
+    /// Velocities.
+    pub qd: Vec<Vec<f64>>,
+    /// Accelerations.
+    pub qdd: Vec<Vec<f64>>,
+    /// Per moving joint.
+    pub joints: Vec<JointObservations>,
+}
+
+/// A range of rows of one log.
+#[derive(Debug, Clone)]
+pub struct Part<'a> {
+    /// The log.
+    pub observations: &'a Observations,
+    /// Its rows.
+    pub rows: Range<usize>,
+}
+
+/// Filters and decimates one trajectory into rows.
+///
+/// # Errors
+/// Those of [`visit_rows`].
+pub fn observe(
+    robot: &Robot,
+    library: &Library,
+    pipeline: &Pipeline,
+    trajectory: &Trajectory,
+) -> Result<Observations> {
+    let dof = robot.dof();
+    let mut out = Observations {
+        log: trajectory.name.clone(),
+        q: vec![Vec::new(); dof],
+        qd: vec![Vec::new(); dof],
+        qdd: vec![Vec::new(); dof],
+        joints: vec![JointObservations::default(); dof],
+        ..Observations::default()
+    };
+    let mut columns: Vec<Vec<Vec<f64>>> = (0..dof)
+        .map(|joint| vec![Vec::new(); library.columns_of_joint(joint).len()])
+        .collect();
+    visit_rows(
+        robot,
+        library,
+        pipeline,
+        trajectory,
+        RowSignal::Filtered,
+        &mut |block| {
+            let len = block.len;
+            if block.first {
+                out.starts.push(out.time.len());
+            }
+            out.time.extend_from_slice(block.time);
+            for joint in 0..dof {
+                out.q[joint].extend_from_slice(&block.q[joint * len..(joint + 1) * len]);
+                out.qd[joint].extend_from_slice(&block.qd[joint * len..(joint + 1) * len]);
+                out.qdd[joint].extend_from_slice(&block.qdd[joint * len..(joint + 1) * len]);
+                let (rows, kept) = (&block.joints[joint], &mut out.joints[joint]);
+                for (i, column) in columns[joint].iter_mut().enumerate() {
+                    column.extend_from_slice(&rows.x[i * rows.stride..i * rows.stride + len]);
+                }
+                kept.measured.extend_from_slice(rows.measured);
+                kept.nominal.extend_from_slice(rows.nominal);
+                kept.y
+                    .extend(rows.measured.iter().zip(rows.nominal).map(|(m, n)| m - n));
+                kept.standstill.extend_from_slice(rows.standstill);
+            }
+            Ok(())
+        },
+    )?;
+    for (joint, values) in columns.into_iter().enumerate() {
+        out.joints[joint].columns = library.columns_of_joint(joint).to_vec();
+        out.joints[joint].x = values.concat();
+    }
+    Ok(out)
+}
+
+impl Observations {
+    /// Rows.
+    pub fn len(&self) -> usize {
+        self.time.len()
+    }
+
+    /// True without rows.
+    pub fn is_empty(&self) -> bool {
+        self.time.is_empty()
+    }
+
+    /// All rows as a part.
+    pub fn whole(&self) -> Part<'_> {
+        Part {
+            observations: self,
+            rows: 0..self.len(),
+        }
+    }
+
+    /// The log cut into `count` parts of equal length.
+    pub fn cut(&self, count: usize) -> Vec<Part<'_>> {
+        let cut = |i: usize| i * self.len() / count;
+        (0..count)
+            .map(|i| Part {
+                observations: self,
+                rows: cut(i)..cut(i + 1),
+            })
+            .collect()
+    }
+
+    /// Drops regression columns and renumbers the others, as [`Library::without_columns`] does.
+    pub fn drop_columns(&mut self, dropped: &[usize]) {
+        let len = self.len();
+        for joint in &mut self.joints {
+            let kept: Vec<usize> = (0..joint.columns.len())
+                .filter(|&i| !dropped.contains(&joint.columns[i]))
+                .collect();
+            joint.x = kept
+                .iter()
+                .flat_map(|&i| joint.x[i * len..(i + 1) * len].iter().copied())
+                .collect();
+            joint.columns = kept
+                .iter()
+                .map(|&i| {
+                    let column = joint.columns[i];
+                    column - dropped.iter().filter(|&&d| d < column).count()
+                })
+                .collect();
+        }
+    }
+}
+
+impl Part<'_> {
+    /// Sufficient statistics of these rows; standstill rows are left out and end a run.
+    pub fn gram(&self) -> Gram {
+        let joints = (0..self.observations.joints.len())
+            .map(|joint| self.joint_gram(joint))
+            .collect();
+        Gram { joints }
+    }
+
+    fn joint_gram(&self, joint: usize) -> crate::gram::JointGram {
+        let (all, rows) = (self.observations, &self.observations.joints[joint]);
+        let columns: Vec<u32> = rows.columns.iter().map(|&c| c as u32).collect();
+        let mut accumulator = JointAccumulator::new(columns);
+        let keep: Vec<bool> = rows.standstill.iter().map(|still| !still).collect();
+        for range in self.runs_between_starts() {
+            let x = if rows.columns.is_empty() {
+                &[][..]
+            } else {
+                &rows.x[range.start..]
+            };
+            accumulator.push_block(
+                x,
+                all.len(),
+                &rows.y[range.clone()],
+                &keep[range.clone()],
+                true,
+            );
+        }
+        accumulator.finish()
+    }
+
+    /// The part's rows split at the starts of segments.
+    fn runs_between_starts(&self) -> Vec<Range<usize>> {
+        let mut edges = vec![self.rows.start];
+        edges.extend(
+            self.observations
+                .starts
+                .iter()
+                .copied()
+                .filter(|s| self.rows.start < *s && *s < self.rows.end),
+        );
+        edges.push(self.rows.end);
+        edges
+            .windows(2)
+            .filter(|w| w[0] < w[1])
+            .map(|w| w[0]..w[1])
+            .collect()
+    }
+
+    /// Residuals `y − Xβ` of a joint as runs of consecutive moving rows.
+    pub fn residual_runs(&self, joint: usize, beta: &[f64]) -> Vec<Vec<f64>> {
+        let rows = &self.observations.joints[joint];
+        let mut runs: Vec<Vec<f64>> = Vec::new();
+        for range in self.runs_between_starts() {
+            let residual = self.residual(joint, beta, range.clone());
+            runs.push(Vec::new());
+            for (row, value) in range.zip(residual) {
+                match (rows.standstill[row], runs.last_mut()) {
+                    (false, Some(run)) => run.push(value),
+                    _ => runs.push(Vec::new()),
+                }
+            }
+        }
+        runs.retain(|run| !run.is_empty());
+        runs
+    }
+
+    /// `y − Xβ` of a joint over a range of the log's rows, standstill included.
+    pub fn residual(&self, joint: usize, beta: &[f64], range: Range<usize>) -> Vec<f64> {
+        let (len, rows) = (self.observations.len(), &self.observations.joints[joint]);
+        let mut residual = rows.y[range.clone()].to_vec();
+        for (i, &column) in rows.columns.iter().enumerate() {
+            let x = &rows.x[i * len + range.start..i * len + range.end];
+            for (r, x) in residual.iter_mut().zip(x) {
+                *r -= x * beta[column];
+            }
+        }
+        residual
+    }
+}

@@ -1,1 +1,0 @@
-//! Noise weights, autocorrelation and slab scale by fixed-point iteration at the model-average residual.

@@ -1,0 +1,226 @@
+//! Noise weights, autocorrelation, tempering and slab scale: everything that is plugged into the posterior.
+//!
+//! [`fit`] iterates likelihood → infer → residual at the model average until nothing moves (method section 5);
+//! [`tempering`] chooses the multiplier c on left-out parts of the training data. Given the plug-ins, exact
+//! enumeration and Gibbs sampling share one target.
+
+mod autoregression;
+mod tempering;
+
+pub use tempering::{LeftOut, fit_tempered};
+
+use crate::diagnostics::integrated_autocorrelation_time;
+use crate::error::Result;
+use crate::gram::Gram;
+use crate::infer::{InferenceSettings, infer};
+use crate::likelihood::{Columns, NoiseModel, NoiseSettings, PlugIn, assemble, mean_squares};
+use crate::observations::Part;
+use crate::posterior::{Posterior, Problem};
+use crate::prior::PriorSettings;
+use crate::signal::Auto;
+
+/// Rounds of the fixed-point iteration at most.
+const ROUNDS: usize = 20;
+/// Relative change of every plug-in below which the iteration has converged.
+const TOLERANCE: f64 = 1e-6;
+/// Bounds of a learned slab scale v.
+const SLAB_BOUNDS: (f64, f64) = (1e-2, 1e9);
+/// v before anything is known.
+const FIRST_SLAB: f64 = 100.0;
+
+/// What a fit is told.
+#[derive(Debug, Clone, Copy)]
+pub struct FitSettings<'a> {
+    /// `[noise]`.
+    pub noise: NoiseSettings,
+    /// `[prior]`.
+    pub prior: &'a PriorSettings,
+    /// `[inference]`.
+    pub inference: &'a InferenceSettings,
+}
+
+/// A posterior with the plug-ins that it was computed from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit {
+    /// The plug-ins in force.
+    pub plug_in: PlugIn,
+    /// The regression and prior that they make.
+    pub problem: Problem,
+    /// Its posterior.
+    pub posterior: Posterior,
+    /// Rounds until nothing moved.
+    pub rounds: usize,
+    /// False if the iteration was still moving after the last round.
+    pub converged: bool,
+}
+
+/// Which plug-ins an iteration may move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Moving {
+    /// Weights, autoregression and slab scale.
+    All,
+    /// The slab scale alone: what is known of the noise stays.
+    SlabScale,
+}
+
+/// Iterates the plug-ins to their fixed point on the training parts.
+///
+/// τ and c of `start` are kept as they are.
+///
+/// # Errors
+/// Those of [`assemble`] and [`infer`].
+pub fn fit(
+    training: &[Part<'_>],
+    columns: &Columns,
+    settings: FitSettings<'_>,
+    start: &PlugIn,
+    moving: Moving,
+) -> Result<Fit> {
+    let gram = total(training);
+    let mut plug_in = start.clone();
+    let mut rounds = 0;
+    loop {
+        rounds += 1;
+        let problem = assemble(&gram, columns, &plug_in, settings.prior)?;
+        let posterior = infer(&problem, settings.inference)?;
+        let mut next = plug_in.clone();
+        if moving == Moving::All {
+            move_noise(&mut next, training, &gram, settings.noise, &posterior);
+        }
+        if settings.prior.scaled_variance == Auto::Auto {
+            next.scaled_variance = slab_scales(&gram, columns, &plug_in, &problem, &posterior);
+        }
+        let converged = largest_change(&plug_in, &next) < TOLERANCE;
+        if converged || rounds == ROUNDS {
+            return Ok(Fit {
+                plug_in,
+                problem,
+                posterior,
+                rounds,
+                converged,
+            });
+        }
+        plug_in = next;
+    }
+}
+
+/// Where an iteration starts: white noise of equal size on every joint.
+pub fn start(training: &[Part<'_>], columns: &Columns, prior: &PriorSettings) -> PlugIn {
+    let joints = training
+        .first()
+        .map_or(0, |part| part.observations.joints.len());
+    let v = match prior.scaled_variance {
+        Auto::Value(v) => v,
+        Auto::Auto => FIRST_SLAB,
+    };
+    PlugIn::start(joints, columns.families.len(), v)
+}
+
+/// Sum of the statistics of several parts.
+pub fn total(parts: &[Part<'_>]) -> Gram {
+    let mut sum = Gram::default();
+    for part in parts {
+        sum += &part.gram();
+    }
+    sum
+}
+
+/// Weights and autoregression that the residual at the model average asks for.
+fn move_noise(
+    plug_in: &mut PlugIn,
+    training: &[Part<'_>],
+    gram: &Gram,
+    noise: NoiseSettings,
+    posterior: &Posterior,
+) {
+    let variance: Vec<f64> = (0..gram.joints.len())
+        .map(|joint| {
+            let runs = residual_runs(training, joint, &posterior.mean);
+            let runs: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
+            if noise.model == NoiseModel::Ar1 {
+                plug_in.rho[joint] = autoregression::coefficient(&runs);
+            }
+            autoregression::innovation_variance(&runs, plug_in.rho[joint])
+        })
+        .collect();
+    if noise.per_joint {
+        plug_in.weight = weights(gram, &variance);
+    }
+}
+
+/// Residuals `y − Xβ` of a joint over all parts, as runs of consecutive moving rows.
+pub fn residual_runs(training: &[Part<'_>], joint: usize, beta: &[f64]) -> Vec<Vec<f64>> {
+    training
+        .iter()
+        .flat_map(|part| part.residual_runs(joint, beta))
+        .collect()
+}
+
+/// Integrated autocorrelation time of a joint's residual, rows, at least 1.
+pub fn residual_correlation_time(training: &[Part<'_>], joint: usize, beta: &[f64]) -> f64 {
+    let runs = residual_runs(training, joint, beta);
+    let runs: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
+    integrated_autocorrelation_time(&runs).max(1.0)
+}
+
+/// `w_j ∝ 1/s_j²` with n_j-weighted geometric mean 1. A joint without rows or without residual weighs like the mean.
+fn weights(gram: &Gram, variance: &[f64]) -> Vec<f64> {
+    let largest = variance.iter().copied().fold(0.0, f64::max);
+    let usable = |j: usize| gram.joints[j].n > 0.0 && variance[j] > 1e-24 * largest;
+    let (mut sum, mut rows) = (0.0, 0.0);
+    for j in (0..variance.len()).filter(|&j| usable(j)) {
+        sum += gram.joints[j].n * variance[j].ln();
+        rows += gram.joints[j].n;
+    }
+    let mean = if rows > 0.0 { sum / rows } else { 0.0 };
+    (0..variance.len())
+        .map(|j| {
+            if usable(j) {
+                (mean - variance[j].ln()).exp()
+            } else {
+                1.0
+            }
+        })
+        .collect()
+}
+
+/// Slab scale of each family by one EM step of its evidence, with one pseudo-term at the scale of the residual.
+///
+/// ```text
+/// v_f = (v_0 + Σ_{k∈f} E[z_k β_k² / φ] rms_k²) / (1 + Σ_{k∈f} PIP_k),   v_0 = mean(y²) / E[φ]
+/// ```
+fn slab_scales(
+    gram: &Gram,
+    columns: &Columns,
+    now: &PlugIn,
+    problem: &Problem,
+    posterior: &Posterior,
+) -> Vec<f64> {
+    let mean_square = mean_squares(gram, columns.names.len(), &now.weight);
+    let noise = posterior.noise.max(f64::MIN_POSITIVE);
+    let reference = (problem.yy / problem.n / noise).clamp(SLAB_BOUNDS.0, SLAB_BOUNDS.1);
+    let mut sum = vec![reference; columns.families.len()];
+    let mut count = vec![1.0; columns.families.len()];
+    for k in 0..columns.names.len() {
+        let second = posterior.sd[k] * posterior.sd[k] + posterior.mean[k] * posterior.mean[k];
+        sum[columns.family[k]] += second * mean_square[k] / noise;
+        count[columns.family[k]] += posterior.inclusion[k];
+    }
+    sum.iter()
+        .zip(&count)
+        .map(|(s, c)| (s / c).clamp(SLAB_BOUNDS.0, SLAB_BOUNDS.1))
+        .collect()
+}
+
+fn largest_change(a: &PlugIn, b: &PlugIn) -> f64 {
+    let relative = |x: &[f64], y: &[f64]| {
+        x.iter()
+            .zip(y)
+            .map(|(x, y)| (x - y).abs() / x.abs().max(y.abs()).max(1e-3))
+            .fold(0.0, f64::max)
+    };
+    relative(&a.weight, &b.weight)
+        .max(relative(&a.rho, &b.rho))
+        .max(relative(&a.autocorrelation_time, &b.autocorrelation_time))
+        .max(relative(&a.scaled_variance, &b.scaled_variance))
+}
