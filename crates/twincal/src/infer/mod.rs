@@ -1,6 +1,11 @@
 //! From a [`Problem`] to a [`Posterior`]: every model (exact) or a Markov chain over models (Gibbs).
 
-use crate::error::Result;
+mod exact;
+mod standard;
+#[cfg(test)]
+mod testing;
+
+use crate::error::{Error, Result};
 use crate::posterior::{Posterior, Problem};
 
 /// `[inference] method`.
@@ -37,6 +42,16 @@ pub struct InferenceSettings {
 /// # Errors
 /// [`crate::Error::Setting`] for an impossible setting, [`crate::Error::NotFinite`] naming the column,
 /// [`crate::Error::Refused`] when chains disagree.
-pub fn infer(_problem: &Problem, _settings: &InferenceSettings) -> Result<Posterior> {
-    todo!()
+pub fn infer(problem: &Problem, settings: &InferenceSettings) -> Result<Posterior> {
+    let size = problem.xy.len();
+    match settings.method {
+        Choice::Auto if size <= EXACT_LIMIT => exact::enumerate(problem),
+        Choice::Exact if size <= EXACT_LIMIT => exact::enumerate(problem),
+        Choice::Exact => Err(Error::Setting {
+            key: "inference.method".into(),
+            problem: format!("`exact` with {size} columns would sum 2^{size} models"),
+            remedy: format!("use `auto` or `gibbs`, or at most {EXACT_LIMIT} columns"),
+        }),
+        Choice::Auto | Choice::Gibbs => todo!(),
+    }
 }

@@ -5,8 +5,10 @@
 //! widest vectors. The functions below use only + − × and bit operations, each rounded once: every instruction set
 //! gives the same bytes.
 
+mod log_exp;
 mod trig;
 
+pub use log_exp::{exp, ln};
 pub use trig::sin_cos;
 
 /// Samples per lane group.

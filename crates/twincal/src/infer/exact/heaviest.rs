@@ -1,0 +1,89 @@
+//! The heaviest models seen so far: a bounded list whose entrance threshold rises.
+
+use super::LISTED_MODELS;
+use crate::lanes::{LANES, Lane};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A threshold that all subtrees share. Positive floats are ordered like their bits.
+///
+/// It only ever says "at least [`LISTED_MODELS`] models are at least as heavy", so that which thread raised it when
+/// changes how many light models are looked at, never which heavy ones are kept.
+#[derive(Debug)]
+pub(super) struct Threshold(AtomicU64);
+
+impl Threshold {
+    pub(super) fn new() -> Self {
+        Self(AtomicU64::new(f64::MIN_POSITIVE.to_bits()))
+    }
+
+    fn raise(&self, weight: f64) -> f64 {
+        let before = self.0.fetch_max(weight.to_bits(), Ordering::Relaxed);
+        f64::from_bits(before).max(weight)
+    }
+}
+
+/// Models as (weight, set of positions), at least the [`LISTED_MODELS`] heaviest of those offered.
+#[derive(Debug)]
+pub(super) struct Heaviest {
+    models: Vec<(f64, u32)>,
+    threshold: f64,
+}
+
+impl Heaviest {
+    pub(super) fn new(shared: &Threshold) -> Self {
+        Self {
+            models: Vec::new(),
+            threshold: shared.raise(f64::MIN_POSITIVE),
+        }
+    }
+
+    /// Offers eight models: the positions of `set`, and the lane's own first three.
+    #[inline(always)]
+    pub(super) fn offer(&mut self, weight: &Lane, set: u32, shared: &Threshold) {
+        let mut heavy = false;
+        for lane in 0..LANES {
+            heavy |= weight[lane] >= self.threshold;
+        }
+        if heavy {
+            self.keep(weight, set, shared);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn keep(&mut self, weight: &Lane, set: u32, shared: &Threshold) {
+        for (lane, &weight) in weight.iter().enumerate() {
+            if weight >= self.threshold {
+                self.models.push((weight, set | lane as u32));
+            }
+        }
+        if self.models.len() >= 4 * LISTED_MODELS {
+            self.shrink();
+            self.threshold = shared.raise(self.models[LISTED_MODELS - 1].0);
+        }
+    }
+
+    /// Keeps the heaviest; of equal ones those with the smaller set. The last one kept is the lightest.
+    fn shrink(&mut self) {
+        if self.models.len() > LISTED_MODELS {
+            self.models
+                .select_nth_unstable_by(LISTED_MODELS - 1, |a, b| {
+                    b.0.total_cmp(&a.0).then(a.1.cmp(&b.1))
+                });
+            self.models.truncate(LISTED_MODELS);
+        }
+    }
+
+    /// The union of two lists.
+    pub(super) fn merge(mut self, other: Heaviest) -> Self {
+        self.models.extend(other.models);
+        self.shrink();
+        self
+    }
+
+    /// At most [`LISTED_MODELS`], in no particular order.
+    pub(super) fn into_models(mut self) -> Vec<(f64, u32)> {
+        self.shrink();
+        self.models
+    }
+}

@@ -1,0 +1,318 @@
+//! The tree against a plain loop over all models by another route: one Cholesky factorisation each, uncentred.
+
+use super::*;
+use crate::infer::testing::{problem, random_gram};
+use crate::linear_algebra::Cholesky;
+use crate::prior::Inclusion;
+use statrs::function::gamma::ln_gamma;
+
+/// Everything that [`enumerate`] promises, by its definition.
+struct Plain {
+    inclusion: Vec<f64>,
+    mean: Vec<f64>,
+    sd: Vec<f64>,
+    noise: f64,
+    log_evidence: f64,
+}
+
+fn plain(problem: &Problem) -> Plain {
+    let (size, prior) = (problem.xy.len(), &problem.prior);
+    let shape = prior.shape + problem.n / 2.0;
+    let mut models = Vec::new();
+    for set in 0u32..1 << size {
+        let members: Vec<usize> = (0..size).filter(|k| set >> k & 1 == 1).collect();
+        let count = members.len();
+        let mut a: Vec<f64> = members
+            .iter()
+            .flat_map(|&i| members.iter().map(move |&j| problem.gram[i * size + j]))
+            .collect();
+        (0..count).for_each(|i| a[i * count + i] += 1.0 / prior.slab[members[i]]);
+        let factor = Cholesky::new(&a, count).unwrap();
+        let mut mean: Vec<f64> = members.iter().map(|&k| problem.xy[k]).collect();
+        factor.solve(&mut mean);
+        let rss = problem.yy
+            - members
+                .iter()
+                .zip(&mean)
+                .map(|(&k, m)| problem.xy[k] * m)
+                .sum::<f64>();
+        let scale = prior.scale + rss / 2.0;
+        let mut families = vec![0; prior.families()];
+        members.iter().for_each(|&k| families[prior.family[k]] += 1);
+        let slabs: f64 = members.iter().map(|&k| prior.slab[k].ln()).sum();
+        let log = prior.log_model(&families) + problem.log_constant
+            - problem.n / 2.0 * (2.0 * std::f64::consts::PI).ln()
+            + prior.shape * prior.scale.ln()
+            - ln_gamma(prior.shape)
+            + ln_gamma(shape)
+            - slabs / 2.0
+            - factor.log_determinant() / 2.0
+            - shape * scale.ln();
+        let phi = scale / (shape - 1.0);
+        let inverse = factor.inverse();
+        let second: Vec<f64> = (0..count)
+            .map(|i| mean[i] * mean[i] + phi * inverse[i * count + i])
+            .collect();
+        models.push((log, members, mean, second, phi));
+    }
+    let top = models.iter().map(|m| m.0).fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = models.iter().map(|m| (m.0 - top).exp()).sum();
+    let mut out = Plain {
+        inclusion: vec![0.0; size],
+        mean: vec![0.0; size],
+        sd: vec![0.0; size],
+        noise: 0.0,
+        log_evidence: top + total.ln(),
+    };
+    for (log, members, mean, second, phi) in &models {
+        let w = (log - top).exp() / total;
+        out.noise += w * phi;
+        for (i, &k) in members.iter().enumerate() {
+            out.inclusion[k] += w;
+            out.mean[k] += w * mean[i];
+            out.sd[k] += w * second[i];
+        }
+    }
+    for k in 0..size {
+        out.sd[k] = (out.sd[k] - out.mean[k] * out.mean[k]).sqrt();
+    }
+    out
+}
+
+fn agree(problem: &Problem, tolerance: f64) {
+    let (a, b) = (enumerate(problem).unwrap(), plain(problem));
+    let close = |x: f64, y: f64, unit: f64, what: &str| {
+        assert!((x - y).abs() <= tolerance * unit, "{what}: {x} and {y}");
+    };
+    for k in 0..problem.xy.len() {
+        close(a.inclusion[k], b.inclusion[k], 1.0, "inclusion");
+        close(a.mean[k], b.mean[k], b.mean[k].abs() + b.sd[k], "mean");
+        close(a.sd[k], b.sd[k], 1e3 * b.sd[k], "sd");
+    }
+    close(a.noise, b.noise, b.noise, "noise");
+    close(
+        a.log_evidence.unwrap(),
+        b.log_evidence,
+        1.0 + b.log_evidence.abs(),
+        "log evidence",
+    );
+    let listed: f64 = a.models.iter().map(|m| m.weight).sum();
+    assert!((listed - 1.0).abs() < 1e-12);
+    assert!(
+        a.models
+            .windows(2)
+            .all(|pair| pair[0].weight >= pair[1].weight)
+    );
+    let all = 1usize << problem.xy.len();
+    assert!(a.models.len() == all.min(LISTED_MODELS) || a.models_mass >= LISTED_MASS);
+}
+
+#[test]
+fn the_tree_equals_the_plain_loop() {
+    for size in 0..=11 {
+        for (seed, inclusion) in [
+            (1, Inclusion::Probability(0.3)),
+            (2, Inclusion::ExpectedTerms(0.4 * size as f64)),
+        ] {
+            if size == 0 && seed == 2 {
+                continue;
+            }
+            for correlation in [0.0, 0.9] {
+                agree(
+                    &problem(size as u64 * 10 + seed, size, 60, correlation, inclusion),
+                    1e-10,
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn listed_models_carry_their_own_posterior() {
+    let problem = problem(5, 6, 50, 0.5, Inclusion::Probability(0.5));
+    let posterior = enumerate(&problem).unwrap();
+    let mean: Vec<f64> = (0..6u32)
+        .map(|k| {
+            let at = |m: &crate::posterior::Model| {
+                m.members
+                    .iter()
+                    .position(|&j| j == k)
+                    .map_or(0.0, |i| m.weight * m.mean[i])
+            };
+            posterior.models.iter().map(at).sum()
+        })
+        .collect();
+    for (k, mean) in mean.iter().enumerate() {
+        assert!(
+            (mean - posterior.mean[k]).abs() < 1e-5 * posterior.sd[k].max(1e-9),
+            "{k}"
+        );
+    }
+    for model in &posterior.models {
+        let m = model.members.len();
+        for (i, &ki) in model.members.iter().enumerate() {
+            for (j, &kj) in model.members.iter().enumerate() {
+                let product: f64 = (0..m)
+                    .map(|l| model.factor[i * m + l] * model.factor[j * m + l])
+                    .sum();
+                let slab = if i == j {
+                    1.0 / problem.prior.slab[ki as usize]
+                } else {
+                    0.0
+                };
+                let expected = problem.gram[ki as usize * 6 + kj as usize] + slab;
+                assert!((product - expected).abs() < 1e-12 * (1.0 + expected.abs()));
+            }
+        }
+    }
+}
+
+/// Fault cases 86 to 88: zero columns, zero residual, more columns than rows, no columns at all.
+#[test]
+fn degenerate_problems_have_finite_answers() {
+    let base = problem(8, 7, 40, 0.3, Inclusion::Probability(0.25));
+    let mut zero_column = base.clone();
+    (0..7).for_each(|k| {
+        zero_column.gram[k * 7 + 2] = 0.0;
+        zero_column.gram[2 * 7 + k] = 0.0;
+    });
+    zero_column.xy[2] = 0.0;
+    let posterior = enumerate(&zero_column).unwrap();
+    assert!((posterior.inclusion[2] - 0.25).abs() < 1e-12 && posterior.mean[2] == 0.0);
+    zero_column.prior.slab[2] = f64::INFINITY;
+    assert!((enumerate(&zero_column).unwrap().inclusion[2] - 0.25).abs() < 1e-12);
+
+    let mut silent = base.clone();
+    silent.yy = 0.0;
+    silent.xy.fill(0.0);
+    for scale in [1e-3, 0.0] {
+        silent.prior.scale = scale;
+        let posterior = enumerate(&silent).unwrap();
+        assert!(
+            posterior.inclusion.iter().all(|p| (0.0..0.25).contains(p)),
+            "{:?}",
+            posterior.inclusion
+        );
+        assert!(
+            posterior.mean.iter().all(|&m| m == 0.0) && posterior.log_evidence.unwrap().is_finite()
+        );
+    }
+
+    agree(&problem(9, 8, 4, 0.0, Inclusion::ExpectedTerms(2.0)), 1e-9);
+    let empty = enumerate(&problem(1, 0, 30, 0.0, Inclusion::Probability(0.5))).unwrap();
+    assert_eq!((empty.models.len(), empty.models_mass), (1, 1.0));
+}
+
+/// Fault case 89: the units of columns and torque change nothing but the units of the answer.
+#[test]
+fn units_do_not_matter() {
+    let problem = problem(21, 8, 50, 0.6, Inclusion::ExpectedTerms(2.0));
+    let expected = enumerate(&problem).unwrap();
+    for torque in [1e-9, 1.0, 3e7] {
+        let unit: Vec<f64> = (0..8)
+            .map(|k| [1e-12, 7e-5, 1.0, 1e12, 3e3, 1e-6, 2e9, 0.1][k])
+            .collect();
+        let mut scaled = problem.clone();
+        for i in 0..8 {
+            for j in 0..8 {
+                scaled.gram[i * 8 + j] *= unit[i] * unit[j];
+            }
+            scaled.xy[i] *= unit[i] * torque;
+            scaled.prior.slab[i] /= unit[i] * unit[i];
+        }
+        scaled.yy *= torque * torque;
+        scaled.prior.scale *= torque * torque;
+        let got = enumerate(&scaled).unwrap();
+        for k in 0..8 {
+            assert!((got.inclusion[k] - expected.inclusion[k]).abs() < 1e-11);
+            let factor = unit[k] / torque;
+            assert!(
+                (got.mean[k] * factor - expected.mean[k]).abs() < 1e-10 * expected.mean[k].abs()
+            );
+            assert!((got.sd[k] * factor - expected.sd[k]).abs() < 1e-9 * expected.sd[k]);
+        }
+        let moved = got.log_evidence.unwrap() + problem.n * f64::ln(torque);
+        assert!((moved - expected.log_evidence.unwrap()).abs() < 1e-9 * moved.abs());
+    }
+}
+
+/// A noise-free log: the residual is 1e-9 of the torque, which `yy − rᵀA⁻¹r` cannot see.
+#[test]
+fn an_almost_perfect_fit_keeps_its_digits() {
+    let exact = problem(31, 6, 80, 0.5, Inclusion::Probability(0.5));
+    let mut shrunk = exact.clone();
+    // y' = 1e9·Xβ + y: the data part beyond Xβ is unchanged; slabs so wide that shrinkage does not matter.
+    let beta: Vec<f64> = (0..6)
+        .map(|k| if k < 3 { 1e6 * (k as f64 + 1.0) } else { 0.0 })
+        .collect();
+    let product: Vec<f64> = (0..6)
+        .map(|i| (0..6).map(|j| exact.gram[i * 6 + j] * beta[j]).sum())
+        .collect();
+    let cross: f64 = (0..6)
+        .map(|k| 2.0 * beta[k] * exact.xy[k] + beta[k] * product[k])
+        .sum();
+    shrunk.yy += cross;
+    (0..6).for_each(|k| shrunk.xy[k] += product[k]);
+    shrunk.prior.slab.fill(1e14);
+    let posterior = enumerate(&shrunk).unwrap();
+    for k in 0..6 {
+        assert!(posterior.sd[k] > 0.0 && posterior.sd[k].is_finite());
+        if k < 3 {
+            assert!(
+                (posterior.mean[k] / beta[k] - 1.0).abs() < 1e-6
+                    && posterior.inclusion[k] > 1.0 - 1e-12
+            );
+            assert!(posterior.sd[k] < 1.0, "{}", posterior.sd[k]);
+        }
+    }
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bytes() {
+    let problem = problem(3, 18, 100, 0.7, Inclusion::ExpectedTerms(5.0));
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| enumerate(&problem).unwrap())
+    };
+    let one = run(1);
+    assert_eq!(one, run(2));
+    assert_eq!(one, run(5));
+    assert_eq!(one.models.len(), LISTED_MODELS.min(one.models.len()));
+}
+
+#[test]
+fn the_list_holds_the_heaviest_of_all() {
+    let (size, rows) = (12, 30);
+    let problem = problem(4, size, rows, 0.8, Inclusion::Probability(0.5));
+    let posterior = enumerate(&problem).unwrap();
+    let standard = Standard::new(&problem).unwrap();
+    let mut all: Vec<(f64, Vec<u32>)> = (0u32..1 << size)
+        .map(|set| {
+            let members: Vec<usize> = (0..size).filter(|d| set >> d & 1 == 1).collect();
+            let model = standard.model(&members, 1.0).unwrap();
+            let log_slabs: f64 = model
+                .members
+                .iter()
+                .map(|&k| problem.prior.slab[k as usize].ln())
+                .sum();
+            let count = model.members.len();
+            let log_factor: f64 = (0..count).map(|i| model.factor[i * count + i].ln()).sum();
+            (
+                -(0.5 * log_slabs + log_factor + posterior.shape * model.scale.ln()),
+                model.members,
+            )
+        })
+        .collect();
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (listed, (log, members)) in posterior.models.iter().zip(&all) {
+        let ratio = (log - all[0].0).exp();
+        assert!(
+            (listed.weight / posterior.models[0].weight - ratio).abs() < 1e-9,
+            "{members:?}"
+        );
+    }
+    assert!(random_gram(1, 3, 10, 0.0).0.len() == 9);
+}
