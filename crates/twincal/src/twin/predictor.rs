@@ -10,6 +10,7 @@ use crate::likelihood::JointNoise;
 use crate::posterior::Posterior;
 use crate::posterior::mixture::Level;
 use crate::posterior::student::StudentT;
+use crate::rows::{JointRows, RowBlock};
 use rayon::prelude::*;
 
 /// Rows of one joint, ready to be predicted: its columns and nominal torque, low-passed like the training rows.
@@ -27,6 +28,35 @@ pub struct JointInput<'a> {
     pub standstill: &'a [bool],
     /// Position, velocity and acceleration per row, for `extrapolating`; empty slices if unknown.
     pub motion: [&'a [f64]; 3],
+}
+
+impl<'a> JointInput<'a> {
+    /// The rows of `joint` in a block.
+    #[must_use]
+    pub fn of_block(block: &RowBlock<'a>, joint: usize) -> Self {
+        let JointRows {
+            x,
+            stride,
+            nominal,
+            measured,
+            standstill,
+            ..
+        } = block.joints[joint];
+        let own = joint * block.len..(joint + 1) * block.len;
+        let motion = [
+            &block.q[own.clone()],
+            &block.qd[own.clone()],
+            &block.qdd[own],
+        ];
+        Self {
+            x,
+            stride,
+            nominal,
+            measured,
+            standstill,
+            motion,
+        }
+    }
 }
 
 /// What one joint needs.
@@ -115,6 +145,24 @@ impl Predictor {
     #[must_use]
     pub fn columns(&self, joint: usize) -> &[usize] {
         &self.joints[joint].columns
+    }
+
+    /// [`Predictor::torque`] of every joint of a block.
+    ///
+    /// # Panics
+    /// If the block's columns are not those of this predictor.
+    #[must_use]
+    pub fn block(&self, block: &RowBlock<'_>, signal: TorqueSignal) -> Vec<JointTorque> {
+        let joints: Vec<usize> = (0..self.joints.len()).collect();
+        let predict = |joint: usize| {
+            assert_eq!(
+                block.joints[joint].columns,
+                self.columns(joint),
+                "columns of joint {joint}"
+            );
+            self.torque(joint, &JointInput::of_block(block, joint), signal)
+        };
+        joints.into_par_iter().map(predict).collect()
     }
 
     /// Torque of `joint` over a block of rows, with the central 95 % interval of the mixture over models.

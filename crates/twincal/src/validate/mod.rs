@@ -1,8 +1,10 @@
 //! Held-out scores: how good the twin's torque is on data it has not seen (method section 8).
 
+mod heldout;
 mod scores;
 mod trace;
 
+pub use heldout::HeldOut;
 pub use scores::{CoverageKeeper, ScoreKeeper};
 pub use trace::{MAX_POINTS, TraceRows};
 
