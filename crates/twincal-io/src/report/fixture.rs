@@ -2,9 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use twincal::calibrate::{Calibration, Draws, LogSummary, TermSummary};
-use twincal::likelihood::JointNoise;
+use twincal::calibrate::{
+    Calibration, Draws, LikelihoodUsed, LogSummary, PriorUsed, TermSummary, Verdict,
+};
+use twincal::likelihood::{JointNoise, NoiseModel};
 use twincal::posterior::{Method, Model, Posterior};
+use twincal::prior::Inclusion;
 use twincal::robot::{
     Inertia, JointDescription, JointKind, LinkDescription, Robot, RobotDescription,
 };
@@ -226,8 +229,21 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
         },
         terms,
         noise: joint_noise,
-        tempering: 3.0,
-        scaled_variance: 240.0,
+        prior: PriorUsed {
+            scaled_variance: vec![(Family::Generic, 240.0)],
+            learned: true,
+            inclusion: Inclusion::ExpectedTerms(5.0),
+            shape: 1e-3,
+            scale: 1e-4,
+        },
+        likelihood: LikelihoodUsed {
+            model: NoiseModel::Tempered,
+            tempering: 3.0,
+            tempering_scores: vec![(1.0, 10.0), (3.0, 14.0), (10.0, 9.0)],
+            rounds: 6,
+        },
+        groups: Vec::new(),
+        sweep: Vec::new(),
         validation: validation(traces, names),
         autocorrelation: names
             .iter()
@@ -437,6 +453,12 @@ fn terms(names: &[&str]) -> Vec<TermSummary> {
             conditional_mean: some(mean),
             conditional_sd: some(sd),
             selected: live && pip >= 0.5,
+            verdict: live.then_some(if pip >= 0.5 {
+                Verdict::Found
+            } else {
+                Verdict::Absent
+            }),
+            column_rms: some(1.0),
             pip_sensitivity: if live {
                 [0.8, 1.0, 1.3, 0.7, 1.4]
                     .map(|f| f64::min(1.0, f * pip))

@@ -129,10 +129,10 @@ fn gather<'a>(
         findings: tables::findings(calibration),
         convergence: tables::convergence(calibration),
         pipeline: tables::pipeline(calibration),
-        tempering: if calibration.tempering == 1.0 {
+        tempering: if calibration.likelihood.tempering == 1.0 {
             String::new()
         } else {
-            calibration.tempering.to_string()
+            calibration.likelihood.tempering.to_string()
         },
     }
 }
