@@ -3,6 +3,8 @@
 //! Only kinematics, inertias and what makes nominal torque are read. Meshes are never opened.
 
 mod xml;
+mod include;
+mod mjcf;
 mod urdf;
 
 use crate::error::{Error, Place, Result};
@@ -63,10 +65,13 @@ fn parse(
     refuse_usd(name, &bytes)?;
     let mut document = Document::default();
     document.parse(name, &bytes)?;
+    if document.elements[0].name == "mujoco" {
+        include::expand(&mut document, path)?;
+    }
     let root = &document.elements[0];
-    let _ = path;
     let (mut description, findings) = match root.name.as_str() {
         "robot" => urdf::read(&document, settings)?,
+        "mujoco" => mjcf::read(&document)?,
         "sdf" => {
             return Err(document.error(
                 root,

@@ -237,18 +237,31 @@ impl Document {
         element: &Element,
         name: &str,
     ) -> Result<Option<[f64; N]>> {
-        let Some(attribute) = element.get(name) else {
-            return Ok(None);
-        };
+        element
+            .get(name)
+            .map(|attribute| self.exactly(element, attribute))
+            .transpose()
+    }
+
+    /// The `N` numbers of an attribute of `element`.
+    ///
+    /// # Errors
+    /// At the attribute when it is not exactly `N` numbers.
+    pub(crate) fn exactly<const N: usize>(
+        &self,
+        element: &Element,
+        attribute: &Attribute,
+    ) -> Result<[f64; N]> {
         let values = self.number_list(element, attribute)?;
         match values[..].try_into() {
-            Ok(array) => Ok(Some(array)),
+            Ok(array) => Ok(array),
             Err(_) => Err(self.attribute_error(
                 element,
                 attribute,
                 format!(
-                    "<{}> {name}=\"{}\" has {} numbers",
+                    "<{}> {}=\"{}\" has {} numbers",
                     element.name,
+                    attribute.name,
                     shorten(&attribute.value),
                     values.len()
                 ),

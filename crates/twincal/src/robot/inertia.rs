@@ -1,6 +1,6 @@
 //! Rigid-body inertia: is it physically possible, and how inertias move to another frame and add.
 
-use super::spatial::{Matrix, add, rotate_tensor, scale};
+use super::spatial::{IDENTITY, Matrix, add, rotate_tensor, scale};
 use super::{Inertia, Placement};
 use crate::error::{Error, Finding, Result, Severity};
 
@@ -49,12 +49,13 @@ impl Moments {
     }
 }
 
-/// Principal moments of a symmetric matrix in increasing order, by Jacobi rotations (error about 1e-16 of the norm).
-pub fn principal_moments(tensor: &Matrix) -> [f64; 3] {
+/// Principal moments of a symmetric matrix in increasing order, with their axes as the columns of a rotation (up to
+/// sign): `tensor = R diag(moments) Rᵀ`. Jacobi rotations, error about 1e-16 of the norm.
+pub fn principal_axes(tensor: &Matrix) -> ([f64; 3], Matrix) {
     let mut a = *tensor;
+    let mut r = IDENTITY;
     for _ in 0..30 {
-        let off = a[0][1].abs() + a[0][2].abs() + a[1][2].abs();
-        if off == 0.0 {
+        if a[0][1] == 0.0 && a[0][2] == 0.0 && a[1][2] == 0.0 {
             break;
         }
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
@@ -68,6 +69,7 @@ pub fn principal_moments(tensor: &Matrix) -> [f64; 3] {
             let s = t * c;
             for k in 0..3 {
                 (a[k][p], a[k][q]) = (c * a[k][p] - s * a[k][q], s * a[k][p] + c * a[k][q]);
+                (r[k][p], r[k][q]) = (c * r[k][p] - s * r[k][q], s * r[k][p] + c * r[k][q]);
             }
             for k in 0..3 {
                 (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
@@ -75,9 +77,9 @@ pub fn principal_moments(tensor: &Matrix) -> [f64; 3] {
             (a[p][q], a[q][p]) = (0.0, 0.0);
         }
     }
-    let mut moments = [a[0][0], a[1][1], a[2][2]];
-    moments.sort_by(f64::total_cmp);
-    moments
+    let mut order = [0, 1, 2];
+    order.sort_by(|&i, &k| a[i][i].total_cmp(&a[k][k]));
+    (order.map(|i| a[i][i]), r.map(|row| order.map(|i| row[i])))
 }
 
 /// Refuses what no body can have: a mass that is not positive, a tensor that is not positive definite or breaks the
@@ -139,7 +141,7 @@ pub(crate) fn check(
             1,
         )));
     }
-    let [i1, i2, i3] = principal_moments(tensor);
+    let ([i1, i2, i3], _) = principal_axes(tensor);
     let problem = if i1 < -TOLERANCE * i3.abs() || i3 <= 0.0 {
         format!(
             "inertia tensor is not positive definite (principal moments {i1:.4e}, {i2:.4e}, {i3:.4e} kg·m²)"
@@ -155,7 +157,7 @@ pub(crate) fn check(
         return refuse(
             problem,
             "no body has such an inertia: correct the model (tensor about the centre of mass, axes of its own frame), \
-             or allow unphysical inertias to go on with a warning",
+             or go on with a warning by allow = [\"unphysical_inertia\"]",
         );
     }
     let message =
@@ -171,7 +173,7 @@ pub(crate) fn check(
 
 #[cfg(test)]
 mod tests {
-    use super::super::spatial::{IDENTITY, axis_angle, norm};
+    use super::super::spatial::{axis_angle, norm};
     use super::*;
 
     fn diagonal(d: [f64; 3]) -> Matrix {
@@ -188,12 +190,17 @@ mod tests {
             [-1.0, 0.0, 4.0],
         ] {
             for angle in [0.0, 1e-9, 0.3, 1.5707963, 2.9] {
-                let found = principal_moments(&rotate_tensor(&axis_angle(u, angle), &diagonal(d)));
-                for k in 0..3 {
+                let tensor = rotate_tensor(&axis_angle(u, angle), &diagonal(d));
+                let (found, axes) = principal_axes(&tensor);
+                let again = rotate_tensor(&axes, &diagonal(found));
+                for i in 0..3 {
                     assert!(
-                        (found[k] - d[k]).abs() < 3e-15,
+                        (found[i] - d[i]).abs() < 4e-15,
                         "{d:?} at {angle}: {found:?}"
                     );
+                    for k in 0..3 {
+                        assert!((again[i][k] - tensor[i][k]).abs() < 8e-15, "{again:?}");
+                    }
                 }
             }
         }

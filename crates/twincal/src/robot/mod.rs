@@ -21,7 +21,7 @@ pub use description::{
 };
 pub use dynamics::{Motion, Workspace, inverse_dynamics, mass_matrix, nominal_torque};
 pub use energy::{kinetic_energy, potential_energy};
-pub use inertia::principal_moments;
+pub use inertia::principal_axes;
 pub use names::{did_you_mean, nearest_names};
 
 use crate::error::{Error, Finding, Result, Severity};
