@@ -168,7 +168,7 @@ fn pool(graph: &Graph, candidates: &[Candidate], joints: usize, wanted: usize) -
 
 /// Columns in the span of those before them, `(position, Σ factor · earlier kept column)`: modified Gram–Schmidt, twice
 /// for orthogonality to rounding, in the order given.
-fn dependent(columns: Vec<Vec<f64>>) -> Vec<(usize, Vec<(f64, usize)>)> {
+pub(super) fn dependent(columns: Vec<Vec<f64>>) -> Vec<(usize, Vec<(f64, usize)>)> {
     let mut kept: Vec<usize> = Vec::new();
     let mut basis: Vec<Vec<f64>> = Vec::new();
     let mut factors: Vec<Vec<f64>> = Vec::new(); // column of R for each kept column, in units of its length

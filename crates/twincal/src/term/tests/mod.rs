@@ -1,6 +1,7 @@
 //! Tests of the whole road from text to columns.
 
 mod action;
+mod arm;
 mod columns;
 mod judgement;
 mod parser;
