@@ -117,18 +117,21 @@ fn sources(root: &Path) -> Vec<Source> {
     let mut folders = vec![root.to_path_buf()];
     let mut sources = Vec::new();
     while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder).unwrap() {
-            let path = entry.unwrap().path();
+        for entry in fs::read_dir(&folder).expect("a readable source tree") {
+            let path = entry.expect("a readable source tree").path();
             if path.is_dir() {
                 folders.push(path);
             } else if path.extension().is_some_and(|extension| extension == "rs") {
-                let inside = path.strip_prefix(root).unwrap().with_extension("");
+                let inside = path
+                    .strip_prefix(root)
+                    .expect("a readable source tree")
+                    .with_extension("");
                 let mut parts: Vec<String> = inside
                     .components()
                     .map(|part| part.as_os_str().to_string_lossy().into_owned())
                     .collect();
                 parts.retain(|part| part != "mod");
-                let code = blanked(&fs::read_to_string(&path).unwrap());
+                let code = blanked(&fs::read_to_string(&path).expect("a readable source tree"));
                 let is_test = parts.iter().any(|part| part.ends_with("tests"));
                 let shipped = if is_test {
                     String::new()
