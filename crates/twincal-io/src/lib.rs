@@ -4,6 +4,8 @@ pub mod error;
 pub mod model;
 pub mod memory;
 pub mod config;
+pub mod log;
+pub mod table;
 pub mod artifact;
 pub mod report;
 

@@ -1,0 +1,451 @@
+//! Which column is which channel of which joint.
+//!
+//! | first wins | position | velocity | acceleration | torque |
+//! |---|---|---|---|---|
+//! | `[columns]` in the config | `q` | `qd` | `qdd` | `tau` |
+//! | joint name and word, joined by `.`, `/`, `_` or `:`, either first | `q`, `pos`, `position`, `angle`; the bare joint name | `qd`, `dq`, `vel`, `velocity`, `speed` | `qdd`, `ddq`, `acc`, `accel`, `acceleration` | `tau`, `torque`, `effort`, `force`, `tau_meas` |
+//! | word and number, with or without `_` or in `[]`, 1 = first moving joint | `q1` | `qd1` | `qdd1` | `tau1` |
+//!
+//! Time is `t`, `time`, `timestamp`, `stamp`, `sec`, `secs` or `seconds`, a unit may follow (`time_s`, `time [s]`, `t_ms`). Letter case is
+//! free where that leaves one column.
+
+use super::{LogOptions, MAX_COLUMNS};
+use crate::error::{Error, Place, Result};
+use std::collections::BTreeMap;
+use twincal::robot::{Robot, did_you_mean};
+use twincal::{Finding, Severity};
+
+/// Words for position, velocity, acceleration, torque.
+const WORDS: [&[&str]; 4] = [
+    &["q", "pos", "position", "angle"],
+    &["qd", "dq", "vel", "velocity", "speed"],
+    &["qdd", "ddq", "acc", "accel", "acceleration"],
+    &["tau", "torque", "effort", "force", "tau_meas"],
+];
+const QUANTITIES: [&str; 4] = ["position", "velocity", "acceleration", "torque"];
+const TIME_WORDS: [&str; 7] = ["t", "time", "timestamp", "stamp", "sec", "secs", "seconds"];
+const UNITS: [&str; 8] = ["s", "sec", "secs", "seconds", "ms", "us", "ns", "µs"];
+
+/// A column of the file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Channel {
+    /// Its index in the file.
+    pub index: usize,
+    /// Its name in the file.
+    pub name: String,
+}
+
+/// The columns that a recording is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Selection {
+    /// Time stamps.
+    pub time: Option<Channel>,
+    /// Position, velocity, acceleration, torque of each moving joint; position is always there.
+    pub joints: Vec<[Option<Channel>; 4]>,
+    /// How the columns were matched.
+    pub findings: Vec<Finding>,
+}
+
+/// Where the channels of a [`Selection`] stand among the columns that were read.
+pub(crate) struct Positions {
+    pub(crate) time: Option<usize>,
+    pub(crate) joints: Vec<[Option<usize>; 4]>,
+}
+
+impl Selection {
+    /// Columns to read, time first, then joint by joint.
+    pub fn file_columns(&self) -> Vec<usize> {
+        let joints = self.joints.iter().flatten().flatten();
+        self.time.iter().chain(joints).map(|c| c.index).collect()
+    }
+
+    pub(crate) fn positions(&self) -> Positions {
+        let mut next = 0;
+        let mut number = |present: bool| {
+            let position = present.then_some(next);
+            next += usize::from(present);
+            position
+        };
+        let time = number(self.time.is_some());
+        let joints = self
+            .joints
+            .iter()
+            .map(|joint| joint.each_ref().map(|c| number(c.is_some())))
+            .collect();
+        Positions { time, joints }
+    }
+}
+
+/// Names of a file's columns, exact and without letter case.
+struct Header<'a> {
+    file: &'a str,
+    names: &'a [String],
+    exact: BTreeMap<&'a str, usize>,
+    folded: BTreeMap<String, Vec<usize>>,
+}
+
+impl<'a> Header<'a> {
+    fn new(file: &'a str, names: &'a [String]) -> Result<Self> {
+        if names.len() > MAX_COLUMNS {
+            return Err(Error::content(
+                Place::line(file, 1),
+                format!("{} columns, the limit is {MAX_COLUMNS}", names.len()),
+                "export only the columns that are needed",
+            ));
+        }
+        let (mut exact, mut folded) = (BTreeMap::new(), BTreeMap::<String, Vec<usize>>::new());
+        for (index, name) in names
+            .iter()
+            .enumerate()
+            .filter(|(_, name)| !name.is_empty())
+        {
+            if let Some(first) = exact.insert(name.as_str(), index) {
+                return Err(Error::content(
+                    Place::line(file, 1),
+                    format!(
+                        "two columns are called `{name}` (number {} and {})",
+                        first + 1,
+                        index + 1
+                    ),
+                    "give every column its own name",
+                ));
+            }
+            folded.entry(name.to_lowercase()).or_default().push(index);
+        }
+        Ok(Self {
+            file,
+            names,
+            exact,
+            folded,
+        })
+    }
+
+    fn channel(&self, index: usize) -> Channel {
+        Channel {
+            index,
+            name: self.names[index].clone(),
+        }
+    }
+
+    /// The column of that name; letter case is free if it leaves one.
+    fn find(&self, name: &str) -> Option<usize> {
+        if let Some(&index) = self.exact.get(name) {
+            return Some(index);
+        }
+        match self.folded.get(&name.to_lowercase()).map(Vec::as_slice) {
+            Some([index]) => Some(*index),
+            _ => None,
+        }
+    }
+
+    /// A column that the config names.
+    fn mapped(&self, key: &str, name: &str) -> Result<Channel> {
+        let index = self.exact.get(name).ok_or_else(|| {
+            Error::content(
+                Place::file(self.file),
+                format!("has no column `{name}`, which [columns] {key} names"),
+                did_you_mean(name, self.names.iter().map(String::as_str)),
+            )
+        })?;
+        Ok(self.channel(*index))
+    }
+}
+
+/// Decides which column of `header` is which channel; see the table at the top of this file.
+///
+/// # Errors
+/// [`Error::Content`] for duplicate or too many columns, a mapped column that is not there, a joint in the log that the model
+/// lacks, a moving joint of the model that the log lacks, numbering from 0, no time column without `--rate`.
+pub fn match_columns(
+    file: &str,
+    header: &[String],
+    robot: &Robot,
+    options: &LogOptions,
+) -> Result<Selection> {
+    let header = Header::new(file, header)?;
+    let joints = robot.joint_names();
+    let tables = [
+        &options.columns.q,
+        &options.columns.qd,
+        &options.columns.qdd,
+        &options.columns.tau,
+    ];
+    for (table, key) in tables.iter().zip(["q", "qd", "qdd", "tau"]) {
+        for joint in table.keys() {
+            if !joints.contains(&joint.as_str()) {
+                return Err(Error::content(
+                    Place::file(file),
+                    format!(
+                        "[columns] {key} names joint `{joint}`, which does not move in the model"
+                    ),
+                    did_you_mean(joint, joints.iter().copied()),
+                ));
+            }
+        }
+    }
+    let time = find_time(&header, options)?;
+    let mut matched = Vec::with_capacity(joints.len());
+    for (number, joint) in joints.iter().enumerate() {
+        let mut channels = [const { None }; 4];
+        for quantity in 0..4 {
+            let key = ["q", "qd", "qdd", "tau"][quantity];
+            channels[quantity] = match tables[quantity].get(*joint) {
+                Some(column) => Some(header.mapped(key, column)?),
+                None => by_joint(&header, joint, quantity)
+                    .or_else(|| by_number(&header, number + 1, quantity))
+                    .map(|index| header.channel(index)),
+            };
+        }
+        matched.push(channels);
+    }
+    refuse_foreign_joints(&header, robot, &matched)?;
+    refuse_missing_joints(&header, &joints, &matched)?;
+    let findings = vec![say(file, &joints, &time, &matched)];
+    Ok(Selection {
+        time,
+        joints: matched,
+        findings,
+    })
+}
+
+fn find_time(header: &Header<'_>, options: &LogOptions) -> Result<Option<Channel>> {
+    if let Some(name) = &options.columns.time {
+        return header.mapped("time", name).map(Some);
+    }
+    let is_time = |name: &str| {
+        let lower = name.to_lowercase();
+        let parts: Vec<&str> = lower
+            .split([' ', '_', '[', ']', '(', ')', '/', '.'])
+            .filter(|part| !part.is_empty())
+            .collect();
+        match parts.as_slice() {
+            [word] => TIME_WORDS.contains(word),
+            [word, unit] => TIME_WORDS.contains(word) && UNITS.contains(unit),
+            _ => false,
+        }
+    };
+    // Words in the order of the list, then the first of their columns.
+    let found = TIME_WORDS
+        .iter()
+        .find_map(|word| header.find(word))
+        .or_else(|| header.names.iter().position(|name| is_time(name)));
+    if found.is_none() && options.rate_hz.is_none() {
+        let shown: Vec<&str> = header.names.iter().take(8).map(String::as_str).collect();
+        return Err(Error::content(
+            Place::file(header.file),
+            format!(
+                "has no time column (`t` or `time`); its columns begin `{}`",
+                shown.join("`, `")
+            ),
+            "name it in [columns] time, or give the sampling rate with --rate HZ",
+        ));
+    }
+    Ok(found.map(|index| header.channel(index)))
+}
+
+fn by_joint(header: &Header<'_>, joint: &str, quantity: usize) -> Option<usize> {
+    for word in WORDS[quantity] {
+        for join in [".", "/", "_", ":"] {
+            if let Some(index) = header.find(&format!("{joint}{join}{word}")) {
+                return Some(index);
+            }
+            if let Some(index) = header.find(&format!("{word}{join}{joint}")) {
+                return Some(index);
+            }
+        }
+    }
+    if quantity == 0 {
+        header.find(joint)
+    } else {
+        None
+    }
+}
+
+fn by_number(header: &Header<'_>, number: usize, quantity: usize) -> Option<usize> {
+    WORDS[quantity].iter().find_map(|word| {
+        [
+            format!("{word}{number}"),
+            format!("{word}_{number}"),
+            format!("{word}[{number}]"),
+        ]
+        .iter()
+        .find_map(|name| header.find(name))
+    })
+}
+
+/// Number of a numbered position column: `q7`, `q_7`, `pos[7]`.
+fn numbered_position(name: &str) -> Option<usize> {
+    let lower = name.to_lowercase();
+    WORDS[0].iter().find_map(|word| {
+        let rest = lower.strip_prefix(word)?;
+        let digits = rest
+            .strip_prefix('_')
+            .or_else(|| rest.strip_prefix('[').and_then(|r| r.strip_suffix(']')))
+            .unwrap_or(rest);
+        digits
+            .bytes()
+            .all(|b| b.is_ascii_digit())
+            .then(|| digits.parse().ok())?
+    })
+}
+
+/// `joint` of a column `joint.position`, `joint/q` …: only the joints that are written like this can be told for sure.
+fn dotted_joint(name: &str) -> Option<&str> {
+    let (joint, word) = name.rsplit_once(['.', '/'])?;
+    (WORDS[0].contains(&word.to_lowercase().as_str()) && !joint.is_empty()).then_some(joint)
+}
+
+/// A position column of a joint that the model does not have (faults.md case 71).
+fn refuse_foreign_joints(
+    header: &Header<'_>,
+    robot: &Robot,
+    matched: &[[Option<Channel>; 4]],
+) -> Result<()> {
+    let used = |index: usize| matched.iter().flatten().flatten().any(|c| c.index == index);
+    let moving = robot.joint_names();
+    let known = |name: &str| {
+        robot
+            .description()
+            .joints
+            .iter()
+            .any(|j| j.name.eq_ignore_ascii_case(name))
+    };
+    let numbered_used = matched
+        .iter()
+        .filter_map(|joint| joint[0].as_ref())
+        .any(|c| numbered_position(&c.name).is_some());
+    for (index, name) in header.names.iter().enumerate() {
+        if used(index) {
+            continue;
+        }
+        if let Some(joint) = dotted_joint(name).filter(|joint| !known(joint)) {
+            return Err(Error::content(
+                Place::file(header.file),
+                format!("column `{name}`: the model has no joint `{joint}`"),
+                format!(
+                    "{}; rename the column, or map it in [columns]",
+                    did_you_mean(joint, moving.iter().copied())
+                ),
+            ));
+        }
+        match numbered_position(name) {
+            Some(0) if !matched.is_empty() => {
+                return Err(Error::content(
+                    Place::file(header.file),
+                    format!("column `{name}`: joints are numbered from 1"),
+                    "rename the columns q1, q2, …, or map them in [columns]",
+                ));
+            }
+            Some(number) if number > matched.len() && numbered_used => {
+                return Err(Error::content(
+                    Place::file(header.file),
+                    format!(
+                        "column `{name}`: the model has only {} moving joints",
+                        matched.len()
+                    ),
+                    format!(
+                        "they are `{}`; name columns after joints, or map them in [columns]",
+                        moving.join("`, `")
+                    ),
+                ));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// A moving joint without a position column (faults.md case 72).
+fn refuse_missing_joints(
+    header: &Header<'_>,
+    joints: &[&str],
+    matched: &[[Option<Channel>; 4]],
+) -> Result<()> {
+    let missing: Vec<usize> = (0..joints.len())
+        .filter(|&j| matched[j][0].is_none())
+        .collect();
+    let Some(&first) = missing.first() else {
+        let silent: Vec<&str> = (0..joints.len())
+            .filter(|&j| matched[j][3].is_none())
+            .map(|j| joints[j])
+            .collect();
+        if silent.is_empty() || silent.len() == joints.len() {
+            return Ok(());
+        }
+        return Err(Error::content(
+            Place::file(header.file),
+            format!(
+                "has torque columns, but none for joint `{}`",
+                silent.join("`, `")
+            ),
+            "add them, map them in [columns] tau, or fix the joint with [model] locked",
+        ));
+    };
+    let (problem, remedy);
+    if missing.len() == joints.len() {
+        let shown: Vec<&str> = header.names.iter().take(12).map(String::as_str).collect();
+        problem = format!(
+            "has no position column for any joint of the model; its columns begin `{}`",
+            shown.join("`, `")
+        );
+        remedy = format!(
+            "name columns `q1`, `qd1`, `tau1` … or `{}.q` …, or map them in [columns]",
+            joints[first]
+        );
+    } else {
+        let names: Vec<String> = missing
+            .iter()
+            .map(|&j| format!("`{}` (q{})", joints[j], j + 1))
+            .collect();
+        let locked: Vec<String> = missing
+            .iter()
+            .map(|&j| format!("{} = 0.0", key(joints[j])))
+            .collect();
+        problem = format!("has no position column for joint {}", names.join(", "));
+        remedy = format!(
+            "if it does not move, fix it with [model] locked = {{ {} }}; else add the column or map it in [columns] q",
+            locked.join(", ")
+        );
+    }
+    Err(Error::content(Place::file(header.file), problem, remedy))
+}
+
+/// A joint name as a TOML key.
+fn key(name: &str) -> String {
+    let bare = !name.is_empty()
+        && name
+            .bytes()
+            .all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
+    if bare {
+        name.to_owned()
+    } else {
+        format!("\"{}\"", name.replace('\\', "\\\\").replace('"', "\\\""))
+    }
+}
+
+/// The whole assignment as one note.
+fn say(
+    file: &str,
+    joints: &[&str],
+    time: &Option<Channel>,
+    matched: &[[Option<Channel>; 4]],
+) -> Finding {
+    let mut parts = Vec::new();
+    if let Some(time) = time {
+        parts.push(format!("time = {}", time.name));
+    }
+    for (joint, channels) in joints.iter().zip(matched) {
+        let columns: Vec<&str> = channels.iter().flatten().map(|c| c.name.as_str()).collect();
+        let missing: Vec<&str> = (0..4)
+            .filter(|&k| channels[k].is_none())
+            .map(|k| QUANTITIES[k])
+            .collect();
+        let missing = if missing.is_empty() {
+            String::new()
+        } else {
+            format!(" (no {})", missing.join(", "))
+        };
+        parts.push(format!("{joint} = {}{missing}", columns.join(" ")));
+    }
+    Finding::new(Severity::Note, "columns", file, parts.join("; "), 0)
+}

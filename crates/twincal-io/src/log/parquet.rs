@@ -1,0 +1,235 @@
+//! Parquet logs: column by column into doubles, after the file's claims about itself have been checked.
+
+use super::pages::check_chunk;
+use super::{Cells, LogOptions, assemble, match_columns};
+use crate::error::{Error, Place, Result};
+use crate::memory;
+use parquet::basic::{LogicalType, Repetition, TimeUnit, Type};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::{AsBytes, DataType};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::ParquetMetaData;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::schema::types::ColumnDescriptor;
+use std::fs::File;
+use twincal::Finding;
+use twincal::Severity;
+use twincal::robot::Robot;
+use twincal::signal::Recording;
+
+/// Values read at a time.
+const BATCH: usize = 8192;
+
+fn broken(name: &str, error: &ParquetError) -> Error {
+    Error::content(
+        Place::file(name),
+        format!("is not a whole Parquet file: {error}"),
+        "copy or export it again",
+    )
+}
+
+/// Reads a Parquet log.
+pub(super) fn read(
+    file: File,
+    name: &str,
+    robot: &Robot,
+    options: &LogOptions,
+) -> Result<(Recording, Vec<Finding>)> {
+    let mut pages = file
+        .try_clone()
+        .map_err(|e| Error::system(name, "read", &e, "check the file"))?;
+    let reader = SerializedFileReader::new(file).map_err(|e| broken(name, &e))?;
+    let metadata = reader.metadata();
+    let columns: Vec<_> = metadata.file_metadata().schema_descr().columns().to_vec();
+    let header: Vec<String> = columns.iter().map(|c| c.path().string()).collect();
+    let selection = match_columns(name, &header, robot, options)?;
+    let wanted = selection.file_columns();
+    let mut findings = Vec::new();
+    let mut scales = Vec::with_capacity(wanted.len());
+    for &index in &wanted {
+        scales.push(scale(name, &columns[index], &mut findings)?);
+    }
+    let rows = check(&mut pages, name, metadata, &wanted)?;
+    memory::require(
+        name,
+        (rows as u64).saturating_mul(wanted.len() as u64 * 8),
+        "read a shorter log, or one with fewer columns",
+    )?;
+    let mut cells = Cells {
+        columns: wanted.iter().map(|_| Vec::with_capacity(rows)).collect(),
+        ..Cells::default()
+    };
+    for group in 0..reader.num_row_groups() {
+        let group = reader.get_row_group(group).map_err(|e| broken(name, &e))?;
+        for (values, &index) in cells.columns.iter_mut().zip(&wanted) {
+            let column = group
+                .get_column_reader(index)
+                .map_err(|e| broken(name, &e))?;
+            append(column, values).map_err(|e| broken(name, &e))?;
+        }
+    }
+    if let Some(short) = cells.columns.iter().position(|c| c.len() != rows) {
+        return Err(Error::content(
+            Place::file(name),
+            format!(
+                "column `{}` has {} values, the file declares {rows} rows",
+                header[wanted[short]],
+                cells.columns[short].len()
+            ),
+            "copy or export it again",
+        ));
+    }
+    for (values, scale) in cells
+        .columns
+        .iter_mut()
+        .zip(scales)
+        .filter(|(_, scale)| *scale != 1.0)
+    {
+        for value in values {
+            *value /= scale;
+        }
+    }
+    let recording = assemble(name, rows, cells, &selection, options, &mut findings)?;
+    Ok((recording, findings))
+}
+
+/// Refuses types that are no numbers; ticks per second of stamps whose type states their unit, else 1.
+fn scale(name: &str, column: &ColumnDescriptor, findings: &mut Vec<Finding>) -> Result<f64> {
+    let path = column.path().string();
+    let refuse = |what: String| {
+        Err(Error::content(
+            Place::file(name),
+            format!("column `{path}` {what}"),
+            "store it as DOUBLE, or map another column in [columns]",
+        ))
+    };
+    if column.max_rep_level() > 0
+        || column.self_type().get_basic_info().repetition() == Repetition::REPEATED
+    {
+        return refuse("is a list, not one number per row".into());
+    }
+    match column.physical_type() {
+        Type::DOUBLE | Type::FLOAT | Type::INT32 => return Ok(1.0),
+        Type::INT64 => {}
+        Type::BYTE_ARRAY | Type::FIXED_LEN_BYTE_ARRAY => {
+            return refuse("is text or bytes, not a number".into());
+        }
+        other => return refuse(format!("is {other}, not a number")),
+    }
+    let Some(LogicalType::Timestamp(stamp)) = column.logical_type_ref() else {
+        return Ok(1.0);
+    };
+    let (ticks, word) = match stamp.unit {
+        TimeUnit::MILLIS => (1e3, "milliseconds"),
+        TimeUnit::MICROS => (1e6, "microseconds"),
+        TimeUnit::NANOS => (1e9, "nanoseconds"),
+    };
+    findings.push(Finding::new(
+        Severity::Note,
+        "timestamp_type",
+        name,
+        format!("column `{path}` is a timestamp in {word} by its type and was turned into seconds"),
+        0,
+    ));
+    Ok(ticks)
+}
+
+/// Compares the footer's claims with each other and with the pages'; the number of rows.
+fn check(
+    pages: &mut File,
+    name: &str,
+    metadata: &ParquetMetaData,
+    wanted: &[usize],
+) -> Result<usize> {
+    let refuse =
+        |problem: String| Error::content(Place::file(name), problem, "copy or export it again");
+    let mut rows = 0_usize;
+    for (number, group) in metadata.row_groups().iter().enumerate() {
+        let claimed = group.num_rows();
+        rows = usize::try_from(claimed)
+            .ok()
+            .and_then(|n| rows.checked_add(n))
+            .ok_or_else(|| refuse(format!("row group {number} declares {claimed} rows")))?;
+        for &index in wanted {
+            let Some(chunk) = group.columns().get(index) else {
+                return Err(refuse(format!(
+                    "row group {number} lacks column {}",
+                    index + 1
+                )));
+            };
+            let values = chunk.num_values();
+            if values != claimed {
+                return Err(refuse(format!(
+                    "column `{}` declares {values} values in row group {number} of {claimed} rows",
+                    chunk.column_path().string()
+                )));
+            }
+            let start = chunk
+                .dictionary_page_offset()
+                .unwrap_or(chunk.data_page_offset());
+            let start = start.min(chunk.data_page_offset());
+            let (Ok(start), Ok(length)) =
+                (u64::try_from(start), u64::try_from(chunk.compressed_size()))
+            else {
+                return Err(refuse(format!(
+                    "column `{}` begins before the file",
+                    chunk.column_path().string()
+                )));
+            };
+            check_chunk(pages, start, length, values).map_err(|problem| {
+                refuse(format!(
+                    "column `{}`: {problem}",
+                    chunk.column_path().string()
+                ))
+            })?;
+        }
+    }
+    Ok(rows)
+}
+
+/// Appends one column chunk, nulls as NaN.
+fn append(column: ColumnReader, values: &mut Vec<f64>) -> std::result::Result<(), ParquetError> {
+    match column {
+        ColumnReader::DoubleColumnReader(reader) => append_typed(reader, values, |v| v),
+        ColumnReader::FloatColumnReader(reader) => append_typed(reader, values, f64::from),
+        ColumnReader::Int32ColumnReader(reader) => append_typed(reader, values, f64::from),
+        ColumnReader::Int64ColumnReader(reader) => append_typed(reader, values, |v| v as f64),
+        _ => Err(ParquetError::General(
+            "the column's type changed between footer and pages".into(),
+        )),
+    }
+}
+
+fn append_typed<T: DataType>(
+    mut reader: ColumnReaderImpl<T>,
+    values: &mut Vec<f64>,
+    convert: impl Fn(T::T) -> f64,
+) -> std::result::Result<(), ParquetError>
+where
+    T::T: AsBytes + Clone,
+{
+    let (mut batch, mut levels) = (Vec::with_capacity(BATCH), Vec::with_capacity(BATCH));
+    loop {
+        batch.clear();
+        levels.clear();
+        let (records, read, _) = reader.read_records(BATCH, Some(&mut levels), None, &mut batch)?;
+        if records == 0 {
+            return Ok(());
+        }
+        if levels.is_empty() {
+            values.extend(batch.drain(..).map(&convert));
+            continue;
+        }
+        // A level below the deepest is a null.
+        let deepest = levels.iter().copied().max().filter(|_| read > 0);
+        let mut present = batch.drain(..);
+        for level in &levels {
+            let value = if Some(*level) == deepest {
+                present.next()
+            } else {
+                None
+            };
+            values.push(value.map_or(f64::NAN, &convert));
+        }
+    }
+}

@@ -1,0 +1,409 @@
+//! Tables out: predictions as CSV or Parquet, written block by block.
+
+use crate::error::{Error, Result};
+use parquet::basic::{Compression, Repetition, Type as Physical, ZstdLevel};
+use parquet::data_type::{BoolType, DoubleType};
+use parquet::errors::ParquetError;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::Type;
+use std::io::{self, Write};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Rows of one Parquet row group.
+const GROUP: usize = 65_536;
+
+/// How a table is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TableFormat {
+    /// Comma-separated text, UTF-8, numbers in the shortest form that reads back to the same double.
+    Csv,
+    /// Parquet, doubles and booleans, Zstandard.
+    Parquet,
+}
+
+impl TableFormat {
+    /// From a file name's ending.
+    ///
+    /// # Errors
+    /// [`Error::Content`] if it is neither `.csv` nor `.parquet`.
+    pub fn of_path(path: &Path) -> Result<Self> {
+        let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        match ending.as_deref() {
+            Some("csv") => Ok(Self::Csv),
+            Some("parquet") => Ok(Self::Parquet),
+            _ => Err(Error::content(
+                crate::error::Place::file(path.display().to_string()),
+                "does not say its format",
+                "let the name end in .csv or .parquet",
+            )),
+        }
+    }
+}
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ColumnKind {
+    /// Doubles; NaN is an empty cell in CSV and NaN in Parquet.
+    Number,
+    /// `true` and `false`.
+    Flag,
+}
+
+/// A block of one column.
+#[derive(Debug, Clone, Copy)]
+pub enum Values<'a> {
+    /// For [`ColumnKind::Number`].
+    Numbers(&'a [f64]),
+    /// For [`ColumnKind::Flag`].
+    Flags(&'a [bool]),
+}
+
+impl Values<'_> {
+    fn len(&self) -> usize {
+        match self {
+            Self::Numbers(v) => v.len(),
+            Self::Flags(v) => v.len(),
+        }
+    }
+}
+
+/// Writes a table whose columns are known and whose rows come in blocks; memory is one row group.
+pub struct TableWriter<W: Write + Send> {
+    columns: Vec<(String, ColumnKind)>,
+    sink: Sink<W>,
+}
+
+enum Sink<W: Write + Send> {
+    Csv {
+        writer: W,
+        line: String,
+    },
+    Parquet {
+        writer: Box<SerializedFileWriter<W>>,
+        waiting: Vec<Column>,
+    },
+}
+
+/// One column's share of the row group that is being gathered.
+enum Column {
+    Numbers(Vec<f64>),
+    Flags(Vec<bool>),
+}
+
+fn io_error(error: ParquetError) -> io::Error {
+    match error {
+        ParquetError::External(inner) => match inner.downcast::<io::Error>() {
+            Ok(error) => *error,
+            Err(other) => io::Error::other(other),
+        },
+        other => io::Error::other(other),
+    }
+}
+
+impl<W: Write + Send> TableWriter<W> {
+    /// Begins a table.
+    ///
+    /// # Errors
+    /// What `writer` returns.
+    pub fn new(
+        mut writer: W,
+        format: TableFormat,
+        columns: &[(String, ColumnKind)],
+    ) -> io::Result<Self> {
+        let sink = match format {
+            TableFormat::Csv => {
+                let names: Vec<String> = columns.iter().map(|(name, _)| csv_cell(name)).collect();
+                writeln!(writer, "{}", names.join(","))?;
+                Sink::Csv {
+                    writer,
+                    line: String::new(),
+                }
+            }
+            TableFormat::Parquet => {
+                let waiting = columns
+                    .iter()
+                    .map(|(_, kind)| match kind {
+                        ColumnKind::Number => Column::Numbers(Vec::new()),
+                        ColumnKind::Flag => Column::Flags(Vec::new()),
+                    })
+                    .collect();
+                let properties = WriterProperties::builder()
+                    .set_compression(Compression::ZSTD(ZstdLevel::default()))
+                    .set_dictionary_enabled(false)
+                    .set_created_by(format!("twincal version {}", env!("CARGO_PKG_VERSION")))
+                    .build();
+                let schema = schema(columns).map_err(io_error)?;
+                let writer = SerializedFileWriter::new(writer, schema, Arc::new(properties))
+                    .map_err(io_error)?;
+                Sink::Parquet {
+                    writer: Box::new(writer),
+                    waiting,
+                }
+            }
+        };
+        Ok(Self {
+            columns: columns.to_vec(),
+            sink,
+        })
+    }
+
+    /// Adds rows: one block per column, all of one length, in the order of the columns.
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::InvalidInput`] if the blocks do not fit the columns; what the writer returns.
+    pub fn push(&mut self, blocks: &[Values<'_>]) -> io::Result<()> {
+        let rows = blocks.first().map_or(0, Values::len);
+        let fits = blocks.len() == self.columns.len()
+            && blocks.iter().zip(&self.columns).all(|(values, (_, kind))| {
+                values.len() == rows
+                    && matches!(values, Values::Flags(_)) == (*kind == ColumnKind::Flag)
+            });
+        if !fits {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidInput,
+                "blocks do not fit the table's columns",
+            ));
+        }
+        match &mut self.sink {
+            Sink::Csv { writer, line } => {
+                for row in 0..rows {
+                    csv_line(line, blocks, row);
+                    writer.write_all(line.as_bytes())?;
+                }
+                Ok(())
+            }
+            Sink::Parquet { writer, waiting } => {
+                for (column, values) in waiting.iter_mut().zip(blocks) {
+                    match (column, values) {
+                        (Column::Numbers(all), Values::Numbers(new)) => all.extend_from_slice(new),
+                        (Column::Flags(all), Values::Flags(new)) => all.extend_from_slice(new),
+                        _ => {}
+                    }
+                }
+                let gathered = waiting.first().map_or(0, Column::len);
+                if gathered >= GROUP {
+                    write_group(writer, waiting).map_err(io_error)?;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// Ends the table and gives the writer back.
+    ///
+    /// # Errors
+    /// What the writer returns.
+    pub fn finish(self) -> io::Result<W> {
+        match self.sink {
+            Sink::Csv { mut writer, .. } => {
+                writer.flush()?;
+                Ok(writer)
+            }
+            Sink::Parquet {
+                mut writer,
+                mut waiting,
+            } => {
+                if waiting.first().is_some_and(|c| c.len() > 0) {
+                    write_group(&mut writer, &mut waiting).map_err(io_error)?;
+                }
+                writer.into_inner().map_err(io_error)
+            }
+        }
+    }
+}
+
+impl Column {
+    fn len(&self) -> usize {
+        match self {
+            Self::Numbers(v) => v.len(),
+            Self::Flags(v) => v.len(),
+        }
+    }
+}
+
+fn schema(columns: &[(String, ColumnKind)]) -> std::result::Result<Arc<Type>, ParquetError> {
+    let fields = columns
+        .iter()
+        .map(|(name, kind)| {
+            let physical = match kind {
+                ColumnKind::Number => Physical::DOUBLE,
+                ColumnKind::Flag => Physical::BOOLEAN,
+            };
+            Type::primitive_type_builder(name, physical)
+                .with_repetition(Repetition::REQUIRED)
+                .build()
+                .map(Arc::new)
+        })
+        .collect::<std::result::Result<Vec<_>, _>>()?;
+    Type::group_type_builder("predictions")
+        .with_fields(fields)
+        .build()
+        .map(Arc::new)
+}
+
+fn write_group<W: Write + Send>(
+    writer: &mut SerializedFileWriter<W>,
+    waiting: &mut [Column],
+) -> std::result::Result<(), ParquetError> {
+    let mut group = writer.next_row_group()?;
+    for column in waiting {
+        let Some(mut out) = group.next_column()? else {
+            break;
+        };
+        match column {
+            Column::Numbers(values) => {
+                out.typed::<DoubleType>().write_batch(values, None, None)?;
+                values.clear();
+            }
+            Column::Flags(values) => {
+                out.typed::<BoolType>().write_batch(values, None, None)?;
+                values.clear();
+            }
+        }
+        out.close()?;
+    }
+    group.close()?;
+    Ok(())
+}
+
+/// One row of a CSV table, line end included.
+fn csv_line(line: &mut String, blocks: &[Values<'_>], row: usize) {
+    use std::fmt::Write as _;
+    line.clear();
+    for (column, values) in blocks.iter().enumerate() {
+        if column > 0 {
+            line.push(',');
+        }
+        // Writing to a String cannot fail.
+        let _ = match values {
+            Values::Numbers(v) if v[row].is_nan() => Ok(()),
+            Values::Numbers(v) => {
+                let size = v[row].abs();
+                if size != 0.0 && !(1e-5..1e16).contains(&size) {
+                    write!(line, "{:e}", v[row])
+                } else {
+                    write!(line, "{}", v[row])
+                }
+            }
+            Values::Flags(v) => write!(line, "{}", v[row]),
+        };
+    }
+    line.push('\n');
+}
+
+/// A text cell: control characters out, no formula in a spreadsheet (a leading `= + - @` gets an apostrophe), quoted where needed.
+pub fn csv_cell(text: &str) -> String {
+    let mut cell: String = text.chars().filter(|c| !c.is_control()).collect();
+    if cell.starts_with(['=', '+', '-', '@']) {
+        cell.insert(0, '\'');
+    }
+    if cell.contains([',', '"', ';']) || cell.starts_with(' ') || cell.ends_with(' ') {
+        cell = format!("\"{}\"", cell.replace('"', "\"\""));
+    }
+    cell
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn columns() -> Vec<(String, ColumnKind)> {
+        vec![
+            ("t".into(), ColumnKind::Number),
+            ("=cmd()|' /C calc'!A0.tau".into(), ColumnKind::Number),
+            ("extrapolating".into(), ColumnKind::Flag),
+        ]
+    }
+
+    const NUMBERS: [f64; 6] = [0.1, -1.0 / 3.0, 1e-300, f64::MAX, f64::NAN, 1e22];
+    const FLAGS: [bool; 6] = [true, false, false, true, false, true];
+
+    fn written(format: TableFormat) -> Vec<u8> {
+        let mut table = TableWriter::new(Vec::new(), format, &columns()).unwrap();
+        for part in [0..2, 2..6] {
+            table
+                .push(&[
+                    Values::Numbers(&NUMBERS[part.clone()]),
+                    Values::Numbers(&NUMBERS[part.clone()]),
+                    Values::Flags(&FLAGS[part]),
+                ])
+                .unwrap();
+        }
+        table.finish().unwrap()
+    }
+
+    #[test]
+    fn csv_reads_back_to_the_same_doubles_and_holds_no_formula() {
+        let text = String::from_utf8(written(TableFormat::Csv)).unwrap();
+        let mut lines = text.lines();
+        assert_eq!(
+            lines.next().unwrap(),
+            "t,'=cmd()|' /C calc'!A0.tau,extrapolating"
+        );
+        for (i, line) in lines.enumerate() {
+            let cells: Vec<&str> = line.split(',').collect();
+            if NUMBERS[i].is_nan() {
+                assert_eq!(cells[0], "");
+            } else {
+                assert_eq!(
+                    cells[0].parse::<f64>().unwrap().to_bits(),
+                    NUMBERS[i].to_bits()
+                );
+            }
+            assert_eq!(cells[2], if FLAGS[i] { "true" } else { "false" });
+        }
+        for (text, cell) in [
+            ("a,b", "\"a,b\""),
+            ("@x", "'@x"),
+            ("-rf", "'-rf"),
+            ("q\u{1b}[31m\"", "\"q[31m\"\"\""),
+        ] {
+            assert_eq!(csv_cell(text), cell);
+        }
+    }
+
+    #[test]
+    fn parquet_reads_back_to_the_same_doubles() {
+        use parquet::file::reader::{FileReader, SerializedFileReader};
+        use parquet::record::RowAccessor;
+        let mut file = tempfile::tempfile().unwrap();
+        file.write_all(&written(TableFormat::Parquet)).unwrap();
+        let reader = SerializedFileReader::new(file).unwrap();
+        let rows: Vec<_> = reader
+            .get_row_iter(None)
+            .unwrap()
+            .map(|row| row.unwrap())
+            .collect();
+        assert_eq!(rows.len(), 6);
+        for (i, row) in rows.iter().enumerate() {
+            assert_eq!(row.get_double(0).unwrap().to_bits(), NUMBERS[i].to_bits());
+            assert_eq!(row.get_bool(2).unwrap(), FLAGS[i]);
+        }
+    }
+
+    #[test]
+    fn blocks_that_do_not_fit_are_refused() {
+        let mut table = TableWriter::new(Vec::new(), TableFormat::Csv, &columns()).unwrap();
+        assert!(table.push(&[Values::Numbers(&[1.0])]).is_err());
+        assert!(
+            table
+                .push(&[
+                    Values::Numbers(&[1.0]),
+                    Values::Numbers(&[1.0, 2.0]),
+                    Values::Flags(&[true])
+                ])
+                .is_err()
+        );
+        assert!(
+            table
+                .push(&[
+                    Values::Numbers(&[1.0]),
+                    Values::Numbers(&[1.0]),
+                    Values::Numbers(&[1.0])
+                ])
+                .is_err()
+        );
+    }
+}
