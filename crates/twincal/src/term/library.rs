@@ -341,7 +341,7 @@ fn statuses(
                 let others: Vec<&str> = combination.iter().map(|&(_, k)| candidates[k].name.as_str()).collect();
                 if candidate.family == Family::User {
                     let formula: Vec<String> =
-                        combination.iter().map(|&(factor, k)| format!("{factor:+.6} × `{}`", candidates[k].name)).collect();
+                        combination.iter().map(|&(factor, k)| share(factor, &candidates[k].name)).collect();
                     let message = format!(
                         "term `{name}` has the same torque as {} for every motion: it is no column; keep one of them",
                         formula.join(" ")
@@ -378,4 +378,14 @@ fn statuses(
         ));
     }
     Ok(statuses)
+}
+
+/// "+2 × `name`", with six significant digits.
+fn share(factor: f64, name: &str) -> String {
+    let rounded: f64 = format!("{factor:.5e}").parse().unwrap_or(factor);
+    if (1e-4..1e6).contains(&rounded.abs()) {
+        format!("{rounded:+} × `{name}`")
+    } else {
+        format!("{rounded:+e} × `{name}`")
+    }
 }
