@@ -54,7 +54,7 @@ pub(super) fn median<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
 pub(super) fn quantile<C: AsRef<[f64]>>(chains: &[C], probability: f64) -> f64 {
     let pooled = sorted(chains);
     let n = pooled.len() as f64;
-    let place = n * probability + (1.0 + probability * (1.0 - 1.0 - 1.0));
+    let place = n * probability + (1.0 - probability);
     let below = place.clamp(1.0, n - 1.0).floor();
     let share = (place - below).clamp(0.0, 1.0);
     let at = below as usize;

@@ -1,6 +1,7 @@
 //! From a [`Problem`] to a [`Posterior`]: every model (exact) or a Markov chain over models (Gibbs).
 
 mod exact;
+mod gibbs;
 mod standard;
 #[cfg(test)]
 mod testing;
@@ -52,6 +53,6 @@ pub fn infer(problem: &Problem, settings: &InferenceSettings) -> Result<Posterio
             problem: format!("`exact` with {size} columns would sum 2^{size} models"),
             remedy: format!("use `auto` or `gibbs`, or at most {EXACT_LIMIT} columns"),
         }),
-        Choice::Auto | Choice::Gibbs => todo!(),
+        Choice::Auto | Choice::Gibbs => gibbs::sample(problem, settings),
     }
 }

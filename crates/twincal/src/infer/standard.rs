@@ -280,7 +280,7 @@ fn check(problem: &Problem) -> Result<()> {
     };
     for k in 0..size {
         let diagonal = problem.gram[k * size + k];
-        if !(diagonal >= 0.0)
+        if diagonal < 0.0
             || problem.gram[k * size..(k + 1) * size]
                 .iter()
                 .any(|x| !x.is_finite())
