@@ -12,7 +12,7 @@ pub use result::{
 };
 
 use crate::error::{Error, Finding, Result, Severity};
-use crate::infer::InferenceSettings;
+use crate::infer::{Choice, InferenceSettings};
 use crate::likelihood::{Columns, JointNoise, NoiseModel, NoiseSettings};
 use crate::observations::Part;
 use crate::plug_in::{
@@ -20,7 +20,7 @@ use crate::plug_in::{
 };
 use crate::prior::PriorSettings;
 use crate::robot::Robot;
-use crate::signal::{Recording, SignalSettings, choose_pipeline};
+use crate::signal::{Auto, Recording, SignalSettings, choose_pipeline};
 use crate::term::{Library, LibrarySettings};
 use crate::twin::Twin;
 use data::Data;
@@ -38,6 +38,42 @@ pub struct CalibrationSettings {
     pub noise: NoiseSettings,
     /// `[inference]`.
     pub inference: InferenceSettings,
+}
+
+impl Default for CalibrationSettings {
+    /// What an empty `twincal.toml` means: every candidate family, everything else chosen from the data.
+    fn default() -> Self {
+        Self {
+            library: LibrarySettings {
+                viscous: true,
+                coulomb: true,
+                offset: true,
+                motor_inertia: true,
+                ..LibrarySettings::default()
+            },
+            signal: SignalSettings {
+                cutoff_hz: Auto::Auto,
+                rate_hz: Auto::Auto,
+                coulomb_velocity: None,
+            },
+            prior: PriorSettings {
+                scaled_variance: Auto::Auto,
+                inclusion: None,
+                noise: None,
+            },
+            noise: NoiseSettings {
+                model: NoiseModel::Tempered,
+                per_joint: true,
+            },
+            inference: InferenceSettings {
+                method: Choice::Auto,
+                chains: 4,
+                draws: 5000,
+                seed: 1,
+                allow_disagreement: false,
+            },
+        }
+    }
 }
 
 /// How far a calibration has come; for progress bars.
