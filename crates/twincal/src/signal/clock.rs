@@ -133,7 +133,28 @@ fn finite_rows(
         cut = !finite;
     }
     let lost = samples - kept.len();
-    if lost > 0 {
+    if let Some(every) = slower_channels(&kept, samples) {
+        let names: Vec<&str> = channels
+            .iter()
+            .zip(&per_channel)
+            .filter(|(_, count)| **count * 10 > samples)
+            .take(4)
+            .map(|((name, _), _)| name.as_str())
+            .collect();
+        let ending = ["th", "st", "nd", "rd"][if every < 4 { every } else { 0 }];
+        findings.push(Finding::new(
+            Severity::Warning,
+            "slower_channels",
+            &log.name,
+            format!(
+                "{} have a value only in every {every}{ending} row: the log is read at that rate, from the {} rows that hold all channels; they share one clock, so no skew can be estimated",
+                names.join(", "),
+                kept.len()
+            ),
+            lost as u64,
+        ));
+        cut_before.fill(false);
+    } else if lost > 0 {
         let worst: Vec<String> = channels
             .iter()
             .zip(&per_channel)
@@ -160,6 +181,18 @@ fn finite_rows(
         ));
     }
     (kept, cut_before)
+}
+
+/// k if nearly all complete rows are k ≥ 2 rows apart: the table joins topics of different rates.
+fn slower_channels(kept: &[usize], samples: usize) -> Option<usize> {
+    let steps = kept.windows(2).map(|pair| pair[1] - pair[0]);
+    let mut sorted: Vec<usize> = steps.clone().collect();
+    sorted.sort_unstable();
+    let every = *sorted.get(sorted.len() / 2).filter(|every| **every >= 2)?;
+    let regular = steps
+        .filter(|step| step.abs_diff(every) <= every / 4)
+        .count();
+    (regular * 10 >= sorted.len() * 9 && kept.len() * every * 5 > samples * 4).then_some(every)
 }
 
 /// Median of the steps that go forward.
@@ -198,8 +231,8 @@ fn median_interval(
     let (problem, remedy) = match guess {
         Some((unit, size)) => (
             format!(
-                "the median time step is {interval} s; the stamps look like {unit} ({:.6} Hz)",
-                1.0 / (interval * size)
+                "the median time step is {interval} s; the stamps look like {unit} ({} Hz)",
+                (1e3 / (interval * size)).round() / 1e3
             ),
             format!(
                 "convert the time column to seconds (divide by {:.0}), or give --rate HZ",

@@ -100,8 +100,11 @@ impl<R: Read> Lines<R> {
         let mut text = std::mem::take(&mut self.spare);
         text.clear();
         let number = self.number + 1;
+        // Parity of quotation marks so far, counted once per byte.
+        let mut open = false;
         loop {
-            let room = (MAX_LINE + 2).saturating_sub(text.len()) as u64;
+            let room = (MAX_LINE + 2 - text.len()) as u64;
+            let before = text.len();
             let read = (&mut self.reader)
                 .take(room)
                 .read_until(b'\n', &mut text)
@@ -113,24 +116,24 @@ impl<R: Read> Lines<R> {
                         "check the disk or the program that writes it",
                     )
                 })?;
-            self.bytes += read as u64;
-            if read == 0 && (text.is_empty() || room > 0) {
+            if read == 0 {
                 break;
             }
+            self.bytes += read as u64;
             self.number += 1;
+            open ^= odd_quotes(&text[before..]);
             let ended = text.last() == Some(&b'\n');
-            let content = text.len() - usize::from(ended);
-            if content > MAX_LINE {
-                return Err(self.too_long(number, &text));
+            if text.len() - usize::from(ended) > MAX_LINE {
+                return Err(self.too_long(number, open));
             }
-            if !ended || !open_quote(&text) {
+            if !ended || !open {
                 break;
             }
         }
         if text.is_empty() {
             return Ok(None);
         }
-        if open_quote(&text) {
+        if open {
             return Err(Error::content(
                 Place::line(&self.name, number),
                 "a quotation mark is never closed",
@@ -146,9 +149,9 @@ impl<R: Read> Lines<R> {
         Ok(Some(Line { number, text }))
     }
 
-    fn too_long(&self, number: u64, text: &[u8]) -> Error {
+    fn too_long(&self, number: u64, open: bool) -> Error {
         let mut problem = format!("the line is longer than {} MiB", MAX_LINE >> 20);
-        if open_quote(text) {
+        if open {
             problem.push_str(", inside an open quotation mark");
         }
         Error::content(
@@ -198,6 +201,6 @@ impl<R: Read> Lines<R> {
 }
 
 /// Whether the number of quotation marks is odd.
-fn open_quote(text: &[u8]) -> bool {
+fn odd_quotes(text: &[u8]) -> bool {
     text.contains(&b'"') && text.iter().filter(|b| **b == b'"').count() % 2 == 1
 }
