@@ -8,5 +8,7 @@ pub mod log;
 pub mod table;
 pub mod artifact;
 pub mod report;
+pub mod result_json;
+pub mod twin_json;
 
 pub use error::{Error, Place, Result};

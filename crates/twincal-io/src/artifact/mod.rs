@@ -3,8 +3,7 @@
 //! ```text
 //! DIR/result.json       the answer, for programs
 //! DIR/report.html       the answer, for people
-//! DIR/twin.json         what check and predict need
-//! DIR/calibration.json  what the report is made from
+//! DIR/twin.json         what check, predict and report need
 //! DIR/run.log           when, where, how long (not reproducible, hence apart)
 //! DIR/manifest.json     format, who wrote it, SHA-256 of every other file
 //! ```
@@ -19,7 +18,7 @@ mod output_file;
 mod read;
 mod write;
 
-pub use manifest::{FORMAT, FileEntry, Maker, Manifest};
+pub use manifest::{FORMAT, FileEntry, Maker, Manifest, sha256, sha256_of_file};
 pub use output_file::OutputFile;
 pub use read::Artifact;
 pub use write::{Claim, Replace};
@@ -28,17 +27,15 @@ pub use write::{Claim, Replace};
 pub const RESULT: &str = "result.json";
 /// The answer, for people.
 pub const REPORT: &str = "report.html";
-/// What `check` and `predict` need.
+/// What `check`, `predict` and `report` need.
 pub const TWIN: &str = "twin.json";
-/// What the report is made from.
-pub const CALIBRATION: &str = "calibration.json";
 /// When, where and how long.
 pub const RUN_LOG: &str = "run.log";
 /// Format, writer and checksums.
 pub const MANIFEST: &str = "manifest.json";
 
-/// All names that an artefact may hold.
-const NAMES: [&str; 6] = [RESULT, REPORT, TWIN, CALIBRATION, RUN_LOG, MANIFEST];
+/// Names that an artefact holds; a manifest may name more.
+const NAMES: [&str; 5] = [RESULT, REPORT, TWIN, RUN_LOG, MANIFEST];
 
 #[cfg(test)]
 mod tests;

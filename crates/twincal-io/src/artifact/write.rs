@@ -5,6 +5,7 @@ use super::manifest::{Maker, Manifest};
 use super::{MANIFEST, NAMES};
 use crate::error::{Error, Place, Result};
 use rustix::fs::{CWD, RenameFlags, renameat_with};
+use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::Path;
@@ -109,12 +110,21 @@ fn check(target: &Path, shown: &str, replace: Replace) -> Result<bool> {
     if metadata.permissions().readonly() {
         return refuse("the folder is read-only", other);
     }
-    let entries = fs::read_dir(target).map_err(|e| Error::system(shown, "list", &e, other))?;
-    for entry in entries {
+    let manifest = fs::read(target.join(MANIFEST)).ok();
+    let manifest = manifest.and_then(|bytes| Manifest::parse(MANIFEST, &bytes).ok());
+    let ours = |name: &OsStr| {
+        let listed = manifest.iter().flat_map(|manifest| manifest.files.keys());
+        NAMES
+            .iter()
+            .copied()
+            .chain(listed.map(String::as_str))
+            .any(|known| name == known)
+    };
+    for entry in fs::read_dir(target).map_err(|e| Error::system(shown, "list", &e, other))? {
         let name = entry
             .map_err(|e| Error::system(shown, "list", &e, other))?
             .file_name();
-        if !NAMES.iter().any(|known| name == *known) {
+        if !ours(&name) {
             let problem = format!(
                 "holds `{}`, which twincal did not write",
                 name.to_string_lossy()
@@ -122,17 +132,13 @@ fn check(target: &Path, shown: &str, replace: Replace) -> Result<bool> {
             return refuse(&problem, "move it away or give another output with -o");
         }
     }
-    if let Replace::MadeBy(maker) = replace {
-        let manifest = fs::read(target.join(MANIFEST)).ok();
-        let made_by = manifest
-            .and_then(|bytes| Manifest::parse(MANIFEST, &bytes).ok())
-            .map(|m| m.made_by);
-        if made_by != Some(maker) {
-            return refuse(
-                "exists and was not written by this command",
-                "move it away or run in another folder",
-            );
-        }
+    if let Replace::MadeBy(maker) = replace
+        && manifest.as_ref().map(|manifest| manifest.made_by) != Some(maker)
+    {
+        return refuse(
+            "exists and was not written by this command",
+            "move it away or run in another folder",
+        );
     }
     Ok(true)
 }

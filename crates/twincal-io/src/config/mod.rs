@@ -6,7 +6,6 @@
 
 mod file;
 mod settings;
-mod suggest;
 mod unknown_keys;
 
 pub use file::{
@@ -14,8 +13,7 @@ pub use file::{
     InferenceTable, LibraryTable, LogTable, MethodWord, ModelTable, NoisePrior, NoiseTable,
     NoiseWord, NumberOrAuto, OutputTable, PriorTable, SignalTable, Slab,
 };
-pub use settings::{Gates, LogSettings, ModelSettings, Settings};
-pub use suggest::nearest;
+pub use settings::{Gates, LogSettings, Settings};
 
 use crate::error::{Error, Place, Result};
 use std::path::{Path, PathBuf};
@@ -108,6 +106,23 @@ impl Config {
         })
     }
 
+    /// The keys that change the result, as TOML for the report: no paths, threads or output.
+    pub fn in_force(&self) -> String {
+        let mut file = self.file.clone();
+        file.model.file = None;
+        file.log.heldout = None;
+        file.inference.threads = None;
+        file.output = OutputTable::default();
+        match toml::Table::try_from(&file) {
+            Ok(mut table) => {
+                prune(&mut table);
+                table.to_string()
+            }
+            // Only paths can fail to be written, and there are none left.
+            Err(_) => String::new(),
+        }
+    }
+
     fn relative_to(&mut self, folder: &Path) {
         let join = |path: &mut PathBuf| *path = folder.join(&*path);
         self.file.model.file.iter_mut().for_each(join);
@@ -139,6 +154,25 @@ impl Config {
             .into(),
         }
     }
+}
+
+/// Removes empty tables, and the empty list of terms that means nothing.
+fn prune(table: &mut toml::Table) {
+    if let Some(toml::Value::Table(library)) = table.get_mut("library")
+        && library
+            .get("terms")
+            .and_then(toml::Value::as_array)
+            .is_some_and(Vec::is_empty)
+    {
+        library.remove("terms");
+    }
+    table.retain(|_, value| match value {
+        toml::Value::Table(inner) => {
+            prune(inner);
+            !inner.is_empty()
+        }
+        _ => true,
+    });
 }
 
 /// Dotted name of the innermost key whose value holds byte `offset`.

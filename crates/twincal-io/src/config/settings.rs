@@ -2,6 +2,7 @@
 
 use super::{Allow, Config, Friction, MethodWord, NoisePrior, NoiseWord, NumberOrAuto, Slab};
 use crate::error::Result;
+use crate::model::ModelSettings;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -11,21 +12,6 @@ use twincal::likelihood::{NoiseModel, NoiseSettings};
 use twincal::prior::{Inclusion, PriorSettings};
 use twincal::signal::{Auto, SignalSettings};
 use twincal::term::LibrarySettings;
-
-/// `[model]` with defaults.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ModelSettings {
-    /// Model file.
-    pub file: Option<PathBuf>,
-    /// Gravity in the base frame, m/s²; `None`: the file's.
-    pub gravity: Option<[f64; 3]>,
-    /// Joints that stand still, rad or m.
-    pub locked: BTreeMap<String, f64>,
-    /// Count the URDF's damping as nominal torque.
-    pub use_urdf_friction: bool,
-    /// Physically impossible inertias are a finding instead of an error.
-    pub allow_unphysical: bool,
-}
 
 /// `[log]` and `[columns]` with defaults.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,8 +40,12 @@ pub struct Gates {
 /// Everything a run can be told, complete and in range.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Model.
+    /// Model file.
+    pub model_file: Option<PathBuf>,
+    /// How it is read.
     pub model: ModelSettings,
+    /// Joints that stand still, rad or m.
+    pub locked: BTreeMap<String, f64>,
     /// Logs.
     pub log: LogSettings,
     /// Mathematics.
@@ -82,7 +72,9 @@ impl Config {
         let (model, log, check) = (self.model()?, self.log()?, self.gates()?);
         let threads = self.count("inference.threads", file.inference.threads, 1, 4096)?;
         Ok(Settings {
+            model_file: file.model.file.clone(),
             model,
+            locked: file.model.locked.clone(),
             log,
             calibration: self.calibration()?,
             gates: check,
@@ -111,9 +103,7 @@ impl Config {
             )?;
         }
         Ok(ModelSettings {
-            file: table.file.clone(),
             gravity: table.gravity,
-            locked: table.locked.clone(),
             use_urdf_friction: table.use_urdf_friction.unwrap_or(false),
             allow_unphysical: self.allows(Allow::UnphysicalInertia),
         })

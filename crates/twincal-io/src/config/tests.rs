@@ -68,7 +68,7 @@ coverage = [0.90, 0.99]
 fn contract_example_is_accepted_and_means_what_it_says() {
     let settings = Config::parse("x", CONTRACT).unwrap().settings().unwrap();
     assert_eq!(settings.model.gravity, Some([0.0, 0.0, -9.81]));
-    assert_eq!(settings.model.locked["finger"], 0.0);
+    assert_eq!(settings.locked["finger"], 0.0);
     assert_eq!(settings.calibration.library.terms[1], "qd1*qd2*cos(q2)");
     assert_eq!(
         settings.calibration.prior.scaled_variance,
@@ -286,4 +286,15 @@ fn not_utf8_and_too_large_are_refused() {
             .to_string()
             .contains("cannot read")
     );
+}
+
+#[test]
+fn settings_in_force_are_the_given_keys_without_paths() {
+    let text = "[model]\nfile = \"/x/a.urdf\"\n[inference]\nseed = 3\nthreads = 2\n[library]\nfriction = []\n";
+    let config = Config::parse("x", text).unwrap();
+    assert_eq!(
+        config.in_force(),
+        "[inference]\nseed = 3\n\n[library]\nfriction = []\n"
+    );
+    assert_eq!(Config::default().in_force(), "");
 }

@@ -1,10 +1,10 @@
 //! Keys that the schema does not have, each with its place in the file and the nearest known name.
 
-use super::suggest::nearest;
 use crate::error::{Error, Place};
 use serde_json::Value;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+use twincal::robot::nearest_names;
 
 /// The first key of `table` that `schema` does not know, in the order of the file.
 pub(super) fn first_unknown(
@@ -22,7 +22,7 @@ pub(super) fn first_unknown(
     } else {
         format!(" in [{path}]")
     };
-    let remedy = match nearest(&key, known.iter().map(String::as_str)) {
+    let remedy = match nearest_names(&key, known.iter().map(String::as_str)).first() {
         Some(name) => format!("did you mean `{name}`?"),
         None => format!("known keys: {}", known.join(", ")),
     };

@@ -83,11 +83,35 @@ pub fn read_log(
     }
     if metadata.is_file() && magic == *b"PAR1" {
         file.seek(SeekFrom::Start(0)).map_err(|e| system(&e))?;
-        return parquet::read(file, &name, robot, options);
+        let pages = file.try_clone().map_err(|e| system(&e))?;
+        return parquet::read(file, pages, &name, robot, options);
     }
     // The bytes already taken go first: a pipe cannot be rewound.
     let head = std::io::Cursor::new(magic[..known].to_vec());
     read_csv(head.chain(file), metadata.len(), &name, robot, options)
+}
+
+/// Reads a log from memory: CSV or Parquet; `name` is what messages call it.
+///
+/// # Errors
+/// Like [`read_log`].
+pub fn parse_log(
+    name: &str,
+    bytes: &'static [u8],
+    robot: &Robot,
+    options: &LogOptions,
+) -> Result<(Recording, Vec<Finding>)> {
+    if bytes.starts_with(b"PAR1") {
+        let pages = std::io::Cursor::new(bytes);
+        return parquet::read(
+            bytes::Bytes::from_static(bytes),
+            pages,
+            name,
+            robot,
+            options,
+        );
+    }
+    read_csv(bytes, bytes.len() as u64, name, robot, options)
 }
 
 /// Reads a CSV log from any source; `name` is what messages call it, `bytes` its length if known (else 0).

@@ -9,9 +9,9 @@ use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{AsBytes, DataType};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
-use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
-use std::fs::File;
+use std::io::{Read, Seek};
 use twincal::Finding;
 use twincal::Severity;
 use twincal::robot::Robot;
@@ -28,17 +28,15 @@ fn broken(name: &str, error: &ParquetError) -> Error {
     )
 }
 
-/// Reads a Parquet log.
+/// Reads a Parquet log; `pages` is a second handle to the same bytes.
 pub(super) fn read(
-    file: File,
+    chunks: impl ChunkReader + 'static,
+    mut pages: impl Read + Seek,
     name: &str,
     robot: &Robot,
     options: &LogOptions,
 ) -> Result<(Recording, Vec<Finding>)> {
-    let mut pages = file
-        .try_clone()
-        .map_err(|e| Error::system(name, "read", &e, "check the file"))?;
-    let reader = SerializedFileReader::new(file).map_err(|e| broken(name, &e))?;
+    let reader = SerializedFileReader::new(chunks).map_err(|e| broken(name, &e))?;
     let metadata = reader.metadata();
     let columns: Vec<_> = metadata.file_metadata().schema_descr().columns().to_vec();
     let header: Vec<String> = columns.iter().map(|c| c.path().string()).collect();
@@ -136,7 +134,7 @@ fn scale(name: &str, column: &ColumnDescriptor, findings: &mut Vec<Finding>) -> 
 
 /// Compares the footer's claims with each other and with the pages'; the number of rows.
 fn check(
-    pages: &mut File,
+    pages: &mut (impl Read + Seek),
     name: &str,
     metadata: &ParquetMetaData,
     wanted: &[usize],

@@ -25,7 +25,7 @@ use crate::error::{Error, Result};
 use twincal::calibrate::Calibration;
 
 /// What the report says about the run beside its result: only things that are the same when the run is repeated.
-#[derive(Debug, Clone, PartialEq, Eq, Default, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub struct ReportContext {
     /// Version of the program.
     pub version: String,
@@ -42,7 +42,7 @@ pub struct ReportContext {
 }
 
 /// An input file and what it held.
-#[derive(Debug, Clone, PartialEq, Eq, Default, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub struct FileHash {
     /// File name as given; the caller leaves out the folder of an absolute one.
     pub name: String,

@@ -1,0 +1,207 @@
+//! The command line: commands, flags and their help, examples first.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+const TOP: &str = "\
+Examples:
+  twincal demo                                        the whole road, offline
+  twincal inspect run.csv --model arm.urdf            what is in this log?
+  twincal fit run*.csv --model arm.urdf               what does my model miss?
+  twincal check heldout.csv --twin twincal-out        is the twin still right?
+  twincal predict run.csv --twin twincal-out -o p.csv torque with intervals
+";
+
+/// Finds the physics missing from a robot's digital twin.
+#[derive(Debug, Parser)]
+#[command(name = "twincal", version, before_help = TOP, max_term_width = 80, subcommand_required = true)]
+#[command(arg_required_else_help = true, disable_help_subcommand = true)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// The paper's study, from simulated logs to a report in ./twincal-demo.
+    #[command(before_help = "Example:\n  twincal demo\n")]
+    Demo(Demo),
+    /// What a model and logs hold: joints, rates, gaps, motion, torque.
+    #[command(before_help = "\
+Examples:
+  twincal inspect arm.urdf
+  twincal inspect run1.csv run2.parquet --model arm.urdf
+  twincal inspect run1.csv --model arm.urdf --json
+")]
+    Inspect(Inspect),
+    /// Discover what the model misses, estimate it, validate on held-out data.
+    #[command(before_help = "\
+Examples:
+  twincal fit run1.csv --model arm.urdf
+  twincal fit run*.csv --model arm.urdf --heldout other.csv -o calibrated
+  twincal fit run*.csv --model arm.urdf --config twincal.toml --force --json
+")]
+    Fit(Fit),
+    /// Score a twin on new logs: exit code 0, or 1 where a gate says no.
+    #[command(before_help = "\
+Examples:
+  twincal check today.csv --twin twincal-out
+  twincal check today.csv --twin twincal-out --config gates.toml --json
+")]
+    Check(Check),
+    /// Torque with 95 % intervals for every row of the logs.
+    #[command(before_help = "\
+Examples:
+  twincal predict job.csv --twin twincal-out -o torque.csv
+  twincal predict job.parquet --twin twincal-out -o torque.parquet
+  twincal predict job.csv --twin twincal-out | head
+")]
+    Predict(Predict),
+    /// Write report.html anew from the stored result.
+    #[command(before_help = "Example:\n  twincal report --twin twincal-out\n")]
+    Report(Report),
+    /// Print the JSON Schema of twincal.toml.
+    #[command(before_help = "Example:\n  twincal schema > twincal.schema.json\n")]
+    Schema,
+}
+
+/// Flags of every command that reads logs.
+#[derive(Debug, Args)]
+pub(crate) struct LogFlags {
+    /// Settings; a flag overrides its key.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+    /// Sampling rate in Hz that replaces missing or wrong time stamps.
+    #[arg(long, value_name = "HZ")]
+    pub(crate) rate: Option<f64>,
+    /// Drop and count rows that cannot be read instead of refusing the file.
+    #[arg(long)]
+    pub(crate) lenient: bool,
+    /// Refuse logs in which data was lost or degraded beyond the stated limit.
+    #[arg(long)]
+    pub(crate) strict: bool,
+    /// Threads; the result is the same for any number.
+    #[arg(long, value_name = "N")]
+    pub(crate) threads: Option<u64>,
+    /// Print the result as JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// What may be accepted with a warning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Allow {
+    /// Inertia tensors that no rigid body can have.
+    UnphysicalInertia,
+    /// Gibbs chains that disagree (R-hat > 1.01).
+    DisagreeingChains,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Demo {
+    /// Seed of all random numbers [default: 1].
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// Threads; the result is the same for any number.
+    #[arg(long, value_name = "N")]
+    pub(crate) threads: Option<u64>,
+    /// Print the result as JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Inspect {
+    /// Logs (CSV, Parquet); without --model the first path is the model.
+    #[arg(value_name = "PATH", required_unless_present = "model")]
+    pub(crate) paths: Vec<PathBuf>,
+    /// Robot model (URDF, MJCF).
+    #[arg(long, value_name = "MODEL")]
+    pub(crate) model: Option<PathBuf>,
+    /// Accept with a warning what would be refused.
+    #[arg(long, value_name = "WHAT", value_enum)]
+    pub(crate) allow: Vec<Allow>,
+    #[command(flatten)]
+    pub(crate) log: LogFlags,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Fit {
+    /// Logs to fit (CSV, Parquet); each is a trajectory of its own.
+    #[arg(value_name = "LOG", required = true)]
+    pub(crate) logs: Vec<PathBuf>,
+    /// Robot model (URDF, MJCF).
+    #[arg(long, value_name = "MODEL")]
+    pub(crate) model: Option<PathBuf>,
+    /// Logs to score on; without them some of the fitted data is left out.
+    #[arg(long, value_name = "LOG", num_args = 1..)]
+    pub(crate) heldout: Vec<PathBuf>,
+    /// Folder of the result [default: twincal-out].
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Replace an earlier result.
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Seed of all random numbers [default: 1].
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// Accept with a warning what would be refused.
+    #[arg(long, value_name = "WHAT", value_enum)]
+    pub(crate) allow: Vec<Allow>,
+    #[command(flatten)]
+    pub(crate) log: LogFlags,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Check {
+    /// Logs to score the twin on.
+    #[arg(value_name = "LOG", required = true)]
+    pub(crate) logs: Vec<PathBuf>,
+    /// Folder that `twincal fit` wrote.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) twin: PathBuf,
+    #[command(flatten)]
+    pub(crate) log: LogFlags,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Predict {
+    /// Logs to predict; their rows follow each other.
+    #[arg(value_name = "LOG", required = true)]
+    pub(crate) logs: Vec<PathBuf>,
+    /// Folder that `twincal fit` wrote.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) twin: PathBuf,
+    /// .csv or .parquet; without it CSV goes to standard output.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// Replace an existing file.
+    #[arg(long)]
+    pub(crate) force: bool,
+    #[command(flatten)]
+    pub(crate) log: LogFlags,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Report {
+    /// Folder that `twincal fit` wrote.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) twin: PathBuf,
+    /// Rewrite a report that was changed by hand.
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Print the path of the report as JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Arguments;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn flags_do_not_contradict_each_other() {
+        Arguments::command().debug_assert();
+    }
+}

@@ -1,0 +1,203 @@
+//! The road that `fit` and `demo` share: calibrate, write the artefact, say what was found.
+
+use super::inputs::{LogInput, RobotInput};
+use super::{code_of, print_json, require_strict, summary};
+use crate::clock::{Stopwatch, now};
+use crate::failure::Outcome;
+use crate::names::display_names;
+use crate::progress::Progress;
+use crate::terminal::Terminal;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use twincal::calibrate::{Calibration, Stage, calibrate};
+use twincal_io::artifact::{Claim, Maker, REPORT};
+use twincal_io::config::{Config, Settings};
+use twincal_io::report::ReportContext;
+use twincal_io::twin_json::StoredTwin;
+
+/// One calibration, ready to run.
+pub(super) struct Job<'a> {
+    pub(super) maker: Maker,
+    pub(super) command: String,
+    pub(super) config: &'a Config,
+    pub(super) settings: &'a Settings,
+    pub(super) robot: RobotInput,
+    pub(super) logs: LogInput,
+    pub(super) heldout: LogInput,
+    pub(super) watch: Stopwatch,
+}
+
+impl Job<'_> {
+    /// Calibrates, writes and prints; returns the exit code.
+    pub(super) fn run(
+        self,
+        claim: Claim,
+        inputs: Vec<(&str, Vec<u8>)>,
+        progress: Progress,
+        terminal: &mut Terminal,
+    ) -> Outcome<u8> {
+        let calibration = self.calibrate(&progress)?;
+        require_strict(self.settings.log.strict, &calibration.findings)?;
+        let code = code_of(&calibration.findings);
+        let stored = StoredTwin {
+            gates: self.settings.gates,
+            context: self.context(),
+            calibration,
+        };
+        progress.step("writing the result");
+        stored.write(claim, self.maker, self.run_log(&stored), inputs)?;
+        drop(progress);
+        if self.settings.json {
+            terminal.data(&stored.result_json()?);
+        } else {
+            summary::print(&stored.calibration, terminal);
+        }
+        Ok(code)
+    }
+
+    fn calibrate(&self, progress: &Progress) -> Outcome<Calibration> {
+        let (logs, heldout) = (&self.logs, &self.heldout);
+        let step = |stage| progress.step(&stage_words(stage));
+        let mut calibration = calibrate(
+            &self.robot.robot,
+            &logs.recordings,
+            &heldout.recordings,
+            &self.settings.calibration,
+            &step,
+        )
+        .map_err(|error| heldout.as_given(logs.as_given(error)))?;
+        let read = [&self.robot.findings, &logs.findings, &heldout.findings];
+        let mut findings: Vec<_> = read.into_iter().flatten().cloned().collect();
+        findings.append(&mut calibration.findings);
+        calibration.findings = findings;
+        Ok(calibration)
+    }
+
+    fn context(&self) -> ReportContext {
+        let logs = self.logs.files.iter().chain(&self.heldout.files);
+        ReportContext {
+            version: env!("CARGO_PKG_VERSION").into(),
+            model: self.robot.file.name.clone(),
+            command: self.command.clone(),
+            settings: self.config.in_force(),
+            seed: self.settings.calibration.inference.seed,
+            files: std::iter::once(&self.robot.file)
+                .chain(logs)
+                .cloned()
+                .collect(),
+        }
+    }
+
+    /// When, where and how long: what may differ between two runs with the same result.
+    fn run_log(&self, stored: &StoredTwin) -> String {
+        let words: Vec<_> = std::env::args_os()
+            .map(|word| quoted(&word.to_string_lossy()))
+            .collect();
+        let folder = std::env::current_dir()
+            .map_or_else(|e| e.to_string(), |d| d.to_string_lossy().into_owned());
+        let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+        let mut text = format!(
+            "twincal {}\nfinished {}\nseconds {:.3}\nthreads {}\nhost {}\nfolder {folder}\ncommand {}\n",
+            env!("CARGO_PKG_VERSION"),
+            now(),
+            self.watch.seconds(),
+            rayon::current_num_threads(),
+            host.trim(),
+            words.join(" "),
+        );
+        for file in &stored.context.files {
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "input {} {}", file.sha256, file.name);
+        }
+        for finding in &stored.calibration.findings {
+            let _ = writeln!(
+                text,
+                "{:?} {}: {}",
+                finding.severity, finding.code, finding.message
+            );
+        }
+        text
+    }
+}
+
+fn stage_words(stage: Stage) -> String {
+    match stage {
+        Stage::Rows => "filtering the logs".into(),
+        Stage::Inference => "weighing every candidate".into(),
+        Stage::Validation(done, all) => format!("predicting held-out data, {} of {all}", done + 1),
+        Stage::Sensitivity => "varying prior and cut-off".into(),
+    }
+}
+
+/// The command that repeats a fit from these files: without what does not change the result.
+pub(super) fn command(model: &Path, logs: &[PathBuf], heldout: &[PathBuf], config: &str) -> String {
+    let mut text = "twincal fit".to_owned();
+    let mut add = |word: &str| {
+        text.push(' ');
+        text.push_str(&quoted(word));
+    };
+    display_names(logs).iter().for_each(|name| add(name));
+    add("--model");
+    add(&display_names(&[model]).remove(0));
+    if !heldout.is_empty() {
+        add("--heldout");
+        display_names(heldout).iter().for_each(|name| add(name));
+    }
+    if !config.is_empty() {
+        add("--config");
+        add("twincal.toml");
+    }
+    text
+}
+
+/// A word as a POSIX shell reads it.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=+:,@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+/// Says where the report is; the last line of the output.
+pub(super) fn say_where(output: &Path, json: bool, terminal: &mut Terminal) {
+    let path = output.join(REPORT);
+    if json {
+        terminal.note(&format!("report: {}", path.to_string_lossy()));
+    } else {
+        terminal.say(&path.to_string_lossy());
+    }
+}
+
+/// What `--json` prints of a command that wrote files.
+#[derive(serde::Serialize)]
+struct Written {
+    report: String,
+}
+
+/// The path of a report as JSON.
+pub(super) fn say_where_in_json(output: &Path, terminal: &mut Terminal) -> Outcome<()> {
+    print_json(
+        terminal,
+        &Written {
+            report: output.join(REPORT).to_string_lossy().into_owned(),
+        },
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn command_is_the_same_wherever_the_files_lie() {
+        let logs = [PathBuf::from("/data/a b.csv"), PathBuf::from("-rf.csv")];
+        let text = command(Path::new("/models/arm.urdf"), &logs, &[], "[prior]\n");
+        assert_eq!(
+            text,
+            "twincal fit 'a b.csv' -rf.csv --model arm.urdf --config twincal.toml"
+        );
+        assert_eq!(quoted("it's"), r"'it'\''s'");
+    }
+}

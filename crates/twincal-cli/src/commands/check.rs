@@ -1,0 +1,219 @@
+//! `twincal check`: scores of a twin on new logs against its gates.
+
+use super::inputs::LogInput;
+use super::summary::{findings, paragraph, percent, scores, significant};
+use super::{code_of, print_json, require_strict, settings, start_threads};
+use crate::args::Check;
+use crate::failure::{GATE, Outcome};
+use crate::progress::Progress;
+use crate::terminal::Terminal;
+use serde::Serialize;
+use twincal::signal::{Recording, align};
+use twincal::twin::Twin;
+use twincal::validate::{HeldOut, Scores, Split, Validation};
+use twincal::{Finding, Result};
+use twincal_io::artifact::Artifact;
+use twincal_io::config::Gates;
+use twincal_io::twin_json::StoredTwin;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Checked {
+    schema: u64,
+    passed: bool,
+    gates: Vec<Gate>,
+    signal: &'static str,
+    #[serde(flatten)]
+    filtered: Scores,
+    moving: Scores,
+    raw: Scores,
+    findings: Vec<Finding>,
+}
+
+/// One gate of one joint.
+#[derive(Serialize)]
+struct Gate {
+    joint: String,
+    gate: &'static str,
+    passed: bool,
+    value: f64,
+    limit: [Option<f64>; 2],
+    words: String,
+}
+
+pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
+    let config = settings::of_logs(&flags.log, terminal)?;
+    let settings = config.settings()?;
+    start_threads(settings.threads)?;
+    let progress = Progress::new();
+    progress.step(&format!("reading {}", flags.twin.to_string_lossy()));
+    let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, false)?;
+    let twin = &stored.calibration.twin;
+    let terms = twin.posterior.inclusion.len() as u64;
+    let mut logs = LogInput::read(&flags.logs, &twin.robot, &settings.log, terms, &progress)?;
+    progress.step("predicting the logs");
+    let mut found = std::mem::take(&mut logs.findings);
+    let validation = score(twin, &logs, &mut found).map_err(|error| logs.as_given(error))?;
+    drop(progress);
+    require_strict(settings.log.strict, &found)?;
+    // Gates of the config where there is one, else those the twin was fitted with.
+    let gates = if flags.log.config.is_some() {
+        settings.gates
+    } else {
+        stored.gates
+    };
+    let gates = judge(
+        &validation.filtered,
+        &stored.calibration.validation.filtered,
+        &gates,
+    );
+    let passed = gates.iter().all(|gate| gate.passed);
+    let code = if passed { code_of(&found) } else { GATE };
+    if settings.json {
+        let Validation {
+            filtered,
+            moving,
+            raw,
+            ..
+        } = validation;
+        let checked = Checked {
+            schema: 1,
+            passed,
+            gates,
+            signal: "filtered",
+            filtered,
+            moving,
+            raw,
+            findings: found,
+        };
+        print_json(terminal, &checked)?;
+        return Ok(code);
+    }
+    terminal.heading(if passed { "passed" } else { "failed" });
+    for gate in gates.iter().filter(|gate| !gate.passed) {
+        paragraph(&gate.words, terminal);
+    }
+    scores(&validation.filtered, terminal);
+    terminal.say("");
+    findings(&found, terminal);
+    Ok(code)
+}
+
+/// Scores of all logs together.
+fn score(twin: &Twin, logs: &LogInput, findings: &mut Vec<Finding>) -> Result<Validation> {
+    let library = twin.library()?;
+    let predictor = twin.predictor(&library)?;
+    let names = twin.robot.joint_names();
+    let mut scores = HeldOut::new(names.clone());
+    for recording in &logs.recordings {
+        require_torque(recording, &names)?;
+        let (trajectory, more) = align(&twin.robot, recording, &twin.pipeline)?;
+        findings.extend(more);
+        scores.score(
+            &twin.robot,
+            &library,
+            &twin.pipeline,
+            &predictor,
+            &trajectory,
+        )?;
+    }
+    Ok(scores.finish(Split::HeldoutLogs))
+}
+
+/// A log without torque can be predicted, not scored.
+fn require_torque(recording: &Recording, names: &[&str]) -> Result<()> {
+    match recording
+        .joints
+        .iter()
+        .position(|channels| channels.tau.is_none())
+    {
+        Some(joint) => Err(twincal::Error::Log {
+            log: recording.name.clone(),
+            problem: format!("has no torque of joint `{}`", names[joint]),
+            remedy: "check needs measured torque; name its column in [columns] tau".into(),
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Two gates per joint.
+fn judge(scores: &Scores, stored: &Scores, gates: &Gates) -> Vec<Gate> {
+    let mut judged = Vec::new();
+    for (joint, stored) in scores.joints.iter().zip(&stored.joints) {
+        let limit = gates.rmse_ratio * stored.rmse_calibrated;
+        let (rmse, name) = (joint.rmse_calibrated, &joint.joint);
+        judged.push(Gate {
+            joint: name.clone(),
+            gate: "rmse",
+            // Without rows, or without a stored score, nothing was shown: not a pass.
+            passed: rmse <= limit,
+            value: rmse,
+            limit: [None, Some(limit)],
+            words: format!(
+                "joint `{name}`: RMSE {} is above the gate {} ({} × {} of the twin)",
+                significant(rmse, 4),
+                significant(limit, 4),
+                gates.rmse_ratio,
+                significant(stored.rmse_calibrated, 4)
+            ),
+        });
+        let [low, high] = gates.coverage;
+        judged.push(Gate {
+            joint: name.clone(),
+            gate: "coverage",
+            passed: low <= joint.coverage95 && joint.coverage95 <= high,
+            value: joint.coverage95,
+            limit: [Some(low), Some(high)],
+            words: format!(
+                "joint `{name}`: the 95 % interval holds {} of the rows, the gate is {} to {}",
+                percent(joint.coverage95),
+                percent(low),
+                percent(high)
+            ),
+        });
+    }
+    judged
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use twincal::validate::JointScore;
+
+    fn scores(rmse: f64, coverage: f64) -> Scores {
+        let joint = JointScore {
+            joint: "elbow".into(),
+            rows: 10,
+            rmse_nominal: 1.0,
+            rmse_calibrated: rmse,
+            coverage95: coverage,
+            mean_width95: 0.4,
+        };
+        Scores {
+            rmse_nominal: 1.0,
+            rmse_calibrated: rmse,
+            coverage95: coverage,
+            joints: vec![joint],
+        }
+    }
+
+    #[test]
+    fn gates_stand_at_their_limits() {
+        let gates = Gates {
+            rmse_ratio: 1.2,
+            coverage: [0.9, 0.99],
+        };
+        let passed = |rmse, coverage| -> Vec<bool> {
+            judge(&scores(rmse, coverage), &scores(0.1, 0.95), &gates)
+                .iter()
+                .map(|gate| gate.passed)
+                .collect()
+        };
+        assert_eq!(passed(0.1199, 0.95), [true, true]);
+        assert_eq!(passed(0.1201, 0.95), [false, true]);
+        assert_eq!(passed(0.1, 0.90), [true, true]);
+        assert_eq!(passed(0.1, 0.899), [true, false]);
+        assert_eq!(passed(0.1, 0.991), [true, false]);
+        assert_eq!(passed(f64::NAN, f64::NAN), [false, false]);
+    }
+}

@@ -1,0 +1,91 @@
+//! `twincal demo`: the paper's study on logs that the program carries, written to ./twincal-demo.
+
+use super::calibration::{Job, command, say_where};
+use super::inputs::{LogInput, RobotInput};
+use super::start_threads;
+use crate::args::Demo;
+use crate::clock::Stopwatch;
+use crate::failure::Outcome;
+use crate::progress::Progress;
+use crate::terminal::Terminal;
+use std::path::{Path, PathBuf};
+use twincal_io::artifact::{Claim, Maker, Replace};
+use twincal_io::config::Config;
+use twincal_io::model::parse_model;
+
+const FOLDER: &str = "twincal-demo";
+const MODEL: (&str, &[u8]) = (
+    "arm.urdf",
+    include_bytes!("../../../../studies/planar_arm/assets/arm.urdf"),
+);
+const TRAIN: [(&str, &[u8]); 3] = [
+    (
+        "train1.parquet",
+        include_bytes!("../../../../studies/planar_arm/assets/train1.parquet"),
+    ),
+    (
+        "train2.parquet",
+        include_bytes!("../../../../studies/planar_arm/assets/train2.parquet"),
+    ),
+    (
+        "train3.parquet",
+        include_bytes!("../../../../studies/planar_arm/assets/train3.parquet"),
+    ),
+];
+const HELDOUT: [(&str, &[u8]); 2] = [
+    (
+        "heldout1.parquet",
+        include_bytes!("../../../../studies/planar_arm/assets/heldout1.parquet"),
+    ),
+    (
+        "heldout2.parquet",
+        include_bytes!("../../../../studies/planar_arm/assets/heldout2.parquet"),
+    ),
+];
+
+pub(super) fn run(flags: &Demo, terminal: &mut Terminal) -> Outcome<u8> {
+    let watch = Stopwatch::start();
+    let mut config = Config::default();
+    config.file.inference.seed = flags.seed;
+    config.file.inference.threads = flags.threads;
+    config.file.output.json = flags.json.then_some(true);
+    let settings = config.settings()?;
+    let output = Path::new(FOLDER);
+    let claim = Claim::new(output, Replace::MadeBy(Maker::Demo))?;
+    start_threads(settings.threads)?;
+    terminal
+        .note("A simulated two-joint arm (MuJoCo) whose model lacks a payload, friction and more:");
+    terminal.note("which effects, how sure, and how well is torque predicted once they are known?");
+    let progress = Progress::new();
+    let robot = RobotInput::new(
+        parse_model(MODEL.0, MODEL.1, &settings.model)?,
+        MODEL.0.into(),
+        &settings,
+    )?;
+    let logs = LogInput::carried(&TRAIN, &robot.robot, &settings.log)?;
+    let heldout = LogInput::carried(&HELDOUT, &robot.robot, &settings.log)?;
+    let paths = |logs: &[(&str, &[u8])]| {
+        logs.iter()
+            .map(|(name, _)| PathBuf::from(name))
+            .collect::<Vec<_>>()
+    };
+    let command = command(Path::new(MODEL.0), &paths(&TRAIN), &paths(&HELDOUT), "");
+    let job = Job {
+        maker: Maker::Demo,
+        command,
+        config: &config,
+        settings: &settings,
+        robot,
+        logs,
+        heldout,
+        watch,
+    };
+    // The inputs lie beside the result, so that the command in the report can be repeated there.
+    let carried = std::iter::once(&MODEL).chain(&TRAIN).chain(&HELDOUT);
+    let inputs = carried
+        .map(|(name, bytes)| (*name, bytes.to_vec()))
+        .collect();
+    let code = job.run(claim, inputs, progress, terminal)?;
+    say_where(output, settings.json, terminal);
+    Ok(code)
+}

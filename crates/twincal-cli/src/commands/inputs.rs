@@ -1,0 +1,176 @@
+//! Model and logs as the commands need them: read, named, hashed, and small enough for the memory there is.
+
+use crate::failure::Outcome;
+use crate::names::display_names;
+use crate::progress::Progress;
+use std::path::{Path, PathBuf};
+use twincal::Finding;
+use twincal::robot::Robot;
+use twincal::signal::Recording;
+use twincal_io::artifact::{sha256, sha256_of_file};
+use twincal_io::config::{LogSettings, Settings};
+use twincal_io::log::{LogOptions, parse_log, read_log};
+use twincal_io::model::{Model, read_model};
+use twincal_io::report::FileHash;
+use twincal_io::{Error, memory};
+
+/// Doubles per sample and joint that alignment, filtering and rows hold at once, beside the table itself.
+const DOUBLES_PER_SAMPLE: u64 = 24;
+
+/// The robot and what its file says.
+pub(super) struct RobotInput {
+    pub(super) robot: Robot,
+    pub(super) file: FileHash,
+    pub(super) findings: Vec<Finding>,
+}
+
+impl RobotInput {
+    /// Reads and checks the model file.
+    pub(super) fn read(path: &Path, settings: &Settings) -> Outcome<Self> {
+        let model = read_model(path, &settings.model)?;
+        let name = display_names(&[path]).remove(0);
+        let given = path.to_string_lossy();
+        Self::new(model, name, settings).map_err(|error| with_file(error, &given).into())
+    }
+
+    /// Checks a model.
+    pub(super) fn new(model: Model, name: String, settings: &Settings) -> Result<Self, Error> {
+        let (robot, more) = Robot::new(model.description, &settings.locked)?;
+        let mut findings = model.findings;
+        findings.extend(more);
+        let sha256 = sha256(&model.bytes);
+        Ok(Self {
+            robot,
+            file: FileHash { name, sha256 },
+            findings,
+        })
+    }
+}
+
+/// Names the file in front of what the mathematics says about a model.
+fn with_file(error: Error, file: &str) -> Error {
+    match error {
+        Error::Core(twincal::Error::Model {
+            culprit,
+            problem,
+            remedy,
+        }) => Error::Core(twincal::Error::Model {
+            culprit: format!("{file}: {culprit}"),
+            problem,
+            remedy,
+        }),
+        other => other,
+    }
+}
+
+/// Logs as read, with what was dropped or assumed.
+#[derive(Default)]
+pub(super) struct LogInput {
+    pub(super) recordings: Vec<Recording>,
+    pub(super) files: Vec<FileHash>,
+    pub(super) findings: Vec<Finding>,
+    given: Vec<PathBuf>,
+}
+
+impl LogInput {
+    /// Reads logs; `terms` is how many candidate columns each row may get.
+    pub(super) fn read(
+        paths: &[PathBuf],
+        robot: &Robot,
+        settings: &LogSettings,
+        terms: u64,
+        progress: &Progress,
+    ) -> Outcome<Self> {
+        let mut rows = 0;
+        let mut input = Self {
+            given: paths.to_vec(),
+            ..Self::default()
+        };
+        for (path, name) in paths.iter().zip(display_names(paths)) {
+            progress.step(&format!("reading {}", path.to_string_lossy()));
+            let (recording, findings) = read_log(path, robot, &options(settings))?;
+            rows += recording.time.len() as u64;
+            let bytes = rows.saturating_mul(robot.dof() as u64 * 8 * (DOUBLES_PER_SAMPLE + terms));
+            memory::require(
+                &path.to_string_lossy(),
+                bytes,
+                "give fewer or shorter logs, or raise the limit",
+            )?;
+            input.push(recording, findings, &name);
+            input.files.push(FileHash {
+                name,
+                sha256: sha256_of_file(path)?,
+            });
+        }
+        Ok(input)
+    }
+
+    /// Logs that the program carries.
+    pub(super) fn carried(
+        logs: &[(&str, &'static [u8])],
+        robot: &Robot,
+        settings: &LogSettings,
+    ) -> Outcome<Self> {
+        let mut input = Self::default();
+        for (name, bytes) in logs {
+            let (recording, findings) = parse_log(name, bytes, robot, &options(settings))?;
+            input.push(recording, findings, name);
+            input.files.push(FileHash {
+                name: (*name).into(),
+                sha256: sha256(bytes),
+            });
+            input.given.push(name.into());
+        }
+        Ok(input)
+    }
+
+    /// Takes a log under the name that it has in results.
+    fn push(&mut self, mut recording: Recording, findings: Vec<Finding>, name: &str) {
+        let given = std::mem::replace(&mut recording.name, name.into());
+        self.recordings.push(recording);
+        self.findings
+            .extend(findings.into_iter().map(|finding| Finding {
+                subject: finding.subject.replace(&given, name),
+                message: finding.message.replace(&given, name),
+                ..finding
+            }));
+    }
+
+    /// The error with the log named as it was given instead of as it stands in results.
+    pub(super) fn as_given(&self, error: twincal::Error) -> twincal::Error {
+        match error {
+            twincal::Error::Log {
+                log,
+                problem,
+                remedy,
+            } => {
+                let at = self
+                    .recordings
+                    .iter()
+                    .position(|recording| recording.name == log);
+                let log = at.map_or(log, |at| self.given[at].to_string_lossy().into_owned());
+                twincal::Error::Log {
+                    log,
+                    problem,
+                    remedy,
+                }
+            }
+            other => other,
+        }
+    }
+}
+
+/// Candidate columns at most, for the estimate of memory.
+pub(super) fn terms_at_most(robot: &Robot, settings: &Settings) -> u64 {
+    // The generic family of three joints is the largest that is on by default.
+    const GENERIC: u64 = 200;
+    settings.calibration.library.terms.len() as u64 + 4 * robot.dof() as u64 + GENERIC
+}
+
+fn options(settings: &LogSettings) -> LogOptions {
+    LogOptions {
+        rate_hz: settings.rate_hz,
+        lenient: settings.lenient,
+        columns: settings.columns.clone(),
+    }
+}

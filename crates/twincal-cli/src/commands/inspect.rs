@@ -1,0 +1,208 @@
+//! `twincal inspect`: what a model and logs hold, before anything is fitted.
+
+use super::inputs::{LogInput, RobotInput};
+use super::summary::{findings, paragraph, print_table, significant, table};
+use super::{code_of, print_json, require_strict, settings, start_threads};
+use crate::args::Inspect;
+use crate::failure::Outcome;
+use crate::progress::Progress;
+use crate::terminal::{Terminal, clean};
+use serde::Serialize;
+use twincal::Finding;
+use twincal::robot::{JointKind, Mimic, Robot};
+use twincal::signal::{LogOverview, describe, hardly_driven};
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Inspection {
+    schema: u64,
+    model: String,
+    gravity: [f64; 3],
+    /// Moving joints q1…qn in order, then those that mimic one of them.
+    joints: Vec<JointRow>,
+    links: Vec<LinkRow>,
+    logs: Vec<LogOverview>,
+    findings: Vec<Finding>,
+}
+
+#[derive(Serialize)]
+struct JointRow {
+    name: String,
+    #[serde(rename = "type")]
+    kind: JointKind,
+    /// 1-based index of its coordinate; null for a joint that mimics another.
+    q: Option<usize>,
+    mimic: Option<Mimic>,
+    parent: String,
+    child: String,
+    armature: f64,
+    damping: f64,
+}
+
+#[derive(Serialize)]
+struct LinkRow {
+    name: String,
+    mass: Option<f64>,
+}
+
+pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
+    let config = settings::of_inspect(flags, terminal)?;
+    let settings = config.settings()?;
+    start_threads(settings.threads)?;
+    let progress = Progress::new();
+    // Without a model by flag or config the first path is the model.
+    let (model, logs) = match (&settings.model_file, flags.paths.split_first()) {
+        (Some(model), _) => (model, &flags.paths[..]),
+        (None, Some((model, logs))) => (model, logs),
+        (None, None) => return Err(super::no_model()),
+    };
+    progress.step(&format!("reading {}", model.to_string_lossy()));
+    let robot = RobotInput::read(model, &settings)?;
+    let mut logs = LogInput::read(logs, &robot.robot, &settings.log, 0, &progress)?;
+    drop(progress);
+    let mut found = robot.findings;
+    found.append(&mut logs.findings);
+    let mut overviews = Vec::new();
+    for recording in &logs.recordings {
+        let (overview, more) =
+            describe(&robot.robot, recording).map_err(|error| logs.as_given(error))?;
+        overviews.push(overview);
+        found.extend(more);
+    }
+    found.extend(hardly_driven(&overviews));
+    require_strict(settings.log.strict, &found)?;
+    let code = code_of(&found);
+    let inspection = inspection(&robot.robot, robot.file.name, overviews, found);
+    if settings.json {
+        print_json(terminal, &inspection)?;
+    } else {
+        print(&inspection, terminal);
+    }
+    Ok(code)
+}
+
+fn inspection(
+    robot: &Robot,
+    model: String,
+    logs: Vec<LogOverview>,
+    findings: Vec<Finding>,
+) -> Inspection {
+    let description = robot.description();
+    let names = robot.joint_names();
+    let moving = (0..names.len()).map(|joint| (robot.joint(joint), Some(joint + 1)));
+    let mimicking = description
+        .joints
+        .iter()
+        .filter(|joint| joint.mimic.is_some())
+        .map(|joint| (joint, None));
+    let joints = moving
+        .chain(mimicking)
+        .map(|(joint, q)| JointRow {
+            name: joint.name.clone(),
+            kind: joint.kind,
+            q,
+            mimic: joint.mimic.clone(),
+            parent: joint.parent.clone(),
+            child: joint.child.clone(),
+            armature: joint.armature,
+            damping: joint.damping,
+        })
+        .collect();
+    let link = |link: &twincal::robot::LinkDescription| LinkRow {
+        name: link.name.clone(),
+        mass: link.inertia.as_ref().map(|inertia| inertia.mass),
+    };
+    let links = description.links.iter().map(link).collect();
+    Inspection {
+        schema: 1,
+        model,
+        gravity: description.gravity,
+        joints,
+        links,
+        logs,
+        findings,
+    }
+}
+
+fn print(inspection: &Inspection, terminal: &mut Terminal) {
+    let [x, y, z] = inspection.gravity;
+    terminal.heading(&format!(
+        "{}: {} joints",
+        inspection.model,
+        inspection.joints.len()
+    ));
+    paragraph(
+        &format!("gravity {x} {y} {z} m/s², {} links", inspection.links.len()),
+        terminal,
+    );
+    let mut joints = table(&["joint", "coordinate", "type", "parent", "child"]);
+    for joint in &inspection.joints {
+        let coordinate = match (joint.q, &joint.mimic) {
+            (Some(q), _) => format!("q{q}"),
+            (None, Some(mimic)) => format!("mimics {}", clean(&mimic.joint)),
+            (None, None) => String::new(),
+        };
+        let kind = format!("{:?}", joint.kind).to_lowercase();
+        joints.add_row([
+            &*clean(&joint.name),
+            &coordinate,
+            &kind,
+            &clean(&joint.parent),
+            &clean(&joint.child),
+        ]);
+    }
+    print_table(&joints, terminal);
+    terminal.say("");
+    for log in &inspection.logs {
+        terminal.heading(&format!("{}: {} rows", log.name, log.samples));
+        let clock = if log.resampled {
+            "uneven clock"
+        } else {
+            "even clock"
+        };
+        let (seconds, rate) = (significant(log.duration, 4), significant(log.rate_hz, 5));
+        paragraph(
+            &format!(
+                "{seconds} s at {rate} Hz, {clock}, {} without a gap",
+                pieces(log.segments)
+            ),
+            terminal,
+        );
+        let mut rows = table(&[
+            "joint",
+            "q from … to",
+            "q sd",
+            "velocity rms",
+            "torque sd",
+            "torque rms",
+        ]);
+        for joint in &log.joints {
+            let number = |value: Option<f64>| {
+                value.map_or_else(|| "not logged".into(), |value| significant(value, 3))
+            };
+            rows.add_row([
+                &*clean(&joint.joint),
+                &format!(
+                    "{} … {}",
+                    significant(joint.q_range[0], 3),
+                    significant(joint.q_range[1], 3)
+                ),
+                &significant(joint.q_sd, 3),
+                &significant(joint.qd_rms, 3),
+                &number(joint.tau_sd),
+                &number(joint.tau_rms),
+            ]);
+        }
+        print_table(&rows, terminal);
+        terminal.say("");
+    }
+    findings(&inspection.findings, terminal);
+}
+
+fn pieces(segments: u64) -> String {
+    if segments == 1 {
+        "1 stretch".into()
+    } else {
+        format!("{segments} stretches")
+    }
+}

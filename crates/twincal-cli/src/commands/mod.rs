@@ -1,0 +1,95 @@
+//! The commands, one file each, and what they share.
+
+mod calibration;
+mod check;
+mod demo;
+mod fit;
+mod inputs;
+mod inspect;
+mod predict;
+mod report;
+mod settings;
+mod summary;
+
+use crate::args::Command;
+use crate::failure::{DEGRADED, Failure, Outcome};
+use crate::terminal::Terminal;
+use serde::Serialize;
+use twincal::{Finding, Severity};
+
+/// Runs one command; the number is the exit code.
+pub(crate) fn run(command: &Command, terminal: &mut Terminal) -> Outcome<u8> {
+    match command {
+        Command::Demo(flags) => demo::run(flags, terminal),
+        Command::Inspect(flags) => inspect::run(flags, terminal),
+        Command::Fit(flags) => fit::run(flags, terminal),
+        Command::Check(flags) => check::run(flags, terminal),
+        Command::Predict(flags) => predict::run(flags, terminal),
+        Command::Report(flags) => report::run(flags, terminal),
+        Command::Schema => {
+            terminal.data(&twincal_io::config::schema());
+            Ok(0)
+        }
+    }
+}
+
+/// Starts this many threads, or one per core.
+fn start_threads(threads: Option<usize>) -> Outcome<()> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.unwrap_or(0))
+        .build_global()
+        .map_err(|e| {
+            Failure::usage(
+                format!("cannot start the threads: {e}"),
+                "give fewer with --threads or raise the limits",
+            )
+        })
+}
+
+/// Prints a value as JSON.
+fn print_json(terminal: &mut Terminal, value: &impl Serialize) -> Outcome<()> {
+    let text = serde_json::to_string_pretty(value).map_err(|e| {
+        let error = twincal_io::Error::Internal {
+            what: "JSON output".into(),
+            problem: e.to_string(),
+        };
+        Failure::Error(error)
+    })?;
+    terminal.data(&text);
+    terminal.data("\n");
+    Ok(())
+}
+
+/// No model by flag, config or argument.
+fn no_model() -> Failure {
+    Failure::usage(
+        "no robot model",
+        "give --model arm.urdf, or `file` in [model] of the config",
+    )
+}
+
+/// 3 if data was lost or degraded beyond the stated limit, else 0.
+fn code_of(findings: &[Finding]) -> u8 {
+    if findings
+        .iter()
+        .any(|finding| finding.severity == Severity::Degraded)
+    {
+        DEGRADED
+    } else {
+        0
+    }
+}
+
+/// With `--strict`, degraded data is an error.
+fn require_strict(strict: bool, findings: &[Finding]) -> Outcome<()> {
+    match findings
+        .iter()
+        .find(|finding| strict && finding.severity == Severity::Degraded)
+    {
+        Some(finding) => Err(Failure::usage(
+            finding.message.clone(),
+            "mend the log, or leave out --strict to go on",
+        )),
+        None => Ok(()),
+    }
+}

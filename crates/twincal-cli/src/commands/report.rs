@@ -1,0 +1,23 @@
+//! `twincal report`: report.html anew from the stored result.
+
+use super::calibration::{say_where, say_where_in_json};
+use crate::args::Report;
+use crate::failure::Outcome;
+use crate::terminal::Terminal;
+use twincal_io::artifact::{Artifact, Claim, REPORT, Replace};
+use twincal_io::twin_json::StoredTwin;
+
+pub(super) fn run(flags: &Report, terminal: &mut Terminal) -> Outcome<u8> {
+    let artifact = Artifact::open(&flags.twin)?;
+    // A missing report is what this command is for; a changed one may hold somebody's notes.
+    let rewrite = flags.force || !flags.twin.join(REPORT).exists();
+    let stored = StoredTwin::read(&artifact, rewrite)?;
+    let claim = Claim::new(&flags.twin, Replace::Artifact)?;
+    stored.rewrite_report(&artifact, claim)?;
+    if flags.json {
+        say_where_in_json(&flags.twin, terminal)?;
+    } else {
+        say_where(&flags.twin, false, terminal);
+    }
+    Ok(0)
+}

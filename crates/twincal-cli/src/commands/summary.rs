@@ -1,0 +1,339 @@
+//! What a person reads after a fit: physical sentences, terms, held-out scores, findings.
+
+use crate::terminal::{Terminal, clean};
+use comfy_table::presets::NOTHING;
+use comfy_table::{CellAlignment, ContentArrangement, Table};
+use twincal::calibrate::{Calibration, TermSummary, Verdict};
+use twincal::term::Status;
+use twincal::validate::{Scores, Split};
+use twincal::{Finding, Severity};
+use twincal_io::result_json::status_word;
+
+/// Width of the terminal that everything fits.
+const WIDTH: u16 = 80;
+/// Terms below this probability are only counted.
+const MENTIONED: f64 = 0.05;
+
+/// Prints the whole summary.
+pub(super) fn print(calibration: &Calibration, terminal: &mut Terminal) {
+    effects(calibration, terminal);
+    terms(&calibration.terms, terminal);
+    validation(calibration, terminal);
+    findings(&calibration.findings, terminal);
+}
+
+fn effects(calibration: &Calibration, terminal: &mut Terminal) {
+    let with = |verdict| {
+        calibration
+            .terms
+            .iter()
+            .filter(move |term: &&TermSummary| term.verdict == Some(verdict))
+    };
+    terminal.heading("What the model misses");
+    if !calibration.terms.iter().any(|term| term.selected) {
+        terminal.say("  nothing: no candidate has a probability of 0.5 or more");
+    }
+    for term in calibration.terms.iter().filter(|term| term.selected) {
+        paragraph(&format!("{} (PIP {})", term.words, pip(term.pip)), terminal);
+    }
+    let names = |verdict| {
+        with(verdict)
+            .map(|term| term.term.name.as_str())
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    for (verdict, words) in [
+        (Verdict::Undecided, "undecided"),
+        (Verdict::NotSeen, "not seen by these data"),
+    ] {
+        let names = names(verdict);
+        if !names.is_empty() {
+            paragraph(&format!("{words}: {names}"), terminal);
+        }
+    }
+    for group in &calibration.groups {
+        let members = group.members.join(", ");
+        paragraph(
+            &format!(
+                "cannot be told apart: {members} (any of them: PIP {})",
+                pip(Some(group.pip))
+            ),
+            terminal,
+        );
+    }
+    terminal.say("");
+}
+
+fn terms(terms: &[TermSummary], terminal: &mut Terminal) {
+    let mut table = table(&["term", "PIP", "mean", "± sd", "unit"]);
+    let (mut rare, mut dropped) = (0, Vec::new());
+    for term in terms {
+        match (term.pip, term.mean, term.sd) {
+            (Some(p), Some(mean), Some(sd)) if p >= MENTIONED || term.selected => {
+                let (mean, sd) = with_sd(mean, sd);
+                table.add_row([
+                    &*clean(&term.term.name),
+                    &pip(Some(p)),
+                    &mean,
+                    &sd,
+                    &clean(&term.term.unit),
+                ]);
+            }
+            (Some(_), ..) => rare += 1,
+            _ => dropped.push(term),
+        }
+    }
+    print_table(&table, terminal);
+    if rare > 0 {
+        terminal.say(&format!("  {rare} more below PIP {MENTIONED}"));
+    }
+    if !dropped.is_empty() {
+        let reason = |term: &&TermSummary| match &term.term.status {
+            Status::AliasOf(other) => format!("{} = {other}", term.term.name),
+            status => format!(
+                "{} ({})",
+                term.term.name,
+                status_word(status).replace('_', " ")
+            ),
+        };
+        paragraph(
+            &format!(
+                "left out: {}",
+                dropped.iter().map(reason).collect::<Vec<_>>().join(", ")
+            ),
+            terminal,
+        );
+    }
+    terminal.say("");
+}
+
+fn validation(calibration: &Calibration, terminal: &mut Terminal) {
+    let validation = &calibration.validation;
+    let split = match &validation.split {
+        Split::HeldoutLogs => "held-out logs",
+        Split::LeaveOneLogOut => "each log predicted from the others",
+        Split::LastThirty => "last 30 % of each log",
+    };
+    terminal.heading(&format!("Held-out torque: {split}"));
+    scores(&validation.filtered, terminal);
+    terminal.say("");
+}
+
+/// Scores per joint, and over all of them.
+pub(super) fn scores(scores: &Scores, terminal: &mut Terminal) {
+    let mut table = table(&[
+        "joint",
+        "RMSE nominal",
+        "calibrated",
+        "in 95 % interval",
+        "its width",
+    ]);
+    for joint in &scores.joints {
+        table.add_row([
+            &*clean(&joint.joint),
+            &significant(joint.rmse_nominal, 3),
+            &significant(joint.rmse_calibrated, 3),
+            &percent(joint.coverage95),
+            &significant(joint.mean_width95, 3),
+        ]);
+    }
+    let (nominal, calibrated) = (
+        significant(scores.rmse_nominal, 3),
+        significant(scores.rmse_calibrated, 3),
+    );
+    table.add_row([
+        "all",
+        &nominal,
+        &calibrated,
+        &percent(scores.coverage95),
+        "",
+    ]);
+    print_table(&table, terminal);
+}
+
+/// Everything that must be said, the most serious first; what is said of several logs is said once.
+pub(super) fn findings(findings: &[Finding], terminal: &mut Terminal) {
+    if findings.is_empty() {
+        return;
+    }
+    terminal.heading("Findings");
+    let order = [
+        (Severity::Degraded, "degraded"),
+        (Severity::Warning, "warning"),
+        (Severity::Note, "note"),
+    ];
+    for (severity, word) in order {
+        let of_severity: Vec<_> = findings
+            .iter()
+            .filter(|finding| finding.severity == severity)
+            .collect();
+        for (number, finding) in of_severity.iter().enumerate() {
+            let same = |other: &&&Finding| {
+                (&other.code, &other.message) == (&finding.code, &finding.message)
+            };
+            if of_severity[..number].iter().any(|other| same(&other)) {
+                continue;
+            }
+            let subjects: Vec<_> = of_severity
+                .iter()
+                .filter(same)
+                .map(|finding| finding.subject.as_str())
+                .collect();
+            let text = format!(
+                "{word}: {}{}",
+                about(&subjects, &finding.message),
+                finding.message
+            );
+            for (line, text) in wrapped(&text, 76).iter().enumerate() {
+                let line = format!("{}{text}", if line == 0 { "  " } else { "    " });
+                if severity == Severity::Note {
+                    terminal.say(&line)
+                } else {
+                    terminal.warning(&line)
+                }
+            }
+        }
+    }
+    terminal.say("");
+}
+
+/// What a message is about, unless it says so itself.
+fn about(subjects: &[&str], message: &str) -> String {
+    match subjects {
+        [] => String::new(),
+        [only] if only.is_empty() || message.contains(only) => String::new(),
+        [first, second, _, ..] => format!("{first}, {second} and {} more: ", subjects.len() - 2),
+        few => format!("{}: ", few.join(", ")),
+    }
+}
+
+/// An indented paragraph of at most 80 columns.
+pub(super) fn paragraph(text: &str, terminal: &mut Terminal) {
+    for (number, line) in wrapped(text, 76).iter().enumerate() {
+        terminal.say(&format!(
+            "{}{line}",
+            if number == 0 { "  " } else { "    " }
+        ));
+    }
+}
+
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.is_empty() => line.push_str(word),
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+/// A table without lines; numbers stand right.
+pub(super) fn table(header: &[&str]) -> Table {
+    let mut table = Table::new();
+    table
+        .load_style(NOTHING)
+        .set_content_arrangement(ContentArrangement::Dynamic)
+        .set_width(WIDTH);
+    table.set_header(header);
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+pub(super) fn print_table(table: &Table, terminal: &mut Terminal) {
+    for line in table.lines() {
+        terminal.say(&format!(" {}", line.trim_end()));
+    }
+}
+
+/// A probability; never rounded to certainty.
+pub(super) fn pip(pip: Option<f64>) -> String {
+    match pip {
+        None => "–".into(),
+        Some(p) if p > 0.999 => ">0.999".into(),
+        Some(p) if p < 0.001 => "<0.001".into(),
+        Some(p) => format!("{p:.3}"),
+    }
+}
+
+pub(super) fn percent(share: f64) -> String {
+    if share.is_finite() {
+        format!("{:.1} %", 100.0 * share)
+    } else {
+        "–".into()
+    }
+}
+
+/// Mean and sd with the sd's two leading digits.
+fn with_sd(mean: f64, sd: f64) -> (String, String) {
+    let size = sd.abs().max(mean.abs());
+    if !(sd > 0.0 && (1e-4..1e6).contains(&size)) {
+        return (format!("{mean:+.3e}"), format!("{sd:.1e}"));
+    }
+    let places = (1 - sd.log10().floor() as i32).clamp(0, 9) as usize;
+    (format!("{mean:+.places$}"), format!("{sd:.places$}"))
+}
+
+/// A number with this many significant digits.
+pub(super) fn significant(value: f64, digits: i32) -> String {
+    if !value.is_finite() {
+        return "–".into();
+    }
+    let size = value.abs();
+    if size != 0.0 && !(1e-4..1e6).contains(&size) {
+        return format!("{value:.*e}", (digits - 1).max(0) as usize);
+    }
+    let exponent = if size == 0.0 {
+        0
+    } else {
+        size.log10().floor() as i32
+    };
+    format!("{value:.*}", (digits - 1 - exponent).clamp(0, 9) as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_as_people_write_them() {
+        assert_eq!(with_sd(0.123456, 0.0123), ("+0.123".into(), "0.012".into()));
+        assert_eq!(with_sd(-12.3456, 3.1), ("-12.3".into(), "3.1".into()));
+        assert_eq!(with_sd(0.0, 0.0), ("+0.000e0".into(), "0.0e0".into()));
+        assert_eq!(with_sd(1e-7, 2e-8), ("+1.000e-7".into(), "2.0e-8".into()));
+        assert_eq!(
+            (
+                significant(0.13712, 3).as_str(),
+                significant(1234.5, 3).as_str()
+            ),
+            ("0.137", "1234")
+        );
+        assert_eq!(
+            (
+                significant(0.0, 3).as_str(),
+                significant(f64::NAN, 3).as_str()
+            ),
+            ("0.00", "–")
+        );
+        assert_eq!(
+            (pip(Some(1.0)), pip(Some(0.0)), pip(Some(0.5))),
+            (">0.999".into(), "<0.001".into(), "0.500".into())
+        );
+    }
+
+    #[test]
+    fn lines_never_exceed_the_width() {
+        let text = "word ".repeat(100);
+        assert!(
+            wrapped(&text, 76)
+                .iter()
+                .all(|line| line.chars().count() <= 76)
+        );
+    }
+}

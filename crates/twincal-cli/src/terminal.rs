@@ -1,0 +1,124 @@
+//! Two streams: results on standard output, everything else on standard error; names from files cannot steer the
+//! terminal.
+
+use crate::failure::{Failure, Outcome};
+use anstream::AutoStream;
+use std::io::{self, IsTerminal as _, Write};
+
+const BOLD: &str = "\x1b[1m";
+const RED: &str = "\x1b[1;31m";
+const YELLOW: &str = "\x1b[33m";
+const PLAIN: &str = "\x1b[0m";
+
+/// Where a command speaks to.
+pub(crate) struct Terminal {
+    out: AutoStream<io::Stdout>,
+    err: AutoStream<io::Stderr>,
+    broken: Option<io::Error>,
+}
+
+impl Terminal {
+    pub(crate) fn new() -> Self {
+        Self {
+            out: anstream::stdout(),
+            err: anstream::stderr(),
+            broken: None,
+        }
+    }
+
+    /// True if a person watches standard error.
+    pub(crate) fn is_watched() -> bool {
+        io::stderr().is_terminal()
+    }
+
+    /// A line of the result.
+    pub(crate) fn say(&mut self, line: &str) {
+        self.write(&format!("{}\n", clean(line)));
+    }
+
+    /// A heading of the result.
+    pub(crate) fn heading(&mut self, line: &str) {
+        self.write(&format!("{BOLD}{}{PLAIN}\n", clean(line)));
+    }
+
+    /// A warning inside the result.
+    pub(crate) fn warning(&mut self, line: &str) {
+        self.write(&format!("{YELLOW}{}{PLAIN}\n", clean(line)));
+    }
+
+    /// A result for programs, as it is.
+    pub(crate) fn data(&mut self, text: &str) {
+        self.write(text);
+    }
+
+    /// Standard output for a command that writes rows itself; what became of that goes to [`Terminal::wrote`].
+    pub(crate) fn rows(&mut self) -> io::BufWriter<io::Stdout> {
+        io::BufWriter::new(io::stdout())
+    }
+
+    /// Takes what became of rows.
+    pub(crate) fn wrote(&mut self, outcome: io::Result<()>) {
+        self.broken = self.broken.take().or(outcome.err());
+    }
+
+    /// A line that is not part of the result.
+    pub(crate) fn note(&mut self, line: &str) {
+        // Nobody is left to be told when standard error is closed.
+        let _ = writeln!(self.err, "{}", clean(line));
+    }
+
+    /// Why the command failed.
+    pub(crate) fn failure(&mut self, failure: &Failure) {
+        let (problem, remedy) = failure.words();
+        let _ = writeln!(self.err, "{RED}error{PLAIN}: {}", clean(&problem));
+        if let Some(remedy) = remedy {
+            let _ = writeln!(self.err, "  {BOLD}help{PLAIN}: {}", clean(&remedy));
+        }
+    }
+
+    /// Says whether everything could be written; a reader that went away (`| head`) wanted no more.
+    pub(crate) fn finish(&mut self) -> Outcome<()> {
+        let flushed = self.out.flush();
+        match self.broken.take().map_or(flushed, Err) {
+            Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(Failure::usage(
+                format!("cannot write to standard output: {e}"),
+                "free space or write elsewhere",
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    fn write(&mut self, text: &str) {
+        if self.broken.is_none() {
+            self.broken = self.out.write_all(text.as_bytes()).err();
+        }
+    }
+}
+
+/// The text without what could steer a terminal or turn the reading direction.
+pub(crate) fn clean(text: &str) -> String {
+    text.chars()
+        .map(|c| match c {
+            '\n' => c,
+            '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{200e}' | '\u{200f}' => {
+                '\u{fffd}'
+            }
+            c if c.is_control() => '\u{fffd}',
+            c => c,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::clean;
+
+    #[test]
+    fn case_109_names_cannot_steer_the_terminal() {
+        assert_eq!(
+            clean("a\x1b[31mred\x07\u{9b}2J\u{202e}x"),
+            "a\u{fffd}[31mred\u{fffd}\u{fffd}2J\u{fffd}x"
+        );
+        assert_eq!(clean("Größe q̇ ± 3 N·m\nnext"), "Größe q̇ ± 3 N·m\nnext");
+    }
+}

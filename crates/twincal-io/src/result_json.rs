@@ -1,0 +1,284 @@
+//! `result.json`, schema 1: the answer for programs. Fields are written in the order in which they stand here.
+//!
+//! Nothing in it depends on the machine, the clock, the number of threads or the folder: the same input, settings and
+//! seed give the same bytes. Numbers are the shortest that read back the same; what is not a number is `null`.
+
+use crate::error::{Error, Result};
+use serde::Serialize;
+use twincal::Finding;
+use twincal::calibrate::{
+    Calibration, Group, LikelihoodUsed, LogSummary, SweepPoint, TermSummary, Verdict,
+};
+use twincal::likelihood::JointNoise;
+use twincal::posterior::Method;
+use twincal::prior::Inclusion;
+use twincal::signal::Pipeline;
+use twincal::term::{Family, Status};
+use twincal::validate::{JointScore, Scores, Split, Validation};
+
+/// Version of this layout.
+pub const SCHEMA: u64 = 1;
+
+/// The text of `result.json`; `model` is the model's file name, `seed` that of all random numbers.
+///
+/// # Errors
+/// [`Error::Internal`] if the values cannot be written.
+pub fn result_json(calibration: &Calibration, model: &str, seed: u64) -> Result<String> {
+    let internal = |e: serde_json::Error| Error::Internal {
+        what: crate::artifact::RESULT.into(),
+        problem: e.to_string(),
+    };
+    let mut text = serde_json::to_string_pretty(&ResultFile::of(calibration, model, seed))
+        .map_err(internal)?;
+    text.push('\n');
+    Ok(text)
+}
+
+#[derive(Serialize)]
+struct ResultFile<'a> {
+    schema: u64,
+    twincal: &'static str,
+    model: &'a str,
+    terms: Vec<TermRow<'a>>,
+    groups: &'a [Group],
+    noise: &'a [JointNoise],
+    log_evidence: Option<f64>,
+    prior: PriorRow,
+    likelihood: &'a LikelihoodUsed,
+    signal: SignalRow<'a>,
+    inference: InferenceRow,
+    validation: ValidationRow<'a>,
+    logs: &'a [LogSummary],
+    findings: &'a [Finding],
+}
+
+#[derive(Serialize)]
+struct TermRow<'a> {
+    name: &'a str,
+    family: Family,
+    unit: &'a str,
+    status: String,
+    pip: Option<f64>,
+    pip_mcse: Option<f64>,
+    mean: Option<f64>,
+    sd: Option<f64>,
+    interval95: Option<[f64; 2]>,
+    conditional_mean: Option<f64>,
+    conditional_sd: Option<f64>,
+    selected: bool,
+    verdict: Option<Verdict>,
+    column_rms: Option<f64>,
+    pip_sensitivity: &'a [f64],
+    words: &'a str,
+}
+
+/// The prior as used, in the form of `[prior]`.
+#[derive(Serialize)]
+struct PriorRow {
+    slab: SlabRow,
+    inclusion: Inclusion,
+    noise: NoisePriorRow,
+}
+
+#[derive(Serialize)]
+struct SlabRow {
+    /// The one value, or null where families have their own.
+    scaled_variance: Option<f64>,
+    learned: bool,
+    families: Vec<FamilyRow>,
+}
+
+#[derive(Serialize)]
+struct FamilyRow {
+    family: Family,
+    scaled_variance: f64,
+}
+
+#[derive(Serialize)]
+struct NoisePriorRow {
+    shape: f64,
+    scale: f64,
+}
+
+#[derive(Serialize)]
+struct SignalRow<'a> {
+    #[serde(flatten)]
+    pipeline: &'a Pipeline,
+    cutoff_sweep: &'a [SweepPoint],
+}
+
+#[derive(Serialize)]
+struct InferenceRow {
+    method: &'static str,
+    models: Option<u64>,
+    chains: Option<usize>,
+    draws: Option<usize>,
+    r_hat: Option<f64>,
+    ess: Option<f64>,
+    seed: u64,
+}
+
+#[derive(Serialize)]
+struct ValidationRow<'a> {
+    split: &'a Split,
+    signal: &'static str,
+    #[serde(flatten)]
+    filtered: ScoresRow<'a>,
+    coverage_levels: Vec<LevelRow>,
+    moving: ScoresRow<'a>,
+    raw: ScoresRow<'a>,
+}
+
+#[derive(Serialize)]
+struct LevelRow {
+    level: f64,
+    coverage: f64,
+}
+
+/// Scores over one set of rows.
+#[derive(Serialize)]
+struct ScoresRow<'a> {
+    rmse_nominal: f64,
+    rmse_calibrated: f64,
+    coverage95: f64,
+    joints: &'a [JointScore],
+}
+
+impl<'a> ResultFile<'a> {
+    fn of(calibration: &'a Calibration, model: &'a str, seed: u64) -> Self {
+        Self {
+            schema: SCHEMA,
+            twincal: env!("CARGO_PKG_VERSION"),
+            model,
+            terms: calibration.terms.iter().map(TermRow::of).collect(),
+            groups: &calibration.groups,
+            noise: &calibration.noise,
+            log_evidence: calibration.twin.posterior.log_evidence,
+            prior: PriorRow::of(calibration),
+            likelihood: &calibration.likelihood,
+            signal: SignalRow {
+                pipeline: &calibration.twin.pipeline,
+                cutoff_sweep: &calibration.sweep,
+            },
+            inference: InferenceRow::of(&calibration.twin.posterior.method, seed),
+            validation: ValidationRow::of(&calibration.validation),
+            logs: &calibration.logs,
+            findings: &calibration.findings,
+        }
+    }
+}
+
+impl<'a> TermRow<'a> {
+    fn of(summary: &'a TermSummary) -> Self {
+        Self {
+            name: &summary.term.name,
+            family: summary.term.family,
+            unit: &summary.term.unit,
+            status: status_word(&summary.term.status),
+            pip: summary.pip,
+            pip_mcse: summary.pip_mcse,
+            mean: summary.mean,
+            sd: summary.sd,
+            interval95: summary.interval95,
+            conditional_mean: summary.conditional_mean,
+            conditional_sd: summary.conditional_sd,
+            selected: summary.selected,
+            verdict: summary.verdict,
+            column_rms: summary.column_rms,
+            pip_sensitivity: &summary.pip_sensitivity,
+            words: &summary.words,
+        }
+    }
+}
+
+/// `candidate`, or why a term is no column.
+pub fn status_word(status: &Status) -> String {
+    match status {
+        Status::Candidate => "candidate".into(),
+        Status::AliasOf(name) => format!("alias_of:{name}"),
+        Status::NullLagrangian => "null_lagrangian".into(),
+        Status::ZeroColumn => "zero_column".into(),
+    }
+}
+
+impl PriorRow {
+    fn of(calibration: &Calibration) -> Self {
+        let prior = &calibration.prior;
+        let first = prior.scaled_variance.first().map(|(_, v)| *v);
+        let same = prior.scaled_variance.iter().all(|(_, v)| Some(*v) == first);
+        let families = prior.scaled_variance.iter();
+        Self {
+            slab: SlabRow {
+                scaled_variance: first.filter(|_| same),
+                learned: prior.learned,
+                families: families
+                    .map(|&(family, scaled_variance)| FamilyRow {
+                        family,
+                        scaled_variance,
+                    })
+                    .collect(),
+            },
+            inclusion: prior.inclusion,
+            noise: NoisePriorRow {
+                shape: prior.shape,
+                scale: prior.scale,
+            },
+        }
+    }
+}
+
+impl InferenceRow {
+    fn of(method: &Method, seed: u64) -> Self {
+        match *method {
+            Method::Exact { models } => Self {
+                method: "exact",
+                models: Some(models),
+                chains: None,
+                draws: None,
+                r_hat: None,
+                ess: None,
+                seed,
+            },
+            Method::Gibbs {
+                chains,
+                draws,
+                r_hat,
+                ess,
+            } => Self {
+                method: "gibbs",
+                models: None,
+                chains: Some(chains),
+                draws: Some(draws),
+                r_hat: Some(r_hat),
+                ess: Some(ess),
+                seed,
+            },
+        }
+    }
+}
+
+impl<'a> ValidationRow<'a> {
+    fn of(validation: &'a Validation) -> Self {
+        Self {
+            split: &validation.split,
+            signal: "filtered",
+            filtered: ScoresRow::of(&validation.filtered),
+            coverage_levels: (validation.coverage_levels.iter())
+                .map(|&(level, coverage)| LevelRow { level, coverage })
+                .collect(),
+            moving: ScoresRow::of(&validation.moving),
+            raw: ScoresRow::of(&validation.raw),
+        }
+    }
+}
+
+impl<'a> ScoresRow<'a> {
+    fn of(scores: &'a Scores) -> Self {
+        Self {
+            rmse_nominal: scores.rmse_nominal,
+            rmse_calibrated: scores.rmse_calibrated,
+            coverage95: scores.coverage95,
+            joints: &scores.joints,
+        }
+    }
+}

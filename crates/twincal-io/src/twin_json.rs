@@ -1,0 +1,93 @@
+//! `twin.json`: everything that `check`, `predict` and `report` need of a calibration.
+
+use crate::artifact::{Artifact, Claim, Maker, REPORT, RESULT, RUN_LOG, TWIN};
+use crate::config::Gates;
+use crate::error::{Error, Place, Result};
+use crate::report::ReportContext;
+use crate::result_json::result_json;
+use serde::{Deserialize, Serialize};
+use twincal::calibrate::Calibration;
+
+/// A calibration as it lies in an artefact.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StoredTwin {
+    /// Gates of `check` as they were set when it was fitted.
+    pub gates: Gates,
+    /// What the report says of the run.
+    pub context: ReportContext,
+    /// The result.
+    pub calibration: Calibration,
+}
+
+impl StoredTwin {
+    /// Reads it from an artefact whose files are verified; `report.html` is left out if `except_report`.
+    ///
+    /// # Errors
+    /// A file that is missing or damaged.
+    pub fn read(artifact: &Artifact, except_report: bool) -> Result<Self> {
+        artifact.verify_except(if except_report {
+            &[REPORT, TWIN]
+        } else {
+            &[TWIN]
+        })?;
+        let bytes = artifact.read(TWIN)?;
+        serde_json::from_slice(&bytes).map_err(|e| {
+            let problem = format!("does not hold a twin of this version: {e}");
+            Error::content(
+                Place::file(TWIN),
+                problem,
+                "fit again with this version of twincal",
+            )
+        })
+    }
+
+    /// The text of `result.json`.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] if the values cannot be written.
+    pub fn result_json(&self) -> Result<String> {
+        result_json(&self.calibration, &self.context.model, self.context.seed)
+    }
+
+    /// Writes the whole artefact with result, report, twin, log and `more` files.
+    ///
+    /// # Errors
+    /// The system's refusal; then nothing has changed.
+    pub fn write(
+        &self,
+        claim: Claim,
+        made_by: Maker,
+        run_log: String,
+        more: Vec<(&str, Vec<u8>)>,
+    ) -> Result<()> {
+        let internal = |problem: String| Error::Internal {
+            what: TWIN.into(),
+            problem,
+        };
+        let twin = serde_json::to_vec(self).map_err(|e| internal(e.to_string()))?;
+        // What cannot be read back must not be written.
+        serde_json::from_slice::<Self>(&twin).map_err(|e| internal(e.to_string()))?;
+        let report = crate::report::render(&self.calibration, &self.context)?;
+        let mut files = vec![
+            (RESULT, self.result_json()?.into_bytes()),
+            (TWIN, twin),
+            (REPORT, report.into_bytes()),
+            (RUN_LOG, run_log.into_bytes()),
+        ];
+        files.extend(more);
+        claim.commit(made_by, files)
+    }
+
+    /// Writes the artefact again with a new report and everything else as it is.
+    ///
+    /// # Errors
+    /// A damaged file, or the system's refusal; then nothing has changed.
+    pub fn rewrite_report(&self, artifact: &Artifact, claim: Claim) -> Result<()> {
+        let report = crate::report::render(&self.calibration, &self.context)?;
+        let mut files = vec![(REPORT, report.into_bytes())];
+        for name in artifact.names().filter(|name| *name != REPORT) {
+            files.push((name, artifact.read(name)?));
+        }
+        claim.commit(artifact.made_by(), files)
+    }
+}
