@@ -1,5 +1,14 @@
 //! What the readers and the dynamics give together, against Pinocchio and MuJoCo.
 
+#![expect(
+    clippy::unwrap_used,
+    reason = "a helper of a test may fail as the test itself may"
+)]
+#![expect(
+    clippy::print_stdout,
+    reason = "a skipped test and the measured errors are said"
+)]
+
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;

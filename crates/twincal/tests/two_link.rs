@@ -81,6 +81,7 @@ fn a_twin_from_json_predicts_the_same_bytes_and_scores_like_the_calibration() {
                 &twin.pipeline,
                 &predictor,
                 &trajectory,
+                f64::NEG_INFINITY,
             )
             .expect("scores");
         scores.finish(Split::HeldoutLogs)

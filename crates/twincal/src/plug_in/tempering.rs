@@ -212,7 +212,8 @@ fn score(predictions: &[Prediction], plug_in: &PlugIn) -> f64 {
     sum
 }
 
-/// `f_j² = Σ (squared error − epistemic variance) / Σ noise variance`, at least 1/4.
+/// `f_j² = Σ (squared error − epistemic variance) / Σ noise variance`, at least 1: left-out data may say that the noise
+/// on the training data was too small, never that it was too large (with few effective rows E[φ] is wide for a reason).
 fn interval_factors(predictions: &[Prediction], plug_in: &PlugIn) -> Vec<f64> {
     (0..plug_in.weight.len())
         .map(|joint| {
@@ -224,7 +225,7 @@ fn interval_factors(predictions: &[Prediction], plug_in: &PlugIn) -> Vec<f64> {
                 }
             }
             if noise > 0.0 {
-                (excess / noise).max(0.25).sqrt()
+                (excess / noise).max(1.0).sqrt()
             } else {
                 1.0
             }

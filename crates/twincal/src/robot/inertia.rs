@@ -189,7 +189,7 @@ mod tests {
             [3.0, 3.0, 3.0],
             [-1.0, 0.0, 4.0],
         ] {
-            for angle in [0.0, 1e-9, 0.3, 1.5707963, 2.9] {
+            for angle in [0.0, 1e-9, 0.3, 1.5, 2.9] {
                 let tensor = rotate_tensor(&axis_angle(u, angle), &diagonal(d));
                 let (found, axes) = principal_axes(&tensor);
                 let again = rotate_tensor(&axes, &diagonal(found));

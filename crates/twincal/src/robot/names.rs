@@ -1,13 +1,13 @@
 //! "Did you mean": the names nearest to one that does not exist.
 
 /// Up to three candidates nearest to `name` by edit distance (insert, delete, replace, swap neighbours; letter case is
-/// free), nearest first, ties in the given order; none when nothing is near.
+/// free; at most a third of the letters), nearest first, ties in the given order; none when nothing is near.
 pub fn nearest_names<'a>(
     name: &str,
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Vec<&'a str> {
     let wanted: Vec<char> = name.to_lowercase().chars().take(64).collect();
-    let limit = 2.max(wanted.len() / 3);
+    let limit = wanted.len().div_ceil(3).min(wanted.len().saturating_sub(1));
     let mut scored: Vec<(usize, &str)> = candidates
         .into_iter()
         .map(|candidate| {
@@ -83,6 +83,7 @@ mod tests {
         assert_eq!(nearest_names("eblow", joints), ["elbow"]);
         assert_eq!(nearest_names("Wrist_3", joints), ["wrist_1", "wrist_2"]);
         assert!(nearest_names("finger", joints).is_empty());
+        assert!(nearest_names("e", ["d", "main"]).is_empty());
         assert_eq!(did_you_mean("elbo", joints), "did you mean `elbow`?");
         assert!(did_you_mean("finger", joints).starts_with("there are `shoulder_pan`"));
     }

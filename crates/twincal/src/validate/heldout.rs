@@ -35,7 +35,8 @@ impl HeldOut {
         }
     }
 
-    /// Predicts every row of a trajectory that was not used to fit `predictor`, and scores it.
+    /// Predicts the rows of a trajectory that were not used to fit `predictor`, those at or after the time `from` in s
+    /// (−∞: all of them), and scores them.
     ///
     /// # Errors
     /// Those of [`visit_rows`].
@@ -46,6 +47,7 @@ impl HeldOut {
         pipeline: &Pipeline,
         predictor: &Predictor,
         trajectory: &Trajectory,
+        from: f64,
     ) -> Result<()> {
         let mut traces: Vec<Trace> = self
             .names
@@ -59,8 +61,11 @@ impl HeldOut {
             trajectory,
             RowSignal::Filtered,
             &mut |block| {
-                let torques = predictor.block(block, TorqueSignal::Filtered);
-                self.push_filtered(block, &torques, &mut traces);
+                let skip = block.time.partition_point(|time| *time < from);
+                if skip < block.len {
+                    let torques = predictor.block(block, TorqueSignal::Filtered);
+                    self.push_filtered(block, skip, &torques, &mut traces);
+                }
                 Ok(())
             },
         )?;
@@ -75,9 +80,13 @@ impl HeldOut {
             trajectory,
             RowSignal::Raw,
             &mut |block| {
-                for (joint, torque) in predictor.block(block, TorqueSignal::Raw).iter().enumerate()
-                {
-                    self.raw.push(joint, block.joints[joint].measured, torque);
+                let skip = block.time.partition_point(|time| *time < from);
+                if skip < block.len {
+                    let torques = predictor.block(block, TorqueSignal::Raw);
+                    for (joint, torque) in torques.iter().enumerate() {
+                        let measured = &block.joints[joint].measured[skip..];
+                        self.raw.push(joint, measured, &torque.after(skip));
+                    }
                 }
                 Ok(())
             },
@@ -87,23 +96,26 @@ impl HeldOut {
     fn push_filtered(
         &mut self,
         block: &RowBlock<'_>,
+        skip: usize,
         torques: &[JointTorque],
         traces: &mut [Trace],
     ) {
         for (joint, torque) in torques.iter().enumerate() {
             let rows = &block.joints[joint];
-            let own = joint * block.len..(joint + 1) * block.len;
-            self.filtered.push(joint, rows.measured, torque);
+            let own = joint * block.len + skip..(joint + 1) * block.len;
+            let torque = torque.after(skip);
+            let (measured, standstill) = (&rows.measured[skip..], &rows.standstill[skip..]);
+            self.filtered.push(joint, measured, &torque);
             self.moving
-                .push_where(joint, rows.measured, torque, |row| !rows.standstill[row]);
+                .push_where(joint, measured, &torque, |row| !standstill[row]);
             self.coverage.push(&torque.pit);
             traces[joint].extend(&TraceRows {
-                time: block.time,
+                time: &block.time[skip..],
                 q: &block.q[own.clone()],
                 qd: &block.qd[own],
-                measured: rows.measured,
-                standstill: rows.standstill,
-                torque,
+                measured,
+                standstill,
+                torque: &torque,
             });
         }
     }
