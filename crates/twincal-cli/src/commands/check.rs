@@ -115,6 +115,7 @@ fn score(twin: &Twin, logs: &LogInput, findings: &mut Vec<Finding>) -> Result<Va
             &twin.pipeline,
             &predictor,
             &trajectory,
+            f64::NEG_INFINITY,
         )?;
     }
     Ok(scores.finish(Split::HeldoutLogs))
