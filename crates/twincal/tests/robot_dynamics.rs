@@ -289,7 +289,8 @@ fn locking_and_mimicking_are_what_they_say() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 64, rng_seed: proptest::test_runner::RngSeed::Fixed(7), ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 64, rng_seed: proptest::test_runner::RngSeed::Fixed(7),
+        failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Power balance: along any motion, the energy changes by what the joints deliver, d(T + U)/dt = q̇ᵀτ.
     /// Lagrange: τ_i = d/dt ∂L/∂q̇_i − ∂L/∂q_i with L = T − U from the energies alone.

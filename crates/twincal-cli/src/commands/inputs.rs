@@ -29,37 +29,18 @@ impl RobotInput {
     pub(super) fn read(path: &Path, settings: &Settings) -> Outcome<Self> {
         let model = read_model(path, &settings.model)?;
         let name = display_names(&[path]).remove(0);
-        let given = path.to_string_lossy();
-        Self::new(model, name, settings).map_err(|error| with_file(error, &given).into())
+        Ok(Self::new(model, name, settings)?)
     }
 
     /// Checks a model.
     pub(super) fn new(model: Model, name: String, settings: &Settings) -> Result<Self, Error> {
-        let (robot, more) = Robot::new(model.description, &settings.locked)?;
-        let mut findings = model.findings;
-        findings.extend(more);
+        let (robot, findings) = model.robot(&settings.locked)?;
         let sha256 = sha256(&model.bytes);
         Ok(Self {
             robot,
             file: FileHash { name, sha256 },
             findings,
         })
-    }
-}
-
-/// Names the file in front of what the mathematics says about a model.
-fn with_file(error: Error, file: &str) -> Error {
-    match error {
-        Error::Core(twincal::Error::Model {
-            culprit,
-            problem,
-            remedy,
-        }) => Error::Core(twincal::Error::Model {
-            culprit: format!("{file}: {culprit}"),
-            problem,
-            remedy,
-        }),
-        other => other,
     }
 }
 

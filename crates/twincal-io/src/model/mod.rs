@@ -8,10 +8,11 @@ mod mjcf;
 mod urdf;
 
 use crate::error::{Error, Place, Result};
+use std::collections::BTreeMap;
 use std::path::Path;
 use twincal::Finding;
-use twincal::robot::RobotDescription;
-use xml::Document;
+use twincal::robot::{Robot, RobotDescription};
+use xml::{Document, Element};
 
 /// What the user may say about a model.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -27,12 +28,58 @@ pub struct ModelSettings {
 /// A model file as read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
-    /// What it says; [`twincal::robot::Robot::new`] checks it.
+    /// What it says, unchecked.
     pub description: RobotDescription,
     /// The bytes of the file (of the main file, where there are includes).
     pub bytes: Vec<u8>,
     /// What had to be assumed or was not used.
     pub findings: Vec<Finding>,
+    /// Where everything stands, for messages.
+    document: Document,
+}
+
+impl Model {
+    /// The checked robot and all findings, those of the file first. `locked` fixes moving joints at a position.
+    ///
+    /// # Errors
+    /// What [`Robot::new`] refuses, with the place of the link or joint in the file.
+    pub fn robot(&self, locked: &BTreeMap<String, f64>) -> Result<(Robot, Vec<Finding>)> {
+        match Robot::new(self.description.clone(), locked) {
+            Ok((robot, more)) => {
+                let findings = self.findings.iter().cloned().chain(more).collect();
+                Ok((robot, findings))
+            }
+            Err(twincal::Error::Model {
+                culprit,
+                problem,
+                remedy,
+            }) => Err(Error::content(
+                self.place(&culprit),
+                format!("{culprit}: {problem}"),
+                remedy,
+            )),
+            Err(other) => Err(other.into()),
+        }
+    }
+
+    /// Where "link `x`" or "joint `x`" is defined (the last time, if twice); else the file.
+    fn place(&self, culprit: &str) -> Place {
+        let defines = |element: &&Element| {
+            let kind = match element.name.as_str() {
+                "link" | "body" => "link",
+                "joint" | "freejoint" => "joint",
+                _ => return false,
+            };
+            let name = element.text("name").unwrap_or("");
+            culprit
+                .strip_prefix(kind)
+                .is_some_and(|rest| rest.trim() == format!("`{name}`"))
+        };
+        match self.document.elements.iter().rfind(defines) {
+            Some(element) => self.document.place(element),
+            None => Place::file(self.document.files.first().map_or("", |f| f.name.as_str())),
+        }
+    }
 }
 
 /// Reads a URDF or MJCF file; MJCF includes are followed inside the file's folder only.
@@ -76,8 +123,7 @@ fn parse(
             return Err(document.error(
                 root,
                 "this is an SDF file, twincal reads URDF and MJCF",
-                "convert it: in ROS 2 the package `sdformat_urdf` publishes it as URDF, or `pip install pysdf` and \
-                 `sdf2urdf model.sdf model.urdf`",
+                "convert it: sdf2mjcf of the Python package sdformat-mjcf, as in sdf2mjcf model.sdf model.xml",
             ));
         }
         other => {
@@ -96,6 +142,7 @@ fn parse(
         description,
         bytes,
         findings,
+        document,
     })
 }
 
@@ -150,6 +197,6 @@ fn usd_error(name: &str) -> Result<()> {
     Err(Error::content(
         Place::file(name),
         "this is a USD file, twincal reads URDF and MJCF",
-        "convert it: Isaac Sim exports URDF (File > Export to URDF), MuJoCo built with USD saves MJCF (mj_saveLastXML)",
+        "convert it: Isaac Sim's USD to URDF exporter, or the Python package nvidia-srl-usd-to-urdf",
     ))
 }

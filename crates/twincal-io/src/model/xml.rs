@@ -15,7 +15,7 @@ pub(crate) const MAX_DEPTH: usize = 256;
 pub(crate) const MAX_ATTRIBUTES: usize = 64;
 
 /// One attribute: value with entities resolved, and where its raw text stands in the file.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Attribute {
     pub(crate) name: String,
     pub(crate) value: String,
@@ -24,7 +24,7 @@ pub(crate) struct Attribute {
 }
 
 /// One element; children are indices into [`Document::elements`].
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Element {
     pub(crate) name: String,
     pub(crate) attributes: Vec<Attribute>,
@@ -36,14 +36,14 @@ pub(crate) struct Element {
 }
 
 /// A file's name as shown to people, and its text.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Source {
     pub(crate) name: String,
     pub(crate) text: String,
 }
 
 /// One or (after includes) several files as one arena of elements; element 0 is the root of the first file.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Document {
     pub(crate) files: Vec<Source>,
     pub(crate) elements: Vec<Element>,

@@ -51,10 +51,9 @@ const MJCF: &str = r#"<mujoco model="arm">
 "#;
 
 fn build(name: &str, text: &[u8]) -> Result<(Robot, Vec<Finding>), String> {
-    let model = parse_model(name, text, &ModelSettings::default()).map_err(|e| e.to_string())?;
-    let (robot, more) =
-        Robot::new(model.description, &BTreeMap::new()).map_err(|e| e.to_string())?;
-    Ok((robot, [model.findings, more].concat()))
+    parse_model(name, text, &ModelSettings::default())
+        .and_then(|model| model.robot(&BTreeMap::new()))
+        .map_err(|error| error.to_string())
 }
 
 /// The refusal of the arm with `from` replaced by `to`.
@@ -83,10 +82,10 @@ fn codes(findings: &[Finding]) -> Vec<&str> {
 }
 
 fn read(path: &Path) -> Result<Robot, String> {
-    let model = read_model(path, &ModelSettings::default()).map_err(|e| e.to_string())?;
-    Robot::new(model.description, &BTreeMap::new())
-        .map(|(r, _)| r)
-        .map_err(|e| e.to_string())
+    read_model(path, &ModelSettings::default())
+        .and_then(|model| model.robot(&BTreeMap::new()))
+        .map(|(robot, _)| robot)
+        .map_err(|error| error.to_string())
 }
 
 #[test]
@@ -123,11 +122,11 @@ fn case_67_impossible_mass() {
     for mass in ["NaN", "inf", "-1", "0"] {
         says(
             &refusal(URDF, "value=\"2\"", &format!("value=\"{mass}\"")),
-            &["link `upper`", "mass"],
+            &["arm.urdf:4:3: link `upper`", "mass"],
         );
         says(
             &refusal(MJCF, "mass=\"1\"", &format!("mass=\"{mass}\"")),
-            &["link `lower`", "mass"],
+            &["arm.xml:8:7: link `lower`", "mass"],
         );
     }
     says(
@@ -268,7 +267,7 @@ fn case_73_mimic_joints_follow() {
 fn case_74_axes() {
     says(
         &refusal(URDF, "axis xyz=\"0 1 0\"", "axis xyz=\"0 0 0\""),
-        &["joint `shoulder`", "axis"],
+        &["arm.urdf:9:3: joint `shoulder`", "axis"],
     );
     says(
         &refusal(MJCF, "axis=\"0 1 0\"", "axis=\"0 0 0\""),

@@ -4,7 +4,8 @@ use super::{MJCF, URDF, build};
 use proptest::prelude::*;
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 3000, rng_seed: proptest::test_runner::RngSeed::Fixed(11), ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 3000, rng_seed: proptest::test_runner::RngSeed::Fixed(11),
+        failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Whatever bytes stand in the file: an answer or a refusal, never a panic.
     #[test]
