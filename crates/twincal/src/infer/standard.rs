@@ -41,13 +41,23 @@ pub(super) struct Standard {
 }
 
 impl Standard {
+    /// Columns in the order of their families.
+    ///
     /// # Errors
     /// [`Error::NotFinite`] naming the column, [`Error::Setting`] for an impossible prior.
     pub(super) fn new(problem: &Problem) -> Result<Self> {
+        let mut order: Vec<usize> = (0..problem.xy.len()).collect();
+        order.sort_by_key(|&k| problem.prior.family[k]);
+        Self::in_order(problem, order)
+    }
+
+    /// The same with the columns in a given order; families lie together in it.
+    ///
+    /// # Errors
+    /// As [`Standard::new`].
+    pub(super) fn in_order(problem: &Problem, order: Vec<usize>) -> Result<Self> {
         check(problem)?;
         let (size, prior) = (problem.xy.len(), &problem.prior);
-        let mut order: Vec<usize> = (0..size).collect();
-        order.sort_by_key(|&k| prior.family[k]);
         // A column that is zero everywhere has no unit of its own: any will do.
         let slab = |k: usize| {
             if problem.gram[k * size + k] == 0.0 {

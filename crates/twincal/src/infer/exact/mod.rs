@@ -3,8 +3,10 @@
 //! A node decides one column. Excluding it costs one row operation, including it one rank-1 Schur complement; a leaf is
 //! one logarithm and one exponential. Sums of weights, inclusions, means and second moments come back up the tree, so
 //! the work is O(2^K) in all. The first three columns are the lanes, the next ones the tasks of the thread pool, in an
-//! order that depends on K only: any number of threads gives the same bytes.
+//! order that depends on K only: any number of threads gives the same bytes. Columns that no model worth counting leaves
+//! out ([`certain`]) are not branched on: what is not visited is below one ulp of the sum.
 
+mod certain;
 mod heaviest;
 mod lanes;
 mod sums;
@@ -26,9 +28,13 @@ pub(super) const LISTED_MODELS: usize = 1000;
 /// # Errors
 /// Those of [`super::infer`].
 pub(super) fn enumerate(problem: &Problem) -> Result<Posterior> {
-    let standard = Standard::new(problem)?;
+    let mut standard = Standard::new(problem)?;
     let size = standard.size();
-    let (sums, heaviest) = tree::sum_all_models(&standard, &problem.prior);
+    let certain = certain::columns(&standard, &problem.prior);
+    if certain.contains(&true) {
+        standard = Standard::in_order(problem, certain::order(&problem.prior, &certain))?;
+    }
+    let (sums, heaviest) = tree::sum_all_models(&standard, &problem.prior, &certain);
     let layout = Layout::new(size);
     let weight = sums[layout.weight()];
     let share = |d: usize| (sums[layout.inclusion(d)] / weight).clamp(0.0, 1.0);

@@ -316,3 +316,24 @@ fn the_list_holds_the_heaviest_of_all() {
     }
     assert!(random_gram(1, 3, 10, 0.0).0.len() == 9);
 }
+
+/// With strong effects the tree does not branch on them; the plain loop, which visits every model, agrees all the same.
+#[test]
+fn certain_columns_change_nothing() {
+    for size in [3, 6, 9, 11] {
+        for (seed, inclusion) in [
+            (3, Inclusion::Probability(0.3)),
+            (4, Inclusion::ExpectedTerms(0.4 * size as f64)),
+        ] {
+            let problem = problem(size as u64 * 10 + seed, size, 3000, 0.5, inclusion);
+            let standard = Standard::new(&problem).unwrap();
+            let certain = certain::columns(&standard, &problem.prior);
+            let count = certain.iter().filter(|c| **c).count();
+            assert!(count >= 1 && count < size, "{count} of {size} are certain");
+            let mut order = certain::order(&problem.prior, &certain);
+            order.sort_unstable();
+            assert!(order.into_iter().eq(0..size));
+            agree(&problem, 1e-9);
+        }
+    }
+}

@@ -30,6 +30,8 @@ struct Level {
     carries: bool,
     /// Bit of this column in a set.
     bit: u32,
+    /// Leaving it out is not worth a visit.
+    certain: bool,
 }
 
 /// Everything that is the same in the whole tree.
@@ -90,13 +92,22 @@ impl Node {
 }
 
 /// Sums over all 2^K models ([`Layout`] of K columns; weights times e^[`LOG_REFERENCE`]) and the heaviest of them.
-pub(super) fn sum_all_models(standard: &Standard, prior: &Prior) -> (Vec<f64>, Heaviest) {
-    pulp::Arch::new().dispatch(Root { standard, prior })
+pub(super) fn sum_all_models(
+    standard: &Standard,
+    prior: &Prior,
+    certain: &[bool],
+) -> (Vec<f64>, Heaviest) {
+    pulp::Arch::new().dispatch(Root {
+        standard,
+        prior,
+        certain,
+    })
 }
 
 struct Root<'a> {
     standard: &'a Standard,
     prior: &'a Prior,
+    certain: &'a [bool],
 }
 
 impl WithSimd for Root<'_> {
@@ -115,11 +126,15 @@ impl WithSimd for Root<'_> {
 /// The first three columns: lane l includes column d where bit d of l is set.
 fn root<S: Simd, const FUSED: bool>(
     simd: S,
-    Root { standard, prior }: Root<'_>,
+    Root {
+        standard,
+        prior,
+        certain,
+    }: Root<'_>,
 ) -> (Vec<f64>, Heaviest) {
     let size = standard.size();
     let padded = size.max(LANE_COLUMNS);
-    let (tree, odds) = plan(standard, prior, padded);
+    let (tree, odds) = plan(standard, prior, certain, padded);
     let mut node = Node::blank(padded);
     let mut entry = 0;
     for i in 0..padded {
@@ -202,7 +217,12 @@ fn root<S: Simd, const FUSED: bool>(
 }
 
 /// Tables of the tree, and prior factors (included, excluded) of the first three columns by lane.
-fn plan(standard: &Standard, prior: &Prior, padded: usize) -> (Tree, Vec<(Lane, Lane)>) {
+fn plan(
+    standard: &Standard,
+    prior: &Prior,
+    certain: &[bool],
+    padded: usize,
+) -> (Tree, Vec<(Lane, Lane)>) {
     let size = standard.size();
     let family: Vec<usize> = (0..padded)
         .map(|d| {
@@ -258,6 +278,7 @@ fn plan(standard: &Standard, prior: &Prior, padded: usize) -> (Tree, Vec<(Lane, 
             exclude,
             carries: d + 1 < padded && family[d + 1] == family[d],
             bit: 1 << d,
+            certain: d < size && certain[standard.order[d]],
         });
     }
     levels.reverse();
@@ -311,10 +332,18 @@ fn branch<S: Simd, const FUSED: bool>(
         outside: &mut outside,
     });
     outside.s.copy_from_slice(&node.s[m..]);
-    let ((inside, first), (outside, second)) = rayon::join(
-        || branch::<S, FUSED>(simd, tree, m - 1, inside),
-        || branch::<S, FUSED>(simd, tree, m - 1, outside),
-    );
+    let ((inside, first), (outside, second)) = if level.certain {
+        let nothing = vec![[0.0; LANES]; Layout::new(m - 1).len()];
+        (
+            branch::<S, FUSED>(simd, tree, m - 1, inside),
+            (nothing, Heaviest::new(&tree.heavy)),
+        )
+    } else {
+        rayon::join(
+            || branch::<S, FUSED>(simd, tree, m - 1, inside),
+            || branch::<S, FUSED>(simd, tree, m - 1, outside),
+        )
+    };
     simd.vectorize(Join::<FUSED> {
         tree,
         m,
@@ -522,17 +551,21 @@ impl<const FUSED: bool> WithSimd for Descend<'_, FUSED> {
                 };
                 descend::<S, FUSED>(simd, tree, m - 1, child, inside, scratch, heavy);
 
-                let c = exclude::<FUSED>(m, node, &level.center, h);
-                let weight = mul(node.weight, &level.exclude[node.count]);
-                let child = View {
-                    s: &node.s[m..],
-                    h,
-                    c: &c,
-                    weight: &weight,
-                    count: same,
-                    set: node.set,
-                };
-                descend::<S, FUSED>(simd, tree, m - 1, child, outside, scratch, heavy);
+                if level.certain {
+                    outside.fill([0.0; LANES]);
+                } else {
+                    let c = exclude::<FUSED>(m, node, &level.center, h);
+                    let weight = mul(node.weight, &level.exclude[node.count]);
+                    let child = View {
+                        s: &node.s[m..],
+                        h,
+                        c: &c,
+                        weight: &weight,
+                        count: same,
+                        set: node.set,
+                    };
+                    descend::<S, FUSED>(simd, tree, m - 1, child, outside, scratch, heavy);
+                }
 
                 combine::<FUSED>(
                     m,
