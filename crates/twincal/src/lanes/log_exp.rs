@@ -1,6 +1,6 @@
-//! Natural logarithm and exponential of eight numbers at once.
+//! Natural logarithm and exponential of a whole vector at once.
 
-use super::{LANES, Lane};
+use pulp::{Simd, bytemuck};
 
 /// ln 2 in two pieces; `k · LN2[0]` is exact for |k| < 2²⁰.
 const LN2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
@@ -10,6 +10,10 @@ const LOG2_E: f64 = std::f64::consts::LOG2_E;
 const ROUND: f64 = 6_755_399_441_055_744.0;
 /// 2⁵², whose bits take an unsigned integer below 2⁵² as they are.
 const TWO_52: f64 = 4_503_599_627_370_496.0;
+/// Bits of 1, of the double below √½ that the reduction cuts at, and of a mantissa.
+const ONE: u64 = 0x3ff0_0000_0000_0000;
+const SQRT_HALF: u64 = 0x3fe6_a09e_0000_0000;
+const MANTISSA: u64 = 0x000f_ffff_ffff_ffff;
 /// Below this `exp` is 0 (the true value is smaller than the smallest normal number).
 const EXP_MIN: f64 = -708.0;
 /// Above this `exp` stays at e^709.
@@ -40,71 +44,128 @@ const FACTORIALS: [f64; 12] = [
     1.0 / 6_227_020_800.0,
 ];
 
-/// ln x of eight positive, normal, finite numbers (others give numbers without meaning), at most 1 ulp off.
+/// ln x of positive, normal, finite numbers (others give numbers without meaning), at most 1 ulp off.
 ///
 /// # Source
 /// Reduction to [√½, √2) and polynomial of FreeBSD's msun (fdlibm) `e_log.c`.
 #[inline(always)]
-pub fn ln(x: &Lane) -> Lane {
-    let mut out = [0.0; LANES];
-    for lane in 0..LANES {
-        out[lane] = ln_one(x[lane]);
+pub fn ln<S: Simd>(simd: S, x: S::f64s) -> S::f64s {
+    // x = 2^k m, √½ ≤ m < √2; k is made a floating number by writing it into the bits of 2⁵².
+    let (mut k, mut m) = ([x], [x]);
+    for (k, m) in lanes_mut(&mut k).iter_mut().zip(lanes_mut(&mut m)) {
+        let shifted = k.wrapping_add(ONE - SQRT_HALF);
+        *k = (shifted >> 52) | TWO_52.to_bits();
+        *m = (shifted & MANTISSA).wrapping_add(SQRT_HALF);
     }
-    out
+    let k = simd.sub_f64s(k[0], simd.splat_f64s(TWO_52 + 1023.0));
+    let f = simd.sub_f64s(m[0], simd.splat_f64s(1.0));
+    let s = simd.div_f64s(f, simd.add_f64s(f, simd.splat_f64s(2.0)));
+    let z = simd.mul_f64s(s, s);
+    let w = simd.mul_f64s(z, z);
+    let even = simd.mul_f64s(w, horner(simd, w, [LOG[1], LOG[3], LOG[5], 0.0]));
+    let odd = simd.mul_f64s(z, horner(simd, w, [LOG[0], LOG[2], LOG[4], LOG[6]]));
+    let half = simd.mul_f64s(simd.mul_f64s(f, simd.splat_f64s(0.5)), f);
+    // k ln2 − ((f²/2 − (s (f²/2 + R) + k ln2_low)) − f)
+    let rest = simd.add_f64s(half, simd.add_f64s(even, odd));
+    let low = simd.mul_add_e_f64s(s, rest, simd.mul_f64s(k, simd.splat_f64s(LN2[1])));
+    let inner = simd.sub_f64s(simd.sub_f64s(half, low), f);
+    simd.sub_f64s(simd.mul_f64s(k, simd.splat_f64s(LN2[0])), inner)
 }
 
-/// e^x of eight numbers, at most 1 ulp off for −708 ≤ x ≤ 709; 0 below, e^709 above.
+/// e^x, at most 1 ulp off for −708 ≤ x ≤ 709; 0 below, e^709 above.
 ///
 /// # Source
 /// Reduction by multiples of ln 2 (Cody and Waite), Taylor polynomial of degree 13.
 #[inline(always)]
-pub fn exp(x: &Lane) -> Lane {
-    let mut out = [0.0; LANES];
-    for lane in 0..LANES {
-        out[lane] = exp_one(x[lane]);
-    }
-    out
-}
-
-#[inline(always)]
-fn ln_one(x: f64) -> f64 {
-    // x = 2^k m, √½ ≤ m < √2; k is made a floating number by writing it into the bits of 2⁵².
-    let bits = x.to_bits();
-    let shifted = bits.wrapping_add(0x3ff0_0000_0000_0000 - 0x3fe6_a09e_0000_0000);
-    let k = f64::from_bits((shifted >> 52) | TWO_52.to_bits()) - (TWO_52 + 1023.0);
-    let m = f64::from_bits((shifted & 0x000f_ffff_ffff_ffff).wrapping_add(0x3fe6_a09e_0000_0000));
-    let f = m - 1.0;
-    let s = f / (2.0 + f);
-    let z = s * s;
-    let w = z * z;
-    let even = w * (LOG[1] + w * (LOG[3] + w * LOG[5]));
-    let odd = z * (LOG[0] + w * (LOG[2] + w * (LOG[4] + w * LOG[6])));
-    let half = 0.5 * f * f;
-    k * LN2[0] - ((half - (s * (half + (even + odd)) + k * LN2[1])) - f)
-}
-
-#[inline(always)]
-fn exp_one(x: f64) -> f64 {
-    let raised = if x > EXP_MIN { x } else { EXP_MIN };
-    let inside = if raised < EXP_MAX { raised } else { EXP_MAX };
-    let rounded = inside * LOG2_E + ROUND;
-    let k = rounded - ROUND;
-    let r = (inside - k * LN2[0]) - k * LN2[1];
-    let p = &FACTORIALS;
-    let (r2, r4) = (r * r, (r * r) * (r * r));
-    let low = (p[0] + r * p[1]) + r2 * (p[2] + r * p[3]);
-    let middle = (p[4] + r * p[5]) + r2 * (p[6] + r * p[7]);
-    let high = (p[8] + r * p[9]) + r2 * (p[10] + r * p[11]);
-    let tail = low + r4 * (middle + r4 * high);
-    let mantissa = 1.0 + (r + r2 * tail);
+pub fn exp<S: Simd>(simd: S, x: S::f64s) -> S::f64s {
+    let (least, most) = (simd.splat_f64s(EXP_MIN), simd.splat_f64s(EXP_MAX));
+    let inside = simd.min_f64s(simd.max_f64s(x, least), most);
+    let round = simd.splat_f64s(ROUND);
+    let rounded = simd.mul_add_e_f64s(inside, simd.splat_f64s(LOG2_E), round);
+    let k = simd.sub_f64s(rounded, round);
+    let r = simd.mul_add_e_f64s(k, simd.splat_f64s(-LN2[0]), inside);
+    let r = simd.mul_add_e_f64s(k, simd.splat_f64s(-LN2[1]), r);
+    let r2 = simd.mul_f64s(r, r);
+    let r4 = simd.mul_f64s(r2, r2);
+    let (low, middle, high) = (
+        four(simd, r, r2, 0),
+        four(simd, r, r2, 4),
+        four(simd, r, r2, 8),
+    );
+    let tail = simd.mul_add_e_f64s(r4, simd.mul_add_e_f64s(r4, high, middle), low);
+    let mantissa = simd.add_f64s(simd.mul_add_e_f64s(r2, tail, r), simd.splat_f64s(1.0));
     // k + 1023 ∈ [2, 2046]: a normal power of two.
-    let power = f64::from_bits(rounded.to_bits().wrapping_add(1023) << 52);
-    if x < EXP_MIN { 0.0 } else { mantissa * power }
+    let mut power = [rounded];
+    for power in lanes_mut(&mut power) {
+        *power = power.wrapping_add(1023) << 52;
+    }
+    let value = simd.mul_f64s(mantissa, power[0]);
+    simd.select_f64s(simd.less_than_f64s(x, least), simd.splat_f64s(0.0), value)
+}
+
+/// The bits of a vector's lanes.
+#[inline(always)]
+fn lanes_mut<V: bytemuck::Pod>(vector: &mut [V; 1]) -> &mut [u64] {
+    bytemuck::cast_slice_mut(vector)
+}
+
+/// c₀ + x (c₁ + x (c₂ + x c₃)).
+#[inline(always)]
+fn horner<S: Simd>(simd: S, x: S::f64s, c: [f64; 4]) -> S::f64s {
+    let p = simd.mul_add_e_f64s(x, simd.splat_f64s(c[3]), simd.splat_f64s(c[2]));
+    let p = simd.mul_add_e_f64s(x, p, simd.splat_f64s(c[1]));
+    simd.mul_add_e_f64s(x, p, simd.splat_f64s(c[0]))
+}
+
+/// Four terms of the exponential's series from coefficient i on: (a + r b) + r² (c + r d).
+#[inline(always)]
+fn four<S: Simd>(simd: S, r: S::f64s, r2: S::f64s, i: usize) -> S::f64s {
+    let low = simd.mul_add_e_f64s(
+        r,
+        simd.splat_f64s(FACTORIALS[i + 1]),
+        simd.splat_f64s(FACTORIALS[i]),
+    );
+    let high = simd.mul_add_e_f64s(
+        r,
+        simd.splat_f64s(FACTORIALS[i + 3]),
+        simd.splat_f64s(FACTORIALS[i + 2]),
+    );
+    simd.mul_add_e_f64s(r2, high, low)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lanes::{LANES, Lane};
+    use pulp::WithSimd;
+
+    struct Both(Lane);
+
+    impl WithSimd for Both {
+        type Output = (Lane, Lane);
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+            let (mut l, mut e) = (self.0, self.0);
+            S::as_mut_simd_f64s(&mut l)
+                .0
+                .iter_mut()
+                .for_each(|x| *x = super::ln(simd, *x));
+            S::as_mut_simd_f64s(&mut e)
+                .0
+                .iter_mut()
+                .for_each(|x| *x = super::exp(simd, *x));
+            (l, e)
+        }
+    }
+
+    fn ln(x: &Lane) -> Lane {
+        pulp::Arch::new().dispatch(Both(*x)).0
+    }
+
+    fn exp(x: &Lane) -> Lane {
+        pulp::Arch::new().dispatch(Both(*x)).1
+    }
 
     /// Distance in units of the last place of `b`.
     fn ulps(a: f64, b: f64) -> f64 {

@@ -1,7 +1,7 @@
 //! The heaviest models seen so far: a bounded list whose entrance threshold rises.
 
 use super::LISTED_MODELS;
-use crate::lanes::{LANES, Lane};
+use pulp::{Simd, bytemuck};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A threshold that all subtrees share. Positive floats are ordered like their bits.
@@ -37,22 +37,25 @@ impl Heaviest {
         }
     }
 
-    /// Offers eight models: the positions of `set`, and the lane's own first three.
+    /// Offers one model per lane: the positions of `set`, and the lane's own first ones.
     #[inline(always)]
-    pub(super) fn offer(&mut self, weight: &Lane, set: u32, shared: &Threshold) {
-        let mut heavy = false;
-        for lane in 0..LANES {
-            heavy |= weight[lane] >= self.threshold;
-        }
-        if heavy {
-            self.keep(weight, set, shared);
+    pub(super) fn offer<S: Simd>(
+        &mut self,
+        simd: S,
+        weight: S::f64s,
+        set: u32,
+        shared: &Threshold,
+    ) {
+        let heavy = simd.greater_than_or_equal_f64s(weight, simd.splat_f64s(self.threshold));
+        if simd.first_true_m64s(heavy) < S::F64_LANES {
+            self.keep(bytemuck::cast_slice(&[weight]), set, shared);
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn keep(&mut self, weight: &Lane, set: u32, shared: &Threshold) {
-        for (lane, &weight) in weight.iter().enumerate() {
+    fn keep(&mut self, weights: &[f64], set: u32, shared: &Threshold) {
+        for (lane, &weight) in weights.iter().enumerate() {
             if weight >= self.threshold {
                 self.models.push((weight, set | lane as u32));
             }

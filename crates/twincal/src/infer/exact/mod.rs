@@ -8,7 +8,7 @@
 
 mod certain;
 mod heaviest;
-mod lanes;
+mod subtree;
 mod sums;
 mod tree;
 

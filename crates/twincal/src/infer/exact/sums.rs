@@ -1,7 +1,6 @@
 //! What a subtree returns about the columns it decides: sums over its models, weighted.
 
-use super::lanes::{add, mul, mul_add, neg};
-use crate::lanes::Lane;
+use pulp::Simd;
 
 /// Entries of the packed upper triangle of order m, row after row.
 #[inline(always)]
@@ -58,68 +57,80 @@ impl Layout {
     }
 }
 
+/// What eliminating column 0 of a node takes.
+#[derive(Clone, Copy)]
+pub(super) struct Elimination<'a, V> {
+    /// Row 0 of S, m entries.
+    pub(super) row: &'a [V],
+    /// h_0.
+    pub(super) h: V,
+    /// 1/p.
+    pub(super) r: V,
+    /// β̂_0.
+    pub(super) center: V,
+}
+
 /// Sums over m columns from those of the two branches of the first one: included (pivot `p`, `r = 1/p`), excluded.
 ///
 /// ```text
 /// included: δ_0 = −(h_0 + Σ_j S_0j δ_j)/p + noise of variance φ/p        excluded: δ_0 = −β̂_0
 /// ```
-///
-/// `row` is the packed row 0 of S (m entries), `h` is h_0, `center` is β̂_0.
 #[inline(always)]
-pub(super) fn combine<const FUSED: bool>(
+pub(super) fn combine<S: Simd>(
+    simd: S,
     m: usize,
-    (row, h, r, center): (&[Lane], &Lane, &Lane, &Lane),
-    inside: &[Lane],
-    outside: &[Lane],
-    out: &mut [Lane],
+    column: Elimination<'_, S::f64s>,
+    inside: &[S::f64s],
+    outside: &[S::f64s],
+    out: &mut [S::f64s],
 ) {
+    let Elimination { row, h, r, center } = column;
     let (own, child) = (Layout::new(m), Layout::new(m - 1));
-    let minus_r = neg(r);
-    let minus_center = neg(center);
+    let minus_r = simd.neg_f64s(r);
+    let minus_center = simd.neg_f64s(center);
     let (weight, noise) = (inside[child.weight()], inside[child.noise()]);
-    out[own.weight()] = add(&weight, &outside[child.weight()]);
-    out[own.noise()] = add(&noise, &outside[child.noise()]);
+    out[own.weight()] = simd.add_f64s(weight, outside[child.weight()]);
+    out[own.noise()] = simd.add_f64s(noise, outside[child.noise()]);
     out[own.inclusion(0)] = weight;
     // u = Σ_j S_0j shift_j,  q_j = Σ_l S_0l moment_lj (gathered where moment_0j will stand)
-    let mut u = [0.0; 8];
+    let zero = simd.splat_f64s(0.0);
+    let mut u = zero;
     for j in 1..m {
-        out[own.moment(0, j)] = [0.0; 8];
+        out[own.moment(0, j)] = zero;
     }
     for j in 1..m {
-        let (a, b) = (
-            &inside[child.inclusion(j - 1)],
-            &outside[child.inclusion(j - 1)],
+        out[own.inclusion(j)] = simd.add_f64s(
+            inside[child.inclusion(j - 1)],
+            outside[child.inclusion(j - 1)],
         );
-        out[own.inclusion(j)] = add(a, b);
-        let (a, b) = (&inside[child.shift(j - 1)], &outside[child.shift(j - 1)]);
-        out[own.shift(j)] = add(a, b);
-        u = mul_add::<FUSED>(&row[j], a, &u);
-        for l in j..m {
-            let (a, b) = (
-                &inside[child.moment(j - 1, l - 1)],
-                &outside[child.moment(j - 1, l - 1)],
-            );
-            out[own.moment(j, l)] = add(a, b);
-            out[own.moment(0, l)] = mul_add::<FUSED>(&row[j], a, &out[own.moment(0, l)]);
-            if l > j {
-                out[own.moment(0, j)] = mul_add::<FUSED>(&row[l], a, &out[own.moment(0, j)]);
-            }
+        let shift = inside[child.shift(j - 1)];
+        out[own.shift(j)] = simd.add_f64s(shift, outside[child.shift(j - 1)]);
+        u = simd.mul_add_e_f64s(row[j], shift, u);
+        let diagonal = inside[child.moment(j - 1, j - 1)];
+        out[own.moment(j, j)] = simd.add_f64s(diagonal, outside[child.moment(j - 1, j - 1)]);
+        let mut q = simd.mul_add_e_f64s(row[j], diagonal, out[own.moment(0, j)]);
+        for l in j + 1..m {
+            let moment = inside[child.moment(j - 1, l - 1)];
+            out[own.moment(j, l)] = simd.add_f64s(moment, outside[child.moment(j - 1, l - 1)]);
+            out[own.moment(0, l)] = simd.mul_add_e_f64s(row[j], moment, out[own.moment(0, l)]);
+            q = simd.mul_add_e_f64s(row[l], moment, q);
         }
+        out[own.moment(0, j)] = q;
     }
     // shift_0 = −(h W + u)/p − β̂ W_outside
-    let hw = mul_add::<FUSED>(h, &weight, &u);
-    let center_weight = mul(&minus_center, &outside[child.weight()]);
-    out[own.shift(0)] = mul_add::<FUSED>(&minus_r, &hw, &center_weight);
+    let hw = simd.mul_add_e_f64s(h, weight, u);
+    let center_weight = simd.mul_f64s(minus_center, outside[child.weight()]);
+    out[own.shift(0)] = simd.mul_add_e_f64s(minus_r, hw, center_weight);
     // moment_00 = (h (h W + 2u) + Σ_j S_0j q_j)/p² + Σ w φ/p + β̂² W_outside
-    let mut square = mul(h, &add(&hw, &u));
+    let mut square = simd.mul_f64s(h, simd.add_f64s(hw, u));
     for j in 1..m {
         let q = out[own.moment(0, j)];
-        square = mul_add::<FUSED>(&row[j], &q, &square);
+        square = simd.mul_add_e_f64s(row[j], q, square);
         // moment_0j = −(h shift_j + q_j)/p − β̂ shift_j outside
-        let inner = mul_add::<FUSED>(h, &inside[child.shift(j - 1)], &q);
-        let outer = mul(&minus_center, &outside[child.shift(j - 1)]);
-        out[own.moment(0, j)] = mul_add::<FUSED>(&minus_r, &inner, &outer);
+        let inner = simd.mul_add_e_f64s(h, inside[child.shift(j - 1)], q);
+        let outer = simd.mul_f64s(minus_center, outside[child.shift(j - 1)]);
+        out[own.moment(0, j)] = simd.mul_add_e_f64s(minus_r, inner, outer);
     }
-    let included = mul(r, &mul_add::<FUSED>(r, &square, &noise));
-    out[own.moment(0, 0)] = mul_add::<FUSED>(&minus_center, &center_weight, &included);
+    let included = simd.mul_f64s(r, simd.mul_add_e_f64s(r, square, noise));
+    out[own.moment(0, 0)] = simd.mul_add_e_f64s(minus_center, center_weight, included);
 }

@@ -1,94 +1,120 @@
-//! The elimination tree: from the root over the lanes and the thread pool's tasks down to the leaves.
+//! The elimination tree from the root over the lanes and the thread pool's tasks down to the subtrees of one task.
 
 use super::heaviest::{Heaviest, Threshold};
-use super::lanes::{mul, mul_add, neg, reciprocal, splat, sqrt};
-use super::sums::{Layout, combine, triangle};
+use super::subtree::{descend, exclude, include, reciprocal, scratch_len};
+use super::sums::{Elimination, Layout, combine, triangle};
 use crate::infer::standard::Standard;
-use crate::lanes::{LANES, Lane, exp, ln};
 use crate::prior::Prior;
-use pulp::{Simd, WithSimd};
+use pulp::{Simd, WithSimd, bytemuck};
 
 /// ln of the factor on all weights: puts the misfit of the full model at e^600, so that both far better priors and far
 /// worse misfits stay within the range of a double.
 pub(super) const LOG_REFERENCE: f64 = 600.0;
-/// Columns that the lanes decide.
-const LANE_COLUMNS: usize = 3;
-/// Subtrees of up to this many columns (2^13 · 8 models) are one task.
+/// Subtrees of up to this many columns (2^13 models in every lane) are one task.
 const TASK_COLUMNS: usize = 13;
 
-/// One column in the tree.
-struct Level {
+/// One column in the tree. `V` is a vector with one model per lane.
+pub(super) struct Level<V> {
     /// β̂.
-    center: Lane,
+    pub(super) center: V,
     /// Least pivot 1/v.
-    precision: f64,
+    pub(super) precision: f64,
     /// P(z = 1 | members of the family so far) · √(1/v), by members decided below the lanes.
-    include: Vec<Lane>,
+    pub(super) include: Vec<V>,
     /// P(z = 0 | …).
-    exclude: Vec<Lane>,
+    pub(super) exclude: Vec<V>,
     /// The next column is of the same family: go on counting.
     carries: bool,
     /// Bit of this column in a set.
-    bit: u32,
+    pub(super) bit: u32,
     /// Leaving it out is not worth a visit.
-    certain: bool,
+    pub(super) certain: bool,
+}
+
+impl<V> Level<V> {
+    /// Members of the family for the including and the excluding child.
+    #[inline(always)]
+    pub(super) fn counts(&self, count: usize) -> (usize, usize) {
+        if self.carries {
+            (count + 1, count)
+        } else {
+            (0, 0)
+        }
+    }
 }
 
 /// Everything that is the same in the whole tree.
-struct Tree {
+pub(super) struct Tree<V> {
     /// By number of columns yet to decide, minus one.
-    levels: Vec<Level>,
+    pub(super) levels: Vec<Level<V>>,
     /// a_n.
-    shape: f64,
+    pub(super) shape: f64,
     /// E[φ] per (1 + c), or 0 where φ has no mean.
-    noise: f64,
-    heavy: Threshold,
+    pub(super) noise: f64,
+    pub(super) heavy: Threshold,
 }
 
 /// What is known at a node: `c + 2 hᵀδ + δᵀS δ` over the m columns yet to decide, the weight so far, members of the
 /// family so far, and the set of included positions below the lanes.
-struct Node {
-    s: Vec<Lane>,
-    h: Vec<Lane>,
-    c: Lane,
-    weight: Lane,
+struct Node<V> {
+    s: Vec<V>,
+    h: Vec<V>,
+    c: V,
+    weight: V,
     count: usize,
     set: u32,
 }
 
 /// The same, borrowed.
 #[derive(Clone, Copy)]
-struct View<'a> {
-    s: &'a [Lane],
-    h: &'a [Lane],
-    c: &'a Lane,
-    weight: &'a Lane,
-    count: usize,
-    set: u32,
+pub(super) struct View<'a, V> {
+    pub(super) s: &'a [V],
+    pub(super) h: &'a [V],
+    pub(super) c: V,
+    pub(super) weight: V,
+    pub(super) count: usize,
+    pub(super) set: u32,
 }
 
-impl Node {
+impl<V: bytemuck::Pod> Node<V> {
     fn blank(m: usize) -> Self {
+        let zero = V::zeroed();
         Self {
-            s: vec![[0.0; LANES]; triangle(m)],
-            h: vec![[0.0; LANES]; m],
-            c: [0.0; LANES],
-            weight: [0.0; LANES],
+            s: vec![zero; triangle(m)],
+            h: vec![zero; m],
+            c: zero,
+            weight: zero,
             count: 0,
             set: 0,
         }
     }
 
-    fn view(&self) -> View<'_> {
+    fn view(&self) -> View<'_, V> {
         View {
             s: &self.s,
             h: &self.h,
-            c: &self.c,
-            weight: &self.weight,
+            c: self.c,
+            weight: self.weight,
             count: self.count,
             set: self.set,
         }
     }
+}
+
+/// The lanes of a vector as numbers.
+fn lanes<V: bytemuck::Pod>(vector: &V) -> &[f64] {
+    bytemuck::cast_slice(std::slice::from_ref(vector))
+}
+
+/// A vector from a function of the lane.
+fn from_lanes<V: bytemuck::Pod>(value: impl Fn(usize) -> f64) -> V {
+    let mut vector = [V::zeroed()];
+    let numbers: &mut [f64] = bytemuck::cast_slice_mut(&mut vector);
+    numbers
+        .iter_mut()
+        .enumerate()
+        .for_each(|(lane, number)| *number = value(lane));
+    vector[0]
 }
 
 /// Sums over all 2^K models ([`Layout`] of K columns; weights times e^[`LOG_REFERENCE`]) and the heaviest of them.
@@ -104,6 +130,8 @@ pub(super) fn sum_all_models(
     })
 }
 
+/// What the tree is about; `certain` by column.
+#[derive(Clone, Copy)]
 struct Root<'a> {
     standard: &'a Standard,
     prior: &'a Prior,
@@ -115,165 +143,131 @@ impl WithSimd for Root<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        if S::IS_SCALAR {
-            root::<S, false>(simd, self)
-        } else {
-            root::<S, true>(simd, self)
-        }
+        root(simd, self)
     }
 }
 
-/// The first three columns: lane l includes column d where bit d of l is set.
-fn root<S: Simd, const FUSED: bool>(
-    simd: S,
-    Root {
-        standard,
-        prior,
-        certain,
-    }: Root<'_>,
-) -> (Vec<f64>, Heaviest) {
+/// The first columns (3 with eight lanes): lane l includes column d where bit d of l is set.
+fn root<S: Simd>(simd: S, about: Root<'_>) -> (Vec<f64>, Heaviest) {
+    let standard = about.standard;
     let size = standard.size();
-    let padded = size.max(LANE_COLUMNS);
-    let (tree, odds) = plan(standard, prior, certain, padded);
-    let mut node = Node::blank(padded);
-    let mut entry = 0;
-    for i in 0..padded {
-        for j in i..padded {
-            node.s[entry] = splat(if j < size {
-                standard.matrix[i * size + j]
-            } else {
-                f64::from(i == j)
-            });
-            entry += 1;
-        }
-        node.h[i] = splat(if i < size { standard.offset[i] } else { 0.0 });
-    }
-    node.weight = splat(1.0);
-    let mut above = Vec::new();
-    for (d, odds) in odds.iter().enumerate() {
-        let m = padded - d;
-        let (mut inside, mut outside) = (Node::blank(m - 1), Node::blank(m - 1));
-        simd.vectorize(Split::<FUSED> {
-            tree: &tree,
-            m,
-            node: node.view(),
-            odds,
-            inside: &mut inside,
-            outside: &mut outside,
+    let lane_columns = S::F64_LANES.ilog2() as usize;
+    let padded = size.max(lane_columns);
+    let (tree, odds) = plan::<S>(about, padded, lane_columns);
+    let mut node = Node::<S::f64s>::blank(padded);
+    let pairs = (0..padded).flat_map(|i| (i..padded).map(move |j| (i, j)));
+    for (entry, (i, j)) in node.s.iter_mut().zip(pairs) {
+        // Columns that only fill the lanes are never included.
+        *entry = simd.splat_f64s(if j < size {
+            standard.matrix[i * size + j]
+        } else {
+            f64::from(i == j)
         });
-        for lane in 0..LANES {
-            if lane >> d & 1 == 0 {
-                inside
-                    .s
-                    .iter_mut()
-                    .zip(&node.s[m..])
-                    .for_each(|(a, b)| a[lane] = b[lane]);
-                inside
-                    .h
-                    .iter_mut()
-                    .zip(&outside.h)
-                    .for_each(|(a, b)| a[lane] = b[lane]);
-                inside.c[lane] = outside.c[lane];
-                inside.weight[lane] = outside.weight[lane];
-            }
-        }
-        inside.count = 0;
-        inside.set = 0;
+    }
+    for (h, offset) in node.h.iter_mut().zip(&standard.offset) {
+        *h = simd.splat_f64s(*offset);
+    }
+    node.weight = simd.splat_f64s(1.0);
+    let mut above = Vec::new();
+    for (d, &odds) in odds.iter().enumerate() {
+        let m = padded - d;
+        let (mut inside, outside) = split(simd, &tree, m, &node, odds);
+        let select = |a: &mut S::f64s, b: &S::f64s| {
+            *a = from_lanes(|lane| {
+                if lane >> d & 1 == 1 {
+                    lanes(a)[lane]
+                } else {
+                    lanes(b)[lane]
+                }
+            });
+        };
+        inside
+            .s
+            .iter_mut()
+            .zip(&outside.s)
+            .for_each(|(a, b)| select(a, b));
+        inside
+            .h
+            .iter_mut()
+            .zip(&outside.h)
+            .for_each(|(a, b)| select(a, b));
+        select(&mut inside.c, &outside.c);
+        select(&mut inside.weight, &outside.weight);
+        (inside.count, inside.set) = (0, 0);
         above.push(std::mem::replace(&mut node, inside));
     }
-    let (mut sums, heavy) = branch::<S, FUSED>(simd, &tree, padded - LANE_COLUMNS, node);
+    let (mut sums, heavy) = branch(simd, &tree, padded - lane_columns, node);
     for (d, node) in above.iter().enumerate().rev() {
-        let m = padded - d;
-        let pick = |bit: usize| -> Vec<Lane> {
-            let from = |lane: usize| (lane & !(1 << d)) | bit << d;
+        // Each lane meets the one that differs from it in column d only.
+        let pick = |bit: usize| -> Vec<S::f64s> {
             sums.iter()
-                .map(|x| std::array::from_fn(|lane| x[from(lane)]))
+                .map(|x| from_lanes(|lane| lanes(x)[(lane & !(1 << d)) | bit << d]))
                 .collect()
         };
-        let (inside, outside) = (pick(1), pick(0));
-        sums = vec![[0.0; LANES]; Layout::new(m).len()];
-        simd.vectorize(Join::<FUSED> {
-            tree: &tree,
-            m,
-            node: node.view(),
-            inside: &inside,
-            outside: &outside,
-            out: &mut sums,
-        });
+        sums = join(simd, &tree, padded - d, node, &pick(1), &pick(0));
     }
-    // Columns that only filled the lanes are dropped.
     let (wide, own) = (Layout::new(padded), Layout::new(size));
+    let first = |index: usize| lanes(&sums[index])[0];
     let mut out = vec![0.0; own.len()];
-    out[own.weight()] = sums[wide.weight()][0];
-    out[own.noise()] = sums[wide.noise()][0];
+    out[own.weight()] = first(wide.weight());
+    out[own.noise()] = first(wide.noise());
     for j in 0..size {
-        out[own.inclusion(j)] = sums[wide.inclusion(j)][0];
-        out[own.shift(j)] = sums[wide.shift(j)][0];
+        out[own.inclusion(j)] = first(wide.inclusion(j));
+        out[own.shift(j)] = first(wide.shift(j));
         for l in j..size {
-            out[own.moment(j, l)] = sums[wide.moment(j, l)][0];
+            out[own.moment(j, l)] = first(wide.moment(j, l));
         }
     }
     (out, heavy)
 }
 
-/// Tables of the tree, and prior factors (included, excluded) of the first three columns by lane.
-fn plan(
-    standard: &Standard,
-    prior: &Prior,
-    certain: &[bool],
+/// Prior factors (included, excluded) of one column.
+type Odds<V> = (V, V);
+
+/// Tables of the tree, and the prior factors of the columns that the lanes decide.
+fn plan<S: Simd>(
+    Root {
+        standard,
+        prior,
+        certain,
+    }: Root<'_>,
     padded: usize,
-) -> (Tree, Vec<(Lane, Lane)>) {
+    lane_columns: usize,
+) -> (Tree<S::f64s>, Vec<Odds<S::f64s>>) {
     let size = standard.size();
-    let family: Vec<usize> = (0..padded)
-        .map(|d| {
-            if d < size {
-                prior.family[standard.order[d]]
-            } else {
-                usize::MAX
-            }
-        })
+    let family: Vec<Option<usize>> = (0..padded)
+        .map(|d| standard.order.get(d).map(|&column| prior.family[column]))
         .collect();
-    let start = |d: usize| {
-        (0..d)
-            .rev()
-            .take_while(|&e| family[e] == family[d])
-            .last()
-            .unwrap_or(d)
-    };
     let mut levels = Vec::new();
     let mut odds = Vec::new();
     for d in 0..padded {
-        let from = start(d);
-        // A padding column is never included.
+        let seen = (0..d).rev().take_while(|&e| family[e] == family[d]).count();
+        let from = d - seen;
         let factor = |lane: usize, count: usize| -> (f64, f64) {
             if d >= size {
                 return (0.0, 1.0);
             }
-            let in_lane = (from..d.min(LANE_COLUMNS))
+            let in_lane = (from..d.min(lane_columns))
                 .filter(|e| lane >> e & 1 == 1)
                 .count();
-            let (inside, outside) = prior.next((in_lane + count).min(d - from), d - from);
+            let (inside, outside) = prior.next((in_lane + count).min(seen), seen);
             (inside * standard.precision[d].sqrt(), outside)
         };
-        let counts = 0..=d.saturating_sub(from.max(LANE_COLUMNS));
-        let table = |included: bool| -> Vec<Lane> {
-            counts
-                .clone()
-                .map(|count| {
-                    std::array::from_fn(|lane| {
-                        let (inside, outside) = factor(lane, count);
-                        if included { inside } else { outside }
-                    })
-                })
-                .collect()
-        };
-        let (include, exclude) = (table(true), table(false));
-        if d < LANE_COLUMNS {
+        let counts = 0..=d.saturating_sub(from.max(lane_columns));
+        let include: Vec<S::f64s> = counts
+            .clone()
+            .map(|count| from_lanes(|lane| factor(lane, count).0))
+            .collect();
+        let exclude: Vec<S::f64s> = counts
+            .map(|count| from_lanes(|lane| factor(lane, count).1))
+            .collect();
+        if d < lane_columns {
             odds.push((include[0], exclude[0]));
         }
+        let real = |values: &[f64], filler: f64| values.get(d).copied().unwrap_or(filler);
         levels.push(Level {
-            center: splat(if d < size { standard.center[d] } else { 0.0 }),
-            precision: if d < size { standard.precision[d] } else { 1.0 },
+            center: from_lanes(|_| real(&standard.center, 0.0)),
+            precision: real(&standard.precision, 1.0),
             include,
             exclude,
             carries: d + 1 < padded && family[d + 1] == family[d],
@@ -282,11 +276,9 @@ fn plan(
         });
     }
     levels.reverse();
-    let noise = if standard.noise_factor().is_finite() {
-        standard.noise_factor()
-    } else {
-        0.0
-    };
+    let noise = Some(standard.noise_factor())
+        .filter(|x| x.is_finite())
+        .unwrap_or(0.0);
     (
         Tree {
             levels,
@@ -299,17 +291,18 @@ fn plan(
 }
 
 /// Nodes near the root: their two branches may run on two threads.
-fn branch<S: Simd, const FUSED: bool>(
+fn branch<S: Simd>(
     simd: S,
-    tree: &Tree,
+    tree: &Tree<S::f64s>,
     m: usize,
-    node: Node,
-) -> (Vec<Lane>, Heaviest) {
-    let mut out = vec![[0.0; LANES]; Layout::new(m).len()];
+    node: Node<S::f64s>,
+) -> (Vec<S::f64s>, Heaviest) {
     if m <= TASK_COLUMNS {
+        let zero = simd.splat_f64s(0.0);
+        let mut out = vec![zero; Layout::new(m).len()];
+        let mut scratch = vec![zero; scratch_len(m)];
         let mut heavy = Heaviest::new(&tree.heavy);
-        let mut scratch = vec![[0.0; LANES]; (BOTTOM..=m).map(scratch_of).sum()];
-        descend::<S, FUSED>(
+        descend(
             simd,
             tree,
             m,
@@ -322,346 +315,129 @@ fn branch<S: Simd, const FUSED: bool>(
     }
     let level = &tree.levels[m - 1];
     let odds = (level.include[node.count], level.exclude[node.count]);
-    let (mut inside, mut outside) = (Node::blank(m - 1), Node::blank(m - 1));
-    simd.vectorize(Split::<FUSED> {
-        tree,
-        m,
-        node: node.view(),
-        odds: &odds,
-        inside: &mut inside,
-        outside: &mut outside,
-    });
-    outside.s.copy_from_slice(&node.s[m..]);
-    let ((inside, first), (outside, second)) = if level.certain {
-        let nothing = vec![[0.0; LANES]; Layout::new(m - 1).len()];
-        (
-            branch::<S, FUSED>(simd, tree, m - 1, inside),
-            (nothing, Heaviest::new(&tree.heavy)),
-        )
-    } else {
-        rayon::join(
-            || branch::<S, FUSED>(simd, tree, m - 1, inside),
-            || branch::<S, FUSED>(simd, tree, m - 1, outside),
-        )
-    };
-    simd.vectorize(Join::<FUSED> {
-        tree,
-        m,
-        node: node.view(),
-        inside: &inside,
-        outside: &outside,
-        out: &mut out,
-    });
-    (out, first.merge(second))
+    let (inside, outside) = split(simd, tree, m, &node, odds);
+    if level.certain {
+        let (inside, heavy) = branch(simd, tree, m - 1, inside);
+        let nothing = vec![simd.splat_f64s(0.0); Layout::new(m - 1).len()];
+        return (join(simd, tree, m, &node, &inside, &nothing), heavy);
+    }
+    let ((inside, first), (outside, second)) = rayon::join(
+        || branch(simd, tree, m - 1, inside),
+        || branch(simd, tree, m - 1, outside),
+    );
+    (
+        join(simd, tree, m, &node, &inside, &outside),
+        first.merge(second),
+    )
 }
 
-/// Both children of a node, except the excluding child's S: that is the node's own from row 1 on.
-struct Split<'a, const FUSED: bool> {
-    tree: &'a Tree,
+/// Both children of a node.
+fn split<S: Simd>(
+    simd: S,
+    tree: &Tree<S::f64s>,
     m: usize,
-    node: View<'a>,
-    odds: &'a (Lane, Lane),
-    inside: &'a mut Node,
-    outside: &'a mut Node,
+    node: &Node<S::f64s>,
+    odds: Odds<S::f64s>,
+) -> (Node<S::f64s>, Node<S::f64s>) {
+    simd.vectorize(Split {
+        simd,
+        level: &tree.levels[m - 1],
+        m,
+        node,
+        odds,
+    })
 }
 
-impl<const FUSED: bool> WithSimd for Split<'_, FUSED> {
-    type Output = ();
+/// Carries its own instruction set, the one it is run with: vectors of another one would be other types.
+struct Split<'a, S: Simd> {
+    simd: S,
+    level: &'a Level<S::f64s>,
+    m: usize,
+    node: &'a Node<S::f64s>,
+    odds: Odds<S::f64s>,
+}
+
+impl<S: Simd> WithSimd for Split<'_, S> {
+    type Output = (Node<S::f64s>, Node<S::f64s>);
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) {
+    fn with_simd<Same: Simd>(self, _: Same) -> Self::Output {
         let Self {
-            tree,
+            simd,
+            level,
             m,
             node,
             odds,
-            inside,
-            outside,
         } = self;
-        let level = &tree.levels[m - 1];
-        let r = reciprocal(&node.s[0], level.precision);
-        inside.c = include::<FUSED>(m, node, &r, &mut inside.s, &mut inside.h);
-        inside.weight = mul(&mul(node.weight, &odds.0), &sqrt(&r));
-        outside.c = exclude::<FUSED>(m, node, &level.center, &mut outside.h);
-        outside.weight = mul(node.weight, &odds.1);
-        (inside.count, outside.count) = counts(level, node.count);
+        let (mut inside, mut outside) = (Node::blank(m - 1), Node::blank(m - 1));
+        let r = reciprocal(simd, node.s[0], level.precision);
+        inside.c = include(simd, m, node.view(), r, &mut inside.s, &mut inside.h);
+        inside.weight = simd.mul_f64s(simd.mul_f64s(node.weight, odds.0), simd.sqrt_f64s(r));
+        outside.c = exclude(simd, m, node.view(), level.center, &mut outside.h);
+        outside.weight = simd.mul_f64s(node.weight, odds.1);
+        outside.s.copy_from_slice(&node.s[m..]);
+        (inside.count, outside.count) = level.counts(node.count);
         (inside.set, outside.set) = (node.set | level.bit, node.set);
-    }
-}
-
-/// Members of the family for the two children.
-#[inline(always)]
-fn counts(level: &Level, count: usize) -> (usize, usize) {
-    if level.carries {
-        (count + 1, count)
-    } else {
-        (0, 0)
+        (inside, outside)
     }
 }
 
 /// Sums of a node from those of its children.
-struct Join<'a, const FUSED: bool> {
-    tree: &'a Tree,
-    m: usize,
-    node: View<'a>,
-    inside: &'a [Lane],
-    outside: &'a [Lane],
-    out: &'a mut [Lane],
-}
-
-impl<const FUSED: bool> WithSimd for Join<'_, FUSED> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) {
-        let Self {
-            tree,
-            m,
-            node,
-            inside,
-            outside,
-            out,
-        } = self;
-        let level = &tree.levels[m - 1];
-        let r = reciprocal(&node.s[0], level.precision);
-        combine::<FUSED>(
-            m,
-            (&node.s[..m], &node.h[0], &r, &level.center),
-            inside,
-            outside,
-            out,
-        );
-    }
-}
-
-/// Minimises over δ_0: `S' = S − s sᵀ/p`, `h' = h − s h_0/p`, `c' = c − h_0²/p`.
-#[inline(always)]
-fn include<const FUSED: bool>(
-    m: usize,
-    node: View<'_>,
-    r: &Lane,
-    s: &mut [Lane],
-    h: &mut [Lane],
-) -> Lane {
-    let mut entry = 0;
-    for j in 1..m {
-        let factor = neg(&mul(&node.s[j], r));
-        for l in j..m {
-            s[entry] = mul_add::<FUSED>(&factor, &node.s[l], &node.s[m + entry]);
-            entry += 1;
-        }
-        h[j - 1] = mul_add::<FUSED>(&factor, &node.h[0], &node.h[j]);
-    }
-    mul_add::<FUSED>(&neg(&mul(&node.h[0], r)), &node.h[0], node.c)
-}
-
-/// Fixes δ_0 = −β̂_0: `h' = h − s β̂_0`, `c' = c + β̂_0 (p β̂_0 − 2 h_0)`; S' is S without its row 0.
-#[inline(always)]
-fn exclude<const FUSED: bool>(m: usize, node: View<'_>, center: &Lane, h: &mut [Lane]) -> Lane {
-    let minus = neg(center);
-    for j in 1..m {
-        h[j - 1] = mul_add::<FUSED>(&minus, &node.s[j], &node.h[j]);
-    }
-    let twice = mul(&splat(-2.0), &node.h[0]);
-    mul_add::<FUSED>(
-        center,
-        &mul_add::<FUSED>(center, &node.s[0], &twice),
-        node.c,
-    )
-}
-
-/// Largest m whose whole subtree is written out.
-const BOTTOM: usize = 4;
-
-/// Scratch of one node of m columns: the including child's S, a child's h, and the sums of both children.
-const fn scratch_of(m: usize) -> usize {
-    if m <= BOTTOM {
-        0
-    } else {
-        triangle(m - 1) + (m - 1) + 2 * Layout::new(m - 1).len()
-    }
-}
-
-/// A subtree of one task.
-fn descend<S: Simd, const FUSED: bool>(
+fn join<S: Simd>(
     simd: S,
-    tree: &Tree,
+    tree: &Tree<S::f64s>,
     m: usize,
-    node: View<'_>,
-    out: &mut [Lane],
-    scratch: &mut [Lane],
-    heavy: &mut Heaviest,
-) {
-    simd.vectorize(Descend::<FUSED> {
-        tree,
+    node: &Node<S::f64s>,
+    inside: &[S::f64s],
+    outside: &[S::f64s],
+) -> Vec<S::f64s> {
+    simd.vectorize(Join {
+        simd,
+        level: &tree.levels[m - 1],
         m,
         node,
-        out,
-        scratch,
-        heavy,
-    });
+        inside,
+        outside,
+    })
 }
 
-struct Descend<'a, const FUSED: bool> {
-    tree: &'a Tree,
+struct Join<'a, S: Simd> {
+    simd: S,
+    level: &'a Level<S::f64s>,
     m: usize,
-    node: View<'a>,
-    out: &'a mut [Lane],
-    scratch: &'a mut [Lane],
-    heavy: &'a mut Heaviest,
+    node: &'a Node<S::f64s>,
+    inside: &'a [S::f64s],
+    outside: &'a [S::f64s],
 }
 
-impl<const FUSED: bool> WithSimd for Descend<'_, FUSED> {
-    type Output = ();
+impl<S: Simd> WithSimd for Join<'_, S> {
+    type Output = Vec<S::f64s>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
+    fn with_simd<Same: Simd>(self, _: Same) -> Self::Output {
         let Self {
-            tree,
+            simd,
+            level,
             m,
             node,
-            out,
-            scratch,
-            heavy,
+            inside,
+            outside,
         } = self;
-        match m {
-            0 => level_0::<FUSED>(tree, node, out, heavy),
-            1 => level_1::<FUSED>(tree, node, out, heavy),
-            2 => level_2::<FUSED>(tree, node, out, heavy),
-            3 => level_3::<FUSED>(tree, node, out, heavy),
-            BOTTOM => level_4::<FUSED>(tree, node, out, heavy),
-            _ => {
-                let level = &tree.levels[m - 1];
-                let r = reciprocal(&node.s[0], level.precision);
-                let (own, scratch) = scratch.split_at_mut(scratch_of(m));
-                let (s, own) = own.split_at_mut(triangle(m - 1));
-                let (h, own) = own.split_at_mut(m - 1);
-                let (inside, outside) = own.split_at_mut(Layout::new(m - 1).len());
-                let (more, same) = counts(level, node.count);
-
-                let c = include::<FUSED>(m, node, &r, s, h);
-                let weight = mul(&mul(node.weight, &level.include[node.count]), &sqrt(&r));
-                let child = View {
-                    s,
-                    h,
-                    c: &c,
-                    weight: &weight,
-                    count: more,
-                    set: node.set | level.bit,
-                };
-                descend::<S, FUSED>(simd, tree, m - 1, child, inside, scratch, heavy);
-
-                if level.certain {
-                    outside.fill([0.0; LANES]);
-                } else {
-                    let c = exclude::<FUSED>(m, node, &level.center, h);
-                    let weight = mul(node.weight, &level.exclude[node.count]);
-                    let child = View {
-                        s: &node.s[m..],
-                        h,
-                        c: &c,
-                        weight: &weight,
-                        count: same,
-                        set: node.set,
-                    };
-                    descend::<S, FUSED>(simd, tree, m - 1, child, outside, scratch, heavy);
-                }
-
-                combine::<FUSED>(
-                    m,
-                    (&node.s[..m], &node.h[0], &r, &level.center),
-                    inside,
-                    outside,
-                    out,
-                );
-            }
-        }
+        let mut out = vec![simd.splat_f64s(0.0); Layout::new(m).len()];
+        let r = reciprocal(simd, node.s[0], level.precision);
+        combine(
+            simd,
+            m,
+            Elimination {
+                row: &node.s[..m],
+                h: node.h[0],
+                r,
+                center: level.center,
+            },
+            inside,
+            outside,
+            &mut out,
+        );
+        out
     }
 }
-
-/// A leaf: `w = weight · e^600 (1 + c)^−a_n`.
-#[inline(always)]
-fn level_0<const FUSED: bool>(tree: &Tree, node: View<'_>, out: &mut [Lane], heavy: &mut Heaviest) {
-    let mut ratio = [1.0; LANES];
-    for lane in 0..LANES {
-        // c ≥ 0 but for rounding.
-        ratio[lane] = if node.c[lane] > 0.0 {
-            1.0 + node.c[lane]
-        } else {
-            1.0
-        };
-    }
-    let power = mul_add::<FUSED>(&splat(-tree.shape), &ln(&ratio), &splat(LOG_REFERENCE));
-    let weight = mul(node.weight, &exp(&power));
-    heavy.offer(&weight, node.set, &tree.heavy);
-    out[0] = weight;
-    out[1] = mul(&mul(&weight, &ratio), &splat(tree.noise));
-}
-
-/// Writes out the subtree of `$m` columns with all sizes constant.
-macro_rules! level {
-    ($name:ident, $m:literal, $child:ident) => {
-        #[inline(always)]
-        fn $name<const FUSED: bool>(
-            tree: &Tree,
-            node: View<'_>,
-            out: &mut [Lane],
-            heavy: &mut Heaviest,
-        ) {
-            let level = &tree.levels[$m - 1];
-            let (Some(s), Some(h)) = (
-                node.s.first_chunk::<{ triangle($m) }>(),
-                node.h.first_chunk::<$m>(),
-            ) else {
-                return;
-            };
-            let Some(out) = out.first_chunk_mut::<{ Layout::new($m).len() }>() else {
-                return;
-            };
-            let node = View { s, h, ..node };
-            let r = reciprocal(&s[0], level.precision);
-            let mut child_s = [[0.0; LANES]; triangle($m - 1)];
-            let mut child_h = [[0.0; LANES]; $m - 1];
-            let mut inside = [[0.0; LANES]; Layout::new($m - 1).len()];
-            let mut outside = [[0.0; LANES]; Layout::new($m - 1).len()];
-            let (more, same) = counts(level, node.count);
-
-            let c = include::<FUSED>($m, node, &r, &mut child_s, &mut child_h);
-            let weight = mul(&mul(node.weight, &level.include[node.count]), &sqrt(&r));
-            let child = View {
-                s: &child_s,
-                h: &child_h,
-                c: &c,
-                weight: &weight,
-                count: more,
-                set: node.set | level.bit,
-            };
-            $child::<FUSED>(tree, child, &mut inside, heavy);
-
-            let c = exclude::<FUSED>($m, node, &level.center, &mut child_h);
-            let weight = mul(node.weight, &level.exclude[node.count]);
-            let child = View {
-                s: &s[$m..],
-                h: &child_h,
-                c: &c,
-                weight: &weight,
-                count: same,
-                set: node.set,
-            };
-            $child::<FUSED>(tree, child, &mut outside, heavy);
-
-            combine::<FUSED>(
-                $m,
-                (&s[..$m], &h[0], &r, &level.center),
-                &inside,
-                &outside,
-                out,
-            );
-        }
-    };
-}
-
-level!(level_1, 1, level_0);
-level!(level_2, 2, level_1);
-level!(level_3, 3, level_2);
-level!(level_4, 4, level_3);

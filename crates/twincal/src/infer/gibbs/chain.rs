@@ -89,18 +89,14 @@ impl WithSimd for Run<'_> {
     type Output = Trace;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) -> Trace {
-        if S::IS_SCALAR {
-            self.run::<false>()
-        } else {
-            self.run::<true>()
-        }
+    fn with_simd<S: Simd>(self, simd: S) -> Trace {
+        self.run(simd)
     }
 }
 
 impl Run<'_> {
     #[inline(always)]
-    fn run<const FUSED: bool>(self) -> Trace {
+    fn run<S: Simd>(self, simd: S) -> Trace {
         let Self {
             standard,
             prior,
@@ -110,7 +106,7 @@ impl Run<'_> {
         } = self;
         let size = standard.size();
         let mut state = Chain::new(standard, prior, Source::new(seed, chain as u64));
-        state.start::<FUSED>(chain);
+        state.start(simd, chain);
         let mut trace = Trace {
             conditional: vec![0.0; size * length.draws],
             beta: vec![0.0; size * length.draws],
@@ -122,13 +118,13 @@ impl Run<'_> {
             moves: 0,
         };
         for _ in 0..length.warm_up * length.scans_per_draw {
-            state.scan::<FUSED>();
+            state.scan(simd);
         }
         state.moves = 0;
         for draw in 0..length.draws {
             state.sums.fill(0.0);
             for _ in 0..length.scans_per_draw {
-                state.scan::<FUSED>();
+                state.scan(simd);
             }
             state.record(&mut trace, draw, length);
         }
@@ -195,13 +191,13 @@ impl<'a> Chain<'a> {
 
     /// Over-dispersed starts: empty, nearly full, half, a few.
     #[inline(always)]
-    fn start<const FUSED: bool>(&mut self, chain: usize) {
+    fn start<S: Simd>(&mut self, simd: S, chain: usize) {
         let size = self.standard.size();
         // More than 100 members at the start would only cost time: they leave within a scan.
         let share = [0.0, 0.9, 0.5, 0.1][chain % 4] * (100.0 / size as f64).min(1.0);
         for j in 0..size {
             if self.source.uniform() < share {
-                self.flip::<FUSED>(j);
+                self.flip(simd, j);
             }
         }
     }
@@ -225,8 +221,8 @@ impl<'a> Chain<'a> {
     }
 
     #[inline(always)]
-    fn flip<const FUSED: bool>(&mut self, j: usize) {
-        self.tableau.flip::<FUSED>(j);
+    fn flip<S: Simd>(&mut self, simd: S, j: usize) {
+        self.tableau.flip(simd, j);
         let family = self.family[j];
         if self.tableau.includes(j) {
             self.members[family] += 1;
@@ -240,12 +236,12 @@ impl<'a> Chain<'a> {
 
     /// All positions once, in order, then the swaps.
     #[inline(always)]
-    fn scan<const FUSED: bool>(&mut self) {
+    fn scan<S: Simd>(&mut self, simd: S) {
         for index in 0..self.chunks.len() {
             let mut from = 0;
             while from < LANES {
                 if self.chunks[index].version != self.version {
-                    self.evaluate(index);
+                    self.evaluate(simd, index);
                 }
                 let chunk = self.chunks[index];
                 let before = if from == 0 {
@@ -275,12 +271,12 @@ impl<'a> Chain<'a> {
                 for l in from..=lane {
                     sums[l] += chunk.conditional[l];
                 }
-                self.flip::<FUSED>(index * LANES + lane);
+                self.flip(simd, index * LANES + lane);
                 self.renew();
                 from = lane + 1;
             }
         }
-        self.swap::<FUSED>();
+        self.swap(simd);
     }
 
     /// A new uniform number for the next flip.
@@ -292,11 +288,12 @@ impl<'a> Chain<'a> {
     /// The scan's proposals to exchange an included column for one that resembles it. Whether and when the next one is
     /// accepted is again one uniform number; which one, another.
     #[inline(always)]
-    fn swap<const FUSED: bool>(&mut self) {
+    fn swap<S: Simd>(&mut self, simd: S) {
         let mut left = self.swaps.proposals_per_scan();
         while left > 0 {
             if self.swaps.version != self.version {
                 self.swaps.evaluate(
+                    simd,
                     &self.tableau,
                     self.standard,
                     &self.odds,
@@ -315,8 +312,8 @@ impl<'a> Chain<'a> {
                 .clamp(1.0, f64::from(left));
             left -= proposal as i32;
             let (i, j) = self.swaps.pick(self.source.uniform());
-            self.flip::<FUSED>(i);
-            self.flip::<FUSED>(j);
+            self.flip(simd, i);
+            self.flip(simd, j);
             self.moves -= 1;
             self.renew();
         }
@@ -324,7 +321,7 @@ impl<'a> Chain<'a> {
 
     /// Ratios of eight flips.
     #[inline(always)]
-    fn evaluate(&mut self, index: usize) {
+    fn evaluate<S: Simd>(&mut self, simd: S, index: usize) {
         let range = index * LANES..(index + 1) * LANES;
         let tableau = &self.tableau;
         let (diagonal, gradient) = (
@@ -348,11 +345,7 @@ impl<'a> Chain<'a> {
             };
             ratio[lane] = odds[lane] / d.sqrt();
         }
-        let mut power = ln(&change);
-        for lane in 0..LANES {
-            power[lane] *= -self.standard.shape;
-        }
-        let power = exp(&power);
+        let power = to_the(simd, change, -self.standard.shape);
         let chunk = &mut self.chunks[index];
         let mut product = 1.0;
         let mut stay = [0.0; LANES];
@@ -419,4 +412,16 @@ impl<'a> Chain<'a> {
         members.iter().for_each(|&k| set[k / 64] |= 1 << (k % 64));
         *trace.visits.entry(set).or_default() += 1;
     }
+}
+
+/// x^power of eight positive numbers.
+#[inline(always)]
+pub(super) fn to_the<S: Simd>(simd: S, mut x: Lane, power: f64) -> Lane {
+    for vector in S::as_mut_simd_f64s(&mut x).0 {
+        *vector = exp(
+            simd,
+            simd.mul_f64s(simd.splat_f64s(power), ln(simd, *vector)),
+        );
+    }
+    x
 }

@@ -4,10 +4,11 @@
 //! probability there and back. The chance that a proposal is accepted is the mean of the acceptance probabilities over
 //! all pairs, which is computed once per state.
 
-use super::chain::LAZY;
+use super::chain::{LAZY, to_the};
 use super::tableau::Tableau;
 use crate::infer::standard::Standard;
-use crate::lanes::{LANES, exp, ln};
+use crate::lanes::LANES;
+use pulp::Simd;
 
 /// Columns less alike than this (cosine) are no pair: two flips do the same.
 const ALIKE: f64 = 0.3;
@@ -73,8 +74,9 @@ impl Swaps {
 
     /// Acceptance probabilities of all pairs in the present state; `odds` are those of single flips.
     #[inline(always)]
-    pub(super) fn evaluate(
+    pub(super) fn evaluate<S: Simd>(
         &mut self,
+        simd: S,
         tableau: &Tableau<'_>,
         standard: &Standard,
         odds: &[f64],
@@ -114,11 +116,7 @@ impl Swaps {
                 };
                 ratio[lane] = prior / (inverse * schur).sqrt();
             }
-            let mut power = ln(&change);
-            for lane in 0..LANES {
-                power[lane] *= -standard.shape;
-            }
-            let power = exp(&power);
+            let power = to_the(simd, change, -standard.shape);
             for lane in 0..pairs.len() {
                 total += (ratio[lane] * power[lane]).min(1.0);
                 self.sums.push(total);

@@ -11,6 +11,7 @@
 
 use crate::infer::standard::Standard;
 use crate::lanes::LANES;
+use pulp::Simd;
 
 /// Moves after which rounding is swept away by starting afresh.
 const MOVES_BETWEEN_SWEEPS: usize = 2000;
@@ -91,39 +92,40 @@ impl<'a> Tableau<'a> {
 
     /// Moves position j in or out.
     #[inline(always)]
-    pub(super) fn flip<const FUSED: bool>(&mut self, j: usize) {
+    pub(super) fn flip<S: Simd>(&mut self, simd: S, j: usize) {
         if self.includes(j) {
-            self.exclude::<FUSED>(j);
+            self.exclude(simd, j);
         } else {
-            self.include::<FUSED>(j);
+            self.include(simd, j);
         }
         self.moves += 1;
         if self.moves >= MOVES_BETWEEN_SWEEPS {
-            self.sweep::<FUSED>();
+            self.sweep(simd);
         }
     }
 
     /// Starts afresh from the empty model with the same members.
     #[inline(always)]
-    fn sweep<const FUSED: bool>(&mut self) {
+    fn sweep<S: Simd>(&mut self, simd: S) {
         let members = std::mem::take(&mut self.members);
         self.clear();
         for &j in &members {
-            self.include::<FUSED>(j);
+            self.include(simd, j);
         }
         self.recenter();
         self.moves = 0;
     }
 
     #[inline(always)]
-    fn include<const FUSED: bool>(&mut self, j: usize) {
+    fn include<S: Simd>(&mut self, simd: S, j: usize) {
         let width = self.width;
         // scratch = S_jk = A_jk − Σ_i t_ij A_ik for the excluded k
         self.scratch
             .copy_from_slice(&self.matrix[j * width..(j + 1) * width]);
         for (slot, &i) in self.members.iter().enumerate() {
             let t = self.rows[slot * width + j];
-            axpy::<FUSED>(
+            axpy(
+                simd,
                 -t,
                 &self.matrix[i * width..(i + 1) * width],
                 &mut self.scratch,
@@ -150,7 +152,7 @@ impl<'a> Tableau<'a> {
             let row = &mut self.rows[slot * width..(slot + 1) * width];
             let t = row[j];
             row[j] = 0.0;
-            axpy::<FUSED>(-t, &self.scratch, row);
+            axpy(simd, -t, &self.scratch, row);
         }
         self.slot[j] = self.members.len();
         self.members.push(j);
@@ -161,7 +163,7 @@ impl<'a> Tableau<'a> {
     }
 
     #[inline(always)]
-    fn exclude<const FUSED: bool>(&mut self, j: usize) {
+    fn exclude<S: Simd>(&mut self, simd: S, j: usize) {
         let width = self.width;
         let slot = self.slot[j];
         let last = self.members.len() - 1;
@@ -191,7 +193,7 @@ impl<'a> Tableau<'a> {
         for row in self.rows.chunks_exact_mut(width) {
             let factor = -row[j] * pivot;
             row[j] = factor;
-            axpy::<FUSED>(factor, &self.scratch, row);
+            axpy(simd, factor, &self.scratch, row);
         }
         self.diagonal[j] = pivot;
         self.gradient[j] = step;
@@ -246,15 +248,12 @@ impl<'a> Tableau<'a> {
 
 /// y += a x.
 #[inline(always)]
-fn axpy<const FUSED: bool>(a: f64, x: &[f64], y: &mut [f64]) {
-    for (x, y) in x.chunks_exact(LANES).zip(y.chunks_exact_mut(LANES)) {
-        for lane in 0..LANES {
-            y[lane] = if FUSED {
-                a.mul_add(x[lane], y[lane])
-            } else {
-                a * x[lane] + y[lane]
-            };
-        }
+fn axpy<S: Simd>(simd: S, a: f64, x: &[f64], y: &mut [f64]) {
+    let a = simd.splat_f64s(a);
+    // Both are whole lanes: no vector set leaves a tail.
+    let ((x, _), (y, _)) = (S::as_simd_f64s(x), S::as_mut_simd_f64s(y));
+    for (x, y) in x.iter().zip(y) {
+        *y = simd.mul_add_e_f64s(a, *x, *y);
     }
 }
 
@@ -276,7 +275,7 @@ mod tests {
             state = state
                 .wrapping_mul(6364136223846793005)
                 .wrapping_add(1442695040888963407);
-            tableau.flip::<false>((state >> 33) as usize % 11);
+            tableau.flip(pulp::Scalar::new(), (state >> 33) as usize % 11);
             if step % 250 == 0 || step < 20 {
                 compare(&tableau, &standard);
             }

@@ -1,0 +1,276 @@
+//! The subtrees of one task: the kernel where all the time goes. Small ones are written out with constant sizes.
+
+use super::heaviest::Heaviest;
+use super::sums::{Elimination, Layout, combine, triangle};
+use super::tree::{LOG_REFERENCE, Tree, View};
+use crate::lanes::{exp, ln};
+use pulp::{Simd, WithSimd};
+
+/// Largest m whose whole subtree is written out.
+const WRITTEN_OUT: usize = 3;
+
+/// Minimises over δ_0: `S' = S − s sᵀ/p`, `h' = h − s h_0/p`, `c' = c − h_0²/p`, with `r = 1/p`.
+#[inline(always)]
+pub(super) fn include<S: Simd>(
+    simd: S,
+    m: usize,
+    node: View<'_, S::f64s>,
+    r: S::f64s,
+    s: &mut [S::f64s],
+    h: &mut [S::f64s],
+) -> S::f64s {
+    let minus_r = simd.neg_f64s(r);
+    let mut entry = 0;
+    for j in 1..m {
+        let factor = simd.mul_f64s(node.s[j], minus_r);
+        for l in j..m {
+            s[entry] = simd.mul_add_e_f64s(factor, node.s[l], node.s[m + entry]);
+            entry += 1;
+        }
+        h[j - 1] = simd.mul_add_e_f64s(factor, node.h[0], node.h[j]);
+    }
+    simd.mul_add_e_f64s(simd.mul_f64s(node.h[0], minus_r), node.h[0], node.c)
+}
+
+/// Fixes δ_0 = −β̂_0: `h' = h − s β̂_0`, `c' = c + β̂_0 (p β̂_0 − 2 h_0)`; S' is S without its row 0.
+#[inline(always)]
+pub(super) fn exclude<S: Simd>(
+    simd: S,
+    m: usize,
+    node: View<'_, S::f64s>,
+    center: S::f64s,
+    h: &mut [S::f64s],
+) -> S::f64s {
+    let minus = simd.neg_f64s(center);
+    for j in 1..m {
+        h[j - 1] = simd.mul_add_e_f64s(minus, node.s[j], node.h[j]);
+    }
+    let twice = simd.mul_f64s(simd.splat_f64s(-2.0), node.h[0]);
+    simd.mul_add_e_f64s(
+        center,
+        simd.mul_add_e_f64s(center, node.s[0], twice),
+        node.c,
+    )
+}
+
+/// 1/max(a, least).
+#[inline(always)]
+pub(super) fn reciprocal<S: Simd>(simd: S, a: S::f64s, least: f64) -> S::f64s {
+    simd.div_f64s(
+        simd.splat_f64s(1.0),
+        simd.max_f64s(a, simd.splat_f64s(least)),
+    )
+}
+
+/// Vectors that the subtree of m columns needs: the including child's S, a child's h, the sums of both children.
+pub(super) fn scratch_len(m: usize) -> usize {
+    (WRITTEN_OUT + 1..=m)
+        .map(|m| triangle(m - 1) + (m - 1) + 2 * Layout::new(m - 1).len())
+        .sum()
+}
+
+/// Sums over the subtree of m columns below `node`.
+pub(super) fn descend<S: Simd>(
+    simd: S,
+    tree: &Tree<S::f64s>,
+    m: usize,
+    node: View<'_, S::f64s>,
+    out: &mut [S::f64s],
+    scratch: &mut [S::f64s],
+    heavy: &mut Heaviest,
+) {
+    simd.vectorize(Descend {
+        simd,
+        tree,
+        m,
+        node,
+        out,
+        scratch,
+        heavy,
+    });
+}
+
+/// Recursion loses the instruction set; `vectorize` gives it back at every level.
+struct Descend<'a, S: Simd> {
+    simd: S,
+    tree: &'a Tree<S::f64s>,
+    m: usize,
+    node: View<'a, S::f64s>,
+    out: &'a mut [S::f64s],
+    scratch: &'a mut [S::f64s],
+    heavy: &'a mut Heaviest,
+}
+
+impl<S: Simd> WithSimd for Descend<'_, S> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<Same: Simd>(self, _: Same) {
+        let Self {
+            simd,
+            tree,
+            m,
+            node,
+            out,
+            scratch,
+            heavy,
+        } = self;
+        match m {
+            0 => level_0(simd, tree, node, out, heavy),
+            1 => level_1(simd, tree, node, out, heavy),
+            2 => level_2(simd, tree, node, out, heavy),
+            WRITTEN_OUT => level_3(simd, tree, node, out, heavy),
+            _ => {
+                let level = &tree.levels[m - 1];
+                let r = reciprocal(simd, node.s[0], level.precision);
+                let (s, scratch) = scratch.split_at_mut(triangle(m - 1));
+                let (h, scratch) = scratch.split_at_mut(m - 1);
+                let (inside, scratch) = scratch.split_at_mut(Layout::new(m - 1).len());
+                let (outside, scratch) = scratch.split_at_mut(Layout::new(m - 1).len());
+                let (more, same) = level.counts(node.count);
+
+                let c = include(simd, m, node, r, s, h);
+                let odds = simd.mul_f64s(level.include[node.count], simd.sqrt_f64s(r));
+                let weight = simd.mul_f64s(node.weight, odds);
+                let child = View {
+                    s,
+                    h,
+                    c,
+                    weight,
+                    count: more,
+                    set: node.set | level.bit,
+                };
+                descend(simd, tree, m - 1, child, inside, scratch, heavy);
+
+                if level.certain {
+                    outside.fill(simd.splat_f64s(0.0));
+                } else {
+                    let c = exclude(simd, m, node, level.center, h);
+                    let weight = simd.mul_f64s(node.weight, level.exclude[node.count]);
+                    let child = View {
+                        s: &node.s[m..],
+                        h,
+                        c,
+                        weight,
+                        count: same,
+                        set: node.set,
+                    };
+                    descend(simd, tree, m - 1, child, outside, scratch, heavy);
+                }
+
+                combine(
+                    simd,
+                    m,
+                    Elimination {
+                        row: &node.s[..m],
+                        h: node.h[0],
+                        r,
+                        center: level.center,
+                    },
+                    inside,
+                    outside,
+                    out,
+                );
+            }
+        }
+    }
+}
+
+/// A leaf: `w = weight · e^600 (1 + c)^−a_n`.
+#[inline(always)]
+fn level_0<S: Simd>(
+    simd: S,
+    tree: &Tree<S::f64s>,
+    node: View<'_, S::f64s>,
+    out: &mut [S::f64s],
+    heavy: &mut Heaviest,
+) {
+    // c ≥ 0 but for rounding.
+    let one = simd.splat_f64s(1.0);
+    let ratio = simd.max_f64s(simd.add_f64s(node.c, one), one);
+    let power = simd.mul_add_e_f64s(
+        simd.splat_f64s(-tree.shape),
+        ln(simd, ratio),
+        simd.splat_f64s(LOG_REFERENCE),
+    );
+    let weight = simd.mul_f64s(node.weight, exp(simd, power));
+    heavy.offer(simd, weight, node.set, &tree.heavy);
+    out[0] = weight;
+    out[1] = simd.mul_f64s(simd.mul_f64s(weight, ratio), simd.splat_f64s(tree.noise));
+}
+
+/// Writes out the subtree of `$m` columns with all sizes constant.
+macro_rules! level {
+    ($name:ident, $m:literal, $child:ident) => {
+        #[inline(always)]
+        fn $name<S: Simd>(
+            simd: S,
+            tree: &Tree<S::f64s>,
+            node: View<'_, S::f64s>,
+            out: &mut [S::f64s],
+            heavy: &mut Heaviest,
+        ) {
+            let level = &tree.levels[$m - 1];
+            let (Some(s), Some(h)) = (
+                node.s.first_chunk::<{ triangle($m) }>(),
+                node.h.first_chunk::<$m>(),
+            ) else {
+                return;
+            };
+            let Some(out) = out.first_chunk_mut::<{ Layout::new($m).len() }>() else {
+                return;
+            };
+            let node = View { s, h, ..node };
+            let zero = simd.splat_f64s(0.0);
+            let r = reciprocal(simd, s[0], level.precision);
+            let mut child_s = [zero; triangle($m - 1)];
+            let mut child_h = [zero; $m - 1];
+            let mut inside = [zero; Layout::new($m - 1).len()];
+            let mut outside = [zero; Layout::new($m - 1).len()];
+            let (more, same) = level.counts(node.count);
+
+            let c = include(simd, $m, node, r, &mut child_s, &mut child_h);
+            let odds = simd.mul_f64s(level.include[node.count], simd.sqrt_f64s(r));
+            let weight = simd.mul_f64s(node.weight, odds);
+            let child = View {
+                s: &child_s,
+                h: &child_h,
+                c,
+                weight,
+                count: more,
+                set: node.set | level.bit,
+            };
+            $child(simd, tree, child, &mut inside, heavy);
+
+            let c = exclude(simd, $m, node, level.center, &mut child_h);
+            let weight = simd.mul_f64s(node.weight, level.exclude[node.count]);
+            let child = View {
+                s: &s[$m..],
+                h: &child_h,
+                c,
+                weight,
+                count: same,
+                set: node.set,
+            };
+            $child(simd, tree, child, &mut outside, heavy);
+
+            combine(
+                simd,
+                $m,
+                Elimination {
+                    row: &s[..$m],
+                    h: h[0],
+                    r,
+                    center: level.center,
+                },
+                &inside,
+                &outside,
+                out,
+            );
+        }
+    };
+}
+
+level!(level_1, 1, level_0);
+level!(level_2, 2, level_1);
+level!(level_3, 3, level_2);
