@@ -11,7 +11,7 @@ use logs::{LogText, arm, motion, robot};
 use std::f64::consts::{PI, TAU};
 use twincal::robot::JointKind;
 use twincal::signal::{
-    Auto, Pipeline, Recording, SignalSettings, Trajectory, align, choose_pipeline,
+    Auto, DerivedFrom, Pipeline, Recording, SignalSettings, Trajectory, align, choose_pipeline,
 };
 use twincal::{Finding, Severity};
 use twincal_io::Result;
@@ -396,6 +396,7 @@ fn case_23_a_wrapped_angle_is_unfolded_and_counted_a_slider_never() {
         rate_hz: 12.5,
         coulomb_velocity: 0.02,
         standstill_velocity: vec![0.02; 2],
+        derived_from: vec![DerivedFrom::Position; 2],
     };
     let (trajectory, findings) = align(&robot, &recording, &pipeline).unwrap();
     let turns = ((turning(3999) + PI) / TAU).floor() as u64;

@@ -56,19 +56,19 @@ pub(super) fn check_chunk(
                 header.uncompressed
             ));
         }
-        if header.compressed < 0 || header.compressed as u64 > length - position - reader.at as u64
-        {
-            return Err(format!(
-                "the page at byte {at} claims {} bytes beyond its column chunk",
-                header.compressed
-            ));
-        }
         // 0 and 3 are data pages; a dictionary (2) counts its own entries.
         let is_data = matches!(header.kind, 0 | 3);
         if header.values < 0 || header.values > values || is_data && header.values > values - seen {
             return Err(format!(
                 "the page at byte {at} declares {} values, its column chunk has {values}",
                 header.values
+            ));
+        }
+        if header.compressed < 0 || header.compressed as u64 > length - position - reader.at as u64
+        {
+            return Err(format!(
+                "the page at byte {at} claims {} bytes beyond its column chunk",
+                header.compressed
             ));
         }
         seen += if is_data { header.values } else { 0 };

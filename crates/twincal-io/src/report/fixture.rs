@@ -218,6 +218,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
                 rate_hz: RATE,
                 coulomb_velocity: 0.02,
                 standstill_velocity: vec![0.02; names.len()],
+                derived_from: vec![twincal::signal::DerivedFrom::Position; names.len()],
             },
             posterior,
             noise: joint_noise.clone(),

@@ -4,7 +4,7 @@ use super::evaluate::Model;
 use super::*;
 use crate::robot::Motion;
 use crate::signal::fir::column_kernel;
-use crate::signal::{LoggedSamples, Segment};
+use crate::signal::{DerivedFrom, LoggedSamples, Segment};
 
 const COLUMNS: [&[usize]; 2] = [&[0, 2, 3], &[1, 2]];
 const BETA: [f64; 4] = [0.7, -1.3, 0.25, 2.0];
@@ -39,6 +39,7 @@ fn pipeline(cutoff_hz: f64) -> Pipeline {
         rate_hz: 2.5 * cutoff_hz,
         coulomb_velocity: 0.02,
         standstill_velocity: vec![0.02; 2],
+        derived_from: vec![DerivedFrom::Position; 2],
     }
 }
 

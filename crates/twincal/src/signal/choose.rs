@@ -1,13 +1,11 @@
 //! Replaces every "auto" of the signal settings by a number that the training logs justify.
 
 use super::clock::even_interval;
-use super::cutoff::{JointSpectra, automatic, motion_band, spectra};
-use super::fir::{
-    MotionKernels, column_half_seconds, column_kernel, motion_half_seconds, noise_gain,
-};
+use super::cutoff::{JointSpectra, automatic, derived_from, motion_band, spectra};
+use super::encoder::velocity_resolution;
+use super::fir::{column_half_seconds, column_kernel, motion_half_seconds, noise_gain};
 use super::prepare::{JointFacts, Prepared, prepare};
-use super::standstill::quantum;
-use super::{Auto, Pipeline, Recording, SignalSettings};
+use super::{Auto, DerivedFrom, Pipeline, Recording, SignalSettings};
 use crate::error::{Error, Finding, Result, Severity};
 
 /// v_s where the pipeline is on and nothing is said, rad/s or m/s.
@@ -147,6 +145,7 @@ fn off(
         rate_hz: if rate.is_finite() { 1.0 / rate } else { 0.0 },
         coulomb_velocity: settings.coulomb_velocity.unwrap_or(0.0),
         standstill_velocity: vec![0.0; joints.len()],
+        derived_from: vec![DerivedFrom::Position; joints.len()],
     };
     Ok((pipeline, findings))
 }
@@ -236,13 +235,16 @@ fn on(
         rate_hz: rate,
         coulomb_velocity,
         standstill_velocity: Vec::with_capacity(joints.len()),
+        derived_from: (0..joints.len())
+            .map(|joint| derived_from(&of_joint(joint), cutoff))
+            .collect(),
     };
     let mut still = Vec::with_capacity(joints.len());
     for (joint, facts) in joints.iter().enumerate() {
         let resolved = velocity_resolution(
             joint,
             facts,
-            prepared,
+            logs,
             &of_joint(joint),
             &pipeline,
             &mut findings,
@@ -338,72 +340,4 @@ fn limits(
         });
     }
     Ok((rate, findings))
-}
-
-/// Velocity that the encoder resolves after the motion filter; says what noise the derivatives carry.
-fn velocity_resolution(
-    joint: usize,
-    facts: &JointFacts,
-    prepared: &[Prepared],
-    spectra: &[&JointSpectra],
-    pipeline: &Pipeline,
-    findings: &mut Vec<Finding>,
-) -> f64 {
-    let pieces = || {
-        prepared
-            .iter()
-            .flat_map(|p| &p.pieces)
-            .map(move |piece| &piece.joints[joint])
-    };
-    let has_qd = pieces().all(|c| c.qd.is_some());
-    let has_qdd = pieces().all(|c| c.qdd.is_some());
-    let (mut velocity, mut acceleration, mut position) = (0.0_f64, 0.0_f64, 0.0_f64);
-    for log in spectra {
-        let kernels = MotionKernels::new(pipeline.motion_cutoff_hz, 1.0 / log.rate);
-        let sd = log.source.0.noise_sd(log.rate);
-        let q_sd = log.position.noise_sd(log.rate);
-        position = position.max(q_sd);
-        velocity = velocity.max(match (has_qd, log.source.1) {
-            (true, 1) => sd * noise_gain(&kernels.smooth),
-            (true, _) => 0.0,
-            _ => q_sd * noise_gain(&kernels.first),
-        });
-        acceleration = acceleration.max(match log.source.1 {
-            0 => sd * noise_gain(&kernels.smooth),
-            1 => sd * noise_gain(&kernels.first),
-            _ => sd * noise_gain(&kernels.second),
-        });
-    }
-    if !has_qdd {
-        let source = if has_qd {
-            "the logged velocity"
-        } else {
-            "position, twice"
-        };
-        findings.push(Finding::new(
-            Severity::Note,
-            "derived_acceleration",
-            &facts.name,
-            format!(
-                "joint `{}`: acceleration is not logged and was derived from {source}, by the motion filter at {:.3} Hz; encoder noise of {position:.2e} leaves a noise of {velocity:.2e} in velocity and {acceleration:.2e} in acceleration (SI units, per sample)",
-                facts.name, pipeline.motion_cutoff_hz
-            ),
-            0,
-        ));
-    }
-    let step = quantum(pieces().map(|c| c.q.as_slice()));
-    let stepping = step.map_or(0.0, |step| 2.0 * pipeline.motion_cutoff_hz * step);
-    if let Some(step) = step.filter(|_| stepping > pipeline.coulomb_velocity) {
-        findings.push(Finding::new(
-            Severity::Warning,
-            "quantised_encoder",
-            &facts.name,
-            format!(
-                "joint `{}`: the encoder steps by {step:.3e}, so velocities below {stepping:.3e} per s cannot be told from standstill",
-                facts.name
-            ),
-            0,
-        ));
-    }
-    stepping.max(3.0 * velocity)
 }

@@ -10,8 +10,9 @@
 //! 4. Raised so that the kernels' ends take at most a third of the longest segment; at most 0.11 of the log's rate, so that the
 //!    motion filter at 4 f_c fits below 0.45 of it.
 
+use super::DerivedFrom;
 use super::prepare::Prepared;
-use super::spectrum::Spectrum;
+use super::spectrum::{Noise, Spectrum};
 use std::f64::consts::PI;
 
 /// What f_c never falls below without reason, Hz.
@@ -28,12 +29,25 @@ const ALLOWED_BIAS: f64 = 0.3;
 pub(crate) struct JointSpectra {
     /// Position.
     pub(crate) position: Spectrum,
-    /// What q̈ is made from: the spectrum of q, q̇ or q̈ and how often it is differentiated (2, 1, 0).
-    pub(crate) source: (Spectrum, i32),
-    /// Sampling rate, Hz.
-    pub(crate) rate: f64,
+    /// Noise of position.
+    pub(crate) position_noise: Noise,
+    /// Noise of logged velocity.
+    pub(crate) velocity_noise: Option<Noise>,
+    /// Noise of logged acceleration.
+    pub(crate) acceleration_noise: Option<Noise>,
     /// Seconds of data.
     pub(crate) duration: f64,
+}
+
+impl JointSpectra {
+    /// Noise of what q̈ is made from and how many derivatives are taken of it.
+    pub(crate) fn source(&self, derived: DerivedFrom) -> (Noise, i32) {
+        match (self.acceleration_noise, self.velocity_noise, derived) {
+            (Some(noise), _, _) => (noise, 0),
+            (None, Some(noise), DerivedFrom::Velocity) => (noise, 1),
+            _ => (self.position_noise, 2),
+        }
+    }
 }
 
 /// Spectra of every joint of a log; `None` if the log is too short.
@@ -46,24 +60,35 @@ pub(crate) fn spectra(prepared: &Prepared) -> Option<Vec<JointSpectra>> {
         .map(|joint| {
             let channels = || pieces.iter().map(move |p| &p.joints[joint]);
             let position = Spectrum::welch(channels().map(|c| c.q.as_slice()), interval)?;
-            let qd = || channels().filter_map(|c| c.qd.as_deref());
-            let qdd = || channels().filter_map(|c| c.qdd.as_deref());
-            let source = match (
-                Spectrum::welch(qdd(), interval),
-                Spectrum::welch(qd(), interval),
-            ) {
-                (Some(spectrum), _) => (spectrum, 0),
-                (None, Some(spectrum)) => (spectrum, 1),
-                (None, None) => (position.clone(), 2),
-            };
+            let qd = Spectrum::welch(channels().filter_map(|c| c.qd.as_deref()), interval);
+            let qdd = Spectrum::welch(channels().filter_map(|c| c.qdd.as_deref()), interval);
             Some(JointSpectra {
+                position_noise: position.noise(0),
+                velocity_noise: qd.map(|spectrum| spectrum.noise(1)),
+                acceleration_noise: qdd.map(|spectrum| spectrum.noise(2)),
                 position,
-                source,
-                rate: 1.0 / interval,
                 duration,
             })
         })
         .collect()
+}
+
+/// Whether q̈ has less noise below `cutoff` from q or from q̇; q̇ unless q is better by a factor 2 in power.
+pub(crate) fn derived_from(logs: &[&JointSpectra], cutoff: f64) -> DerivedFrom {
+    let power = |derived: DerivedFrom| -> f64 {
+        let one = |log: &&JointSpectra| {
+            let (noise, more) = log.source(derived);
+            log.duration * noise.power(more, cutoff)
+        };
+        logs.iter().map(one).sum()
+    };
+    let (position, velocity) = (power(DerivedFrom::Position), power(DerivedFrom::Velocity));
+    let has_velocity = logs.iter().all(|log| log.velocity_noise.is_some());
+    if has_velocity && velocity <= 2.0 * position {
+        DerivedFrom::Velocity
+    } else {
+        DerivedFrom::Position
+    }
 }
 
 /// Frequency f_m and rms velocity of one joint over all logs.
@@ -92,21 +117,21 @@ pub(crate) fn motion_band(logs: &[&JointSpectra]) -> (f64, f64) {
     (band.map_or(0.0, |b| b.0), total.sqrt())
 }
 
-/// Noise power over signal power of q̈ below `cutoff`, pooled over logs; the signal is what lies below 3 f_m.
+/// Noise power of q̈ below `cutoff` over its signal power, pooled over logs; the signal is what lies below 3 f_m.
 fn noise_ratio(logs: &[&JointSpectra], cutoff: f64, band: f64) -> f64 {
+    let derived = derived_from(logs, cutoff);
     let (mut noise, mut signal) = (0.0, 0.0);
     for log in logs {
-        let (spectrum, order) = &log.source;
-        let power = 2 * order;
-        noise += log.duration * spectrum.floor * (2.0 * PI).powi(power) * cutoff.powi(power + 1)
-            / f64::from(power + 1);
+        let (source, more) = log.source(derived);
+        noise += log.duration * source.power(more, cutoff);
+        let spectrum = &log.position;
         let below = spectrum
             .density
             .iter()
             .enumerate()
             .take_while(|(i, _)| spectrum.frequency(*i) <= 3.0 * band)
             .map(|(i, d)| {
-                (d - spectrum.floor).max(0.0) * (2.0 * PI * spectrum.frequency(i)).powi(power)
+                (d - spectrum.floor).max(0.0) * (2.0 * PI * spectrum.frequency(i)).powi(4)
             })
             .sum::<f64>();
         signal += log.duration * below * spectrum.width;

@@ -6,6 +6,7 @@ mod clock;
 pub(crate) mod convolve;
 mod cutoff;
 mod describe;
+mod encoder;
 pub(crate) mod fir;
 mod prepare;
 mod spectrum;
@@ -63,6 +64,16 @@ pub struct Recording {
     pub joints: Vec<Channels>,
 }
 
+/// What an acceleration that is not logged is derived from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DerivedFrom {
+    /// Position, twice.
+    Position,
+    /// Logged velocity, once.
+    Velocity,
+}
+
 /// The pipeline with every "auto" replaced by its number; the same for all logs of a fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pipeline {
@@ -76,6 +87,8 @@ pub struct Pipeline {
     pub coulomb_velocity: f64,
     /// Standstill threshold per joint: max(v_s, what the encoder resolves), rad/s or m/s.
     pub standstill_velocity: Vec<f64>,
+    /// What q̈ is derived from where it is not logged, per joint: the channel that leaves less noise.
+    pub derived_from: Vec<DerivedFrom>,
 }
 
 /// A run of samples on one clock without a cut: finite, time increasing. Arrays are `joint * len + sample`.
@@ -132,6 +145,7 @@ impl Pipeline {
             rate_hz: 0.0,
             coulomb_velocity: 0.0,
             standstill_velocity: vec![0.0; dof],
+            derived_from: vec![DerivedFrom::Position; dof],
         }
     }
 
@@ -180,7 +194,7 @@ impl Pipeline {
 /// | `cutoff_hz` | max(5 Hz, 2 f_m), f_m the frequency below which 99 % of the velocity's power lies; lower where encoder noise in q̈ asks for it (`signal/cutoff.rs` states the whole rule) |
 /// | `motion_cutoff_hz` | 4 f_c, at most 0.45 of the slowest log's rate |
 /// | `rate_hz` | 2.5 f_c |
-/// | `standstill_velocity` | the largest of v_s, three standard deviations of the velocity noise after the motion filter, and two encoder steps per period of f_q |
+/// | `standstill_velocity` | the largest of v_s, three standard deviations of the noise in the derivative of position after the motion filter, and 4 f_q encoder steps (two steps at once look that fast) |
 ///
 /// # Errors
 /// [`crate::Error::Setting`] for numbers out of range or a cut-off above 0.4 of a log's rate; [`crate::Error::Log`] for logs that
@@ -208,3 +222,6 @@ pub fn align(
 ) -> Result<(Trajectory, Vec<Finding>)> {
     align::align(&prepare::joint_facts(robot), log, pipeline)
 }
+
+#[cfg(test)]
+mod tests;

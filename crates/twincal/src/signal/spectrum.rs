@@ -19,9 +19,36 @@ impl Spectrum {
         (i + 1) as f64 * self.width
     }
 
-    /// sd of the white noise of one sample of a channel sampled at `rate` Hz.
-    pub(crate) fn noise_sd(&self, rate: f64) -> f64 {
-        (self.floor * rate / 2.0).sqrt()
+    /// The noise as white noise that was differenced `order` times: what drives log as velocity is often the
+    /// difference of encoder counts, whose noise rises with f and must not be taken for white.
+    ///
+    /// The order (at most `most`) is told by how much the density grows from a tenth to a third of the rate: 1, 9 and 80
+    /// times for orders 0, 1 and 2.
+    pub(crate) fn noise(&self, most: i32) -> Noise {
+        let (low, high) = (self.median(0.08, 0.14), self.median(0.25, 0.42));
+        let order = i32::from(high > 4.0 * low) + i32::from(high > 30.0 * low);
+        let order = order.min(most);
+        let size = 2.0 * self.density.len() as f64;
+        let rate = self.width * size;
+        let gain = |i: usize| (2.0 * rate * (PI * (i + 1) as f64 / size).sin()).powi(2 * order);
+        let undone: Vec<f64> = self
+            .density
+            .iter()
+            .enumerate()
+            .map(|(i, d)| d / gain(i))
+            .collect();
+        let floor = median(&undone, 0.25, 0.42) * self.floor
+            / self.median(0.25, 0.42).max(f64::MIN_POSITIVE);
+        Noise {
+            floor: floor * f64::from(u8::from(self.floor > 0.0)),
+            order,
+            rate,
+        }
+    }
+
+    /// Median density between two shares of the rate.
+    fn median(&self, from: f64, to: f64) -> f64 {
+        median(&self.density, from, to)
     }
 
     /// Welch's average over 20 s pieces (or the whole run) of all `runs` that have at least 32 samples, Hann window, half
@@ -66,9 +93,7 @@ impl Spectrum {
             let gain = 2.0 * (PI * (i + 1) as f64 / size as f64).sin();
             *value *= 2.0 * interval / (energy * pieces * gain * gain);
         }
-        let mut high = density[size / 4..size * 42 / 100].to_vec();
-        let middle = high.len() / 2;
-        let (_, &mut median, _) = high.select_nth_unstable_by(middle, f64::total_cmp);
+        let median = median(&density, 0.25, 0.42);
         // A bin is an average of `pieces` exponentials: median/mean goes from ln 2 to 1 (Wilson–Hilferty).
         let floor = median / (1.0 - 1.0 / (9.0 * pieces)).powi(3);
         Some(Self {
@@ -77,6 +102,38 @@ impl Spectrum {
             floor,
         })
     }
+}
+
+/// Noise of a channel: white noise of density `floor`, differenced `order` times.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Noise {
+    /// Density before differencing, unit²/Hz.
+    pub(crate) floor: f64,
+    /// Times it was differenced.
+    pub(crate) order: i32,
+    /// Sampling rate, Hz.
+    pub(crate) rate: f64,
+}
+
+impl Noise {
+    /// sd of one sample before differencing.
+    pub(crate) fn sd(&self) -> f64 {
+        (self.floor * self.rate / 2.0).sqrt()
+    }
+
+    /// Power below `cutoff` after `more` derivatives: `∫ floor (2πf)^{2k} df`, k = order + more.
+    pub(crate) fn power(&self, more: i32, cutoff: f64) -> f64 {
+        let k = 2 * (self.order + more);
+        self.floor * (2.0 * PI).powi(k) * cutoff.powi(k + 1) / f64::from(k + 1)
+    }
+}
+
+/// Median of a one-sided density between two shares of the rate (bin i is at (i + 1)/(2 len) of it).
+fn median(density: &[f64], from: f64, to: f64) -> f64 {
+    let bins = 2.0 * density.len() as f64;
+    let mut band = density[(from * bins) as usize..(to * bins) as usize].to_vec();
+    let middle = band.len() / 2;
+    *band.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// In-place radix-2 Fourier transform; the length is a power of two.
@@ -124,8 +181,16 @@ mod tests {
                 })
                 .collect();
             let spectrum = Spectrum::welch(std::iter::once(q.as_slice()), 1e-3).unwrap();
-            let found = spectrum.noise_sd(1000.0);
-            assert!((found / sd - 1.0).abs() < 0.15, "{found} for {sd}");
+            let noise = spectrum.noise(1);
+            assert_eq!(noise.order, 0);
+            assert!((noise.sd() / sd - 1.0).abs() < 0.15, "{noise:?} for {sd}");
+            // The same noise in a velocity that is a difference of positions is found as what it is.
+            let qd: Vec<f64> = q.windows(2).map(|w| (w[1] - w[0]) * 1e3).collect();
+            let noise = Spectrum::welch(std::iter::once(qd.as_slice()), 1e-3)
+                .unwrap()
+                .noise(1);
+            assert_eq!(noise.order, 1);
+            assert!((noise.sd() / sd - 1.0).abs() < 0.15, "{noise:?} for {sd}");
         }
     }
 

@@ -1,0 +1,114 @@
+//! What an encoder can tell: its step, and the noise that it leaves in velocity and acceleration.
+
+use super::cutoff::JointSpectra;
+use super::fir::{MotionKernels, noise_gain};
+use super::prepare::JointFacts;
+use super::spectrum::Noise;
+use super::{DerivedFrom, Pipeline, Recording};
+use crate::error::{Finding, Severity};
+
+/// Velocity that the encoder resolves after the motion filter; says what noise the derivatives carry.
+pub(crate) fn velocity_resolution(
+    joint: usize,
+    facts: &JointFacts,
+    logs: &[Recording],
+    spectra: &[&JointSpectra],
+    pipeline: &Pipeline,
+    findings: &mut Vec<Finding>,
+) -> f64 {
+    let channels = || logs.iter().map(move |log| &log.joints[joint]);
+    let has_qd = channels().all(|c| c.qd.is_some());
+    let has_qdd = channels().all(|c| c.qdd.is_some());
+    let derived = pipeline.derived_from[joint];
+    let (mut velocity, mut acceleration, mut position) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let mut travel = 0.0_f64;
+    for log in spectra {
+        let kernels = MotionKernels::new(pipeline.motion_cutoff_hz, 1.0 / log.position_noise.rate);
+        let derivatives = [&kernels.smooth, &kernels.first, &kernels.second];
+        // Noise that was differenced n times and is differentiated m times more.
+        let after = |noise: Noise, more: i32| {
+            noise.sd() * noise_gain(derivatives[(noise.order + more).clamp(0, 2) as usize])
+        };
+        position = position.max(log.position_noise.sd());
+        travel = travel.max(after(log.position_noise, 1));
+        velocity = velocity.max(match log.velocity_noise {
+            Some(noise) if has_qd => after(noise, 0),
+            _ => after(log.position_noise, 1),
+        });
+        let (noise, more) = log.source(derived);
+        acceleration = acceleration.max(after(noise, more));
+    }
+    if !has_qdd {
+        let source = match derived {
+            DerivedFrom::Velocity => "the logged velocity",
+            DerivedFrom::Position => "position, twice",
+        };
+        findings.push(Finding::new(
+            Severity::Note,
+            "derived_acceleration",
+            &facts.name,
+            format!(
+                "joint `{}`: acceleration is not logged and was derived from {source}, by the motion filter at {:.3} Hz; encoder noise of {position:.2e} leaves a noise of {velocity:.2e} in velocity and {acceleration:.2e} in acceleration (SI units, per sample)",
+                facts.name, pipeline.motion_cutoff_hz
+            ),
+            0,
+        ));
+    }
+    let step = quantum(channels().map(|c| c.q.as_slice()));
+    let stepping = step.map_or(0.0, |step| 4.0 * pipeline.motion_cutoff_hz * step);
+    if let Some(step) = step.filter(|_| stepping > pipeline.coulomb_velocity) {
+        findings.push(Finding::new(
+            Severity::Warning,
+            "quantised_encoder",
+            &facts.name,
+            format!(
+                "joint `{}`: the encoder steps by {step:.3e}, so velocities below {stepping:.3e} per s cannot be told from standstill",
+                facts.name
+            ),
+            0,
+        ));
+    }
+    stepping.max(3.0 * travel)
+}
+
+/// Step of a quantised channel: the smallest change, if changes are multiples of it and many are 0 or 1 steps.
+pub(crate) fn quantum<'a>(runs: impl Iterator<Item = &'a [f64]> + Clone) -> Option<f64> {
+    let changes = || {
+        runs.clone()
+            .flat_map(|run| run.windows(2))
+            .map(|pair| (pair[1] - pair[0]).abs())
+    };
+    // What is smaller is rounding of the file's decimals.
+    let scale = runs.clone().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let step = changes()
+        .filter(|c| *c > 1e-7 * scale)
+        .fold(f64::INFINITY, f64::min);
+    if !step.is_finite() {
+        return None;
+    }
+    let (mut all, mut multiples, mut small) = (0_u64, 0_u64, 0_u64);
+    for change in changes() {
+        let units = change / step;
+        all += 1;
+        multiples += u64::from((units - units.round()).abs() < (0.05 + 1e-3 * units).min(0.2));
+        small += u64::from(units < 1.5);
+    }
+    (multiples as f64 > 0.95 * all as f64 && small as f64 > 0.05 * all as f64).then_some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_encoder_step_is_found_and_smooth_data_has_none() {
+        let smooth: Vec<f64> = (0..2000).map(|i| (f64::from(i) * 0.003).sin()).collect();
+        let coarse: Vec<f64> = smooth
+            .iter()
+            .map(|q| (q / 3.8e-4).round() * 3.8e-4)
+            .collect();
+        let step = quantum(std::iter::once(coarse.as_slice())).unwrap();
+        assert!((step / 3.8e-4 - 1.0).abs() < 1e-6);
+        assert_eq!(quantum(std::iter::once(smooth.as_slice())), None);
+    }
+}

@@ -1,0 +1,227 @@
+//! The whole pipeline on motion that is known in closed form.
+
+use super::prepare::JointFacts;
+use super::*;
+use crate::robot::JointKind;
+use rand::{RngExt, SeedableRng};
+use std::f64::consts::TAU;
+
+fn joints() -> Vec<JointFacts> {
+    ["shoulder", "elbow"]
+        .map(|name| JointFacts {
+            name: name.into(),
+            kind: JointKind::Revolute,
+        })
+        .to_vec()
+}
+
+/// Fourier series of five harmonics as identification experiments use them; `[q, q̇, q̈]` of a joint at `t`.
+fn fourier(joint: usize, fundamental: f64, t: f64) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    for k in 1..=5 {
+        let omega = TAU * fundamental * f64::from(k);
+        let phase = 0.7 * f64::from(k * k) + joint as f64;
+        let amplitude = 0.8 / f64::from(k);
+        let (sin, cos) = (omega * t + phase).sin_cos();
+        sum[0] += amplitude * sin;
+        sum[1] += amplitude * omega * cos;
+        sum[2] -= amplitude * omega * omega * sin;
+    }
+    sum
+}
+
+/// Standard normal by the sum of twelve uniforms: tails beyond 6 are cut, which only makes tests stricter on bounds.
+fn normal(random: &mut rand_chacha::ChaCha8Rng) -> f64 {
+    (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
+}
+
+fn recording(
+    rate: f64,
+    seconds: f64,
+    fundamental: f64,
+    noise: f64,
+    derivatives: bool,
+) -> Recording {
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+    let time: Vec<f64> = (0..(rate * seconds) as usize)
+        .map(|i| i as f64 / rate)
+        .collect();
+    let joints = (0..2)
+        .map(|joint| {
+            let state: Vec<[f64; 3]> = time
+                .iter()
+                .map(|&t| fourier(joint, fundamental, t))
+                .collect();
+            Channels {
+                q: state
+                    .iter()
+                    .map(|s| s[0] + noise * normal(&mut random))
+                    .collect(),
+                qd: derivatives.then(|| state.iter().map(|s| s[1]).collect()),
+                qdd: derivatives.then(|| state.iter().map(|s| s[2]).collect()),
+                tau: Some(state.iter().map(|s| s[2]).collect()),
+            }
+        })
+        .collect();
+    Recording {
+        name: "run".into(),
+        time,
+        joints,
+    }
+}
+
+fn settings(cutoff_hz: Auto) -> SignalSettings {
+    SignalSettings {
+        cutoff_hz,
+        rate_hz: Auto::Auto,
+        coulomb_velocity: None,
+    }
+}
+
+fn pipeline(log: &Recording) -> Pipeline {
+    choose::choose(&joints(), std::slice::from_ref(log), &settings(Auto::Auto))
+        .unwrap()
+        .0
+}
+
+/// Root mean square error of q̇ and q̈ over both joints.
+fn errors(log: &Recording, pipeline: &Pipeline, fundamental: f64) -> [f64; 2] {
+    let (trajectory, _) = align::align(&joints(), log, pipeline).unwrap();
+    let (mut wrong, mut samples) = ([0.0; 2], 0.0);
+    for segment in &trajectory.segments {
+        let len = segment.time.len();
+        for joint in 0..2 {
+            for (i, &t) in segment.time.iter().enumerate() {
+                samples += 1.0;
+                let truth = fourier(joint, fundamental, t);
+                for (k, value) in [segment.qd[joint * len + i], segment.qdd[joint * len + i]]
+                    .into_iter()
+                    .enumerate()
+                {
+                    wrong[k] += (value - truth[k + 1]).powi(2);
+                }
+            }
+        }
+    }
+    wrong.map(|w| (w / samples).sqrt())
+}
+
+#[test]
+fn clean_positions_are_differentiated_to_a_millionth() {
+    for (rate, fundamental) in [(100.0, 0.1), (200.0, 0.2), (1000.0, 0.15)] {
+        let log = recording(rate, 20.0, fundamental, 0.0, false);
+        let pipeline = pipeline(&log);
+        assert_eq!((pipeline.cutoff_hz, pipeline.rate_hz), (5.0, 12.5));
+        let [qd, qdd] = errors(&log, &pipeline, fundamental);
+        assert!(qd < 1e-7 && qdd < 1e-6, "{rate} Hz: {qd} {qdd}");
+    }
+}
+
+#[test]
+fn encoder_noise_leaves_the_acceleration_usable() {
+    // sd of a derivative of white noise below f_q: σ √(2 dt ∫ (2πf)^{2k} df); the bound is 1.3 times that (a filter that is not a
+    // brick wall) plus its bias on the clean motion, and half of it from below: a bound that is always met says nothing.
+    for noise in [1e-5, 1e-4, 1e-3] {
+        let log = recording(1000.0, 20.0, 0.2, noise, false);
+        let pipeline = pipeline(&log);
+        let f = pipeline.motion_cutoff_hz;
+        let bound = |k: i32| {
+            1.3 * noise * (2e-3 * TAU.powi(2 * k) * f.powi(2 * k + 1) / f64::from(2 * k + 1)).sqrt()
+        };
+        let [qd, qdd] = errors(&log, &pipeline, 0.2);
+        for (error, bound) in [(qd, bound(1)), (qdd, bound(2))] {
+            assert!(
+                (0.5 * bound..bound).contains(&error),
+                "{noise}: {error} {bound}"
+            );
+        }
+        assert!(pipeline.cutoff_hz >= 2.0, "{}", pipeline.cutoff_hz);
+    }
+}
+
+#[test]
+fn logged_derivatives_pass_the_same_kernel() {
+    let log = recording(200.0, 20.0, 0.2, 0.0, true);
+    let [qd, qdd] = errors(&log, &pipeline(&log), 0.2);
+    assert!(qd < 1e-8 && qdd < 1e-8, "{qd} {qdd}");
+}
+
+#[test]
+fn without_filter_every_row_is_taken_as_it_is() {
+    let mut log = recording(100.0, 3.0, 0.2, 0.0, true);
+    log.joints[1].q[17] = f64::NAN;
+    let (off, _) = choose::choose(
+        &joints(),
+        std::slice::from_ref(&log),
+        &settings(Auto::Value(0.0)),
+    )
+    .unwrap();
+    assert!(off.is_off() && off.coulomb_velocity == 0.0);
+    assert_eq!(off.kernel_length(), 0.0);
+    let (trajectory, findings) = align::align(&joints(), &log, &off).unwrap();
+    assert_eq!(findings.len(), 1);
+    assert_eq!(
+        (findings[0].code.as_str(), findings[0].count),
+        ("not_finite_rows", 1)
+    );
+    let rows: Vec<usize> = trajectory
+        .segments
+        .iter()
+        .flat_map(|s| s.input_rows.clone())
+        .collect();
+    assert_eq!(rows, (0..300).filter(|row| *row != 17).collect::<Vec<_>>());
+    for segment in &trajectory.segments {
+        let len = segment.time.len();
+        for (i, &row) in segment.input_rows.iter().enumerate() {
+            assert_eq!(
+                segment.qdd[len + i],
+                log.joints[1].qdd.as_ref().unwrap()[row]
+            );
+            assert_eq!(segment.tau[i], log.joints[0].tau.as_ref().unwrap()[row]);
+        }
+        assert!(segment.standstill.iter().all(|s| !s));
+    }
+}
+
+#[test]
+fn unfit_settings_are_refused_with_the_key() {
+    let log = [recording(100.0, 20.0, 0.2, 0.0, false)];
+    let choose = |cutoff: f64, rate: Auto| {
+        let settings = SignalSettings {
+            rate_hz: rate,
+            ..settings(Auto::Value(cutoff))
+        };
+        choose::choose(&joints(), &log, &settings)
+    };
+    for (cutoff, rate, part) in [
+        (-1.0, Auto::Auto, "signal.cutoff_hz"),
+        (f64::NAN, Auto::Auto, "signal.cutoff_hz"),
+        (45.0, Auto::Auto, "at most 40.000"),
+        (5.0, Auto::Value(0.0), "signal.rate_hz"),
+        (0.2, Auto::Auto, "record longer"),
+    ] {
+        let message = choose(cutoff, rate).unwrap_err().to_string();
+        assert!(message.contains(part), "{message}");
+    }
+    let (_, findings) = choose(5.0, Auto::Value(6.0)).unwrap();
+    assert!(findings.iter().any(|f| f.code == "rows_alias"));
+    let (pipeline, findings) = choose(20.0, Auto::Auto).unwrap();
+    assert!((pipeline.motion_cutoff_hz - 45.0).abs() < 1e-9);
+    assert!(findings.iter().any(|f| f.code == "motion_filter_capped"));
+}
+
+#[test]
+fn white_noise_gain_is_what_white_noise_shows() {
+    // 40 000 samples, about 400 independent ones after the filter: relative sd 3.5 %, bound 6 sd.
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+    let x: Vec<f64> = (0..40_000).map(|_| normal(&mut random)).collect();
+    let pipeline = Pipeline {
+        cutoff_hz: 5.0,
+        ..Pipeline::off(1)
+    };
+    let kernel = fir::column_kernel(5.0, 1e-3);
+    let mut out = vec![0.0; x.len() - kernel.len() + 1];
+    convolve::correlate(&kernel, &x, 1, &mut out);
+    let sd = (out.iter().map(|v| v * v).sum::<f64>() / out.len() as f64).sqrt();
+    assert!((sd / pipeline.noise_gain(1000.0) - 1.0).abs() < 0.2, "{sd}");
+}
