@@ -1,7 +1,9 @@
 //! The command line: commands, flags and their help, examples first.
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::error::{ContextKind, ContextValue};
+use clap::{Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use twincal::robot::nearest_names;
 
 const TOP: &str = "\
 Examples:
@@ -195,10 +197,28 @@ pub(crate) struct Report {
     pub(crate) json: bool,
 }
 
+/// Adds the nearest command to an error about an unknown one, where clap has none (`fti`).
+pub(crate) fn with_suggestion(mut error: clap::Error) -> clap::Error {
+    if let (Some(ContextValue::String(given)), None) = (
+        error.get(ContextKind::InvalidSubcommand),
+        error.get(ContextKind::SuggestedSubcommand),
+    ) {
+        let command = Arguments::command();
+        let near = nearest_names(
+            given,
+            command.get_subcommands().map(clap::Command::get_name),
+        );
+        if let Some(name) = near.first() {
+            let suggested = ContextValue::Strings(vec![(*name).to_owned()]);
+            error.insert(ContextKind::SuggestedSubcommand, suggested);
+        }
+    }
+    error
+}
+
 #[cfg(test)]
 mod tests {
-    use super::Arguments;
-    use clap::CommandFactory as _;
+    use super::*;
 
     #[test]
     fn flags_do_not_contradict_each_other() {

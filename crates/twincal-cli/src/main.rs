@@ -22,7 +22,8 @@ fn main() -> ExitCode {
     std::panic::set_hook(Box::new(failure::report_panic));
     listen_to_signals();
     let outcome = catch_unwind(AssertUnwindSafe(|| {
-        let arguments = args::Arguments::parse();
+        let arguments = args::Arguments::try_parse()
+            .unwrap_or_else(|error| args::with_suggestion(error).exit());
         let mut terminal = Terminal::new();
         let outcome = commands::run(&arguments.command, &mut terminal)
             .and_then(|code| terminal.finish().map(|()| code));

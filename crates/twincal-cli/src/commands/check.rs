@@ -1,7 +1,7 @@
 //! `twincal check`: scores of a twin on new logs against its gates.
 
 use super::inputs::LogInput;
-use super::summary::{findings, paragraph, percent, scores, significant};
+use super::summary::{Notes, findings, paragraph, percent, scores, significant};
 use super::{code_of, print_json, require_strict, settings, start_threads};
 use crate::args::Check;
 use crate::failure::{GATE, Outcome};
@@ -95,7 +95,7 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     }
     scores(&validation.filtered, terminal);
     terminal.say("");
-    findings(&found, terminal);
+    findings(&found, Notes::In("the output of --json"), terminal);
     Ok(code)
 }
 

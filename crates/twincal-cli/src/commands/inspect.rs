@@ -1,7 +1,7 @@
 //! `twincal inspect`: what a model and logs hold, before anything is fitted.
 
 use super::inputs::{LogInput, RobotInput};
-use super::summary::{findings, paragraph, print_table, significant, table};
+use super::summary::{Notes, findings, paragraph, print_table, significant, table};
 use super::{code_of, print_json, require_strict, settings, start_threads};
 use crate::args::Inspect;
 use crate::failure::Outcome;
@@ -196,7 +196,7 @@ fn print(inspection: &Inspection, terminal: &mut Terminal) {
         print_table(&rows, terminal);
         terminal.say("");
     }
-    findings(&inspection.findings, terminal);
+    findings(&inspection.findings, Notes::Shown, terminal);
 }
 
 fn pieces(segments: u64) -> String {

@@ -1,7 +1,7 @@
 //! `twincal predict`: torque with intervals, one row per input row.
 
 use super::inputs::LogInput;
-use super::summary::paragraph;
+use super::summary::{Notes, paragraph};
 use super::{code_of, print_json, require_strict, settings, start_threads};
 use crate::args::Predict;
 use crate::failure::{Failure, Outcome};
@@ -111,7 +111,7 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
             ),
             terminal,
         );
-        super::summary::findings(&findings, terminal);
+        super::summary::findings(&findings, Notes::In("the output of --json"), terminal);
         terminal.say(&output);
     } else {
         notes(&findings, terminal);

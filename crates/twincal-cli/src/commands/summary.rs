@@ -19,7 +19,7 @@ pub(super) fn print(calibration: &Calibration, terminal: &mut Terminal) {
     effects(calibration, terminal);
     terms(&calibration.terms, terminal);
     validation(calibration, terminal);
-    findings(&calibration.findings, terminal);
+    findings(&calibration.findings, Notes::In("the report"), terminal);
 }
 
 fn effects(calibration: &Calibration, terminal: &mut Terminal) {
@@ -151,8 +151,17 @@ pub(super) fn scores(scores: &Scores, terminal: &mut Terminal) {
     print_table(&table, terminal);
 }
 
+/// What becomes of findings that are only good to know.
+#[derive(Clone, Copy)]
+pub(super) enum Notes {
+    /// Printed like the others.
+    Shown,
+    /// Counted; they stand elsewhere.
+    In(&'static str),
+}
+
 /// Everything that must be said, the most serious first; what is said of several logs is said once.
-pub(super) fn findings(findings: &[Finding], terminal: &mut Terminal) {
+pub(super) fn findings(findings: &[Finding], notes: Notes, terminal: &mut Terminal) {
     if findings.is_empty() {
         return;
     }
@@ -163,6 +172,16 @@ pub(super) fn findings(findings: &[Finding], terminal: &mut Terminal) {
         (Severity::Note, "note"),
     ];
     for (severity, word) in order {
+        if let (Severity::Note, Notes::In(place)) = (severity, notes) {
+            let count = findings
+                .iter()
+                .filter(|finding| finding.severity == Severity::Note)
+                .count();
+            if count > 0 {
+                terminal.say(&format!("  {count} notes are in {place}"));
+            }
+            continue;
+        }
         let of_severity: Vec<_> = findings
             .iter()
             .filter(|finding| finding.severity == severity)
