@@ -6,7 +6,7 @@
 
 use std::process::Command;
 use std::time::Instant;
-use twincal::infer::{Choice, InferenceSettings, infer};
+use twincal::infer::{Choice, InferenceSettings, infer, scan};
 use twincal::posterior::{Method, Problem};
 use twincal::prior::{Inclusion, Prior};
 
@@ -45,8 +45,9 @@ fn least<T>(repeats: usize, mut run: impl FnMut() -> T) -> (f64, T) {
     (best, answer)
 }
 
-/// Columns with pairwise correlation ½, four of them true.
-fn problem(size: usize) -> Problem {
+/// Columns with pairwise correlation `correlation`, a few of them true with effects of the given size; effects near 0 keep
+/// every model in play.
+fn problem(size: usize, correlation: f64, effect: f64) -> Problem {
     let mut state = 88_172_645_463_325_252u64;
     let mut normal = || -> f64 {
         (0..12)
@@ -63,8 +64,10 @@ fn problem(size: usize) -> Problem {
     let (mut gram, mut xy, mut yy) = (vec![0.0; size * size], vec![0.0; size], 0.0);
     for _ in 0..rows {
         let common = normal();
-        let x: Vec<f64> = (0..size).map(|_| 0.7 * common + 0.7 * normal()).collect();
-        let y = x[0] - 0.5 * x[3] + 0.3 * x[5] + 0.08 * x[7] + normal();
+        let x: Vec<f64> = (0..size)
+            .map(|_| correlation.sqrt() * common + (1.0 - correlation).sqrt() * normal())
+            .collect();
+        let y = effect * (x[0] - 0.5 * x[3] + 0.3 * x[5] + 0.2 * x[7]) + normal();
         for i in 0..size {
             xy[i] += x[i] * y;
             (0..size).for_each(|j| gram[i * size + j] += x[i] * x[j]);
@@ -95,50 +98,64 @@ fn main() {
         .expect("one thread");
     let settings = |method, draws| InferenceSettings {
         method,
-        chains: 1,
+        chains: 4,
         draws,
         seed: 1,
         allow_disagreement: true,
     };
-    println!("{:<34} {:>12} {:>16}", "one core, CPU time", "seconds", "");
-    for size in [16, 20, 24] {
-        let problem = problem(size);
+    println!("{:<44} {:>10}", "one core, CPU time", "seconds");
+    for (size, effect) in [(20, 0.05), (24, 0.05), (24, 1.0)] {
+        let problem = problem(size, 0.5, effect);
         let (seconds, _) = pool.install(|| {
             least(7, || {
                 infer(&problem, &settings(Choice::Exact, 0)).expect("exact")
             })
         });
         let each = seconds * 1e9 / (1u64 << size) as f64;
-        println!(
-            "{:<34} {seconds:>12.6} {each:>10.3} ns/model",
-            format!("exact/2^{size} models")
-        );
-    }
-    for size in [24, 50, 200] {
-        let problem = problem(size);
-        let draws = if size > 100 { 2000 } else { 20_000 };
-        let (seconds, posterior) = pool.install(|| {
-            least(3, || {
-                infer(&problem, &settings(Choice::Gibbs, draws)).expect("gibbs")
-            })
-        });
-        let Method::Gibbs { ess, .. } = posterior.method else {
-            return;
+        let what = if effect < 0.5 {
+            "every model visited"
+        } else {
+            "four strong effects"
         };
         println!(
-            "{:<34} {seconds:>12.6} {ess:>10.0} ESS",
-            format!("gibbs/{size} columns/{draws} draws")
+            "{:<44} {seconds:>10.6} {each:>9.3} ns/model",
+            format!("exact/2^{size}/{what}")
         );
     }
-    let script = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../benches/peers/inference.py"
-    );
-    let python = concat!(env!("CARGO_MANIFEST_DIR"), "/../../.venv/bin/python");
-    match Command::new(python).arg(script).output() {
+    for (size, scans) in [(24, 400_000), (50, 100_000), (200, 10_000)] {
+        for correlation in [0.5, 0.9] {
+            let problem = problem(size, correlation, 1.0);
+            let (seconds, flips) =
+                pool.install(|| least(5, || scan(&problem, scans, 1).expect("scans")));
+            let (rate, flips) = (scans as f64 / seconds, 2.0 * flips as f64 / scans as f64);
+            let name = format!("gibbs/{size} columns/correlation {correlation}");
+            println!(
+                "{name:<44} {seconds:>10.6} {:>9.3} M scans/s, {flips:.2} flips per scan",
+                rate * 1e-6
+            );
+        }
+    }
+    let problem = problem(24, 0.5, 1.0);
+    let (seconds, posterior) = pool.install(|| {
+        least(3, || {
+            infer(&problem, &settings(Choice::Gibbs, 5000)).expect("gibbs")
+        })
+    });
+    if let Method::Gibbs { ess, r_hat, .. } = posterior.method {
+        println!(
+            "{:<44} {seconds:>10.6} ESS {ess:.0}, R-hat {r_hat:.4}",
+            "gibbs/24 columns/4 chains of 5000, judged"
+        );
+    }
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+    match Command::new(format!("{root}/.venv/bin/python"))
+        .arg(format!("{root}/benches/peers/inference.py"))
+        .output()
+    {
         Ok(output) if output.status.success() => {
             print!("{}", String::from_utf8_lossy(&output.stdout))
         }
-        _ => println!("peers skipped: no .venv (./check makes it)"),
+        Ok(output) => println!("peers failed: {}", String::from_utf8_lossy(&output.stderr)),
+        Err(_) => println!("peers skipped: no .venv (./check makes it)"),
     }
 }

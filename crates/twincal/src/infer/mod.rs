@@ -56,3 +56,12 @@ pub fn infer(problem: &Problem, settings: &InferenceSettings) -> Result<Posterio
         Choice::Auto | Choice::Gibbs => gibbs::sample(problem, settings),
     }
 }
+
+/// Runs one Gibbs chain for `scans` scans (half of them warm-up) and returns how many of the others' moves were
+/// accepted: what a scan costs, and how much one does, without the summaries around it.
+///
+/// # Errors
+/// As [`infer`].
+pub fn scan(problem: &Problem, scans: usize, seed: u64) -> Result<u64> {
+    gibbs::scan(problem, scans, seed)
+}

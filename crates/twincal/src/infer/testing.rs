@@ -12,12 +12,7 @@ pub(super) fn normal(rng: &mut ChaCha8Rng) -> f64 {
 }
 
 /// `(XᵀX, Xᵀy, yᵀy)` of `rows` rows: columns with pairwise correlation about `correlation`, every third one acts.
-pub(super) fn random_gram(
-    seed: u64,
-    size: usize,
-    rows: usize,
-    correlation: f64,
-) -> (Vec<f64>, Vec<f64>, f64) {
+fn random_gram(seed: u64, size: usize, rows: usize, correlation: f64) -> (Vec<f64>, Vec<f64>, f64) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (mut gram, mut xy, mut yy) = (vec![0.0; size * size], vec![0.0; size], 0.0);
     for _ in 0..rows {

@@ -104,6 +104,17 @@ pub(super) fn sample(problem: &Problem, settings: &InferenceSettings) -> Result<
     summarise(&standard, &traces, &agreement, settings)
 }
 
+/// See [`super::scan`].
+pub(super) fn scan(problem: &Problem, scans: usize, seed: u64) -> Result<u64> {
+    let standard = Standard::new(problem)?;
+    let length = Length {
+        warm_up: 1,
+        draws: 1,
+        scans_per_draw: scans / 2,
+    };
+    Ok(chain::run(&standard, &problem.prior, seed, 0, length).moves)
+}
+
 fn judge(standard: &Standard, traces: &[Trace], draws: usize) -> Agreement {
     let judged: Vec<[f64; 4]> = (0..standard.size())
         .into_par_iter()

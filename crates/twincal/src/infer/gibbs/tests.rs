@@ -128,10 +128,10 @@ fn any_number_of_threads_gives_the_same_bytes() {
     assert_ne!(one, run(1, 6));
 }
 
-/// Fault cases 90 and 91: two models that no single move or swap connects. Chains stay where they started, and that is
+/// Two models that no single move or swap connects. Chains stay where they started, and that is
 /// said instead of reported as a result.
 #[test]
-fn stuck_chains_are_refused() {
+fn case_90_and_91_stuck_chains_are_refused() {
     // Four columns in one plane, y in it: any two explain y to 1e-6, one alone does not, three cost 20 nats of prior.
     let (n, noise) = (1e6, 1e-6);
     let angle = |i: usize| [0.0, 90.0, 45.0, 135.0][i] * std::f64::consts::PI / 180.0;
