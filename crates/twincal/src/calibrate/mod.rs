@@ -12,12 +12,13 @@ pub use result::{
 };
 
 use crate::error::{Error, Finding, Result, Severity};
-use crate::infer::{Choice, InferenceSettings};
+use crate::infer::{Choice, InferenceSettings, infer};
 use crate::likelihood::{Columns, JointNoise, NoiseModel, NoiseSettings};
 use crate::observations::Part;
 use crate::plug_in::{
     Fit, FitSettings, LeftOut, Moving, fit, fit_tempered, residual_correlation_time, start,
 };
+use crate::posterior::Method;
 use crate::prior::PriorSettings;
 use crate::robot::Robot;
 use crate::signal::{Auto, Recording, SignalSettings, choose_pipeline};
@@ -130,6 +131,7 @@ pub fn calibrate(
         .map(|log| log.observations.whole())
         .collect();
     let fitted = estimate(&training, &columns, settings)?;
+    require_agreement(&fitted.fit, settings)?;
     findings.extend(findings_of_fit(robot, &fitted, settings, &training));
 
     // τ_calib = τ_nom + Φβ̂ with intervals, and held-out truth
@@ -173,10 +175,11 @@ fn estimate(
     columns: &Columns,
     settings: &CalibrationSettings,
 ) -> Result<Fitted> {
+    let inference = lenient(&settings.inference);
     let fit_settings = FitSettings {
         noise: settings.noise,
         prior: &settings.prior,
-        inference: &settings.inference,
+        inference: &inference,
     };
     match settings.noise.model {
         NoiseModel::Tempered => {
@@ -194,6 +197,22 @@ fn estimate(
             })
         }
     }
+}
+
+/// On the way to the answer, and around it, chains may disagree; the answer itself is judged by [`require_agreement`].
+fn lenient(inference: &InferenceSettings) -> InferenceSettings {
+    InferenceSettings {
+        allow_disagreement: true,
+        ..inference.clone()
+    }
+}
+
+/// Refuses a sampled answer whose chains disagree, unless that is allowed (cases 90 and 91).
+fn require_agreement(fit: &Fit, settings: &CalibrationSettings) -> Result<()> {
+    if matches!(fit.posterior.method, Method::Gibbs { .. }) {
+        infer(&fit.problem, &settings.inference)?;
+    }
+    Ok(())
 }
 
 /// Names and families of the live columns.

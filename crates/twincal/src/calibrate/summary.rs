@@ -4,7 +4,7 @@ use super::data::Data;
 use super::result::{
     Calibration, Draws, Group, LikelihoodUsed, PriorUsed, SweepPoint, TermSummary, Verdict,
 };
-use super::{CalibrationSettings, Fitted, refuse};
+use super::{CalibrationSettings, Fitted, lenient, refuse};
 use crate::error::{Finding, Result, Severity};
 use crate::infer::infer;
 use crate::likelihood::{Columns, mean_squares};
@@ -147,7 +147,7 @@ fn sensitivity(problem: &Problem, settings: &CalibrationSettings) -> Result<Vec<
     }
     let pips: Vec<Vec<f64>> = variants
         .iter()
-        .map(|variant| infer(variant, &settings.inference).map(|posterior| posterior.inclusion))
+        .map(|variant| infer(variant, &lenient(&settings.inference)).map(|posterior| posterior.inclusion))
         .collect::<Result<_>>()?;
     Ok((0..problem.names.len())
         .map(|k| pips.iter().map(|p| p[k]).collect())

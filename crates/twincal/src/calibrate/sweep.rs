@@ -1,6 +1,6 @@
 //! Does an estimate depend on the cut-off? The same fit at 0.7 and 1.4 times f_c (method section 1).
 
-use super::CalibrationSettings;
+use super::{CalibrationSettings, lenient};
 use super::data::Data;
 use super::result::SweepPoint;
 use crate::error::{Finding, Result, Severity};
@@ -54,7 +54,7 @@ pub(super) fn cutoff(
             continue;
         }
         let problem = assemble(&total(&parts), columns, &fit.plug_in, &settings.prior)?;
-        let posterior = infer(&problem, &settings.inference)?;
+        let posterior = infer(&problem, &lenient(&settings.inference))?;
         points.push(SweepPoint {
             cutoff_hz: scaled.cutoff_hz,
             mean: posterior.mean,

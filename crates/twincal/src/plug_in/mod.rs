@@ -21,6 +21,8 @@ use crate::signal::Auto;
 
 /// Rounds of the fixed-point iteration at most.
 const ROUNDS: usize = 20;
+/// Rounds of a rough one.
+const ROUGH_ROUNDS: usize = 4;
 /// Relative change of every plug-in below which the iteration has converged.
 const TOLERANCE: f64 = 1e-6;
 /// Bounds of a learned slab scale v.
@@ -54,13 +56,24 @@ pub struct Fit {
     pub converged: bool,
 }
 
-/// Which plug-ins an iteration may move.
+/// Which plug-ins an iteration may move, and how long.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Moving {
-    /// Weights, autoregression and slab scale.
+    /// Weights, autoregression and slab scale, until they rest.
     All,
-    /// The slab scale alone: what is known of the noise stays.
+    /// The slab scale alone, until it rests: what is known of the noise stays.
     SlabScale,
+    /// The slab scale alone, a few rounds: enough to compare settings, not to report.
+    SlabScaleRoughly,
+}
+
+impl Moving {
+    fn rounds(self) -> usize {
+        match self {
+            Self::All | Self::SlabScale => ROUNDS,
+            Self::SlabScaleRoughly => ROUGH_ROUNDS,
+        }
+    }
 }
 
 /// Iterates the plug-ins to their fixed point on the training parts.
@@ -91,7 +104,7 @@ pub fn fit(
             next.scaled_variance = slab_scales(&gram, columns, &plug_in, &problem, &posterior);
         }
         let converged = largest_change(&plug_in, &next) < TOLERANCE;
-        if converged || rounds == ROUNDS {
+        if converged || rounds == moving.rounds() {
             return Ok(Fit {
                 plug_in,
                 problem,

@@ -69,7 +69,13 @@ pub fn fit_tempered(
             tempering: c,
             ..correlated.clone()
         };
-        let fitted = fit(training, columns, settings, &plug_in, Moving::SlabScale)?;
+        let fitted = fit(
+            training,
+            columns,
+            settings,
+            &plug_in,
+            Moving::SlabScaleRoughly,
+        )?;
         let predicted = predict_left_out(&folds, columns, settings, &fitted.plug_in)?;
         let score = score(&predicted, &fitted.plug_in);
         candidates.push((fitted, predicted, score));
@@ -84,7 +90,14 @@ pub fn fit_tempered(
         .iter()
         .position(|s| s.1 >= best - MARGIN)
         .unwrap_or(0);
-    let (fitted, predicted, _) = candidates.swap_remove(chosen);
+    let (rough, predicted, _) = candidates.swap_remove(chosen);
+    let fitted = fit(
+        training,
+        columns,
+        settings,
+        &rough.plug_in,
+        Moving::SlabScale,
+    )?;
     let interval_factor = interval_factors(&predicted, &fitted.plug_in);
     Ok((
         fitted,
