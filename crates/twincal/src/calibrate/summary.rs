@@ -147,7 +147,9 @@ fn sensitivity(problem: &Problem, settings: &CalibrationSettings) -> Result<Vec<
     }
     let pips: Vec<Vec<f64>> = variants
         .iter()
-        .map(|variant| infer(variant, &lenient(&settings.inference)).map(|posterior| posterior.inclusion))
+        .map(|variant| {
+            infer(variant, &lenient(&settings.inference)).map(|posterior| posterior.inclusion)
+        })
         .collect::<Result<_>>()?;
     Ok((0..problem.names.len())
         .map(|k| pips.iter().map(|p| p[k]).collect())
