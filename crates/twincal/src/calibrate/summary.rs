@@ -23,6 +23,8 @@ use crate::validate::Validation;
 const LEAST_EFFECTIVE_ROWS: f64 = 10.0;
 /// Columns whose cosine over the rows is above this are hard to tell apart.
 const ALIKE: f64 = 0.95;
+/// Group probability below which nobody asks which member it was.
+const WORTH_TELLING: f64 = 0.2;
 /// Lags of the residual autocorrelation, rows.
 const LAGS: usize = 20;
 /// Terms in the pair plot at most, and draws of each.
@@ -247,7 +249,8 @@ fn verdict(pip: f64, mcse: f64, sd: Option<f64>, prior_sd: f64) -> Verdict {
 }
 
 /// Sets of columns that are alike in these data (cosine above 0.95, chained), with the probability of any of them.
-/// Only sets whose members share posterior mass are told: at least two members with PIP above 0.02, none above 0.98.
+/// Only sets whose members share posterior mass are told: at least two members with PIP above 0.02, none above 0.98,
+/// and one of them in with probability of at least 0.2.
 fn groups(problem: &Problem, posterior: &Posterior) -> Vec<Group> {
     let count = problem.names.len();
     let diagonal: Vec<f64> = (0..count).map(|k| problem.gram[k * count + k]).collect();
@@ -267,23 +270,19 @@ fn groups(problem: &Problem, posterior: &Posterior) -> Vec<Group> {
     (0..count)
         .filter_map(|first| {
             let members: Vec<usize> = (first..count).filter(|&k| label[k] == first).collect();
-            let unsure = members
+            let unsure = |k: &&usize| (0.02..0.98).contains(&posterior.inclusion[**k]);
+            if members.iter().filter(unsure).count() < 2 {
+                return None;
+            }
+            let holds = |m: &u32| members.contains(&(*m as usize));
+            let any = posterior
+                .models
                 .iter()
-                .filter(|&&k| (0.02..0.98).contains(&posterior.inclusion[k]))
-                .count();
-            (members.len() > 1 && unsure > 1).then(|| Group {
+                .filter(|model| model.members.iter().any(holds));
+            let pip: f64 = any.map(|model| model.weight).sum();
+            (pip >= WORTH_TELLING).then(|| Group {
                 members: members.iter().map(|&k| problem.names[k].clone()).collect(),
-                pip: posterior
-                    .models
-                    .iter()
-                    .filter(|model| {
-                        model
-                            .members
-                            .iter()
-                            .any(|m| members.contains(&(*m as usize)))
-                    })
-                    .map(|model| model.weight)
-                    .sum(),
+                pip,
             })
         })
         .collect()

@@ -195,8 +195,18 @@ impl Library {
     /// A term (index into [`Library::terms`]) with its coefficient in one sentence, e.g.
     /// "viscous friction on elbow: +0.120 ± 0.010 N·m·s/rad".
     pub fn words(&self, term: usize, mean: f64, sd: f64) -> String {
+        // What no motor or brake can do on its own is said of the model.
+        let hint = match self.terms[term].family {
+            Family::MotorInertia if mean < 0.0 => {
+                " (negative: the model has too much inertia there)"
+            }
+            Family::Viscous | Family::Coulomb if mean < 0.0 => {
+                " (negative: the model has too much friction there)"
+            }
+            _ => "",
+        };
         format!(
-            "{}: {} {}",
+            "{}: {} {}{hint}",
             self.stories[term],
             super::words::estimate(mean, sd),
             self.terms[term].unit
