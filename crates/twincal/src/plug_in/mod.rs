@@ -1,7 +1,7 @@
 //! Noise weights, autocorrelation, tempering and slab scale: everything that is plugged into the posterior.
 //!
 //! [`fit`] iterates likelihood → infer → residual at the model average until nothing moves (method section 5);
-//! [`tempering`] chooses the multiplier c on left-out parts of the training data. Given the plug-ins, exact
+//! [`fit_tempered`] chooses the multiplier c on left-out parts of the training data. Given the plug-ins, exact
 //! enumeration and Gibbs sampling share one target.
 
 mod autoregression;

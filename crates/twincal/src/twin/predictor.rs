@@ -108,7 +108,7 @@ impl Predictor {
     /// Prepares the mixtures of all joints.
     ///
     /// # Errors
-    /// [`Error::Setting`] with the key `twin` if posterior, noise and columns do not fit each other (a damaged file).
+    /// [`crate::Error::Setting`] with the key `twin` if posterior, noise and columns do not fit each other (a damaged file).
     pub fn new(posterior: &Posterior, joints: &[JointSetting<'_>]) -> Result<Self> {
         check(posterior, joints)?;
         let student = StudentT::new(2.0 * posterior.shape);
