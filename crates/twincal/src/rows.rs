@@ -108,15 +108,7 @@ fn visit_model(
         if signal == RowSignal::Raw || pipeline.is_off() {
             unfiltered::visit(model, index, segment, trajectory.dof, visit)?;
         } else {
-            filtered::visit(
-                model,
-                pipeline,
-                index,
-                segment,
-                trajectory.dof,
-                filtered::CHUNK,
-                visit,
-            )?;
+            filtered::visit(model, pipeline, index, segment, trajectory.dof, None, visit)?;
         }
     }
     Ok(())

@@ -7,8 +7,8 @@ use crate::signal::convolve::correlate;
 use crate::signal::fir::column_kernel;
 use crate::signal::{Pipeline, Segment};
 
-/// Samples that are evaluated at a time.
-pub(super) const CHUNK: usize = 512;
+/// Fewest samples that are evaluated at a time; at least two kernels, so that moving the window on costs little.
+const CHUNK: usize = 512;
 
 /// Which samples of a segment become rows.
 pub(super) struct Plan {
@@ -39,18 +39,19 @@ struct Window {
     channels: Vec<Vec<f64>>,
 }
 
-/// Visits the filtered rows of one segment; `chunk` samples are evaluated at a time.
+/// Visits the filtered rows of one segment; `chunk` samples are evaluated at a time (no matter how many).
 pub(super) fn visit(
     model: &mut Model<'_, '_>,
     pipeline: &Pipeline,
     index: usize,
     segment: &Segment,
     dof: usize,
-    chunk: usize,
+    chunk: Option<usize>,
     visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
 ) -> Result<()> {
     let plan = Plan::new(pipeline, segment);
     let (taps, total) = (plan.kernel.len(), segment.time.len());
+    let chunk = chunk.unwrap_or(CHUNK.max(2 * taps));
     let has_tau = !segment.tau.is_empty();
     let mut stretch = Stretch::default();
     let mut windows: Vec<Window> = (0..dof)

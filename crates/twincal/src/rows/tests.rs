@@ -122,7 +122,7 @@ fn collect(
             0,
             &trajectory.segments[0],
             2,
-            chunk,
+            Some(chunk),
             &mut gather,
         )
         .unwrap(),

@@ -2,7 +2,7 @@
 
 use super::choose::{COLUMN_LIMIT, MOTION_LIMIT, require_derivatives};
 use super::convolve::correlate;
-use super::fir::{MotionKernels, column_half_seconds, motion_half_seconds};
+use super::fir::{MotionKernels, column_half_seconds, motion_half_samples, motion_half_seconds};
 use super::prepare::{JointFacts, Piece, prepare, report_short};
 use super::standstill::standstill;
 use super::{Channels, DerivedFrom, LoggedSamples, Pipeline, Recording, Segment, Trajectory};
@@ -147,13 +147,13 @@ fn smoothed(
     log: &Recording,
     with_tau: bool,
 ) -> Option<Segment> {
-    let kernels = MotionKernels::new(cutoff, piece.interval);
-    let half = kernels.half;
+    let half = motion_half_samples(cutoff, piece.interval);
     let len = piece
         .time
         .len()
         .checked_sub(2 * half)
         .filter(|len| *len >= 2)?;
+    let kernels = MotionKernels::new(cutoff, piece.interval);
     let dof = piece.joints.len();
     let inner = half..half + len;
     let (mut q, mut qd, mut qdd) = (

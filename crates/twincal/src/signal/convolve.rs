@@ -6,7 +6,10 @@
 use crate::lanes::LANES;
 use pulp::{Arch, Simd, WithSimd};
 
-/// `Σ_k kernel_k x_k` over slices of one length.
+/// Neighbouring outputs that are summed side by side.
+const BLOCK: usize = 4 * LANES;
+
+/// `Σ_k kernel_k x_k` over slices of one length: lanes along the kernel.
 #[inline(always)]
 fn dot(kernel: &[f64], x: &[f64]) -> f64 {
     // Two groups of eight sums hide the latency of the addition.
@@ -19,15 +22,44 @@ fn dot(kernel: &[f64], x: &[f64]) -> f64 {
             sums[1][lane] += h[LANES + lane] * v[LANES + lane];
         }
     }
-    let mut rest = 0.0;
-    for (h, v) in kernel_rest.iter().zip(x_rest) {
-        rest += h * v;
+    let (kernel_lanes, kernel_rest) = kernel_rest.as_chunks::<LANES>();
+    let (x_lanes, x_rest) = x_rest.as_chunks::<LANES>();
+    for (h, v) in kernel_lanes.iter().zip(x_lanes) {
+        for lane in 0..LANES {
+            sums[0][lane] += h[lane] * v[lane];
+        }
     }
-    let mut total = rest;
+    let mut total = 0.0;
+    for (h, v) in kernel_rest.iter().zip(x_rest) {
+        total += h * v;
+    }
     for lane in 0..LANES {
         total += sums[0][lane] + sums[1][lane];
     }
     total
+}
+
+/// Every sample: lanes along the outputs, each the plain sum in the order of the kernel.
+#[inline(always)]
+fn every(kernel: &[f64], x: &[f64], out: &mut [f64]) {
+    let (blocks, rest) = out.as_chunks_mut::<BLOCK>();
+    let done = blocks.len() * BLOCK;
+    for (b, block) in blocks.iter_mut().enumerate() {
+        let mut sums = [0.0; BLOCK];
+        for (h, window) in kernel.iter().zip(x[b * BLOCK..].windows(BLOCK)) {
+            for lane in 0..BLOCK {
+                sums[lane] += h * window[lane];
+            }
+        }
+        *block = sums;
+    }
+    for (i, out) in rest.iter_mut().enumerate() {
+        let mut sum = 0.0;
+        for (h, v) in kernel.iter().zip(&x[done + i..]) {
+            sum += h * v;
+        }
+        *out = sum;
+    }
 }
 
 /// See [`correlate`].
@@ -43,6 +75,10 @@ impl WithSimd for Correlate<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
+        if self.step == 1 {
+            every(self.kernel, self.x, self.out);
+            return;
+        }
         let taps = self.kernel.len();
         for (i, out) in self.out.iter_mut().enumerate() {
             let start = i * self.step;
@@ -56,6 +92,15 @@ impl WithSimd for Correlate<'_> {
 /// # Panics
 /// If `x` is shorter than `(out.len() − 1)·step + kernel.len()`.
 pub(crate) fn correlate(kernel: &[f64], x: &[f64], step: usize, out: &mut [f64]) {
+    let needed = out
+        .len()
+        .checked_sub(1)
+        .map_or(0, |last| last * step + kernel.len());
+    assert!(
+        x.len() >= needed,
+        "{} samples for a kernel that needs {needed}",
+        x.len()
+    );
     Arch::new().dispatch(Correlate {
         kernel,
         x,

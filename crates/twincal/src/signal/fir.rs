@@ -39,6 +39,11 @@ pub(crate) fn motion_half_seconds(cutoff_hz: f64) -> f64 {
     half_length_factor(MOTION_ATTENUATION) / cutoff_hz
 }
 
+/// Samples on either side of the motion filter's centre.
+pub(crate) fn motion_half_samples(cutoff_hz: f64, interval: f64) -> usize {
+    (motion_half_seconds(cutoff_hz) / interval).round().max(5.0) as usize
+}
+
 /// The column filter F as `2 half + 1` symmetric taps whose sum is exactly the DC gain 1 (to rounding).
 ///
 /// ```text
@@ -77,21 +82,13 @@ impl MotionKernels {
     /// degree 9 (smooth), 10 (first) and 11 (second). Robots move far below the cut-off, where this is what counts: the gain of q, q̇ and q̈ is 1
     /// within 1e-4 up to f/4 = f_c and within 1e-7 up to f/10 (3e-3 and more without the correction).
     pub(crate) fn new(cutoff_hz: f64, interval: f64) -> Self {
-        let half = (motion_half_seconds(cutoff_hz) / interval).round().max(5.0) as usize;
+        let half = motion_half_samples(cutoff_hz, interval);
         let window = Window::new(MOTION_ATTENUATION, half, interval);
-        // (w g)⁽ⁿ⁾ by Leibniz; a correlation sees h(−t), which turns the sign of the first derivative.
-        let mut smooth = sampled(half, interval, |t| {
-            let (w, g) = (window.derivatives(t), sinc(cutoff_hz, t));
-            w[0] * g[0] * interval
-        });
-        let mut first = sampled(half, interval, |t| {
-            let (w, g) = (window.derivatives(t), sinc(cutoff_hz, t));
-            -(w[1] * g[0] + w[0] * g[1]) * interval
-        });
-        let mut second = sampled(half, interval, |t| {
-            let (w, g) = (window.derivatives(t), sinc(cutoff_hz, t));
-            (w[2] * g[0] + 2.0 * w[1] * g[1] + w[0] * g[2]) * interval
-        });
+        // A correlation sees h(−t), which turns the sign of the odd derivative.
+        let low_pass = |t| windowed_sinc(&window, cutoff_hz, t);
+        let mut smooth = sampled(half, interval, |t| low_pass(t)[0] * interval);
+        let mut first = sampled(half, interval, |t| -low_pass(t)[1] * interval);
+        let mut second = sampled(half, interval, |t| low_pass(t)[2] * interval);
         let span = half as f64 * interval;
         // Moments in u = t/span: what x = 1, t, t², … must give at the centre.
         correct_moments(
@@ -136,6 +133,16 @@ fn sampled(half: usize, interval: f64, f: impl Fn(f64) -> f64) -> Vec<f64> {
     (0..=2 * half)
         .map(|i| f((i as f64 - half as f64) * interval))
         .collect()
+}
+
+/// `h = w g` and its first two derivatives at `t`.
+fn windowed_sinc(window: &Window, cutoff_hz: f64, t: f64) -> [f64; 3] {
+    let (w, g) = (window.derivatives(t), sinc(cutoff_hz, t));
+    [
+        w[0] * g[0],
+        w[1] * g[0] + w[0] * g[1],
+        w[2] * g[0] + 2.0 * w[1] * g[1] + w[0] * g[2],
+    ]
 }
 
 /// `g(t) = sin(a t)/(π t)`, a = 2π f, with first and second derivative; by Taylor series near 0.
@@ -385,6 +392,29 @@ mod tests {
                         assert!((value - 1.0).abs() < 1e-7, "{frequency} Hz: {value}");
                     }
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn analytic_derivatives_are_those_of_the_kernel() {
+        // Central differences over the whole kernel, its ends and the series at its centre included.
+        let (cutoff, interval, step) = (20.0, 0.001, 1e-5);
+        let window = Window::new(MOTION_ATTENUATION, 150, interval);
+        let at = |t: f64| windowed_sinc(&window, cutoff, t);
+        for i in -3000..=3000 {
+            let t = f64::from(i) * 0.05 * interval;
+            let (before, here, after) = (at(t - step), at(t), at(t + step));
+            for order in 0..2 {
+                let slope = (after[order] - before[order]) / (2.0 * step);
+                // h⁽ⁿ⁾ is of size (2πf)ⁿ h(0); the difference is good to step² of the third derivative.
+                let size = 2.0 * cutoff * (2.0 * PI * cutoff).powi(order as i32 + 1);
+                assert!(
+                    (slope - here[order + 1]).abs() < 1e-5 * size,
+                    "derivative {} at {t}: {slope} {}",
+                    order + 1,
+                    here[order + 1]
+                );
             }
         }
     }

@@ -147,17 +147,25 @@ fn fourier(re: &mut [f64], im: &mut [f64]) {
             im.swap(i, j);
         }
     }
+    let turns: Vec<(f64, f64)> = (0..n / 2)
+        .map(|k| (-2.0 * PI * k as f64 / n as f64).sin_cos())
+        .collect();
     let mut half = 1;
     while half < n {
-        for k in 0..half {
-            let (sin, cos) = (-PI * k as f64 / half as f64).sin_cos();
-            for a in (k..n).step_by(2 * half) {
-                let b = a + half;
-                let (x, y) = (re[b] * cos - im[b] * sin, re[b] * sin + im[b] * cos);
-                re[b] = re[a] - x;
-                im[b] = im[a] - y;
-                re[a] += x;
-                im[a] += y;
+        let stride = n / (2 * half);
+        for (re, im) in re
+            .chunks_exact_mut(2 * half)
+            .zip(im.chunks_exact_mut(2 * half))
+        {
+            let (re_a, re_b) = re.split_at_mut(half);
+            let (im_a, im_b) = im.split_at_mut(half);
+            for k in 0..half {
+                let (sin, cos) = turns[k * stride];
+                let (x, y) = (re_b[k] * cos - im_b[k] * sin, re_b[k] * sin + im_b[k] * cos);
+                re_b[k] = re_a[k] - x;
+                im_b[k] = im_a[k] - y;
+                re_a[k] += x;
+                im_a[k] += y;
             }
         }
         half *= 2;

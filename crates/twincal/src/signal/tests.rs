@@ -140,6 +140,44 @@ fn encoder_noise_leaves_the_acceleration_usable() {
 }
 
 #[test]
+fn torque_stays_with_its_own_motion() {
+    // Torque is q̈ here, so the segment's torque is the filtered acceleration of the same sample, resampled or not.
+    let even = recording(500.0, 10.0, 0.2, 0.0, true);
+    let mut uneven = even.clone();
+    for (i, t) in uneven.time.iter_mut().enumerate() {
+        *t += 4e-4 * (2.4 * i as f64).sin();
+    }
+    for (joint, channels) in uneven.joints.iter_mut().enumerate() {
+        let at = |k: usize| -> Vec<f64> {
+            let state = uneven.time.iter().map(|&t| fourier(joint, 0.2, t)[k]);
+            state.collect()
+        };
+        (channels.q, channels.qd, channels.qdd) = (at(0), Some(at(1)), Some(at(2)));
+        channels.tau = channels.qdd.clone();
+    }
+    for log in [even, uneven] {
+        let (trajectory, _) = align::align(&joints(), &log, &pipeline(&log)).unwrap();
+        let segment = &trajectory.segments[0];
+        let worst = segment
+            .tau
+            .iter()
+            .zip(&segment.qdd)
+            .map(|(a, b)| (a - b).abs());
+        assert!(worst.fold(0.0, f64::max) < 1e-5);
+        if let Some(logged) = &segment.logged {
+            let len = logged.time.len();
+            for joint in 0..2 {
+                let tau = log.joints[joint].tau.as_ref().unwrap();
+                for (i, &row) in logged.input_rows.iter().enumerate() {
+                    assert_eq!(logged.time[i], log.time[row]);
+                    assert_eq!(logged.tau[joint * len + i], tau[row]);
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn logged_derivatives_pass_the_same_kernel() {
     let log = recording(200.0, 20.0, 0.2, 0.0, true);
     let [qd, qdd] = errors(&log, &pipeline(&log), 0.2);

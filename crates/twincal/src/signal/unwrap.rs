@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 /// Unfolds an angle in place and returns the number of jumps.
 ///
 /// Only a signal that stays within one turn can have been folded, so one that leaves it is left alone. A jump is a step
-/// of more than half a turn from one row to the next; `runs` are the row ranges without a cut, across a cut the
+/// of more than half a turn from one row to the next; `cuts` (ascending) are the rows right after a cut; across a cut the
 /// nearest turn is taken once a jump has been seen.
 pub(crate) fn unwrap_angle(q: &mut [f64], cuts: &[usize]) -> u64 {
     let (low, high) = q
@@ -17,7 +17,8 @@ pub(crate) fn unwrap_angle(q: &mut [f64], cuts: &[usize]) -> u64 {
         return 0;
     }
     let mut jumps = 0;
-    let folded = (1..q.len()).any(|i| (q[i] - q[i - 1]).abs() > PI && !cuts.contains(&i));
+    let folded =
+        (1..q.len()).any(|i| (q[i] - q[i - 1]).abs() > PI && cuts.binary_search(&i).is_err());
     if !folded {
         return 0;
     }
