@@ -54,6 +54,11 @@ def columns_and_target(logs):
     return phi, y
 
 
+def mean_squares(phi, weights):
+    """rms(column)^2: mean over all rows of all joints and logs, weighted by w."""
+    return np.mean(phi**2 * weights[:, None], axis=(0, 1, 2)) / np.mean(weights)
+
+
 def compare(result, pips, evidence, means):
     """Our numbers against brute force."""
     terms = {term["name"]: term for term in result["terms"]}
@@ -95,8 +100,8 @@ def test_iid_given_weights(logs, tmp_path):
     assert weights.prod() == pytest.approx(1.0, abs=1e-12) and abs(weights[0] - 1) > 0.01
     rows = y.shape[0] * y.shape[1]
     root = np.sqrt(weights)
+    slab = SLAB / mean_squares(phi, weights)
     phi, y = (phi * root[:, None]).reshape(-1, 12), (y * root).ravel()
-    slab = SLAB / np.mean(phi**2, axis=0)
     jacobian = 0.5 * rows * np.log(weights).sum()
     compare(result, *brute_force.posterior(phi, y, slab, brute_force.independent(0.2), A0, B0, log_jacobian=jacobian))
 
@@ -108,7 +113,7 @@ def test_ar1_given_weights_and_correlations(logs, tmp_path):
     weights = np.array([noise["weight"] for noise in result["noise"]])
     rho = np.array([noise["rho"] for noise in result["noise"]])
     assert (rho > 0.2).all()
-    slab = SLAB / np.mean(phi**2 * weights[:, None], axis=(0, 1, 2))
+    slab = SLAB / mean_squares(phi, weights)
     jacobian = 0.5 * len(logs[0]) * (y.shape[1] * np.log(weights) + np.log1p(-(rho**2))).sum()
     stacked = np.concatenate([phi, y[..., None]], axis=3)
     white = stacked.copy()
@@ -127,7 +132,7 @@ def test_tempered_given_effective_rows(logs, tmp_path):
     kept = np.array([noise["n_eff"] for noise in result["noise"]])
     rows = y.shape[0] * y.shape[1]
     assert (kept < rows).all()
-    slab = SLAB / np.mean(phi**2 * weights[:, None], axis=(0, 1, 2))
+    slab = SLAB / mean_squares(phi, weights)
     root = np.sqrt(weights * kept / rows)
     phi, y = (phi * root[:, None]).reshape(-1, 12), (y * root).ravel()
     prior = brute_force.independent(0.2)
