@@ -16,9 +16,9 @@ WORLDS = {world.name: world for world in acceptance.worlds()}
 
 @pytest.mark.parametrize("name", ["white noise", "white noise, the paper's likelihood", "white noise, friction"])
 def test_exact_rows(name):
-    """24 candidates, 2000 x 2 rows: false alarm about 1 % per seed (2 % tails of the false terms' PIPs and of |z| > 3)."""
+    """24 candidates, 2000 x 2 rows: false alarm about 2 % per seed (|z| > 3 of four frictions, false PIPs)."""
     for run in acceptance.run(WORLDS[name], (1, 2)):
-        assert run["candidates"] == 24 and run["visible"] >= 9
+        assert run["candidates"] == 24 and run["visible"] >= 7
         assert run["visible_pip"] > 0.99, run
         assert run["false"] == 0, run
         assert run["rmse_ratio"] <= 1.01, run
