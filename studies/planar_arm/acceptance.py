@@ -7,6 +7,7 @@ the checks; `--long` is 20 seeds per world, and its last table stands in README.
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -19,7 +20,8 @@ import candidates
 from arm import ASSETS, GENERIC, JOINTS, NOMINAL, inverse_dynamics, mujoco_model
 from simulate import Settings, simulate, write
 
-PROGRAM = Path(__file__).resolve().parents[2] / "target" / "release" / "twincal"
+RELEASE = Path(__file__).resolve().parents[2] / "target" / "release"
+PROGRAM = Path(os.environ.get("TWINCAL_BIN_DIR", RELEASE)) / "twincal"
 
 # Seven terms of the user's own beside the 17 generic ones: 24 candidates.
 USER = ["sin(2*q1)", "cos(2*q1)", "sin(2*q2)", "cos(2*q2)", "q1*q2", "q1^3", "q2^3"]

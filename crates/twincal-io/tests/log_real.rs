@@ -10,9 +10,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use twincal::Severity;
 use twincal::robot::Robot;
-use twincal::signal::{
-    Auto, Recording, SignalSettings, align, choose_pipeline, describe, hardly_driven,
-};
+use twincal::signal::{Auto, Recording, SignalSettings, align, choose_pipeline, hardly_driven};
 use twincal_io::log::{LogOptions, read_log};
 use twincal_io::model::{ModelSettings, read_model};
 
@@ -93,11 +91,7 @@ fn a_passive_elbow_and_one_that_rests_are_told() {
         })
         .collect();
     assert_eq!(rests, [5]);
-    let overviews: Vec<_> = logs
-        .iter()
-        .map(|log| describe(&robot, log).unwrap().0)
-        .collect();
-    let said = hardly_driven(&overviews);
+    let said = hardly_driven(&robot, &logs);
     let passive = |joint: &str| -> Vec<usize> {
         let named = format!("`{joint}`");
         (0..8)

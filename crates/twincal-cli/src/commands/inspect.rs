@@ -69,7 +69,7 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
         overviews.push(overview);
         found.extend(more);
     }
-    found.extend(hardly_driven(&overviews));
+    found.extend(hardly_driven(&robot.robot, &logs.recordings));
     require_strict(settings.log.strict, &found)?;
     let code = code_of(&found);
     let inspection = inspection(&robot.robot, robot.file.name, overviews, found);

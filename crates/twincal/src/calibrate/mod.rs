@@ -21,7 +21,7 @@ use crate::plug_in::{
 use crate::posterior::Method;
 use crate::prior::PriorSettings;
 use crate::robot::Robot;
-use crate::signal::{Auto, Recording, SignalSettings, choose_pipeline};
+use crate::signal::{Auto, Recording, SignalSettings, choose_pipeline, hardly_driven};
 use crate::term::{Library, LibrarySettings};
 use crate::twin::Twin;
 use data::Data;
@@ -109,6 +109,7 @@ pub fn calibrate(
     // the same filters for every log, and candidates for this robot
     progress(Stage::Rows);
     let (pipeline, mut findings) = choose_pipeline(robot, logs, &settings.signal)?;
+    findings.extend(hardly_driven(robot, logs.iter().chain(heldout)));
     let library_settings = LibrarySettings {
         coulomb_velocity: pipeline.coulomb_velocity,
         ..settings.library.clone()

@@ -116,36 +116,39 @@ pub fn describe(robot: &Robot, log: &Recording) -> Result<(LogOverview, Vec<Find
 
 /// Joints whose torque in a log is below a fifth of what it is in another log: they were hardly driven there, and
 /// their motion is that of a passive joint.
-pub fn hardly_driven(logs: &[LogOverview]) -> Vec<Finding> {
-    let dof = logs.first().map_or(0, |log| log.joints.len());
+pub fn hardly_driven<'a>(
+    robot: &Robot,
+    logs: impl IntoIterator<Item = &'a Recording>,
+) -> Vec<Finding> {
+    let logs: Vec<&Recording> = logs.into_iter().collect();
     let mut findings = Vec::new();
-    for joint in 0..dof {
-        let torque = |log: &LogOverview| {
-            log.joints
-                .get(joint)
-                .and_then(|j| j.tau_rms)
-                .unwrap_or(f64::NAN)
-        };
-        let largest = logs.iter().map(torque).fold(0.0, f64::max);
-        for log in logs
-            .iter()
-            .filter(|log| torque(log) < HARDLY_DRIVEN * largest)
-        {
+    for (joint, name) in robot.joint_names().into_iter().enumerate() {
+        let torque: Vec<Option<f64>> = logs.iter().map(|log| torque_rms(log, joint)).collect();
+        let largest = torque.iter().flatten().copied().fold(0.0, f64::max);
+        for (log, torque) in logs.iter().zip(torque) {
+            let Some(torque) = torque.filter(|t| *t < HARDLY_DRIVEN * largest) else {
+                continue;
+            };
             findings.push(Finding::new(
                 Severity::Note,
                 "joint_not_driven",
                 &log.name,
                 format!(
-                    "joint `{}` is hardly driven: rms torque {:.3e}, {:.1} % of its largest in any log",
-                    log.joints[joint].joint,
-                    torque(log),
-                    100.0 * torque(log) / largest
+                    "joint `{name}` is hardly driven: rms torque {torque:.3e}, {:.1} % of its largest in any log",
+                    100.0 * torque / largest
                 ),
                 0,
             ));
         }
     }
     findings
+}
+
+/// Root mean square of a joint's finite torques; `None` without any.
+fn torque_rms(log: &Recording, joint: usize) -> Option<f64> {
+    let tau = log.joints[joint].tau.as_deref()?;
+    let finite: Vec<f64> = tau.iter().copied().filter(|t| t.is_finite()).collect();
+    (!finite.is_empty()).then(|| rms(&finite))
 }
 
 fn rms(x: &[f64]) -> f64 {
