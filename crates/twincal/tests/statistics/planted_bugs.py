@@ -1,0 +1,128 @@
+"""Plants errors, one at a time, and demands that the tests of inference catch each: a test that cannot fail is a lie.
+
+Works on the sources in place and restores them; takes about as many minutes as there are errors.
+
+    python crates/twincal/tests/statistics/planted_bugs.py [number ...]
+"""
+
+import pathlib
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[4]
+SOURCE = ROOT / "crates" / "twincal" / "src"
+
+# (name, file, right, wrong)
+BUGS = [
+    (
+        "evidence without the determinant of A",
+        "infer/exact/subtree.rs",
+        "let odds = simd.mul_f64s(level.include[node.count], simd.sqrt_f64s(r));",
+        "let odds = level.include[node.count];",
+    ),
+    (
+        "a wrong one half: b0 + RSS instead of b0 + RSS/2",
+        "infer/standard.rs",
+        "let full_scale = b0 + 0.5 * misfit.max(0.0);",
+        "let full_scale = b0 + misfit.max(0.0);",
+    ),
+    (
+        "degrees of freedom a0 + n instead of a0 + n/2",
+        "infer/standard.rs",
+        "let shape = prior.shape + 0.5 * problem.n;",
+        "let shape = prior.shape + problem.n;",
+    ),
+    (
+        "the log-determinant of weights and stationary starts forgotten",
+        "infer/standard.rs",
+        "problem.log_constant\n            - 0.5 * problem.n",
+        "-0.5 * problem.n",
+    ),
+    (
+        "one urn for all families",
+        "infer/exact/tree.rs",
+        "carries: d + 1 < padded && family[d + 1] == family[d],",
+        "carries: d + 1 < size,",
+    ),
+    (
+        "posterior variance without the noise of beta",
+        "infer/exact/sums.rs",
+        "simd.mul_f64s(r, simd.mul_add_e_f64s(r, square, noise))",
+        "simd.mul_f64s(r, simd.mul_f64s(r, square))",
+    ),
+    (
+        "a stale tableau: gradients not updated when a column leaves",
+        "infer/gibbs/tableau.rs",
+        "self.gradient[k] -= self.sign[k] * s * step;",
+        "self.gradient[k] -= 0.0 * s * step;",
+    ),
+    (
+        "an asymmetric swap: the slabs' ratio upside down",
+        "infer/gibbs/swaps.rs",
+        "(standard.precision[j] / standard.precision[i]).sqrt()",
+        "(standard.precision[i] / standard.precision[j]).sqrt()",
+    ),
+    (
+        "conditionals kept after a flip",
+        "infer/gibbs/chain.rs",
+        "        self.version += 1;\n",
+        "",
+    ),
+    (
+        "prior odds of a family not updated after a flip",
+        "infer/gibbs/chain.rs",
+        "        self.update_odds(family);\n        self.version",
+        "        self.version",
+    ),
+    (
+        "a forgotten stationary factor: first rows count fully",
+        "gram/mod.rs",
+        "let (a, b, c) = ((1.0 - rho) * (1.0 - rho), rho, rho * (1.0 - rho));",
+        "let (a, b, c) = ((1.0 - rho) * (1.0 - rho), rho, 1.0 - rho);",
+    ),
+    (
+        "the difference over a cut lost",
+        "gram/accumulate.rs",
+        "steps[0] = if starts { 0.0 } else { column[0] - last[i] };",
+        "steps[0] = 0.0;",
+    ),
+    (
+        "ranks without ties",
+        "diagnostics/ranks.rs",
+        "let rank = from as f64 + (tie.len() as f64 + 1.0) / 2.0;",
+        "let rank = from as f64 + 1.0;",
+    ),
+]
+
+
+def caught():
+    command = ["cargo", "test", "-q", "-p", "twincal", "--lib", "--test", "statistics", "--"]
+    command += ["infer::", "gram::", "diagnostics::", "enumeration::", "calibration::"]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    output = result.stdout + result.stderr
+    if "error[" in output or "could not compile" in output:
+        sys.exit(output)
+    return result.returncode != 0
+
+
+def main():
+    chosen = [int(x) for x in sys.argv[1:]] or range(1, len(BUGS) + 1)
+    missed = 0
+    for number in chosen:
+        name, file, right, wrong = BUGS[number - 1]
+        path = SOURCE / file
+        text = path.read_text()
+        if right not in text:
+            sys.exit(f"{number}: `{right}` does not stand in {file} any more")
+        try:
+            path.write_text(text.replace(right, wrong))
+            found = caught()
+        finally:
+            path.write_text(text)
+        missed += not found
+        print(f"{number:2} {'caught' if found else 'MISSED'}  {name}", flush=True)
+    sys.exit(missed)
+
+
+if __name__ == "__main__":
+    main()
