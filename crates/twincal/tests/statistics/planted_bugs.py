@@ -101,7 +101,7 @@ def caught():
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     output = result.stdout + result.stderr
     if "error[" in output or "could not compile" in output:
-        sys.exit(output)
+        sys.exit(f"does not compile:\n{output}")
     return result.returncode != 0
 
 
