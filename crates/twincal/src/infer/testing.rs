@@ -1,6 +1,7 @@
 //! Random regression problems for the tests of this module.
 
-use crate::posterior::Problem;
+use crate::infer::{Choice, InferenceSettings, infer};
+use crate::posterior::{Posterior, Problem};
 use crate::prior::{Inclusion, Prior};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -65,4 +66,16 @@ pub(super) fn problem(
         prior,
         names,
     }
+}
+
+/// The posterior by a short run of four chains.
+pub(super) fn sampled(problem: &Problem) -> Posterior {
+    let settings = InferenceSettings {
+        method: Choice::Gibbs,
+        chains: 4,
+        draws: 400,
+        seed: 1,
+        allow_disagreement: true,
+    };
+    infer(problem, &settings).unwrap()
 }

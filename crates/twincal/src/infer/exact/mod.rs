@@ -40,25 +40,24 @@ pub(super) fn enumerate(problem: &Problem) -> Result<Posterior> {
     let share = |d: usize| (sums[layout.inclusion(d)] / weight).clamp(0.0, 1.0);
     let shift = |d: usize| sums[layout.shift(d)] / weight;
     let variance = |d: usize| (sums[layout.moment(d, d)] / weight - shift(d) * shift(d)).max(0.0);
-    let spread = if standard.noise_factor().is_finite() {
-        1.0
-    } else {
-        f64::INFINITY
-    };
+    // With a_n ≤ 1 the noise has no mean, and an included coefficient no variance.
+    let finite = standard.noise_factor().is_finite();
     let (models, models_mass) = list(&standard, heaviest, weight)?;
     Ok(Posterior {
         inclusion: standard.in_columns(share),
         inclusion_mcse: vec![0.0; size],
         mean: standard.coefficients(|d| standard.center[d] + shift(d)),
-        sd: standard.coefficients(|d| {
-            if share(d) > 0.0 {
-                variance(d).sqrt() * spread
-            } else {
-                0.0
-            }
+        sd: standard.coefficients(|d| match share(d) > 0.0 {
+            true if finite => variance(d).sqrt(),
+            true => f64::INFINITY,
+            false => 0.0,
         }),
         shape: standard.shape,
-        noise: standard.noise(spread * sums[layout.noise()] / weight),
+        noise: if finite {
+            standard.noise(sums[layout.noise()] / weight)
+        } else {
+            f64::INFINITY
+        },
         models,
         models_mass,
         log_evidence: Some(standard.log_evidence(weight.ln() - tree::LOG_REFERENCE)),

@@ -215,6 +215,22 @@ fn case_88_more_columns_than_rows() {
     agree(&problem(9, 10, 2, 0.5, Inclusion::ExpectedTerms(2.0)), 1e-9);
 }
 
+/// One row: φ has no mean, so that standard deviations are infinite; probabilities and means are not.
+#[test]
+fn a_single_row() {
+    let problem = problem(9, 5, 1, 0.0, Inclusion::Probability(0.3));
+    for posterior in [
+        enumerate(&problem).unwrap(),
+        crate::infer::testing::sampled(&problem),
+    ] {
+        assert!(posterior.inclusion.iter().all(|p| (0.0..=1.0).contains(p)));
+        assert!(posterior.mean.iter().all(|x| x.is_finite()));
+        assert!(
+            posterior.sd.iter().all(|x| *x == f64::INFINITY) && posterior.noise == f64::INFINITY
+        );
+    }
+}
+
 #[test]
 fn no_column_at_all() {
     let empty = enumerate(&problem(1, 0, 30, 0.0, Inclusion::Probability(0.5))).unwrap();

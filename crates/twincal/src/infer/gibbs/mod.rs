@@ -196,24 +196,17 @@ fn summarise(
     let shift = |d: usize| mean_of(|t| &t.shift, d);
     let variance = |d: usize| (mean_of(|t| &t.moment, d) - shift(d) * shift(d)).max(0.0);
     let factor = standard.noise_factor();
-    let spread = if factor.is_finite() {
-        1.0
-    } else {
-        f64::INFINITY
-    };
     let misfit = traces.iter().map(|t| t.misfit).sum::<f64>() / draws;
-    let visited = |d: usize| variance(d) > 0.0;
+    let inclusion = |d: usize| mean_of(|t| &t.inclusion, d).clamp(0.0, 1.0);
     let (models, models_mass) = list(standard, traces, draws)?;
     Ok(Posterior {
-        inclusion: standard.in_columns(|d| mean_of(|t| &t.inclusion, d).clamp(0.0, 1.0)),
+        inclusion: standard.in_columns(inclusion),
         inclusion_mcse: standard.in_columns(|d| agreement.mcse[d]),
         mean: standard.coefficients(|d| standard.center[d] + shift(d)),
-        sd: standard.coefficients(|d| {
-            if visited(d) {
-                variance(d).sqrt() * spread
-            } else {
-                0.0
-            }
+        sd: standard.coefficients(|d| match inclusion(d) > 0.0 {
+            true if factor.is_finite() => variance(d).sqrt(),
+            true => f64::INFINITY,
+            false => 0.0,
         }),
         shape: standard.shape,
         noise: standard.noise(misfit * factor),
