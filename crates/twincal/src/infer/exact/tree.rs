@@ -49,7 +49,7 @@ pub(super) struct Tree<V> {
     pub(super) levels: Vec<Level<V>>,
     /// a_n.
     pub(super) shape: f64,
-    /// E[φ] per (1 + c), or 0 where φ has no mean.
+    /// Mean of φ per (1 + c), or 0 where φ has no mean.
     pub(super) noise: f64,
     pub(super) heavy: Threshold,
 }
