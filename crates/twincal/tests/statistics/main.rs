@@ -1,7 +1,6 @@
 //! Is the posterior the posterior? Against brute force written elsewhere, and against its own prior.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-
 mod calibration;
 mod enumeration;
 
