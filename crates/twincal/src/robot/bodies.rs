@@ -21,6 +21,8 @@ pub(crate) struct Body {
     pub(crate) translation: [f64; 3],
     /// Slides along z instead of turning about it.
     pub(crate) prismatic: bool,
+    /// Index of the link that its joint moves.
+    pub(crate) link: usize,
     /// Coordinate that moves it, 0-based.
     pub(crate) coordinate: usize,
     /// Joint position = multiplier · q + offset.
@@ -39,6 +41,9 @@ pub(crate) struct Body {
     pub(crate) spring_reference: f64,
 }
 
+/// The body that a link belongs to (`None`: the base) and the link's frame in that body's frame.
+pub(crate) type Home = (Option<usize>, Placement);
+
 fn refuse<T>(joint: &JointDescription, problem: String, remedy: &str) -> Result<T> {
     Err(Error::Model {
         culprit: format!("joint `{}`", joint.name),
@@ -56,16 +61,14 @@ pub(crate) fn lay_out(
     tree: &Tree,
     sources: &[Source],
     findings: &mut Vec<Finding>,
-) -> Result<Vec<Body>> {
+) -> Result<(Vec<Body>, Vec<Home>)> {
     for link in &description.links {
         if let Some(inertia) = &link.inertia {
             findings.extend(check(&link.name, inertia, description.allow_unphysical)?);
         }
     }
     let mut bodies: Vec<Body> = Vec::new();
-    // Per link: the body it belongs to and its frame in that body's frame.
-    let mut home: Vec<(Option<usize>, Placement)> =
-        vec![(None, Placement::IDENTITY); description.links.len()];
+    let mut home: Vec<Home> = vec![(None, Placement::IDENTITY); description.links.len()];
     for &j in &tree.order {
         let joint = &description.joints[j];
         let (parent, child) = tree.links[j];
@@ -99,6 +102,7 @@ pub(crate) fn lay_out(
                     rotation: multiply(&frame.rotation, &to_z),
                     translation: frame.translation,
                     prismatic: joint.kind == JointKind::Prismatic,
+                    link: child,
                     coordinate: index,
                     multiplier,
                     offset,
@@ -123,7 +127,7 @@ pub(crate) fn lay_out(
             bodies[body].moments = bodies[body].moments.plus(&Moments::placed(inertia, &frame));
         }
     }
-    Ok(bodies)
+    Ok((bodies, home))
 }
 
 /// The axis at length 1; a correction beyond printing precision is a finding.

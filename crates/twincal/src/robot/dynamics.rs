@@ -1,12 +1,9 @@
 //! Torque that a motion needs: one sample, batches over lanes, and the mass matrix.
 
 use super::Robot;
+use super::block::{Angles, BLOCK};
 use super::recursion::{State, newton_euler};
-use crate::lanes::{LANES, Lane, sin_cos};
 use pulp::{Scalar, Simd};
-
-/// Samples whose sines and cosines are computed at once: small enough to stay in the first-level cache.
-const BLOCK: usize = 64;
 
 /// Scratch memory of the one-sample algorithms for one robot; one per thread.
 #[derive(Debug, Clone)]
@@ -145,48 +142,18 @@ impl pulp::WithSimd for Batch<'_> {
         let Self { robot, motion, tau } = self;
         let bodies = &robot.bodies[..];
         let mut states = vec![State::new(s.splat_f64s(0.0)); bodies.len()];
-        let mut sines = vec![[0.0; BLOCK]; bodies.len()];
-        let mut cosines = vec![[1.0; BLOCK]; bodies.len()];
+        let mut angles = Angles::new(bodies.len());
         tau.fill(0.0);
         let mut start = 0;
         while start < motion.len {
             let end = motion.len.min(start + BLOCK);
-            for i in 0..bodies.len() {
-                let body = &bodies[i];
-                if !body.prismatic {
-                    let row = body.coordinate * motion.len;
-                    let q = &motion.q[row + start..row + end];
-                    let mut angles = [0.0; BLOCK];
-                    for k in 0..q.len() {
-                        angles[k] = body.multiplier * q[k] + body.offset;
-                    }
-                    for k in 0..q.len().div_ceil(LANES) {
-                        let group = k * LANES..(k + 1) * LANES;
-                        let mut lane: Lane = [0.0; LANES];
-                        lane.copy_from_slice(&angles[group.clone()]);
-                        let (sine, cosine) = sin_cos(&lane);
-                        sines[i][group.clone()].copy_from_slice(&sine);
-                        cosines[i][group].copy_from_slice(&cosine);
-                    }
-                }
-            }
+            angles.fill(bodies, &motion, start..end);
             let mut first = start;
             while first < end {
                 let last = end.min(first + S::F64_LANES);
-                let local = first - start..last - start;
                 for i in 0..bodies.len() {
-                    let body = &bodies[i];
                     let state = &mut states[i];
-                    let row = body.coordinate * motion.len;
-                    let (m, c) = (s.splat_f64s(body.multiplier), s.splat_f64s(body.offset));
-                    let q = s.partial_load_f64s(&motion.q[row + first..row + last]);
-                    let qd = s.partial_load_f64s(&motion.qd[row + first..row + last]);
-                    let qdd = s.partial_load_f64s(&motion.qdd[row + first..row + last]);
-                    state.position = s.mul_add_e_f64s(m, q, c);
-                    state.velocity = s.mul_f64s(m, qd);
-                    state.acceleration = s.mul_f64s(m, qdd);
-                    state.sin = s.partial_load_f64s(&sines[i][local.clone()]);
-                    state.cos = s.partial_load_f64s(&cosines[i][local.clone()]);
+                    angles.joint(s, i, &bodies[i], &motion, start, first..last, state);
                 }
                 newton_euler(s, bodies, robot.description.gravity, &mut states);
                 for i in 0..bodies.len() {

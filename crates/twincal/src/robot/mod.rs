@@ -11,10 +11,15 @@ mod inertia;
 mod tree;
 mod coordinates;
 mod bodies;
+mod parameters;
+mod lane_vectors;
 mod recursion;
 mod dynamics;
+mod block;
+pub mod regressor;
 mod energy;
 
+pub use block::{BLOCK, STRIDE};
 pub use description::{
     Inertia, JointDescription, JointKind, Limits, LinkDescription, Mimic, Placement,
     RobotDescription,
@@ -23,9 +28,11 @@ pub use dynamics::{Motion, Workspace, inverse_dynamics, mass_matrix, nominal_tor
 pub use energy::{kinetic_energy, potential_energy};
 pub use inertia::principal_axes;
 pub use names::{did_you_mean, nearest_names};
+pub use parameters::{PARAMETERS, PINOCCHIO_ORDER, body_parameters, inertia_of, to_body_frame};
+pub use regressor::{Pair, Regressor, RegressorBlock};
 
 use crate::error::{Error, Finding, Result, Severity};
-use bodies::Body;
+use bodies::{Body, Home};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -41,6 +48,8 @@ pub struct Robot {
     coordinates: Vec<usize>,
     /// Moving bodies, parents first.
     bodies: Vec<Body>,
+    /// Per link of `description`.
+    homes: Vec<Home>,
     planar: bool,
 }
 
@@ -91,7 +100,7 @@ impl Robot {
         }
         let tree = tree::plant(&description)?;
         let (sources, coordinates) = coordinates::assign(&description, locked, &mut findings)?;
-        let bodies = bodies::lay_out(&description, &tree, &sources, &mut findings)?;
+        let (bodies, homes) = bodies::lay_out(&description, &tree, &sources, &mut findings)?;
         report_massless(&description, &coordinates, &bodies, &mut findings);
         let planar = axes_parallel(&bodies);
         Ok((
@@ -100,6 +109,7 @@ impl Robot {
                 locked: locked.clone(),
                 coordinates,
                 bodies,
+                homes,
                 planar,
             },
             findings,

@@ -4,10 +4,10 @@
 //! With [`pulp::Scalar`] the group is a single sample: the same lines serve both.
 
 use super::bodies::Body;
+use super::lane_vectors::{
+    cross_add, dot, dot_add, origin, splat, to_child, to_parent_add, turn, turn_back,
+};
 use pulp::Simd;
-
-/// Three components, each a group of samples.
-type V3<S> = [<S as Simd>::f64s; 3];
 
 /// What one body needs and leaves behind.
 #[derive(Debug, Clone, Copy)]
@@ -23,13 +23,13 @@ pub(crate) struct State<F> {
     /// Joint acceleration.
     pub(crate) acceleration: F,
     /// ω, in the body's frame.
-    w: [F; 3],
+    pub(crate) w: [F; 3],
     /// B = [ω̇]× + ω ωᵀ − |ω|² E, row-major: acceleration of a point p of the body is a + B p.
-    b: [[F; 3]; 3],
+    pub(crate) b: [[F; 3]; 3],
     /// ω̇.
-    wd: [F; 3],
+    pub(crate) wd: [F; 3],
     /// Classical acceleration of the origin minus gravity.
-    a: [F; 3],
+    pub(crate) a: [F; 3],
     /// Force and moment about the origin that the parent must give.
     force: [F; 3],
     moment: [F; 3],
@@ -74,13 +74,14 @@ pub(crate) fn newton_euler<S: Simd>(
     for i in 0..bodies.len() {
         let body = &bodies[i];
         let (before, rest) = states.split_at_mut(i);
-        forward(
+        move_body(
             s,
             body,
             gravity,
             body.parent.map(|p| &before[p]),
             &mut rest[0],
         );
+        load(s, body, &mut rest[0]);
     }
     for i in (0..bodies.len()).rev() {
         let body = &bodies[i];
@@ -89,9 +90,9 @@ pub(crate) fn newton_euler<S: Simd>(
     }
 }
 
-/// Motion of a body from its parent's, and the force and moment that its own mass needs.
+/// Motion of a body from its parent's.
 #[inline(always)]
-fn forward<S: Simd>(
+pub(crate) fn move_body<S: Simd>(
     s: S,
     body: &Body,
     gravity: [f64; 3],
@@ -169,6 +170,13 @@ fn forward<S: Simd>(
             s.neg_f64s(s.add_f64s(xx, yy)),
         ],
     ];
+    (state.w, state.wd, state.a, state.b) = (w, wd, a, b);
+}
+
+/// Force and moment that the body's own mass needs.
+#[inline(always)]
+fn load<S: Simd>(s: S, body: &Body, state: &mut State<S::f64s>) {
+    let State { w, wd, a, b, .. } = *state;
     let m = s.splat_f64s(body.moments.mass);
     let mc = splat(s, body.moments.first);
     let tensor = body.moments.tensor.map(|row| splat(s, row));
@@ -191,7 +199,6 @@ fn forward<S: Simd>(
     ];
     moment = cross_add(s, w, spin, moment);
     state.moment = cross_add(s, mc, a, moment);
-    (state.w, state.wd, state.a, state.b) = (w, wd, a, b);
 }
 
 /// Torque along the axis; force and moment go on to the parent.
@@ -220,119 +227,4 @@ fn backward<S: Simd>(
     for k in 0..3 {
         parent.force[k] = s.add_f64s(parent.force[k], f[k]);
     }
-}
-
-/// Origin of the body in the parent's frame: fixed for a hinge, `p + R z q` for a slider.
-#[inline(always)]
-fn origin<S: Simd>(s: S, body: &Body, position: S::f64s) -> V3<S> {
-    let p = splat(s, body.translation);
-    if !body.prismatic {
-        return p;
-    }
-    let r = &body.rotation;
-    [
-        s.mul_add_e_f64s(s.splat_f64s(r[0][2]), position, p[0]),
-        s.mul_add_e_f64s(s.splat_f64s(r[1][2]), position, p[1]),
-        s.mul_add_e_f64s(s.splat_f64s(r[2][2]), position, p[2]),
-    ]
-}
-
-#[inline(always)]
-fn splat<S: Simd>(s: S, v: [f64; 3]) -> V3<S> {
-    [s.splat_f64s(v[0]), s.splat_f64s(v[1]), s.splat_f64s(v[2])]
-}
-
-#[inline(always)]
-fn dot<S: Simd>(s: S, a: V3<S>, b: V3<S>) -> S::f64s {
-    s.mul_add_e_f64s(
-        a[2],
-        b[2],
-        s.mul_add_e_f64s(a[1], b[1], s.mul_f64s(a[0], b[0])),
-    )
-}
-
-/// aᵀb + c.
-#[inline(always)]
-fn dot_add<S: Simd>(s: S, a: V3<S>, b: V3<S>, c: S::f64s) -> S::f64s {
-    s.mul_add_e_f64s(
-        a[2],
-        b[2],
-        s.mul_add_e_f64s(a[1], b[1], s.mul_add_e_f64s(a[0], b[0], c)),
-    )
-}
-
-/// a × b + c.
-#[inline(always)]
-fn cross_add<S: Simd>(s: S, a: V3<S>, b: V3<S>, c: V3<S>) -> V3<S> {
-    [
-        s.negate_mul_add_e_f64s(a[2], b[1], s.mul_add_e_f64s(a[1], b[2], c[0])),
-        s.negate_mul_add_e_f64s(a[0], b[2], s.mul_add_e_f64s(a[2], b[0], c[1])),
-        s.negate_mul_add_e_f64s(a[1], b[0], s.mul_add_e_f64s(a[0], b[1], c[2])),
-    ]
-}
-
-/// Rz(q)ᵀ v.
-#[inline(always)]
-fn turn_back<S: Simd>(s: S, cos: S::f64s, sin: S::f64s, v: V3<S>) -> V3<S> {
-    [
-        s.mul_add_e_f64s(sin, v[1], s.mul_f64s(cos, v[0])),
-        s.negate_mul_add_e_f64s(sin, v[0], s.mul_f64s(cos, v[1])),
-        v[2],
-    ]
-}
-
-/// Rz(q) v.
-#[inline(always)]
-fn turn<S: Simd>(s: S, cos: S::f64s, sin: S::f64s, v: V3<S>) -> V3<S> {
-    [
-        s.negate_mul_add_e_f64s(sin, v[1], s.mul_f64s(cos, v[0])),
-        s.mul_add_e_f64s(sin, v[0], s.mul_f64s(cos, v[1])),
-        v[2],
-    ]
-}
-
-/// Rᵀ v for the body's constant rotation R.
-#[inline(always)]
-fn to_child<S: Simd>(s: S, body: &Body, v: V3<S>) -> V3<S> {
-    let r = &body.rotation;
-    [
-        dot(
-            s,
-            [
-                s.splat_f64s(r[0][0]),
-                s.splat_f64s(r[1][0]),
-                s.splat_f64s(r[2][0]),
-            ],
-            v,
-        ),
-        dot(
-            s,
-            [
-                s.splat_f64s(r[0][1]),
-                s.splat_f64s(r[1][1]),
-                s.splat_f64s(r[2][1]),
-            ],
-            v,
-        ),
-        dot(
-            s,
-            [
-                s.splat_f64s(r[0][2]),
-                s.splat_f64s(r[1][2]),
-                s.splat_f64s(r[2][2]),
-            ],
-            v,
-        ),
-    ]
-}
-
-/// R v + c for the body's constant rotation R.
-#[inline(always)]
-fn to_parent_add<S: Simd>(s: S, body: &Body, v: V3<S>, c: V3<S>) -> V3<S> {
-    let r = &body.rotation;
-    [
-        dot_add(s, splat(s, r[0]), v, c[0]),
-        dot_add(s, splat(s, r[1]), v, c[1]),
-        dot_add(s, splat(s, r[2]), v, c[2]),
-    ]
 }

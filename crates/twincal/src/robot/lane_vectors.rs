@@ -1,0 +1,132 @@
+//! Vectors of three components in lanes, and a body's frame seen from its parent's: what every recursion shares.
+
+use super::bodies::Body;
+use pulp::Simd;
+
+/// Three components, each a group of samples.
+pub(super) type V3<S> = [<S as Simd>::f64s; 3];
+
+/// Origin of the body in the parent's frame: fixed for a hinge, `p + R z q` for a slider.
+#[inline(always)]
+pub(super) fn origin<S: Simd>(s: S, body: &Body, position: S::f64s) -> V3<S> {
+    let p = splat(s, body.translation);
+    if !body.prismatic {
+        return p;
+    }
+    let r = &body.rotation;
+    [
+        s.mul_add_e_f64s(s.splat_f64s(r[0][2]), position, p[0]),
+        s.mul_add_e_f64s(s.splat_f64s(r[1][2]), position, p[1]),
+        s.mul_add_e_f64s(s.splat_f64s(r[2][2]), position, p[2]),
+    ]
+}
+
+#[inline(always)]
+pub(super) fn splat<S: Simd>(s: S, v: [f64; 3]) -> V3<S> {
+    [s.splat_f64s(v[0]), s.splat_f64s(v[1]), s.splat_f64s(v[2])]
+}
+
+#[inline(always)]
+pub(super) fn dot<S: Simd>(s: S, a: V3<S>, b: V3<S>) -> S::f64s {
+    s.mul_add_e_f64s(
+        a[2],
+        b[2],
+        s.mul_add_e_f64s(a[1], b[1], s.mul_f64s(a[0], b[0])),
+    )
+}
+
+/// aᵀb + c.
+#[inline(always)]
+pub(super) fn dot_add<S: Simd>(s: S, a: V3<S>, b: V3<S>, c: S::f64s) -> S::f64s {
+    s.mul_add_e_f64s(
+        a[2],
+        b[2],
+        s.mul_add_e_f64s(a[1], b[1], s.mul_add_e_f64s(a[0], b[0], c)),
+    )
+}
+
+/// a × b + c.
+#[inline(always)]
+pub(super) fn cross_add<S: Simd>(s: S, a: V3<S>, b: V3<S>, c: V3<S>) -> V3<S> {
+    [
+        s.negate_mul_add_e_f64s(a[2], b[1], s.mul_add_e_f64s(a[1], b[2], c[0])),
+        s.negate_mul_add_e_f64s(a[0], b[2], s.mul_add_e_f64s(a[2], b[0], c[1])),
+        s.negate_mul_add_e_f64s(a[1], b[0], s.mul_add_e_f64s(a[0], b[1], c[2])),
+    ]
+}
+
+/// Rz(q)ᵀ v.
+#[inline(always)]
+pub(super) fn turn_back<S: Simd>(s: S, cos: S::f64s, sin: S::f64s, v: V3<S>) -> V3<S> {
+    [
+        s.mul_add_e_f64s(sin, v[1], s.mul_f64s(cos, v[0])),
+        s.negate_mul_add_e_f64s(sin, v[0], s.mul_f64s(cos, v[1])),
+        v[2],
+    ]
+}
+
+/// Rz(q) v.
+#[inline(always)]
+pub(super) fn turn<S: Simd>(s: S, cos: S::f64s, sin: S::f64s, v: V3<S>) -> V3<S> {
+    [
+        s.negate_mul_add_e_f64s(sin, v[1], s.mul_f64s(cos, v[0])),
+        s.mul_add_e_f64s(sin, v[0], s.mul_f64s(cos, v[1])),
+        v[2],
+    ]
+}
+
+/// Rᵀ v for the body's constant rotation R.
+#[inline(always)]
+pub(super) fn to_child<S: Simd>(s: S, body: &Body, v: V3<S>) -> V3<S> {
+    let r = &body.rotation;
+    [
+        dot(
+            s,
+            [
+                s.splat_f64s(r[0][0]),
+                s.splat_f64s(r[1][0]),
+                s.splat_f64s(r[2][0]),
+            ],
+            v,
+        ),
+        dot(
+            s,
+            [
+                s.splat_f64s(r[0][1]),
+                s.splat_f64s(r[1][1]),
+                s.splat_f64s(r[2][1]),
+            ],
+            v,
+        ),
+        dot(
+            s,
+            [
+                s.splat_f64s(r[0][2]),
+                s.splat_f64s(r[1][2]),
+                s.splat_f64s(r[2][2]),
+            ],
+            v,
+        ),
+    ]
+}
+
+/// R v + c for the body's constant rotation R.
+#[inline(always)]
+pub(super) fn to_parent_add<S: Simd>(s: S, body: &Body, v: V3<S>, c: V3<S>) -> V3<S> {
+    let r = &body.rotation;
+    [
+        dot_add(s, splat(s, r[0]), v, c[0]),
+        dot_add(s, splat(s, r[1]), v, c[1]),
+        dot_add(s, splat(s, r[2]), v, c[2]),
+    ]
+}
+
+/// a × b.
+#[inline(always)]
+pub(super) fn cross<S: Simd>(s: S, a: V3<S>, b: V3<S>) -> V3<S> {
+    [
+        s.negate_mul_add_e_f64s(a[2], b[1], s.mul_f64s(a[1], b[2])),
+        s.negate_mul_add_e_f64s(a[0], b[2], s.mul_f64s(a[2], b[0])),
+        s.negate_mul_add_e_f64s(a[1], b[0], s.mul_f64s(a[0], b[1])),
+    ]
+}

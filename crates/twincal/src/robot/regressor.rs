@@ -1,0 +1,323 @@
+//! The joint-torque regressor: what each inertial parameter of each body adds to each joint's torque.
+//!
+//! ```text
+//! τ_rigid[j] = Σ_bodies Σ_k Y[j, body, k](q, q̇, q̈) · π[body][k]
+//! ```
+//! Only pairs (coordinate, body) in which the coordinate moves the body can differ from zero; of their ten columns those
+//! that vanish whatever the robot does are known beforehand ([`Pair::present`]) and are not computed.
+
+use super::Robot;
+use super::block::{Angles, BLOCK, Registers, STRIDE};
+use super::dynamics::Motion;
+use super::lane_vectors::{V3, cross, cross_add, dot, dot_add, origin, to_child, turn_back};
+use super::recursion::{State, move_body};
+use pulp::Simd;
+use std::ops::Range;
+
+/// A body that a coordinate moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pair {
+    /// 0-based coordinate, the row of the regressor.
+    pub coordinate: usize,
+    /// Index in [`Robot::bodies`].
+    pub body: usize,
+    /// Which of the ten columns can differ from zero; order of [`PARAMETERS`](super::PARAMETERS).
+    pub present: [bool; 10],
+}
+
+/// The joint-torque regressor of one robot, see the [module](self).
+#[derive(Debug, Clone)]
+pub struct Regressor {
+    pairs: Vec<Pair>,
+    /// Pair of the same coordinate with the parent body.
+    parents: Vec<Option<usize>>,
+    /// Motion of the body's own joint per unit of the coordinate: its multiplier, 0 when another coordinate moves it.
+    own: Vec<f64>,
+    /// First pair of each body, and their number at the end.
+    starts: Vec<usize>,
+}
+
+/// What [`Regressor::evaluate`] leaves behind, and its memory; one per thread.
+#[derive(Debug, Clone)]
+pub struct RegressorBlock {
+    values: Vec<f64>,
+    angles: Angles,
+    registers: Registers,
+    axes: Registers,
+}
+
+impl RegressorBlock {
+    /// Column of parameter `parameter` of pair `pair`: one value per sample of the block, N·m per unit of the
+    /// parameter (N for a slider); 0 behind the last sample. Length [`BLOCK`].
+    ///
+    /// # Panics
+    /// If there is no such pair or parameter.
+    pub fn column(&self, pair: usize, parameter: usize) -> &[f64] {
+        let start = pair * 10 * STRIDE + parameter * STRIDE;
+        &self.values[start..start + BLOCK]
+    }
+
+    /// All columns of a pair: parameter k of sample s stands at `k * STRIDE + s`.
+    ///
+    /// # Panics
+    /// If there is no such pair.
+    pub fn pair(&self, pair: usize) -> &[f64] {
+        &self.values[pair * 10 * STRIDE..(pair + 1) * 10 * STRIDE]
+    }
+}
+
+impl Regressor {
+    /// The pairs of `robot` and their columns.
+    ///
+    /// A column is left out when it is below 1e-13 of the largest column of its kind (mass, first moments, tensor) in
+    /// 64 states with joints anywhere and gravity as the model has it.
+    pub fn new(robot: &Robot) -> Self {
+        let mut pairs: Vec<Pair> = Vec::new();
+        let (mut parents, mut own, mut starts) = (Vec::new(), Vec::new(), vec![0]);
+        for (index, body) in robot.bodies.iter().enumerate() {
+            let above = body.parent.map_or(0..0, |p| starts[p]..starts[p + 1]);
+            let mut moved = false;
+            for parent in above {
+                let coordinate = pairs[parent].coordinate;
+                let own_too = coordinate == body.coordinate;
+                moved |= own_too;
+                pairs.push(Pair {
+                    coordinate,
+                    body: index,
+                    present: [true; 10],
+                });
+                parents.push(Some(parent));
+                own.push(if own_too { body.multiplier } else { 0.0 });
+            }
+            if !moved {
+                pairs.push(Pair {
+                    coordinate: body.coordinate,
+                    body: index,
+                    present: [true; 10],
+                });
+                parents.push(None);
+                own.push(body.multiplier);
+            }
+            starts.push(pairs.len());
+        }
+        let mut regressor = Self {
+            pairs,
+            parents,
+            own,
+            starts,
+        };
+        regressor.find_zeros(robot);
+        regressor
+    }
+
+    /// Pairs (coordinate, body), by body, parents first.
+    pub fn pairs(&self) -> &[Pair] {
+        &self.pairs
+    }
+
+    /// Memory for one thread.
+    pub fn block(&self, robot: &Robot) -> RegressorBlock {
+        RegressorBlock {
+            values: vec![0.0; self.pairs.len() * 10 * STRIDE],
+            angles: Angles::new(robot.bodies.len()),
+            registers: Registers::default(),
+            axes: Registers::default(),
+        }
+    }
+
+    /// Computes the columns of the samples `samples` (at most [`BLOCK`]) of a motion into `block`.
+    ///
+    /// The same bytes wherever a sample stands in a block. Without motors' inertia, damping and springs, which are no
+    /// inertial parameters. Bodies that share a coordinate (mimic) are pairs of their own; where a chain holds several
+    /// joints of one coordinate, the pair of a body above them is their sum already, multipliers included.
+    ///
+    /// # Panics
+    /// If `samples` holds more than [`BLOCK`] samples, goes beyond the motion, or the block is another robot's.
+    /// # Source
+    /// Atkeson, An, Hollerbach 1986; without 6 × 10 matrices: with u the axis of the joint and v the velocity of the
+    /// body's origin per unit of the joint's velocity, both in the body's frame,
+    /// `τ = v·f + u·n`, `f = m a + B mc`, `n = I ω̇ + ω × I ω + mc × a`.
+    pub fn evaluate(
+        &self,
+        robot: &Robot,
+        motion: Motion<'_>,
+        samples: Range<usize>,
+        block: &mut RegressorBlock,
+    ) {
+        pulp::Arch::new().dispatch(Kernel {
+            regressor: self,
+            robot,
+            motion,
+            samples,
+            block,
+        });
+    }
+
+    /// Marks the columns that are zero in any state.
+    fn find_zeros(&mut self, robot: &Robot) {
+        let dof = robot.dof();
+        // A Weyl sequence: spread evenly, never special.
+        let spread = |scale: f64, irrational: f64| -> Vec<f64> {
+            (1..=dof * BLOCK)
+                .map(|i| scale * (2.0 * (i as f64 * irrational).fract() - 1.0))
+                .collect()
+        };
+        let (q, qd, qdd) = (
+            spread(3.1, 0.618_033_988_749_894_9),
+            spread(2.0, 0.414_213_562_373_095_1),
+            spread(3.0, 0.732_050_807_568_877_2),
+        );
+        let motion = Motion {
+            len: BLOCK,
+            q: &q,
+            qd: &qd,
+            qdd: &qdd,
+        };
+        let mut block = self.block(robot);
+        self.evaluate(robot, motion, 0..BLOCK, &mut block);
+        let largest = |pair: usize, k: usize| {
+            block
+                .column(pair, k)
+                .iter()
+                .fold(0f64, |most, v| most.max(v.abs()))
+        };
+        let kind = |k: usize| usize::from(k > 0) + usize::from(k > 3);
+        let mut scale = [0f64; 3];
+        for pair in 0..self.pairs.len() {
+            for k in 0..10 {
+                scale[kind(k)] = scale[kind(k)].max(largest(pair, k));
+            }
+        }
+        for (index, pair) in self.pairs.iter_mut().enumerate() {
+            pair.present = std::array::from_fn(|k| largest(index, k) > 1e-13 * scale[kind(k)]);
+        }
+    }
+}
+
+struct Kernel<'a> {
+    regressor: &'a Regressor,
+    robot: &'a Robot,
+    motion: Motion<'a>,
+    samples: Range<usize>,
+    block: &'a mut RegressorBlock,
+}
+
+impl pulp::WithSimd for Kernel<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, s: S) {
+        let Self {
+            regressor,
+            robot,
+            motion,
+            samples,
+            block,
+        } = self;
+        let RegressorBlock {
+            values,
+            angles,
+            registers,
+            axes,
+        } = block;
+        assert!(samples.len() <= BLOCK, "at most {BLOCK} samples");
+        let bodies = &robot.bodies[..];
+        let gravity = robot.description.gravity;
+        let zero = s.splat_f64s(0.0);
+        let states = registers.slice(bodies.len(), State::new(zero));
+        let axes = axes.slice(regressor.pairs.len(), [[zero; 3]; 2]);
+        angles.fill(bodies, &motion, samples.clone());
+        let mut first = samples.start;
+        while first < samples.end {
+            let last = samples.end.min(first + S::F64_LANES);
+            for i in 0..bodies.len() {
+                let body = &bodies[i];
+                let (before, rest) = states.split_at_mut(i);
+                let state = &mut rest[0];
+                angles.joint(s, i, body, &motion, samples.start, first..last, state);
+                move_body(s, body, gravity, body.parent.map(|p| &before[p]), state);
+                let p = origin(s, body, state.position);
+                for pair in regressor.starts[i]..regressor.starts[i + 1] {
+                    // u' = Rᵀ u, v' = Rᵀ (v + u × p), then the body's own joint
+                    let [mut u, mut v] = [[zero; 3]; 2];
+                    if let Some(parent) = regressor.parents[pair] {
+                        [u, v] = axes[parent];
+                        v = cross_add(s, u, p, v);
+                        u = to_child(s, body, u);
+                        v = to_child(s, body, v);
+                        if !body.prismatic {
+                            u = turn_back(s, state.cos, state.sin, u);
+                            v = turn_back(s, state.cos, state.sin, v);
+                        }
+                    }
+                    let own = s.splat_f64s(regressor.own[pair]);
+                    if body.prismatic {
+                        v[2] = s.add_f64s(v[2], own);
+                    } else {
+                        u[2] = s.add_f64s(u[2], own);
+                    }
+                    axes[pair] = [u, v];
+                    let cells = &mut values[pair * 10 * STRIDE..(pair + 1) * 10 * STRIDE];
+                    let at = first - samples.start;
+                    columns(
+                        s,
+                        &regressor.pairs[pair].present,
+                        [u, v],
+                        state,
+                        cells,
+                        at..at + last - first,
+                    );
+                }
+            }
+            first = last;
+        }
+        // Nothing of an earlier block may stand behind the last sample.
+        if samples.len() < BLOCK {
+            for column in values.chunks_exact_mut(STRIDE) {
+                column[samples.len()..BLOCK].fill(0.0);
+            }
+        }
+    }
+}
+
+/// The ten columns of one pair, written to `cells[k * STRIDE + at]`.
+#[inline(always)]
+fn columns<S: Simd>(
+    s: S,
+    present: &[bool; 10],
+    [u, v]: [V3<S>; 2],
+    state: &State<S::f64s>,
+    cells: &mut [f64],
+    at: Range<usize>,
+) {
+    let State { w, wd, a, b, .. } = state;
+    let store = |cells: &mut [f64], k: usize, value: S::f64s| {
+        s.partial_store_f64s(
+            &mut cells[k * STRIDE + at.start..k * STRIDE + at.end],
+            value,
+        );
+    };
+    if present[0] {
+        store(cells, 0, dot(s, v, *a));
+    }
+    // Bᵀ v + a × u
+    let turned: V3<S> = cross(s, *a, u);
+    for k in 0..3 {
+        if present[1 + k] {
+            let column = [b[0][k], b[1][k], b[2][k]];
+            store(cells, 1 + k, dot_add(s, column, v, turned[k]));
+        }
+    }
+    // u·(I ω̇) + (u × ω)·(I ω)
+    let e = cross(s, u, *w);
+    for (k, (i, j)) in super::parameters::ENTRIES.into_iter().enumerate() {
+        if !present[4 + k] {
+            continue;
+        }
+        let mut value = s.mul_add_e_f64s(u[i], wd[j], s.mul_f64s(e[i], w[j]));
+        if i != j {
+            value = s.mul_add_e_f64s(u[j], wd[i], s.mul_add_e_f64s(e[j], w[i], value));
+        }
+        store(cells, 4 + k, value);
+    }
+}
