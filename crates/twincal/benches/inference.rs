@@ -81,13 +81,12 @@ fn problem(size: usize, correlation: f64, effect: f64) -> Problem {
         n: f64::from(rows),
         log_constant: 0.0,
         names: (0..size).map(|k| format!("x{k}")).collect(),
-        prior: Prior {
-            slab: vec![100.0; size],
-            family: (0..size).map(|k| k * 3 / size).collect(),
-            inclusion: Inclusion::ExpectedTerms(5.0),
-            shape: 1e-3,
-            scale: 1e-3,
-        },
+        prior: Prior::single(
+            vec![100.0; size],
+            (0..size).map(|k| k * 3 / size).collect(),
+            Inclusion::ExpectedTerms(5.0),
+            (1e-3, 1e-3),
+        ),
     }
 }
 

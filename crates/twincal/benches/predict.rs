@@ -29,10 +29,12 @@ fn posterior(count: usize, random: &mut Random) -> Posterior {
             scale: 100.0 * (1.0 + 0.01 * random.normal()),
             mean: (0..MEMBERS).map(|_| 1.0 + 0.05 * random.normal()).collect(),
             factor: (0..MEMBERS * MEMBERS).map(|at| lower(at, random)).collect(),
+            sites: Vec::new(),
         }
     });
     Posterior {
         models: models.collect(),
+        component: (0..COLUMNS).collect(),
         inclusion: vec![0.3; COLUMNS],
         inclusion_mcse: vec![0.0; COLUMNS],
         mean: vec![0.3; COLUMNS],

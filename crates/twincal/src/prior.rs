@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Inclusion {
-    /// Every column independently with this probability.
+    /// Every component independently with this probability.
     Probability(f64),
-    /// Beta–Binomial(1, K/m0 − 1) per family, K all columns: m0 terms expected in total.
+    /// Beta–Binomial(1, C/m0 − 1) per family, C all components: m0 components expected in total.
     ExpectedTerms(f64),
 }
 
@@ -24,13 +24,22 @@ pub struct PriorSettings {
     pub noise: Option<(f64, f64)>,
 }
 
-/// The prior with every number filled in, for the K columns of one problem.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// The prior with every number filled in, for the K columns and C components of one problem.
+///
+/// A component is in or out with all its columns: a payload (10 columns), a friction (1). Components are independent of
+/// each other but for the Beta–Binomial of their family.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     /// v_k: `β_k | z_k=1, φ ~ N(0, φ v_k)` in the column's own units, K.
     pub slab: Vec<f64>,
-    /// Family index of each column (0..families), K.
+    /// Component of each column (0..C, every one with at least one column, in any order), K.
+    pub component: Vec<usize>,
+    /// Family of each component (0..families), C.
     pub family: Vec<usize>,
+    /// r_f > 0: factor on the prior odds of the components of each family; 1 leaves them alone.
+    pub odds: Vec<f64>,
+    /// β_k ≥ lower_k (≤ 0, so that 0 is allowed); −∞: free, K. The slab is truncated there and normalised again.
+    pub lower: Vec<f64>,
     /// Inclusion.
     pub inclusion: Inclusion,
     /// a0.
@@ -40,30 +49,75 @@ pub struct Prior {
 }
 
 impl Prior {
-    /// Number of families.
-    pub fn families(&self) -> usize {
-        self.family.iter().map(|f| f + 1).max().unwrap_or(0)
+    /// Every column a component of its own, `family` by column, no bounds and equal odds.
+    pub fn single(
+        slab: Vec<f64>,
+        family: Vec<usize>,
+        inclusion: Inclusion,
+        (shape, scale): (f64, f64),
+    ) -> Self {
+        let families = family.iter().map(|f| f + 1).max().unwrap_or(0);
+        Self {
+            component: (0..slab.len()).collect(),
+            lower: vec![f64::NEG_INFINITY; slab.len()],
+            odds: vec![1.0; families],
+            slab,
+            family,
+            inclusion,
+            shape,
+            scale,
+        }
     }
 
-    /// Columns per family.
+    /// C.
+    pub fn components(&self) -> usize {
+        self.family.len()
+    }
+
+    /// Columns of each component, ascending.
+    pub fn columns(&self) -> Vec<Vec<usize>> {
+        let mut columns = vec![Vec::new(); self.components()];
+        for (k, &c) in self.component.iter().enumerate() {
+            columns[c].push(k);
+        }
+        columns
+    }
+
+    /// Family of a column's component.
+    pub fn family_of(&self, column: usize) -> usize {
+        self.family[self.component[column]]
+    }
+
+    /// Number of families.
+    pub fn families(&self) -> usize {
+        self.odds.len()
+    }
+
+    /// Components per family.
     pub fn family_sizes(&self) -> Vec<usize> {
         let mut sizes = vec![0; self.families()];
         self.family.iter().for_each(|&f| sizes[f] += 1);
         sizes
     }
 
-    /// `(P(z = 1), P(z = 0))` of the next column of a family of which `seen` columns are decided, `included` of them in:
-    /// the Pólya urn of the Beta–Binomial(1, b), b = K/m0 − 1. Multiplied over all columns, in any order, it gives the
+    /// `(P(z = 1), P(z = 0))` of the next component of a family of which `seen` components are decided, `included` of
+    /// them in: the Pólya urn of the Beta–Binomial(1, b_f). Multiplied over all components, in any order, it gives the
     /// prior probability of a model.
     ///
     /// ```text
-    /// P(z = 1 | included, seen) = (1 + included) / (1 + b + seen)
+    /// P(z = 1 | included, seen) = (1 + included) / (1 + b_f + seen),     b_f = (C/m0 − 1) / r_f
     /// ```
-    pub fn next(&self, included: usize, seen: usize) -> (f64, f64) {
+    ///
+    /// The odds of a component alone are `1/b_f`: r_f times those of a family with r = 1, whatever r_f is.
+    pub fn next(&self, family: usize, included: usize, seen: usize) -> (f64, f64) {
+        let odds = self.odds[family];
         match self.inclusion {
-            Inclusion::Probability(p) => (p, 1.0 - p),
+            Inclusion::Probability(p) => {
+                let total = p * odds + (1.0 - p);
+                (p * odds / total, (1.0 - p) / total)
+            }
             Inclusion::ExpectedTerms(expected) => {
-                let b = self.family.len() as f64 / expected - 1.0;
+                let b = (self.components() as f64 / expected - 1.0) / odds;
                 let total = 1.0 + b + seen as f64;
                 (
                     (1.0 + included as f64) / total,
@@ -73,16 +127,21 @@ impl Prior {
         }
     }
 
-    /// `ln p(z)` of a model by its number of members in each family.
+    /// `ln p(z)` of a model by its number of components in each family.
     pub fn log_model(&self, members: &[usize]) -> f64 {
-        let family = |(&size, &included): (&usize, &usize)| -> f64 {
-            let inside: f64 = (0..included).map(|i| self.next(i, i).0.ln()).sum();
+        let family = |f: usize, size: usize, included: usize| -> f64 {
+            let inside: f64 = (0..included).map(|i| self.next(f, i, i).0.ln()).sum();
             inside
                 + (included..size)
-                    .map(|seen| self.next(included, seen).1.ln())
+                    .map(|seen| self.next(f, included, seen).1.ln())
                     .sum::<f64>()
         };
-        self.family_sizes().iter().zip(members).map(family).sum()
+        self.family_sizes()
+            .iter()
+            .zip(members)
+            .enumerate()
+            .map(|(f, (&size, &included))| family(f, size, included))
+            .sum()
     }
 }
 
@@ -91,13 +150,12 @@ mod tests {
     use super::*;
 
     fn prior(inclusion: Inclusion) -> Prior {
-        Prior {
-            slab: vec![1.0; 7],
-            family: vec![0, 1, 0, 1, 0, 0, 1],
+        Prior::single(
+            vec![1.0; 7],
+            vec![0, 1, 0, 1, 0, 0, 1],
             inclusion,
-            shape: 1e-3,
-            scale: 1e-3,
-        }
+            (1e-3, 1e-3),
+        )
     }
 
     /// ln Γ by Stirling's series with recurrence: independent of the urn.
@@ -129,6 +187,23 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// Odds of a component alone, and of the second once the first is in: closed forms.
+    #[test]
+    fn a_familys_odds_are_multiplied() {
+        let mut prior = prior(Inclusion::Probability(0.2));
+        prior.odds[1] = 0.1;
+        let (inside, outside) = prior.next(1, 0, 0);
+        assert!(
+            (inside / outside - 0.1 * 0.25).abs() < 1e-15 && (inside + outside - 1.0).abs() < 1e-15
+        );
+        prior.inclusion = Inclusion::ExpectedTerms(2.0);
+        let (inside, outside) = prior.next(1, 0, 0);
+        assert!((inside / outside - 0.1 / 2.5).abs() < 1e-15);
+        prior.odds[1] = 1e6;
+        let (inside, outside) = prior.next(1, 1, 1);
+        assert!(outside > 0.0 && (inside / outside - 2e6 / 2.5).abs() < 1e-3);
     }
 
     /// Probabilities sum to one and the expected number of terms is the stated one.

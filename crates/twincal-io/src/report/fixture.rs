@@ -167,6 +167,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
         .map(|k| k as u32)
         .collect();
     let posterior = Posterior {
+        component: (0..live.len()).collect(),
         inclusion: column(&|t| t.pip),
         inclusion_mcse: vec![0.0; live.len()],
         mean: column(&|t| t.mean),
@@ -176,6 +177,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
         models: vec![Model {
             mean: vec![0.0; members.len()],
             factor: Vec::new(),
+            sites: Vec::new(),
             members,
             weight: 0.83,
             scale: 7.5,

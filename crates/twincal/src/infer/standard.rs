@@ -20,6 +20,8 @@ use statrs::function::gamma::ln_gamma;
 pub(super) struct Standard {
     /// Column of each position.
     pub(super) order: Vec<usize>,
+    /// Component of each column.
+    pub(super) component: Vec<usize>,
     /// `√(G_kk + 1/v_k)` of each position: `β = β_natural · unit / scale`.
     scale: Vec<f64>,
     /// `√(2 b̂)`, N·m.
@@ -47,7 +49,7 @@ impl Standard {
     /// [`Error::NotFinite`] naming the column, [`Error::Setting`] for an impossible prior.
     pub(super) fn new(problem: &Problem) -> Result<Self> {
         let mut order: Vec<usize> = (0..problem.xy.len()).collect();
-        order.sort_by_key(|&k| problem.prior.family[k]);
+        order.sort_by_key(|&k| (problem.prior.family_of(k), problem.prior.component[k]));
         Self::in_order(problem, order)
     }
 
@@ -118,6 +120,7 @@ impl Standard {
             - shape * full_scale.ln();
         Ok(Self {
             order,
+            component: prior.component.clone(),
             scale,
             unit,
             matrix,
@@ -215,6 +218,7 @@ impl Standard {
                 .map(|(&d, delta)| (self.center[d] + delta) * self.unit / self.scale[d])
                 .collect(),
             factor: lower,
+            sites: Vec::new(),
         })
     }
 }
@@ -269,18 +273,46 @@ fn check(problem: &Problem) -> Result<()> {
     let fits = problem.gram.len() == size * size
         && problem.names.len() == size
         && prior.slab.len() == size
-        && prior.family.len() == size;
+        && prior.component.len() == size
+        && prior.lower.len() == size;
     if !fits {
         return Err(Error::Setting {
             key: "problem".into(),
             problem: format!(
-                "{size} right-hand sides, {} matrix entries, {} names, {} slabs, {} families",
+                "{size} right-hand sides, {} matrix entries, {} names, {} slabs, {} components, {} bounds",
                 problem.gram.len(),
                 problem.names.len(),
                 prior.slab.len(),
-                prior.family.len()
+                prior.component.len(),
+                prior.lower.len()
             ),
             remedy: "all must belong to the same K columns".into(),
+        });
+    }
+    let components = prior.components();
+    let mut occurs = vec![false; components];
+    let inside = prior
+        .component
+        .iter()
+        .all(|&c| occurs.get_mut(c).map(|o| *o = true).is_some());
+    if !inside || occurs.contains(&false) || prior.family.iter().any(|&f| f >= prior.families()) {
+        return Err(Error::Setting {
+            key: "problem".into(),
+            problem: format!(
+                "{components} components of {} families do not match the columns",
+                prior.families()
+            ),
+            remedy: "every column needs a component, every component a column and a family".into(),
+        });
+    }
+    if let Some(k) = (0..size).find(|&k| !(prior.lower[k] <= 0.0)) {
+        return Err(Error::Setting {
+            key: "prior.lower".into(),
+            problem: format!(
+                "`{}` must be at least {}, which forbids 0",
+                problem.names[k], prior.lower[k]
+            ),
+            remedy: "give a bound that is not above 0: being out means exactly 0".into(),
         });
     }
     let not_finite = |what: &str, column: &str| Error::NotFinite {
@@ -340,17 +372,26 @@ fn check(problem: &Problem) -> Result<()> {
             "use 0.001 or more",
         ));
     }
+    if let Some(r) = prior.odds.iter().find(|r| !(**r > 0.0 && r.is_finite())) {
+        return Err(setting(
+            "prior.odds",
+            format!("{r} is not positive"),
+            "use 1, or e.g. 0.1 for a family that should need more evidence",
+        ));
+    }
     match prior.inclusion {
         Inclusion::Probability(p) if !(p > 0.0 && p < 1.0) => Err(setting(
             "prior.inclusion.probability",
             format!("{p} is not between 0 and 1"),
             "use 0.2, or `expected_terms`",
         )),
-        Inclusion::ExpectedTerms(m) if size > 0 && !(m > 0.0 && m < size as f64) => Err(setting(
-            "prior.inclusion.expected_terms",
-            format!("{m} of {size} columns"),
-            "it must lie between 0 and the number of columns",
-        )),
+        Inclusion::ExpectedTerms(m) if size > 0 && !(m > 0.0 && m < components as f64) => {
+            Err(setting(
+                "prior.inclusion.expected_terms",
+                format!("{m} of {components} components"),
+                "it must lie between 0 and the number of components",
+            ))
+        }
         _ => Ok(()),
     }
 }

@@ -49,13 +49,12 @@ pub(super) fn problem(
     inclusion: Inclusion,
 ) -> Problem {
     let (gram, xy, yy) = random_gram(seed, size, rows, correlation);
-    let prior = Prior {
-        slab: (0..size).map(|k| 10.0 / (1.0 + k as f64)).collect(),
-        family: (0..size).map(|k| [0, 1, 0, 2, 1][k % 5]).collect(),
+    let prior = Prior::single(
+        (0..size).map(|k| 10.0 / (1.0 + k as f64)).collect(),
+        (0..size).map(|k| [0, 1, 0, 2, 1][k % 5]).collect(),
         inclusion,
-        shape: 0.01,
-        scale: 0.02,
-    };
+        (0.01, 0.02),
+    );
     let names = (0..size).map(|k| format!("x{k}")).collect();
     Problem {
         gram,

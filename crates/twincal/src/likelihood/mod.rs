@@ -170,13 +170,12 @@ pub fn assemble(
         yy,
         n,
         log_constant,
-        prior: Prior {
+        prior: Prior::single(
             slab,
-            family: columns.family.clone(),
-            inclusion: inclusion(settings.inclusion, count)?,
-            shape,
-            scale,
-        },
+            columns.family.clone(),
+            inclusion(settings.inclusion, count)?,
+            (shape, scale),
+        ),
         names: columns.names.clone(),
     })
 }

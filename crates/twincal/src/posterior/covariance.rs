@@ -47,8 +47,10 @@ mod tests {
             scale: 6.0,
             mean: vec![0.5, -1.0],
             factor: vec![2.0, 0.0, 1.0, 3.0],
+            sites: Vec::new(),
         };
         let posterior = Posterior {
+            component: vec![0, 1, 2],
             inclusion: vec![1.0, 0.0, 1.0],
             inclusion_mcse: vec![0.0; 3],
             mean: vec![0.5, 0.0, -1.0],

@@ -81,6 +81,7 @@ mod tests {
             scale: 6.0,
             mean: vec![1.0, -2.0],
             factor: vec![2.0, 0.0, 1.0, 3.0],
+            sites: Vec::new(),
         };
         let small = Model {
             members: vec![1],
@@ -88,8 +89,10 @@ mod tests {
             scale: 8.0,
             mean: vec![0.5],
             factor: vec![2.0],
+            sites: Vec::new(),
         };
         Posterior {
+            component: vec![0, 1, 2],
             inclusion: vec![0.7, 0.3, 0.7],
             inclusion_mcse: vec![0.0; 3],
             mean: vec![0.7, 0.15, -1.4],

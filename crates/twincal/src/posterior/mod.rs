@@ -48,6 +48,26 @@ pub struct Model {
     pub mean: Vec<f64>,
     /// Lower Cholesky factor L of A_z = L Lᵀ, row-major, m × m.
     pub factor: Vec<f64>,
+    /// Bounds that act on the coefficients; empty without bounds.
+    pub sites: Vec<Site>,
+}
+
+/// One bound `β_k ≥ lower` of a model. `mean` and `factor` of the model are those of the normal distribution with the
+/// moments of the bounded one; without its sites it is the conjugate posterior, so that draws can respect the bound:
+///
+/// ```text
+/// A_z (conjugate) = L Lᵀ − diag(precision),     A_z μ (conjugate) = L Lᵀ mean − shift
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Site {
+    /// Index in `members`.
+    pub place: u32,
+    /// The bound, in the coefficient's unit.
+    pub lower: f64,
+    /// What the bound adds to the diagonal of A_z.
+    pub precision: f64,
+    /// What it adds to A_z μ.
+    pub shift: f64,
 }
 
 /// How the posterior was computed.
@@ -56,7 +76,7 @@ pub struct Model {
 pub enum Method {
     /// Every model was summed.
     Exact {
-        /// 2^K.
+        /// 2^C.
         models: u64,
     },
     /// Collapsed Gibbs sampling of the structure.
@@ -75,7 +95,9 @@ pub enum Method {
 /// The posterior over models, coefficients and noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Posterior {
-    /// P(z_k = 1 | y), K.
+    /// Component of each column (0..C), K.
+    pub component: Vec<usize>,
+    /// P(z_k = 1 | y): that of the column's component, K.
     pub inclusion: Vec<f64>,
     /// Monte Carlo standard error of `inclusion`; 0 when exact.
     pub inclusion_mcse: Vec<f64>,

@@ -149,6 +149,7 @@ mod tests {
                 .map(|&k| if k == 0 { m1 } else { m2 })
                 .collect(),
             factor: factor(members),
+            sites: Vec::new(),
         };
         let shape: f64 = 11.0;
         let phi = 3.0 / (shape - 1.0);
@@ -163,6 +164,7 @@ mod tests {
         let (mean0, sd0) = moments(pips[0], m1, phi / (4.0 * unit * unit));
         let (mean1, sd1) = moments(pips[1], m2, phi / 25.0);
         Posterior {
+            component: vec![0, 1],
             inclusion: pips.to_vec(),
             inclusion_mcse: vec![0.0; 2],
             mean: vec![mean0, mean1],

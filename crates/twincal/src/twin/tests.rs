@@ -304,6 +304,7 @@ fn models_that_differ_elsewhere_are_one_component_here() {
             scale,
             mean: members.iter().map(|&k| f64::from(k) + 1.0).collect(),
             factor,
+            sites: Vec::new(),
         }
     };
     let mut posterior = Reference::read().cases["one_model"].posterior.clone();

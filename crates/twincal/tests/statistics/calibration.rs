@@ -21,15 +21,14 @@ struct Truth {
 
 /// One draw from the joint distribution of parameters and data; two families, correlated columns.
 fn simulate(source: &mut Source, inclusion: Inclusion) -> (Truth, Problem) {
-    let prior = Prior {
-        slab: (0..SIZE)
+    let prior = Prior::single(
+        (0..SIZE)
             .map(|k| 0.4 * f64::powi(2.0, k as i32 - 4))
             .collect(),
-        family: (0..SIZE).map(|k| k % 2).collect(),
+        (0..SIZE).map(|k| k % 2).collect(),
         inclusion,
-        shape: 3.0,
-        scale: 2.0,
-    };
+        (3.0, 2.0),
+    );
     // φ = b0/Gamma(a0); the urn of each family.
     let phi = prior.scale / source.gamma(6);
     let (mut seen, mut inside) = ([0, 0], [0, 0]);

@@ -38,16 +38,15 @@ fn cases() -> Vec<(String, Problem, Value)> {
                 n: number("n"),
                 log_constant: number("log_constant"),
                 names: (0..slab.len()).map(|k| format!("x{k}")).collect(),
-                prior: Prior {
+                prior: Prior::single(
                     slab,
-                    family: numbers(&case["family"])
+                    numbers(&case["family"])
                         .into_iter()
                         .map(|f| f as usize)
                         .collect(),
                     inclusion,
-                    shape: number("shape"),
-                    scale: number("scale"),
-                },
+                    (number("shape"), number("scale")),
+                ),
             };
             let name = format!(
                 "case {index} ({}, correlation {})",

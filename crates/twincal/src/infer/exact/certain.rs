@@ -37,10 +37,11 @@ pub(super) fn columns(standard: &Standard, prior: &Prior) -> Vec<bool> {
 pub(super) fn order(prior: &Prior, certain: &[bool]) -> Vec<usize> {
     let uncertain = |family: usize| {
         (0..certain.len())
-            .filter(|&k| prior.family[k] == family && !certain[k])
+            .filter(|&k| prior.family_of(k) == family && !certain[k])
             .count()
     };
-    let sure = |family: usize| (0..certain.len()).any(|k| prior.family[k] == family && certain[k]);
+    let sure =
+        |family: usize| (0..certain.len()).any(|k| prior.family_of(k) == family && certain[k]);
     let mut families: Vec<usize> = (0..prior.families()).collect();
     families.sort_by_key(|&f| (sure(f), uncertain(f), f));
     if let Some(last) = (0..families.len()).max_by_key(|&i| (uncertain(families[i]), i)) {
@@ -50,7 +51,7 @@ pub(super) fn order(prior: &Prior, certain: &[bool]) -> Vec<usize> {
     let mut order = Vec::with_capacity(certain.len());
     for family in families {
         let (sure, mut open): (Vec<usize>, Vec<usize>) = (0..certain.len())
-            .filter(|&k| prior.family[k] == family)
+            .filter(|&k| prior.family_of(k) == family)
             .partition(|&k| certain[k]);
         let first = 3_usize.saturating_sub(order.len()).min(open.len());
         let rest = open.split_off(first);
@@ -118,7 +119,7 @@ fn best_by_elimination(standard: &Standard, prior: &Prior, mut members: Vec<usiz
         let mut counts = vec![0; prior.families()];
         members
             .iter()
-            .for_each(|&d| counts[prior.family[standard.order[d]]] += 1);
+            .for_each(|&d| counts[prior.family_of(standard.order[d])] += 1);
         log_weight + prior.log_model(&counts)
     };
     let mut best = f64::NEG_INFINITY;

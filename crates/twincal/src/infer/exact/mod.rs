@@ -44,6 +44,7 @@ pub(super) fn enumerate(problem: &Problem) -> Result<Posterior> {
     let finite = standard.noise_factor().is_finite();
     let (models, models_mass) = list(&standard, heaviest, weight)?;
     Ok(Posterior {
+        component: standard.component.clone(),
         inclusion: standard.in_columns(share),
         inclusion_mcse: vec![0.0; size],
         mean: standard.coefficients(|d| standard.center[d] + shift(d)),

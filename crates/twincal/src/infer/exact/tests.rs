@@ -38,7 +38,9 @@ fn plain(problem: &Problem) -> Plain {
                 .sum::<f64>();
         let scale = prior.scale + rss / 2.0;
         let mut families = vec![0; prior.families()];
-        members.iter().for_each(|&k| families[prior.family[k]] += 1);
+        members
+            .iter()
+            .for_each(|&k| families[prior.family_of(k)] += 1);
         let slabs: f64 = members.iter().map(|&k| prior.slab[k].ln()).sum();
         let log = prior.log_model(&families) + problem.log_constant
             - problem.n / 2.0 * (2.0 * std::f64::consts::PI).ln()

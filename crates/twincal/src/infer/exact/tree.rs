@@ -236,7 +236,7 @@ fn plan<S: Simd>(
 ) -> (Tree<S::f64s>, Vec<Odds<S::f64s>>) {
     let size = standard.size();
     let family: Vec<Option<usize>> = (0..padded)
-        .map(|d| standard.order.get(d).map(|&column| prior.family[column]))
+        .map(|d| standard.order.get(d).map(|&column| prior.family_of(column)))
         .collect();
     let mut levels = Vec::new();
     let mut odds = Vec::new();
@@ -250,7 +250,8 @@ fn plan<S: Simd>(
             let in_lane = (from..d.min(lane_columns))
                 .filter(|e| lane >> e & 1 == 1)
                 .count();
-            let (inside, outside) = prior.next((in_lane + count).min(seen), seen);
+            let (inside, outside) =
+                prior.next(family[d].unwrap_or(0), (in_lane + count).min(seen), seen);
             (inside * standard.precision[d].sqrt(), outside)
         };
         let counts = 0..=d.saturating_sub(from.max(lane_columns));

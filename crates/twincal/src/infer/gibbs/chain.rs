@@ -166,7 +166,7 @@ impl<'a> Chain<'a> {
             prior,
             swaps: Swaps::new(standard),
             source,
-            family: standard.order.iter().map(|&k| prior.family[k]).collect(),
+            family: standard.order.iter().map(|&k| prior.family_of(k)).collect(),
             sizes: prior.family_sizes(),
             members: vec![0; prior.families()],
             odds: vec![0.0; width],
@@ -216,7 +216,7 @@ impl<'a> Chain<'a> {
 
     /// Prior odds of one more member of a family that has `others` beside it.
     fn prior_odds(&self, family: usize, others: usize) -> f64 {
-        let (inside, outside) = self.prior.next(others, self.sizes[family] - 1);
+        let (inside, outside) = self.prior.next(family, others, self.sizes[family] - 1);
         inside / outside
     }
 

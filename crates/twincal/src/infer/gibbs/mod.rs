@@ -200,6 +200,7 @@ fn summarise(
     let inclusion = |d: usize| mean_of(|t| &t.inclusion, d).clamp(0.0, 1.0);
     let (models, models_mass) = list(standard, traces, draws)?;
     Ok(Posterior {
+        component: standard.component.clone(),
         inclusion: standard.in_columns(inclusion),
         inclusion_mcse: standard.in_columns(|d| agreement.mcse[d]),
         mean: standard.coefficients(|d| standard.center[d] + shift(d)),
