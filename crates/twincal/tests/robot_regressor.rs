@@ -8,7 +8,9 @@
 use serde_json::Value;
 use std::collections::BTreeMap;
 use twincal::robot::{
-    BLOCK, Motion, Regressor, Robot, RobotDescription, body_parameters, nominal_torque,
+    BLOCK, BlockWorkspace, Motion, Regressor, Robot, RobotDescription, STRIDE, Workspace,
+    body_parameters, energy_regressor, gravity_regressor, inverse_dynamics, kinetic_energy,
+    mass_matrices, mass_matrix, nominal_torque, position_derivative, potential_energy,
     to_body_frame,
 };
 
@@ -126,5 +128,196 @@ fn links_find_their_bodies() {
             }
         }
         assert_eq!(robot.body_of_link("no such link"), None);
+    }
+}
+
+/// The nominal torque of one sample.
+fn torque(robot: &Robot, q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
+    let mut tau = vec![0.0; robot.dof()];
+    inverse_dynamics(robot, &mut Workspace::new(robot), q, qd, qdd, &mut tau);
+    tau
+}
+
+fn pick(values: &[f64], len: usize, s: usize) -> Vec<f64> {
+    values.iter().skip(s).step_by(len).copied().collect()
+}
+
+/// Robots as the golden file has them, with motors, dampers and springs.
+fn full_robots() -> Vec<Robot> {
+    let mut robots = robots();
+    for robot in &mut robots {
+        let mut description = robot.description().clone();
+        for joint in &mut description.joints {
+            (joint.armature, joint.damping, joint.stiffness) = (0.2, 0.4, 3.0);
+        }
+        *robot = Robot::new(description, &BTreeMap::new()).unwrap().0;
+    }
+    robots
+}
+
+#[test]
+fn gravity_times_its_regressor_is_the_torque_at_rest() {
+    for robot in robots() {
+        let (n, len) = (robot.dof(), 70);
+        let [q, _, _] = &motion(&robot, len);
+        let motion = Motion {
+            len,
+            q,
+            qd: q,
+            qdd: q,
+        };
+        let mut workspace = BlockWorkspace::new(&robot);
+        let mut out = vec![f64::NAN; 3 * n * STRIDE];
+        for samples in [0..64, 64..70] {
+            gravity_regressor(&robot, &mut workspace, motion, samples.clone(), &mut out);
+            for s in samples.clone() {
+                let expected = torque(&robot, &pick(q, len, s), &vec![0.0; n], &vec![0.0; n]);
+                for j in 0..n {
+                    let sum: f64 = (0..3)
+                        .map(|k| {
+                            out[(3 * j + k) * STRIDE + s - samples.start]
+                                * robot.description().gravity[k]
+                        })
+                        .sum();
+                    let scale = expected.iter().fold(1f64, |most, v| most.max(v.abs()));
+                    assert!(
+                        (sum - expected[j]).abs() < 1e-13 * scale,
+                        "{sum} {expected:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Fourth-order central difference with step h.
+fn difference(h: f64, f: &dyn Fn(f64) -> f64) -> f64 {
+    (8.0 * (f(h) - f(-h)) - (f(2.0 * h) - f(-2.0 * h))) / (12.0 * h)
+}
+
+#[test]
+fn the_position_derivative_is_the_difference_of_torques() {
+    for robot in full_robots() {
+        let (n, len) = (robot.dof(), 70);
+        let [q, qd, qdd] = &motion(&robot, len);
+        let motion = Motion { len, q, qd, qdd };
+        let mut workspace = BlockWorkspace::new(&robot);
+        let mut out = vec![f64::NAN; n * STRIDE];
+        for coordinate in 0..n {
+            position_derivative(&robot, &mut workspace, coordinate, motion, 3..67, &mut out);
+            for s in [3, 10, 66] {
+                let [q, qd, qdd] = [q, qd, qdd].map(|v| pick(v, len, s));
+                let moved = |d: f64, j: usize| {
+                    let mut q = q.clone();
+                    q[coordinate] += d;
+                    torque(&robot, &q, &qd, &qdd)[j]
+                };
+                let scale = (0..n).fold(1f64, |most, j| most.max(moved(0.0, j).abs()));
+                for j in 0..n {
+                    // Rounding 1e-16/h and h⁴ leave about 1e-11.
+                    let expected = difference(1e-3, &|d| moved(d, j));
+                    let ours = out[j * STRIDE + s - 3];
+                    assert!((ours - expected).abs() < 1e-9 * scale, "{ours} {expected}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_energy_regressor_gives_the_energies_and_its_euler_lagrange_image_is_the_regressor() {
+    for robot in robots() {
+        let (n, bodies) = (robot.dof(), robot.bodies().len());
+        let [q, qd, qdd] = &motion(&robot, 1);
+        let regressor = Regressor::new(&robot);
+        let mut block = regressor.block(&robot);
+        let at = Motion { len: 1, q, qd, qdd };
+        regressor.evaluate(&robot, at, 0..1, &mut block);
+        let energies = |q: &[f64], qd: &[f64]| {
+            let mut workspace = BlockWorkspace::new(&robot);
+            let mut out = [
+                vec![f64::NAN; 10 * bodies * STRIDE],
+                vec![f64::NAN; 10 * bodies * STRIDE],
+            ];
+            let [kinetic, potential] = &mut out;
+            let motion = Motion { len: 1, q, qd, qdd };
+            energy_regressor(&robot, &mut workspace, motion, 0..1, kinetic, potential);
+            out.map(|v| v.into_iter().step_by(STRIDE).collect::<Vec<f64>>())
+        };
+        let [kinetic, potential] = energies(q, qd);
+        let total = |columns: &[f64]| -> f64 {
+            (0..bodies)
+                .flat_map(|b| robot.parameters_of_body(b))
+                .zip(columns)
+                .map(|(p, c)| p * c)
+                .sum()
+        };
+        assert!((total(&kinetic) / kinetic_energy(&robot, q, qd) - 1.0).abs() < 1e-13);
+        let expected = potential_energy(&robot, q);
+        assert!((total(&potential) - expected).abs() < 1e-12 * (1.0 + expected.abs()));
+
+        // d/dt ∂L/∂q̇ − ∂L/∂q along q + q̇ t + ½ q̈ t²
+        let lagrangian = |q: &[f64], qd: &[f64], column: usize| {
+            let [kinetic, potential] = energies(q, qd);
+            kinetic[column] - potential[column]
+        };
+        for (p, pair) in regressor.pairs().iter().enumerate() {
+            // One robot in full is slow enough; of each pair one column of each kind is.
+            for k in [0, 1 + pair.body % 3, 4 + (pair.body + pair.coordinate) % 6] {
+                let (column, j) = (10 * pair.body + k, pair.coordinate);
+                let momentum = |t: f64| {
+                    let (mut q, mut qd) = (q.clone(), qd.clone());
+                    for i in 0..n {
+                        q[i] += qd[i] * t + 0.5 * qdd[i] * t * t;
+                        qd[i] += qdd[i] * t;
+                    }
+                    // L is quadratic in q̇: the central difference is exact with any step.
+                    let moved = |d: f64| {
+                        let mut qd = qd.clone();
+                        qd[j] += d;
+                        lagrangian(&q, &qd, column)
+                    };
+                    0.5 * (moved(1.0) - moved(-1.0))
+                };
+                let slope = |d: f64| {
+                    let mut q = q.clone();
+                    q[j] += d;
+                    lagrangian(&q, qd, column)
+                };
+                let image = difference(1e-3, &momentum) - difference(1e-3, &slope);
+                let scale = qd.iter().chain(qdd).fold(10f64, |most, v| most.max(v * v)) * n as f64;
+                let ours = block.column(p, k)[0];
+                assert!(
+                    (ours - image).abs() < 1e-8 * scale,
+                    "{pair:?} {k}: {ours} {image}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn mass_matrices_of_a_block_are_those_of_its_samples() {
+    for robot in full_robots() {
+        let (n, len) = (robot.dof(), 20);
+        let [q, qd, qdd] = &motion(&robot, len);
+        let motion = Motion { len, q, qd, qdd };
+        let mut out = vec![f64::NAN; n * n * STRIDE];
+        mass_matrices(
+            &robot,
+            &mut BlockWorkspace::new(&robot),
+            motion,
+            2..20,
+            &mut out,
+        );
+        let mut expected = vec![0.0; n * n];
+        for s in 2..20 {
+            let q = pick(q, len, s);
+            mass_matrix(&robot, &mut Workspace::new(&robot), &q, &mut expected);
+            let scale = expected.iter().fold(0f64, |most, v| most.max(v.abs()));
+            for i in 0..n * n {
+                assert!((out[i * STRIDE + s - 2] - expected[i]).abs() < 1e-13 * scale);
+            }
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! Blocks of samples: the joints' motion brought into lanes, and memory that blocks after blocks reuse.
 
+use super::Robot;
 use super::bodies::Body;
 use super::dynamics::Motion;
 use super::recursion::State;
@@ -115,4 +116,111 @@ impl Clone for Registers {
     fn clone(&self) -> Self {
         Self(None)
     }
+}
+
+/// Memory of the algorithms that work on blocks, for one robot; one per thread. Nothing is allocated after the first
+/// block.
+#[derive(Debug, Clone)]
+pub struct BlockWorkspace {
+    angles: Angles,
+    states: Registers,
+    extra: Registers,
+}
+
+impl BlockWorkspace {
+    /// Memory for `robot`.
+    pub fn new(robot: &Robot) -> Self {
+        Self {
+            angles: Angles::new(robot.bodies.len()),
+            states: Registers::default(),
+            extra: Registers::default(),
+        }
+    }
+}
+
+/// What an algorithm does with one vector's worth of samples.
+pub(super) trait Group {
+    /// `states` holds the joints' motion; results go to the cells `at` of every column.
+    fn group<S: Simd>(
+        &mut self,
+        s: S,
+        robot: &Robot,
+        states: &mut [State<S::f64s>],
+        extra: &mut Registers,
+        at: Range<usize>,
+    );
+}
+
+/// Runs `kernel` over the samples `samples` of a motion, on this machine's widest vectors.
+pub(super) fn run(
+    robot: &Robot,
+    workspace: &mut BlockWorkspace,
+    motion: Motion<'_>,
+    samples: Range<usize>,
+    kernel: impl Group,
+) {
+    pulp::Arch::new().dispatch(Drive {
+        robot,
+        workspace,
+        motion,
+        samples,
+        kernel,
+    });
+}
+
+struct Drive<'a, K> {
+    robot: &'a Robot,
+    workspace: &'a mut BlockWorkspace,
+    motion: Motion<'a>,
+    samples: Range<usize>,
+    kernel: K,
+}
+
+impl<K: Group> pulp::WithSimd for Drive<'_, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, s: S) {
+        let Self {
+            robot,
+            workspace,
+            motion,
+            samples,
+            mut kernel,
+        } = self;
+        assert!(samples.len() <= BLOCK, "at most {BLOCK} samples");
+        let BlockWorkspace {
+            angles,
+            states,
+            extra,
+        } = workspace;
+        let bodies = &robot.bodies[..];
+        let states = states.slice(bodies.len(), State::new(s.splat_f64s(0.0)));
+        angles.fill(bodies, &motion, samples.clone());
+        let mut first = samples.start;
+        while first < samples.end {
+            let last = samples.end.min(first + S::F64_LANES);
+            for i in 0..bodies.len() {
+                let state = &mut states[i];
+                angles.joint(s, i, &bodies[i], &motion, samples.start, first..last, state);
+            }
+            let at = first - samples.start..last - samples.start;
+            kernel.group(s, robot, states, extra, at);
+            first = last;
+        }
+    }
+}
+
+/// Adds `value` to the cells `at` of column `column`.
+#[inline(always)]
+pub(super) fn add_to<S: Simd>(
+    s: S,
+    out: &mut [f64],
+    column: usize,
+    at: &Range<usize>,
+    value: S::f64s,
+) {
+    let cells = &mut out[column * STRIDE + at.start..column * STRIDE + at.end];
+    let sum = s.add_f64s(s.partial_load_f64s(cells), value);
+    s.partial_store_f64s(cells, sum);
 }

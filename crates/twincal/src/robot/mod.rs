@@ -17,16 +17,24 @@ mod recursion;
 mod dynamics;
 mod block;
 pub mod regressor;
+mod gravity;
+mod derivative;
+mod mass_matrix;
+mod energy_regressor;
 mod energy;
 
-pub use block::{BLOCK, STRIDE};
+pub use block::{BLOCK, BlockWorkspace, STRIDE};
+pub use derivative::position_derivative;
 pub use description::{
     Inertia, JointDescription, JointKind, Limits, LinkDescription, Mimic, Placement,
     RobotDescription,
 };
 pub use dynamics::{Motion, Workspace, inverse_dynamics, mass_matrix, nominal_torque};
 pub use energy::{kinetic_energy, potential_energy};
+pub use energy_regressor::energy_regressor;
+pub use gravity::gravity_regressor;
 pub use inertia::principal_axes;
+pub use mass_matrix::mass_matrices;
 pub use names::{did_you_mean, nearest_names};
 pub use parameters::{PARAMETERS, PINOCCHIO_ORDER, body_parameters, inertia_of, to_body_frame};
 pub use regressor::{Pair, Regressor, RegressorBlock};

@@ -31,8 +31,8 @@ pub(crate) struct State<F> {
     /// Classical acceleration of the origin minus gravity.
     pub(crate) a: [F; 3],
     /// Force and moment about the origin that the parent must give.
-    force: [F; 3],
-    moment: [F; 3],
+    pub(crate) force: [F; 3],
+    pub(crate) moment: [F; 3],
     /// Torque or force along the joint axis, without passive terms.
     pub(crate) torque: F,
 }
