@@ -129,8 +129,9 @@ pub(crate) struct Inspect {
 
 #[derive(Debug, Args)]
 pub(crate) struct Fit {
-    /// Logs to fit (CSV, Parquet); each is a trajectory of its own.
-    #[arg(value_name = "LOG", required = true)]
+    /// Logs to fit (CSV, Parquet); each is a trajectory of its own [default:
+    /// those of [[log]] in the config].
+    #[arg(value_name = "LOG")]
     pub(crate) logs: Vec<PathBuf>,
     /// Robot model (URDF, MJCF).
     #[arg(long, value_name = "MODEL")]

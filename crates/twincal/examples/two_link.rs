@@ -3,7 +3,7 @@
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::posterior::random::Random;
 use twincal::robot::*;
-use twincal::signal::{Auto, Channels, Recording};
+use twincal::signal::{Auto, Channels, Payload, Recording};
 
 /// A planar arm of two links of 0.5 m that carry 3 kg and `fore` kg at their ends.
 pub(crate) fn arm(fore: f64) -> twincal::Result<Robot> {
@@ -52,7 +52,12 @@ pub(crate) fn log(name: &str, phase: f64, real: &Robot, noise: &mut Random) -> R
         Channels { q, qd, qdd, tau }
     });
     let (name, joints) = (name.into(), joints.to_vec());
-    Recording { name, time, joints }
+    Recording {
+        name,
+        time,
+        joints,
+        payload: Payload::None,
+    }
 }
 
 /// The model believes in 2 kg at the tip; the arm carries 2.6 kg, and something unknown acts.

@@ -14,6 +14,7 @@ pub mod linear_algebra;
 pub mod diagnostics;
 pub mod robot;
 pub mod signal;
+pub mod self_check;
 pub mod term;
 pub mod rows;
 pub mod gram;

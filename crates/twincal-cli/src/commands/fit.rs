@@ -5,7 +5,7 @@ use super::inputs::{LogInput, RobotInput};
 use super::{settings, start_threads};
 use crate::args::Fit;
 use crate::clock::Stopwatch;
-use crate::failure::Outcome;
+use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use twincal_io::artifact::{Claim, Maker, Replace};
@@ -14,6 +14,18 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     let watch = Stopwatch::start();
     let config = settings::of_fit(flags, terminal)?;
     let settings = config.settings()?;
+    let named = settings.log.named();
+    let given = if flags.logs.is_empty() {
+        &named
+    } else {
+        &flags.logs
+    };
+    if given.is_empty() {
+        return Err(Failure::usage(
+            "no log",
+            "give logs, as in `twincal fit run.csv --model arm.urdf`, or [[log]] entries in the config",
+        ));
+    }
     let Some(model) = &settings.model_file else {
         return Err(super::no_model());
     };
@@ -30,7 +42,7 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     progress.step(&format!("reading {}", model.to_string_lossy()));
     let robot = RobotInput::read(model, &settings)?;
     let terms = super::inputs::terms_at_most(&robot.robot, &settings);
-    let logs = LogInput::read(&flags.logs, &robot.robot, &settings.log, terms, &progress)?;
+    let logs = LogInput::read(given, &robot.robot, &settings.log, terms, &progress)?;
     let heldout = LogInput::read(
         &settings.log.heldout,
         &robot.robot,
@@ -38,12 +50,7 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
         terms,
         &progress,
     )?;
-    let command = command(
-        model,
-        &flags.logs,
-        &settings.log.heldout,
-        &config.in_force(),
-    );
+    let command = command(model, given, &settings.log.heldout, &config.in_force());
     let job = Job {
         maker: Maker::Fit,
         command,

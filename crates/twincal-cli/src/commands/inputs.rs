@@ -9,7 +9,7 @@ use twincal::robot::Robot;
 use twincal::signal::Recording;
 use twincal_io::artifact::{sha256, sha256_of_file};
 use twincal_io::config::{LogSettings, Settings};
-use twincal_io::log::{LogOptions, parse_log, read_log};
+use twincal_io::log::{parse_log, read_log};
 use twincal_io::model::{Model, read_model};
 use twincal_io::report::FileHash;
 use twincal_io::{Error, memory};
@@ -69,7 +69,7 @@ impl LogInput {
         };
         for (path, name) in paths.iter().zip(display_names(paths)) {
             progress.step(&format!("reading {}", path.to_string_lossy()));
-            let (recording, findings) = read_log(path, robot, &options(settings))?;
+            let (recording, findings) = read_log(path, robot, &settings.options(path))?;
             rows += recording.time.len() as u64;
             let bytes = rows.saturating_mul(robot.dof() as u64 * 8 * (DOUBLES_PER_SAMPLE + terms));
             memory::require(
@@ -94,7 +94,8 @@ impl LogInput {
     ) -> Outcome<Self> {
         let mut input = Self::default();
         for (name, bytes) in logs {
-            let (recording, findings) = parse_log(name, bytes, robot, &options(settings))?;
+            let (recording, findings) =
+                parse_log(name, bytes, robot, &settings.options(Path::new(name)))?;
             input.push(recording, findings, name);
             input.files.push(FileHash {
                 name: (*name).into(),
@@ -146,12 +147,4 @@ pub(super) fn terms_at_most(robot: &Robot, settings: &Settings) -> u64 {
     // The generic family of three joints is the largest that is on by default.
     const GENERIC: u64 = 200;
     settings.calibration.library.terms.len() as u64 + 4 * robot.dof() as u64 + GENERIC
-}
-
-fn options(settings: &LogSettings) -> LogOptions {
-    LogOptions {
-        rate_hz: settings.rate_hz,
-        lenient: settings.lenient,
-        columns: settings.columns.clone(),
-    }
 }

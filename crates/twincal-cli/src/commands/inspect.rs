@@ -10,7 +10,10 @@ use crate::terminal::{Terminal, clean};
 use serde::Serialize;
 use twincal::Finding;
 use twincal::robot::{JointKind, Mimic, Robot};
-use twincal::signal::{LogOverview, describe, hardly_driven};
+use twincal::self_check::self_check;
+use twincal::signal::{
+    LogOverview, SignalSettings, Trajectory, align, choose_pipeline, describe, hardly_driven,
+};
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -70,6 +73,7 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
         found.extend(more);
     }
     found.extend(hardly_driven(&robot.robot, &logs.recordings));
+    found.extend(compare(&robot.robot, &logs, &settings.calibration.signal)?);
     require_strict(settings.log.strict, &found)?;
     let code = code_of(&found);
     let inspection = inspection(&robot.robot, robot.file.name, overviews, found);
@@ -79,6 +83,20 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
         print(&inspection, terminal);
     }
     Ok(code)
+}
+
+/// What log and model disagree about; nothing for logs that no pipeline fits (too short, standing still): `fit` says why.
+fn compare(robot: &Robot, logs: &LogInput, signal: &SignalSettings) -> Outcome<Vec<Finding>> {
+    let Ok((pipeline, _)) = choose_pipeline(robot, &logs.recordings, signal) else {
+        return Ok(Vec::new());
+    };
+    let trajectories: Vec<Trajectory> = logs
+        .recordings
+        .iter()
+        .filter_map(|recording| align(robot, recording, &pipeline).ok())
+        .map(|(trajectory, _)| trajectory)
+        .collect();
+    Ok(self_check(robot, &pipeline, &trajectories).map_err(|error| logs.as_given(error))?)
 }
 
 fn inspection(

@@ -12,7 +12,12 @@ use std::path::PathBuf;
 pub struct ConfigFile {
     /// The robot model.
     pub model: ModelTable,
-    /// The logs.
+    /// The logs: settings for all of them, [log], or one entry per log, [[log]].
+    #[serde(
+        deserialize_with = "super::log_forms::deserialize",
+        serialize_with = "super::log_forms::serialize"
+    )]
+    #[schemars(with = "super::log_forms::LogForms")]
     pub log: LogTable,
     /// Which column of a log is which channel; needed only where the column names do not say it.
     pub columns: ColumnsTable,
@@ -39,14 +44,25 @@ pub struct ConfigFile {
 pub struct ModelTable {
     /// URDF or MJCF file, relative to this config (flag `--model`).
     pub file: Option<PathBuf>,
-    /// Gravity in the base frame, m/s²; default: the file's, else [0, 0, -9.81].
+    /// Gravity in the base frame, m/s²; default: the file's, else [0, 0, -9.81]. With `base` it is gravity in the world.
     pub gravity: Option<[f64; 3]>,
+    /// How the base stands in the world: { rpy = [roll, pitch, yaw] } in rad, as in a URDF origin. On a ceiling
+    /// [3.14159265358979, 0, 0], on a wall [0, 1.5707963267949, 0].
+    pub base: Option<BaseTable>,
     /// Moving joints that the log does not have, and where they stand (rad or m).
     pub locked: BTreeMap<String, f64>,
     /// Count `<dynamics damping="…">` of a URDF as nominal torque. Vendors put solver values there: default false.
     pub use_urdf_friction: Option<bool>,
     /// What is accepted with a warning instead of being refused (flag `--allow`).
     pub allow: Option<Vec<Allow>>,
+}
+
+/// `[model] base`
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct BaseTable {
+    /// Roll, pitch and yaw about the world's fixed x, y and z axes, in this order, rad.
+    pub rpy: [f64; 3],
 }
 
 /// What may be accepted with a warning.
@@ -73,6 +89,55 @@ pub struct LogTable {
     pub lenient: Option<bool>,
     /// Refuse a log (exit code 2) where data was lost or degraded beyond the stated limit (flag `--strict`).
     pub strict: Option<bool>,
+    /// The entries, where the file has `[[log]]` instead.
+    #[serde(skip)]
+    pub entries: Vec<LogEntry>,
+}
+
+/// `[[log]]`: one log and what is known of it. Without LOG on the command line these are the logs; with LOG an entry
+/// speaks of the log that is the same file.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct LogEntry {
+    /// The log, relative to this config.
+    pub file: PathBuf,
+    /// What the robot carried beyond its model: { mass = kg, com = [x, y, z] } in the payload frame, m; "unknown": to be
+    /// found. Default: nothing.
+    pub payload: Option<PayloadKey>,
+    /// Score on this log instead of fitting it; default false.
+    pub heldout: Option<bool>,
+    /// Sampling rate, Hz: replaces time stamps that are missing or wrong (flag `--rate`).
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub rate_hz: Option<f64>,
+    /// Drop and count rows that cannot be read instead of refusing the file (flag `--lenient`).
+    pub lenient: Option<bool>,
+}
+
+/// The word "unknown".
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum UnknownWord {
+    /// To be found in the log.
+    #[serde(rename = "unknown")]
+    Unknown,
+}
+
+/// A payload or "unknown".
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "expected { mass = kg, com = [x, y, z] } or \"unknown\""
+)]
+pub enum PayloadKey {
+    /// As given.
+    Known {
+        /// kg.
+        #[schemars(extend("minimum" = 0))]
+        mass: f64,
+        /// Centre of mass in the payload frame, m.
+        com: [f64; 3],
+    },
+    /// To be found in the log.
+    Unknown(UnknownWord),
 }
 
 /// `[columns]`

@@ -5,15 +5,17 @@
 //! [`Config::file`] before that: a flag overrides its key.
 
 mod file;
+mod log_forms;
 mod settings;
 mod unknown_keys;
 
 pub use file::{
-    Allow, AutoWord, CheckTable, ColumnsTable, ConfigFile, Friction, InclusionTable,
-    InferenceTable, LibraryTable, LogTable, MethodWord, ModelTable, NoisePrior, NoiseTable,
-    NoiseWord, NumberOrAuto, OutputTable, PriorTable, SignalTable, Slab,
+    Allow, AutoWord, BaseTable, CheckTable, ColumnsTable, ConfigFile, Friction, InclusionTable,
+    InferenceTable, LibraryTable, LogEntry, LogTable, MethodWord, ModelTable, NoisePrior,
+    NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PriorTable, SignalTable, Slab,
+    UnknownWord,
 };
-pub use settings::{Gates, LogSettings, Settings};
+pub use settings::{Gates, LogSettings, OneLog, Settings};
 
 use crate::error::{Error, Place, Result};
 use std::path::{Path, PathBuf};
@@ -111,6 +113,10 @@ impl Config {
         let mut file = self.file.clone();
         file.model.file = None;
         file.log.heldout = None;
+        for entry in &mut file.log.entries {
+            let name = entry.file.file_name().unwrap_or_default();
+            entry.file = PathBuf::from(name.to_string_lossy().into_owned());
+        }
         file.inference.threads = None;
         file.output = OutputTable::default();
         match toml::Table::try_from(&file) {
@@ -128,6 +134,8 @@ impl Config {
         self.file.model.file.iter_mut().for_each(join);
         self.file.output.directory.iter_mut().for_each(join);
         self.file.log.heldout.iter_mut().flatten().for_each(join);
+        let entries = self.file.log.entries.iter_mut();
+        entries.for_each(|entry| join(&mut entry.file));
     }
 
     /// Place of a dotted key in the file, if it stands there.
@@ -185,6 +193,10 @@ fn key_of(table: &DeTable<'_>, offset: usize, path: &str) -> Option<String> {
         };
         let inside = match value.get_ref() {
             DeValue::Table(inner) => key_of(inner, offset, &name),
+            DeValue::Array(items) => items.iter().find_map(|item| match item.get_ref() {
+                DeValue::Table(inner) => key_of(inner, offset, &name),
+                _ => None,
+            }),
             _ => None,
         };
         inside.or_else(|| {
@@ -202,6 +214,14 @@ fn offset_of(table: &DeTable<'_>, key: &str) -> Option<usize> {
     match (rest, value.get_ref()) {
         (None, _) => Some(value.span().start),
         (Some(rest), DeValue::Table(inner)) => offset_of(inner, rest).or(Some(value.span().start)),
+        (Some(rest), DeValue::Array(items)) => {
+            let (index, rest) = rest.split_once('.').unwrap_or((rest, ""));
+            let item = items.get(index.parse::<usize>().ok()?)?;
+            match item.get_ref() {
+                DeValue::Table(inner) => offset_of(inner, rest).or(Some(item.span().start)),
+                _ => Some(item.span().start),
+            }
+        }
         (Some(_), _) => Some(value.span().start),
     }
 }

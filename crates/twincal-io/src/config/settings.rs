@@ -1,16 +1,19 @@
 //! From keys to settings: defaults filled in, ranges checked.
 
-use super::{Allow, Config, Friction, MethodWord, NoisePrior, NoiseWord, NumberOrAuto, Slab};
+use super::{
+    Allow, Config, Friction, MethodWord, NoisePrior, NoiseWord, NumberOrAuto, PayloadKey, Slab,
+};
 use crate::error::Result;
+use crate::log::LogOptions;
 use crate::model::ModelSettings;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use twincal::calibrate::CalibrationSettings;
 use twincal::infer::{Choice, InferenceSettings};
 use twincal::likelihood::{NoiseModel, NoiseSettings};
 use twincal::prior::{Inclusion, PriorSettings};
-use twincal::signal::{Auto, SignalSettings};
+use twincal::signal::{Auto, Payload, SignalSettings};
 use twincal::term::LibrarySettings;
 
 /// `[log]` and `[columns]` with defaults.
@@ -26,6 +29,46 @@ pub struct LogSettings {
     pub strict: bool,
     /// Column names by channel and joint.
     pub columns: super::ColumnsTable,
+    /// What is known of single logs (`[[log]]`), in the config's order.
+    pub entries: Vec<OneLog>,
+}
+
+/// `[[log]]` with defaults.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OneLog {
+    /// The log.
+    pub file: PathBuf,
+    /// What the robot carried.
+    pub payload: Payload,
+    /// Scored on instead of fitted.
+    pub heldout: bool,
+    /// Sampling rate that replaces the time stamps, Hz.
+    pub rate_hz: Option<f64>,
+    /// Drop and count unreadable rows.
+    pub lenient: bool,
+}
+
+impl LogSettings {
+    /// How a log is read: what its entry says (the same file by any path), else what holds for all.
+    pub fn options(&self, path: &Path) -> LogOptions {
+        let same = |entry: &&OneLog| {
+            entry.file == path
+                || matches!((entry.file.canonicalize(), path.canonicalize()), (Ok(a), Ok(b)) if a == b)
+        };
+        let entry = self.entries.iter().find(same);
+        LogOptions {
+            rate_hz: self.rate_hz.or(entry.and_then(|entry| entry.rate_hz)),
+            lenient: self.lenient || entry.is_some_and(|entry| entry.lenient),
+            columns: self.columns.clone(),
+            payload: entry.map_or(Payload::None, |entry| entry.payload),
+        }
+    }
+
+    /// The logs that the config itself names, to be fitted.
+    pub fn named(&self) -> Vec<PathBuf> {
+        let fitted = self.entries.iter().filter(|entry| !entry.heldout);
+        fitted.map(|entry| entry.file.clone()).collect()
+    }
 }
 
 /// `[check]` with defaults; stored in the twin.
@@ -94,6 +137,9 @@ impl Config {
         for value in table.gravity.iter().flatten() {
             self.number("model.gravity", *value, |_| true, "finite numbers in m/s²")?;
         }
+        for angle in table.base.iter().flat_map(|base| base.rpy) {
+            self.number("model.base.rpy", angle, |_| true, "finite angles in rad")?;
+        }
         for (joint, position) in &table.locked {
             self.number(
                 &format!("model.locked.{joint}"),
@@ -104,6 +150,7 @@ impl Config {
         }
         Ok(ModelSettings {
             gravity: table.gravity,
+            base_rpy: table.base.map(|base| base.rpy),
             use_urdf_friction: table.use_urdf_friction.unwrap_or(false),
             allow_unphysical: self.allows(Allow::UnphysicalInertia),
         })
@@ -128,13 +175,55 @@ impl Config {
                 "a positive number of Hz",
             )?;
         }
+        let entries = self.entries()?;
+        let heldout = table.heldout.clone().unwrap_or_else(|| {
+            let heldout = entries.iter().filter(|entry| entry.heldout);
+            heldout.map(|entry| entry.file.clone()).collect()
+        });
         Ok(LogSettings {
-            heldout: table.heldout.clone().unwrap_or_default(),
+            heldout,
             rate_hz: table.rate_hz,
             lenient: table.lenient.unwrap_or(false),
             strict: table.strict.unwrap_or(false),
             columns: self.file.columns.clone(),
+            entries,
         })
+    }
+
+    fn entries(&self) -> Result<Vec<OneLog>> {
+        let mut entries: Vec<OneLog> = Vec::new();
+        for (index, entry) in self.file.log.entries.iter().enumerate() {
+            let key = |name: &str| format!("log.{index}.{name}");
+            if entries.iter().any(|other| other.file == entry.file) {
+                let problem = format!("`{}` has two entries", entry.file.display());
+                return Err(self.out_of_range(&key("file"), problem, "keep one of them"));
+            }
+            if let Some(rate) = entry.rate_hz {
+                let range = "a positive number of Hz";
+                self.number(&key("rate_hz"), rate, |rate| rate > 0.0, range)?;
+            }
+            let payload = match entry.payload {
+                None => Payload::None,
+                Some(PayloadKey::Unknown(_)) => Payload::Unknown,
+                Some(PayloadKey::Known { mass, com }) => {
+                    let range = "a mass of 0 kg or more";
+                    self.number(&key("payload.mass"), mass, |mass| mass >= 0.0, range)?;
+                    for value in com {
+                        let range = "finite coordinates in m";
+                        self.number(&key("payload.com"), value, |_| true, range)?;
+                    }
+                    Payload::Known { mass, com }
+                }
+            };
+            entries.push(OneLog {
+                file: entry.file.clone(),
+                payload,
+                heldout: entry.heldout.unwrap_or(false),
+                rate_hz: entry.rate_hz,
+                lenient: entry.lenient.unwrap_or(false),
+            });
+        }
+        Ok(entries)
     }
 
     fn gates(&self) -> Result<Gates> {

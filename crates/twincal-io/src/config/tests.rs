@@ -2,7 +2,7 @@
 
 use super::*;
 use twincal::prior::Inclusion;
-use twincal::signal::Auto;
+use twincal::signal::{Auto, Payload};
 
 fn message(text: &str) -> String {
     match Config::parse("twincal.toml", text).and_then(|config| config.settings()) {
@@ -297,4 +297,146 @@ fn settings_in_force_are_the_given_keys_without_paths() {
         "[inference]\nseed = 3\n\n[library]\nfriction = []\n"
     );
     assert_eq!(Config::default().in_force(), "");
+}
+
+#[test]
+fn log_is_a_table_or_one_entry_per_log() {
+    let text = "[[log]]\nfile = \"a.csv\"\npayload = { mass = 1.2, com = [0.0, 0.0, 0.06] }\n\
+                [[log]]\nfile = \"b.csv\"\npayload = \"unknown\"\nrate_hz = 250\nlenient = true\n\
+                [[log]]\nfile = \"c.csv\"\nheldout = true\n";
+    let mut config = Config::parse("x", text).unwrap();
+    let log = config.settings().unwrap().log;
+    assert_eq!(
+        log.named(),
+        [PathBuf::from("a.csv"), PathBuf::from("b.csv")]
+    );
+    assert_eq!(log.heldout, [PathBuf::from("c.csv")]);
+    let options = |name: &str| log.options(Path::new(name));
+    let known = Payload::Known {
+        mass: 1.2,
+        com: [0.0, 0.0, 0.06],
+    };
+    assert_eq!(options("a.csv").payload, known);
+    let b = options("b.csv");
+    assert_eq!(
+        (b.payload, b.rate_hz, b.lenient),
+        (Payload::Unknown, Some(250.0), true)
+    );
+    let other = options("d.csv");
+    assert_eq!(
+        (other.payload, other.rate_hz, other.lenient),
+        (Payload::None, None, false)
+    );
+    // The report's settings say the same when they are read again; flags hold for every log.
+    config.file.log.rate_hz = Some(100.0);
+    let again = Config::parse("x", &config.in_force())
+        .unwrap()
+        .settings()
+        .unwrap()
+        .log;
+    assert_eq!(again.options(Path::new("a.csv")).payload, known);
+    assert!(
+        again
+            .entries
+            .iter()
+            .all(|entry| entry.rate_hz == Some(100.0))
+    );
+    assert!(again.entries[1].lenient && again.entries[2].heldout);
+    // A held-out flag wins over entries.
+    config.file.log.heldout = Some(vec!["e.csv".into()]);
+    assert_eq!(
+        config.settings().unwrap().log.heldout,
+        [PathBuf::from("e.csv")]
+    );
+}
+
+#[test]
+fn an_entry_speaks_of_the_same_file_by_any_path() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("logs")).unwrap();
+    std::fs::write(folder.path().join("logs/a.csv"), "").unwrap();
+    let path = folder.path().join("twincal.toml");
+    std::fs::write(
+        &path,
+        "[[log]]\nfile = \"logs/a.csv\"\npayload = \"unknown\"\n",
+    )
+    .unwrap();
+    let log = Config::read(&path).unwrap().settings().unwrap().log;
+    assert_eq!(log.named(), [folder.path().join("logs/a.csv")]);
+    let other = folder.path().join("logs/../logs/a.csv");
+    assert_eq!(log.options(&other).payload, Payload::Unknown);
+    std::fs::copy(
+        folder.path().join("logs/a.csv"),
+        folder.path().join("a.csv"),
+    )
+    .unwrap();
+    assert_eq!(
+        log.options(&folder.path().join("a.csv")).payload,
+        Payload::None
+    );
+}
+
+#[test]
+fn wrong_entries_and_bases_name_key_and_place() {
+    for (text, place, words) in [
+        (
+            "[[log]]\nfile = \"a.csv\"\npaylod = 3\n",
+            "twincal.toml:3:1",
+            "unknown key `paylod` in [log]; did you mean `payload`?",
+        ),
+        (
+            "[[log]]\nfile = \"a.csv\"\npayload = { mas = 1.0, com = [0, 0, 0] }\n",
+            "twincal.toml:3:13",
+            "unknown key `mas` in [log.payload]; did you mean `mass`?",
+        ),
+        (
+            "[[log]]\nfile = \"a.csv\"\npayload = 1.2\n",
+            "twincal.toml:3:11",
+            "expected { mass = kg, com = [x, y, z] } or \"unknown\"",
+        ),
+        (
+            "[[log]]\nfile = \"a.csv\"\npayload = { mass = -1.0, com = [0.0, 0.0, 0.0] }\n",
+            "twincal.toml:3:",
+            "key `log.0.payload.mass`: -1 is out of range",
+        ),
+        (
+            "[[log]]\nfile = \"a.csv\"\n[[log]]\nfile = \"b.csv\"\nrate_hz = 0.0\n",
+            "twincal.toml:5:11",
+            "key `log.1.rate_hz`: 0 is out of range",
+        ),
+        (
+            "[[log]]\nfile = \"a.csv\"\n[[log]]\nfile = \"a.csv\"\n",
+            "twincal.toml:4:8",
+            "`a.csv` has two entries",
+        ),
+        (
+            "[[log]]\npayload = \"unknown\"\n",
+            "twincal.toml:1:1",
+            "missing field `file`",
+        ),
+        (
+            "log = 3\n",
+            "twincal.toml:1:7",
+            "a table [log] or entries [[log]]",
+        ),
+        (
+            "[log]\nrate_hz = \"fast\"\n",
+            "twincal.toml:2:11",
+            "key `log.rate_hz`",
+        ),
+        (
+            "[model]\nbase = { rpy = [0.0, inf, 0.0] }\n",
+            "twincal.toml:2:16",
+            "key `model.base.rpy`: inf is out of range",
+        ),
+        (
+            "[model]\nbase = { rpi = [0.0, 0.0, 0.0] }\n",
+            "twincal.toml:2:10",
+            "did you mean `rpy`?",
+        ),
+    ] {
+        let message = message(text);
+        assert!(message.starts_with(place), "{text}\n{message}");
+        assert!(message.contains(words), "{text}\n{message}");
+    }
 }

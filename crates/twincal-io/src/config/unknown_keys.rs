@@ -68,9 +68,25 @@ fn descend(
     path: &str,
     found: &mut Vec<Unknown>,
 ) {
-    if let DeValue::Table(table) = value.get_ref() {
-        walk(table, schema, root, path, found);
+    match value.get_ref() {
+        DeValue::Table(table) => walk(table, schema, root, path, found),
+        DeValue::Array(values) => {
+            if let Some(item) = items(schema) {
+                for value in values {
+                    descend(value, item, root, path, found);
+                }
+            }
+        }
+        _ => {}
     }
+}
+
+/// Schema of a list's items.
+fn items(schema: &Value) -> Option<&Value> {
+    schema.get("items").or_else(|| {
+        let alternatives = schema.get("anyOf").and_then(Value::as_array)?;
+        alternatives.iter().find_map(items)
+    })
 }
 
 /// Known keys of a table: `None` where any key is allowed (a map by joint name).

@@ -19,7 +19,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 use twincal::robot::Robot;
-use twincal::signal::{Channels, Recording};
+use twincal::signal::{Channels, Payload, Recording};
 use twincal::{Finding, Severity};
 
 /// Most columns of a table.
@@ -36,6 +36,8 @@ pub struct LogOptions {
     pub lenient: bool,
     /// Which column is which channel where the names do not say it (`[columns]`).
     pub columns: ColumnsTable,
+    /// What the robot carried (`[[log]] payload`); handed on as it is.
+    pub payload: Payload,
 }
 
 /// A table's selected columns as they stand in the file; missing cells are NaN.
@@ -224,6 +226,7 @@ pub(crate) fn assemble(
         name: name.to_owned(),
         time,
         joints,
+        payload: options.payload,
     };
     refuse_empty_columns(name, &recording, selection)?;
     Ok(recording)

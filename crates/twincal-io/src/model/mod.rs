@@ -11,14 +11,18 @@ use crate::error::{Error, Place, Result};
 use std::collections::BTreeMap;
 use std::path::Path;
 use twincal::Finding;
+use twincal::robot::spatial::{apply, roll_pitch_yaw, transpose};
 use twincal::robot::{Robot, RobotDescription};
 use xml::{Document, Element};
 
 /// What the user may say about a model.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ModelSettings {
-    /// Gravity in the base frame, m/s², instead of the file's (URDF has none: 0, 0, −9.81).
+    /// Gravity, m/s², instead of the file's (URDF has none: 0, 0, −9.81): in the base frame, with `base_rpy` in the world's.
     pub gravity: Option<[f64; 3]>,
+    /// Orientation of the base (URDF's root link, MJCF's world) in the real world, as URDF's fixed-axis roll, pitch and yaw,
+    /// rad: R = R_z(yaw) R_y(pitch) R_x(roll). Gravity in the base frame is then Rᵀ g.
+    pub base_rpy: Option<[f64; 3]>,
     /// Count the `damping` of URDF `<dynamics>` as nominal torque.
     pub use_urdf_friction: bool,
     /// Physically impossible inertias are a finding instead of an error.
@@ -136,6 +140,10 @@ fn parse(
     };
     if let Some(gravity) = settings.gravity {
         description.gravity = gravity;
+    }
+    if let Some(angles) = settings.base_rpy {
+        let base = roll_pitch_yaw(angles);
+        description.gravity = apply(&transpose(&base), description.gravity);
     }
     description.allow_unphysical = settings.allow_unphysical;
     Ok(Model {

@@ -34,6 +34,7 @@ pub(super) fn read(
             _ => {}
         }
     }
+    report_shapes_without_inertia(document, root, &joints, &mut findings);
     define_world(&mut links, &joints, &mut findings);
     let name = root.text("name").unwrap_or("robot").to_string();
     Ok((
@@ -208,6 +209,35 @@ fn joint(
         }
     }
     Ok(joint)
+}
+
+/// A moving link that has a shape but no `<inertial>` weighs nothing here; meshes are never opened.
+fn report_shapes_without_inertia(
+    document: &Document,
+    root: &Element,
+    joints: &[JointDescription],
+    findings: &mut Vec<Finding>,
+) {
+    for link in document.children(root, "link") {
+        let has = |child: &str| document.child(link, child).is_some();
+        let name = link.text("name").unwrap_or("");
+        let moves = joints
+            .iter()
+            .any(|joint| joint.kind != JointKind::Fixed && joint.child == name);
+        if moves && (has("visual") || has("collision")) && !has("inertial") {
+            let message = format!(
+                "link `{name}` has a shape but no <inertial>: it weighs nothing in the nominal torque; compute mass, centre of mass \
+                 and inertia from its mesh (MeshLab, or the CAD program) and add them"
+            );
+            findings.push(Finding::new(
+                Severity::Warning,
+                "link_without_inertia",
+                name,
+                message,
+                1,
+            ));
+        }
+    }
 }
 
 /// Drake's convention: a link `world` that is used and not defined is the fixed base.

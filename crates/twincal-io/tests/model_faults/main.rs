@@ -452,6 +452,38 @@ fn case_84_other_formats_say_how_to_convert() {
 }
 
 #[test]
+fn a_moving_shape_without_inertia_is_said() {
+    let start = URDF.find("<inertial>").unwrap();
+    let end = URDF.find("</inertial>").unwrap() + "</inertial>".len();
+    let text = format!("{}{}", &URDF[..start], &URDF[end..]);
+    let (_, findings) = build("arm.urdf", text.as_bytes()).unwrap();
+    assert!(codes(&findings).contains(&"link_without_inertia"));
+    says(
+        &findings[1].message,
+        &["link `upper`", "<inertial>", "mesh"],
+    );
+    // What stands on the base needs none.
+    let fixed = text.replace("type=\"revolute\"", "type=\"fixed\"");
+    let (_, findings) = build("arm.urdf", fixed.as_bytes()).unwrap();
+    assert!(!codes(&findings).contains(&"link_without_inertia"));
+}
+
+#[test]
+fn case_20_an_actuators_gear_is_said() {
+    let geared = MJCF.replace(
+        "</worldbody>",
+        "</worldbody><actuator><motor name=\"m\" joint=\"elbow\" gear=\"50\" armature=\"1e-4\"/></actuator>",
+    );
+    let (robot, findings) = build("arm.xml", geared.as_bytes()).unwrap();
+    assert_eq!(codes(&findings), ["actuator_gear"]);
+    says(
+        &findings[0].message,
+        &["gear 50", "joint `elbow`", "50 × the actuator's force"],
+    );
+    assert_eq!(robot.joint(1).armature, 0.25);
+}
+
+#[test]
 fn an_undefined_world_is_the_fixed_base() {
     let text = URDF
         .replace("<link name=\"base\"/>", "<joint name=\"weld\" type=\"fixed\"><parent link=\"world\"/><child link=\"base\"/></joint><link name=\"base\"/>");

@@ -62,6 +62,14 @@ impl Data {
         })
     }
 
+    /// Trajectories of all logs.
+    pub(super) fn trajectories(&self) -> impl Iterator<Item = &Trajectory> {
+        self.fit
+            .iter()
+            .chain(&self.heldout)
+            .map(|log| &log.trajectory)
+    }
+
     /// Drops the columns that are zero on all fit logs, e.g. of joints that never move; returns their indices.
     pub(super) fn drop_zero_columns(&mut self, library: Library) -> (Library, Vec<usize>) {
         let mut square = vec![0.0_f64; library.columns().len()];

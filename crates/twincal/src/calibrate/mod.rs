@@ -1,6 +1,7 @@
 //! The whole road, from a robot and its logs to a calibrated twin, in one function that reads like the paper.
 
 mod data;
+mod heavy_tails;
 mod held_out;
 mod result;
 mod summary;
@@ -21,6 +22,7 @@ use crate::plug_in::{
 use crate::posterior::Method;
 use crate::prior::PriorSettings;
 use crate::robot::Robot;
+use crate::self_check::self_check;
 use crate::signal::{Auto, Recording, SignalSettings, choose_pipeline, hardly_driven};
 use crate::term::{Library, LibrarySettings};
 use crate::twin::Twin;
@@ -119,6 +121,7 @@ pub fn calibrate(
 
     // eq. (1)–(4): residual torque and Euler–Lagrange columns, filtered alike
     let mut data = Data::read(robot, &library, &pipeline, logs, heldout)?;
+    findings.extend(self_check(robot, &pipeline, data.trajectories())?);
     let (library, zero_columns) = data.drop_zero_columns(library);
     data.require_enough(robot)?;
     findings.append(&mut data.findings);
@@ -134,6 +137,8 @@ pub fn calibrate(
     let fitted = estimate(&training, &columns, settings)?;
     require_agreement(&fitted.fit, settings)?;
     findings.extend(findings_of_fit(robot, &fitted, settings, &training));
+    let mean = &fitted.fit.posterior.mean;
+    findings.extend(heavy_tails::findings(robot, &training, mean));
 
     // τ_calib = τ_nom + Φβ̂ with intervals, and held-out truth
     let out_of_band = data.out_of_band(robot, &library, &pipeline, &fitted.fit.posterior.mean)?;

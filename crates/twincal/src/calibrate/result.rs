@@ -114,9 +114,9 @@ pub struct LogSummary {
     pub rate_hz: f64,
     /// Segments after cutting.
     pub segments: u64,
-    /// Rows used per joint (standstill excluded).
+    /// Rows used per joint (standstill and saturated torque excluded).
     pub rows: Vec<u64>,
-    /// Rows masked as standstill per joint.
+    /// Rows masked per joint: standstill and saturated torque.
     pub standstill: Vec<u64>,
 }
 

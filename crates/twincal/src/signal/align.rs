@@ -3,6 +3,7 @@
 use super::choose::{COLUMN_LIMIT, MOTION_LIMIT, require_derivatives};
 use super::convolve::correlate;
 use super::fir::{MotionKernels, column_half_seconds, motion_half_samples, motion_half_seconds};
+use super::mask::Saturated;
 use super::prepare::{JointFacts, Piece, prepare, report_short};
 use super::standstill::standstill;
 use super::{Channels, DerivedFrom, LoggedSamples, Pipeline, Recording, Segment, Trajectory};
@@ -38,6 +39,7 @@ pub(crate) fn align(
             .iter()
             .map(|piece| as_logged(piece, with_tau))
             .collect();
+        Saturated::find(joints, log, pipeline).mask(log, &mut trajectory, &mut findings);
         return Ok((trajectory, findings));
     }
     let rate = 1.0 / prepared.interval;
@@ -104,6 +106,7 @@ pub(crate) fn align(
         0,
     ));
     report_standstill(joints, log, &trajectory, &mut findings);
+    Saturated::find(joints, log, pipeline).mask(log, &mut trajectory, &mut findings);
     Ok((trajectory, findings))
 }
 

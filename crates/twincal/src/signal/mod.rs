@@ -8,10 +8,13 @@ mod cutoff;
 mod describe;
 mod encoder;
 pub(crate) mod fir;
+mod mask;
 mod prepare;
+mod saturation;
 mod spectrum;
 pub(crate) mod spline;
 mod standstill;
+mod units;
 mod unwrap;
 
 pub use describe::{JointOverview, LogOverview, describe, hardly_driven};
@@ -53,6 +56,24 @@ pub struct Channels {
     pub tau: Option<Vec<f64>>,
 }
 
+/// What a robot carried in a log, beyond its model.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Payload {
+    /// Nothing that the model does not have.
+    #[default]
+    None,
+    /// A point mass (a body whose own tensor is left out) at a known place.
+    Known {
+        /// kg.
+        mass: f64,
+        /// Centre of mass in the payload frame, m.
+        com: [f64; 3],
+    },
+    /// Something: mass and centre of mass are to be found in these logs.
+    Unknown,
+}
+
 /// A log as read: joints already matched to the robot's q1…qn, values untouched (NaN included).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
@@ -62,6 +83,8 @@ pub struct Recording {
     pub time: Vec<f64>,
     /// One entry per moving joint of the robot, in order.
     pub joints: Vec<Channels>,
+    /// What the robot carried.
+    pub payload: Payload,
 }
 
 /// What an acceleration that is not logged is derived from.
@@ -108,7 +131,7 @@ pub struct Segment {
     pub qdd: Vec<f64>,
     /// Torque as logged (resampled if needed), unfiltered; empty if the log has none.
     pub tau: Vec<f64>,
-    /// Standstill per joint and sample.
+    /// Per joint and sample: the joint stands still or its torque is saturated, so that the torque says nothing.
     pub standstill: Vec<bool>,
     /// Sampling interval, s.
     pub interval: f64,

@@ -2,6 +2,7 @@
 
 use super::clock::{Run, even_interval, read_clock, report_jitter};
 use super::spline::resample;
+use super::units::refuse_degrees;
 use super::unwrap::unwrap_angle;
 use super::{Channels, Recording};
 use crate::error::{Error, Finding, Result, Severity};
@@ -19,15 +20,24 @@ pub(crate) struct JointFacts {
     pub(crate) name: String,
     /// Only angles are unfolded.
     pub(crate) kind: JointKind,
+    /// Upper less lower limit where the model states both, rad or m.
+    pub(crate) range: Option<f64>,
+    /// Largest torque that the model states, N·m or N.
+    pub(crate) effort: Option<f64>,
 }
 
 /// The moving joints of a robot.
 pub(crate) fn joint_facts(robot: &Robot) -> Vec<JointFacts> {
     let names = robot.joint_names();
     (0..robot.dof())
-        .map(|joint| JointFacts {
-            name: names[joint].to_owned(),
-            kind: robot.joint_kind(joint),
+        .map(|joint| {
+            let limits = robot.joint(joint).limits;
+            JointFacts {
+                name: names[joint].to_owned(),
+                kind: robot.joint_kind(joint),
+                range: limits.lower.zip(limits.upper).map(|(low, high)| high - low),
+                effort: limits.effort,
+            }
         })
         .collect()
 }
@@ -77,6 +87,7 @@ pub(crate) fn prepare(
     let names: Vec<String> = joints.iter().map(|j| j.name.clone()).collect();
     let minimum = if every_row { 2 } else { MINIMUM_SAMPLES };
     let clock = read_clock(log, &names, minimum, every_row, findings)?;
+    refuse_degrees(joints, log)?;
     let unfolded = unfold(joints, log, &clock.runs, every_row, findings);
     let channels = |joint: usize, run: &Run| Channels {
         q: unfolded[joint].as_ref().map_or_else(

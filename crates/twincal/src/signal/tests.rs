@@ -11,6 +11,8 @@ fn joints() -> Vec<JointFacts> {
         .map(|name| JointFacts {
             name: name.into(),
             kind: JointKind::Revolute,
+            range: None,
+            effort: None,
         })
         .to_vec()
 }
@@ -67,6 +69,7 @@ fn recording(
         name: "run".into(),
         time,
         joints,
+        payload: Payload::None,
     }
 }
 

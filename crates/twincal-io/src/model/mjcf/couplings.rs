@@ -147,27 +147,11 @@ fn equality<'a>(tree: &mut Tree<'a>, joints: &Joints, element: &'a Element) -> R
     Ok(())
 }
 
-/// Rotor inertia and damping that an actuator adds to its joint: gear² times its own.
+/// Rotor inertia and damping that an actuator adds to its joint: gear² times its own. A gear other than 1 is said: columns
+/// of torque are meant at the joint, which is gear × control of a motor.
 fn actuator<'a>(tree: &mut Tree<'a>, joints: &Joints, element: &'a Element) -> Result<()> {
     let view = tree.defaults.view(tree.document, element, None)?;
     let (armature, damping) = (view.linear("armature")?, view.linear("damping")?);
-    if armature == 0.0 && damping == 0.0 {
-        return Ok(());
-    }
-    let Some(joint) = element.text("joint") else {
-        let name = element.text("name").unwrap_or("").to_string();
-        let message = format!(
-            "actuator `{name}` drives no single joint: its inertia and damping are not used"
-        );
-        tree.findings.push(Finding::new(
-            Severity::Warning,
-            "actuator_not_used",
-            name,
-            message,
-            1,
-        ));
-        return Ok(());
-    };
     let gear = match view.get("gear") {
         Some((element, attribute)) => tree
             .document
@@ -177,8 +161,37 @@ fn actuator<'a>(tree: &mut Tree<'a>, joints: &Joints, element: &'a Element) -> R
             .unwrap_or(1.0),
         None => 1.0,
     };
-    let joint = find(tree, joints, element, joint)?;
-    tree.joints[joint].armature += gear * gear * armature;
-    tree.joints[joint].damping += gear * gear * damping;
+    let name = element.text("name").unwrap_or("").to_string();
+    let Some(joint) = element.text("joint") else {
+        if armature != 0.0 || damping != 0.0 {
+            let message = format!(
+                "actuator `{name}` drives no single joint: its inertia and damping are not used"
+            );
+            tree.findings.push(Finding::new(
+                Severity::Warning,
+                "actuator_not_used",
+                name,
+                message,
+                1,
+            ));
+        }
+        return Ok(());
+    };
+    let index = find(tree, joints, element, joint)?;
+    tree.joints[index].armature += gear * gear * armature;
+    tree.joints[index].damping += gear * gear * damping;
+    if gear != 1.0 {
+        let message = format!(
+            "actuator `{name}` has gear {gear}: torque columns are those of joint `{joint}`, which is {gear} × the actuator's force; \
+             the gear itself changes no nominal torque"
+        );
+        tree.findings.push(Finding::new(
+            Severity::Note,
+            "actuator_gear",
+            joint,
+            message,
+            1,
+        ));
+    }
     Ok(())
 }

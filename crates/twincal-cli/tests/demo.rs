@@ -1,0 +1,43 @@
+//! `twincal demo` as a new user runs it.
+#![allow(clippy::unwrap_used, reason = "a broken test may panic")]
+
+mod common;
+
+use common::run;
+use std::fs;
+
+#[test]
+fn demo_ends_with_its_report_and_replaces_only_its_own_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let done = run(folder.path(), ["demo"]).expect(0);
+    assert_eq!(
+        done.out.lines().last(),
+        Some("twincal-demo/report.html"),
+        "{}",
+        done.out
+    );
+    let read = |name: &str| fs::read(folder.path().join("twincal-demo").join(name)).unwrap();
+    let report = read("report.html");
+    assert!(report.starts_with(b"<!doctype html>") || report.starts_with(b"<!DOCTYPE html>"));
+    // Its own earlier output is replaced, with the same result.
+    let result = read("result.json");
+    run(folder.path(), ["demo"]).expect(0);
+    assert!(read("result.json") == result && read("report.html") == report);
+    // What it says can be repeated where it lies.
+    let twin = run(
+        &folder.path().join("twincal-demo"),
+        ["check", "heldout1.parquet", "--twin", "."],
+    );
+    assert!(matches!(twin.code, Some(0 | 1)), "{}", twin.err);
+    // A file of the user stays, and so does an output of `fit`.
+    fs::write(folder.path().join("twincal-demo/notes.txt"), "mine").unwrap();
+    run(folder.path(), ["demo"])
+        .expect(2)
+        .says(&["twincal-demo", "notes.txt"]);
+    assert_eq!(read("notes.txt"), b"mine");
+    let other = common::fitted_copy();
+    fs::rename(other.path().join("twin"), other.path().join("twincal-demo")).unwrap();
+    run(other.path(), ["demo"])
+        .expect(2)
+        .says(&["twincal-demo"]);
+}

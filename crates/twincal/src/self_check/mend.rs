@@ -1,0 +1,129 @@
+//! The reading of the log that model and friction explain best: signs turned, joints exchanged.
+
+use super::explain::{Explained, Reading, explain};
+use super::sample::Sample;
+use crate::robot::Robot;
+
+/// Share of torque left beyond which it is worth looking for another reading.
+const DOUBTFUL: f64 = 0.1;
+/// Share left beyond which a joint counts as unexplained, and below which as explained.
+const BAD: f64 = 0.4;
+const GOOD: f64 = 0.2;
+/// Least gain in Σ ln(share left) where a joint was unexplained: e² ≈ 7 times less in all.
+const LEAST_GAIN: f64 = 2.0;
+/// Least gain where every joint was explained somehow: e⁶ ≈ 400 times less.
+const GREAT_GAIN: f64 = 6.0;
+/// A joint may not get worse by more than this factor, unless it stays explained.
+const WORSE: f64 = 1.5;
+/// Shares below this are alike.
+const FLOOR: f64 = 1e-3;
+/// Least gain of a single step on the way.
+const LEAST_STEP: f64 = 1.0;
+/// By how much a step that changes more must be better than one that changes less.
+const PREFERENCE: f64 = 0.3;
+
+/// One change of a reading, ordered by how much it changes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Step {
+    TurnTorque(usize),
+    TurnMotion(usize),
+    TurnBoth(usize),
+    SwapTorque(usize, usize),
+    SwapBoth(usize, usize),
+    SwapMotion(usize, usize),
+}
+
+impl Step {
+    fn all(dof: usize) -> Vec<Self> {
+        let joints = || 0..dof;
+        let pairs = || joints().flat_map(move |a| (a + 1..dof).map(move |b| (a, b)));
+        let mut steps: Vec<Self> = joints().map(Self::TurnTorque).collect();
+        steps.extend(joints().map(Self::TurnMotion));
+        steps.extend(joints().map(Self::TurnBoth));
+        steps.extend(pairs().map(|(a, b)| Self::SwapBoth(a, b)));
+        steps.extend(pairs().map(|(a, b)| Self::SwapTorque(a, b)));
+        steps.extend(pairs().map(|(a, b)| Self::SwapMotion(a, b)));
+        steps
+    }
+
+    fn apply(self, reading: &Reading) -> Reading {
+        let mut new = reading.clone();
+        match self {
+            Self::TurnTorque(j) => new.torque[j].1 *= -1.0,
+            Self::TurnMotion(j) => new.motion[j].1 *= -1.0,
+            Self::TurnBoth(j) => {
+                new.motion[j].1 *= -1.0;
+                new.torque[j].1 *= -1.0;
+            }
+            Self::SwapTorque(a, b) => new.torque.swap(a, b),
+            Self::SwapMotion(a, b) => new.motion.swap(a, b),
+            Self::SwapBoth(a, b) => {
+                new.motion.swap(a, b);
+                new.torque.swap(a, b);
+            }
+        }
+        new
+    }
+}
+
+/// True where a joint's torque is not well explained, so that it is worth looking for another reading.
+fn doubtful(joints: &[Option<Explained>]) -> bool {
+    joints.iter().flatten().any(|joint| joint.left > DOUBTFUL)
+}
+
+/// Σ ln(share left) before less after.
+fn gain(before: &[Option<Explained>], after: &[Option<Explained>]) -> f64 {
+    let both = before.iter().flatten().zip(after.iter().flatten());
+    both.map(|(b, a)| (b.left.max(FLOOR) / a.left.max(FLOOR)).ln())
+        .sum()
+}
+
+/// True if `after` explains a driven joint by so much more that chance and model error are out of the question, and no joint
+/// pays for it.
+pub(super) fn overwhelming(before: &[Option<Explained>], after: &[Option<Explained>]) -> bool {
+    let both = || before.iter().zip(after).filter_map(|(b, a)| b.zip(*a));
+    if both().any(|(b, a)| a.left > 0.5 * GOOD && a.left > WORSE * b.left) {
+        return false;
+    }
+    let gain = gain(before, after);
+    let mended = both().any(|(b, a)| a.driven && b.left > BAD && a.left < GOOD);
+    let improved = both().any(|(b, a)| a.driven && b.left > DOUBTFUL && a.left < 0.1 * b.left);
+    mended && gain >= LEAST_GAIN || improved && gain >= GREAT_GAIN
+}
+
+/// Turns signs and exchanges joints, the best step first, while that helps; the log as it stands unless the result is
+/// [`overwhelming`].
+pub(super) fn mend(
+    robot: &Robot,
+    sample: &Sample,
+    as_logged: &[Option<Explained>],
+) -> (Reading, Vec<Option<Explained>>) {
+    let dof = robot.dof();
+    let (mut reading, mut current) = (Reading::as_logged(dof), as_logged.to_vec());
+    for _ in 0..2 * dof {
+        if !doubtful(&current) {
+            break;
+        }
+        let mut best: Option<(f64, Reading, Vec<Option<Explained>>)> = None;
+        for step in Step::all(dof) {
+            let tried = step.apply(&reading);
+            let explained = explain(robot, sample, &tried);
+            let gain = gain(&current, &explained);
+            let most = best
+                .as_ref()
+                .map_or(LEAST_STEP, |(most, ..)| most + PREFERENCE);
+            if gain > most {
+                best = Some((gain, tried, explained));
+            }
+        }
+        let Some((_, better, explained)) = best else {
+            break;
+        };
+        (reading, current) = (better, explained);
+    }
+    if overwhelming(as_logged, &current) {
+        (reading, current)
+    } else {
+        (Reading::as_logged(dof), as_logged.to_vec())
+    }
+}

@@ -1,0 +1,94 @@
+//! A few hundred smoothed samples of a trajectory: enough to tell gross mistakes, cheap enough to try many readings.
+
+use crate::robot::{JointKind, Robot};
+use crate::signal::{Pipeline, Segment, Trajectory};
+
+/// Samples that are taken of one trajectory at most.
+const MOST: usize = 800;
+/// Width of the moving average in periods of the cut-off.
+const WINDOW: f64 = 0.5;
+
+/// Motion and torque at a few samples, averaged alike over half a period of the cut-off.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Sample {
+    /// Samples.
+    pub(super) len: usize,
+    /// Position, velocity, acceleration, torque: `channels[k][joint][sample]`.
+    pub(super) channels: [Vec<Vec<f64>>; 4],
+    /// Whether the joint moves there: `moves[joint][sample]`.
+    pub(super) moves: Vec<Vec<bool>>,
+}
+
+impl Sample {
+    /// Takes samples that are spread evenly over a trajectory; `None` without torque.
+    pub(super) fn take(pipeline: &Pipeline, trajectory: &Trajectory) -> Option<Self> {
+        let dof = trajectory.dof;
+        let total: usize = trajectory.segments.iter().map(|s| s.time.len()).sum();
+        if total == 0 || trajectory.segments.iter().any(|s| s.tau.is_empty()) {
+            return None;
+        }
+        let step = total.div_ceil(MOST);
+        let mut sample = Self {
+            len: 0,
+            channels: std::array::from_fn(|_| vec![Vec::new(); dof]),
+            moves: vec![Vec::new(); dof],
+        };
+        for segment in &trajectory.segments {
+            sample.append(pipeline, segment, dof, step);
+        }
+        (sample.len > 0).then_some(sample)
+    }
+
+    fn append(&mut self, pipeline: &Pipeline, segment: &Segment, dof: usize, step: usize) {
+        let len = segment.time.len();
+        let half = if pipeline.is_off() {
+            0
+        } else {
+            (0.5 * WINDOW / pipeline.cutoff_hz / segment.interval).round() as usize
+        };
+        let centres = || (half..len.saturating_sub(half)).step_by(step);
+        self.len += centres().count();
+        for joint in 0..dof {
+            let all = joint * len..(joint + 1) * len;
+            let from = [&segment.q, &segment.qd, &segment.qdd, &segment.tau];
+            for (to, from) in self.channels.iter_mut().zip(from) {
+                let values = &from[all.clone()];
+                to[joint].extend(centres().map(|i| mean(&values[i - half..=i + half])));
+            }
+            let still = &segment.standstill[all];
+            self.moves[joint].extend(centres().map(|i| !still[i]));
+        }
+    }
+
+    /// Samples of several logs as one.
+    pub(super) fn pool(samples: &[Self]) -> Self {
+        let Some((first, rest)) = samples.split_first() else {
+            return Self::default();
+        };
+        let mut all = first.clone();
+        for sample in rest {
+            all.len += sample.len;
+            for (to, from) in all.channels.iter_mut().zip(&sample.channels) {
+                for (to, from) in to.iter_mut().zip(from) {
+                    to.extend_from_slice(from);
+                }
+            }
+            for (to, from) in all.moves.iter_mut().zip(&sample.moves) {
+                to.extend_from_slice(from);
+            }
+        }
+        all
+    }
+
+    /// Largest |q| of the joints that turn, rad.
+    pub(super) fn largest_angle(&self, robot: &Robot) -> f64 {
+        (0..robot.dof())
+            .filter(|&joint| robot.joint_kind(joint) != JointKind::Prismatic)
+            .flat_map(|joint| &self.channels[0][joint])
+            .fold(0.0, |largest, q| q.abs().max(largest))
+    }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}

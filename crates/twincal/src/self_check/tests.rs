@@ -1,0 +1,272 @@
+//! Planted mistakes on a simulated arm with friction, noise and a wrong model: each is named, and nothing else.
+
+use super::*;
+use crate::robot::{
+    Inertia, JointDescription, LinkDescription, Motion, RobotDescription, nominal_torque,
+};
+use crate::signal::Segment;
+use std::collections::BTreeMap;
+
+const LEN: usize = 4000;
+const INTERVAL: f64 = 0.005;
+
+/// A four-joint arm: vertical axis, two horizontal ones, a twisted wrist. `heavier` scales the masses.
+fn arm(heavier: f64) -> Robot {
+    let axes = [
+        [0.0, 0.0, 1.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.3, 0.0],
+    ];
+    let mut links = vec![LinkDescription {
+        name: "base".into(),
+        inertia: None,
+    }];
+    let mut joints = Vec::new();
+    for (i, axis) in axes.into_iter().enumerate() {
+        let (parent, child) = (links[i].name.clone(), format!("link{i}"));
+        let mut joint =
+            JointDescription::new(&format!("j{}", i + 1), JointKind::Revolute, &parent, &child);
+        joint.axis = axis;
+        joint.placement.translation = [0.3, 0.0, 0.1];
+        joints.push(joint);
+        let mass = heavier * (6.0 - 1.2 * i as f64);
+        links.push(LinkDescription {
+            name: child,
+            inertia: Some(Inertia {
+                mass,
+                com: [0.15, 0.05, 0.04],
+                tensor: [
+                    [0.02 * mass, 0.0, 0.0],
+                    [0.0, 0.03 * mass, 0.0],
+                    [0.0, 0.0, 0.03 * mass],
+                ],
+            }),
+        });
+    }
+    let description = RobotDescription {
+        name: "arm".into(),
+        gravity: [0.0, 0.0, -9.81],
+        links,
+        joints,
+        allow_unphysical: false,
+    };
+    Robot::new(description, &BTreeMap::new()).unwrap().0
+}
+
+/// What the log of a robot 15 % heavier than the model with friction looks like; joints are independent.
+fn log(seed: f64) -> Trajectory {
+    let dof = 4;
+    let wave = |k: usize| -> Vec<f64> {
+        let mut all = Vec::new();
+        for joint in 0..dof {
+            let (w, v) = (0.9 + 0.37 * joint as f64, 2.3 - 0.41 * joint as f64);
+            for i in 0..LEN {
+                let t = i as f64 * INTERVAL + seed + joint as f64;
+                all.push(match k {
+                    0 => 0.9 * (w * t).sin() + 0.4 * (v * t).cos() - 0.3,
+                    1 => 0.9 * w * (w * t).cos() - 0.4 * v * (v * t).sin(),
+                    _ => -0.9 * w * w * (w * t).sin() - 0.4 * v * v * (v * t).cos(),
+                });
+            }
+        }
+        all
+    };
+    let [q, qd, qdd] = [wave(0), wave(1), wave(2)];
+    let mut tau = vec![0.0; dof * LEN];
+    let motion = Motion {
+        len: LEN,
+        q: &q,
+        qd: &qd,
+        qdd: &qdd,
+    };
+    nominal_torque(&arm(1.15), motion, &mut tau);
+    let mut state = 7_u64;
+    for (i, tau) in tau.iter_mut().enumerate() {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        let noise = (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
+        *tau += 1.5 * qd[i] + 2.0 * (qd[i] / 0.01).tanh() + 0.7 + noise;
+    }
+    let segment = Segment {
+        time: (0..LEN).map(|i| i as f64 * INTERVAL).collect(),
+        input_rows: (0..LEN).collect(),
+        logged: None,
+        q,
+        qd,
+        qdd,
+        tau,
+        standstill: vec![false; dof * LEN],
+        interval: INTERVAL,
+    };
+    Trajectory {
+        name: "run".into(),
+        dof,
+        segments: vec![segment],
+    }
+}
+
+fn check(trajectory: &Trajectory) -> Result<Vec<Finding>> {
+    let pipeline = Pipeline {
+        cutoff_hz: 5.0,
+        ..Pipeline::off(4)
+    };
+    self_check(&arm(1.0), &pipeline, [trajectory])
+}
+
+fn said(trajectory: &Trajectory) -> Vec<(String, String)> {
+    let findings = check(trajectory).unwrap();
+    findings.into_iter().map(|f| (f.code, f.subject)).collect()
+}
+
+/// The rows of one joint in a channel.
+fn rows(values: &mut [f64], joint: usize) -> &mut [f64] {
+    &mut values[joint * LEN..(joint + 1) * LEN]
+}
+
+fn swap(values: &mut [f64], a: usize, b: usize) {
+    for i in 0..LEN {
+        values.swap(a * LEN + i, b * LEN + i);
+    }
+}
+
+#[test]
+fn a_good_log_is_passed_in_silence() {
+    for seed in 0..10 {
+        assert_eq!(said(&log(f64::from(seed) * 3.1)), []);
+    }
+}
+
+#[test]
+fn case_18_degrees_are_refused() {
+    let mut degrees = log(0.0);
+    let s = &mut degrees.segments[0];
+    for values in [&mut s.q, &mut s.qd, &mut s.qdd] {
+        values.iter_mut().for_each(|v| *v *= 180.0 / PI);
+    }
+    let message = check(&degrees).unwrap_err().to_string();
+    assert!(
+        message.contains("log `run`: positions look like degrees") && message.contains("π/180"),
+        "{message}"
+    );
+    // Radians beyond a turn are none.
+    let mut turned = log(0.0);
+    rows(&mut turned.segments[0].q, 0)
+        .iter_mut()
+        .for_each(|q| *q += 4.0 * TAU);
+    assert_eq!(said(&turned), []);
+}
+
+#[test]
+fn case_19_and_20_torque_of_another_unit_or_side_is_named_with_its_gain() {
+    for (gain, words) in [
+        (1.0 / 11.3, "looks like gain "),
+        (0.01, "motor's side"),
+        (1000.0, "N·mm"),
+    ] {
+        let mut scaled = log(0.0);
+        rows(&mut scaled.segments[0].tau, 1)
+            .iter_mut()
+            .for_each(|t| *t *= gain);
+        let findings = check(&scaled).unwrap();
+        assert_eq!(findings.len(), 1, "{findings:#?}");
+        assert_eq!(
+            (&*findings[0].code, &*findings[0].subject),
+            ("torque_scale", "j2")
+        );
+        assert!(findings[0].message.contains(words), "{findings:#?}");
+    }
+    // 11.3 A per 1.15 N·m of the model: the stated number is 11.3 / 1.15.
+    let mut scaled = log(0.0);
+    rows(&mut scaled.segments[0].tau, 1)
+        .iter_mut()
+        .for_each(|t| *t /= 11.3);
+    let message = &check(&scaled).unwrap()[0].message;
+    let after = message.split("looks like gain ").nth(1).unwrap();
+    let stated: f64 = after.split(' ').next().unwrap().parse().unwrap();
+    assert!((stated / (11.3 / 1.15) - 1.0).abs() < 0.05, "{message}");
+}
+
+#[test]
+fn case_21_a_turned_sign_is_named_with_its_joint() {
+    for joint in 0..4 {
+        let mut torque = log(0.0);
+        rows(&mut torque.segments[0].tau, joint)
+            .iter_mut()
+            .for_each(|t| *t *= -1.0);
+        let findings = check(&torque).unwrap();
+        assert_eq!(findings.len(), 1, "{joint}: {findings:#?}");
+        assert_eq!(findings[0].subject, format!("j{}", joint + 1));
+        assert!(
+            findings[0].message.contains("its torque has"),
+            "{findings:#?}"
+        );
+    }
+    // Motion of joint 2 turned: its gravity torque and what it does to the others tell.
+    let mut motion = log(0.0);
+    let s = &mut motion.segments[0];
+    for values in [&mut s.q, &mut s.qd, &mut s.qdd] {
+        rows(values, 1).iter_mut().for_each(|v| *v *= -1.0);
+    }
+    let findings = check(&motion).unwrap();
+    assert_eq!(findings.len(), 1, "{findings:#?}");
+    assert_eq!(findings[0].subject, "j2");
+    assert!(
+        findings[0].message.contains("its position and velocity"),
+        "{findings:#?}"
+    );
+    // All drives count the other way.
+    let mut all = log(0.0);
+    all.segments[0].tau.iter_mut().for_each(|t| *t *= -1.0);
+    let flips = ["j1", "j2", "j3", "j4"].map(|j| ("sign_flip".to_owned(), j.to_owned()));
+    assert_eq!(said(&all), flips);
+}
+
+#[test]
+fn case_22_exchanged_joints_are_named_with_the_order_to_try() {
+    // Two joints exchanged in all columns, in torque only, and three in a ring.
+    for (swaps, all, words) in [
+        (
+            &[(1, 2)][..],
+            true,
+            "`j2` = all columns of `j3`, `j3` = all columns of `j2`",
+        ),
+        (
+            &[(0, 1)],
+            false,
+            "`j1` = torque of `j2`, `j2` = torque of `j1`",
+        ),
+        (
+            &[(0, 1), (1, 2)],
+            true,
+            "`j1` = all columns of `j3`, `j2` = all columns of `j1`, `j3` = all columns of `j2`",
+        ),
+    ] {
+        let mut mixed = log(0.0);
+        let s = &mut mixed.segments[0];
+        for &(a, b) in swaps {
+            swap(&mut s.tau, a, b);
+            if all {
+                swap(&mut s.q, a, b);
+                swap(&mut s.qd, a, b);
+                swap(&mut s.qdd, a, b);
+            }
+        }
+        let findings = check(&mixed).unwrap();
+        assert_eq!(findings.len(), 1, "{findings:#?}");
+        assert_eq!(findings[0].code, "joint_order");
+        assert!(findings[0].message.contains(words), "{findings:#?}");
+    }
+}
+
+#[test]
+fn a_joint_that_is_only_damped_is_no_turned_sign() {
+    // Joint 3 swings under gravity and inertia; its drive takes a little energy out, which is friction with a minus.
+    let mut passive = log(0.0);
+    let s = &mut passive.segments[0];
+    for i in 2 * LEN..3 * LEN {
+        s.tau[i] = -0.3 * s.qd[i];
+    }
+    assert_eq!(said(&passive), []);
+}

@@ -1,0 +1,113 @@
+//! Takes samples with saturated torque out of the fit, with those whose filter sees them, and says so (case 26).
+
+use super::prepare::JointFacts;
+use super::saturation::flat_runs;
+use super::{Pipeline, Recording, Trajectory};
+use crate::error::{Finding, Severity};
+
+/// Time on either side of a flat run that is left out with it, in periods of the cut-off: main lobe and first side lobe
+/// of the filter.
+const MARGIN: f64 = 1.0;
+
+/// Where torque is flat, by joint.
+pub(crate) struct Saturated {
+    joints: Vec<Flat>,
+    /// s.
+    margin: f64,
+}
+
+/// Flat runs of one joint.
+struct Flat {
+    joint: usize,
+    name: String,
+    /// First and last stamp of each run, s.
+    spans: Vec<[f64; 2]>,
+    samples: u64,
+    /// Largest |τ| among them, N·m or N.
+    level: f64,
+}
+
+impl Saturated {
+    /// Flat runs of every joint of a log.
+    pub(crate) fn find(joints: &[JointFacts], log: &Recording, pipeline: &Pipeline) -> Self {
+        let mut found = Vec::new();
+        for (joint, (facts, channels)) in joints.iter().zip(&log.joints).enumerate() {
+            let Some(tau) = &channels.tau else {
+                continue;
+            };
+            let (time, q) = (&log.time, &channels.q);
+            let runs = flat_runs(tau, facts.effort, |run| {
+                let seconds = time[run.end - 1] - time[run.start];
+                let (low, high) = q[run.clone()]
+                    .iter()
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| {
+                        (l.min(*q), h.max(*q))
+                    });
+                high - low > pipeline.standstill_velocity[joint] * seconds
+            });
+            if runs.is_empty() {
+                continue;
+            }
+            found.push(Flat {
+                joint,
+                name: facts.name.clone(),
+                spans: runs
+                    .iter()
+                    .map(|run| [time[run.start], time[run.end - 1]])
+                    .collect(),
+                samples: runs.iter().map(|run| run.len() as u64).sum(),
+                level: runs
+                    .iter()
+                    .fold(0.0, |level: f64, run| level.max(tau[run.start].abs())),
+            });
+        }
+        let margin = if pipeline.is_off() {
+            0.0
+        } else {
+            MARGIN / pipeline.cutoff_hz
+        };
+        Self {
+            joints: found,
+            margin,
+        }
+    }
+
+    /// Marks the samples of a trajectory; one finding per joint.
+    pub(crate) fn mask(
+        &self,
+        log: &Recording,
+        trajectory: &mut Trajectory,
+        findings: &mut Vec<Finding>,
+    ) {
+        for flat in &self.joints {
+            let (mut masked, mut all) = (0_usize, 0_usize);
+            for segment in &mut trajectory.segments {
+                let len = segment.time.len();
+                let mask = &mut segment.standstill[flat.joint * len..(flat.joint + 1) * len];
+                for [first, last] in &flat.spans {
+                    let from = segment.time.partition_point(|t| *t < first - self.margin);
+                    let to = segment.time.partition_point(|t| *t <= last + self.margin);
+                    mask[from..to.max(from)].fill(true);
+                }
+                masked += mask.iter().filter(|m| **m).count();
+                all += len;
+            }
+            findings.push(Finding::new(
+                Severity::Warning,
+                "saturated_torque",
+                &log.name,
+                format!(
+                    "joint `{}`: torque is flat at its limit of {:.4} in {} samples ({} times); the fit and the scores of \
+                     moving rows leave them out with all that the filter mixes with them and with standstill ({:.1} % of the \
+                     log); the scores over all rows contain them",
+                    flat.name,
+                    flat.level,
+                    flat.samples,
+                    flat.spans.len(),
+                    100.0 * masked as f64 / all.max(1) as f64
+                ),
+                flat.samples,
+            ));
+        }
+    }
+}
