@@ -71,7 +71,7 @@ fn descend(
     match value.get_ref() {
         DeValue::Table(table) => walk(table, schema, root, path, found),
         DeValue::Array(values) => {
-            if let Some(item) = items(schema) {
+            if let Some(item) = items(schema, root) {
                 for value in values {
                     descend(value, item, root, path, found);
                 }
@@ -82,10 +82,13 @@ fn descend(
 }
 
 /// Schema of a list's items.
-fn items(schema: &Value) -> Option<&Value> {
+fn items<'a>(schema: &'a Value, root: &'a Value) -> Option<&'a Value> {
+    if let Some(target) = referred(schema, root) {
+        return items(target, root);
+    }
     schema.get("items").or_else(|| {
         let alternatives = schema.get("anyOf").and_then(Value::as_array)?;
-        alternatives.iter().find_map(items)
+        alternatives.iter().find_map(|inner| items(inner, root))
     })
 }
 
@@ -96,12 +99,14 @@ fn properties<'a>(schema: &'a Value, root: &'a Value) -> Option<Vec<(&'a str, &'
     if all.is_empty() { None } else { Some(all) }
 }
 
+/// What a `$ref` points to.
+fn referred<'a>(schema: &Value, root: &'a Value) -> Option<&'a Value> {
+    let pointer = schema.get("$ref")?.as_str()?.strip_prefix('#')?;
+    root.pointer(pointer)
+}
+
 fn collect<'a>(schema: &'a Value, root: &'a Value, all: &mut Vec<(&'a str, &'a Value)>) {
-    if let Some(reference) = schema.get("$ref").and_then(Value::as_str)
-        && let Some(target) = reference
-            .strip_prefix('#')
-            .and_then(|pointer| root.pointer(pointer))
-    {
+    if let Some(target) = referred(schema, root) {
         collect(target, root, all);
     }
     for alternative in ["anyOf", "oneOf", "allOf"] {

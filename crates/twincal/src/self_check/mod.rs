@@ -16,9 +16,9 @@ use sample::Sample;
 use std::f64::consts::{PI, TAU};
 
 /// Torque that differs by this factor from the model's is not of the joint's side, or not in N·m.
-const OTHER_UNIT: f64 = 3.0;
+const OTHER_UNIT: f64 = 5.0;
 /// Share of torque that may be left where a factor is believed.
-const CLEAR: f64 = 0.15;
+const CLEAR: f64 = 0.05;
 /// Share that must be left without the model: else friction alone explains the torque, and the factor says nothing.
 const NEEDED: f64 = 0.2;
 /// The model must leave less than this part of what friction alone leaves.
@@ -28,7 +28,7 @@ const PART: f64 = 0.3;
 ///
 /// | finding | what was seen |
 /// |---|---|
-/// | `torque_scale` | a joint's torque has the model's shape, but is more than 3 times larger or smaller |
+/// | `torque_scale` | a joint's torque has the model's shape, but is more than 5 times larger or smaller |
 /// | `sign_flip` | a joint's torque, or its motion, has the opposite sign |
 /// | `joint_order` | joints are exchanged |
 ///
@@ -101,14 +101,14 @@ fn scales(robot: &Robot, explained: &[Option<Explained>]) -> Vec<Finding> {
         };
         let problem = if joint.gain < 1.0 / OTHER_UNIT {
             format!(
-                "torque is {:.3} of the model's: looks like gain {:.4} between this column and N·m at the joint (a current, \
+                "torque is {:.3} of the model's: looks like gain {:.1} between this column and N·m at the joint (a current, \
                  or torque at the motor's side)",
                 joint.gain,
                 1.0 / joint.gain
             )
         } else if joint.gain > OTHER_UNIT {
             format!(
-                "torque is {0:.4} times the model's: looks like gain {0:.4} (N·mm, mA or counts for N·m), unless a payload \
+                "torque is {0:.1} times the model's: looks like gain {0:.1} (N·mm, mA or counts for N·m), unless a payload \
                  that heavy is missing in the model",
                 joint.gain
             )
