@@ -29,7 +29,7 @@ fn case_89_the_scale_of_a_candidate_does_not_matter() {
             .collect::<Vec<_>>()
     };
     let plain = fitted("sin(q2)");
-    for scale in [1e-12, 1e12] {
+    for scale in [1e-9, 1e9] {
         let scaled = fitted(&format!("{scale}*sin(q2)"));
         assert_eq!(scaled.len(), plain.len());
         for (index, (a, b)) in plain.iter().zip(&scaled).enumerate() {
@@ -44,26 +44,32 @@ fn case_89_the_scale_of_a_candidate_does_not_matter() {
 #[test]
 fn case_90_and_91_chains_that_disagree_are_refused_or_labelled() {
     let folder = folder();
-    // Candidates that are nearly the same, and far too few draws to walk between them.
-    let terms: Vec<String> = (0..24)
-        .map(|k| format!("\"sin(q2 + {}e-3*q1)\"", 1 + k))
+    // Candidates that are nearly the same, and the fewest draws that are allowed. Whether chains agree is a matter of luck
+    // then: of ten seeds one that does not is enough.
+    let terms: Vec<String> = (1..=24)
+        .map(|k| format!("\"sin(q2 + {k}e-3*q1)\""))
         .collect();
     let config = format!(
-        "[signal]\ncutoff_hz = 0\n[library]\nterms = [{}]\ngeneric = false\n[inference]\nmethod = \"gibbs\"\nchains = 4\ndraws = 4\n",
+        "[signal]\ncutoff_hz = 0\n[library]\nterms = [{}]\ngeneric = false\n[inference]\nmethod = \"gibbs\"\nchains = 2\n\
+         draws = 100\n",
         terms.join(", ")
     );
     fs::write(folder.path().join("quick.toml"), config).unwrap();
-    fit(folder.path(), &["-o", "out"])
-        .expect(4)
-        .says(&["refused", "disagree", "draws"]);
+    let seeds: Vec<String> = (1..=10).map(|seed: u32| seed.to_string()).collect();
+    let refused = seeds.iter().find_map(|seed| {
+        let _ = fs::remove_dir_all(folder.path().join("out"));
+        let done = fit(folder.path(), &["-o", "out", "--seed", seed]);
+        (done.code != Some(0)).then_some((seed, done))
+    });
+    let (seed, done) = refused.unwrap();
+    done.expect(4)
+        .says(&["refused", "disagree", "R-hat", "inference.draws"]);
     assert!(!folder.path().join("out").exists());
-    let allowed = fit(
-        folder.path(),
-        &["-o", "out", "--allow", "disagreeing-chains"],
-    );
-    assert!(matches!(allowed.code, Some(0 | 3)), "{}", allowed.err);
-    let labelled = result(folder.path());
-    let largest = labelled["inference"]["r_hat"].as_f64().unwrap();
+    let allow = ["-o", "out", "--seed", seed, "--allow", "disagreeing-chains"];
+    fit(folder.path(), &allow).expect(0);
+    let largest = result(folder.path())["inference"]["r_hat"]
+        .as_f64()
+        .unwrap();
     assert!(largest > 1.01, "{largest}");
 }
 

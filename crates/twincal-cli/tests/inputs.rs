@@ -125,8 +125,26 @@ fn case_21_a_turned_sign_is_named() {
 
 #[test]
 fn case_22_exchanged_joints_are_named() {
-    let said = self_check(|_, row| row.swap(7, 8));
-    assert_eq!(said, [("joint_order".into(), String::new())]);
+    let folder = folder();
+    fs::write(folder.path().join("quick.toml"), upright()).unwrap();
+    let swapped = upright_log(|_, row| row.swap(7, 8));
+    fs::write(folder.path().join("run.csv"), swapped).unwrap();
+    let arguments = [
+        "inspect",
+        "arm.urdf",
+        "run.csv",
+        "--config",
+        "quick.toml",
+        "--json",
+    ];
+    let done = run(folder.path(), arguments).expect(0);
+    let said = found(&serde_json::from_str(&done.out).unwrap(), &CHECKS);
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert_eq!(said[0].0, "joint_order");
+    assert!(
+        said[0].3.contains("`shoulder` = torque of `elbow`"),
+        "{said:?}"
+    );
 }
 
 #[test]

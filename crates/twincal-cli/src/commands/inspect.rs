@@ -8,12 +8,12 @@ use crate::failure::Outcome;
 use crate::progress::Progress;
 use crate::terminal::{Terminal, clean};
 use serde::Serialize;
-use twincal::Finding;
 use twincal::robot::{JointKind, Mimic, Robot};
 use twincal::self_check::self_check;
 use twincal::signal::{
     LogOverview, SignalSettings, Trajectory, align, choose_pipeline, describe, hardly_driven,
 };
+use twincal::{Finding, Severity};
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -73,7 +73,11 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
         found.extend(more);
     }
     found.extend(hardly_driven(&robot.robot, &logs.recordings));
-    found.extend(compare(&robot.robot, &logs, &settings.calibration.signal)?);
+    for finding in compare(&robot.robot, &logs, &settings.calibration.signal)? {
+        if !found.contains(&finding) {
+            found.push(finding);
+        }
+    }
     require_strict(settings.log.strict, &found)?;
     let code = code_of(&found);
     let inspection = inspection(&robot.robot, robot.file.name, overviews, found);
@@ -85,18 +89,22 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
     Ok(code)
 }
 
-/// What log and model disagree about; nothing for logs that no pipeline fits (too short, standing still): `fit` says why.
+/// What the filters would warn of, and what log and model disagree about; nothing for logs that no pipeline fits (too short, standing still): `fit` says why.
 fn compare(robot: &Robot, logs: &LogInput, signal: &SignalSettings) -> Outcome<Vec<Finding>> {
     let Ok((pipeline, _)) = choose_pipeline(robot, &logs.recordings, signal) else {
         return Ok(Vec::new());
     };
-    let trajectories: Vec<Trajectory> = logs
-        .recordings
-        .iter()
-        .filter_map(|recording| align(robot, recording, &pipeline).ok())
-        .map(|(trajectory, _)| trajectory)
-        .collect();
-    Ok(self_check(robot, &pipeline, &trajectories).map_err(|error| logs.as_given(error))?)
+    let mut trajectories: Vec<Trajectory> = Vec::new();
+    let mut found = Vec::new();
+    for recording in &logs.recordings {
+        if let Ok((trajectory, more)) = align(robot, recording, &pipeline) {
+            trajectories.push(trajectory);
+            found.extend(more.into_iter().filter(|f| f.severity > Severity::Note));
+        }
+    }
+    let more = self_check(robot, &pipeline, &trajectories);
+    found.extend(more.map_err(|error| logs.as_given(error))?);
+    Ok(found)
 }
 
 fn inspection(
