@@ -239,6 +239,15 @@ impl InferenceRow {
                 ess: None,
                 seed,
             },
+            Method::Search { models, .. } => Self {
+                method: "search",
+                models: Some(models),
+                chains: None,
+                draws: None,
+                r_hat: None,
+                ess: None,
+                seed,
+            },
             Method::Gibbs {
                 chains,
                 draws,

@@ -6,7 +6,7 @@
 
 use std::process::Command;
 use std::time::Instant;
-use twincal::infer::{Choice, InferenceSettings, infer, scan};
+use twincal::infer::{Choice, InferenceSettings, approximate, infer, scan};
 use twincal::posterior::{Method, Problem};
 use twincal::prior::{Inclusion, Prior};
 
@@ -90,6 +90,114 @@ fn problem(size: usize, correlation: f64, effect: f64) -> Problem {
     }
 }
 
+/// A seven-joint arm: a payload (10 columns) that the last link's mass moments and tensor nearly repeat, seven links (4 + 6
+/// columns each) and 30 single columns, K = 110 in C = 45; every second component acts.
+fn arm(size: usize) -> Problem {
+    let mut sizes = vec![10];
+    (0..7).for_each(|_| sizes.extend([4, 6]));
+    sizes.extend([1; 30]);
+    let base = problem(110, 0.2, 0.0);
+    let component: Vec<usize> = sizes
+        .iter()
+        .enumerate()
+        .flat_map(|(c, &len)| std::iter::repeat_n(c, len))
+        .collect();
+    // x_payload = x_last + 0.1 · noise: columns 0..10 and 70..80.
+    let mix = |gram: &[f64], from: usize, to: usize| -> Vec<f64> {
+        let mut out = gram.to_vec();
+        for i in 0..110 {
+            out[i * 110 + to] = gram[i * 110 + from] + 0.1 * gram[i * 110 + to];
+        }
+        let half = out.clone();
+        for j in 0..110 {
+            out[to * 110 + j] = half[from * 110 + j] + 0.1 * half[to * 110 + j];
+        }
+        out
+    };
+    let gram = (0..10).fold(base.gram, |gram, k| mix(&gram, 70 + k, k));
+    let mut noise = base.xy.clone();
+    (0..10).for_each(|k| noise[k] = noise[70 + k] + 0.1 * noise[k]);
+    let beta: Vec<f64> = component
+        .iter()
+        .enumerate()
+        .map(|(k, c)| match c % 2 {
+            0 => 0.0,
+            _ => 0.06 * (1.0 + (k % 3) as f64),
+        })
+        .collect();
+    let signal: Vec<f64> = (0..110)
+        .map(|i| (0..110).map(|j| gram[i * 110 + j] * beta[j]).sum())
+        .collect();
+    let xy: Vec<f64> = signal.iter().zip(&noise).map(|(s, e)| s + e).collect();
+    let yy = base.yy
+        + (0..110)
+            .map(|k| beta[k] * (signal[k] + 2.0 * noise[k]))
+            .sum::<f64>();
+    // Only the first components, with all that they explain.
+    let columns = component.iter().filter(|&&c| c < size).count();
+    let keep = |i: usize| (0..columns).map(move |j| (i, j));
+    Problem {
+        gram: (0..columns)
+            .flat_map(keep)
+            .map(|(i, j)| gram[i * 110 + j])
+            .collect(),
+        xy: xy[..columns].to_vec(),
+        yy,
+        names: base.names[..columns].to_vec(),
+        prior: Prior {
+            slab: vec![10.0; columns],
+            component: component[..columns].to_vec(),
+            family: (0..size)
+                .map(|c| if c < 15 { c.min(1) } else { 2 })
+                .collect(),
+            odds: vec![1.0; 3],
+            lower: vec![f64::NEG_INFINITY; columns],
+            inclusion: Inclusion::ExpectedTerms(size as f64 / 3.0),
+            shape: 1e-3,
+            scale: 1e-3,
+        },
+        ..base
+    }
+}
+
+/// The rows about components.
+fn components(settings: impl Fn(Choice, usize) -> InferenceSettings) {
+    let problem = arm(45);
+    let (seconds, exact) = least(3, || {
+        infer(&problem, &settings(Choice::Auto, 5000)).expect("auto")
+    });
+    let how = match exact.method {
+        Method::Exact { .. } => "exact",
+        _ => "sampled",
+    };
+    println!(
+        "{:<44} {seconds:>10.6} {how}",
+        "arm/110 columns in 45 components/auto"
+    );
+    let (seconds, sampled) = least(2, || {
+        infer(&problem, &settings(Choice::Gibbs, 5000)).expect("gibbs")
+    });
+    if let Method::Gibbs { ess, r_hat, .. } = sampled.method {
+        println!(
+            "{:<44} {seconds:>10.6} ESS {ess:.0}, R-hat {r_hat:.4}",
+            "arm/the same/gibbs, 4 chains of 5000"
+        );
+    }
+    for (name, warm) in [("cold", None), ("warm", Some(&exact))] {
+        let (seconds, found) = least(5, || approximate(&problem, warm).expect("search"));
+        let worst = (0..110)
+            .map(|k| (found.inclusion[k] - exact.inclusion[k]).abs())
+            .fold(0.0, f64::max);
+        let Method::Search { models, missing } = found.method else {
+            continue;
+        };
+        println!(
+            "{:<44} {seconds:>10.6} {models} models, {missing:.1e} missing, PIPs within {worst:.1e}",
+            format!("arm/the same/search, {name}")
+        );
+    }
+}
+
 fn main() {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
@@ -146,6 +254,7 @@ fn main() {
             "gibbs/24 columns/4 chains of 5000, judged"
         );
     }
+    pool.install(|| components(settings));
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
     match Command::new(format!("{root}/.venv/bin/python"))
         .arg(format!("{root}/benches/peers/inference.py"))

@@ -104,26 +104,57 @@ impl Cholesky {
         self.solve_upper(x);
     }
 
-    /// `A⁻¹`, row-major.
-    pub fn inverse(&self) -> Vec<f64> {
+    /// `L⁻¹`, row-major, zeros above the diagonal.
+    fn inverse_lower(&self) -> Vec<f64> {
         let n = self.size;
         let mut inverse = vec![0.0; n * n];
-        let mut x = vec![0.0; n];
-        for k in 0..n {
-            x.fill(0.0);
-            x[k] = 1.0;
-            self.solve(&mut x);
-            for i in 0..n {
-                inverse[i * n + k] = x[i];
+        for i in 0..n {
+            let (above, row) = inverse.split_at_mut(i * n);
+            let row = &mut row[..=i];
+            // Row i of L⁻¹ is (e_i − Σ_j L_ij row_j)/L_ii.
+            for (j, other) in above.chunks_exact(n).enumerate() {
+                let factor = self.lower[i * n + j];
+                for (x, y) in row.iter_mut().zip(&other[..=j]) {
+                    *x -= factor * y;
+                }
+            }
+            row[i] = 1.0;
+            let pivot = 1.0 / self.lower[i * n + i];
+            row.iter_mut().for_each(|x| *x *= pivot);
+        }
+        inverse
+    }
+
+    /// `A⁻¹ = L⁻ᵀ L⁻¹`, row-major, exactly symmetric.
+    pub fn inverse(&self) -> Vec<f64> {
+        let n = self.size;
+        let lower = self.inverse_lower();
+        let mut inverse = vec![0.0; n * n];
+        for row in lower
+            .chunks_exact(n.max(1))
+            .enumerate()
+            .map(|(k, row)| &row[..=k])
+        {
+            for (i, x) in row.iter().enumerate() {
+                let target = &mut inverse[i * n..i * n + i + 1];
+                target.iter_mut().zip(row).for_each(|(t, y)| *t += x * y);
             }
         }
-        // The two halves differ by rounding only; callers may rely on exact symmetry.
         for i in 0..n {
             for j in 0..i {
                 inverse[j * n + i] = inverse[i * n + j];
             }
         }
         inverse
+    }
+
+    /// Diagonal of `A⁻¹`.
+    pub fn inverse_diagonal(&self) -> Vec<f64> {
+        let mut diagonal = vec![0.0; self.size];
+        for row in self.inverse_lower().chunks_exact(self.size.max(1)) {
+            diagonal.iter_mut().zip(row).for_each(|(d, x)| *d += x * x);
+        }
+        diagonal
     }
 }
 

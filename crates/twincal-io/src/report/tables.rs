@@ -215,6 +215,11 @@ pub(super) fn convergence(calibration: &Calibration) -> Vec<String> {
             "Exact: all {} models were summed. The probabilities carry no Monte Carlo error.",
             count(models)
         )),
+        Method::Search { models, missing } => out.push(format!(
+            "Search: {} models were weighed; an estimated share of {} of the probability was not found.",
+            count(models),
+            number(missing, 2)
+        )),
         Method::Gibbs {
             chains,
             draws,

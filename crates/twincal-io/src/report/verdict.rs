@@ -234,6 +234,7 @@ fn limits(calibration: &Calibration, joints: &[Joint<'_>], worse: &[String]) -> 
 pub(super) fn converged(calibration: &Calibration) -> bool {
     match calibration.twin.posterior.method {
         Method::Exact { .. } => true,
+        Method::Search { missing, .. } => missing < 1e-3,
         Method::Gibbs { r_hat, ess, .. } => r_hat <= 1.01 && ess >= 400.0,
     }
 }

@@ -9,19 +9,44 @@
 //!
 //! so that neither `yy − rᵀA⁻¹r` nor `E[β²] − E[β]²` is ever a difference of large numbers.
 
+use super::check::check;
 use crate::error::{Error, Result};
 use crate::linear_algebra::Cholesky;
 use crate::posterior::{Model, Problem};
-use crate::prior::Inclusion;
+use statrs::function::erf::erfc;
 use statrs::function::gamma::ln_gamma;
+use std::ops::Range;
 
-/// A [`Problem`] in natural units. Position d stands for column `order[d]`; families lie together.
+/// One component: its columns lie together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Block {
+    /// Its own number.
+    pub(super) component: usize,
+    pub(super) family: usize,
+    /// First position.
+    pub(super) start: usize,
+    /// Columns.
+    pub(super) len: usize,
+    /// Factor on the weight of every model that holds it: 1 over the slab's mass within the bounds.
+    pub(super) factor: f64,
+}
+
+impl Block {
+    /// Positions.
+    pub(super) fn range(&self) -> Range<usize> {
+        self.start..self.start + self.len
+    }
+}
+
+/// A [`Problem`] in natural units. Position d stands for column `order[d]`; the columns of a component lie together.
 #[derive(Debug, Clone)]
 pub(super) struct Standard {
     /// Column of each position.
     pub(super) order: Vec<usize>,
     /// Component of each column.
     pub(super) component: Vec<usize>,
+    /// Components in the order of their positions.
+    pub(super) blocks: Vec<Block>,
     /// `√(G_kk + 1/v_k)` of each position: `β = β_natural · unit / scale`.
     scale: Vec<f64>,
     /// `√(2 b̂)`, N·m.
@@ -34,6 +59,10 @@ pub(super) struct Standard {
     pub(super) offset: Vec<f64>,
     /// `1/v_k`, the smallest value that a pivot can have.
     pub(super) precision: Vec<f64>,
+    /// Bounds, −∞ where free.
+    pub(super) lower: Vec<f64>,
+    /// Some coefficient has a bound.
+    pub(super) bounded: bool,
     /// `a_n = a0 + n/2`.
     pub(super) shape: f64,
     /// `b̂ = b0 + RSS/2` of the full model, (N·m)².
@@ -43,23 +72,29 @@ pub(super) struct Standard {
 }
 
 impl Standard {
-    /// Columns in the order of their families.
+    /// Components of several columns first, each kind in the order of families.
     ///
     /// # Errors
     /// [`Error::NotFinite`] naming the column, [`Error::Setting`] for an impossible prior.
     pub(super) fn new(problem: &Problem) -> Result<Self> {
-        let mut order: Vec<usize> = (0..problem.xy.len()).collect();
-        order.sort_by_key(|&k| (problem.prior.family_of(k), problem.prior.component[k]));
-        Self::in_order(problem, order)
+        let mut components: Vec<usize> = (0..problem.prior.components()).collect();
+        let wide = problem.prior.columns();
+        components.sort_by_key(|&c| (wide.get(c).map_or(0, Vec::len) < 2, problem.prior.family[c]));
+        Self::in_order(problem, &components)
     }
 
-    /// The same with the columns in a given order; families lie together in it.
+    /// The same with the components in a given order.
     ///
     /// # Errors
     /// As [`Standard::new`].
-    pub(super) fn in_order(problem: &Problem, order: Vec<usize>) -> Result<Self> {
+    pub(super) fn in_order(problem: &Problem, components: &[usize]) -> Result<Self> {
         check(problem)?;
         let (size, prior) = (problem.xy.len(), &problem.prior);
+        let columns = prior.columns();
+        let order: Vec<usize> = components
+            .iter()
+            .flat_map(|&c| columns[c].iter().copied())
+            .collect();
         // A column that is zero everywhere has no unit of its own: any will do.
         let slab = |k: usize| {
             if problem.gram[k * size + k] == 0.0 {
@@ -118,9 +153,39 @@ impl Standard {
             - ln_gamma(prior.shape)
             + ln_gamma(shape)
             - shape * full_scale.ln();
+        let lower: Vec<f64> = order
+            .iter()
+            .zip(&scale)
+            .map(|(&k, scale)| prior.lower[k] * scale / unit)
+            .collect();
+        let mut start = 0;
+        let blocks = components
+            .iter()
+            .map(|&c| {
+                let block = Block {
+                    component: c,
+                    family: prior.family[c],
+                    start,
+                    len: columns[c].len(),
+                    factor: 1.0,
+                };
+                start += block.len;
+                let mass: f64 = block
+                    .range()
+                    .map(|d| slab_mass(lower[d], precision[d], 2.0 * shape))
+                    .product();
+                Block {
+                    factor: 1.0 / mass,
+                    ..block
+                }
+            })
+            .collect();
         Ok(Self {
             order,
             component: prior.component.clone(),
+            blocks,
+            bounded: lower.iter().any(|&l| l > f64::NEG_INFINITY),
+            lower,
             scale,
             unit,
             matrix,
@@ -138,6 +203,29 @@ impl Standard {
         self.order.len()
     }
 
+    /// Place in `blocks` of each position.
+    pub(super) fn block_of(&self) -> Vec<usize> {
+        self.blocks
+            .iter()
+            .enumerate()
+            .flat_map(|(b, block)| std::iter::repeat_n(b, block.len))
+            .collect()
+    }
+
+    /// (columns ascending, positions) of a set of components, bit b of word b/64 the component at place b in `blocks`.
+    pub(super) fn members(&self, set: &[u64]) -> (Vec<u32>, Vec<usize>) {
+        let positions: Vec<usize> = self
+            .blocks
+            .iter()
+            .enumerate()
+            .filter(|(b, _)| set[b / 64] >> (b % 64) & 1 == 1)
+            .flat_map(|(_, block)| block.range())
+            .collect();
+        let mut members: Vec<u32> = positions.iter().map(|&d| self.order[d] as u32).collect();
+        members.sort_unstable();
+        (members, positions)
+    }
+
     /// `E[φ | z, y]` per `(1 + c_z)` in natural units; infinite where the data leave φ without a mean.
     pub(super) fn noise_factor(&self) -> f64 {
         if self.shape > 1.0 {
@@ -150,6 +238,30 @@ impl Standard {
     /// `ln Σ_z p(y, z)` from `ln Σ_z p(z) Π (v_k p_k)^−½ (1 + c_z)^−a_n`.
     pub(super) fn log_evidence(&self, log_sum: f64) -> f64 {
         self.log_constant + log_sum
+    }
+
+    /// `1 + c` of a model from its b_z.
+    pub(super) fn misfit(&self, scale: f64) -> f64 {
+        (scale / self.full_scale).max(1.0)
+    }
+
+    /// Natural units per unit of the coefficient.
+    pub(super) fn natural(&self, d: usize) -> f64 {
+        self.scale[d] / self.unit
+    }
+
+    /// Natural units of `(A⁻¹)_dd` per unit of the columns'.
+    pub(super) fn precision_unit(&self, d: usize) -> f64 {
+        self.scale[d] * self.scale[d]
+    }
+
+    /// What to say when a model has no factor because of the column at a position.
+    pub(super) fn singular(&self, d: usize) -> Error {
+        Error::NotFinite {
+            what: "Cholesky factor of a model".into(),
+            column: format!("{}", self.order[d]),
+            remedy: "remove one of the columns that are equal on these data".into(),
+        }
     }
 
     /// Variance φ in (N·m)² from natural units.
@@ -180,11 +292,8 @@ impl Standard {
             .iter()
             .flat_map(|&i| members.iter().map(move |&j| self.matrix[i * size + j]))
             .collect();
-        let factor = Cholesky::new(&block, count).map_err(|error| Error::NotFinite {
-            what: "Cholesky factor of a model".into(),
-            column: format!("{}", self.order[members[error.pivot]]),
-            remedy: "remove one of the columns that are equal on these data".into(),
-        })?;
+        let factor =
+            Cholesky::new(&block, count).map_err(|error| self.singular(members[error.pivot]))?;
         // min over δ_z of 2hᵀδ + δᵀAδ with δ = −β̂ outside z: A_zz δ_z = A_ze β̂_e − h_z.
         let mut delta: Vec<f64> = self.center.iter().map(|x| -x).collect();
         members.iter().for_each(|&d| delta[d] = 0.0);
@@ -221,6 +330,14 @@ impl Standard {
             sites: Vec::new(),
         })
     }
+}
+
+/// `P(x ≥ lower)` of the slab: `x ~ N(0, φ/precision)` with `1/φ = weight`.
+pub(super) fn slab_mass(lower: f64, precision: f64, weight: f64) -> f64 {
+    if lower == f64::NEG_INFINITY {
+        return 1.0;
+    }
+    0.5 * erfc(lower * (0.5 * weight * precision).sqrt())
 }
 
 /// Posterior mean of the full model. Columns that agree to the last digit have no factor; a nudge of the diagonal far
@@ -266,132 +383,4 @@ fn multiply(matrix: &[f64], x: &[f64]) -> Vec<f64> {
         .chunks_exact(x.len())
         .map(|row| row.iter().zip(x).map(|(a, x)| a * x).sum())
         .collect()
-}
-
-fn check(problem: &Problem) -> Result<()> {
-    let (size, prior) = (problem.xy.len(), &problem.prior);
-    let fits = problem.gram.len() == size * size
-        && problem.names.len() == size
-        && prior.slab.len() == size
-        && prior.component.len() == size
-        && prior.lower.len() == size;
-    if !fits {
-        return Err(Error::Setting {
-            key: "problem".into(),
-            problem: format!(
-                "{size} right-hand sides, {} matrix entries, {} names, {} slabs, {} components, {} bounds",
-                problem.gram.len(),
-                problem.names.len(),
-                prior.slab.len(),
-                prior.component.len(),
-                prior.lower.len()
-            ),
-            remedy: "all must belong to the same K columns".into(),
-        });
-    }
-    let components = prior.components();
-    let mut occurs = vec![false; components];
-    let inside = prior
-        .component
-        .iter()
-        .all(|&c| occurs.get_mut(c).map(|o| *o = true).is_some());
-    if !inside || occurs.contains(&false) || prior.family.iter().any(|&f| f >= prior.families()) {
-        return Err(Error::Setting {
-            key: "problem".into(),
-            problem: format!(
-                "{components} components of {} families do not match the columns",
-                prior.families()
-            ),
-            remedy: "every column needs a component, every component a column and a family".into(),
-        });
-    }
-    if let Some(k) = (0..size).find(|&k| !(prior.lower[k] <= 0.0)) {
-        return Err(Error::Setting {
-            key: "prior.lower".into(),
-            problem: format!(
-                "`{}` must be at least {}, which forbids 0",
-                problem.names[k], prior.lower[k]
-            ),
-            remedy: "give a bound that is not above 0: being out means exactly 0".into(),
-        });
-    }
-    let not_finite = |what: &str, column: &str| Error::NotFinite {
-        what: what.into(),
-        column: column.into(),
-        remedy: "look for samples that are not numbers, or columns that grow beyond 1e150".into(),
-    };
-    for k in 0..size {
-        let diagonal = problem.gram[k * size + k];
-        if diagonal < 0.0
-            || problem.gram[k * size..(k + 1) * size]
-                .iter()
-                .any(|x| !x.is_finite())
-        {
-            return Err(not_finite("the Gram matrix", &problem.names[k]));
-        }
-        if !problem.xy[k].is_finite() {
-            return Err(not_finite(
-                "the product with the residual torque",
-                &problem.names[k],
-            ));
-        }
-        let slab = prior.slab[k];
-        if diagonal > 0.0 && !(slab > 0.0 && slab.is_finite()) {
-            return Err(not_finite("the slab variance", &problem.names[k]));
-        }
-    }
-    if !(problem.yy >= 0.0 && problem.yy.is_finite() && problem.n >= 0.0 && problem.n.is_finite()) {
-        return Err(not_finite(
-            "the sum of squares or the number of rows",
-            "torque",
-        ));
-    }
-    if !problem.log_constant.is_finite() {
-        return Err(not_finite(
-            "the log-determinant of the noise weights",
-            "torque",
-        ));
-    }
-    let setting = |key: &str, problem: String, remedy: &str| Error::Setting {
-        key: key.into(),
-        problem,
-        remedy: remedy.into(),
-    };
-    if !(prior.shape > 0.0 && prior.shape.is_finite()) {
-        return Err(setting(
-            "prior.noise.shape",
-            format!("{} is not positive", prior.shape),
-            "use 0.001 or more",
-        ));
-    }
-    if !(prior.scale >= 0.0 && prior.scale.is_finite()) || (prior.scale == 0.0 && problem.yy > 0.0)
-    {
-        return Err(setting(
-            "prior.noise.scale",
-            format!("{} is not positive", prior.scale),
-            "use 0.001 or more",
-        ));
-    }
-    if let Some(r) = prior.odds.iter().find(|r| !(**r > 0.0 && r.is_finite())) {
-        return Err(setting(
-            "prior.odds",
-            format!("{r} is not positive"),
-            "use 1, or e.g. 0.1 for a family that should need more evidence",
-        ));
-    }
-    match prior.inclusion {
-        Inclusion::Probability(p) if !(p > 0.0 && p < 1.0) => Err(setting(
-            "prior.inclusion.probability",
-            format!("{p} is not between 0 and 1"),
-            "use 0.2, or `expected_terms`",
-        )),
-        Inclusion::ExpectedTerms(m) if size > 0 && !(m > 0.0 && m < components as f64) => {
-            Err(setting(
-                "prior.inclusion.expected_terms",
-                format!("{m} of {components} components"),
-                "it must lie between 0 and the number of components",
-            ))
-        }
-        _ => Ok(()),
-    }
 }

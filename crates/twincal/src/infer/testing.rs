@@ -1,10 +1,12 @@
 //! Random regression problems for the tests of this module.
 
 use crate::infer::{Choice, InferenceSettings, infer};
+use crate::linear_algebra::Cholesky;
 use crate::posterior::{Posterior, Problem};
 use crate::prior::{Inclusion, Prior};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use statrs::function::gamma::ln_gamma;
 
 /// A standard normal number (Box and Muller).
 pub(super) fn normal(rng: &mut ChaCha8Rng) -> f64 {
@@ -77,4 +79,174 @@ pub(super) fn sampled(problem: &Problem) -> Posterior {
         allow_disagreement: true,
     };
     infer(problem, &settings).unwrap()
+}
+
+/// A regression with components of the given sizes, kept with its rows.
+pub(super) struct Grouped {
+    pub(super) problem: Problem,
+    /// Rows × columns, row-major.
+    pub(super) x: Vec<f64>,
+    pub(super) y: Vec<f64>,
+}
+
+/// Components of the given sizes in three families with odds; the first two columns of component 1 are nearly those of
+/// component 0, every third component acts. `interleaved` mixes the columns of different components.
+pub(super) fn grouped(seed: u64, sizes: &[usize], rows: usize, interleaved: bool) -> Grouped {
+    acting(seed, sizes, rows, interleaved, 0.25)
+}
+
+/// [`grouped`] with effects of a given size beside noise of 0.5.
+pub(super) fn acting(
+    seed: u64,
+    sizes: &[usize],
+    rows: usize,
+    interleaved: bool,
+    effect: f64,
+) -> Grouped {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut component: Vec<usize> = sizes
+        .iter()
+        .enumerate()
+        .flat_map(|(c, &len)| std::iter::repeat_n(c, len))
+        .collect();
+    if interleaved {
+        component.reverse();
+        let half = component.len() / 2;
+        component.rotate_left(half / 2);
+    }
+    let size = component.len();
+    let columns = |c: usize| -> Vec<usize> { (0..size).filter(|&k| component[k] == c).collect() };
+    let (zero, one) = (columns(0), columns(1));
+    let (mut x, mut y) = (vec![0.0; rows * size], vec![0.0; rows]);
+    for (row, y) in x.chunks_exact_mut(size).zip(&mut y) {
+        let common = normal(&mut rng);
+        for value in row.iter_mut() {
+            *value = 0.5 * common + 0.8 * normal(&mut rng);
+        }
+        for (&a, &b) in zero.iter().zip(&one) {
+            row[b] = row[a] + 0.05 * normal(&mut rng);
+        }
+        *y = 0.5 * normal(&mut rng);
+        for k in (0..size).filter(|&k| component[k].is_multiple_of(3)) {
+            *y += effect * row[k] / (1.0 + component[k] as f64);
+        }
+    }
+    let (mut gram, mut xy) = (vec![0.0; size * size], vec![0.0; size]);
+    for (row, y) in x.chunks_exact(size).zip(&y) {
+        for i in 0..size {
+            xy[i] += row[i] * y;
+            (0..size).for_each(|j| gram[i * size + j] += row[i] * row[j]);
+        }
+    }
+    let prior = Prior {
+        slab: (0..size).map(|k| 1.0 + 0.2 * k as f64).collect(),
+        component,
+        family: (0..sizes.len()).map(|c| [0, 1, 0, 2][c % 4]).collect(),
+        odds: vec![1.0, 0.3, 4.0],
+        lower: vec![f64::NEG_INFINITY; size],
+        inclusion: Inclusion::ExpectedTerms(0.3 * sizes.len() as f64),
+        shape: 0.01,
+        scale: 0.02,
+    };
+    let problem = Problem {
+        gram,
+        xy,
+        yy: y.iter().map(|y| y * y).sum(),
+        n: rows as f64,
+        log_constant: 0.7,
+        prior,
+        names: (0..size).map(|k| format!("x{k}")).collect(),
+    };
+    Grouped { problem, x, y }
+}
+
+/// Posterior of every set of components by multivariate t densities of the rows: no Gram matrix, no Schur complement.
+///
+/// ```text
+/// y | z ~ t with 2 a0 degrees of freedom, location 0, scale (b0/a0)(1 + X_z V_z X_zᵀ)
+/// ```
+pub(super) struct Densities {
+    pub(super) log_evidence: f64,
+    /// By component.
+    pub(super) pip: Vec<f64>,
+    /// By column.
+    pub(super) mean: Vec<f64>,
+    pub(super) sd: Vec<f64>,
+    /// Of every set, bit c its component c.
+    pub(super) weights: Vec<f64>,
+}
+
+impl Densities {
+    pub(super) fn new(data: &Grouped) -> Self {
+        let (problem, prior) = (&data.problem, &data.problem.prior);
+        let (size, rows, count) = (problem.xy.len(), data.y.len(), prior.components());
+        let shape = prior.shape + 0.5 * rows as f64;
+        let mut models = Vec::new();
+        for set in 0u32..1 << count {
+            let members: Vec<usize> = (0..size)
+                .filter(|&k| set >> prior.component[k] & 1 == 1)
+                .collect();
+            let at = |i: usize, k: usize| data.x[i * size + k];
+            let mut scale = vec![0.0; rows * rows];
+            for i in 0..rows {
+                for j in 0..=i {
+                    let inner: f64 = members
+                        .iter()
+                        .map(|&k| at(i, k) * at(j, k) * prior.slab[k])
+                        .sum();
+                    scale[i * rows + j] = inner + f64::from(i == j);
+                    scale[j * rows + i] = scale[i * rows + j];
+                }
+            }
+            let factor = Cholesky::new(&scale, rows).unwrap();
+            let mut solved = data.y.clone();
+            factor.solve(&mut solved);
+            let square: f64 = data.y.iter().zip(&solved).map(|(a, b)| a * b).sum();
+            let mut families = vec![0; prior.families()];
+            (0..count)
+                .filter(|&c| set >> c & 1 == 1)
+                .for_each(|c| families[prior.family[c]] += 1);
+            let log = prior.log_model(&families) + problem.log_constant + ln_gamma(shape)
+                - ln_gamma(prior.shape)
+                - 0.5 * rows as f64 * (2.0 * std::f64::consts::PI * prior.scale).ln()
+                - 0.5 * factor.log_determinant()
+                - shape * (0.5 * square / prior.scale).ln_1p();
+            let phi = (prior.scale + 0.5 * square) / (shape - 1.0);
+            let (mut mean, mut second) = (vec![0.0; size], vec![0.0; size]);
+            for &k in &members {
+                let column: Vec<f64> = (0..rows).map(|i| at(i, k)).collect();
+                let mut gain = column.clone();
+                factor.solve(&mut gain);
+                let along = |v: &[f64]| -> f64 { gain.iter().zip(v).map(|(a, b)| a * b).sum() };
+                let v = prior.slab[k];
+                mean[k] = v * along(&data.y);
+                second[k] = mean[k] * mean[k] + phi * v * (1.0 - v * along(&column));
+            }
+            models.push((log, set, mean, second));
+        }
+        let top = models.iter().map(|m| m.0).fold(f64::NEG_INFINITY, f64::max);
+        let total: f64 = models.iter().map(|m| (m.0 - top).exp()).sum();
+        let mut out = Self {
+            log_evidence: top + total.ln(),
+            pip: vec![0.0; count],
+            mean: vec![0.0; size],
+            sd: vec![0.0; size],
+            weights: Vec::new(),
+        };
+        for (log, set, mean, second) in &models {
+            let weight = (log - top).exp() / total;
+            out.weights.push(weight);
+            (0..count)
+                .filter(|c| set >> c & 1 == 1)
+                .for_each(|c| out.pip[c] += weight);
+            for k in 0..size {
+                out.mean[k] += weight * mean[k];
+                out.sd[k] += weight * second[k];
+            }
+        }
+        for k in 0..size {
+            out.sd[k] = (out.sd[k] - out.mean[k] * out.mean[k]).max(0.0).sqrt();
+        }
+        out
+    }
 }

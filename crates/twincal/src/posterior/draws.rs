@@ -1,8 +1,8 @@
 //! Joint posterior draws of structure, noise and coefficients (paper fig. 3; method section 7).
 
 use super::Posterior;
+use super::bounded::Law;
 use super::random::Random;
-use crate::linear_algebra::Cholesky;
 
 /// Independent draws from p(z, φ, β | y).
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +18,8 @@ pub struct CoefficientDraws {
 }
 
 /// `count` independent draws: z by model weight, φ | z ~ InvGamma(a_n, b_n), then β_z = μ_z + √φ L⁻ᵀ ε with A_z = L Lᵀ.
+///
+/// Coefficients with bounds ([`super::Site`]) come from the normal distribution of the model cut off there.
 ///
 /// Draw `i` depends only on `seed`, `stream` and the draws before it, never on threads. A posterior without models (it
 /// cannot come from inference) gives no draws.
@@ -43,11 +45,7 @@ pub fn draw(posterior: &Posterior, count: usize, seed: u64, stream: u64) -> Coef
         })
         .collect();
     draws.beta = vec![0.0; count * columns];
-    let factors: Vec<Cholesky> = posterior
-        .models
-        .iter()
-        .map(|model| Cholesky::from_lower(model.factor.clone(), model.members.len()))
-        .collect();
+    let laws: Vec<Law> = posterior.models.iter().map(Law::new).collect();
     let mut direction = Vec::new();
     for row in 0..count {
         let level = random.uniform() * cumulative[last];
@@ -57,9 +55,14 @@ pub fn draw(posterior: &Posterior, count: usize, seed: u64, stream: u64) -> Coef
         let size = model.members.len();
         direction.clear();
         direction.extend((0..size).map(|_| random.normal()));
-        factors[index].solve_upper(&mut direction);
-        for ((&column, mean), x) in model.members.iter().zip(&model.mean).zip(&direction) {
-            draws.beta[row * columns + column as usize] = mean + phi.sqrt() * x;
+        let law = &laws[index];
+        law.factor.solve_upper(&mut direction);
+        for (x, mean) in direction.iter_mut().zip(&law.mean) {
+            *x = mean + phi.sqrt() * *x;
+        }
+        law.cut_off(&mut direction, phi, &mut random);
+        for (&column, x) in model.members.iter().zip(&direction) {
+            draws.beta[row * columns + column as usize] = *x;
         }
         draws.models.push(index as u32);
         draws.noise.push(phi);

@@ -1,5 +1,6 @@
 //! What is known after the data: models, inclusion probabilities, coefficients, draws (method section 7).
 
+mod bounded;
 mod covariance;
 pub mod draws;
 pub mod mixture;
@@ -79,6 +80,13 @@ pub enum Method {
         /// 2^C.
         models: u64,
     },
+    /// The models that a search found.
+    Search {
+        /// Models that were weighed.
+        models: u64,
+        /// Estimated share of the mass that was not found.
+        missing: f64,
+    },
     /// Collapsed Gibbs sampling of the structure.
     Gibbs {
         /// Chains.
@@ -117,4 +125,67 @@ pub struct Posterior {
     pub log_evidence: Option<f64>,
     /// How it was computed.
     pub method: Method,
+}
+
+impl Posterior {
+    /// P(at least one of these components is in | y), from the listed models, within what the components' own
+    /// probabilities allow: `max PIP ≤ P ≤ min(1, Σ PIP)`. 0 for no component.
+    pub fn any(&self, components: &[usize]) -> f64 {
+        let asked = |k: usize| components.contains(&self.component[k]);
+        let listed: f64 = self
+            .models
+            .iter()
+            .filter(|model| model.members.iter().any(|&k| asked(k as usize)))
+            .map(|model| model.weight)
+            .sum();
+        let mut own: Vec<(usize, f64)> = (0..self.component.len())
+            .filter(|&k| asked(k))
+            .map(|k| (self.component[k], self.inclusion[k]))
+            .collect();
+        own.sort_by_key(|pip| pip.0);
+        own.dedup_by_key(|pip| pip.0);
+        let largest = own.iter().map(|pip| pip.1).fold(0.0, f64::max);
+        let sum: f64 = own.iter().map(|pip| pip.1).sum();
+        listed.min(sum).max(largest).min(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_of_several_is_a_sum_over_models() {
+        let model = |members: &[u32], weight: f64| Model {
+            members: members.to_vec(),
+            weight,
+            scale: 1.0,
+            mean: Vec::new(),
+            factor: Vec::new(),
+            sites: Vec::new(),
+        };
+        let posterior = Posterior {
+            component: vec![0, 1, 1, 2],
+            inclusion: vec![0.5, 0.4, 0.4, 0.2],
+            inclusion_mcse: vec![0.0; 4],
+            mean: vec![0.0; 4],
+            sd: vec![0.0; 4],
+            shape: 3.0,
+            noise: 1.0,
+            models: vec![
+                model(&[0], 0.5),
+                model(&[1, 2], 0.2),
+                model(&[1, 2, 3], 0.2),
+                model(&[], 0.1),
+            ],
+            models_mass: 1.0,
+            log_evidence: None,
+            method: Method::Exact { models: 8 },
+        };
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
+        near(posterior.any(&[0, 1]), 0.9);
+        near(posterior.any(&[1, 2]), 0.4);
+        near(posterior.any(&[2]), 0.2);
+        near(posterior.any(&[]), 0.0);
+    }
 }

@@ -67,7 +67,9 @@ pub fn summarise(posterior: &Posterior) -> Vec<ColumnSummary> {
         let size = model.members.len();
         let inverse = Cholesky::from_lower(model.factor.clone(), size).inverse();
         for (place, &column) in model.members.iter().enumerate() {
+            let bound = model.sites.iter().find(|site| site.place as usize == place);
             components[column as usize].push(
+                bound.map_or(f64::NEG_INFINITY, |site| site.lower),
                 model,
                 model.mean[place],
                 inverse[place * size + place],
@@ -81,17 +83,31 @@ pub fn summarise(posterior: &Posterior) -> Vec<ColumnSummary> {
 }
 
 /// The t components of one coefficient given that it is included.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 struct Components {
     weights: Vec<f64>,
     locations: Vec<f64>,
     scales: Vec<f64>,
+    /// Bound of the coefficient where it acts: intervals end there.
+    lower: f64,
+}
+
+impl Default for Components {
+    fn default() -> Self {
+        Self {
+            weights: Vec::new(),
+            locations: Vec::new(),
+            scales: Vec::new(),
+            lower: f64::NEG_INFINITY,
+        }
+    }
 }
 
 impl Components {
     /// β_k | z, y ~ t_{2 a_n}(μ_k, (b_n/a_n) (A⁻¹)_kk).
-    fn push(&mut self, model: &Model, location: f64, variance: f64, shape: f64) {
+    fn push(&mut self, lower: f64, model: &Model, location: f64, variance: f64, shape: f64) {
         if model.weight > 0.0 {
+            self.lower = self.lower.max(lower);
             self.weights.push(model.weight);
             self.locations.push(location);
             self.scales.push((model.scale / shape * variance).sqrt());
@@ -111,7 +127,7 @@ impl Components {
             scales: &self.scales,
             spike,
         };
-        Level::central(student, 0.95).map(|level| mixture.quantile(student, level))
+        Level::central(student, 0.95).map(|level| mixture.quantile(student, level).max(self.lower))
     }
 }
 

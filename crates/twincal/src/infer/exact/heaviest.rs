@@ -1,6 +1,6 @@
 //! The heaviest models seen so far: a bounded list whose entrance threshold rises.
 
-use super::LISTED_MODELS;
+use crate::infer::answer::LISTED_MODELS;
 use pulp::{Simd, bytemuck};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -22,7 +22,7 @@ impl Threshold {
     }
 }
 
-/// Models as (weight, set of positions), at least the [`LISTED_MODELS`] heaviest of those offered.
+/// Models as (weight, set of components), at least the [`LISTED_MODELS`] heaviest of those offered.
 #[derive(Debug)]
 pub(super) struct Heaviest {
     models: Vec<(f64, u32)>,
@@ -37,7 +37,7 @@ impl Heaviest {
         }
     }
 
-    /// Offers one model per lane: the positions of `set`, and the lane's own first ones.
+    /// Offers one model per lane: the components of `set`, and the lane's own first ones.
     #[inline(always)]
     pub(super) fn offer<S: Simd>(
         &mut self,

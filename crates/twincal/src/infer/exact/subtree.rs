@@ -1,13 +1,14 @@
 //! The subtrees of one task: the kernel where all the time goes. Small ones are written out with constant sizes.
 
 use super::heaviest::Heaviest;
+use super::node::View;
 use super::sums::{Elimination, Layout, combine, triangle};
-use super::tree::{LOG_REFERENCE, Tree, View};
+use super::tree::{LOG_REFERENCE, Tree};
 use crate::lanes::{exp, ln};
 use pulp::{Simd, WithSimd};
 
 /// Largest m whose whole subtree is written out.
-const WRITTEN_OUT: usize = 3;
+pub(super) const WRITTEN_OUT: usize = 3;
 
 /// Minimises over δ_0: `S' = S − s sᵀ/p`, `h' = h − s h_0/p`, `c' = c − h_0²/p`, with `r = 1/p`.
 #[inline(always)]
@@ -64,9 +65,98 @@ pub(super) fn reciprocal<S: Simd>(simd: S, a: S::f64s, least: f64) -> S::f64s {
 
 /// Vectors that the subtree of m columns needs: the including child's S, a child's h, the sums of both children.
 pub(super) fn scratch_len(m: usize) -> usize {
-    (WRITTEN_OUT + 1..=m)
+    (1..=m)
         .map(|m| triangle(m - 1) + (m - 1) + 2 * Layout::new(m - 1).len())
         .sum()
+}
+
+/// Whoever sums over the models below a child.
+trait Below<S: Simd> {
+    fn sum(
+        &mut self,
+        simd: S,
+        tree: &Tree<S::f64s>,
+        node: View<'_, S::f64s>,
+        out: &mut [S::f64s],
+        heavy: &mut Heaviest,
+    );
+}
+
+/// Room for the children of one node.
+struct Room<'a, V> {
+    s: &'a mut [V],
+    h: &'a mut [V],
+    inside: &'a mut [V],
+    outside: &'a mut [V],
+}
+
+/// Sums over a node from those `below` its children; `branches` says which of them (included, excluded) exist.
+#[expect(
+    clippy::too_many_arguments,
+    reason = "one call in the hot loop, all of it in registers"
+)]
+#[inline(always)]
+fn visit<S: Simd>(
+    simd: S,
+    tree: &Tree<S::f64s>,
+    m: usize,
+    node: View<'_, S::f64s>,
+    branches: (bool, bool),
+    room: Room<'_, S::f64s>,
+    below: &mut impl Below<S>,
+    out: &mut [S::f64s],
+    heavy: &mut Heaviest,
+) {
+    let level = &tree.levels[m - 1];
+    let Room {
+        s,
+        h,
+        inside,
+        outside,
+    } = room;
+    let r = reciprocal(simd, node.s[0], level.precision);
+    let (include_odds, exclude_odds) = level.odds(node.count);
+    if branches.0 {
+        let c = include(simd, m, node, r, s, h);
+        let odds = simd.mul_f64s(include_odds, simd.sqrt_f64s(r));
+        let child = View {
+            s,
+            h,
+            c,
+            weight: simd.mul_f64s(node.weight, odds),
+            count: node.count + level.step,
+            set: node.set | level.bit,
+        };
+        below.sum(simd, tree, child, inside, heavy);
+    } else {
+        inside.fill(simd.splat_f64s(0.0));
+    }
+    if branches.1 {
+        let c = exclude(simd, m, node, level.center, h);
+        let child = View {
+            s: &node.s[m..],
+            h,
+            c,
+            weight: simd.mul_f64s(node.weight, exclude_odds),
+            ..node
+        };
+        below.sum(simd, tree, child, outside, heavy);
+    } else {
+        outside.fill(simd.splat_f64s(0.0));
+    }
+    combine(
+        simd,
+        m,
+        Elimination {
+            row: &node.s[..m],
+            h: node.h[0],
+            r,
+            center: level.center,
+        },
+        inside,
+        outside,
+        out,
+    );
 }
 
 /// Sums over the subtree of m columns below `node`.
@@ -115,162 +205,117 @@ impl<S: Simd> WithSimd for Descend<'_, S> {
             scratch,
             heavy,
         } = self;
-        match m {
-            0 => level_0(simd, tree, node, out, heavy),
-            1 => level_1(simd, tree, node, out, heavy),
-            2 => level_2(simd, tree, node, out, heavy),
-            WRITTEN_OUT => level_3(simd, tree, node, out, heavy),
-            _ => {
-                let level = &tree.levels[m - 1];
-                let r = reciprocal(simd, node.s[0], level.precision);
-                let (s, scratch) = scratch.split_at_mut(triangle(m - 1));
-                let (h, scratch) = scratch.split_at_mut(m - 1);
-                let (inside, scratch) = scratch.split_at_mut(Layout::new(m - 1).len());
-                let (outside, scratch) = scratch.split_at_mut(Layout::new(m - 1).len());
-                let (more, same) = level.counts(node.count);
-
-                let c = include(simd, m, node, r, s, h);
-                let odds = simd.mul_f64s(level.include[node.count], simd.sqrt_f64s(r));
-                let weight = simd.mul_f64s(node.weight, odds);
-                let child = View {
-                    s,
-                    h,
-                    c,
-                    weight,
-                    count: more,
-                    set: node.set | level.bit,
-                };
-                descend(simd, tree, m - 1, child, inside, scratch, heavy);
-
-                if level.certain {
-                    outside.fill(simd.splat_f64s(0.0));
-                } else {
-                    let c = exclude(simd, m, node, level.center, h);
-                    let weight = simd.mul_f64s(node.weight, level.exclude[node.count]);
-                    let child = View {
-                        s: &node.s[m..],
-                        h,
-                        c,
-                        weight,
-                        count: same,
-                        set: node.set,
-                    };
-                    descend(simd, tree, m - 1, child, outside, scratch, heavy);
-                }
-
-                combine(
-                    simd,
-                    m,
-                    Elimination {
-                        row: &node.s[..m],
-                        h: node.h[0],
-                        r,
-                        center: level.center,
-                    },
-                    inside,
-                    outside,
-                    out,
-                );
+        if m <= tree.written_out {
+            match m {
+                0 => Written::<0>.sum(simd, tree, node, out, heavy),
+                1 => Written::<1>.sum(simd, tree, node, out, heavy),
+                2 => Written::<2>.sum(simd, tree, node, out, heavy),
+                _ => Written::<3>.sum(simd, tree, node, out, heavy),
             }
+            return;
         }
+        let (s, scratch) = scratch.split_at_mut(triangle(m - 1));
+        let (h, scratch) = scratch.split_at_mut(m - 1);
+        let (inside, scratch) = scratch.split_at_mut(Layout::new(m - 1).len());
+        let (outside, scratch) = scratch.split_at_mut(Layout::new(m - 1).len());
+        let room = Room {
+            s,
+            h,
+            inside,
+            outside,
+        };
+        let branches = tree.levels[m - 1].branches(node.set);
+        let below = &mut Deeper { m: m - 1, scratch };
+        visit(simd, tree, m, node, branches, room, below, out, heavy);
     }
 }
 
-/// A leaf: `w = weight · e^600 (1 + c)^−a_n`.
-#[inline(always)]
-fn level_0<S: Simd>(
-    simd: S,
-    tree: &Tree<S::f64s>,
-    node: View<'_, S::f64s>,
-    out: &mut [S::f64s],
-    heavy: &mut Heaviest,
-) {
-    // c ≥ 0 but for rounding.
-    let one = simd.splat_f64s(1.0);
-    let ratio = simd.max_f64s(simd.add_f64s(node.c, one), one);
-    let power = simd.mul_add_e_f64s(
-        simd.splat_f64s(-tree.shape),
-        ln(simd, ratio),
-        simd.splat_f64s(LOG_REFERENCE),
-    );
-    let weight = simd.mul_f64s(node.weight, exp(simd, power));
-    heavy.offer(simd, weight, node.set, &tree.heavy);
-    out[0] = weight;
-    out[1] = simd.mul_f64s(simd.mul_f64s(weight, ratio), simd.splat_f64s(tree.noise));
+/// The recursion.
+struct Deeper<'a, V> {
+    m: usize,
+    scratch: &'a mut [V],
 }
 
-/// Writes out the subtree of `$m` columns with all sizes constant.
-macro_rules! level {
-    ($name:ident, $m:literal, $child:ident) => {
-        #[inline(always)]
-        fn $name<S: Simd>(
-            simd: S,
-            tree: &Tree<S::f64s>,
-            node: View<'_, S::f64s>,
-            out: &mut [S::f64s],
-            heavy: &mut Heaviest,
-        ) {
-            let level = &tree.levels[$m - 1];
-            let (Some(s), Some(h)) = (
-                node.s.first_chunk::<{ triangle($m) }>(),
-                node.h.first_chunk::<$m>(),
-            ) else {
-                return;
-            };
-            let Some(out) = out.first_chunk_mut::<{ Layout::new($m).len() }>() else {
-                return;
-            };
-            let node = View { s, h, ..node };
-            let zero = simd.splat_f64s(0.0);
-            let r = reciprocal(simd, s[0], level.precision);
-            let mut child_s = [zero; triangle($m - 1)];
-            let mut child_h = [zero; $m - 1];
-            let mut inside = [zero; Layout::new($m - 1).len()];
-            let mut outside = [zero; Layout::new($m - 1).len()];
-            let (more, same) = level.counts(node.count);
+impl<S: Simd> Below<S> for Deeper<'_, S::f64s> {
+    #[inline(always)]
+    fn sum(
+        &mut self,
+        simd: S,
+        tree: &Tree<S::f64s>,
+        node: View<'_, S::f64s>,
+        out: &mut [S::f64s],
+        heavy: &mut Heaviest,
+    ) {
+        descend(simd, tree, self.m, node, out, self.scratch, heavy);
+    }
+}
 
-            let c = include(simd, $m, node, r, &mut child_s, &mut child_h);
-            let odds = simd.mul_f64s(level.include[node.count], simd.sqrt_f64s(r));
-            let weight = simd.mul_f64s(node.weight, odds);
-            let child = View {
-                s: &child_s,
-                h: &child_h,
-                c,
-                weight,
-                count: more,
-                set: node.set | level.bit,
-            };
-            $child(simd, tree, child, &mut inside, heavy);
+/// The subtree of the last M columns, each a component of its own, with all sizes constant.
+struct Written<const M: usize>;
 
-            let c = exclude(simd, $m, node, level.center, &mut child_h);
-            let weight = simd.mul_f64s(node.weight, level.exclude[node.count]);
-            let child = View {
-                s: &s[$m..],
-                h: &child_h,
-                c,
-                weight,
-                count: same,
-                set: node.set,
-            };
-            $child(simd, tree, child, &mut outside, heavy);
+/// A leaf: `w = weight · e^600 (1 + c)^−a_n`.
+impl<S: Simd> Below<S> for Written<0> {
+    #[inline(always)]
+    fn sum(
+        &mut self,
+        simd: S,
+        tree: &Tree<S::f64s>,
+        node: View<'_, S::f64s>,
+        out: &mut [S::f64s],
+        heavy: &mut Heaviest,
+    ) {
+        // c ≥ 0 but for rounding.
+        let one = simd.splat_f64s(1.0);
+        let ratio = simd.max_f64s(simd.add_f64s(node.c, one), one);
+        let power = simd.mul_add_e_f64s(
+            simd.splat_f64s(-tree.shape),
+            ln(simd, ratio),
+            simd.splat_f64s(LOG_REFERENCE),
+        );
+        let weight = simd.mul_f64s(node.weight, exp(simd, power));
+        heavy.offer(simd, weight, node.set, &tree.heavy);
+        out[0] = weight;
+        out[1] = simd.mul_f64s(simd.mul_f64s(weight, ratio), simd.splat_f64s(tree.noise));
+    }
+}
 
-            combine(
-                simd,
-                $m,
-                Elimination {
-                    row: &s[..$m],
-                    h: h[0],
-                    r,
-                    center: level.center,
-                },
-                &inside,
-                &outside,
-                out,
-            );
+/// Writes out the subtree of `$m` columns.
+macro_rules! written_out {
+    ($m:literal) => {
+        impl<S: Simd> Below<S> for Written<$m> {
+            #[inline(always)]
+            fn sum(
+                &mut self,
+                simd: S,
+                tree: &Tree<S::f64s>,
+                node: View<'_, S::f64s>,
+                out: &mut [S::f64s],
+                heavy: &mut Heaviest,
+            ) {
+                let (Some(s), Some(h)) = (
+                    node.s.first_chunk::<{ triangle($m) }>(),
+                    node.h.first_chunk::<$m>(),
+                ) else {
+                    return;
+                };
+                let Some(out) = out.first_chunk_mut::<{ Layout::new($m).len() }>() else {
+                    return;
+                };
+                let zero = simd.splat_f64s(0.0);
+                let room = Room {
+                    s: &mut [zero; triangle($m - 1)],
+                    h: &mut [zero; $m - 1],
+                    inside: &mut [zero; Layout::new($m - 1).len()],
+                    outside: &mut [zero; Layout::new($m - 1).len()],
+                };
+                let node = View { s, h, ..node };
+                let below = &mut Written::<{ $m - 1 }>;
+                visit(simd, tree, $m, node, (true, true), room, below, out, heavy);
+            }
         }
     };
 }
 
-level!(level_1, 1, level_0);
-level!(level_2, 2, level_1);
-level!(level_3, 3, level_2);
+written_out!(1);
+written_out!(2);
+written_out!(3);

@@ -1,7 +1,7 @@
 //! The tree against a plain loop over all models by another route: one Cholesky factorisation each, uncentred.
 
 use super::*;
-use crate::infer::testing::problem;
+use crate::infer::testing::{Densities, acting, grouped, problem};
 use crate::linear_algebra::Cholesky;
 use crate::prior::Inclusion;
 use statrs::function::gamma::ln_gamma;
@@ -362,13 +362,80 @@ fn certain_columns_change_nothing() {
         ] {
             let problem = problem(size as u64 * 10 + seed, size, 3000, 0.5, inclusion);
             let standard = Standard::new(&problem).unwrap();
-            let certain = certain::columns(&standard, &problem.prior);
+            let certain = certain::components(&standard, &problem.prior);
             let count = certain.iter().filter(|c| **c).count();
             assert!(count >= 1 && count < size, "{count} of {size} are certain");
-            let mut order = certain::order(&problem.prior, &certain);
+            let (mut order, first) = certain::order(&problem.prior, &certain);
+            assert!(first == count && order[..count].iter().all(|&c| certain[c]));
             order.sort_unstable();
             assert!(order.into_iter().eq(0..size));
             agree(&problem, 1e-9);
         }
+    }
+}
+
+/// Components of several columns, in three families with odds, two of them nearly alike, columns lying apart.
+#[test]
+fn components_equal_multivariate_t_densities() {
+    let cases: [&[usize]; 7] = [
+        &[1, 2],
+        &[6, 4, 1],
+        &[2, 2, 1, 4, 1],
+        &[10, 10, 1, 1, 4, 6, 1, 2],
+        &[4, 4, 4, 4],
+        &[1, 1, 1, 6],
+        &[2, 1, 1, 1, 2, 1, 1, 1, 1],
+    ];
+    for (seed, sizes) in cases.iter().enumerate() {
+        for (rows, interleaved) in [(30, false), (45, true), (7, true)] {
+            let data = grouped(seed as u64, sizes, rows, interleaved);
+            let (got, truth) = (enumerate(&data.problem).unwrap(), Densities::new(&data));
+            for k in 0..data.problem.xy.len() {
+                let pip = truth.pip[data.problem.prior.component[k]];
+                assert!(
+                    (got.inclusion[k] - pip).abs() < 1e-9,
+                    "{sizes:?} {rows}: PIP {k}"
+                );
+                let off = (got.mean[k] - truth.mean[k]).abs();
+                assert!(off < 1e-8 * truth.sd[k], "{sizes:?} {rows}: mean {k}");
+                let off = (got.sd[k] / truth.sd[k] - 1.0).abs();
+                assert!(off < 1e-6, "{sizes:?} {rows}: sd {k}");
+            }
+            let off = got.log_evidence.unwrap() - truth.log_evidence;
+            assert!(off.abs() < 1e-9 * truth.log_evidence.abs(), "{off}");
+            for model in &got.models {
+                let holds = |c: usize| {
+                    let k = data.problem.prior.component.iter().position(|&d| d == c);
+                    k.is_some_and(|k| model.members.contains(&(k as u32)))
+                };
+                let set: usize = (0..sizes.len()).filter(|&c| holds(c)).map(|c| 1 << c).sum();
+                let off = model.weight * got.models_mass - truth.weights[set];
+                assert!(off.abs() < 1e-9, "{sizes:?} {rows}: model {set:b}");
+            }
+        }
+    }
+}
+
+/// With much data some components are certain; more than 32 columns; the densities visit every set all the same.
+#[test]
+fn certain_components_change_nothing() {
+    let sizes = [10, 6, 4, 4, 1, 6, 1, 4];
+    let data = acting(3, &sizes, 150, true, 2.0);
+    assert!(data.problem.xy.len() > 32);
+    let standard = Standard::new(&data.problem).unwrap();
+    let certain = certain::components(&standard, &data.problem.prior);
+    assert!(
+        certain.contains(&true) && certain.contains(&false),
+        "{certain:?}"
+    );
+    let (got, truth) = (enumerate(&data.problem).unwrap(), Densities::new(&data));
+    for k in 0..data.problem.xy.len() {
+        let pip = truth.pip[data.problem.prior.component[k]];
+        assert!((got.inclusion[k] - pip).abs() < 1e-9, "PIP {k}");
+        assert!(
+            (got.mean[k] - truth.mean[k]).abs() < 1e-8 * truth.sd[k],
+            "mean {k}"
+        );
+        assert!((got.sd[k] / truth.sd[k] - 1.0).abs() < 1e-6, "sd {k}");
     }
 }

@@ -1,16 +1,17 @@
-//! One Markov chain over models: scans of flips, swaps of columns that resemble each other, then φ | z and β | z, φ.
+//! One Markov chain over models: scans of flips, swaps of components that resemble each other, then φ | z and β | z, φ.
 //!
-//! A flip of position j is accepted with probability `f_j = 0.95 min(1, R_j)`, R_j the ratio of posterior probabilities
+//! A flip of component j is accepted with probability `f_j = 0.95 min(1, R_j)`, R_j the ratio of posterior probabilities
 //! with β and φ integrated out (a metropolised Gibbs step; the factor keeps it aperiodic). As long as nothing flips, all
 //! f stay what they are: eight are computed at a time and kept, and ONE uniform number, compared with the running
-//! product Π(1 − f), says where the next flip is. A scan without flips is K/8 multiplications.
+//! product Π(1 − f), says where the next flip is. A scan without flips is C/8 multiplications.
+//! Components that every model with weight holds ([`crate::infer::certain`]) are in from the start and stay.
 
 use super::random::Source;
 use super::swaps::Swaps;
-use super::tableau::Tableau;
+use crate::infer::exchanges::Exchange;
 use crate::infer::standard::Standard;
+use crate::infer::walker::Walker;
 use crate::lanes::{LANES, Lane, exp, ln};
-use crate::linear_algebra::Cholesky;
 use crate::prior::Prior;
 use pulp::{Simd, WithSimd};
 use std::collections::BTreeMap;
@@ -28,28 +29,39 @@ pub(super) struct Length {
     pub(super) scans_per_draw: usize,
 }
 
-/// What a chain found. Arrays `[position * draws + draw]` or by position, natural units.
+/// What chains are about.
+#[derive(Clone, Copy)]
+pub(super) struct Target<'a> {
+    pub(super) standard: &'a Standard,
+    pub(super) prior: &'a Prior,
+    /// By place in `standard.blocks`: in every model.
+    pub(super) certain: &'a [bool],
+    /// Exchanges in which a component of several columns takes part.
+    pub(super) exchanges: &'a [Exchange],
+}
+
+/// What a chain found. Arrays `[component * draws + draw]` (`beta`: position), natural units.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Trace {
     /// P(z = 1 | all other z), mean over a draw's scans.
     pub(super) conditional: Vec<f32>,
-    /// Draws of β.
+    /// Draws of β_k given z, each from its own margin: their joint law is not needed to judge a chain.
     pub(super) beta: Vec<f32>,
     /// Σ over draws of E[δ | z].
     pub(super) shift: Vec<f64>,
     /// Σ over draws of E[δ² | z].
     pub(super) moment: Vec<f64>,
-    /// Σ over draws of P(z = 1 | all other z).
+    /// Σ over draws of P(z = 1 | all other z), by component.
     pub(super) inclusion: Vec<f64>,
     /// Σ over draws of (1 + c).
     pub(super) misfit: f64,
-    /// How often each model was the state of a draw.
+    /// How often each model (a set of components) was the state of a draw.
     pub(super) visits: BTreeMap<Vec<u64>, u64>,
     /// Accepted moves.
     pub(super) moves: u64,
 }
 
-/// Eight positions whose conditionals are known.
+/// Eight components whose conditionals are known.
 #[derive(Debug, Clone, Copy)]
 struct Chunk {
     /// State of the chain that they belong to.
@@ -61,16 +73,9 @@ struct Chunk {
 }
 
 /// Runs one chain.
-pub(super) fn run(
-    standard: &Standard,
-    prior: &Prior,
-    seed: u64,
-    chain: usize,
-    length: Length,
-) -> Trace {
+pub(super) fn run(target: Target<'_>, seed: u64, chain: usize, length: Length) -> Trace {
     pulp::Arch::new().dispatch(Run {
-        standard,
-        prior,
+        target,
         seed,
         chain,
         length,
@@ -78,8 +83,7 @@ pub(super) fn run(
 }
 
 struct Run<'a> {
-    standard: &'a Standard,
-    prior: &'a Prior,
+    target: Target<'a>,
     seed: u64,
     chain: usize,
     length: Length,
@@ -98,21 +102,20 @@ impl Run<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Trace {
         let Self {
-            standard,
-            prior,
+            target,
             seed,
             chain,
             length,
         } = self;
-        let size = standard.size();
-        let mut state = Chain::new(standard, prior, Source::new(seed, chain as u64));
+        let (size, count) = (target.standard.size(), target.standard.blocks.len());
+        let mut state = Chain::new(simd, target, Source::new(seed, chain as u64));
         state.start(simd, chain);
         let mut trace = Trace {
-            conditional: vec![0.0; size * length.draws],
+            conditional: vec![0.0; count * length.draws],
             beta: vec![0.0; size * length.draws],
             shift: vec![0.0; size],
             moment: vec![0.0; size],
-            inclusion: vec![0.0; size],
+            inclusion: vec![0.0; count],
             misfit: 0.0,
             visits: BTreeMap::new(),
             moves: 0,
@@ -135,106 +138,94 @@ impl Run<'_> {
 
 /// A chain at work.
 struct Chain<'a> {
-    standard: &'a Standard,
-    prior: &'a Prior,
-    tableau: Tableau<'a>,
+    walker: Walker<'a>,
     swaps: Swaps,
+    exchanges: &'a [Exchange],
     source: Source,
-    /// Family of each position, its size, and its members in the present model.
-    family: Vec<usize>,
-    sizes: Vec<usize>,
-    members: Vec<usize>,
-    /// Prior ratio of flipping each position, times √(v_j) or √(1/v_j).
+    /// Components that may flip, by place in `standard.blocks`: wide ones first.
+    active: Vec<usize>,
+    /// The others, in every model.
+    certain: Vec<usize>,
+    /// Prior ratio of flipping each of them, slab's mass within the bounds included.
     odds: Vec<f64>,
     chunks: Vec<Chunk>,
     version: u64,
     /// Uniform number that the running product has not reached yet, and that product.
     target: f64,
     product: f64,
-    /// Σ over scans of P(z = 1 | all other z).
+    /// Σ over scans of P(z = 1 | all other z), by place in `active`.
     sums: Vec<f64>,
     moves: u64,
 }
 
 impl<'a> Chain<'a> {
-    fn new(standard: &'a Standard, prior: &'a Prior, mut source: Source) -> Self {
-        let tableau = Tableau::new(standard);
-        let width = tableau.width;
-        let target = source.uniform();
+    #[inline(always)]
+    fn new<S: Simd>(simd: S, target: Target<'a>, mut source: Source) -> Self {
+        let standard = target.standard;
+        let mut walker = Walker::new(standard, target.prior);
+        let (certain, active): (Vec<usize>, Vec<usize>) =
+            (0..standard.blocks.len()).partition(|&b| target.certain[b]);
+        certain.iter().for_each(|&block| walker.flip(simd, block));
+        let chunks = active.len().div_ceil(LANES);
+        let uniform = source.uniform();
         let mut chain = Self {
-            standard,
-            prior,
-            swaps: Swaps::new(standard),
+            swaps: Swaps::new(standard, &active),
+            exchanges: target.exchanges,
             source,
-            family: standard.order.iter().map(|&k| prior.family_of(k)).collect(),
-            sizes: prior.family_sizes(),
-            members: vec![0; prior.families()],
-            odds: vec![0.0; width],
+            odds: vec![0.0; chunks * LANES],
             chunks: vec![
                 Chunk {
                     version: 0,
                     conditional: [0.0; LANES],
                     stays: [1.0; LANES]
                 };
-                width / LANES
+                chunks
             ],
             version: 1,
-            target,
+            target: uniform,
             product: 1.0,
-            sums: vec![0.0; width],
+            sums: vec![0.0; chunks * LANES],
             moves: 0,
-            tableau,
+            walker,
+            active,
+            certain,
         };
-        (0..chain.members.len()).for_each(|family| chain.update_odds(family));
+        (0..target.prior.families()).for_each(|family| chain.update_odds(family));
         chain
     }
 
     /// Over-dispersed starts: empty, nearly full, half, a few.
     #[inline(always)]
     fn start<S: Simd>(&mut self, simd: S, chain: usize) {
-        let size = self.standard.size();
+        let count = self.active.len();
         // More than 100 members at the start would only cost time: they leave within a scan.
-        let share = [0.0, 0.9, 0.5, 0.1][chain % 4] * (100.0 / size as f64).min(1.0);
-        for j in 0..size {
+        let share = [0.0, 0.9, 0.5, 0.1][chain % 4] * (100.0 / count as f64).min(1.0);
+        for index in 0..count {
             if self.source.uniform() < share {
-                self.flip(simd, j);
+                self.flip(simd, self.active[index]);
             }
         }
     }
 
-    /// `P(z_j flips)/P(z_j stays)` a priori, with the slab's part of the determinant.
+    /// `P(z_j flips)/P(z_j stays)` a priori.
     fn update_odds(&mut self, family: usize) {
-        for j in (0..self.family.len()).filter(|&j| self.family[j] == family) {
-            let root = self.standard.precision[j].sqrt();
-            self.odds[j] = if self.tableau.includes(j) {
-                1.0 / (self.prior_odds(family, self.members[family] - 1) * root)
-            } else {
-                self.prior_odds(family, self.members[family]) * root
-            };
+        for (odds, &block) in self.odds.iter_mut().zip(&self.active) {
+            if self.walker.standard.blocks[block].family == family {
+                *odds = self.walker.flip_odds(block);
+            }
         }
-    }
-
-    /// Prior odds of one more member of a family that has `others` beside it.
-    fn prior_odds(&self, family: usize, others: usize) -> f64 {
-        let (inside, outside) = self.prior.next(family, others, self.sizes[family] - 1);
-        inside / outside
     }
 
     #[inline(always)]
-    fn flip<S: Simd>(&mut self, simd: S, j: usize) {
-        self.tableau.flip(simd, j);
-        let family = self.family[j];
-        if self.tableau.includes(j) {
-            self.members[family] += 1;
-        } else {
-            self.members[family] -= 1;
-        }
+    fn flip<S: Simd>(&mut self, simd: S, block: usize) {
+        self.walker.flip(simd, block);
+        let family = self.walker.standard.blocks[block].family;
         self.update_odds(family);
         self.version += 1;
         self.moves += 1;
     }
 
-    /// All positions once, in order, then the swaps.
+    /// All components once, in order, then the swaps.
     #[inline(always)]
     fn scan<S: Simd>(&mut self, simd: S) {
         for index in 0..self.chunks.len() {
@@ -271,12 +262,34 @@ impl<'a> Chain<'a> {
                 for l in from..=lane {
                     sums[l] += chunk.conditional[l];
                 }
-                self.flip(simd, index * LANES + lane);
+                self.flip(simd, self.active[index * LANES + lane]);
                 self.renew();
                 from = lane + 1;
             }
         }
         self.swap(simd);
+        self.exchange(simd);
+    }
+
+    /// Proposes one exchange, drawn uniformly; void unless one side is wholly in and the other wholly out, which it is
+    /// there and back with the same probability.
+    #[inline(always)]
+    fn exchange<S: Simd>(&mut self, simd: S) {
+        if self.exchanges.is_empty() {
+            return;
+        }
+        let index = (self.source.uniform() * self.exchanges.len() as f64) as usize;
+        let Some(step) = self.exchanges[index].step(&self.walker) else {
+            return;
+        };
+        let gain = self.walker.exchange_gain(&step);
+        if self.source.uniform() < LAZY * gain.exp() {
+            for &block in step.leaving.iter().chain(&step.entering) {
+                self.flip(simd, block);
+                self.moves -= 1;
+            }
+            self.moves += 1;
+        }
     }
 
     /// A new uniform number for the next flip.
@@ -292,14 +305,7 @@ impl<'a> Chain<'a> {
         let mut left = self.swaps.proposals_per_scan();
         while left > 0 {
             if self.swaps.version != self.version {
-                self.swaps.evaluate(
-                    simd,
-                    &self.tableau,
-                    self.standard,
-                    &self.odds,
-                    &self.family,
-                    self.version,
-                );
+                self.swaps.evaluate(simd, &self.walker, self.version);
             }
             let stay = 1.0 - LAZY * self.swaps.accepted;
             let all = self.product * stay.powi(left);
@@ -322,30 +328,24 @@ impl<'a> Chain<'a> {
     /// Ratios of eight flips.
     #[inline(always)]
     fn evaluate<S: Simd>(&mut self, simd: S, index: usize) {
-        let range = index * LANES..(index + 1) * LANES;
-        let tableau = &self.tableau;
-        let (diagonal, gradient) = (
-            &tableau.diagonal[range.clone()],
-            &tableau.gradient[range.clone()],
-        );
-        let (sign, odds) = (&tableau.sign[range.clone()], &self.odds[range]);
+        let (tableau, standard) = (&self.walker.tableau, self.walker.standard);
         let misfit = 1.0 + tableau.excess;
-        let (mut change, mut ratio) = ([0.0; LANES], [0.0; LANES]);
-        for lane in 0..LANES {
-            let d = if diagonal[lane] > f64::MIN_POSITIVE {
-                diagonal[lane]
-            } else {
-                f64::MIN_POSITIVE
-            };
-            let flipped = (misfit + sign[lane] * gradient[lane] * gradient[lane] / d) / misfit;
+        let (mut change, mut ratio, mut sign) = ([1.0; LANES], [0.0; LANES], [-1.0; LANES]);
+        let blocks = self.active[index * LANES..].iter().take(LANES);
+        for (lane, &block) in blocks.enumerate() {
+            let (d, square) = tableau.block(block);
+            if tableau.holds(block) {
+                sign[lane] = 1.0;
+            }
+            let flipped = (misfit + sign[lane] * square) / misfit;
             change[lane] = if flipped > f64::MIN_POSITIVE {
                 flipped
             } else {
                 f64::MIN_POSITIVE
             };
-            ratio[lane] = odds[lane] / d.sqrt();
+            ratio[lane] = self.odds[index * LANES + lane] / d.sqrt();
         }
-        let power = to_the(simd, change, -self.standard.shape);
+        let power = to_the(simd, change, -standard.shape);
         let chunk = &mut self.chunks[index];
         let mut product = 1.0;
         let mut stay = [0.0; LANES];
@@ -362,26 +362,33 @@ impl<'a> Chain<'a> {
         chunk.version = self.version;
     }
 
-    /// φ | z, then β | z, φ; sums that need no draw use the conditional expectations.
+    /// φ | z, then each β_k | z, φ; sums that need no draw use the conditional expectations.
     fn record(&mut self, trace: &mut Trace, draw: usize, length: Length) {
-        let size = self.standard.size();
-        let misfit = 1.0 + self.tableau.excess;
-        let factor = self.standard.noise_factor();
+        let (standard, tableau) = (self.walker.standard, &self.walker.tableau);
+        let misfit = 1.0 + tableau.excess;
+        let factor = standard.noise_factor();
         let phi = if factor.is_finite() {
             misfit * factor
         } else {
             0.0
         };
-        for k in 0..size {
-            let conditional = self.sums[k] / length.scans_per_draw as f64;
-            trace.conditional[k * length.draws + draw] = conditional as f32;
-            trace.inclusion[k] += conditional;
-            let center = self.standard.center[k];
-            let (delta, variance) = if self.tableau.includes(k) {
-                (
-                    self.tableau.gradient[k] - center,
-                    phi * self.tableau.diagonal[k],
-                )
+        let mut set = vec![0u64; standard.blocks.len().div_ceil(64)];
+        for block in (0..standard.blocks.len()).filter(|&block| tableau.holds(block)) {
+            set[block / 64] |= 1 << (block % 64);
+        }
+        for &block in &self.certain {
+            trace.conditional[block * length.draws + draw] = 1.0;
+            trace.inclusion[block] += 1.0;
+        }
+        for (sum, &block) in self.sums.iter().zip(&self.active) {
+            let conditional = sum / length.scans_per_draw as f64;
+            trace.conditional[block * length.draws + draw] = conditional as f32;
+            trace.inclusion[block] += conditional;
+        }
+        for k in 0..standard.size() {
+            let center = standard.center[k];
+            let (delta, variance) = if tableau.includes(k) {
+                (tableau.gradient[k] - center, phi * tableau.diagonal[k])
             } else {
                 (-center, 0.0)
             };
@@ -390,26 +397,13 @@ impl<'a> Chain<'a> {
         }
         trace.misfit += misfit;
 
-        // φ | z ~ InvGamma(a_n, (1 + c)/2), β | z, φ ~ N(β_z, φ A_zz⁻¹)
-        let members = &self.tableau.members;
-        let count = members.len();
-        let sampled = 0.5 * misfit / self.source.gamma(self.standard.shape);
-        let covariance: Vec<f64> = members
-            .iter()
-            .flat_map(|&i| members.iter().map(move |&j| (i, j)))
-            .map(|(i, j)| self.tableau.row(i)[j])
-            .collect();
-        let noise: Vec<f64> = (0..count).map(|_| self.source.normal()).collect();
-        if let Ok(factor) = Cholesky::new(&covariance, count) {
-            for (a, &k) in members.iter().enumerate() {
-                let row = &factor.lower()[a * count..a * count + a + 1];
-                let step: f64 = row.iter().zip(&noise).map(|(l, e)| l * e).sum();
-                trace.beta[k * length.draws + draw] =
-                    (self.tableau.gradient[k] + sampled.sqrt() * step) as f32;
-            }
+        // φ | z ~ InvGamma(a_n, (1 + c)/2), β_k | z, φ ~ N(β_k, φ (A_zz⁻¹)_kk)
+        let sampled = 0.5 * misfit / self.source.gamma(standard.shape);
+        for &k in &tableau.members {
+            let sd = (sampled * tableau.diagonal[k]).sqrt();
+            trace.beta[k * length.draws + draw] =
+                (tableau.gradient[k] + sd * self.source.normal()) as f32;
         }
-        let mut set = vec![0u64; size.div_ceil(64)];
-        members.iter().for_each(|&k| set[k / 64] |= 1 << (k % 64));
         *trace.visits.entry(set).or_default() += 1;
     }
 }

@@ -6,15 +6,15 @@
 mod chain;
 mod random;
 mod swaps;
-mod tableau;
 
-use super::InferenceSettings;
-use super::exact::{LISTED_MASS, LISTED_MODELS};
+use super::answer::{Averages, LISTED_MASS, LISTED_MODELS, Listed, posterior};
+use super::exchanges::exchanges;
 use super::standard::Standard;
+use super::{InferenceSettings, bounds, certain};
 use crate::diagnostics::{ess_bulk, mcse_mean, r_hat};
 use crate::error::{Error, Result};
-use crate::posterior::{Method, Model, Posterior, Problem};
-use chain::{Length, Trace};
+use crate::posterior::{Method, Posterior, Problem};
+use chain::{Length, Target, Trace};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -29,12 +29,14 @@ const WORK_LIMIT: f64 = 4e11;
 /// Fewest draws per chain that can be judged.
 const LEAST_DRAWS: usize = 100;
 
-/// How far the chains agree, per position.
+/// How far the chains agree.
 struct Agreement {
+    /// Of β, per position.
     r_hat: Vec<f64>,
     ess: Vec<f64>,
+    /// Of the PIP, per place in `standard.blocks`.
     mcse: Vec<f64>,
-    /// Largest difference of the PIP between two chains.
+    /// Largest difference of the PIP between two chains, likewise.
     spread: Vec<f64>,
 }
 
@@ -61,6 +63,16 @@ pub(super) fn sample(problem: &Problem, settings: &InferenceSettings) -> Result<
         });
     }
     let standard = Standard::new(problem)?;
+    let sure = certain::components(&standard, &problem.prior);
+    let certain: Vec<bool> = standard.blocks.iter().map(|b| sure[b.component]).collect();
+    let active: Vec<usize> = (0..certain.len()).filter(|&b| !certain[b]).collect();
+    let exchanges = exchanges(&standard, &active, false);
+    let target = Target {
+        standard: &standard,
+        prior: &problem.prior,
+        certain: &certain,
+        exchanges: &exchanges,
+    };
     let mut best: Option<(Vec<Trace>, Agreement)> = None;
     for scans_per_draw in SCANS_PER_DRAW {
         let length = Length {
@@ -75,10 +87,10 @@ pub(super) fn sample(problem: &Problem, settings: &InferenceSettings) -> Result<
         }
         let traces: Vec<Trace> = (0..settings.chains)
             .into_par_iter()
-            .map(|chain| chain::run(&standard, &problem.prior, settings.seed, chain, length))
+            .map(|chain| chain::run(target, settings.seed, chain, length))
             .collect();
         let agreement = judge(&standard, &traces, settings.draws);
-        let agree = disagreement(&agreement).is_none();
+        let agree = disagreement(&standard, &agreement).is_none();
         best = Some((traces, agreement));
         if agree {
             break;
@@ -91,7 +103,9 @@ pub(super) fn sample(problem: &Problem, settings: &InferenceSettings) -> Result<
             remedy: "use fewer draws".into(),
         });
     };
-    if let Some((d, why)) = disagreement(&agreement).filter(|_| !settings.allow_disagreement) {
+    if let Some((d, why)) =
+        disagreement(&standard, &agreement).filter(|_| !settings.allow_disagreement)
+    {
         return Err(Error::Refused {
             problem: format!(
                 "{} chains of {} draws disagree, most about `{}`: {why}",
@@ -101,35 +115,44 @@ pub(super) fn sample(problem: &Problem, settings: &InferenceSettings) -> Result<
                 .into(),
         });
     }
-    summarise(&standard, &traces, &agreement, settings)
+    summarise(problem, &standard, &traces, &agreement, settings)
 }
 
 /// See [`super::scan`].
 pub(super) fn scan(problem: &Problem, scans: usize, seed: u64) -> Result<u64> {
     let standard = Standard::new(problem)?;
+    let certain = vec![false; standard.blocks.len()];
+    let active: Vec<usize> = (0..certain.len()).collect();
+    let target = Target {
+        standard: &standard,
+        prior: &problem.prior,
+        certain: &certain,
+        exchanges: &exchanges(&standard, &active, false),
+    };
     let length = Length {
         warm_up: 1,
         draws: 1,
         scans_per_draw: scans / 2,
     };
-    Ok(chain::run(&standard, &problem.prior, seed, 0, length).moves)
+    Ok(chain::run(target, seed, 0, length).moves)
+}
+
+/// The chains' values of one row, `[row * draws + draw]`.
+fn rows(traces: &[Trace], draws: usize, row: usize, values: fn(&Trace) -> &[f32]) -> Vec<Vec<f64>> {
+    let of = |t: &Trace| {
+        values(t)[row * draws..(row + 1) * draws]
+            .iter()
+            .map(|&x| f64::from(x))
+            .collect()
+    };
+    traces.iter().map(of).collect()
 }
 
 fn judge(standard: &Standard, traces: &[Trace], draws: usize) -> Agreement {
-    let judged: Vec<[f64; 4]> = (0..standard.size())
+    let (r_hat, ess) = (0..standard.size())
         .into_par_iter()
         .map(|d| {
-            let chains = |values: fn(&Trace) -> &[f32]| -> Vec<Vec<f64>> {
-                let of = |t: &Trace| {
-                    values(t)[d * draws..(d + 1) * draws]
-                        .iter()
-                        .map(|&x| f64::from(x))
-                        .collect()
-                };
-                traces.iter().map(of).collect()
-            };
-            let beta = chains(|t| &t.beta);
-            let conditional = chains(|t| &t.conditional);
+            let beta = rows(traces, draws, d, |t| &t.beta);
             // One chain is compared with itself: its halves.
             let halves: Vec<&[f64]> = beta
                 .iter()
@@ -141,32 +164,32 @@ fn judge(standard: &Standard, traces: &[Trace], draws: usize) -> Agreement {
                 r_hat(&halves)
             };
             // Draws that are all equal (never included) agree.
-            let r_hat = if r_hat.is_nan() { 1.0 } else { r_hat };
-            let pips = traces.iter().map(|t| t.inclusion[d] / draws as f64);
-            let spread = pips.clone().fold(0.0, f64::max) - pips.fold(1.0, f64::min);
-            [
-                r_hat,
-                ess_bulk(&beta),
-                mcse_mean(&conditional),
-                spread.max(0.0),
-            ]
+            (if r_hat.is_nan() { 1.0 } else { r_hat }, ess_bulk(&beta))
         })
-        .collect();
-    let column = |i: usize| judged.iter().map(|row| row[i]).collect();
+        .unzip();
+    let (mcse, spread) = (0..standard.blocks.len())
+        .into_par_iter()
+        .map(|b| {
+            let conditional = rows(traces, draws, b, |t| &t.conditional);
+            let pips = traces.iter().map(|t| t.inclusion[b] / draws as f64);
+            let spread = pips.clone().fold(0.0, f64::max) - pips.fold(1.0, f64::min);
+            (mcse_mean(&conditional), spread.max(0.0))
+        })
+        .unzip();
     Agreement {
-        r_hat: column(0),
-        ess: column(1),
-        mcse: column(2),
-        spread: column(3),
+        r_hat,
+        ess,
+        mcse,
+        spread,
     }
 }
 
 /// The position that the chains disagree about most, and in which words.
-fn disagreement(agreement: &Agreement) -> Option<(usize, String)> {
+fn disagreement(standard: &Standard, agreement: &Agreement) -> Option<(usize, String)> {
     let worst = |values: &[f64]| (0..values.len()).max_by(|&a, &b| values[a].total_cmp(&values[b]));
-    if let Some(d) = worst(&agreement.spread).filter(|&d| agreement.spread[d] > SPREAD_LIMIT) {
+    if let Some(d) = worst(&agreement.spread).filter(|&b| agreement.spread[b] > SPREAD_LIMIT) {
         return Some((
-            d,
+            standard.blocks[d].start,
             format!(
                 "its inclusion probability differs by {:.2} between chains",
                 agreement.spread[d]
@@ -184,6 +207,7 @@ fn disagreement(agreement: &Agreement) -> Option<(usize, String)> {
 }
 
 fn summarise(
+    problem: &Problem,
     standard: &Standard,
     traces: &[Trace],
     agreement: &Agreement,
@@ -193,72 +217,50 @@ fn summarise(
     let mean_of = |sums: fn(&Trace) -> &[f64], d: usize| {
         traces.iter().map(|t| sums(t)[d]).sum::<f64>() / draws
     };
-    let shift = |d: usize| mean_of(|t| &t.shift, d);
-    let variance = |d: usize| (mean_of(|t| &t.moment, d) - shift(d) * shift(d)).max(0.0);
-    let factor = standard.noise_factor();
-    let misfit = traces.iter().map(|t| t.misfit).sum::<f64>() / draws;
-    let inclusion = |d: usize| mean_of(|t| &t.inclusion, d).clamp(0.0, 1.0);
-    let (models, models_mass) = list(standard, traces, draws)?;
-    Ok(Posterior {
-        component: standard.component.clone(),
-        inclusion: standard.in_columns(inclusion),
-        inclusion_mcse: standard.in_columns(|d| agreement.mcse[d]),
-        mean: standard.coefficients(|d| standard.center[d] + shift(d)),
-        sd: standard.coefficients(|d| match inclusion(d) > 0.0 {
-            true if factor.is_finite() => variance(d).sqrt(),
-            true => f64::INFINITY,
-            false => 0.0,
-        }),
-        shape: standard.shape,
-        noise: standard.noise(misfit * factor),
-        models,
-        models_mass,
-        log_evidence: None,
-        method: Method::Gibbs {
-            chains: settings.chains,
-            draws: settings.draws,
-            r_hat: agreement.r_hat.iter().copied().fold(1.0, f64::max),
-            ess: agreement.ess.iter().copied().fold(draws, f64::min),
-        },
-    })
+    let block = standard.block_of();
+    let positions = 0..standard.size();
+    let mut averages = Averages {
+        inclusion: positions
+            .clone()
+            .map(|d| mean_of(|t| &t.inclusion, block[d]).clamp(0.0, 1.0))
+            .collect(),
+        mcse: block.iter().map(|&b| agreement.mcse[b]).collect(),
+        shift: positions
+            .clone()
+            .map(|d| mean_of(|t| &t.shift, d))
+            .collect(),
+        moment: positions.map(|d| mean_of(|t| &t.moment, d)).collect(),
+        misfit: traces.iter().map(|t| t.misfit).sum::<f64>() / draws,
+    };
+    let listed = Listed::new(
+        standard,
+        visited(standard, traces, draws),
+        LISTED_MASS,
+        LISTED_MODELS,
+    )?;
+    let listed = bounds::settle(problem, standard, &mut averages, listed)?;
+    let method = Method::Gibbs {
+        chains: settings.chains,
+        draws: settings.draws,
+        r_hat: agreement.r_hat.iter().copied().fold(1.0, f64::max),
+        ess: agreement.ess.iter().copied().fold(draws, f64::min),
+    };
+    Ok(posterior(standard, &averages, listed, None, method))
 }
 
-/// Visited models by how often they were visited, most often first.
-fn list(standard: &Standard, traces: &[Trace], draws: f64) -> Result<(Vec<Model>, f64)> {
+/// Visited models: share of the draws, columns, positions.
+fn visited(standard: &Standard, traces: &[Trace], draws: f64) -> Vec<(f64, Vec<u32>, Vec<usize>)> {
     let mut visits: BTreeMap<&[u64], u64> = BTreeMap::new();
     for (set, count) in traces.iter().flat_map(|t| &t.visits) {
         *visits.entry(set).or_default() += count;
     }
-    let mut found: Vec<(u64, Vec<u32>, Vec<usize>)> = visits
+    visits
         .into_iter()
         .map(|(set, count)| {
-            let positions: Vec<usize> = (0..standard.size())
-                .filter(|d| set[d / 64] >> (d % 64) & 1 == 1)
-                .collect();
-            let mut members: Vec<u32> = positions
-                .iter()
-                .map(|&d| standard.order[d] as u32)
-                .collect();
-            members.sort_unstable();
-            (count, members, positions)
+            let (members, positions) = standard.members(set);
+            (count as f64 / draws, members, positions)
         })
-        .collect();
-    found.sort_by(|a, b| b.0.cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
-    let mut listed = 0;
-    let mut models = Vec::new();
-    for (count, _, positions) in found {
-        if models.len() == LISTED_MODELS || listed as f64 >= LISTED_MASS * draws {
-            break;
-        }
-        listed += count;
-        models.push((positions, count));
-    }
-    let total = listed as f64;
-    let models: Result<Vec<Model>> = models
-        .iter()
-        .map(|(positions, count)| standard.model(positions, *count as f64 / total))
-        .collect();
-    Ok((models?, total / draws))
+        .collect()
 }
 
 #[cfg(test)]

@@ -1,12 +1,12 @@
-//! Proposals to exchange an included column for an excluded one that resembles it.
+//! Proposals to exchange an included component of one column for an excluded one that resembles it.
 //!
 //! A proposal draws one of E fixed pairs uniformly and is void unless exactly one of the two is included: the same
 //! probability there and back. The chance that a proposal is accepted is the mean of the acceptance probabilities over
 //! all pairs, which is computed once per state.
 
 use super::chain::{LAZY, to_the};
-use super::tableau::Tableau;
 use crate::infer::standard::Standard;
+use crate::infer::walker::Walker;
 use crate::lanes::LANES;
 use pulp::Simd;
 
@@ -30,19 +30,29 @@ pub(super) struct Swaps {
 }
 
 impl Swaps {
-    pub(super) fn new(standard: &Standard) -> Self {
+    /// Pairs among `active` components.
+    pub(super) fn new(standard: &Standard, active: &[usize]) -> Self {
         let size = standard.size();
+        let single: Vec<usize> = active
+            .iter()
+            .copied()
+            .filter(|&b| standard.blocks[b].len == 1)
+            .collect();
         let mut pairs = Vec::new();
-        for i in 0..size {
-            let alike = |j: usize| standard.matrix[i * size + j].abs();
-            let mut others: Vec<usize> =
-                (0..size).filter(|&j| j != i && alike(j) > ALIKE).collect();
+        for &a in &single {
+            let row = standard.blocks[a].start * size;
+            let alike = |b: usize| standard.matrix[row + standard.blocks[b].start].abs();
+            let mut others: Vec<usize> = single
+                .iter()
+                .copied()
+                .filter(|&b| b != a && alike(b) > ALIKE)
+                .collect();
             others.sort_by(|&a, &b| alike(b).total_cmp(&alike(a)));
             others.truncate(PAIRS_PER_COLUMN);
             pairs.extend(
                 others
                     .into_iter()
-                    .map(|j| (i.min(j) as u32, i.max(j) as u32)),
+                    .map(|b| (a.min(b) as u32, a.max(b) as u32)),
             );
         }
         pairs.sort_unstable();
@@ -72,21 +82,14 @@ impl Swaps {
         (i as usize, j as usize)
     }
 
-    /// Acceptance probabilities of all pairs in the present state; `odds` are those of single flips.
+    /// Acceptance probabilities of all pairs in the present state.
     #[inline(always)]
-    pub(super) fn evaluate<S: Simd>(
-        &mut self,
-        simd: S,
-        tableau: &Tableau<'_>,
-        standard: &Standard,
-        odds: &[f64],
-        family: &[usize],
-        version: u64,
-    ) {
+    pub(super) fn evaluate<S: Simd>(&mut self, simd: S, walker: &Walker<'_>, version: u64) {
+        let (standard, tableau) = (walker.standard, &walker.tableau);
         self.live.clear();
         self.sums.clear();
         for &(a, b) in &self.pairs {
-            match (tableau.includes(a as usize), tableau.includes(b as usize)) {
+            match (tableau.holds(a as usize), tableau.holds(b as usize)) {
                 (true, false) => self.live.push((a, b)),
                 (false, true) => self.live.push((b, a)),
                 _ => {}
@@ -97,7 +100,8 @@ impl Swaps {
         for pairs in self.live.chunks(LANES) {
             let (mut change, mut ratio) = ([1.0; LANES], [0.0; LANES]);
             for (lane, &(i, j)) in pairs.iter().enumerate() {
-                let (i, j) = (i as usize, j as usize);
+                let (out, into) = (i as usize, j as usize);
+                let (i, j) = (standard.blocks[out].start, standard.blocks[into].start);
                 // Without i: s_j grows by t²/C_i, u_j by t β_i/C_i.
                 let (t, inverse, beta) = (
                     tableau.row(i)[j],
@@ -108,12 +112,8 @@ impl Swaps {
                 let gradient = tableau.gradient[j] + t * beta / inverse;
                 let swapped = misfit + beta * beta / inverse - gradient * gradient / schur;
                 change[lane] = (swapped / misfit).max(f64::MIN_POSITIVE);
-                // Within one family the number of members stays: only the slabs' part of the odds remains.
-                let prior = if family[i] == family[j] {
-                    (standard.precision[j] / standard.precision[i]).sqrt()
-                } else {
-                    odds[i] * odds[j]
-                };
+                let slabs = (standard.precision[j] / standard.precision[i]).sqrt();
+                let prior = walker.exchange_odds(out, into) * slabs;
                 ratio[lane] = prior / (inverse * schur).sqrt();
             }
             let power = to_the(simd, change, -standard.shape);

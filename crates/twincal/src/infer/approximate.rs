@@ -1,0 +1,124 @@
+//! A posterior without random numbers in milliseconds, for comparing settings: fixed points, folds, sensitivities.
+//!
+//! What is reported at the end comes from [`super::infer`].
+
+use super::answer::{Averages, Listed, posterior};
+use super::search::{self, Found, Start};
+use super::standard::Standard;
+use super::{bounds, certain};
+use crate::error::Result;
+use crate::posterior::{Method, Posterior, Problem};
+
+/// Models that a search expands at most.
+const BUDGET: usize = 256;
+/// Share of the mass and most models in the list.
+const LISTED_MASS: f64 = 0.9999;
+const LISTED_MODELS: usize = 32;
+
+/// See [`super::approximate`].
+pub(super) fn approximate(problem: &Problem, warm: Option<&Posterior>) -> Result<Posterior> {
+    let standard = Standard::new(problem)?;
+    let found = search(&standard, problem, warm, BUDGET);
+    let total = found.sums.total() / (1.0 - found.missing);
+    let listed = Listed::new(
+        &standard,
+        shares(&standard, &found, total, LISTED_MODELS),
+        LISTED_MASS,
+        LISTED_MODELS,
+    )?;
+    let mut averages = averages(&standard, &found);
+    let method = Method::Search {
+        models: found.models.len() as u64,
+        missing: found.missing,
+    };
+    let log_evidence = standard.log_evidence(total.ln() + found.sums.reference);
+    let listed = bounds::apply(&standard, &mut averages, listed, bounds::Weights::Guided)?;
+    Ok(posterior(
+        &standard,
+        &averages,
+        listed,
+        Some(log_evidence),
+        method,
+    ))
+}
+
+/// Runs the search on a problem; `warm` gives starts.
+pub(super) fn search(
+    standard: &Standard,
+    problem: &Problem,
+    warm: Option<&Posterior>,
+    budget: usize,
+) -> Found {
+    let sure = certain::components(standard, &problem.prior);
+    let (certain, active): (Vec<usize>, Vec<usize>) =
+        (0..standard.blocks.len()).partition(|&b| sure[standard.blocks[b].component]);
+    let starts: Vec<Vec<usize>> = warm
+        .filter(|warm| warm.component == standard.component)
+        .map(|warm| {
+            let mut starts: Vec<Vec<usize>> = warm
+                .models
+                .iter()
+                .take(2)
+                .map(|model| {
+                    let mut holds = vec![false; standard.blocks.len()];
+                    model
+                        .members
+                        .iter()
+                        .for_each(|&k| holds[standard.component[k as usize]] = true);
+                    active
+                        .iter()
+                        .copied()
+                        .filter(|&b| holds[standard.blocks[b].component])
+                        .collect()
+                })
+                .collect();
+            starts.dedup();
+            starts
+        })
+        .unwrap_or_default();
+    search::run(
+        standard,
+        &problem.prior,
+        &Start {
+            certain: &certain,
+            active: &active,
+            warm: &starts,
+            budget,
+        },
+    )
+}
+
+/// (share of `total`, columns, positions) of the heaviest models found.
+pub(super) fn shares(
+    standard: &Standard,
+    found: &Found,
+    total: f64,
+    most: usize,
+) -> Vec<(f64, Vec<u32>, Vec<usize>)> {
+    found
+        .models
+        .iter()
+        .take(most)
+        .map(|(log_weight, set)| {
+            let (members, positions) = standard.members(set);
+            (found.sums.weight(*log_weight) / total, members, positions)
+        })
+        .collect()
+}
+
+/// Averages over all models found.
+pub(super) fn averages(standard: &Standard, found: &Found) -> Averages {
+    let (sums, total) = (&found.sums, found.sums.total());
+    let share = |values: &[f64]| -> Vec<f64> { values.iter().map(|x| x / total).collect() };
+    Averages {
+        inclusion: standard
+            .block_of()
+            .iter()
+            .map(|&b| sums.inclusion[b] / total)
+            .collect(),
+        mcse: vec![0.0; standard.size()],
+        shift: share(&sums.shift),
+        moment: share(&sums.moment),
+        misfit: sums.misfit / total,
+    }
+}

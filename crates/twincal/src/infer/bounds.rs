@@ -1,0 +1,303 @@
+//! Coefficients with bounds: the slab and the posterior of every model truncated to `β_k ≥ lower_k`.
+//!
+//! Truncating both multiplies the weight of a model by
+//!
+//! ```text
+//! P(β ≥ lower | z, y) / P(β ≥ lower | z)
+//! ```
+//!
+//! and makes its moments those of a truncated distribution. Both come from expectation propagation (Minka 2001; Cunningham,
+//! Hennig & Lacoste-Julien 2011): each bound becomes a normal site that matches mean and variance. φ is set to b_z/a_n.
+//!
+//! Listed models are treated one by one; the others, light by construction, are scaled as the listed ones are on
+//! average. Where that moves weight to models that a method without bounds does not list, a search that knows the bounds
+//! lists them.
+
+mod propagation;
+
+use super::answer::{Averages, Listed};
+use super::approximate;
+use super::standard::{Standard, slab_mass};
+use crate::error::Result;
+use crate::linear_algebra::Cholesky;
+use crate::posterior::{Model, Problem, Site};
+use propagation::propagate;
+use std::collections::BTreeMap;
+
+/// A bound this many standard deviations below the mean does not act: its mass is 1 − 6e-16.
+const FAR: f64 = 8.0;
+
+/// Models that the search beside another method expands, and how many of its models join the list.
+const BUDGET: usize = 1024;
+const JOINED: usize = 300;
+
+/// What the weights of listed models already contain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Weights {
+    /// The mass of the slab within the bounds, nothing of the posterior's.
+    Free,
+    /// Also the posterior's mass as if coefficients were independent.
+    Guided,
+}
+
+/// Truncates the listed models and corrects the averages.
+pub(super) fn apply(
+    standard: &Standard,
+    averages: &mut Averages,
+    listed: Listed,
+    weights: Weights,
+) -> Result<Listed> {
+    if !standard.bounded || listed.models.is_empty() {
+        return Ok(listed);
+    }
+    let before: Vec<Model> = listed.models.clone();
+    let mut listed = listed;
+    let mut acts = false;
+    for (model, positions) in listed.models.iter_mut().zip(&listed.positions) {
+        let log_ratio = truncate(standard, model, positions, weights)?;
+        acts |= log_ratio.abs() > 1e-12 || !model.sites.is_empty();
+        model.weight *= log_ratio.exp();
+    }
+    if !acts {
+        return Ok(Listed {
+            models: before,
+            ..listed
+        });
+    }
+    let (old, new) = (before.iter().map(|m| m.weight).sum::<f64>(), listed.mass());
+    // Models that are not listed are scaled like the listed ones.
+    let scale = new / old;
+    let total = new + scale * (1.0 - old).max(0.0);
+    let size = standard.size();
+    let mut sums = Averages {
+        inclusion: averages.inclusion.clone(),
+        mcse: averages.mcse.clone(),
+        shift: averages.shift.clone(),
+        moment: averages.moment.clone(),
+        misfit: averages.misfit,
+    };
+    for d in 0..size {
+        sums.inclusion[d] *= scale;
+        sums.shift[d] *= scale;
+        sums.moment[d] *= scale;
+    }
+    sums.misfit *= scale;
+    for ((model, old), positions) in listed.models.iter().zip(&before).zip(&listed.positions) {
+        count(standard, &mut sums, old, positions, -scale);
+        count(standard, &mut sums, model, positions, 1.0);
+    }
+    for d in 0..size {
+        averages.inclusion[d] = (sums.inclusion[d] / total).clamp(0.0, 1.0);
+        averages.shift[d] = sums.shift[d] / total;
+        averages.moment[d] = sums.moment[d] / total;
+    }
+    averages.misfit = sums.misfit / total;
+    let mut order: Vec<usize> = (0..listed.models.len()).collect();
+    order.sort_by(|&a, &b| {
+        let (a, b) = (&listed.models[a], &listed.models[b]);
+        b.weight
+            .total_cmp(&a.weight)
+            .then_with(|| a.members.cmp(&b.members))
+    });
+    Ok(Listed {
+        models: order
+            .iter()
+            .map(|&i| Model {
+                weight: listed.models[i].weight / total,
+                ..listed.models[i].clone()
+            })
+            .collect(),
+        positions: order.iter().map(|&i| listed.positions[i].clone()).collect(),
+    })
+}
+
+/// [`apply`] for a method that does not know the bounds: where they act, its list is joined by what a search finds.
+pub(super) fn settle(
+    problem: &Problem,
+    standard: &Standard,
+    averages: &mut Averages,
+    mut listed: Listed,
+) -> Result<Listed> {
+    if !standard.bounded {
+        return Ok(listed);
+    }
+    let found = approximate::search(standard, problem, None, BUDGET);
+    let known: BTreeMap<Vec<u32>, f64> = listed
+        .models
+        .iter()
+        .map(|model| (model.members.clone(), model.weight))
+        .collect();
+    // Free weights of models that are not listed, relative to the heaviest listed one.
+    let Some(heaviest) = listed.models.first() else {
+        return Ok(listed);
+    };
+    let (reference, share) = (log_weight(problem, standard, heaviest), heaviest.weight);
+    let mut more = Vec::new();
+    for (_, members, positions) in approximate::shares(standard, &found, found.sums.total(), JOINED)
+    {
+        if known.contains_key(&members) {
+            continue;
+        }
+        let model = standard.model(&positions, 1.0)?;
+        let weight = share * (log_weight(problem, standard, &model) - reference).exp();
+        more.push((weight, members, positions));
+    }
+    let joined = Listed::new(standard, more, f64::INFINITY, JOINED)?;
+    listed.models.extend(joined.models);
+    listed.positions.extend(joined.positions);
+    apply(standard, averages, listed, Weights::Free)
+}
+
+/// ln of a model's weight but for what all models share, from its own factor.
+fn log_weight(problem: &Problem, standard: &Standard, model: &Model) -> f64 {
+    let prior = &problem.prior;
+    let mut holds = vec![false; prior.components()];
+    model
+        .members
+        .iter()
+        .for_each(|&k| holds[prior.component[k as usize]] = true);
+    let mut counts = vec![0; prior.families()];
+    let mut log = 0.0;
+    for block in standard.blocks.iter().filter(|b| holds[b.component]) {
+        counts[block.family] += 1;
+        log += block.factor.ln();
+    }
+    let count = model.members.len();
+    for (i, &k) in model.members.iter().enumerate() {
+        log -= 0.5 * prior.slab[k as usize].ln() + model.factor[i * count + i].ln();
+    }
+    log + prior.log_model(&counts) - standard.shape * standard.misfit(model.scale).ln()
+}
+
+/// Adds `factor · weight` times the moments of a model.
+fn count(
+    standard: &Standard,
+    sums: &mut Averages,
+    model: &Model,
+    positions: &[usize],
+    factor: f64,
+) {
+    let weight = factor * model.weight;
+    let noise = standard.noise_factor();
+    let noise = if noise.is_finite() { noise } else { 0.0 };
+    let misfit = standard.misfit(model.scale);
+    sums.misfit += weight * misfit;
+    let mut delta: Vec<f64> = standard.center.iter().map(|x| -x).collect();
+    let inverse = Cholesky::from_lower(model.factor.clone(), positions.len()).inverse_diagonal();
+    let mut variance = vec![0.0; delta.len()];
+    for (i, &d) in positions.iter().enumerate() {
+        let unit = standard.natural(d);
+        delta[d] += model.mean[i] * unit;
+        // Coefficients in natural units, φ in (1 + c): φ/(N·m)² · unit² = misfit · factor.
+        variance[d] = inverse[i] * standard.precision_unit(d) * misfit * noise;
+        sums.inclusion[d] += weight;
+    }
+    for d in 0..delta.len() {
+        sums.shift[d] += weight * delta[d];
+        sums.moment[d] += weight * (delta[d] * delta[d] + variance[d]);
+    }
+}
+
+/// Truncates one model: its mean and factor become those of the matched normal. Returns ln of what its weight, as it
+/// stands, must be multiplied with.
+fn truncate(
+    standard: &Standard,
+    model: &mut Model,
+    positions: &[usize],
+    weights: Weights,
+) -> Result<f64> {
+    let phi = model.scale / standard.shape;
+    let count = positions.len();
+    let factor = Cholesky::from_lower(model.factor.clone(), count);
+    let bounded: Vec<usize> = (0..count)
+        .filter(|&i| standard.lower[positions[i]] > f64::NEG_INFINITY)
+        .collect();
+    // The slab's mass at this model's φ instead of the full model's.
+    let misfit = standard.misfit(model.scale);
+    let mut log_ratio: f64 = bounded
+        .iter()
+        .map(|&i| {
+            let d = positions[i];
+            let mass = |weight: f64| slab_mass(standard.lower[d], standard.precision[d], weight);
+            (mass(2.0 * standard.shape) / mass(2.0 * standard.shape / misfit)).ln()
+        })
+        .sum();
+    // Covariance of the bounded coefficients, in units of φ.
+    let columns: Vec<Vec<f64>> = bounded
+        .iter()
+        .map(|&i| {
+            let mut x = vec![0.0; count];
+            x[i] = 1.0;
+            factor.solve(&mut x);
+            x
+        })
+        .collect();
+    let lower = |i: usize| standard.lower[positions[i]] / standard.natural(positions[i]);
+    let place = |a: usize| {
+        let i = bounded[a];
+        let sd = (phi * columns[a][i]).sqrt();
+        (sd, (model.mean[i] - lower(i)) / sd)
+    };
+    if weights == Weights::Guided {
+        log_ratio -= (0..bounded.len())
+            .map(|a| super::moments::log_normal_mass(place(a).1))
+            .sum::<f64>();
+    }
+    let near: Vec<usize> = (0..bounded.len()).filter(|&a| place(a).1 < FAR).collect();
+    if near.is_empty() {
+        return Ok(log_ratio);
+    }
+    let score: Vec<f64> = near.iter().map(|&a| place(a).1).collect();
+    let correlation: Vec<f64> = near
+        .iter()
+        .flat_map(|&a| near.iter().map(move |&b| (a, b)))
+        .map(|(a, b)| phi * columns[a][bounded[b]] / (place(a).0 * place(b).0))
+        .collect();
+    let (log_mass, sites) = propagate(&score, &correlation);
+    log_ratio += log_mass;
+    // Sites are in x = (β − lower)/sd: −½ τ x² + ν x.
+    let mut matrix = multiply_transposed(&model.factor, count);
+    let mut right = vec![0.0; count];
+    for i in 0..count {
+        right[i] = (0..count)
+            .map(|k| matrix[i * count + k] * model.mean[k])
+            .sum();
+    }
+    for (&a, (precision, shift)) in near.iter().zip(sites) {
+        let (i, sd) = (bounded[a], place(a).0);
+        let precision = phi * precision / (sd * sd);
+        let shift = phi * shift / sd + precision * lower(i);
+        matrix[i * count + i] += precision;
+        right[i] += shift;
+        model.sites.push(Site {
+            place: i as u32,
+            lower: lower(i),
+            precision,
+            shift,
+        });
+    }
+    let factor =
+        Cholesky::new(&matrix, count).map_err(|error| standard.singular(positions[error.pivot]))?;
+    factor.solve(&mut right);
+    model.mean = right;
+    model.factor = factor.into_lower();
+    Ok(log_ratio)
+}
+
+/// `L Lᵀ`.
+fn multiply_transposed(lower: &[f64], count: usize) -> Vec<f64> {
+    let mut matrix = vec![0.0; count * count];
+    for i in 0..count {
+        for k in 0..=i {
+            let value = (0..=k)
+                .map(|j| lower[i * count + j] * lower[k * count + j])
+                .sum();
+            matrix[i * count + k] = value;
+            matrix[k * count + i] = value;
+        }
+    }
+    matrix
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,137 @@
+//! What a problem must be before its posterior can be computed.
+
+use crate::error::{Error, Result};
+use crate::posterior::Problem;
+use crate::prior::Inclusion;
+
+/// Sizes that fit, numbers that are numbers, a prior that is one.
+///
+/// # Errors
+/// [`Error::NotFinite`] naming the column, [`Error::Setting`] for an impossible prior.
+pub(super) fn check(problem: &Problem) -> Result<()> {
+    let (size, prior) = (problem.xy.len(), &problem.prior);
+    let fits = problem.gram.len() == size * size
+        && problem.names.len() == size
+        && prior.slab.len() == size
+        && prior.component.len() == size
+        && prior.lower.len() == size;
+    if !fits {
+        return Err(Error::Setting {
+            key: "problem".into(),
+            problem: format!(
+                "{size} right-hand sides, {} matrix entries, {} names, {} slabs, {} components, {} bounds",
+                problem.gram.len(),
+                problem.names.len(),
+                prior.slab.len(),
+                prior.component.len(),
+                prior.lower.len()
+            ),
+            remedy: "all must belong to the same K columns".into(),
+        });
+    }
+    let components = prior.components();
+    let mut occurs = vec![false; components];
+    let inside = prior
+        .component
+        .iter()
+        .all(|&c| occurs.get_mut(c).map(|o| *o = true).is_some());
+    if !inside || occurs.contains(&false) || prior.family.iter().any(|&f| f >= prior.families()) {
+        return Err(Error::Setting {
+            key: "problem".into(),
+            problem: format!(
+                "{components} components of {} families do not match the columns",
+                prior.families()
+            ),
+            remedy: "every column needs a component, every component a column and a family".into(),
+        });
+    }
+    if let Some(k) = (0..size).find(|&k| prior.lower[k].is_nan() || prior.lower[k] > 0.0) {
+        return Err(Error::Setting {
+            key: "prior.lower".into(),
+            problem: format!(
+                "`{}` must be at least {}, which forbids 0",
+                problem.names[k], prior.lower[k]
+            ),
+            remedy: "give a bound that is not above 0: being out means exactly 0".into(),
+        });
+    }
+    let not_finite = |what: &str, column: &str| Error::NotFinite {
+        what: what.into(),
+        column: column.into(),
+        remedy: "look for samples that are not numbers, or columns that grow beyond 1e150".into(),
+    };
+    for k in 0..size {
+        let diagonal = problem.gram[k * size + k];
+        if diagonal < 0.0
+            || problem.gram[k * size..(k + 1) * size]
+                .iter()
+                .any(|x| !x.is_finite())
+        {
+            return Err(not_finite("the Gram matrix", &problem.names[k]));
+        }
+        if !problem.xy[k].is_finite() {
+            return Err(not_finite(
+                "the product with the residual torque",
+                &problem.names[k],
+            ));
+        }
+        let slab = prior.slab[k];
+        if diagonal > 0.0 && !(slab > 0.0 && slab.is_finite()) {
+            return Err(not_finite("the slab variance", &problem.names[k]));
+        }
+    }
+    if !(problem.yy >= 0.0 && problem.yy.is_finite() && problem.n >= 0.0 && problem.n.is_finite()) {
+        return Err(not_finite(
+            "the sum of squares or the number of rows",
+            "torque",
+        ));
+    }
+    if !problem.log_constant.is_finite() {
+        return Err(not_finite(
+            "the log-determinant of the noise weights",
+            "torque",
+        ));
+    }
+    let setting = |key: &str, problem: String, remedy: &str| Error::Setting {
+        key: key.into(),
+        problem,
+        remedy: remedy.into(),
+    };
+    if !(prior.shape > 0.0 && prior.shape.is_finite()) {
+        return Err(setting(
+            "prior.noise.shape",
+            format!("{} is not positive", prior.shape),
+            "use 0.001 or more",
+        ));
+    }
+    if !(prior.scale >= 0.0 && prior.scale.is_finite()) || (prior.scale == 0.0 && problem.yy > 0.0)
+    {
+        return Err(setting(
+            "prior.noise.scale",
+            format!("{} is not positive", prior.scale),
+            "use 0.001 or more",
+        ));
+    }
+    if let Some(r) = prior.odds.iter().find(|r| !(**r > 0.0 && r.is_finite())) {
+        return Err(setting(
+            "prior.odds",
+            format!("{r} is not positive"),
+            "use 1, or e.g. 0.1 for a family that should need more evidence",
+        ));
+    }
+    match prior.inclusion {
+        Inclusion::Probability(p) if !(p > 0.0 && p < 1.0) => Err(setting(
+            "prior.inclusion.probability",
+            format!("{p} is not between 0 and 1"),
+            "use 0.2, or `expected_terms`",
+        )),
+        Inclusion::ExpectedTerms(m) if size > 0 && !(m > 0.0 && m < components as f64) => {
+            Err(setting(
+                "prior.inclusion.expected_terms",
+                format!("{m} of {components} components"),
+                "it must lie between 0 and the number of components",
+            ))
+        }
+        _ => Ok(()),
+    }
+}

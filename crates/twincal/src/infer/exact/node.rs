@@ -1,0 +1,183 @@
+//! One node of the elimination tree, and how its columns are split off and joined again near the root.
+
+use super::subtree::{exclude, include, reciprocal};
+use super::sums::{Elimination, Layout, combine, triangle};
+use super::tree::Level;
+use pulp::{Simd, WithSimd, bytemuck};
+
+/// What is known at a node: `c + 2 hᵀδ + δᵀS δ` over the m columns yet to decide, the weight so far, the
+/// packed counts of members per family, and the set of included components below the lanes.
+pub(super) struct Node<V> {
+    pub(super) s: Vec<V>,
+    pub(super) h: Vec<V>,
+    pub(super) c: V,
+    pub(super) weight: V,
+    pub(super) count: u32,
+    pub(super) set: u32,
+}
+
+/// The same, borrowed.
+#[derive(Clone, Copy)]
+pub(super) struct View<'a, V> {
+    pub(super) s: &'a [V],
+    pub(super) h: &'a [V],
+    pub(super) c: V,
+    pub(super) weight: V,
+    pub(super) count: u32,
+    pub(super) set: u32,
+}
+
+impl<V: bytemuck::Pod> Node<V> {
+    pub(super) fn blank(m: usize) -> Self {
+        let zero = V::zeroed();
+        Self {
+            s: vec![zero; triangle(m)],
+            h: vec![zero; m],
+            c: zero,
+            weight: zero,
+            count: 0,
+            set: 0,
+        }
+    }
+
+    pub(super) fn view(&self) -> View<'_, V> {
+        View {
+            s: &self.s,
+            h: &self.h,
+            c: self.c,
+            weight: self.weight,
+            count: self.count,
+            set: self.set,
+        }
+    }
+}
+
+/// The lanes of a vector as numbers.
+pub(super) fn lanes<V: bytemuck::Pod>(vector: &V) -> &[f64] {
+    bytemuck::cast_slice(std::slice::from_ref(vector))
+}
+
+/// A vector from a function of the lane.
+pub(super) fn from_lanes<V: bytemuck::Pod>(value: impl Fn(usize) -> f64) -> V {
+    let mut vector = [V::zeroed()];
+    let numbers: &mut [f64] = bytemuck::cast_slice_mut(&mut vector);
+    numbers
+        .iter_mut()
+        .enumerate()
+        .for_each(|(lane, number)| *number = value(lane));
+    vector[0]
+}
+
+/// Prior factors (included, excluded) of one column.
+pub(super) type Odds<V> = (V, V);
+
+/// Both children of a node.
+pub(super) fn split<S: Simd>(
+    simd: S,
+    level: &Level<S::f64s>,
+    m: usize,
+    node: &Node<S::f64s>,
+    odds: Odds<S::f64s>,
+) -> (Node<S::f64s>, Node<S::f64s>) {
+    simd.vectorize(Split {
+        simd,
+        level,
+        m,
+        node,
+        odds,
+    })
+}
+
+/// Carries its own instruction set, the one it is run with: vectors of another one would be other types.
+struct Split<'a, S: Simd> {
+    simd: S,
+    level: &'a Level<S::f64s>,
+    m: usize,
+    node: &'a Node<S::f64s>,
+    odds: Odds<S::f64s>,
+}
+
+impl<S: Simd> WithSimd for Split<'_, S> {
+    type Output = (Node<S::f64s>, Node<S::f64s>);
+
+    #[inline(always)]
+    fn with_simd<Same: Simd>(self, _: Same) -> Self::Output {
+        let Self {
+            simd,
+            level,
+            m,
+            node,
+            odds,
+        } = self;
+        let (mut inside, mut outside) = (Node::blank(m - 1), Node::blank(m - 1));
+        let r = reciprocal(simd, node.s[0], level.precision);
+        inside.c = include(simd, m, node.view(), r, &mut inside.s, &mut inside.h);
+        inside.weight = simd.mul_f64s(simd.mul_f64s(node.weight, odds.0), simd.sqrt_f64s(r));
+        outside.c = exclude(simd, m, node.view(), level.center, &mut outside.h);
+        outside.weight = simd.mul_f64s(node.weight, odds.1);
+        outside.s.copy_from_slice(&node.s[m..]);
+        (inside.count, outside.count) = (node.count + level.step, node.count);
+        (inside.set, outside.set) = (node.set | level.bit, node.set);
+        (inside, outside)
+    }
+}
+
+/// Sums of a node from those of its children.
+pub(super) fn join<S: Simd>(
+    simd: S,
+    level: &Level<S::f64s>,
+    m: usize,
+    node: &Node<S::f64s>,
+    inside: &[S::f64s],
+    outside: &[S::f64s],
+) -> Vec<S::f64s> {
+    simd.vectorize(Join {
+        simd,
+        level,
+        m,
+        node,
+        inside,
+        outside,
+    })
+}
+
+struct Join<'a, S: Simd> {
+    simd: S,
+    level: &'a Level<S::f64s>,
+    m: usize,
+    node: &'a Node<S::f64s>,
+    inside: &'a [S::f64s],
+    outside: &'a [S::f64s],
+}
+
+impl<S: Simd> WithSimd for Join<'_, S> {
+    type Output = Vec<S::f64s>;
+
+    #[inline(always)]
+    fn with_simd<Same: Simd>(self, _: Same) -> Self::Output {
+        let Self {
+            simd,
+            level,
+            m,
+            node,
+            inside,
+            outside,
+        } = self;
+        let mut out = vec![simd.splat_f64s(0.0); Layout::new(m).len()];
+        let r = reciprocal(simd, node.s[0], level.precision);
+        combine(
+            simd,
+            m,
+            Elimination {
+                row: &node.s[..m],
+                h: node.h[0],
+                r,
+                center: level.center,
+            },
+            inside,
+            outside,
+            &mut out,
+        );
+        out
+    }
+}

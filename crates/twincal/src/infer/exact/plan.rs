@@ -1,0 +1,170 @@
+//! The tables of the tree: which column is decided where, and what the prior says there.
+//!
+//! Components are decided in the order of [`Standard`]: the certain ones, then the largest first (a large one near the
+//! leaves would be eliminated again under every model of those above it). Members of a family are counted in a few bits
+//! of one number, so that families need not lie together.
+
+use super::heaviest::Threshold;
+use super::node::{Odds, from_lanes};
+use super::subtree::WRITTEN_OUT;
+use super::tree::{Choice, Level, Root, Tree};
+use pulp::Simd;
+
+/// A column that is decided above the tasks.
+pub(super) struct Top<V> {
+    /// Bit of its component in a lane's number; `None` if certain.
+    pub(super) bit: Option<usize>,
+    /// First column of its component.
+    pub(super) first: bool,
+    pub(super) odds: Odds<V>,
+}
+
+/// The tree's tables.
+pub(super) struct Plan<V> {
+    pub(super) tree: Tree<V>,
+    /// Certain columns and those of the lanes, in order.
+    pub(super) top: Vec<Top<V>>,
+    /// Columns, those included that only fill the lanes.
+    pub(super) padded: usize,
+}
+
+/// Makes the tables.
+pub(super) fn plan<S: Simd>(about: Root<'_>) -> Plan<S::f64s> {
+    let Root {
+        standard,
+        prior,
+        certain,
+    } = about;
+    let lane_components = S::F64_LANES.ilog2() as usize;
+    let free = standard.blocks.len() - certain;
+    let counters = counters(about, lane_components);
+    let mut levels = Vec::new();
+    let mut top = Vec::new();
+    for (index, block) in standard.blocks.iter().enumerate() {
+        let seen: Vec<usize> = (0..index)
+            .filter(|&e| standard.blocks[e].family == block.family)
+            .collect();
+        let sure = seen.iter().filter(|&&e| e < certain).count();
+        // Number of the component among those that are branched on: the first ones are the lanes.
+        let number = index.checked_sub(certain);
+        let in_lanes = number.is_none_or(|number| number < lane_components);
+        let below = seen
+            .iter()
+            .filter(|&&e| e >= certain + lane_components)
+            .count();
+        let factor = |lane: usize, count: usize| {
+            let in_lane = seen
+                .iter()
+                .filter(|&&e| {
+                    (certain..certain + lane_components).contains(&e)
+                        && lane >> (e - certain) & 1 == 1
+                })
+                .count();
+            let members = (sure + in_lane + count).min(seen.len());
+            prior.next(block.family, members, seen.len())
+        };
+        for d in block.range() {
+            let first = d == block.start;
+            let root = standard.precision[d].sqrt();
+            let counts = if first { 0..=below } else { 0..=0 };
+            let include: Vec<S::f64s> = counts
+                .clone()
+                .map(|count| {
+                    from_lanes(|lane| match first {
+                        true => factor(lane, count).0 * block.factor * root,
+                        false => root,
+                    })
+                })
+                .collect();
+            let exclude: Vec<S::f64s> = counts
+                .map(|count| from_lanes(|lane| if first { factor(lane, count).1 } else { 1.0 }))
+                .collect();
+            if in_lanes {
+                top.push(Top {
+                    bit: number,
+                    first,
+                    odds: (include[0], exclude[0]),
+                });
+            }
+            let (shift, mask) = counters[block.family];
+            levels.push(Level {
+                center: from_lanes(|_| standard.center[d]),
+                precision: standard.precision[d],
+                include,
+                exclude,
+                shift,
+                mask: if first { mask } else { 0 },
+                step: u32::from(first && !in_lanes) << shift,
+                bit: number.map_or(0, |number| 1 << number),
+                choice: match (number, first) {
+                    (None, _) => Choice::Certain,
+                    (_, true) => Choice::Free,
+                    (_, false) => Choice::Follows,
+                },
+                left: standard.blocks.len() - index,
+            });
+        }
+    }
+    for filler in free..lane_components {
+        let odds = (from_lanes(|_| 0.0), from_lanes(|_| 1.0));
+        top.push(Top {
+            bit: Some(filler),
+            first: true,
+            odds,
+        });
+        levels.push(Level {
+            center: from_lanes(|_| 0.0),
+            precision: 1.0,
+            include: vec![odds.0],
+            exclude: vec![odds.1],
+            shift: 0,
+            mask: 0,
+            step: 0,
+            bit: 1 << filler,
+            choice: Choice::Free,
+            left: 0,
+        });
+    }
+    let padded = levels.len();
+    levels.reverse();
+    let written_out = levels
+        .iter()
+        .take(WRITTEN_OUT.min(padded - top.len()))
+        .take_while(|level| level.choice == Choice::Free)
+        .count();
+    let noise = Some(standard.noise_factor())
+        .filter(|x| x.is_finite())
+        .unwrap_or(0.0);
+    Plan {
+        tree: Tree {
+            levels,
+            shape: standard.shape,
+            noise,
+            written_out,
+            heavy: Threshold::new(),
+        },
+        top,
+        padded,
+    }
+}
+
+/// `(shift, mask)` of each family's counter: as many bits as its components below the lanes can fill.
+fn counters(about: Root<'_>, lane_components: usize) -> Vec<(u32, u32)> {
+    let below = about
+        .standard
+        .blocks
+        .iter()
+        .skip(about.certain + lane_components);
+    let mut sizes = vec![0u32; about.prior.families()];
+    below.for_each(|block| sizes[block.family] += 1);
+    let mut shift = 0;
+    sizes
+        .iter()
+        .map(|&size| {
+            let bits = u32::BITS - size.leading_zeros();
+            let own = (shift.min(u32::BITS - 1), (1 << bits) - 1);
+            shift += bits;
+            own
+        })
+        .collect()
+}

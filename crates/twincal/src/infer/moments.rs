@@ -1,0 +1,176 @@
+//! Moments of one model's coefficients, read off the tableau, for the present model and for its neighbours; and their
+//! weighted sums.
+
+use super::standard::Standard;
+use super::walker::Walker;
+use crate::linear_algebra::Cholesky;
+use statrs::function::erf::erfc;
+
+/// `E[δ]` and `Var[β]/φ` of every position, c, and the components of one model.
+pub(super) struct Moments {
+    /// δ = β − β̂; −β̂ outside.
+    pub(super) delta: Vec<f64>,
+    /// `(A_zz⁻¹)_kk`, 0 outside.
+    pub(super) variance: Vec<f64>,
+    pub(super) excess: f64,
+    /// By place in `standard.blocks`.
+    pub(super) holds: Vec<bool>,
+}
+
+impl Moments {
+    /// ln of the mass within the bounds if the coefficients were independent: guides the search, is no part of a result.
+    pub(super) fn log_mass(&self, standard: &Standard) -> f64 {
+        if !standard.bounded {
+            return 0.0;
+        }
+        let phi = 0.5 * (1.0 + self.excess) / standard.shape;
+        (0..self.delta.len())
+            .filter(|&k| self.variance[k] > 0.0 && standard.lower[k] > f64::NEG_INFINITY)
+            .map(|k| {
+                let beta = standard.center[k] + self.delta[k];
+                log_normal_mass((beta - standard.lower[k]) / (phi * self.variance[k]).sqrt())
+            })
+            .sum()
+    }
+}
+
+/// `ln Φ(t)`, also far below 0.
+pub(super) fn log_normal_mass(t: f64) -> f64 {
+    if t > -30.0 {
+        return (0.5 * erfc(-t * std::f64::consts::FRAC_1_SQRT_2)).ln();
+    }
+    // Mills' ratio by its asymptotic series: relative error below 1e-8.
+    let s = 1.0 / (t * t);
+    -0.5 * t * t - 0.5 * (2.0 * std::f64::consts::PI).ln() - (-t).ln()
+        + (-s * (1.0 - 3.0 * s * (1.0 - 5.0 * s))).ln_1p()
+}
+
+/// Moments of the present model.
+pub(super) fn present(walker: &Walker<'_>) -> Moments {
+    let (standard, tableau) = (walker.standard, &walker.tableau);
+    let size = standard.size();
+    let mut delta: Vec<f64> = standard.center.iter().map(|x| -x).collect();
+    let mut variance = vec![0.0; size];
+    for &k in &tableau.members {
+        delta[k] += tableau.gradient[k];
+        variance[k] = tableau.diagonal[k];
+    }
+    Moments {
+        delta,
+        variance,
+        excess: tableau.excess,
+        holds: (0..standard.blocks.len())
+            .map(|b| tableau.holds(b))
+            .collect(),
+    }
+}
+
+/// Moments after moving one component; `excess` is c then.
+///
+/// ```text
+/// out: β_i −= C_iB C_BB⁻¹ β_B,  C_ii −= C_iB C_BB⁻¹ C_Bi      in: β_i −= t_iB b,  C_ii += t_iB S⁻¹ t_iBᵀ,  b = S⁻¹ u_B
+/// ```
+pub(super) fn after_flip(walker: &Walker<'_>, block: usize, excess: f64) -> Moments {
+    let (standard, tableau) = (walker.standard, &walker.tableau);
+    let mut moments = present(walker);
+    moments.excess = excess;
+    let own = standard.blocks[block];
+    let inside = tableau.holds(block);
+    moments.holds[block] = !inside;
+    // S⁻¹ or C_BB⁻¹ as rows of L⁻¹: x ↦ |L⁻¹ x|², and its product with the gradient.
+    let square: Vec<f64> = if own.len == 1 {
+        vec![tableau.diagonal[own.start]]
+    } else {
+        tableau.square(block).to_vec()
+    };
+    let Ok(factor) = Cholesky::new(&square, own.len) else {
+        return moments;
+    };
+    let mut step = tableau.gradient[own.range()].to_vec();
+    factor.solve(&mut step);
+    let sign = if inside { -1.0 } else { 1.0 };
+    let mut cross = vec![0.0; own.len];
+    for &i in tableau.members.iter().filter(|i| !own.range().contains(i)) {
+        cross.copy_from_slice(&tableau.row(i)[own.range()]);
+        let shift: f64 = cross.iter().zip(&step).map(|(t, b)| t * b).sum();
+        moments.delta[i] -= shift;
+        factor.solve_lower(&mut cross);
+        let spread: f64 = cross.iter().map(|x| x * x).sum();
+        moments.variance[i] = (moments.variance[i] + sign * spread).max(1.0);
+    }
+    if inside {
+        for k in own.range() {
+            moments.delta[k] = -standard.center[k];
+            moments.variance[k] = 0.0;
+        }
+    } else {
+        let mut unit = vec![0.0; own.len];
+        for (a, k) in own.range().enumerate() {
+            unit.fill(0.0);
+            unit[a] = 1.0;
+            factor.solve_lower(&mut unit);
+            moments.delta[k] = step[a] - standard.center[k];
+            moments.variance[k] = unit.iter().map(|x| x * x).sum();
+        }
+    }
+    moments
+}
+
+/// Weighted sums over models; weights relative to `e^reference`.
+#[derive(Debug, Clone)]
+pub(super) struct Sums {
+    pub(super) reference: f64,
+    factor: f64,
+    total: f64,
+    /// Σ w z by place in `standard.blocks`.
+    pub(super) inclusion: Vec<f64>,
+    /// Σ w E[δ], Σ w E[δ²] by position.
+    pub(super) shift: Vec<f64>,
+    pub(super) moment: Vec<f64>,
+    /// Σ w (1 + c).
+    pub(super) misfit: f64,
+}
+
+impl Sums {
+    pub(super) fn new(standard: &Standard) -> Self {
+        let factor = standard.noise_factor();
+        Self {
+            reference: 0.0,
+            factor: if factor.is_finite() { factor } else { 0.0 },
+            total: 0.0,
+            inclusion: vec![0.0; standard.blocks.len()],
+            shift: vec![0.0; standard.size()],
+            moment: vec![0.0; standard.size()],
+            misfit: 0.0,
+        }
+    }
+
+    /// Σ w.
+    pub(super) fn total(&self) -> f64 {
+        self.total
+    }
+
+    /// w of a log weight.
+    pub(super) fn weight(&self, log_weight: f64) -> f64 {
+        (log_weight - self.reference).min(690.0).exp()
+    }
+
+    /// One more model.
+    pub(super) fn add(&mut self, log_weight: f64, moments: &Moments) {
+        let weight = self.weight(log_weight);
+        let misfit = 1.0 + moments.excess;
+        let phi = misfit * self.factor;
+        self.total += weight;
+        self.misfit += weight * misfit;
+        for (sum, &holds) in self.inclusion.iter_mut().zip(&moments.holds) {
+            *sum += if holds { weight } else { 0.0 };
+        }
+        let rows = self.shift.iter_mut().zip(&mut self.moment);
+        for ((shift, moment), (delta, variance)) in
+            rows.zip(moments.delta.iter().zip(&moments.variance))
+        {
+            *shift += weight * delta;
+            *moment += weight * (delta * delta + phi * variance);
+        }
+    }
+}

@@ -1,0 +1,322 @@
+//! A deterministic search for the models that hold the mass: fast enough for loops.
+//!
+//! From a good model the heaviest known one is expanded again and again: all its neighbours (one component in or out,
+//! one exchanged) are weighed in the tableau, and every model that was ever weighed counts in probabilities and moments.
+//! Expansion ends when what a further one would add is negligible, or at a fixed number of models. No random numbers,
+//! one thread: the same bytes everywhere.
+
+use super::exchanges::{Exchange, exchanges};
+use super::moments::{Sums, after_flip, present};
+use super::standard::Standard;
+use super::walker::{Step, Walker};
+use crate::prior::Prior;
+use pulp::{Simd, WithSimd};
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, BinaryHeap};
+
+/// ln of the weight, relative to the heaviest model, below which a model is not kept.
+const NEGLIGIBLE: f64 = -28.0;
+/// ln of the weight, relative to the heaviest model, above which exchanges are tried as well.
+const EXCHANGED: f64 = -4.6;
+/// Share of the mass that may be missing.
+const MISSING: f64 = 1e-6;
+/// Weight of the last expansion beside the one after it, in the estimate of what is missing.
+const FORGET: f64 = 0.8;
+/// Models that are expanded at least: an estimate of what is missing needs a few.
+const LEAST_EXPANDED: usize = 4;
+
+/// A set of components, one bit each.
+pub(super) type Set = Vec<u64>;
+
+/// What a search found.
+pub(super) struct Found {
+    /// Sums over all weighed models.
+    pub(super) sums: Sums,
+    /// (ln weight, components) of all of them, heaviest first.
+    pub(super) models: Vec<(f64, Set)>,
+    /// Estimated share of the mass that was not found.
+    pub(super) missing: f64,
+}
+
+/// What a search is told.
+pub(super) struct Start<'a> {
+    /// Components (by place in `standard.blocks`) that every model holds.
+    pub(super) certain: &'a [usize],
+    /// The others.
+    pub(super) active: &'a [usize],
+    /// Components of models to start from, beside the two of its own.
+    pub(super) warm: &'a [Vec<usize>],
+    /// Models that are expanded at most.
+    pub(super) budget: usize,
+}
+
+/// Runs a search.
+pub(super) fn run(standard: &Standard, prior: &Prior, start: &Start<'_>) -> Found {
+    pulp::Arch::new().dispatch(Run {
+        standard,
+        prior,
+        start,
+    })
+}
+
+struct Run<'a> {
+    standard: &'a Standard,
+    prior: &'a Prior,
+    start: &'a Start<'a>,
+}
+
+impl WithSimd for Run<'_> {
+    type Output = Found;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Found {
+        let Self {
+            standard,
+            prior,
+            start,
+        } = self;
+        let exchanges = exchanges(standard, start.active, true);
+        let mut walker = Walker::new(standard, prior);
+        for &block in start.certain {
+            walker.flip(simd, block);
+        }
+        let mut search = Search {
+            known: BTreeMap::new(),
+            queue: BinaryHeap::new(),
+            sums: Sums::new(standard),
+            best: f64::NEG_INFINITY,
+            walker,
+            active: start.active,
+            exchanges: &exchanges,
+        };
+        search.begin(simd, start.warm);
+        search.expand(simd, start.budget)
+    }
+}
+
+/// Steepest ascent by flips of `active` components, then by exchanges, until neither helps.
+#[inline(always)]
+pub(super) fn climb<S: Simd>(
+    simd: S,
+    walker: &mut Walker<'_>,
+    active: &[usize],
+    exchanges: &[Exchange],
+) {
+    for _ in 0..4 * active.len() + 4 {
+        let best = active
+            .iter()
+            .map(|&block| (walker.flip_gain(block).0, block))
+            .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
+        if let Some((gain, block)) = best
+            && gain > 1e-9
+        {
+            walker.flip(simd, block);
+            continue;
+        }
+        let step = exchanges
+            .iter()
+            .filter_map(|exchange| exchange.step(walker))
+            .map(|step| (walker.exchange_gain(&step), step))
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        match step {
+            Some((gain, step)) if gain > 1e-9 => walker.take(simd, &step),
+            _ => return,
+        }
+    }
+}
+
+/// A model in the queue, heaviest first; of equal ones the smaller set.
+#[derive(PartialEq)]
+struct Candidate {
+    log_weight: f64,
+    set: Set,
+}
+
+impl Eq for Candidate {}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Candidate {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.log_weight
+            .total_cmp(&other.log_weight)
+            .then_with(|| other.set.cmp(&self.set))
+    }
+}
+
+struct Search<'a> {
+    walker: Walker<'a>,
+    active: &'a [usize],
+    exchanges: &'a [Exchange],
+    /// ln weight of every model that was weighed and is not negligible.
+    known: BTreeMap<Set, f64>,
+    queue: BinaryHeap<Candidate>,
+    sums: Sums,
+    best: f64,
+}
+
+impl Search<'_> {
+    /// The components of the present model.
+    fn set(&self) -> Set {
+        let count = self.walker.standard.blocks.len();
+        let mut set = vec![0; count.div_ceil(64)];
+        (0..count)
+            .filter(|&b| self.walker.tableau.holds(b))
+            .for_each(|b| set[b / 64] |= 1 << (b % 64));
+        set
+    }
+
+    /// Walks to a model.
+    #[inline(always)]
+    fn go<S: Simd>(&mut self, simd: S, set: &[u64]) {
+        for index in 0..self.active.len() {
+            let block = self.active[index];
+            if self.walker.tableau.holds(block) != (set[block / 64] >> (block % 64) & 1 == 1) {
+                self.walker.flip(simd, block);
+            }
+        }
+    }
+
+    /// Climbs from the given models, or from the empty and the full one.
+    #[inline(always)]
+    fn begin<S: Simd>(&mut self, simd: S, warm: &[Vec<usize>]) {
+        let words = self.walker.standard.blocks.len().div_ceil(64);
+        let bits = |blocks: &[usize]| {
+            let mut set = vec![0u64; words];
+            blocks.iter().for_each(|&b| set[b / 64] |= 1 << (b % 64));
+            set
+        };
+        let mut starts: Vec<Set> = warm.iter().map(|blocks| bits(blocks)).collect();
+        if starts.is_empty() {
+            starts.extend([bits(&[]), bits(self.active)]);
+        }
+        let mut found: Vec<(f64, Set)> = Vec::new();
+        for set in starts {
+            self.go(simd, &set);
+            climb(simd, &mut self.walker, self.active, self.exchanges);
+            found.push((self.walker.log_weight(), self.set()));
+        }
+        found.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
+        self.sums.reference = found.first().map_or(0.0, |f| f.0);
+        for (_, set) in found {
+            self.go(simd, &set);
+            self.add_present();
+        }
+    }
+
+    /// Counts the present model unless it is known.
+    fn add_present(&mut self) {
+        let set = self.set();
+        if !self.known.contains_key(&set) {
+            let moments = present(&self.walker);
+            let log_weight = self.walker.log_weight() + moments.log_mass(self.walker.standard);
+            self.sums.add(log_weight, &moments);
+            self.keep(set, log_weight);
+        }
+    }
+
+    fn keep(&mut self, set: Set, log_weight: f64) {
+        self.best = self.best.max(log_weight);
+        self.queue.push(Candidate {
+            log_weight,
+            set: set.clone(),
+        });
+        self.known.insert(set, log_weight);
+    }
+
+    /// All models one component away from the present one, which is `set`.
+    #[inline(always)]
+    fn neighbours(&mut self, set: &[u64]) {
+        let now = self.walker.log_weight();
+        for index in 0..self.active.len() {
+            let block = self.active[index];
+            let (gain, excess) = self.walker.flip_gain(block);
+            // The bounds can only take weight away.
+            if now + gain < self.best + NEGLIGIBLE {
+                continue;
+            }
+            let mut other = set.to_vec();
+            other[block / 64] ^= 1 << (block % 64);
+            if self.known.contains_key(&other) {
+                continue;
+            }
+            let moments = after_flip(&self.walker, block, excess);
+            let log_weight = now + gain + moments.log_mass(self.walker.standard);
+            if log_weight >= self.best + NEGLIGIBLE {
+                self.sums.add(log_weight, &moments);
+                self.keep(other, log_weight);
+            }
+        }
+    }
+
+    /// All models one exchange away from the present one.
+    #[inline(always)]
+    fn exchanged<S: Simd>(&mut self, simd: S) {
+        let now = self.walker.log_weight();
+        for index in 0..self.exchanges.len() {
+            let Some(step) = self.exchanges[index].step(&self.walker) else {
+                continue;
+            };
+            if now + self.walker.exchange_gain(&step) < self.best + NEGLIGIBLE {
+                continue;
+            }
+            self.walker.take(simd, &step);
+            self.add_present();
+            self.walker.take(
+                simd,
+                &Step {
+                    leaving: step.entering,
+                    entering: step.leaving,
+                },
+            );
+        }
+    }
+
+    #[inline(always)]
+    fn expand<S: Simd>(mut self, simd: S, budget: usize) -> Found {
+        // Mass that was expanded, in all and lately, and what it brought lately.
+        let (mut expanded, mut recent, mut brought) = (0.0, 0.0, 0.0);
+        let mut missing = 0.0;
+        for step in 0..budget {
+            let Some(next) = self.queue.pop() else {
+                missing = 0.0;
+                break;
+            };
+            self.go(simd, &next.set);
+            let before = self.sums.total();
+            self.neighbours(&next.set);
+            if next.log_weight > self.best + EXCHANGED {
+                self.exchanged(simd);
+            }
+            let own = self.sums.weight(next.log_weight);
+            expanded += own;
+            recent = FORGET * recent + own;
+            brought = FORGET * brought + self.sums.total() - before;
+            // What waits brings as much per mass as what was expanded lately.
+            let waiting = (self.sums.total() - expanded).max(0.0);
+            let rate = (brought / recent).min(1.0);
+            missing = (waiting * rate / self.sums.total()).min(0.5);
+            if missing < MISSING && step >= LEAST_EXPANDED {
+                break;
+            }
+        }
+        let mut models: Vec<(f64, Set)> = self
+            .known
+            .into_iter()
+            .map(|(set, log_weight)| (log_weight, set))
+            .collect();
+        models.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
+        Found {
+            sums: self.sums,
+            models,
+            missing,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

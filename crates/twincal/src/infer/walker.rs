@@ -1,0 +1,158 @@
+//! A model that walks: the tableau together with its weight, and what every step would do to it.
+//!
+//! ```text
+//! ln weight(z) = ln p(z) + Σ ln factor − ½ ln |A_zz| Π v − a_n ln(1 + c_z)
+//! ```
+
+use super::standard::Standard;
+use super::tableau::Tableau;
+use crate::prior::Prior;
+use pulp::Simd;
+
+/// Least value of 1 + c in units of the present one: rounding must not make it zero.
+const LEAST: f64 = f64::MIN_POSITIVE;
+
+/// See the module's text. Components are numbered by their place in `standard.blocks`.
+pub(super) struct Walker<'a> {
+    pub(super) standard: &'a Standard,
+    pub(super) tableau: Tableau<'a>,
+    prior: &'a Prior,
+    /// Members and size of each family.
+    members: Vec<usize>,
+    sizes: Vec<usize>,
+    /// `Σ ln factor − ½ ln |A_zz| Π v`.
+    log_slab: f64,
+}
+
+/// A step: components that leave and enter.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Step {
+    pub(super) leaving: Vec<usize>,
+    pub(super) entering: Vec<usize>,
+}
+
+impl<'a> Walker<'a> {
+    /// The empty model.
+    pub(super) fn new(standard: &'a Standard, prior: &'a Prior) -> Self {
+        Self {
+            standard,
+            tableau: Tableau::new(standard),
+            prior,
+            members: vec![0; prior.families()],
+            sizes: prior.family_sizes(),
+            log_slab: 0.0,
+        }
+    }
+
+    /// ln of the present model's weight.
+    pub(super) fn log_weight(&self) -> f64 {
+        self.prior.log_model(&self.members) + self.log_slab
+            - self.standard.shape * self.tableau.excess.ln_1p()
+    }
+
+    /// Moves a component in or out.
+    #[inline(always)]
+    pub(super) fn flip<S: Simd>(&mut self, simd: S, block: usize) {
+        let own = self.standard.blocks[block];
+        let (d, _) = self.tableau.block(block);
+        self.log_slab -= 0.5 * d.ln();
+        if self.tableau.holds(block) {
+            self.members[own.family] -= 1;
+            self.log_slab -= own.factor.ln();
+        } else {
+            self.members[own.family] += 1;
+            self.log_slab += own.factor.ln();
+        }
+        self.tableau.flip_block(simd, block);
+    }
+
+    /// Takes a step.
+    #[inline(always)]
+    pub(super) fn take<S: Simd>(&mut self, simd: S, step: &Step) {
+        for &block in step.leaving.iter().chain(&step.entering) {
+            self.flip(simd, block);
+        }
+    }
+
+    /// A priori, how much likelier a component is where it is not; the slab's mass within the bounds included.
+    #[inline(always)]
+    pub(super) fn flip_odds(&self, block: usize) -> f64 {
+        let own = &self.standard.blocks[block];
+        let inside = self.tableau.holds(block);
+        let others = self.members[own.family] - usize::from(inside);
+        let (p, q) = self
+            .prior
+            .next(own.family, others, self.sizes[own.family] - 1);
+        let odds = p / q * own.factor;
+        if inside { 1.0 / odds } else { odds }
+    }
+
+    /// (ln of the weight's growth, c after) of moving one component.
+    #[inline(always)]
+    pub(super) fn flip_gain(&self, block: usize) -> (f64, f64) {
+        let (d, square) = self.tableau.block(block);
+        let sign = if self.tableau.holds(block) { 1.0 } else { -1.0 };
+        let (misfit, after) = self.misfits(sign * square);
+        let gain =
+            self.flip_odds(block).ln() - 0.5 * d.ln() - self.standard.shape * (after / misfit).ln();
+        (gain, after - 1.0)
+    }
+
+    /// Prior ratio of an exchange of single components, slab's mass within the bounds included.
+    pub(super) fn exchange_odds(&self, leaving: usize, entering: usize) -> f64 {
+        let (out, into) = (
+            &self.standard.blocks[leaving],
+            &self.standard.blocks[entering],
+        );
+        if out.family == into.family {
+            into.factor / out.factor
+        } else {
+            self.flip_odds(leaving) * self.flip_odds(entering)
+        }
+    }
+
+    /// ln of the weight's growth of an exchange.
+    pub(super) fn exchange_gain(&self, step: &Step) -> f64 {
+        let positions = |blocks: &[usize]| -> Vec<usize> {
+            blocks
+                .iter()
+                .flat_map(|&b| self.standard.blocks[b].range())
+                .collect()
+        };
+        let (d, change) = self
+            .tableau
+            .exchange(&positions(&step.leaving), &positions(&step.entering));
+        let (misfit, after) = self.misfits(change);
+        let mut members = self.members.clone();
+        let mut log_factor = 0.0;
+        for &block in &step.leaving {
+            members[self.standard.blocks[block].family] -= 1;
+            log_factor -= self.standard.blocks[block].factor.ln();
+        }
+        for &block in &step.entering {
+            members[self.standard.blocks[block].family] += 1;
+            log_factor += self.standard.blocks[block].factor.ln();
+        }
+        let prior = self.log_prior_change(&members);
+        prior + log_factor - 0.5 * d.ln() - self.standard.shape * (after / misfit).ln()
+    }
+
+    /// `ln p(z') − ln p(z)` by the members of each family, one urn draw per difference.
+    fn log_prior_change(&self, members: &[usize]) -> f64 {
+        let mut sum = 0.0;
+        for (family, (&now, &then)) in self.members.iter().zip(members).enumerate() {
+            let odds = |others: usize| {
+                let (p, q) = self.prior.next(family, others, self.sizes[family] - 1);
+                (p / q).ln()
+            };
+            sum += (now..then).map(odds).sum::<f64>() - (then..now).map(odds).sum::<f64>();
+        }
+        sum
+    }
+
+    /// 1 + c now and after a change of c.
+    fn misfits(&self, change: f64) -> (f64, f64) {
+        let misfit = 1.0 + self.tableau.excess;
+        (misfit, (misfit + change).max(misfit * LEAST))
+    }
+}
