@@ -9,8 +9,10 @@ use super::{bounds, certain};
 use crate::error::Result;
 use crate::posterior::{Method, Posterior, Problem};
 
-/// Models that a search expands at most.
-const BUDGET: usize = 256;
+/// Models that a search expands at most: many where the columns are few, so that the time is about the same.
+const BUDGET: (usize, usize) = (256, 3000);
+/// That many times K² between the two.
+const WORK: usize = 1_000_000;
 /// Share of the mass and most models in the list.
 const LISTED_MASS: f64 = 0.9999;
 const LISTED_MODELS: usize = 32;
@@ -18,7 +20,9 @@ const LISTED_MODELS: usize = 32;
 /// See [`super::approximate`].
 pub(super) fn approximate(problem: &Problem, warm: Option<&Posterior>) -> Result<Posterior> {
     let standard = Standard::new(problem)?;
-    let found = search(&standard, problem, warm, BUDGET);
+    let size = standard.size().max(1);
+    let budget = (WORK / (size * size)).clamp(BUDGET.0, BUDGET.1);
+    let found = search(&standard, problem, warm, budget);
     let total = found.sums.total() / (1.0 - found.missing);
     let listed = Listed::new(
         &standard,
