@@ -83,9 +83,9 @@ fn what_is_left_out_is_zero_for_a_reason() {
     for robot in robots() {
         let regressor = Regressor::new(&robot);
         for pair in regressor.pairs() {
-            let own = robot.coordinate_of_body(pair.body) == pair.coordinate;
+            let own = robot.motion_of_body(pair.body).0 == pair.coordinate;
             let alone = (0..robot.bodies().len())
-                .filter(|&body| robot.coordinate_of_body(body) == pair.coordinate)
+                .filter(|&body| robot.motion_of_body(body).0 == pair.coordinate)
                 .count()
                 == 1;
             let kind = robot.joint_kind(pair.coordinate);

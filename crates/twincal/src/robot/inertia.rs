@@ -84,7 +84,7 @@ pub fn principal_axes(tensor: &Matrix) -> ([f64; 3], Matrix) {
 
 /// Refuses what no body can have: a mass that is not positive, a tensor that is not positive definite or breaks the
 /// triangle inequality (one principal moment above the sum of the others). Thin rods, flat plates and point masses are
-/// the bounds and pass. With `allow_unphysical` an impossible tensor is a finding.
+/// the bounds and pass. With `allow_unphysical` an impossible tensor, or a tensor without mass, is a finding.
 ///
 /// # Errors
 /// [`Error::Model`] naming the link.
@@ -102,7 +102,8 @@ pub(crate) fn check(
     };
     let Inertia { mass, com, tensor } = inertia;
     let zero_tensor = tensor.as_flattened().iter().all(|&v| v == 0.0);
-    if !mass.is_finite() || *mass < 0.0 || (*mass == 0.0 && !zero_tensor) {
+    let hollow = *mass == 0.0 && !zero_tensor;
+    if !mass.is_finite() || *mass < 0.0 || (hollow && !allow_unphysical) {
         return refuse(
             format!("mass is {mass} kg"),
             "give it a positive mass (0 only for a link without any inertia)",
@@ -129,7 +130,7 @@ pub(crate) fn check(
             );
         }
     }
-    if *mass == 0.0 {
+    if *mass == 0.0 && zero_tensor {
         return Ok(None);
     }
     if zero_tensor {
@@ -142,7 +143,9 @@ pub(crate) fn check(
         )));
     }
     let ([i1, i2, i3], _) = principal_axes(tensor);
-    let problem = if i1 < -TOLERANCE * i3.abs() || i3 <= 0.0 {
+    let problem = if hollow {
+        format!("it has an inertia tensor (up to {i3:.4e} kg·m²) but no mass")
+    } else if i1 < -TOLERANCE * i3.abs() || i3 <= 0.0 {
         format!(
             "inertia tensor is not positive definite (principal moments {i1:.4e}, {i2:.4e}, {i3:.4e} kg·m²)"
         )
@@ -235,7 +238,7 @@ mod tests {
                 .code,
             "point_mass"
         );
-        for bad in [f64::NAN, f64::INFINITY, -1.0, 0.0] {
+        for bad in [f64::NAN, f64::INFINITY, -1.0] {
             let text = check("fore", &body(bad, [1.0; 3]), true)
                 .unwrap_err()
                 .to_string();
@@ -244,6 +247,14 @@ mod tests {
                 "{text}"
             );
         }
+        assert!(check("l", &body(0.0, [1.0; 3]), false).is_err());
+        assert_eq!(
+            check("l", &body(0.0, [1.0; 3]), true)
+                .unwrap()
+                .unwrap()
+                .code,
+            "unphysical_inertia"
+        );
         for bad in [[-1e-3, 1.0, 1.0], [1.0, 2.0, 3.001], [-1.0, -1.0, -1.0]] {
             assert!(check("l", &turned(bad), false).is_err(), "{bad:?}");
             assert_eq!(

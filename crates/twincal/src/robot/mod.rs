@@ -17,12 +17,14 @@ mod recursion;
 mod dynamics;
 mod block;
 pub mod regressor;
+mod base_parameters;
 mod gravity;
 mod derivative;
 mod mass_matrix;
 mod energy_regressor;
 mod energy;
 
+pub use base_parameters::{BaseParameters, DependentParameter, base_parameters};
 pub use block::{BLOCK, BlockWorkspace, STRIDE};
 pub use derivative::position_derivative;
 pub use description::{

@@ -112,12 +112,14 @@ impl Robot {
             .collect()
     }
 
-    /// Coordinate (0-based) that moves a body against its parent; several bodies may share one when joints mimic.
+    /// How a body moves against its parent: coordinate (0-based), multiplier and offset of `position = multiplier · q +
+    /// offset`; multiplier 1 and offset 0 unless its joint mimics. Several bodies may share a coordinate.
     ///
     /// # Panics
     /// If there is no such body.
-    pub fn coordinate_of_body(&self, body: usize) -> usize {
-        self.bodies[body].coordinate
+    pub fn motion_of_body(&self, body: usize) -> (usize, f64, f64) {
+        let body = &self.bodies[body];
+        (body.coordinate, body.multiplier, body.offset)
     }
 
     /// Names of the links that move rigidly as one body, in the model's order.

@@ -7,6 +7,7 @@
 //! that vanish whatever the robot does are known beforehand ([`Pair::present`]) and are not computed.
 
 use super::Robot;
+use super::base_parameters::random_states;
 use super::block::{Angles, BLOCK, Registers, STRIDE};
 use super::dynamics::Motion;
 use super::lane_vectors::{V3, cross, cross_add, dot, dot_add, origin, to_child, turn_back};
@@ -70,7 +71,7 @@ impl Regressor {
     /// The pairs of `robot` and their columns.
     ///
     /// A column is left out when it is below 1e-13 of the largest column of its kind (mass, first moments, tensor) in
-    /// 64 states with joints anywhere and gravity as the model has it.
+    /// 64 random states with joints anywhere and gravity as the model has it.
     pub fn new(robot: &Robot) -> Self {
         let mut pairs: Vec<Pair> = Vec::new();
         let (mut parents, mut own, mut starts) = (Vec::new(), Vec::new(), vec![0]);
@@ -155,18 +156,7 @@ impl Regressor {
 
     /// Marks the columns that are zero in any state.
     fn find_zeros(&mut self, robot: &Robot) {
-        let dof = robot.dof();
-        // A Weyl sequence: spread evenly, never special.
-        let spread = |scale: f64, irrational: f64| -> Vec<f64> {
-            (1..=dof * BLOCK)
-                .map(|i| scale * (2.0 * (i as f64 * irrational).fract() - 1.0))
-                .collect()
-        };
-        let (q, qd, qdd) = (
-            spread(3.1, 0.618_033_988_749_894_9),
-            spread(2.0, 0.414_213_562_373_095_1),
-            spread(3.0, 0.732_050_807_568_877_2),
-        );
+        let [q, qd, qdd] = random_states(robot, BLOCK);
         let motion = Motion {
             len: BLOCK,
             q: &q,
