@@ -17,7 +17,7 @@ from test_nominal_torque import compare
 PACKAGE = distribution("example-robot-data")
 ROBOTS = Path(PACKAGE.locate_file("cmeel.prefix/share/example-robot-data/robots"))
 SAMPLES = 1000
-RANK_SAMPLES = 100
+RANK_SAMPLES = 40
 PINOCCHIO_ORDER = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]
 
 # Files that hold no dynamics: what the message must say.

@@ -8,10 +8,10 @@
 use serde_json::Value;
 use std::collections::BTreeMap;
 use twincal::robot::{
-    BLOCK, BlockWorkspace, Motion, Regressor, Robot, RobotDescription, STRIDE, Workspace,
-    body_parameters, energy_regressor, gravity_regressor, inverse_dynamics, kinetic_energy,
-    mass_matrices, mass_matrix, nominal_torque, position_derivative, potential_energy,
-    to_body_frame,
+    BLOCK, BlockWorkspace, Instructions, Motion, Regressor, Robot, RobotDescription, STRIDE,
+    Workspace, body_parameters, energy_regressor, gravity_regressor, inverse_dynamics,
+    kinetic_energy, mass_matrices, mass_matrix, nominal_torque, nominal_torque_with,
+    position_derivative, potential_energy, to_body_frame,
 };
 
 /// Robots of the golden file (serial, sliders, trees, twelve joints, mimicking fingers), rigid bodies only.
@@ -317,6 +317,34 @@ fn mass_matrices_of_a_block_are_those_of_its_samples() {
             let scale = expected.iter().fold(0f64, |most, v| most.max(v.abs()));
             for i in 0..n * n {
                 assert!((out[i * STRIDE + s - 2] - expected[i]).abs() < 1e-13 * scale);
+            }
+        }
+    }
+}
+
+#[test]
+fn all_instructions_agree() {
+    for robot in robots() {
+        let len = 64;
+        let [q, qd, qdd] = &motion(&robot, len);
+        let motion = Motion { len, q, qd, qdd };
+        let regressor = Regressor::new(&robot);
+        let run = |set: Instructions| {
+            let mut tau = vec![0.0; robot.dof() * len];
+            nominal_torque_with(set, &robot, motion, &mut tau);
+            let mut block = regressor.block(&robot);
+            regressor.evaluate_with(set, &robot, motion, 0..len, &mut block);
+            for pair in 0..regressor.pairs().len() {
+                tau.extend_from_slice(block.pair(pair));
+            }
+            tau
+        };
+        let reference = run(Instructions::Portable);
+        let scale = reference.iter().fold(0f64, |most, v| most.max(v.abs()));
+        for set in [Instructions::Avx2, Instructions::Widest] {
+            for (a, b) in run(set).iter().zip(&reference) {
+                // The portable copy has no fused multiply-add.
+                assert!((a - b).abs() <= 1e-13 * scale, "{set:?}: {a} {b}");
             }
         }
     }

@@ -9,8 +9,10 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
 
-/// Blocks of random states that the analysis looks at.
-const BLOCKS: usize = 2;
+/// Random states that the analysis looks at. A body has ten parameters and at least one joint's torque, so ten states
+/// are enough for almost every draw; three times as many keep the columns well apart.
+const STATES: usize = 32;
+const _: () = assert!(STATES <= BLOCK);
 
 /// A column whose part outside the span of those chosen before is below this fraction of its length depends on them.
 /// Angles in model files are often rounded to four or five digits; what they make visible is below this bound.
@@ -71,11 +73,14 @@ pub fn base_parameters(robot: &Robot) -> BaseParameters {
     let mut directions: Vec<Vec<f64>> = Vec::new();
     let mut products: Vec<Vec<f64>> = vec![Vec::new(); 10 * bodies];
     let mut free = seen.clone();
+    // What is left of each column, brought up to date as parts go; measured again where most of it has gone.
+    let mut left = vec![1.0_f64; 10 * bodies];
+    let mut measured = left.clone();
     for wanted in 0..3 {
         loop {
             let candidates = (0..10 * bodies).filter(|&c| free[c] && kind(c) == wanted);
             let best = candidates
-                .map(|c| (c, norm(&columns[c])))
+                .map(|c| (c, left[c]))
                 .max_by(|a, b| a.1.total_cmp(&b.1));
             let Some((best, length)) = best else { break };
             if length <= TOLERANCE {
@@ -91,7 +96,13 @@ pub fn base_parameters(robot: &Robot) -> BaseParameters {
             products[best].push(length);
             for c in 0..10 * bodies {
                 if free[c] {
-                    products[c].push(subtract(&mut columns[c], &direction));
+                    let part = subtract(&mut columns[c], &direction);
+                    products[c].push(part);
+                    left[c] = f64::max(left[c] * left[c] - part * part, 0.0).sqrt();
+                    if left[c] < 1e-3 * measured[c] {
+                        left[c] = norm(&columns[c]);
+                        measured[c] = left[c];
+                    }
                 }
             }
             chosen.push(best);
@@ -119,16 +130,31 @@ fn kind_of(parameter: usize) -> usize {
     usize::from(parameter > 0) + usize::from(parameter > 3)
 }
 
+/// aᵀb in eight running sums, which the compiler keeps in vectors.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let (a8, a) = a.as_chunks::<8>();
+    let (b8, b) = b.as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for (x, y) in a8.iter().zip(b8) {
+        for k in 0..8 {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    sums.iter().sum::<f64>() + a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>()
+}
+
 fn norm(v: &[f64]) -> f64 {
-    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+    dot(v, v).sqrt()
 }
 
 /// Takes the part along `direction` (of length 1) out of `v` and returns it.
 fn subtract(v: &mut [f64], direction: &[f64]) -> f64 {
-    let part: f64 = v.iter().zip(direction).map(|(a, b)| a * b).sum();
-    v.iter_mut()
-        .zip(direction)
-        .for_each(|(a, b)| *a -= part * b);
+    let part = dot(v, direction);
+    if part != 0.0 {
+        v.iter_mut()
+            .zip(direction)
+            .for_each(|(a, b)| *a -= part * b);
+    }
     part
 }
 
@@ -158,7 +184,7 @@ fn combination(
 /// One column per parameter of every body, in the frame of its main link: its rows are joints × random states.
 fn link_columns(robot: &Robot) -> Vec<Vec<f64>> {
     let (dof, bodies) = (robot.dof(), robot.bodies.len());
-    let len = BLOCKS * BLOCK;
+    let len = STATES;
     let [q, qd, qdd] = random_states(robot, len);
     let motion = Motion {
         len,
@@ -169,19 +195,17 @@ fn link_columns(robot: &Robot) -> Vec<Vec<f64>> {
     let regressor = Regressor::new(robot);
     let mut block = regressor.block(robot);
     let mut columns = vec![vec![0.0; dof * len]; 10 * bodies];
-    for start in (0..len).step_by(BLOCK) {
-        regressor.evaluate(robot, motion, start..start + BLOCK, &mut block);
-        for (index, pair) in regressor.pairs().iter().enumerate() {
-            let home = &robot.homes[robot.bodies[pair.body].link].1;
-            let map = to_body_frame(home);
-            let at = pair.coordinate * len + start;
-            for i in (0..10).filter(|&i| pair.present[i]) {
-                let values = block.column(index, i);
-                for k in (0..10).filter(|&k| map[i][k] != 0.0) {
-                    let cells = &mut columns[10 * pair.body + k][at..at + BLOCK];
-                    for (cell, value) in cells.iter_mut().zip(values) {
-                        *cell += map[i][k] * value;
-                    }
+    regressor.evaluate(robot, motion, 0..len, &mut block);
+    for (index, pair) in regressor.pairs().iter().enumerate() {
+        let home = &robot.homes[robot.bodies[pair.body].link].1;
+        let map = to_body_frame(home);
+        let at = pair.coordinate * len;
+        for i in (0..10).filter(|&i| pair.present[i]) {
+            let values = block.column(index, i);
+            for k in (0..10).filter(|&k| map[i][k] != 0.0) {
+                let cells = &mut columns[10 * pair.body + k][at..at + len];
+                for (cell, value) in cells.iter_mut().zip(values) {
+                    *cell += map[i][k] * value;
                 }
             }
         }

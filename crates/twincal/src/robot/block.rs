@@ -3,6 +3,7 @@
 use super::Robot;
 use super::bodies::Body;
 use super::dynamics::Motion;
+use super::lane_vectors::{load, store};
 use super::recursion::State;
 use crate::lanes::{LANES, Lane, sin_cos};
 use pulp::Simd;
@@ -15,6 +16,33 @@ pub const BLOCK: usize = 64;
 /// Distance between two columns of a block's results. Not a power of two, or the columns would fight for the same
 /// few sets of the first-level cache.
 pub const STRIDE: usize = BLOCK + LANES;
+
+/// Which vectors the batched algorithms use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Instructions {
+    /// The widest of this machine, found at run time.
+    #[default]
+    Widest,
+    /// 256 bits with fused multiply-add (x86-64-v3); the widest where the machine has none.
+    Avx2,
+    /// One sample at a time, on any machine.
+    Portable,
+}
+
+impl Instructions {
+    /// Runs `kernel` compiled for these instructions.
+    pub(super) fn dispatch<K: pulp::WithSimd>(self, kernel: K) -> K::Output {
+        match self {
+            Self::Portable => pulp::Scalar.vectorize(kernel),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => match pulp::x86::V3::try_new() {
+                Some(simd) => pulp::Simd::vectorize(simd, kernel),
+                None => pulp::Arch::new().dispatch(kernel),
+            },
+            _ => pulp::Arch::new().dispatch(kernel),
+        }
+    }
+}
 
 /// Sines and cosines of the joints of one block.
 #[derive(Debug, Clone)]
@@ -73,15 +101,15 @@ impl Angles {
         let row = body.coordinate * motion.len;
         let (from, to) = (row + group.start, row + group.end);
         let (m, c) = (s.splat_f64s(body.multiplier), s.splat_f64s(body.offset));
-        let q = s.partial_load_f64s(&motion.q[from..to]);
-        let qd = s.partial_load_f64s(&motion.qd[from..to]);
-        let qdd = s.partial_load_f64s(&motion.qdd[from..to]);
+        let q = load(s, &motion.q[from..to]);
+        let qd = load(s, &motion.qd[from..to]);
+        let qdd = load(s, &motion.qdd[from..to]);
         state.position = s.mul_add_e_f64s(m, q, c);
         state.velocity = s.mul_f64s(m, qd);
         state.acceleration = s.mul_f64s(m, qdd);
         let local = group.start - start..group.end - start;
-        state.sin = s.partial_load_f64s(&self.sines[i][local.clone()]);
-        state.cos = s.partial_load_f64s(&self.cosines[i][local]);
+        state.sin = load(s, &self.sines[i][local.clone()]);
+        state.cos = load(s, &self.cosines[i][local]);
     }
 }
 
@@ -221,6 +249,6 @@ pub(super) fn add_to<S: Simd>(
     value: S::f64s,
 ) {
     let cells = &mut out[column * STRIDE + at.start..column * STRIDE + at.end];
-    let sum = s.add_f64s(s.partial_load_f64s(cells), value);
-    s.partial_store_f64s(cells, sum);
+    let sum = s.add_f64s(load(s, cells), value);
+    store(s, cells, sum);
 }

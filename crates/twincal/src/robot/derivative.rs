@@ -130,6 +130,16 @@ impl PositionDerivative<'_> {
     }
 }
 
+/// M v + c.
+#[inline(always)]
+fn matrix_add<S: Simd>(s: S, m: &[V3<S>; 3], v: V3<S>, c: V3<S>) -> V3<S> {
+    [
+        dot_add(s, m[0], v, c[0]),
+        dot_add(s, m[1], v, c[1]),
+        dot_add(s, m[2], v, c[2]),
+    ]
+}
+
 /// −z × v per unit of the seed: how a vector seen from a turning frame changes.
 #[inline(always)]
 fn seen_from_turning<S: Simd>(s: S, seed: S::f64s, v: V3<S>, change: V3<S>) -> V3<S> {
@@ -170,10 +180,10 @@ fn forward<S: Simd>(
     tangent: &mut Tangent<S::f64s>,
 ) {
     let p = origin(s, body, state.position);
-    let mut at_origin: V3<S> = std::array::from_fn(|k| dot_add(s, above.b[k], p, above.a[k]));
+    let mut at_origin = matrix_add(s, &above.b, p, above.a);
     if let Some(b) = parent_b {
         let dp = slide(s, body, seed);
-        at_origin = std::array::from_fn(|k| dot_add(s, b[k], dp, at_origin[k]));
+        at_origin = matrix_add(s, &b, dp, at_origin);
     }
     let mut w = to_child(s, body, above.w);
     let mut wd = to_child(s, body, above.wd);
@@ -213,14 +223,21 @@ fn forward<S: Simd>(
     }
     let m = s.splat_f64s(body.moments.mass);
     let mc = splat(s, body.moments.first);
-    let tensor = body.moments.tensor.map(|row| splat(s, row));
-    let spin: V3<S> = std::array::from_fn(|k| dot(s, tensor[k], state.w));
-    let change: V3<S> = std::array::from_fn(|k| dot(s, tensor[k], w));
-    let moment: V3<S> = std::array::from_fn(|k| dot(s, tensor[k], wd));
+    let [x, y, z] = body.moments.tensor;
+    let tensor = [splat(s, x), splat(s, y), splat(s, z)];
+    let none = [s.splat_f64s(0.0); 3];
+    let spin = matrix_add(s, &tensor, state.w, none);
+    let change = matrix_add(s, &tensor, w, none);
+    let moment = matrix_add(s, &tensor, wd, none);
     let moment = cross_add(s, w, spin, moment);
     let moment = cross_add(s, state.w, change, moment);
     tangent.moment = cross_add(s, mc, a, moment);
-    tangent.force = std::array::from_fn(|k| dot_add(s, b[k], mc, s.mul_f64s(m, a[k])));
+    let inert = [
+        s.mul_f64s(m, a[0]),
+        s.mul_f64s(m, a[1]),
+        s.mul_f64s(m, a[2]),
+    ];
+    tangent.force = matrix_add(s, &b, mc, inert);
     (tangent.w, tangent.wd, tangent.a, tangent.b) = (w, wd, a, b);
 }
 
@@ -248,5 +265,7 @@ fn backward<S: Simd>(
     let dn = cross_add(s, origin(s, body, state.position), df, dn);
     let f = to_parent_add(s, body, f, zero);
     above.moment = cross_add(s, slide(s, body, seed), f, dn);
-    above.force = std::array::from_fn(|k| s.add_f64s(above.force[k], df[k]));
+    for k in 0..3 {
+        above.force[k] = s.add_f64s(above.force[k], df[k]);
+    }
 }

@@ -1,7 +1,8 @@
 //! Torque that a motion needs: one sample, batches over lanes, and the mass matrix.
 
 use super::Robot;
-use super::block::{Angles, BLOCK};
+use super::block::{Angles, BLOCK, Instructions};
+use super::lane_vectors::{load, store};
 use super::recursion::{State, newton_euler};
 use pulp::{Scalar, Simd};
 
@@ -114,6 +115,19 @@ fn run_one(robot: &Robot, workspace: &mut Workspace, gravity: [f64; 3], [q, qd, 
 /// # Panics
 /// If a slice is shorter than dof × len.
 pub fn nominal_torque(robot: &Robot, motion: Motion<'_>, tau: &mut [f64]) {
+    nominal_torque_with(Instructions::Widest, robot, motion, tau);
+}
+
+/// [`nominal_torque`] on chosen instructions: to compare them, or to have the same bytes on different machines.
+///
+/// # Panics
+/// As [`nominal_torque`].
+pub fn nominal_torque_with(
+    instructions: Instructions,
+    robot: &Robot,
+    motion: Motion<'_>,
+    tau: &mut [f64],
+) {
     let total = robot.dof() * motion.len;
     let motion = Motion {
         len: motion.len,
@@ -121,7 +135,7 @@ pub fn nominal_torque(robot: &Robot, motion: Motion<'_>, tau: &mut [f64]) {
         qd: &motion.qd[..total],
         qdd: &motion.qdd[..total],
     };
-    pulp::Arch::new().dispatch(Batch {
+    instructions.dispatch(Batch {
         robot,
         motion,
         tau: &mut tau[..total],
@@ -167,12 +181,9 @@ impl pulp::WithSimd for Batch<'_> {
                         s.mul_add_e_f64s(s.splat_f64s(body.armature), state.acceleration, torque);
                     torque = s.mul_add_e_f64s(s.splat_f64s(body.damping), state.velocity, torque);
                     torque = s.mul_add_e_f64s(s.splat_f64s(body.stiffness), stretch, torque);
-                    let sum = s.mul_add_e_f64s(
-                        s.splat_f64s(body.multiplier),
-                        torque,
-                        s.partial_load_f64s(cell),
-                    );
-                    s.partial_store_f64s(cell, sum);
+                    let sum =
+                        s.mul_add_e_f64s(s.splat_f64s(body.multiplier), torque, load(s, cell));
+                    store(s, cell, sum);
                 }
                 first = last;
             }

@@ -108,7 +108,9 @@ impl Group for Gravity<'_> {
             let above = &mut composites[parent];
             // m' = Σ m, mc' = Σ R mc + m p
             let moved = to_parent_add(s, body, turned, above.first);
-            above.first = std::array::from_fn(|k| s.mul_add_e_f64s(mass, p[k], moved[k]));
+            for k in 0..3 {
+                above.first[k] = s.mul_add_e_f64s(mass, p[k], moved[k]);
+            }
             above.mass = s.add_f64s(above.mass, mass);
         }
     }

@@ -6,6 +6,27 @@ use pulp::Simd;
 /// Three components, each a group of samples.
 pub(super) type V3<S> = [<S as Simd>::f64s; 3];
 
+/// As many samples as `cells` holds, zeros behind them.
+#[inline(always)]
+pub(super) fn load<S: Simd>(s: S, cells: &[f64]) -> S::f64s {
+    // A whole vector needs no mask, and no call.
+    match S::as_simd_f64s(cells) {
+        ([whole], []) => *whole,
+        _ => s.partial_load_f64s(cells),
+    }
+}
+
+/// The first samples of `value`, as many as `cells` takes.
+#[inline(always)]
+pub(super) fn store<S: Simd>(s: S, cells: &mut [f64], value: S::f64s) {
+    if cells.len() == S::F64_LANES {
+        let (whole, _) = S::as_mut_simd_f64s(cells);
+        whole[0] = value;
+    } else {
+        s.partial_store_f64s(cells, value);
+    }
+}
+
 /// Origin of the body in the parent's frame: fixed for a hinge, `p + R z q` for a slider.
 #[inline(always)]
 pub(super) fn origin<S: Simd>(s: S, body: &Body, position: S::f64s) -> V3<S> {

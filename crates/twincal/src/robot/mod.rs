@@ -25,13 +25,15 @@ mod energy_regressor;
 mod energy;
 
 pub use base_parameters::{BaseParameters, DependentParameter, base_parameters};
-pub use block::{BLOCK, BlockWorkspace, STRIDE};
+pub use block::{BLOCK, BlockWorkspace, Instructions, STRIDE};
 pub use derivative::position_derivative;
 pub use description::{
     Inertia, JointDescription, JointKind, Limits, LinkDescription, Mimic, Placement,
     RobotDescription,
 };
-pub use dynamics::{Motion, Workspace, inverse_dynamics, mass_matrix, nominal_torque};
+pub use dynamics::{
+    Motion, Workspace, inverse_dynamics, mass_matrix, nominal_torque, nominal_torque_with,
+};
 pub use energy::{kinetic_energy, potential_energy};
 pub use energy_regressor::energy_regressor;
 pub use gravity::gravity_regressor;

@@ -179,7 +179,8 @@ fn load<S: Simd>(s: S, body: &Body, state: &mut State<S::f64s>) {
     let State { w, wd, a, b, .. } = *state;
     let m = s.splat_f64s(body.moments.mass);
     let mc = splat(s, body.moments.first);
-    let tensor = body.moments.tensor.map(|row| splat(s, row));
+    let [x, y, z] = body.moments.tensor;
+    let tensor = [splat(s, x), splat(s, y), splat(s, z)];
     // f = m a + B mc
     state.force = [
         dot_add(s, b[0], mc, s.mul_f64s(m, a[0])),

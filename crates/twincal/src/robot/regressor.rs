@@ -8,9 +8,9 @@
 
 use super::Robot;
 use super::base_parameters::random_states;
-use super::block::{Angles, BLOCK, Registers, STRIDE};
+use super::block::{Angles, BLOCK, Instructions, Registers, STRIDE};
 use super::dynamics::Motion;
-use super::lane_vectors::{V3, cross, cross_add, dot, dot_add, origin, to_child, turn_back};
+use super::lane_vectors::{V3, cross, cross_add, dot, dot_add, origin, store, to_child, turn_back};
 use super::recursion::{State, move_body};
 use pulp::Simd;
 use std::ops::Range;
@@ -42,6 +42,8 @@ pub struct Regressor {
 #[derive(Debug, Clone)]
 pub struct RegressorBlock {
     values: Vec<f64>,
+    /// Samples of the block before: nothing but zeros stands behind them.
+    filled: usize,
     angles: Angles,
     registers: Registers,
     axes: Registers,
@@ -120,6 +122,7 @@ impl Regressor {
     pub fn block(&self, robot: &Robot) -> RegressorBlock {
         RegressorBlock {
             values: vec![0.0; self.pairs.len() * 10 * STRIDE],
+            filled: 0,
             angles: Angles::new(robot.bodies.len()),
             registers: Registers::default(),
             axes: Registers::default(),
@@ -145,7 +148,22 @@ impl Regressor {
         samples: Range<usize>,
         block: &mut RegressorBlock,
     ) {
-        pulp::Arch::new().dispatch(Kernel {
+        self.evaluate_with(Instructions::Widest, robot, motion, samples, block);
+    }
+
+    /// [`Regressor::evaluate`] on chosen instructions: to compare them, or to have the same bytes on different machines.
+    ///
+    /// # Panics
+    /// As [`Regressor::evaluate`].
+    pub fn evaluate_with(
+        &self,
+        instructions: Instructions,
+        robot: &Robot,
+        motion: Motion<'_>,
+        samples: Range<usize>,
+        block: &mut RegressorBlock,
+    ) {
+        instructions.dispatch(Kernel {
             regressor: self,
             robot,
             motion,
@@ -206,6 +224,7 @@ impl pulp::WithSimd for Kernel<'_> {
         } = self;
         let RegressorBlock {
             values,
+            filled,
             angles,
             registers,
             axes,
@@ -262,11 +281,12 @@ impl pulp::WithSimd for Kernel<'_> {
             first = last;
         }
         // Nothing of an earlier block may stand behind the last sample.
-        if samples.len() < BLOCK {
+        if samples.len() < *filled {
             for column in values.chunks_exact_mut(STRIDE) {
-                column[samples.len()..BLOCK].fill(0.0);
+                column[samples.len()..*filled].fill(0.0);
             }
         }
+        *filled = samples.len();
     }
 }
 
@@ -281,21 +301,15 @@ fn columns<S: Simd>(
     at: Range<usize>,
 ) {
     let State { w, wd, a, b, .. } = state;
-    let store = |cells: &mut [f64], k: usize, value: S::f64s| {
-        s.partial_store_f64s(
-            &mut cells[k * STRIDE + at.start..k * STRIDE + at.end],
-            value,
-        );
-    };
     if present[0] {
-        store(cells, 0, dot(s, v, *a));
+        put(s, cells, 0, &at, dot(s, v, *a));
     }
     // Bᵀ v + a × u
     let turned: V3<S> = cross(s, *a, u);
     for k in 0..3 {
         if present[1 + k] {
             let column = [b[0][k], b[1][k], b[2][k]];
-            store(cells, 1 + k, dot_add(s, column, v, turned[k]));
+            put(s, cells, 1 + k, &at, dot_add(s, column, v, turned[k]));
         }
     }
     // u·(I ω̇) + (u × ω)·(I ω)
@@ -308,6 +322,16 @@ fn columns<S: Simd>(
         if i != j {
             value = s.mul_add_e_f64s(u[j], wd[i], s.mul_add_e_f64s(e[j], w[i], value));
         }
-        store(cells, 4 + k, value);
+        put(s, cells, 4 + k, &at, value);
     }
+}
+
+/// Writes the samples `at` of column `k`.
+#[inline(always)]
+fn put<S: Simd>(s: S, cells: &mut [f64], k: usize, at: &Range<usize>, value: S::f64s) {
+    store(
+        s,
+        &mut cells[k * STRIDE + at.start..k * STRIDE + at.end],
+        value,
+    );
 }
