@@ -49,6 +49,8 @@ impl Instructions {
 pub(super) struct Angles {
     sines: Vec<[f64; BLOCK]>,
     cosines: Vec<[f64; BLOCK]>,
+    /// First sample of the block.
+    start: usize,
 }
 
 impl Angles {
@@ -57,12 +59,14 @@ impl Angles {
         Self {
             sines: vec![[0.0; BLOCK]; bodies],
             cosines: vec![[1.0; BLOCK]; bodies],
+            start: 0,
         }
     }
 
     /// Sines and cosines of the samples `block` (at most [`BLOCK`]) of a motion.
     #[inline(always)]
     pub(super) fn fill(&mut self, bodies: &[Body], motion: &Motion<'_>, block: Range<usize>) {
+        self.start = block.start;
         for i in 0..bodies.len() {
             let body = &bodies[i];
             if body.prismatic {
@@ -85,8 +89,8 @@ impl Angles {
         }
     }
 
-    /// Position, velocity, acceleration, sine and cosine of joint `i` for the samples `group` of the motion; `start`
-    /// is the first sample of the block.
+    /// Position, velocity, acceleration, sine and cosine of joint `i` for the samples `group` of the motion, which
+    /// lie in the block that was filled.
     #[inline(always)]
     pub(super) fn joint<S: Simd>(
         &self,
@@ -94,7 +98,6 @@ impl Angles {
         i: usize,
         body: &Body,
         motion: &Motion<'_>,
-        start: usize,
         group: Range<usize>,
         state: &mut State<S::f64s>,
     ) {
@@ -107,7 +110,7 @@ impl Angles {
         state.position = s.mul_add_e_f64s(m, q, c);
         state.velocity = s.mul_f64s(m, qd);
         state.acceleration = s.mul_f64s(m, qdd);
-        let local = group.start - start..group.end - start;
+        let local = group.start - self.start..group.end - self.start;
         state.sin = load(s, &self.sines[i][local.clone()]);
         state.cos = load(s, &self.cosines[i][local]);
     }
@@ -230,7 +233,7 @@ impl<K: Group> pulp::WithSimd for Drive<'_, K> {
             let last = samples.end.min(first + S::F64_LANES);
             for i in 0..bodies.len() {
                 let state = &mut states[i];
-                angles.joint(s, i, &bodies[i], &motion, samples.start, first..last, state);
+                angles.joint(s, i, &bodies[i], &motion, first..last, state);
             }
             let at = first - samples.start..last - samples.start;
             kernel.group(s, robot, states, extra, at);

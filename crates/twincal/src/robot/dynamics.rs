@@ -167,7 +167,7 @@ impl pulp::WithSimd for Batch<'_> {
                 let last = end.min(first + S::F64_LANES);
                 for i in 0..bodies.len() {
                     let state = &mut states[i];
-                    angles.joint(s, i, &bodies[i], &motion, start, first..last, state);
+                    angles.joint(s, i, &bodies[i], &motion, first..last, state);
                 }
                 newton_euler(s, bodies, robot.description.gravity, &mut states);
                 for i in 0..bodies.len() {

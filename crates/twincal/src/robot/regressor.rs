@@ -243,7 +243,7 @@ impl pulp::WithSimd for Kernel<'_> {
                 let body = &bodies[i];
                 let (before, rest) = states.split_at_mut(i);
                 let state = &mut rest[0];
-                angles.joint(s, i, body, &motion, samples.start, first..last, state);
+                angles.joint(s, i, body, &motion, first..last, state);
                 move_body(s, body, gravity, body.parent.map(|p| &before[p]), state);
                 let p = origin(s, body, state.position);
                 for pair in regressor.starts[i]..regressor.starts[i + 1] {
