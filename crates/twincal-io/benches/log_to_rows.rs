@@ -13,7 +13,7 @@ mod logs;
 use std::time::Instant;
 use twincal::rows::{RowSignal, visit_rows};
 use twincal::signal::{Auto, SignalSettings, align, choose_pipeline};
-use twincal::term::{Library, LibrarySettings};
+use twincal::term::{Family, Library, LibrarySettings};
 use twincal_io::log::{LogOptions, read_csv, read_log};
 use twincal_io::table::{ColumnKind, TableFormat, TableWriter, Values};
 
@@ -102,11 +102,8 @@ fn main() {
     say("align/2_joints", seconds, None);
     let library = LibrarySettings {
         generic: Some(true),
-        viscous: true,
-        coulomb: true,
+        families: Family::JOINT.to_vec(),
         coulomb_velocity: 0.02,
-        offset: true,
-        motor_inertia: true,
         ..LibrarySettings::default()
     };
     let library = Library::propose(&robot, &library).expect("terms").0;

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use serde::Serialize;
 use twincal::Finding;
 use twincal::calibrate::{
-    Calibration, Group, LikelihoodUsed, LogSummary, SweepPoint, TermSummary, Verdict,
+    Calibration, ComponentSummary, Group, LikelihoodUsed, LogSummary, SweepPoint, TermSummary, Verdict,
 };
 use twincal::likelihood::JointNoise;
 use twincal::posterior::Method;
@@ -39,6 +39,7 @@ struct ResultFile<'a> {
     schema: u64,
     twincal: &'static str,
     model: &'a str,
+    components: &'a [ComponentSummary],
     terms: Vec<TermRow<'a>>,
     groups: &'a [Group],
     noise: &'a [JointNoise],
@@ -150,6 +151,7 @@ impl<'a> ResultFile<'a> {
             schema: SCHEMA,
             twincal: env!("CARGO_PKG_VERSION"),
             model,
+            components: &calibration.components,
             terms: calibration.terms.iter().map(TermRow::of).collect(),
             groups: &calibration.groups,
             noise: &calibration.noise,

@@ -12,7 +12,7 @@ use std::time::Instant;
 use twincal::robot::{
     Inertia, JointDescription, JointKind, LinkDescription, Motion, Robot, RobotDescription,
 };
-use twincal::term::{Library, LibrarySettings, Scratch};
+use twincal::term::{Family, Library, LibrarySettings, Scratch};
 
 /// Samples per call for two joints; fewer for the big library, so that all columns of a call stay in the cache, as they do
 /// where rows are streamed.
@@ -35,11 +35,8 @@ fn main() {
         ..LibrarySettings::default()
     };
     let whole = LibrarySettings {
-        viscous: true,
-        coulomb: true,
+        families: Family::JOINT.to_vec(),
         coulomb_velocity: 0.02,
-        offset: true,
-        motor_inertia: true,
         ..generic.clone()
     };
     println!("Euler-Lagrange columns, one core, best of 2000 batches");

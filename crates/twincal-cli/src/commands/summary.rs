@@ -3,7 +3,7 @@
 use crate::terminal::{Terminal, clean};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, ContentArrangement, Table};
-use twincal::calibrate::{Calibration, TermSummary, Verdict};
+use twincal::calibrate::{Calibration, ComponentSummary, TermSummary, Verdict};
 use twincal::term::Status;
 use twincal::validate::{Scores, Split};
 use twincal::{Finding, Severity};
@@ -17,38 +17,32 @@ const MENTIONED: f64 = 0.05;
 /// Prints the whole summary.
 pub(super) fn print(calibration: &Calibration, terminal: &mut Terminal) {
     effects(calibration, terminal);
-    terms(&calibration.terms, terminal);
+    components(calibration, terminal);
     validation(calibration, terminal);
     findings(&calibration.findings, Notes::In("the report"), terminal);
 }
 
 fn effects(calibration: &Calibration, terminal: &mut Terminal) {
-    let with = |verdict| {
-        calibration
-            .terms
-            .iter()
-            .filter(move |term: &&TermSummary| term.verdict == Some(verdict))
-    };
+    let all = &calibration.components;
     terminal.heading("What the model misses");
-    if !calibration.terms.iter().any(|term| term.selected) {
+    if !all.iter().any(|component| component.selected) {
         terminal.say("  nothing: no candidate has a probability of 0.5 or more");
     }
-    for term in calibration.terms.iter().filter(|term| term.selected) {
-        paragraph(&format!("{} (PIP {})", term.words, pip(term.pip)), terminal);
+    for component in all.iter().filter(|component| component.selected) {
+        let text = format!("{} (PIP {})", component.words, pip(component.pip));
+        paragraph(&text, terminal);
     }
-    let names = |verdict| {
-        with(verdict)
-            .map(|term| term.term.name.as_str())
-            .collect::<Vec<_>>()
-            .join(", ")
-    };
     for (verdict, words) in [
         (Verdict::Undecided, "undecided"),
         (Verdict::NotSeen, "not seen by these data"),
     ] {
-        let names = names(verdict);
+        let names: Vec<&str> = all
+            .iter()
+            .filter(|component| component.verdict == Some(verdict))
+            .map(|component| component.name.as_str())
+            .collect();
         if !names.is_empty() {
-            paragraph(&format!("{words}: {names}"), terminal);
+            paragraph(&format!("{words}: {}", names.join(", ")), terminal);
         }
     }
     for group in &calibration.groups {
@@ -64,23 +58,17 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
     terminal.say("");
 }
 
-fn terms(terms: &[TermSummary], terminal: &mut Terminal) {
-    let mut table = table(&["term", "PIP", "mean", "± sd", "unit"]);
+/// Every component worth mentioning; one of several columns has its numbers in the report and in result.json.
+fn components(calibration: &Calibration, terminal: &mut Terminal) {
+    let mut table = table(&["component", "PIP", "mean", "± sd", "unit"]);
     let (mut rare, mut dropped) = (0, Vec::new());
-    for term in terms {
-        match (term.pip, term.mean, term.sd) {
-            (Some(p), Some(mean), Some(sd)) if p >= MENTIONED || term.selected => {
-                let (mean, sd) = with_sd(mean, sd);
-                table.add_row([
-                    &*clean(&term.term.name),
-                    &pip(Some(p)),
-                    &mean,
-                    &sd,
-                    &clean(&term.term.unit),
-                ]);
+    for component in &calibration.components {
+        match component.pip {
+            Some(p) if p >= MENTIONED || component.selected => {
+                table.add_row(row(component, &calibration.terms));
             }
-            (Some(_), ..) => rare += 1,
-            _ => dropped.push(term),
+            Some(_) => rare += 1,
+            None => dropped.extend(terms_of(component, &calibration.terms)),
         }
     }
     print_table(&table, terminal);
@@ -96,15 +84,36 @@ fn terms(terms: &[TermSummary], terminal: &mut Terminal) {
                 status_word(status).replace('_', " ")
             ),
         };
-        paragraph(
-            &format!(
-                "left out: {}",
-                dropped.iter().map(reason).collect::<Vec<_>>().join(", ")
-            ),
-            terminal,
-        );
+        let reasons: Vec<String> = dropped.iter().map(reason).collect();
+        paragraph(&format!("left out: {}", reasons.join(", ")), terminal);
     }
     terminal.say("");
+}
+
+/// A component's terms.
+fn terms_of<'a>(
+    component: &'a ComponentSummary,
+    terms: &'a [TermSummary],
+) -> impl Iterator<Item = &'a TermSummary> {
+    let own = |term: &&TermSummary| component.columns.contains(&term.term.name);
+    terms.iter().filter(own)
+}
+
+fn row(component: &ComponentSummary, terms: &[TermSummary]) -> [String; 5] {
+    let (name, p) = (clean(&component.name).into(), pip(component.pip));
+    let own: Vec<&TermSummary> = terms_of(component, terms).collect();
+    match own[..] {
+        [term] => {
+            let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
+            let (mean, sd) = with_sd(number(term.mean), number(term.sd));
+            [name, p, mean, sd, clean(&term.term.unit).into()]
+        }
+        _ => {
+            let live = own.iter().filter(|term| term.pip.is_some()).count();
+            let size = format!("{live} numbers");
+            [name, p, size, String::new(), String::new()]
+        }
+    }
 }
 
 fn validation(calibration: &Calibration, terminal: &mut Terminal) {

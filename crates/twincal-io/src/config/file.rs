@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use twincal::term::Family;
 
 /// Settings of twincal. Every key is optional; a flag on the command line overrides its key.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
@@ -166,6 +167,15 @@ pub struct LibraryTable {
     pub terms: Vec<String>,
     /// The built-in trigonometric and polynomial family; default: on up to 3 joints.
     pub generic: Option<bool>,
+    /// Built-in families of physical components. Default: all but mass_scale, gain, encoder_zero and ripple; with own `terms`
+    /// or `generic = true`: viscous, coulomb, offset and motor_inertia.
+    pub families: Option<Vec<FamilyWord>>,
+    /// Link in whose frame the payload is described; default: the last link.
+    pub payload_frame: Option<String>,
+    /// Total viscous friction, Coulomb friction and motor inertia of a joint are at least 0; default true.
+    pub nonnegative: Option<bool>,
+    /// Gear ripple: periods per turn of a joint (the gear ratio), by joint name.
+    pub ripple: BTreeMap<String, f64>,
     /// Friction per joint; default ["viscous", "coulomb"]; [] for none.
     pub friction: Option<Vec<Friction>>,
     /// A constant torque offset per joint; default true.
@@ -185,6 +195,73 @@ pub enum Friction {
     Viscous,
     /// Constant against the motion.
     Coulomb,
+}
+
+/// A built-in family of components.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FamilyWord {
+    /// `<joint>.viscous`: friction proportional to velocity.
+    Viscous,
+    /// `<joint>.coulomb`: constant friction against the motion.
+    Coulomb,
+    /// `<joint>.offset`: constant torque.
+    Offset,
+    /// `<joint>.motor_inertia`: rotor inertia seen through the gear.
+    MotorInertia,
+    /// `payload`: a body at the tool.
+    Payload,
+    /// `<link>.mass_moments`: mass and first moments of a link.
+    MassMoments,
+    /// `<link>.tensor`: inertia tensor of a link.
+    Tensor,
+    /// `<link>.mass_scale`: mass, first moments and tensor by one factor.
+    MassScale,
+    /// `base.tilt`: direction and size of gravity in the base.
+    Tilt,
+    /// `<joint>.spring`: spring with rest position.
+    Spring,
+    /// `<joint>.potential`: conservative torque of one joint, two harmonics.
+    Potential,
+    /// `<joint>.asymmetry`: friction that depends on the direction.
+    Asymmetry,
+    /// `<joint>.stribeck`: friction that falls from breakaway to sliding.
+    Stribeck,
+    /// `<joint>.load_friction`: friction that grows with the load.
+    LoadFriction,
+    /// `<a>+<b>.coupled_friction`: friction of a motor that turns with two joints.
+    CoupledFriction,
+    /// `<joint>.gain`: torque scaled by a factor (drive constant).
+    Gain,
+    /// `<joint>.encoder_zero`: zero position of an encoder.
+    EncoderZero,
+    /// `<joint>.ripple`: gear ripple; needs `ripple = { joint = gear ratio }`.
+    Ripple,
+}
+
+impl From<FamilyWord> for Family {
+    fn from(word: FamilyWord) -> Self {
+        match word {
+            FamilyWord::Viscous => Self::Viscous,
+            FamilyWord::Coulomb => Self::Coulomb,
+            FamilyWord::Offset => Self::Offset,
+            FamilyWord::MotorInertia => Self::MotorInertia,
+            FamilyWord::Payload => Self::Payload,
+            FamilyWord::MassMoments => Self::MassMoments,
+            FamilyWord::Tensor => Self::Tensor,
+            FamilyWord::MassScale => Self::MassScale,
+            FamilyWord::Tilt => Self::Tilt,
+            FamilyWord::Spring => Self::Spring,
+            FamilyWord::Potential => Self::Potential,
+            FamilyWord::Asymmetry => Self::Asymmetry,
+            FamilyWord::Stribeck => Self::Stribeck,
+            FamilyWord::LoadFriction => Self::LoadFriction,
+            FamilyWord::CoupledFriction => Self::CoupledFriction,
+            FamilyWord::Gain => Self::Gain,
+            FamilyWord::EncoderZero => Self::EncoderZero,
+            FamilyWord::Ripple => Self::Ripple,
+        }
+    }
 }
 
 /// The word "auto".

@@ -10,7 +10,7 @@ mod settings;
 mod unknown_keys;
 
 pub use file::{
-    Allow, AutoWord, BaseTable, CheckTable, ColumnsTable, ConfigFile, Friction, InclusionTable,
+    Allow, AutoWord, BaseTable, CheckTable, ColumnsTable, ConfigFile, FamilyWord, Friction, InclusionTable,
     InferenceTable, LibraryTable, LogEntry, LogTable, MethodWord, ModelTable, NoisePrior,
     NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PriorTable, SignalTable, Slab,
     UnknownWord,

@@ -14,7 +14,7 @@ use twincal::infer::{Choice, InferenceSettings};
 use twincal::likelihood::{NoiseModel, NoiseSettings};
 use twincal::prior::{Inclusion, PriorSettings};
 use twincal::signal::{Auto, Payload, SignalSettings};
-use twincal::term::LibrarySettings;
+use twincal::term::{Family, LibrarySettings};
 
 /// `[log]` and `[columns]` with defaults.
 #[derive(Debug, Clone, PartialEq)]
@@ -297,22 +297,68 @@ impl Config {
 
     fn library(&self, signal: &SignalSettings) -> Result<LibrarySettings> {
         let table = &self.file.library;
-        let both = [Friction::Viscous, Friction::Coulomb];
-        let friction = table.friction.as_deref().unwrap_or(&both);
         let default_velocity = if signal.cutoff_hz == Auto::Value(0.0) {
             0.0
         } else {
             0.02
         };
+        for (joint, &periods) in &table.ripple {
+            self.number(
+                &format!("library.ripple.{joint}"),
+                periods,
+                |periods| periods > 0.0,
+                "the gear ratio, a positive number",
+            )?;
+        }
         Ok(LibrarySettings {
             terms: table.terms.clone(),
             generic: table.generic,
-            viscous: friction.contains(&Friction::Viscous),
-            coulomb: friction.contains(&Friction::Coulomb),
+            families: self.families(),
             coulomb_velocity: signal.coulomb_velocity.unwrap_or(default_velocity),
-            offset: table.offset.unwrap_or(true),
-            motor_inertia: table.motor_inertia.unwrap_or(true),
+            payload_frame: table.payload_frame.clone(),
+            nonnegative: table.nonnegative.unwrap_or(true),
+            ripple: table.ripple.clone(),
         })
+    }
+
+    /// `families`, or what is proposed unasked: everything an industrial arm may have; with own `terms`, or where the
+    /// generic family is asked for, these compete with friction, offset and motor inertia alone. The keys `friction`, `offset`
+    /// and `motor_inertia` switch their own families.
+    fn families(&self) -> Vec<Family> {
+        let table = &self.file.library;
+        let own = !table.terms.is_empty() || table.generic == Some(true);
+        let mut families: Vec<Family> = match &table.families {
+            Some(given) => given.iter().map(|&word| word.into()).collect(),
+            None if own => Family::JOINT.to_vec(),
+            None => Family::DEFAULT.to_vec(),
+        };
+        let friction = table.friction.as_ref();
+        let switches = [
+            (
+                Family::Viscous,
+                friction.map(|f| f.contains(&Friction::Viscous)),
+            ),
+            (
+                Family::Coulomb,
+                friction.map(|f| f.contains(&Friction::Coulomb)),
+            ),
+            (Family::Offset, table.offset),
+            (Family::MotorInertia, table.motor_inertia),
+        ];
+        for (family, switch) in switches {
+            match switch {
+                Some(true) => families.push(family),
+                Some(false) => families.retain(|&f| f != family),
+                None => {}
+            }
+        }
+        // With all friction switched off by its old key, none of the finer kinds is meant either.
+        if friction.is_some_and(Vec::is_empty) && table.families.is_none() {
+            families.retain(|family| !family.is_friction());
+        }
+        families.sort_unstable();
+        families.dedup();
+        families
     }
 
     fn prior(&self) -> Result<PriorSettings> {

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use twincal::calibrate::{
-    Calibration, Draws, LikelihoodUsed, LogSummary, PriorUsed, TermSummary, Verdict,
+    Calibration, ComponentSummary, Draws, LikelihoodUsed, LogSummary, ParameterSummary, PriorUsed,
+    TermSummary, Verdict,
 };
 use twincal::likelihood::{JointNoise, NoiseModel};
 use twincal::posterior::{Method, Model, Posterior};
@@ -230,6 +231,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
                 .map(|(j, _)| [-1.2, 1.4 + 0.1 * j as f64, -3.1, 3.0, -14.2, 13.9])
                 .collect(),
         },
+        components: components(&terms),
         terms,
         noise: joint_noise,
         prior: PriorUsed {
@@ -447,6 +449,7 @@ fn terms(names: &[&str]) -> Vec<TermSummary> {
                 family,
                 unit: unit.into(),
                 status: Status::Candidate,
+                component: out.len(),
             },
             pip: some(pip),
             pip_mcse: some(0.0),
@@ -550,6 +553,35 @@ fn terms(names: &[&str]) -> Vec<TermSummary> {
         }
     }
     out
+}
+
+/// One component per term.
+fn components(terms: &[TermSummary]) -> Vec<ComponentSummary> {
+    let component = |term: &TermSummary| ComponentSummary {
+        name: term.term.name.clone(),
+        family: term.term.family,
+        story: term.term.name.clone(),
+        columns: vec![term.term.name.clone()],
+        pip: term.pip,
+        pip_mcse: term.pip_mcse,
+        selected: term.selected,
+        verdict: term.verdict,
+        alias_of: Vec::new(),
+        words: term.words.clone(),
+        parameters: term
+            .conditional_mean
+            .zip(term.conditional_sd)
+            .map(|(mean, sd)| ParameterSummary {
+                name: "value".into(),
+                unit: term.term.unit.clone(),
+                mean,
+                sd,
+                interval95: [mean - 1.96 * sd, mean + 1.96 * sd],
+            })
+            .into_iter()
+            .collect(),
+    };
+    terms.iter().map(component).collect()
 }
 
 /// Correlated normal draws of the kept coefficients; those that are not sure have a spike at zero.

@@ -1,5 +1,6 @@
 //! The whole road, from a robot and its logs to a calibrated twin, in one function that reads like the paper.
 
+mod components;
 mod data;
 mod heavy_tails;
 mod held_out;
@@ -8,8 +9,8 @@ mod summary;
 mod sweep;
 
 pub use result::{
-    Calibration, Draws, Group, LikelihoodUsed, LogSummary, PriorUsed, SweepPoint, TermSummary,
-    Verdict,
+    Calibration, ComponentSummary, Draws, Group, LikelihoodUsed, LogSummary, ParameterSummary,
+    PriorUsed, SweepPoint, TermSummary, Verdict,
 };
 
 use crate::error::{Error, Finding, Result, Severity};
@@ -24,7 +25,7 @@ use crate::prior::PriorSettings;
 use crate::robot::Robot;
 use crate::self_check::self_check;
 use crate::signal::{Auto, Recording, SignalSettings, choose_pipeline, hardly_driven};
-use crate::term::{Library, LibrarySettings};
+use crate::term::{Family, Library, LibrarySettings};
 use crate::twin::Twin;
 use data::Data;
 
@@ -48,10 +49,8 @@ impl Default for CalibrationSettings {
     fn default() -> Self {
         Self {
             library: LibrarySettings {
-                viscous: true,
-                coulomb: true,
-                offset: true,
-                motor_inertia: true,
+                families: Family::DEFAULT.to_vec(),
+                nonnegative: true,
                 ..LibrarySettings::default()
             },
             signal: SignalSettings {
@@ -128,7 +127,7 @@ pub fn calibrate(
 
     // eq. (5): sparse regression with everything that is plugged in at its fixed point
     progress(Stage::Inference);
-    let columns = columns_of(&library);
+    let columns = columns_of(robot, &library, settings.library.nonnegative);
     let training: Vec<Part<'_>> = data
         .fit
         .iter()
@@ -221,25 +220,34 @@ fn require_agreement(fit: &Fit, settings: &CalibrationSettings) -> Result<()> {
     Ok(())
 }
 
-/// Names and families of the live columns.
-fn columns_of(library: &Library) -> Columns {
+/// The live columns with their components, families and bounds.
+fn columns_of(robot: &Robot, library: &Library, nonnegative: bool) -> Columns {
     let mut columns = Columns {
         names: Vec::new(),
+        component: Vec::new(),
         family: Vec::new(),
         families: Vec::new(),
+        scale: library.column_scales(),
+        lower: Vec::new(),
     };
+    let mut last = None;
     for &index in library.columns() {
         let term = &library.terms()[index];
-        let family = columns
-            .families
-            .iter()
-            .position(|f| *f == term.family)
-            .unwrap_or_else(|| {
+        if last != Some(term.component) {
+            last = Some(term.component);
+            let known = columns.families.iter().position(|f| *f == term.family);
+            columns.family.push(known.unwrap_or_else(|| {
                 columns.families.push(term.family);
                 columns.families.len() - 1
-            });
+            }));
+        }
+        columns.component.push(columns.family.len() - 1);
         columns.names.push(term.name.clone());
-        columns.family.push(family);
+        columns.lower.push(if nonnegative {
+            library.least_value(index, robot)
+        } else {
+            f64::NEG_INFINITY
+        });
     }
     columns
 }

@@ -39,6 +39,48 @@ pub struct TermSummary {
     pub words: String,
 }
 
+/// One physical story: a row of `result.json` `components[]`; numbers are `None` where it has no column.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ComponentSummary {
+    /// Name: `payload`, `<link>.tensor`, `<joint>.spring`, …
+    pub name: String,
+    /// Family.
+    pub family: Family,
+    /// What it is, in words: "spring on elbow".
+    pub story: String,
+    /// Names of its terms, dropped ones included.
+    pub columns: Vec<String>,
+    /// Probability that it is in.
+    pub pip: Option<f64>,
+    /// Monte Carlo standard error of `pip` (0 when exact).
+    pub pip_mcse: Option<f64>,
+    /// PIP ≥ 0.5 and seen by the data.
+    pub selected: bool,
+    /// What the data say about it.
+    pub verdict: Option<Verdict>,
+    /// Components that no motion of this robot can tell from it.
+    pub alias_of: Vec<String>,
+    /// One sentence: "payload at tool0: +1.20 ± 0.03 kg, centre of mass (0, 2, 61) ± 4 mm".
+    pub words: String,
+    /// Its parameters given that it is in.
+    pub parameters: Vec<ParameterSummary>,
+}
+
+/// A physical parameter with its uncertainty, given that its component is in.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ParameterSummary {
+    /// `mass`, `com_x`, `stiffness`, …
+    pub name: String,
+    /// SI unit.
+    pub unit: String,
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub sd: f64,
+    /// Central 95 % interval.
+    pub interval95: [f64; 2],
+}
+
 /// What the data say about a candidate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -53,10 +95,10 @@ pub enum Verdict {
     NotSeen,
 }
 
-/// Terms that these data cannot tell apart.
+/// Components that these data cannot tell apart.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Group {
-    /// Names of the terms.
+    /// Names of the components.
     pub members: Vec<String>,
     /// Probability that at least one of them is in.
     pub pip: f64,
@@ -136,6 +178,8 @@ pub struct Calibration {
     pub twin: Twin,
     /// One per term of the library, in order.
     pub terms: Vec<TermSummary>,
+    /// One per component of the library, in order.
+    pub components: Vec<ComponentSummary>,
     /// Noise per joint (also in the twin).
     pub noise: Vec<JointNoise>,
     /// Prior as used.

@@ -1,8 +1,10 @@
 //! From posterior to what people read: terms, verdicts, groups, sensitivity, autocorrelation.
 
+use super::components::{components, groups};
 use super::data::Data;
 use super::result::{
-    Calibration, Draws, Group, LikelihoodUsed, PriorUsed, SweepPoint, TermSummary, Verdict,
+    Calibration, ComponentSummary, Draws, Group, LikelihoodUsed, PriorUsed, SweepPoint,
+    TermSummary, Verdict,
 };
 use super::{CalibrationSettings, Fitted, lenient, refuse};
 use crate::error::{Finding, Result, Severity};
@@ -21,10 +23,6 @@ use crate::validate::Validation;
 
 /// Effective rows below which nothing is concluded (case 7).
 const LEAST_EFFECTIVE_ROWS: f64 = 10.0;
-/// Columns whose cosine over the rows is above this are hard to tell apart.
-const ALIKE: f64 = 0.95;
-/// Group probability below which nobody asks which member it was.
-const WORTH_TELLING: f64 = 0.2;
 /// Lags of the residual autocorrelation, rows.
 const LAGS: usize = 20;
 /// Terms in the pair plot at most, and draws of each.
@@ -74,8 +72,14 @@ pub(super) fn summarise(
         .collect();
     let sensitivity = sensitivity(&fit.problem, settings)?;
     let terms = terms(library, &fit.posterior, &fit.problem, &rms, &sensitivity);
-    let groups = groups(&fit.problem, &fit.posterior);
-    findings.extend(findings_of_posterior(&terms, &groups, &fit.problem, data));
+    let components = components(library, &fit.posterior, &terms, settings.inference.seed);
+    let groups = groups(&fit.problem, &fit.posterior, library);
+    findings.extend(findings_of_posterior(
+        &components,
+        &groups,
+        &fit.problem,
+        data,
+    ));
     let selected = pair_plot_columns(&fit.posterior);
     let draws = draw(
         &fit.posterior,
@@ -102,6 +106,7 @@ pub(super) fn summarise(
         },
         twin,
         terms,
+        components,
         prior: PriorUsed {
             scaled_variance: columns
                 .families
@@ -144,7 +149,8 @@ fn sensitivity(problem: &Problem, settings: &CalibrationSettings) -> Result<Vec<
     }
     for factor in [0.5, 2.0] {
         let mut variant = problem.clone();
-        variant.prior.inclusion = scaled(problem.prior.inclusion, factor, problem.names.len());
+        let components = problem.prior.components();
+        variant.prior.inclusion = scaled(problem.prior.inclusion, factor, components);
         variants.push(variant);
     }
     let pips: Vec<Vec<f64>> = variants
@@ -248,48 +254,8 @@ fn verdict(pip: f64, mcse: f64, sd: Option<f64>, prior_sd: f64) -> Verdict {
     }
 }
 
-/// Sets of columns that are alike in these data (cosine above 0.95, chained), with the probability of any of them.
-/// Only sets whose members share posterior mass are told: at least two members with PIP above 0.02, none above 0.98,
-/// and one of them in with probability of at least 0.2.
-fn groups(problem: &Problem, posterior: &Posterior) -> Vec<Group> {
-    let count = problem.names.len();
-    let diagonal: Vec<f64> = (0..count).map(|k| problem.gram[k * count + k]).collect();
-    let mut label: Vec<usize> = (0..count).collect();
-    for a in 0..count {
-        for b in 0..a {
-            let cosine = problem.gram[a * count + b] / (diagonal[a] * diagonal[b]).sqrt();
-            if cosine.abs() > ALIKE {
-                let (from, to) = (label[a].max(label[b]), label[a].min(label[b]));
-                label
-                    .iter_mut()
-                    .filter(|l| **l == from)
-                    .for_each(|l| *l = to);
-            }
-        }
-    }
-    (0..count)
-        .filter_map(|first| {
-            let members: Vec<usize> = (first..count).filter(|&k| label[k] == first).collect();
-            let unsure = |k: &&usize| (0.02..0.98).contains(&posterior.inclusion[**k]);
-            if members.iter().filter(unsure).count() < 2 {
-                return None;
-            }
-            let holds = |m: &u32| members.contains(&(*m as usize));
-            let any = posterior
-                .models
-                .iter()
-                .filter(|model| model.members.iter().any(holds));
-            let pip: f64 = any.map(|model| model.weight).sum();
-            (pip >= WORTH_TELLING).then(|| Group {
-                members: members.iter().map(|&k| problem.names[k].clone()).collect(),
-                pip,
-            })
-        })
-        .collect()
-}
-
 fn findings_of_posterior(
-    terms: &[TermSummary],
+    components: &[ComponentSummary],
     groups: &[Group],
     problem: &Problem,
     data: &Data,
@@ -324,26 +290,28 @@ fn findings_of_posterior(
             group.members.len() as u64,
         ));
     }
-    for term in terms {
-        match term.verdict {
+    for component in components {
+        let name = &component.name;
+        match component.verdict {
             Some(Verdict::Undecided) => findings.push(Finding::new(
                 Severity::Note,
                 "undecided",
-                term.term.name.clone(),
+                name.clone(),
                 format!(
-                    "`{}` is undecided (inclusion probability {:.2}): more or richer motion would decide",
-                    term.term.name,
-                    term.pip.unwrap_or(f64::NAN)
+                    "`{name}` is undecided (inclusion probability {:.2}): more or richer motion would decide",
+                    component.pip.unwrap_or(f64::NAN)
                 ),
                 0,
             )),
-            Some(Verdict::NotSeen) if term.pip.is_some_and(|p| p > 0.2) => findings.push(Finding::new(
-                Severity::Note,
-                "not_seen",
-                term.term.name.clone(),
-                format!("these data say nothing about `{}`: its coefficient is as wide as before", term.term.name),
-                0,
-            )),
+            Some(Verdict::NotSeen) if component.pip.is_some_and(|p| p > 0.2) => {
+                findings.push(Finding::new(
+                    Severity::Note,
+                    "not_seen",
+                    name.clone(),
+                    format!("these data say nothing about `{name}`: its coefficients are as wide as before"),
+                    0,
+                ));
+            }
             _ => {}
         }
     }

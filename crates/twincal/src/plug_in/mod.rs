@@ -200,8 +200,9 @@ fn weights(gram: &Gram, variance: &[f64]) -> Vec<f64> {
 /// Slab scale of each family by one EM step of its evidence, with one pseudo-term at the scale of the residual.
 ///
 /// ```text
-/// v_f = (v_0 + Σ_{k∈f} E[z_k β_k² / φ] rms_k²) / (1 + Σ_{k∈f} PIP_k),   v_0 = mean(y²) / E[φ]
+/// v_f = (v_0 + Σ_{k∈f} E[z_k β_k² / φ] r_k) / (1 + Σ_{k∈f} PIP_k),   v_0 = mean(y²) / E[φ]
 /// ```
+/// with r_k of [`Columns::references`].
 fn slab_scales(
     gram: &Gram,
     columns: &Columns,
@@ -209,15 +210,17 @@ fn slab_scales(
     problem: &Problem,
     posterior: &Posterior,
 ) -> Vec<f64> {
-    let mean_square = mean_squares(gram, columns.names.len(), &now.weight);
+    let reference_of =
+        columns.references(&mean_squares(gram, columns.names.len(), &now.weight));
     let noise = posterior.noise.max(f64::MIN_POSITIVE);
     let reference = (problem.yy / problem.n / noise).clamp(SLAB_BOUNDS.0, SLAB_BOUNDS.1);
     let mut sum = vec![reference; columns.families.len()];
     let mut count = vec![1.0; columns.families.len()];
     for k in 0..columns.names.len() {
         let second = posterior.sd[k] * posterior.sd[k] + posterior.mean[k] * posterior.mean[k];
-        sum[columns.family[k]] += second * mean_square[k] / noise;
-        count[columns.family[k]] += posterior.inclusion[k];
+        let family = columns.family_of(k);
+        sum[family] += second * reference_of[k] / noise;
+        count[family] += posterior.inclusion[k];
     }
     sum.iter()
         .zip(&count)

@@ -1,6 +1,5 @@
 //! Which candidates say nothing, or nothing new: judged at random states, so for every motion and not for one log.
 
-use super::Family;
 use super::candidate::Candidate;
 use super::expression::{Bounded, Graph, Variable, bounded_values};
 use rand_chacha::ChaCha8Rng;
@@ -30,18 +29,41 @@ pub(super) enum Verdict {
     NotCompared,
 }
 
-/// Torque of all candidates at one state, `[candidate * joints + joint]`.
-type State = Vec<Bounded>;
+/// Position, velocity and acceleration of every joint.
+pub(super) type Motions = Vec<[f64; 3]>;
+
+/// Torque of the candidates that are made from the robot model, `(candidate, torque)` with `torque[state * joints + joint]`.
+pub(super) type ModelTorques<'a> = dyn Fn(&[&Motions]) -> Vec<(usize, Vec<f64>)> + 'a;
+
+/// One random state: its motion and the torque of all candidates, `[candidate * joints + joint]`.
+struct State {
+    motion: Motions,
+    torque: Vec<Bounded>,
+}
 
 /// Judges all candidates, and removes the image entries that are zero at every state.
-pub(super) fn judge(graph: &Graph, candidates: &mut [Candidate], joints: usize) -> Vec<Verdict> {
+///
+/// `shares(k)` says that candidate k belongs to a component of several columns. Such columns, and those of the robot model,
+/// are one story and stay; built-in generic terms that they span are aliases.
+pub(super) fn judge(
+    graph: &Graph,
+    candidates: &mut [Candidate],
+    joints: usize,
+    shares: &dyn Fn(usize) -> bool,
+    model: &ModelTorques<'_>,
+) -> Vec<Verdict> {
     let wanted = candidates.len() + 32;
     let pool = pool(graph, candidates, joints, wanted);
     let rows = |k: usize| k * joints..(k + 1) * joints;
-    let finite = |state: &State, k: usize| state[rows(k)].iter().all(|entry| entry.is_finite());
+    let finite =
+        |state: &State, k: usize| state.torque[rows(k)].iter().all(|entry| entry.is_finite());
 
     let mut verdicts = Vec::with_capacity(candidates.len());
     for (k, candidate) in candidates.iter_mut().enumerate() {
+        if candidate.model.is_some() {
+            verdicts.push(Verdict::New);
+            continue;
+        }
         let own: Vec<&State> = pool.iter().filter(|state| finite(state, k)).collect();
         if own.is_empty() {
             verdicts.push(Verdict::NeverFinite(pool.len()));
@@ -49,7 +71,7 @@ pub(super) fn judge(graph: &Graph, candidates: &mut [Candidate], joints: usize) 
         }
         candidate.image.retain(|&(joint, _)| {
             own.iter()
-                .any(|state| !state[k * joints + joint].may_be_zero())
+                .any(|state| !state.torque[k * joints + joint].may_be_zero())
         });
         verdicts.push(if candidate.image.is_empty() {
             Verdict::Null
@@ -60,7 +82,7 @@ pub(super) fn judge(graph: &Graph, candidates: &mut [Candidate], joints: usize) 
 
     // states at which all columns exist; the rarest columns stand back until there are enough
     let mut live: Vec<usize> = (0..candidates.len())
-        .filter(|&k| verdicts[k] == Verdict::New)
+        .filter(|&k| verdicts[k] == Verdict::New && candidates[k].model.is_none())
         .collect();
     let usable = loop {
         let usable: Vec<&State> = pool
@@ -81,37 +103,30 @@ pub(super) fn judge(graph: &Graph, candidates: &mut [Candidate], joints: usize) 
         }
     };
 
-    live.sort_by_key(|&k| preference(candidates[k].family)); // stable: as written within a family
-    let columns: Vec<Vec<f64>> = live
+    let usable = &usable[..usable.len().min(wanted)];
+    let mut columns: Vec<(usize, Vec<f64>)> = live
         .iter()
         .map(|&k| {
-            usable
-                .iter()
-                .take(wanted)
-                .flat_map(|state| &state[rows(k)])
-                .map(|entry| entry.value)
-                .collect()
+            let torque = usable.iter().flat_map(|state| &state.torque[rows(k)]);
+            (k, torque.map(|entry| entry.value).collect())
         })
         .collect();
+    let motions: Vec<&Motions> = usable.iter().map(|state| &state.motion).collect();
+    columns.extend(model(&motions));
+    columns.sort_by_key(|&(k, _)| (candidates[k].family.preference(), k));
+    let (order, columns): (Vec<usize>, Vec<Vec<f64>>) = columns.into_iter().unzip();
     for (position, combination) in dependent(columns) {
+        let k = order[position];
+        if shares(k) || candidates[k].model.is_some() {
+            continue;
+        }
         let combination = combination
             .into_iter()
-            .map(|(factor, other)| (factor, live[other]))
+            .map(|(factor, other)| (factor, order[other]))
             .collect();
-        verdicts[live[position]] = Verdict::Combination(combination);
+        verdicts[k] = Verdict::Combination(combination);
     }
     verdicts
-}
-
-/// What the user asked for most directly stays.
-fn preference(family: Family) -> u8 {
-    match family {
-        Family::User => 0,
-        Family::Viscous | Family::Coulomb => 1,
-        Family::Offset => 2,
-        Family::MotorInertia => 3,
-        Family::Generic => 4,
-    }
 }
 
 /// Random states, until all candidates exist at `wanted` of them; at most a bounded number where they do not.
@@ -124,7 +139,7 @@ fn pool(graph: &Graph, candidates: &[Candidate], joints: usize, wanted: usize) -
             if complete == wanted {
                 return pool;
             }
-            let motion: Vec<[f64; 3]> = (0..joints)
+            let motion: Motions = (0..joints)
                 .map(|_| [reach * uniform(), 2.0 * uniform(), 5.0 * uniform()])
                 .collect();
             let values = bounded_values(graph, |variable| match variable {
@@ -132,7 +147,7 @@ fn pool(graph: &Graph, candidates: &[Candidate], joints: usize, wanted: usize) -
                 Variable::Velocity(joint) => motion[joint][1],
                 Variable::Acceleration(joint) => motion[joint][2],
             });
-            let mut state = vec![
+            let mut torque = vec![
                 Bounded {
                     value: 0.0,
                     error: 0.0
@@ -145,22 +160,24 @@ fn pool(graph: &Graph, candidates: &[Candidate], joints: usize, wanted: usize) -
                     .lagrangian
                     .is_none_or(|phi| values[phi.0 as usize].value.is_finite());
                 for &(joint, image) in &candidate.image {
-                    state[k * joints + joint] = values[image.0 as usize];
+                    torque[k * joints + joint] = values[image.0 as usize];
                 }
                 if !exists {
-                    state[k * joints] = Bounded {
+                    torque[k * joints] = Bounded {
                         value: f64::NAN,
                         error: 0.0,
                     };
                 }
             }
-            if state.iter().all(|entry| entry.is_finite()) {
+            let whole = torque.iter().all(|entry| entry.is_finite());
+            if whole {
                 complete += 1;
-                pool.push(state);
             } else if partial < wanted * (stage + 1) {
                 partial += 1;
-                pool.push(state);
+            } else {
+                continue;
             }
+            pool.push(State { motion, torque });
         }
     }
     pool
@@ -177,6 +194,9 @@ pub(super) fn dependent(columns: Vec<Vec<f64>>) -> Vec<(usize, Vec<(f64, usize)>
     for (position, mut column) in columns.into_iter().enumerate() {
         let length = norm(&column);
         lengths[position] = length;
+        if length == 0.0 {
+            continue; // judged by itself, see `Verdict::Null`
+        }
         column.iter_mut().for_each(|value| *value /= length);
         let mut shares = vec![0.0; basis.len()];
         for _ in 0..2 {

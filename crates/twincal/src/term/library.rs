@@ -1,45 +1,54 @@
-//! The library: all candidates of one robot in order, judged, compiled into one tape.
+//! The library: all candidates of one robot in order, judged, compiled into one tape and one pass over the model.
 
-use super::aliases::{Verdict, judge};
-use super::candidate::{Candidate, Joint};
-use super::expression::{Graph, Id, Scratch, Slot, Tape, Variable, bounded_values};
-use super::{
-    Family, LibrarySettings, Status, Term, coulomb, generic, motor_inertia, offset, user, viscous,
-};
+use super::aliases::{Motions, Verdict, judge};
+use super::candidate::{Candidate, Joint, Proposal};
+use super::component::{Component, Meaning, Parameter};
+use super::expression::{Graph, Id, Slot, Tape, Variable, bounded_values};
+use super::model_column::{ModelColumn, ModelColumns};
+use super::propose::{About, proposals};
+use super::sentence::{Estimate, sentence};
+use super::{Family, LibrarySettings, Status, Term, user};
 use crate::error::{Error, Finding, Result, Severity};
 use crate::robot::{JointKind, Motion, Robot};
 use std::sync::Arc;
 
-/// Most terms a library may have.
-const TERM_LIMIT: usize = 1000;
-/// Joints up to which the generic family is proposed unasked.
-const GENERIC_JOINTS: usize = 3;
+pub use super::model_column::Scratch;
+
+/// A model column's torque on a joint below this share of the largest of its kind is zero by structure.
+const STRUCTURAL_ZERO: f64 = 1e-10;
 
 /// Ordered terms for one robot, ready to be evaluated. Column k of the regression is the k-th term whose status is
 /// [`Status::Candidate`].
 #[derive(Debug, Clone)]
 pub struct Library {
     terms: Vec<Term>,
+    components: Vec<Component>,
     /// "viscous friction on elbow", one per term.
     stories: Vec<String>,
-    /// φ of each term that is a Lagrangian.
+    /// Size of the coefficient relative to the others of its component, one per term.
+    scales: Vec<f64>,
+    /// φ of each term that is a Lagrangian written as an expression.
     lagrangians: Vec<Option<Id>>,
-    /// `(joint, torque)` of each term, zero entries left out.
+    /// `(joint, torque)` of each term that is an expression, zero entries left out.
     images: Vec<Vec<(usize, Id)>>,
+    /// Terms that are made from the robot model, with the joints where they are not zero by structure.
+    sources: Vec<Option<(ModelColumn, Vec<usize>)>>,
     graph: Arc<Graph>,
     columns: Vec<usize>,
     by_joint: Vec<Vec<usize>>,
     tape: Arc<Tape>,
+    model: Option<Arc<ModelColumns>>,
 }
 
 impl Library {
     /// Builds, judges and compiles the candidates for `robot`.
     ///
-    /// Order: the user's expressions, generic family, then for each of viscous friction, Coulomb friction, offset and
-    /// motor inertia the joints in order. A total time derivative (its torque is 0 for every motion) becomes
-    /// [`Status::NullLagrangian`]; a term whose torque is a combination of others for every motion becomes
-    /// [`Status::AliasOf`], where the user's expressions stay before friction, offset and motor inertia, these before
-    /// generic ones, and the earlier before the later. Every user term that is dropped is a finding.
+    /// Order: the user's expressions, generic family, then family by family as in [`Family::NAMED`], joint by joint or link
+    /// by link. A total time derivative (its torque is 0 for every motion) becomes [`Status::NullLagrangian`]; a term whose
+    /// torque is a combination of others for every motion becomes [`Status::AliasOf`], where the user's expressions stay
+    /// before friction, offset and motor inertia, these before generic ones, and the earlier before the later. Every user
+    /// term that is dropped is a finding. Components of several columns and those made from the robot model are never
+    /// dropped for what others span: they are other stories, told apart by data or said to be one.
     ///
     /// # Errors
     /// [`Error::Term`] for an expression that cannot be read or is nowhere a finite number; [`Error::Setting`] for
@@ -55,51 +64,75 @@ impl Library {
             slides: robot.joint_kind(index) == JointKind::Prismatic,
         };
         let joints: Vec<Joint> = names.iter().enumerate().map(joint).collect();
-        Self::build(&joints, robot.is_planar(), settings)
+        let about = About {
+            joints: &joints,
+            parallel: robot.is_planar(),
+            robot: Some(robot),
+        };
+        Self::build(&about, settings)
     }
 
-    /// [`Library::propose`] for joints without their robot.
+    /// [`Library::propose`], also for joints without their robot.
     pub(super) fn build(
-        joints: &[Joint],
-        parallel: bool,
+        about: &About<'_>,
         settings: &LibrarySettings,
     ) -> Result<(Self, Vec<Finding>)> {
+        let joints = about.joints;
         let mut findings = Vec::new();
         let mut graph = Graph::default();
-        let mut candidates = candidates(&mut graph, joints, parallel, settings, &mut findings)?;
+        let proposed = proposals(&mut graph, about, settings, &mut findings)?;
+        let (components, mut candidates) = flattened(proposed);
         user::fill_units(&graph, joints, &mut candidates);
-        let verdicts = judge(&graph, &mut candidates, joints.len());
-        let statuses = statuses(&graph, &candidates, &verdicts, &mut findings)?;
+        let model = about
+            .robot
+            .map(|robot| ModelColumns::new(Arc::new(robot.clone())));
+        let home = home(&components, candidates.len());
+        let verdicts = {
+            let sources: Vec<(usize, ModelColumn)> = sources(&candidates);
+            let torques = |motions: &[&Motions]| match &model {
+                Some(model) => torques(model, &sources, motions, joints.len()),
+                None => Vec::new(),
+            };
+            let shares = |k: usize| components[home[k]].terms.len() > 1;
+            judge(&graph, &mut candidates, joints.len(), &shares, &torques)
+        };
+        let acting = match &model {
+            Some(model) => acting_joints(model, &candidates, joints.len()),
+            None => vec![Vec::new(); candidates.len()],
+        };
+        let statuses = statuses(&graph, &candidates, &verdicts, &acting, &mut findings)?;
 
         graph.forget_derivatives();
         let mut library = Self {
             terms: Vec::new(),
+            components,
             stories: Vec::new(),
+            scales: Vec::new(),
             lagrangians: Vec::new(),
             images: Vec::new(),
+            sources: Vec::new(),
             graph: Arc::new(graph),
             columns: Vec::new(),
             by_joint: vec![Vec::new(); joints.len()],
             tape: Arc::default(),
+            model: model.map(Arc::new),
         };
-        for (candidate, status) in candidates.into_iter().zip(statuses) {
-            let Candidate {
-                name,
-                family,
-                unit,
-                story,
-                lagrangian,
-                image,
-            } = candidate;
+        let judged = candidates.into_iter().zip(statuses).zip(acting);
+        for (index, ((candidate, status), acting)) in judged.enumerate() {
             library.terms.push(Term {
-                name,
-                family,
-                unit,
+                name: candidate.name,
+                family: candidate.family,
+                unit: candidate.unit,
                 status,
+                component: home[index],
             });
-            library.stories.push(story);
-            library.lagrangians.push(lagrangian);
-            library.images.push(image);
+            library.stories.push(candidate.story);
+            library.scales.push(candidate.scale);
+            library.lagrangians.push(candidate.lagrangian);
+            library.images.push(candidate.image);
+            library
+                .sources
+                .push(candidate.model.map(|column| (column, acting)));
         }
         library.compile();
         if library.columns.is_empty() {
@@ -120,24 +153,99 @@ impl Library {
             .collect();
         self.by_joint.iter_mut().for_each(Vec::clear);
         let mut outputs = Vec::new();
+        let mut model = self.model.as_ref().map(|model| model.emptied());
         for (column, &term) in self.columns.iter().enumerate() {
+            let by_joint = &mut self.by_joint;
+            let mut row_on = |joint: usize| {
+                by_joint[joint].push(column);
+                by_joint[joint].len() - 1
+            };
             for &(joint, image) in &self.images[term] {
-                outputs.push((
-                    image,
-                    Slot {
-                        table: joint,
-                        row: self.by_joint[joint].len(),
-                    },
-                ));
-                self.by_joint[joint].push(column);
+                let row = row_on(joint);
+                outputs.push((image, Slot { table: joint, row }));
+            }
+            if let (Some((source, joints)), Some(model)) = (&self.sources[term], &mut model) {
+                let slots = joints.iter().map(|&joint| (joint, row_on(joint)));
+                model.push(source.clone(), slots.collect());
             }
         }
         self.tape = Arc::new(Tape::new(&self.graph, &outputs));
+        self.model = model.map(Arc::new);
     }
 
     /// All terms, dropped ones included, in order.
     pub fn terms(&self) -> &[Term] {
         &self.terms
+    }
+
+    /// All components, in order; every term belongs to one.
+    pub fn components(&self) -> &[Component] {
+        &self.components
+    }
+
+    /// Size of each column's coefficient relative to the others of its component: the shape of their joint prior.
+    pub fn column_scales(&self) -> Vec<f64> {
+        self.columns.iter().map(|&term| self.scales[term]).collect()
+    }
+
+    /// The parameters that people know a component by.
+    ///
+    /// # Panics
+    /// If there is no such component.
+    pub fn parameters(&self, component: usize) -> Vec<Parameter> {
+        let component = &self.components[component];
+        let columns: Vec<(String, String)> = component
+            .terms
+            .iter()
+            .map(|&term| {
+                let Term { name, unit, .. } = &self.terms[term];
+                let own = name.strip_prefix(&component.name).unwrap_or(name);
+                let own = own.strip_prefix('.').unwrap_or(own);
+                let own = if own.is_empty() { "value" } else { own };
+                (own.to_owned(), unit.clone())
+            })
+            .collect();
+        Meaning::of(component.family).parameters(&columns)
+    }
+
+    /// Values of [`Library::parameters`] at coefficients `beta`, one per term of the component (0 for dropped ones).
+    pub fn parameter_values(&self, component: usize, beta: &[f64]) -> Vec<f64> {
+        Meaning::of(self.components[component].family).values(beta)
+    }
+
+    /// True if parameter `parameter` of a component is the coefficient of its term at the same place.
+    pub fn is_coefficient(&self, component: usize, parameter: usize) -> bool {
+        match Meaning::of(self.components[component].family) {
+            Meaning::Coefficients => true,
+            Meaning::Payload => !(1..=3).contains(&parameter),
+            Meaning::Spring => parameter == 0,
+        }
+    }
+
+    /// A component with its parameters in one sentence, e.g. "payload at tool0: +1.20 ± 0.03 kg, centre of mass (0, 2, 61)
+    /// ± 4 mm".
+    pub fn component_words(&self, component: usize, parameters: &[Estimate]) -> String {
+        sentence(&self.components[component], parameters)
+    }
+
+    /// Least value of a term's coefficient if friction and motor inertia cannot be negative: minus what the model has; −∞
+    /// where any value is physical.
+    ///
+    /// # Panics
+    /// If there is no such term or the robot is another one.
+    pub fn least_value(&self, term: usize, robot: &Robot) -> f64 {
+        let Term { name, family, .. } = &self.terms[term];
+        let joint = |suffix: &str| {
+            let own = name.strip_suffix(suffix)?;
+            let index = robot.joint_names().iter().position(|joint| *joint == own)?;
+            Some(robot.joint(index))
+        };
+        match family {
+            Family::Viscous => joint(".viscous").map_or(0.0, |joint| -joint.damping),
+            Family::MotorInertia => joint(".motor_inertia").map_or(0.0, |joint| -joint.armature),
+            Family::Coulomb | Family::CoupledFriction => 0.0,
+            _ => f64::NEG_INFINITY,
+        }
     }
 
     /// Index in `terms()` of each column, ascending.
@@ -177,7 +285,10 @@ impl Library {
         for (columns, out) in self.by_joint.iter().zip(out.iter_mut()) {
             out.resize(columns.len() * motion.len, 0.0);
         }
-        self.tape.evaluate(motion, out, scratch);
+        self.tape.evaluate(motion, out, &mut scratch.tape);
+        if let Some(model) = &self.model {
+            model.evaluate(motion, out, scratch);
+        }
     }
 
     /// φ(q, q̇) of a term (index into [`Library::terms`]) at one state, J per unit of β; `None` where the term
@@ -214,92 +325,127 @@ impl Library {
     }
 }
 
-/// All candidates in the order of `terms[]`.
-fn candidates(
-    graph: &mut Graph,
-    joints: &[Joint],
-    parallel: bool,
-    settings: &LibrarySettings,
-    findings: &mut Vec<Finding>,
-) -> Result<Vec<Candidate>> {
-    let velocity = settings.coulomb_velocity;
-    if !(velocity.is_finite()
-        && velocity >= 0.0
-        && (velocity == 0.0 || (1.0 / velocity).is_finite()))
-    {
-        return Err(Error::Setting {
-            key: "library.coulomb_velocity".to_owned(),
-            problem: format!("{velocity} is not a velocity"),
-            remedy: "give 0 or a positive number, rad/s".to_owned(),
-        });
-    }
-    let generic = settings.generic.unwrap_or(joints.len() <= GENERIC_JOINTS);
-    if settings.generic.is_none() && !generic {
-        findings.push(Finding::new(
-            Severity::Note,
-            "generic_family_off",
-            "",
-            format!(
-                "the robot has {} moving joints: the generic family, which has {} terms for them, is proposed unasked up \
-                 to {GENERIC_JOINTS} joints only; name the terms you want in [library] terms",
-                joints.len(),
-                generic::count(joints, parallel)
-            ),
-            0,
-        ));
-    }
-    let count = settings.terms.len() as f64
-        + if generic {
-            generic::count(joints, parallel)
-        } else {
-            0.0
-        };
-    if count > TERM_LIMIT as f64 {
-        return Err(Error::Setting {
-            key: if settings.terms.len() > TERM_LIMIT {
-                "library.terms"
-            } else {
-                "library.generic"
-            }
-            .to_owned(),
-            problem: format!(
-                "{count} terms for {} joints, the limit is {TERM_LIMIT}",
-                joints.len()
-            ),
-            remedy: "name the terms you want in `terms` and set `generic = false`".to_owned(),
-        });
-    }
-
-    let mut all = Vec::new();
-    for text in &settings.terms {
-        all.push(user::candidate(graph, text, Family::User, joints)?);
-    }
-    if generic {
-        for name in generic::names(joints, parallel) {
-            all.push(user::candidate(graph, &name, Family::Generic, joints)?);
+/// Components and their columns, numbered.
+fn flattened(proposed: Vec<Proposal>) -> (Vec<Component>, Vec<Candidate>) {
+    let mut components = Vec::with_capacity(proposed.len());
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for Proposal { name, columns } in proposed {
+        let (first, count) = (candidates.len(), columns.len());
+        if let Some(column) = columns.first() {
+            components.push(Component {
+                name,
+                family: column.family,
+                story: column.story.clone(),
+                terms: (first..first + count).collect(),
+                alias_of: Vec::new(),
+            });
         }
+        candidates.extend(columns);
     }
-    if settings.viscous {
-        all.extend(joints.iter().map(|joint| viscous::candidate(graph, joint)));
+    (components, candidates)
+}
+
+/// Component of each term.
+fn home(components: &[Component], terms: usize) -> Vec<usize> {
+    let mut home = vec![0; terms];
+    for (index, component) in components.iter().enumerate() {
+        component.terms.iter().for_each(|&term| home[term] = index);
     }
-    if settings.coulomb {
-        all.extend(
-            joints
-                .iter()
-                .map(|joint| coulomb::candidate(graph, joint, velocity)),
-        );
+    home
+}
+
+/// Candidates that are made from the robot model.
+fn sources(candidates: &[Candidate]) -> Vec<(usize, ModelColumn)> {
+    let with_source = |(k, candidate): (usize, &Candidate)| Some((k, candidate.model.clone()?));
+    candidates
+        .iter()
+        .enumerate()
+        .filter_map(with_source)
+        .collect()
+}
+
+/// Torque of model columns on all joints at some states: `(candidate, torque[state * joints + joint])`.
+fn torques(
+    model: &ModelColumns,
+    sources: &[(usize, ModelColumn)],
+    motions: &[&Motions],
+    joints: usize,
+) -> Vec<(usize, Vec<f64>)> {
+    let len = motions.len();
+    let mut all = model.emptied();
+    for (row, (_, source)) in sources.iter().enumerate() {
+        let slots = (0..joints).map(|joint| (joint, row)).collect();
+        all.push(source.clone(), slots);
     }
-    if settings.offset {
-        all.extend(joints.iter().map(|joint| offset::candidate(graph, joint)));
+    let channel = |k: usize| -> Vec<f64> {
+        (0..joints)
+            .flat_map(|joint| motions.iter().map(move |motion| motion[joint][k]))
+            .collect()
+    };
+    let (q, qd, qdd) = (channel(0), channel(1), channel(2));
+    let motion = Motion {
+        len,
+        q: &q,
+        qd: &qd,
+        qdd: &qdd,
+    };
+    let mut out = vec![vec![0.0; sources.len() * len]; joints];
+    all.evaluate(motion, &mut out, &mut Scratch::default());
+    sources
+        .iter()
+        .enumerate()
+        .map(|(row, &(k, _))| {
+            let value = |state: usize, joint: usize| out[joint][row * len + state];
+            let torque = (0..len).flat_map(|state| (0..joints).map(move |joint| (state, joint)));
+            (k, torque.map(|(s, j)| value(s, j)).collect())
+        })
+        .collect()
+}
+
+/// Joints on which each model column is not zero by structure, from random states.
+fn acting_joints(model: &ModelColumns, candidates: &[Candidate], joints: usize) -> Vec<Vec<usize>> {
+    let mut acting = vec![Vec::new(); candidates.len()];
+    let sources = sources(candidates);
+    let motions = random_motions(joints);
+    let motions: Vec<&Motions> = motions.iter().collect();
+    let torques = torques(model, &sources, &motions, joints);
+    let size = |torque: &[f64]| torque.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let largest = |unit: &str| {
+        let same = torques.iter().filter(|(k, _)| candidates[*k].unit == unit);
+        same.map(|(_, torque)| size(torque)).fold(0.0, f64::max)
+    };
+    for (k, torque) in &torques {
+        let limit = STRUCTURAL_ZERO * largest(&candidates[*k].unit);
+        acting[*k] = (0..joints)
+            .filter(|&joint| {
+                let own = torque.iter().skip(joint).step_by(joints);
+                own.fold(0.0_f64, |m, x| m.max(x.abs())) > limit
+            })
+            .collect();
     }
-    if settings.motor_inertia {
-        all.extend(
-            joints
-                .iter()
-                .map(|joint| motor_inertia::candidate(graph, joint)),
-        );
-    }
-    Ok(all)
+    acting
+}
+
+/// States that have nothing in particular in common: a Weyl sequence with irrational steps.
+fn random_motions(joints: usize) -> Vec<Motions> {
+    const STATES: usize = 40;
+    let value = |state: usize, joint: usize, k: usize| {
+        let step = ((3 * joint + k + 2) as f64).sqrt() * std::f64::consts::E;
+        2.0 * ((state as f64 + 1.0) * step).fract() - 1.0
+    };
+    (0..STATES)
+        .map(|state| {
+            (0..joints)
+                .map(|joint| {
+                    [
+                        3.0 * value(state, joint, 0),
+                        2.0 * value(state, joint, 1),
+                        5.0 * value(state, joint, 2),
+                    ]
+                })
+                .collect()
+        })
+        .collect()
 }
 
 /// Verdicts as statuses, with a finding for everything the user wrote in vain.
@@ -307,12 +453,17 @@ fn statuses(
     graph: &Graph,
     candidates: &[Candidate],
     verdicts: &[Verdict],
+    acting: &[Vec<usize>],
     findings: &mut Vec<Finding>,
 ) -> Result<Vec<Status>> {
     let mut repeated = Vec::new();
     let mut statuses = Vec::with_capacity(candidates.len());
-    for (candidate, verdict) in candidates.iter().zip(verdicts) {
+    for ((candidate, verdict), acting) in candidates.iter().zip(verdicts).zip(acting) {
         let name = &candidate.name;
+        if candidate.model.is_some() && acting.is_empty() {
+            statuses.push(Status::NullLagrangian); // e.g. the mass of a link on a vertical axis
+            continue;
+        }
         let severity = if candidate.family == Family::User {
             Severity::Warning
         } else {

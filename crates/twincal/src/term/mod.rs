@@ -3,47 +3,53 @@
 //! ```text
 //! text or family → φ(q, q̇) → D(φ) exactly → nulls and aliases out → one tape for all columns and joints
 //! ```
-//! One file per family: `viscous.rs` is the shortest, copy it to add one.
+//! One file per family: `viscous.rs` is the shortest that is an expression, `gain.rs` the shortest that is made from the
+//! robot model; copy one to add a family. A family proposes components: a component is one physical story (a payload,
+//! one joint's spring), in or out of the model with all its columns.
 
 mod expression;
 mod euler_lagrange;
 mod candidate;
+mod family;
+mod model_column;
 mod viscous;
 mod coulomb;
 mod offset;
 mod motor_inertia;
+mod payload;
+mod mass_moments;
+mod tensor;
+mod mass_scale;
+mod base_tilt;
+mod spring;
+mod potential;
+mod asymmetry;
+mod stribeck;
+mod load_friction;
+mod coupled_friction;
+mod gain;
+mod encoder_zero;
+mod ripple;
 mod user;
 mod generic;
 mod aliases;
 mod words;
 mod status;
+mod component;
+mod sentence;
+mod propose;
 mod library;
 #[cfg(test)]
 mod tests;
 
-pub use expression::Scratch;
-pub use library::Library;
+pub use component::{Component, Parameter};
+pub use family::Family;
+pub use library::{Library, Scratch};
+pub use sentence::Estimate;
 pub use status::Status;
 
 use serde::{Deserialize, Serialize};
-
-/// Which family a term belongs to; each family has its own Beta–Binomial inclusion prior.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Family {
-    /// The user's own expressions.
-    User,
-    /// The built-in trigonometric and polynomial family.
-    Generic,
-    /// Viscous friction.
-    Viscous,
-    /// Coulomb friction.
-    Coulomb,
-    /// Constant torque offset.
-    Offset,
-    /// Reflected inertia of the motor.
-    MotorInertia,
-}
+use std::collections::BTreeMap;
 
 /// One candidate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -57,6 +63,8 @@ pub struct Term {
     pub unit: String,
     /// Column or not.
     pub status: Status,
+    /// Index in [`Library::components`] of the component that it belongs to.
+    pub component: usize,
 }
 
 /// `[library]`.
@@ -67,14 +75,21 @@ pub struct LibrarySettings {
     pub terms: Vec<String>,
     /// Built-in generic family; `None`: on up to 3 joints.
     pub generic: Option<bool>,
-    /// Viscous friction per joint.
-    pub viscous: bool,
-    /// Coulomb friction per joint.
-    pub coulomb: bool,
+    /// Families that are proposed, beside `terms` and the generic one; order and repetition do not matter.
+    pub families: Vec<Family>,
     /// v_s, rad/s or m/s; 0: sign(q̇).
     pub coulomb_velocity: f64,
-    /// Torque offset per joint.
-    pub offset: bool,
-    /// Motor inertia per joint.
-    pub motor_inertia: bool,
+    /// Link in whose frame the payload is described; `None`: the last link.
+    pub payload_frame: Option<String>,
+    /// Total viscous friction, Coulomb friction and motor inertia of a joint, the model's included, are at least 0.
+    pub nonnegative: bool,
+    /// Periods of gear ripple per turn (per metre for a slider) by joint; joints without an entry have none.
+    pub ripple: BTreeMap<String, f64>,
+}
+
+impl LibrarySettings {
+    /// True if the family is switched on.
+    pub fn has(&self, family: Family) -> bool {
+        self.families.contains(&family)
+    }
 }

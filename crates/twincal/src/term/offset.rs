@@ -2,21 +2,19 @@
 
 use super::Family;
 use super::candidate::{Candidate, Joint};
-use super::expression::{Graph, Variable};
+use super::expression::Graph;
 
 /// `<joint>.offset`: the actuator delivers β more, always, N·m (N for a slider). Lagrangian −q.
 pub(super) fn candidate(graph: &mut Graph, joint: &Joint) -> Candidate {
-    let position = graph.variable(Variable::Position(joint.index));
-    Candidate {
-        name: format!("{}.offset", joint.name),
-        family: Family::Offset,
-        unit: joint.torque_unit().to_owned(),
-        story: format!(
-            "constant {} offset on {}",
-            if joint.slides { "force" } else { "torque" },
-            joint.name
-        ),
-        lagrangian: Some(graph.scaled(-1.0, position)),
-        image: vec![(joint.index, graph.constant(1.0))],
-    }
+    let position = joint.position(graph);
+    let phi = graph.scaled(-1.0, position);
+    let kind = if joint.slides { "force" } else { "torque" };
+    Candidate::lagrangian(
+        graph,
+        format!("{}.offset", joint.name),
+        Family::Offset,
+        joint.torque_unit(),
+        format!("constant {kind} offset on {}", joint.name),
+        phi,
+    )
 }

@@ -2,7 +2,6 @@
 
 use super::Family;
 use super::candidate::{Candidate, Joint};
-use super::euler_lagrange::euler_lagrange;
 use super::expression::{Dimension, Function, Graph, Id, Node, Variable, dimensions, parse};
 use crate::error::{Error, Result};
 
@@ -18,7 +17,8 @@ pub(super) fn candidate(
 ) -> Result<Candidate> {
     let names: Vec<&str> = joints.iter().map(|joint| joint.name.as_str()).collect();
     let phi = parse(graph, text, &names)?;
-    let image = euler_lagrange(graph, phi);
+    let story = format!("{} {}", kind(graph, phi), text.trim());
+    let candidate = Candidate::lagrangian(graph, text.to_owned(), family, "", story, phi);
     if graph.is_exhausted() {
         return Err(Error::Term {
             term: text.to_owned(),
@@ -27,14 +27,7 @@ pub(super) fn candidate(
             remedy: "simplify the expression or split it into several terms".to_owned(),
         });
     }
-    Ok(Candidate {
-        name: text.to_owned(),
-        family,
-        unit: String::new(),
-        story: format!("{} {}", kind(graph, phi), text.trim()),
-        lagrangian: Some(phi),
-        image,
-    })
+    Ok(candidate)
 }
 
 /// Writes the unit of β of every expression: J divided by the unit of φ.

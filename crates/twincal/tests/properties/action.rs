@@ -124,7 +124,9 @@ proptest! {
     #[test]
     fn lagrangian_columns_do_no_work_on_a_cycle_and_friction_only_takes((robot, waves, direction) in with_motion(2)) {
         let settings = LibrarySettings {
-            generic: Some(true), viscous: true, coulomb: true, motor_inertia: true, ..LibrarySettings::default()
+            generic: Some(true),
+            families: vec![Family::Viscous, Family::Coulomb, Family::MotorInertia],
+            ..LibrarySettings::default()
         };
         let (library, _) = Library::propose(&robot, &settings).unwrap();
         let [q, qd, qdd] = sampled(&waves);

@@ -149,6 +149,20 @@ pub(in crate::report) fn family_name(family: Family) -> &'static str {
         Family::Coulomb => "Coulomb friction",
         Family::Offset => "torque offset",
         Family::MotorInertia => "motor inertia",
+        Family::Payload => "payload",
+        Family::MassMoments => "mass and centre of mass",
+        Family::Tensor => "inertia tensor",
+        Family::MassScale => "mass scale",
+        Family::Tilt => "gravity",
+        Family::Spring => "spring",
+        Family::Potential => "conservative torque of one joint",
+        Family::Asymmetry => "direction-dependent friction",
+        Family::Stribeck => "Stribeck friction",
+        Family::LoadFriction => "load-dependent friction",
+        Family::CoupledFriction => "friction of coupled motors",
+        Family::Gain => "torque gain",
+        Family::EncoderZero => "encoder zero",
+        Family::Ripple => "gear ripple",
     }
 }
 

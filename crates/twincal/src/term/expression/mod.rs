@@ -11,5 +11,4 @@ pub(crate) use bounds::{Bounded, bounded_values};
 pub(crate) use dimension::{Dimension, dimensions};
 pub(crate) use graph::{Function, Graph, Id, Node, Variable};
 pub(crate) use parse::parse;
-pub use tape::Scratch;
-pub(crate) use tape::{Slot, Tape};
+pub(crate) use tape::{Scratch as TapeScratch, Slot, Tape};

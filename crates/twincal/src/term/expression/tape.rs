@@ -57,7 +57,7 @@ pub(crate) struct Tape {
 
 /// Working memory of one thread; grows to what the tape needs.
 #[derive(Debug, Clone, Default)]
-pub struct Scratch {
+pub(crate) struct Scratch {
     registers: Vec<Block>,
 }
 

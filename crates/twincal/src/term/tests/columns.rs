@@ -1,9 +1,11 @@
 //! Order, names, units and values of the columns.
 
 use super::super::candidate::Joint;
-use super::super::expression::{Graph, Scratch, Slot, Tape, Variable, bounded_values, parse};
+use super::super::expression::{
+    Graph, Slot, Tape, TapeScratch as Scratch, Variable, bounded_values, parse,
+};
 use super::super::{Family, Library, Status, Term};
-use super::{all, joints, only, planar};
+use super::{all, bare, joints, only, planar};
 use crate::robot::Motion;
 
 #[test]
@@ -52,7 +54,7 @@ fn order_and_names_are_the_contract() {
 
 #[test]
 fn sliders_have_their_own_units() {
-    let (library, _) = Library::build(&joints(&[false, true]), false, &all(&[])).unwrap();
+    let (library, _) = bare(&joints(&[false, true]), false, &all(&[])).unwrap();
     let unit = |name: &str| {
         library
             .terms()
@@ -283,7 +285,7 @@ fn joint_names_are_free_text() {
         odd(0, "<script>alert(1)</script>"),
         odd(1, "q1, \"é\"\n=cmd()"),
     ];
-    let (library, _) = Library::build(&named, true, &all(&["cos(q1)"])).unwrap();
+    let (library, _) = bare(&named, true, &all(&["cos(q1)"])).unwrap();
     let alias = library
         .terms()
         .iter()

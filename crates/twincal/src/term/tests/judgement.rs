@@ -1,7 +1,7 @@
 //! Nulls, aliases and what is said about them (fault cases 85 and 86, as far as they are structural).
 
 use super::super::{Family, LibrarySettings, Status};
-use super::{Library, all, joints, only, planar, status_of};
+use super::{all, bare, joints, only, planar, status_of};
 use crate::error::{Error, Severity};
 
 fn alias(of: &str) -> Status {
@@ -187,7 +187,7 @@ fn terms_with_a_domain_are_compared_inside_it() {
 #[test]
 fn generic_family_of_three_hinges_loses_nothing_but_motor_inertia() {
     for parallel in [true, false] {
-        let (library, _) = Library::build(&joints(&[false; 3]), parallel, &all(&[])).unwrap();
+        let (library, _) = bare(&joints(&[false; 3]), parallel, &all(&[])).unwrap();
         for term in library
             .terms()
             .iter()
@@ -220,7 +220,7 @@ fn limits_and_empty_libraries_are_settings_errors() {
         (&nulls, "library", "none of its 1 terms"),
         (&velocity, "library.coulomb_velocity", "NaN"),
     ] {
-        match Library::build(&six, false, settings) {
+        match bare(&six, false, settings) {
             Err(Error::Setting {
                 key: found,
                 problem,
@@ -235,10 +235,10 @@ fn limits_and_empty_libraries_are_settings_errors() {
         }
     }
     let unasked = LibrarySettings {
-        viscous: true,
+        families: vec![Family::Viscous],
         ..LibrarySettings::default()
     };
-    let (library, findings) = Library::build(&six, false, &unasked).unwrap();
+    let (library, findings) = bare(&six, false, &unasked).unwrap();
     assert_eq!(library.columns().len(), 6);
     assert_eq!(findings[0].code, "generic_family_off");
 }

@@ -8,7 +8,8 @@ mod parser;
 mod sympy;
 
 use super::candidate::Joint;
-use super::{Library, LibrarySettings, Status};
+use super::propose::About;
+use super::{Family, Library, LibrarySettings, Status};
 use crate::error::{Finding, Result};
 
 /// Joints `joint1`…; a slider where `slides` says so.
@@ -34,18 +35,27 @@ fn only(terms: &[&str]) -> LibrarySettings {
 fn all(terms: &[&str]) -> LibrarySettings {
     let mut settings = only(terms);
     settings.generic = Some(true);
-    (
-        settings.viscous,
-        settings.coulomb,
-        settings.offset,
-        settings.motor_inertia,
-    ) = (true, true, true, true);
+    settings.families = Family::JOINT.to_vec();
     settings
 }
 
 /// A library for `n` hinges with parallel axes.
 fn planar(n: usize, settings: &LibrarySettings) -> Result<(Library, Vec<Finding>)> {
-    Library::build(&joints(&vec![false; n]), true, settings)
+    bare(&joints(&vec![false; n]), true, settings)
+}
+
+/// A library for joints alone.
+fn bare(
+    joints: &[Joint],
+    parallel: bool,
+    settings: &LibrarySettings,
+) -> Result<(Library, Vec<Finding>)> {
+    let about = About {
+        joints,
+        parallel,
+        robot: None,
+    };
+    Library::build(&about, settings)
 }
 
 fn status_of<'a>(library: &'a Library, name: &str) -> &'a Status {

@@ -1,8 +1,10 @@
 //! Torque images and Lagrangians against SymPy (`tests/reference/term/make.py`).
 
-use super::super::LibrarySettings;
+use super::super::{Family, LibrarySettings};
 use super::super::euler_lagrange::euler_lagrange;
-use super::super::expression::{Graph, Scratch, Slot, Tape, Variable, bounded_values, parse};
+use super::super::expression::{
+    Graph, Slot, Tape, TapeScratch as Scratch, Variable, bounded_values, parse,
+};
 use super::{only, planar};
 use crate::robot::Motion;
 use serde::Deserialize;
@@ -120,7 +122,7 @@ fn the_lagrangian_itself_is_sympys() {
     let reference = reference();
     // motor inertia keeps the library alive where the expression is a total derivative
     let settings = |text: &str| LibrarySettings {
-        motor_inertia: true,
+        families: vec![Family::MotorInertia],
         ..only(&[text])
     };
     for case in &reference.cases {

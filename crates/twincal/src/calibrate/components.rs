@@ -1,0 +1,243 @@
+//! From the posterior over columns to physical stories: one line per component, with parameters that people know.
+
+use super::result::{ComponentSummary, Group, ParameterSummary, TermSummary, Verdict};
+use crate::posterior::draws::{CoefficientDraws, draw};
+use crate::posterior::{Model, Posterior, Problem};
+use crate::term::{Component, Estimate, Library};
+
+/// Draws that the parameters are worked out from.
+const DRAWS: usize = 4000;
+/// Fewest of them that must hold a component; for rarer ones there are draws given that it is in.
+const ENOUGH: usize = 500;
+/// Random stream of those draws.
+const STREAM: u64 = (1 << 32) + 1;
+/// Columns whose cosine over the rows is above this are hard to tell apart.
+const ALIKE: f64 = 0.95;
+/// Components whose inclusions are correlated below this stand for each other.
+const EXCLUSIVE: f64 = -0.4;
+/// Group probability below which nobody asks which member it was.
+const WORTH_TELLING: f64 = 0.2;
+
+/// One summary per component of the library, in order. `terms` are the finished summaries of its terms.
+pub(super) fn components(
+    library: &Library,
+    posterior: &Posterior,
+    terms: &[TermSummary],
+    seed: u64,
+) -> Vec<ComponentSummary> {
+    let all = draw(posterior, DRAWS, seed, STREAM);
+    (0..library.components().len())
+        .map(|index| summary(library, index, posterior, terms, &all, seed))
+        .collect()
+}
+
+fn summary(
+    library: &Library,
+    index: usize,
+    posterior: &Posterior,
+    terms: &[TermSummary],
+    all: &CoefficientDraws,
+    seed: u64,
+) -> ComponentSummary {
+    let component = &library.components()[index];
+    let own: Vec<&TermSummary> = component.terms.iter().map(|&t| &terms[t]).collect();
+    let live: Vec<&TermSummary> = own.iter().copied().filter(|t| t.pip.is_some()).collect();
+    let mut summary = ComponentSummary {
+        name: component.name.clone(),
+        family: component.family,
+        story: component.story.clone(),
+        columns: own.iter().map(|term| term.term.name.clone()).collect(),
+        pip: None,
+        pip_mcse: None,
+        selected: false,
+        verdict: None,
+        alias_of: component.alias_of.clone(),
+        words: String::new(),
+        parameters: Vec::new(),
+    };
+    let Some(first) = live.first() else {
+        return summary;
+    };
+    (summary.pip, summary.pip_mcse) = (first.pip, first.pip_mcse);
+    summary.verdict = verdict(&live);
+    summary.selected = first.pip.is_some_and(|pip| pip >= 0.5)
+        && summary.verdict != Some(Verdict::NotSeen);
+    summary.parameters = parameters(library, component, index, &own, posterior, all, seed);
+    let estimates: Vec<Estimate> = summary
+        .parameters
+        .iter()
+        .map(|p| Estimate {
+            name: p.name.clone(),
+            unit: p.unit.clone(),
+            mean: p.mean,
+            sd: p.sd,
+        })
+        .collect();
+    summary.words = library.component_words(index, &estimates);
+    summary
+}
+
+/// The verdict that all columns share, except that one seen column is enough for the component to be seen.
+fn verdict(live: &[&TermSummary]) -> Option<Verdict> {
+    let seen = live.iter().find(|term| term.verdict != Some(Verdict::NotSeen));
+    seen.or(live.first()).and_then(|term| term.verdict)
+}
+
+/// Mean, sd and central interval of every parameter, given that the component is in.
+fn parameters(
+    library: &Library,
+    component: &Component,
+    index: usize,
+    own: &[&TermSummary],
+    posterior: &Posterior,
+    all: &CoefficientDraws,
+    seed: u64,
+) -> Vec<ParameterSummary> {
+    let columns: Vec<Option<usize>> = component
+        .terms
+        .iter()
+        .map(|term| library.columns().iter().position(|column| column == term))
+        .collect();
+    let Some(member) = columns.iter().flatten().next().copied() else {
+        return Vec::new();
+    };
+    let holds = |model: &Model| model.members.contains(&(member as u32));
+    let with = |draws: &CoefficientDraws, posterior: &Posterior| -> Vec<Vec<f64>> {
+        draws
+            .models
+            .iter()
+            .enumerate()
+            .filter(|(_, model)| holds(&posterior.models[**model as usize]))
+            .map(|(row, _)| {
+                let value = |column: &Option<usize>| {
+                    column.map_or(0.0, |k| draws.beta[row * draws.columns + k])
+                };
+                let beta: Vec<f64> = columns.iter().map(value).collect();
+                library.parameter_values(index, &beta)
+            })
+            .collect()
+    };
+    let mut values = with(all, posterior);
+    if values.len() < ENOUGH {
+        let given = given(posterior, &holds);
+        values = with(&draw(&given, ENOUGH, seed, STREAM), &given);
+    }
+    library
+        .parameters(index)
+        .into_iter()
+        .enumerate()
+        .map(|(p, parameter)| {
+            let mut column: Vec<f64> = values.iter().map(|row| row[p]).collect();
+            column.sort_by(f64::total_cmp);
+            let count = column.len() as f64;
+            let mean = column.iter().sum::<f64>() / count;
+            let square = column.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>();
+            let quantile = |level: f64| {
+                let place = (level * (count - 1.0)).round().max(0.0) as usize;
+                column.get(place).copied().unwrap_or(f64::NAN)
+            };
+            // A coefficient has exact moments; what is computed from several has those of the draws.
+            let exact = own.get(p).filter(|_| library.is_coefficient(index, p));
+            let exact = exact.and_then(|term| term.conditional_mean.zip(term.conditional_sd));
+            let (mean, sd) = exact.unwrap_or((mean, (square / (count - 1.0)).sqrt()));
+            ParameterSummary {
+                name: parameter.name,
+                unit: parameter.unit,
+                mean,
+                sd,
+                interval95: [quantile(0.025), quantile(0.975)],
+            }
+        })
+        .collect()
+}
+
+/// The posterior given that a component is in.
+fn given(posterior: &Posterior, holds: &dyn Fn(&Model) -> bool) -> Posterior {
+    let mut given = Posterior {
+        models: posterior.models.iter().filter(|m| holds(m)).cloned().collect(),
+        ..posterior.clone()
+    };
+    let total: f64 = given.models.iter().map(|model| model.weight).sum();
+    given.models.iter_mut().for_each(|model| model.weight /= total);
+    given
+}
+
+/// Sets of components that these data cannot tell apart, with the probability that at least one is in.
+///
+/// Two components belong together if they are single columns that are alike in the data (cosine above 0.95), or if their
+/// inclusions exclude each other (correlation below −0.4 over the models); chained. Only sets whose members share
+/// posterior mass are told: at least two with PIP between 0.02 and 0.98, and one of them in with probability ≥ 0.2.
+pub(super) fn groups(
+    problem: &Problem,
+    posterior: &Posterior,
+    library: &Library,
+) -> Vec<Group> {
+    let columns = problem.prior.columns();
+    let count = columns.len();
+    let holds: Vec<Vec<bool>> = posterior
+        .models
+        .iter()
+        .map(|model| {
+            let mut holds = vec![false; count];
+            for &member in &model.members {
+                holds[problem.prior.component[member as usize]] = true;
+            }
+            holds
+        })
+        .collect();
+    let share = |test: &dyn Fn(&[bool]) -> bool| -> f64 {
+        let models = posterior.models.iter().zip(&holds);
+        models.filter(|(_, h)| test(h)).map(|(m, _)| m.weight).sum()
+    };
+    let pip: Vec<f64> = columns.iter().map(|own| posterior.inclusion[own[0]]).collect();
+    let unsure: Vec<bool> = pip.iter().map(|p| (0.02..0.98).contains(p)).collect();
+    let mut label: Vec<usize> = (0..count).collect();
+    for a in 0..count {
+        for b in 0..a {
+            if alike(problem, &columns[a], &columns[b])
+                || (unsure[a] && unsure[b] && correlation(&share, &pip, a, b) < EXCLUSIVE)
+            {
+                let (from, to) = (label[a].max(label[b]), label[a].min(label[b]));
+                let labels = label.iter_mut().filter(|l| **l == from);
+                labels.for_each(|l| *l = to);
+            }
+        }
+    }
+    let name = |component: usize| {
+        let term = library.columns()[columns[component][0]];
+        library.components()[library.terms()[term].component].name.clone()
+    };
+    (0..count)
+        .filter_map(|first| {
+            let members: Vec<usize> = (first..count).filter(|&k| label[k] == first).collect();
+            if members.iter().filter(|&&k| unsure[k]).count() < 2 {
+                return None;
+            }
+            let any = share(&|holds: &[bool]| members.iter().any(|&k| holds[k]));
+            (any >= WORTH_TELLING).then(|| Group {
+                members: members.iter().map(|&k| name(k)).collect(),
+                pip: any,
+            })
+        })
+        .collect()
+}
+
+/// Correlation of two inclusions over the models.
+fn correlation(
+    share: &dyn Fn(&dyn Fn(&[bool]) -> bool) -> f64,
+    pip: &[f64],
+    a: usize,
+    b: usize,
+) -> f64 {
+    let both = share(&|holds: &[bool]| holds[a] && holds[b]);
+    let variance = |p: f64| p * (1.0 - p);
+    (both - pip[a] * pip[b]) / (variance(pip[a]) * variance(pip[b])).sqrt()
+}
+
+/// Two single columns that point the same way over the rows.
+fn alike(problem: &Problem, a: &[usize], b: &[usize]) -> bool {
+    let (&[a], &[b]) = (a, b) else { return false };
+    let count = problem.names.len();
+    let at = |i: usize, j: usize| problem.gram[i * count + j];
+    (at(a, b) / (at(a, a) * at(b, b)).sqrt()).abs() > ALIKE
+}

@@ -1,0 +1,173 @@
+//! The families of candidates: who shares an inclusion prior and a slab scale.
+
+use serde::{Deserialize, Serialize};
+
+/// Which family a component belongs to; each family has its own Beta–Binomial inclusion prior and slab scale.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Family {
+    /// The user's own expressions.
+    User,
+    /// The built-in trigonometric and polynomial family.
+    Generic,
+    /// Viscous friction.
+    Viscous,
+    /// Coulomb friction.
+    Coulomb,
+    /// Constant torque offset.
+    Offset,
+    /// Reflected inertia of the motor.
+    MotorInertia,
+    /// A body at the tool: mass, first moments, inertia.
+    Payload,
+    /// Mass and first moments of a link.
+    MassMoments,
+    /// Inertia tensor of a link.
+    Tensor,
+    /// Mass, first moments and inertia of a link by one factor.
+    MassScale,
+    /// Direction and size of gravity in the base.
+    Tilt,
+    /// Joint spring with rest position.
+    Spring,
+    /// Potential of one joint: gravity compensators, counterbalances.
+    Potential,
+    /// Friction that differs between the two directions.
+    Asymmetry,
+    /// Friction that falls from breakaway to sliding.
+    Stribeck,
+    /// Friction that grows with the load.
+    LoadFriction,
+    /// Friction of a motor that turns with the sum or difference of two joints.
+    CoupledFriction,
+    /// Drive constant: torque scaled by a factor.
+    Gain,
+    /// Zero position of a joint encoder.
+    EncoderZero,
+    /// Gear ripple.
+    Ripple,
+}
+
+impl Family {
+    /// All families that `[library] families` can name, in the order of `terms[]`.
+    pub const NAMED: [Self; 18] = [
+        Self::Viscous,
+        Self::Coulomb,
+        Self::Offset,
+        Self::MotorInertia,
+        Self::Payload,
+        Self::MassMoments,
+        Self::Tensor,
+        Self::MassScale,
+        Self::Tilt,
+        Self::Spring,
+        Self::Potential,
+        Self::Asymmetry,
+        Self::Stribeck,
+        Self::LoadFriction,
+        Self::CoupledFriction,
+        Self::Gain,
+        Self::EncoderZero,
+        Self::Ripple,
+    ];
+
+    /// What twincal proposes unasked for an arm with geared drives: all but `mass_scale` (a special case of
+    /// `mass_moments` and `tensor`), `ripple` (it asks for a gear ratio), and `gain` and `encoder_zero`, which can imitate
+    /// almost anything: on real logs they took what springs and counterbalances are.
+    pub const DEFAULT: [Self; 14] = [
+        Self::Viscous,
+        Self::Coulomb,
+        Self::Offset,
+        Self::MotorInertia,
+        Self::Payload,
+        Self::MassMoments,
+        Self::Tensor,
+        Self::Tilt,
+        Self::Spring,
+        Self::Potential,
+        Self::Asymmetry,
+        Self::Stribeck,
+        Self::LoadFriction,
+        Self::CoupledFriction,
+    ];
+
+    /// What is proposed beside the user's own expressions: friction, offset and motor inertia of every joint.
+    pub const JOINT: [Self; 4] = [
+        Self::Viscous,
+        Self::Coulomb,
+        Self::Offset,
+        Self::MotorInertia,
+    ];
+
+    /// The part of a component's name after the dot, or `payload`.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::User => "user",
+            Self::Generic => "generic",
+            Self::Viscous => "viscous",
+            Self::Coulomb => "coulomb",
+            Self::Offset => "offset",
+            Self::MotorInertia => "motor_inertia",
+            Self::Payload => "payload",
+            Self::MassMoments => "mass_moments",
+            Self::Tensor => "tensor",
+            Self::MassScale => "mass_scale",
+            Self::Tilt => "tilt",
+            Self::Spring => "spring",
+            Self::Potential => "potential",
+            Self::Asymmetry => "asymmetry",
+            Self::Stribeck => "stribeck",
+            Self::LoadFriction => "load_friction",
+            Self::CoupledFriction => "coupled_friction",
+            Self::Gain => "gain",
+            Self::EncoderZero => "encoder_zero",
+            Self::Ripple => "ripple",
+        }
+    }
+
+    /// Prior odds of its components relative to the others': below 1 for what is rare or can imitate others.
+    #[must_use]
+    pub fn prior_odds(self) -> f64 {
+        match self {
+            Self::Payload => 2.0,
+            Self::Potential
+            | Self::Tilt
+            | Self::Gain
+            | Self::EncoderZero
+            | Self::Stribeck
+            | Self::LoadFriction
+            | Self::Asymmetry
+            | Self::Ripple => 0.2,
+            _ => 1.0,
+        }
+    }
+
+    /// True for everything that dissipates.
+    #[must_use]
+    pub fn is_friction(self) -> bool {
+        matches!(
+            self,
+            Self::Viscous
+                | Self::Coulomb
+                | Self::Asymmetry
+                | Self::Stribeck
+                | Self::LoadFriction
+                | Self::CoupledFriction
+        )
+    }
+
+    /// Who stays when two have the same torque: the smaller.
+    pub(super) fn preference(self) -> u8 {
+        match self {
+            Self::User => 0,
+            Self::Viscous | Self::Coulomb => 1,
+            Self::Offset => 2,
+            Self::MotorInertia => 3,
+            Self::Generic => 5,
+            _ => 4,
+        }
+    }
+}

@@ -1,0 +1,17 @@
+//! Drive constant: a torque that is measured as current is off by one factor.
+
+use super::Family;
+use super::candidate::{Candidate, Joint};
+use super::model_column::ModelColumn;
+
+/// `<joint>.gain`: torque + the joint's nominal torque, dimensionless: 0.05 means that the drive delivers 5 % more than its
+/// constant says. Beside it payload mass and gravity are hard to tell: see groups.
+pub(super) fn candidate(joint: &Joint) -> Candidate {
+    Candidate::model(
+        format!("{}.gain", joint.name),
+        Family::Gain,
+        "1",
+        format!("torque gain of {}", joint.name),
+        ModelColumn::Nominal { joint: joint.index },
+    )
+}

@@ -1,0 +1,32 @@
+//! Mass and first moments of a link: what a wrong mass or centre of mass in the model changes.
+
+use super::Family;
+use super::candidate::{Candidate, Proposal};
+use super::model_column::LinkFrame;
+
+/// Names and units of the four, in the order of the regressor's parameters.
+pub(super) const COLUMNS: [(&str, &str); 4] =
+    [("m", "kg"), ("mx", "kg·m"), ("my", "kg·m"), ("mz", "kg·m")];
+
+/// `<link>.mass_moments`: columns `.m`, `.mx`, `.my`, `.mz`: differences of mass and mass × centre of mass from the model,
+/// in the link's frame, the tensor about the frame's origin unchanged.
+///
+/// `reach` is the distance in m that makes a first moment out of a mass, for the prior.
+pub(super) fn proposal(link: &LinkFrame, reach: f64) -> Proposal {
+    let name = format!("{}.mass_moments", link.name);
+    let columns = COLUMNS
+        .into_iter()
+        .enumerate()
+        .map(|(parameter, (column, unit))| {
+            Candidate::model(
+                format!("{name}.{column}"),
+                Family::MassMoments,
+                unit,
+                format!("mass and centre of mass of {}", link.name),
+                link.column(parameter),
+            )
+            .scaled(if parameter == 0 { 1.0 } else { reach })
+        })
+        .collect();
+    Proposal { name, columns }
+}

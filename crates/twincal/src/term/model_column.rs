@@ -1,0 +1,272 @@
+//! Columns that are made from the robot model: no expression, but exact torque images from the dynamics recursions.
+//!
+//! The Lagrangian of a robot is linear in the ten inertial parameters of every link, so the Euler–Lagrange image of
+//! each is a column of the joint-torque regressor; gravity, gains and encoder zeros are first-order changes of the
+//! nominal torque.
+
+use super::expression::TapeScratch;
+use crate::robot::{
+    BLOCK, BlockWorkspace, Motion, Regressor, RegressorBlock, Robot, STRIDE, gravity_regressor,
+    nominal_torque, position_derivative,
+};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// What a column of the robot model is.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum ModelColumn {
+    /// Σ weight_p · (column of parameter p of `body` in the joint-torque regressor).
+    Inertia {
+        /// Index of the body.
+        body: usize,
+        /// In the regressor's order of parameters, body frame.
+        weights: [f64; 10],
+    },
+    /// Torque per unit of gravity along an axis of the base.
+    Gravity {
+        /// 0, 1, 2: x, y, z.
+        axis: usize,
+    },
+    /// Nominal torque of a joint, on that joint.
+    Nominal {
+        /// 0-based.
+        joint: usize,
+    },
+    /// |nominal torque| in the direction of motion, on the same joint.
+    LoadFriction {
+        /// 0-based.
+        joint: usize,
+        /// v_s, rad/s or m/s.
+        velocity: f64,
+    },
+    /// ∂τ_nom/∂q of a joint, on all joints.
+    PositionDerivative {
+        /// 0-based.
+        joint: usize,
+    },
+}
+
+impl ModelColumn {
+    /// True if it comes from a recursion that works on blocks of samples.
+    fn is_blockwise(&self) -> bool {
+        !matches!(self, Self::Nominal { .. } | Self::LoadFriction { .. })
+    }
+
+    /// False on joints that it cannot act on by definition.
+    fn acts_on(&self, other: usize) -> bool {
+        match self {
+            Self::Nominal { joint } | Self::LoadFriction { joint, .. } => *joint == other,
+            _ => true,
+        }
+    }
+}
+
+/// A link's frame as the inertial families need it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct LinkFrame {
+    /// Name of the link.
+    pub(super) name: String,
+    /// The body that it belongs to.
+    pub(super) body: usize,
+    /// Parameters in the body's frame = this × parameters in the link's frame.
+    pub(super) to_body: [[f64; 10]; 10],
+}
+
+impl LinkFrame {
+    /// The column of one parameter (mass, three first moments, six of the tensor) in the link's frame.
+    pub(super) fn column(&self, parameter: usize) -> ModelColumn {
+        ModelColumn::Inertia {
+            body: self.body,
+            weights: std::array::from_fn(|row| self.to_body[row][parameter]),
+        }
+    }
+}
+
+/// Working memory that is kept between calls of [`super::Library::evaluate_with`].
+#[derive(Debug, Clone, Default)]
+pub struct Scratch {
+    pub(super) tape: TapeScratch,
+    blocks: Option<Blocks>,
+    /// Nominal torque of all joints.
+    nominal: Vec<f64>,
+}
+
+/// Memory of the recursions that work block by block.
+#[derive(Debug, Clone)]
+struct Blocks {
+    regressor: RegressorBlock,
+    workspace: BlockWorkspace,
+    /// Torque per unit of gravity, `(joint * 3 + axis) * STRIDE + sample`.
+    gravity: Vec<f64>,
+    /// Derivative to one position, `joint * STRIDE + sample`.
+    derivative: Vec<f64>,
+}
+
+/// A column and where it goes: `(joint, row of that joint's table)`.
+#[derive(Debug, Clone, PartialEq)]
+struct Output {
+    column: ModelColumn,
+    slots: Vec<(usize, usize)>,
+}
+
+/// All model columns of a library, ready to be evaluated.
+#[derive(Debug, Clone)]
+pub(super) struct ModelColumns {
+    robot: Arc<Robot>,
+    regressor: Arc<Regressor>,
+    outputs: Vec<Output>,
+}
+
+impl ModelColumns {
+    pub(super) fn new(robot: Arc<Robot>) -> Self {
+        let regressor = Arc::new(Regressor::new(&robot));
+        Self {
+            robot,
+            regressor,
+            outputs: Vec::new(),
+        }
+    }
+
+    /// The same without columns.
+    pub(super) fn emptied(&self) -> Self {
+        Self {
+            outputs: Vec::new(),
+            ..self.clone()
+        }
+    }
+
+    /// Adds a column.
+    pub(super) fn push(&mut self, column: ModelColumn, slots: Vec<(usize, usize)>) {
+        self.outputs.push(Output { column, slots });
+    }
+
+    /// Writes every column: `out[joint][row * len + sample]`.
+    pub(super) fn evaluate(&self, motion: Motion<'_>, out: &mut [Vec<f64>], scratch: &mut Scratch) {
+        self.of_nominal_torque(motion, out, scratch);
+        if !self.outputs.iter().any(|output| output.column.is_blockwise()) {
+            return;
+        }
+        let blocks = scratch.blocks.get_or_insert_with(|| Blocks {
+            regressor: self.regressor.block(&self.robot),
+            workspace: BlockWorkspace::new(&self.robot),
+            gravity: vec![0.0; 3 * self.robot.dof() * STRIDE],
+            derivative: vec![0.0; self.robot.dof() * STRIDE],
+        });
+        let mut first = 0;
+        while first < motion.len {
+            let last = motion.len.min(first + BLOCK);
+            self.block(motion, first..last, out, blocks);
+            first = last;
+        }
+    }
+
+    /// Columns that are made from the nominal torque itself.
+    fn of_nominal_torque(&self, motion: Motion<'_>, out: &mut [Vec<f64>], scratch: &mut Scratch) {
+        let len = motion.len;
+        let mut ready = false;
+        for Output { column, slots } in &self.outputs {
+            let friction = match column {
+                ModelColumn::Nominal { .. } => None,
+                ModelColumn::LoadFriction { velocity, .. } => Some(*velocity),
+                _ => continue,
+            };
+            if !ready {
+                scratch.nominal.resize(self.robot.dof() * len, 0.0);
+                nominal_torque(&self.robot, motion, &mut scratch.nominal);
+                ready = true;
+            }
+            for &(joint, row) in slots.iter().filter(|slot| column.acts_on(slot.0)) {
+                let torque = &scratch.nominal[joint * len..(joint + 1) * len];
+                let cells = &mut out[joint][row * len..(row + 1) * len];
+                cells.copy_from_slice(torque);
+                if let Some(velocity) = friction {
+                    let rates = &motion.qd[joint * len..(joint + 1) * len];
+                    for (cell, rate) in cells.iter_mut().zip(rates) {
+                        *cell = cell.abs() * sense(*rate, velocity);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Columns from the recursions, one block of samples: the regressor itself is never stored.
+    fn block(
+        &self,
+        motion: Motion<'_>,
+        samples: Range<usize>,
+        out: &mut [Vec<f64>],
+        blocks: &mut Blocks,
+    ) {
+        let robot = &*self.robot;
+        let any = |test: fn(&ModelColumn) -> bool| self.outputs.iter().any(|o| test(&o.column));
+        if any(|column| matches!(column, ModelColumn::Inertia { .. })) {
+            let block = &mut blocks.regressor;
+            self.regressor.evaluate(robot, motion, samples.clone(), block);
+        }
+        if any(|column| matches!(column, ModelColumn::Gravity { .. })) {
+            let (workspace, gravity) = (&mut blocks.workspace, &mut blocks.gravity);
+            gravity_regressor(robot, workspace, motion, samples.clone(), gravity);
+        }
+        let count = samples.len();
+        for Output { column, slots } in &self.outputs {
+            if let ModelColumn::PositionDerivative { joint } = *column {
+                let (workspace, change) = (&mut blocks.workspace, &mut blocks.derivative);
+                position_derivative(robot, workspace, joint, motion, samples.clone(), change);
+            }
+            for &(joint, row) in slots {
+                let cells = row * motion.len + samples.start..row * motion.len + samples.end;
+                let cells = &mut out[joint][cells];
+                match column {
+                    ModelColumn::Inertia { body, weights } => {
+                        self.combine(&blocks.regressor, *body, weights, joint, cells);
+                    }
+                    ModelColumn::Gravity { axis } => {
+                        let start = (joint * 3 + axis) * STRIDE;
+                        cells.copy_from_slice(&blocks.gravity[start..start + count]);
+                    }
+                    ModelColumn::PositionDerivative { .. } => {
+                        let start = joint * STRIDE;
+                        cells.copy_from_slice(&blocks.derivative[start..start + count]);
+                    }
+                    ModelColumn::Nominal { .. } | ModelColumn::LoadFriction { .. } => {}
+                }
+            }
+        }
+    }
+
+    /// Σ_k weight_k · (column of parameter k) of one body on one joint.
+    fn combine(
+        &self,
+        block: &RegressorBlock,
+        body: usize,
+        weights: &[f64; 10],
+        joint: usize,
+        cells: &mut [f64],
+    ) {
+        cells.fill(0.0);
+        for (index, pair) in self.regressor.pairs().iter().enumerate() {
+            if pair.body != body || pair.coordinate != joint {
+                continue;
+            }
+            for (k, &weight) in weights.iter().enumerate() {
+                if weight == 0.0 || !pair.present[k] {
+                    continue;
+                }
+                for (cell, value) in cells.iter_mut().zip(block.column(index, k)) {
+                    *cell += weight * value;
+                }
+            }
+        }
+    }
+}
+
+/// tanh(rate / v_s), or the sign for v_s = 0.
+fn sense(rate: f64, velocity: f64) -> f64 {
+    if velocity > 0.0 {
+        (rate / velocity).tanh()
+    } else if rate == 0.0 {
+        0.0
+    } else {
+        rate.signum()
+    }
+}

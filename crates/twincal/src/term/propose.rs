@@ -1,0 +1,268 @@
+//! Which candidates a robot gets: every family that is switched on, in the order of `terms[]`.
+
+use super::candidate::{Joint, Proposal};
+use super::expression::Graph;
+use super::model_column::LinkFrame;
+use super::{
+    Family, LibrarySettings, asymmetry, base_tilt, coulomb, coupled_friction, encoder_zero, gain,
+    generic, load_friction, mass_moments, mass_scale, motor_inertia, offset, payload, potential,
+    ripple, spring, stribeck, tensor, user, viscous,
+};
+use crate::error::{Error, Finding, Result, Severity};
+use crate::robot::{Robot, did_you_mean, to_body_frame};
+
+/// Most columns a library may have.
+const TERM_LIMIT: usize = 1000;
+/// Joints up to which the generic family is proposed unasked.
+const GENERIC_JOINTS: usize = 3;
+/// Distance that makes a first moment out of a mass, m, for the prior: links of arms are about this large.
+const REACH: f64 = 0.2;
+
+/// Everything about a robot that the families ask for; `robot` is absent where a library is made for joints alone.
+pub(super) struct About<'a> {
+    pub(super) joints: &'a [Joint],
+    /// All axes are parallel.
+    pub(super) parallel: bool,
+    pub(super) robot: Option<&'a Robot>,
+}
+
+/// All proposals in the order of `terms[]`.
+///
+/// # Errors
+/// [`Error::Term`] and [`Error::Setting`].
+pub(super) fn proposals(
+    graph: &mut Graph,
+    about: &About<'_>,
+    settings: &LibrarySettings,
+    findings: &mut Vec<Finding>,
+) -> Result<Vec<Proposal>> {
+    let velocity = settings.coulomb_velocity;
+    if !(velocity.is_finite()
+        && velocity >= 0.0
+        && (velocity == 0.0 || (1.0 / velocity).is_finite()))
+    {
+        return Err(Error::Setting {
+            key: "library.coulomb_velocity".to_owned(),
+            problem: format!("{velocity} is not a velocity"),
+            remedy: "give 0 or a positive number, rad/s".to_owned(),
+        });
+    }
+    let joints = about.joints;
+    let generic = wants_generic(about, settings, findings)?;
+    let mut all: Vec<Proposal> = Vec::new();
+    for text in &settings.terms {
+        all.push(user::candidate(graph, text, Family::User, joints)?.into());
+    }
+    if generic {
+        for name in generic::names(joints, about.parallel) {
+            all.push(user::candidate(graph, &name, Family::Generic, joints)?.into());
+        }
+    }
+    let mut per_joint = |family: Family, make: &mut dyn FnMut(&Joint) -> Option<Proposal>| {
+        if settings.has(family) {
+            all.extend(joints.iter().filter_map(make));
+        }
+    };
+    per_joint(Family::Viscous, &mut |joint| {
+        Some(viscous::candidate(graph, joint).into())
+    });
+    per_joint(Family::Coulomb, &mut |joint| {
+        Some(coulomb::candidate(graph, joint, velocity).into())
+    });
+    per_joint(Family::Offset, &mut |joint| {
+        Some(offset::candidate(graph, joint).into())
+    });
+    per_joint(Family::MotorInertia, &mut |joint| {
+        Some(motor_inertia::candidate(graph, joint).into())
+    });
+    if let Some(robot) = about.robot {
+        all.extend(inertial(robot, settings)?);
+        if settings.has(Family::Tilt) {
+            all.push(base_tilt::proposal());
+        }
+    }
+    let mut per_joint = |family: Family, make: &mut dyn FnMut(&Joint) -> Option<Proposal>| {
+        if settings.has(family) {
+            all.extend(joints.iter().filter_map(make));
+        }
+    };
+    per_joint(Family::Spring, &mut |joint| {
+        Some(spring::proposal(graph, joint))
+    });
+    per_joint(Family::Potential, &mut |joint| {
+        (!joint.slides).then(|| potential::proposal(graph, joint))
+    });
+    per_joint(Family::Asymmetry, &mut |joint| {
+        Some(asymmetry::proposal(graph, joint, velocity))
+    });
+    per_joint(Family::Stribeck, &mut |joint| {
+        Some(stribeck::candidate(graph, joint, velocity).into())
+    });
+    if about.robot.is_some() {
+        per_joint(Family::LoadFriction, &mut |joint| {
+            Some(load_friction::candidate(joint, velocity).into())
+        });
+    }
+    if settings.has(Family::CoupledFriction) {
+        for (a, b) in coupled_friction::pairs(joints) {
+            for sign in [1.0, -1.0] {
+                let (a, b) = (&joints[a], &joints[b]);
+                all.push(coupled_friction::proposal(graph, a, b, sign, velocity));
+            }
+        }
+    }
+    let mut per_joint = |family: Family, make: &mut dyn FnMut(&Joint) -> Option<Proposal>| {
+        if settings.has(family) {
+            all.extend(joints.iter().filter_map(make));
+        }
+    };
+    if about.robot.is_some() {
+        per_joint(Family::Gain, &mut |joint| {
+            Some(gain::candidate(joint).into())
+        });
+        per_joint(Family::EncoderZero, &mut |joint| {
+            Some(encoder_zero::candidate(joint).into())
+        });
+    }
+    all.extend(ripples(graph, joints, settings)?);
+    Ok(all)
+}
+
+/// Payload and, link by link, mass moments, tensor and mass scale: of the link that each moving joint carries.
+fn inertial(robot: &Robot, settings: &LibrarySettings) -> Result<Vec<Proposal>> {
+    let links: Vec<(LinkFrame, f64)> = robot
+        .bodies()
+        .into_iter()
+        .enumerate()
+        .filter_map(|(body, link)| {
+            let (_, placement) = robot.body_of_link(link)?;
+            let frame = LinkFrame {
+                name: link.to_owned(),
+                body,
+                to_body: to_body_frame(&placement),
+            };
+            Some((frame, REACH))
+        })
+        .collect();
+    let mut all = Vec::new();
+    if settings.has(Family::Payload) {
+        all.push(payload::proposal(&payload_frame(robot, settings)?));
+    }
+    if settings.has(Family::MassMoments) {
+        all.extend(
+            links
+                .iter()
+                .map(|(link, reach)| mass_moments::proposal(link, *reach)),
+        );
+    }
+    if settings.has(Family::Tensor) {
+        all.extend(links.iter().map(|(link, _)| tensor::proposal(link)));
+    }
+    if settings.has(Family::MassScale) {
+        all.extend(links.iter().map(|(link, _)| {
+            mass_scale::candidate(link, robot.parameters_of_body(link.body)).into()
+        }));
+    }
+    Ok(all)
+}
+
+/// The frame of `payload_frame`, or of the last link.
+fn payload_frame(robot: &Robot, settings: &LibrarySettings) -> Result<LinkFrame> {
+    let name = match &settings.payload_frame {
+        Some(name) => name.as_str(),
+        None => last_link(robot),
+    };
+    let Some((body, placement)) = robot.body_of_link(name) else {
+        let links = robot.description().links.iter();
+        return Err(Error::Setting {
+            key: "library.payload_frame".to_owned(),
+            problem: format!("the model has no moving link `{name}`"),
+            remedy: did_you_mean(name, links.map(|link| link.name.as_str())),
+        });
+    };
+    Ok(LinkFrame {
+        name: name.to_owned(),
+        body,
+        to_body: to_body_frame(&placement),
+    })
+}
+
+/// Where a tool is mounted: the last of the links that move with the last body of the longest chain. Frames without
+/// inertia (`tool0`, `flange`) come behind the link that carries them.
+fn last_link(robot: &Robot) -> &str {
+    let last = robot.bodies().len().saturating_sub(1);
+    robot.links_of_body(last).last().copied().unwrap_or("")
+}
+
+fn ripples(
+    graph: &mut Graph,
+    joints: &[Joint],
+    settings: &LibrarySettings,
+) -> Result<Vec<Proposal>> {
+    let refuse = |joint: &str, problem: String, remedy: String| {
+        Err(Error::Setting {
+            key: format!("library.ripple.{joint}"),
+            problem,
+            remedy,
+        })
+    };
+    let mut all = Vec::new();
+    for (name, &periods) in &settings.ripple {
+        let Some(joint) = joints.iter().find(|joint| joint.name == *name) else {
+            let remedy = did_you_mean(name, joints.iter().map(|joint| joint.name.as_str()));
+            return refuse(name, "no such moving joint".into(), remedy);
+        };
+        if !(periods.is_finite() && periods > 0.0) {
+            let remedy = "give the gear ratio, such as 101".into();
+            return refuse(name, format!("{periods} periods per turn"), remedy);
+        }
+        all.push(ripple::proposal(graph, joint, periods));
+    }
+    Ok(all)
+}
+
+/// Whether the generic family is proposed; says so where it is left out unasked.
+fn wants_generic(
+    about: &About<'_>,
+    settings: &LibrarySettings,
+    findings: &mut Vec<Finding>,
+) -> Result<bool> {
+    let (joints, parallel) = (about.joints, about.parallel);
+    let generic = settings.generic.unwrap_or(joints.len() <= GENERIC_JOINTS);
+    if settings.generic.is_none() && !generic {
+        findings.push(Finding::new(
+            Severity::Note,
+            "generic_family_off",
+            "",
+            format!(
+                "the robot has {} moving joints: the generic family, which has {} terms for them, is proposed unasked up \
+                 to {GENERIC_JOINTS} joints only; name the terms you want in [library] terms",
+                joints.len(),
+                generic::count(joints, parallel)
+            ),
+            0,
+        ));
+    }
+    let count = settings.terms.len() as f64
+        + if generic {
+            generic::count(joints, parallel)
+        } else {
+            0.0
+        };
+    if count > TERM_LIMIT as f64 {
+        let key = if settings.terms.len() > TERM_LIMIT {
+            "library.terms"
+        } else {
+            "library.generic"
+        };
+        return Err(Error::Setting {
+            key: key.to_owned(),
+            problem: format!(
+                "{count} terms for {} joints, the limit is {TERM_LIMIT}",
+                joints.len()
+            ),
+            remedy: "name the terms you want in `terms` and set `generic = false`".to_owned(),
+        });
+    }
+    Ok(generic)
+}

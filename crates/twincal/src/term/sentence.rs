@@ -1,0 +1,178 @@
+//! A component with its parameters in one sentence.
+
+use super::component::Component;
+use super::words::estimate;
+use super::{Family, words};
+
+/// A parameter's value with its sd, as it goes into a sentence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// `mass`, `com_x`, `stiffness`, …
+    pub name: String,
+    /// SI unit.
+    pub unit: String,
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub sd: f64,
+}
+
+/// Parameters of a component that are told at most; the rest stands in the tables.
+const TOLD: usize = 3;
+/// A parameter further from 0 than this many sds is worth telling.
+const CLEAR: f64 = 2.0;
+
+/// "payload at tool0: +1.200 ± 0.030 kg, centre of mass (0, 2, 61) ± 4 mm".
+pub(super) fn sentence(component: &Component, parameters: &[Estimate]) -> String {
+    let text = match component.family {
+        Family::Payload => payload(parameters),
+        Family::Gain | Family::LoadFriction | Family::MassScale => parameters
+            .first()
+            .map(|p| format!("{} %", words::estimate(100.0 * p.mean, 100.0 * p.sd)))
+            .unwrap_or_default(),
+        Family::EncoderZero => parameters.first().map(angle).unwrap_or_default(),
+        Family::Tilt => tilt(parameters),
+        _ if parameters.len() == 1 => one(&parameters[0]),
+        _ => several(parameters),
+    };
+    let hint = hint(component.family, parameters);
+    format!("{}: {text}{hint}", component.story)
+}
+
+fn one(p: &Estimate) -> String {
+    format!("{} {}", estimate(p.mean, p.sd), p.unit)
+}
+
+/// The clearest parameters by name.
+fn several(parameters: &[Estimate]) -> String {
+    let clearness = |p: &Estimate| p.mean.abs() / p.sd.max(f64::MIN_POSITIVE);
+    let mut order: Vec<&Estimate> = parameters.iter().filter(|p| p.mean.is_finite()).collect();
+    order.sort_by(|a, b| clearness(b).total_cmp(&clearness(a)));
+    let clear = order.iter().filter(|p| clearness(p) > CLEAR).count();
+    order.truncate(clear.clamp(1, TOLD));
+    let told: Vec<String> = order
+        .iter()
+        .map(|p| format!("{} {}", p.name.replace('_', " "), one(p)))
+        .collect();
+    told.join(", ")
+}
+
+fn payload(parameters: &[Estimate]) -> String {
+    let Some((mass, rest)) = parameters.split_first() else {
+        return String::new();
+    };
+    let com = &rest[..3.min(rest.len())];
+    let mass_text = one(mass);
+    // Without a clear mass there is no centre of it.
+    if mass.mean.abs() < CLEAR * mass.sd || com.iter().any(|c| !c.mean.is_finite()) {
+        return mass_text;
+    }
+    let millimetres: Vec<String> = com.iter().map(|c| format!("{:.0}", 1e3 * c.mean)).collect();
+    let worst = com.iter().map(|c| 1e3 * c.sd).fold(0.0, f64::max);
+    format!(
+        "{mass_text}, centre of mass ({}) ± {:.*} mm",
+        millimetres.join(", "),
+        usize::from(worst < 1.0),
+        worst
+    )
+}
+
+fn angle(p: &Estimate) -> String {
+    if p.unit == "m" {
+        return format!("{} mm", estimate(1e3 * p.mean, 1e3 * p.sd));
+    }
+    format!(
+        "{}°",
+        estimate(p.mean.to_degrees(), p.sd.to_degrees()).replace(" ± ", "° ± ")
+    )
+}
+
+fn tilt(parameters: &[Estimate]) -> String {
+    let values: Vec<String> = parameters
+        .iter()
+        .map(|p| format!("{} {}", p.name, estimate(p.mean, p.sd)))
+        .collect();
+    format!("{} m/s²", values.join(", "))
+}
+
+/// What no motor or brake can do on its own is said of the model.
+fn hint(family: Family, parameters: &[Estimate]) -> &'static str {
+    let negative = parameters.first().is_some_and(|p| p.mean < 0.0);
+    match family {
+        Family::MotorInertia if negative => " (negative: the model has too much inertia there)",
+        Family::Viscous | Family::Coulomb if negative => {
+            " (negative: the model has too much friction there)"
+        }
+        Family::Payload if negative => " (negative: the model carries too much)",
+        _ => "",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn component(family: Family, story: &str) -> Component {
+        Component {
+            name: story.into(),
+            family,
+            story: story.into(),
+            terms: vec![0],
+            alias_of: Vec::new(),
+        }
+    }
+
+    fn estimates(values: &[(&str, &str, f64, f64)]) -> Vec<Estimate> {
+        let one = |&(name, unit, mean, sd): &(&str, &str, f64, f64)| Estimate {
+            name: name.into(),
+            unit: unit.into(),
+            mean,
+            sd,
+        };
+        values.iter().map(one).collect()
+    }
+
+    #[test]
+    fn a_payload_has_mass_and_centre() {
+        let parameters = estimates(&[
+            ("mass", "kg", 1.2, 0.03),
+            ("com_x", "m", 0.0, 0.002),
+            ("com_y", "m", 0.002, 0.003),
+            ("com_z", "m", 0.061, 0.004),
+        ]);
+        assert_eq!(
+            sentence(&component(Family::Payload, "payload at tool0"), &parameters),
+            "payload at tool0: +1.200 ± 0.030 kg, centre of mass (0, 2, 61) ± 4 mm"
+        );
+    }
+
+    #[test]
+    fn the_clearest_parameters_are_told() {
+        let parameters = estimates(&[
+            ("ixx", "kg·m²", 0.001, 0.01),
+            ("izz", "kg·m²", 0.5, 0.01),
+            ("iyy", "kg·m²", -0.1, 0.01),
+        ]);
+        assert_eq!(
+            sentence(
+                &component(Family::Tensor, "inertia tensor of arm"),
+                &parameters
+            ),
+            "inertia tensor of arm: izz +0.500 ± 0.010 kg·m², iyy -0.100 ± 0.010 kg·m²"
+        );
+    }
+
+    #[test]
+    fn factors_are_told_in_per_cent_and_angles_in_degrees() {
+        let gain = estimates(&[("value", "1", 0.05, 0.01)]);
+        assert_eq!(
+            sentence(&component(Family::Gain, "torque gain of a"), &gain),
+            "torque gain of a: +5.0 ± 1.0 %"
+        );
+        let zero = estimates(&[("value", "rad", 0.0175, 0.00175)]);
+        assert_eq!(
+            sentence(&component(Family::EncoderZero, "zero position of a"), &zero),
+            "zero position of a: +1.00° ± 0.10°"
+        );
+    }
+}

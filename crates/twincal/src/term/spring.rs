@@ -1,0 +1,47 @@
+//! Joint spring with a rest position: torque k (q − q₀), energy ½ k (q − q₀)².
+
+use super::Family;
+use super::candidate::{Candidate, Joint, Proposal};
+use super::component::Parameter;
+use super::expression::Graph;
+
+/// `<joint>.spring`: columns `.stiffness` (torque +q) and `.preload` (torque +1), so that k (q − q₀) = k q + c with
+/// q₀ = −c/k. Lagrangian −½ k q² − c q.
+pub(super) fn proposal(graph: &mut Graph, joint: &Joint) -> Proposal {
+    let name = format!("{}.spring", joint.name);
+    let story = format!("spring on {}", joint.name);
+    let q = joint.position(graph);
+    let square = graph.product(&[(q, 2)]);
+    let energies = [graph.scaled(-0.5, square), graph.scaled(-1.0, q)];
+    let unit = if joint.slides { "N/m" } else { "N·m/rad" };
+    let columns = [("stiffness", unit), ("preload", joint.torque_unit())]
+        .into_iter()
+        .zip(energies)
+        .map(|((column, unit), phi)| {
+            Candidate::lagrangian(
+                graph,
+                format!("{name}.{column}"),
+                Family::Spring,
+                unit,
+                story.clone(),
+                phi,
+            )
+        })
+        .collect();
+    Proposal { name, columns }
+}
+
+/// Stiffness and rest position.
+pub(super) fn parameters(columns: &[(String, String)]) -> Vec<Parameter> {
+    let unit = columns.first().map_or("", |column| column.1.as_str());
+    let rest = if unit == "N/m" { "m" } else { "rad" };
+    vec![
+        Parameter::new("stiffness", unit),
+        Parameter::new("rest_position", rest),
+    ]
+}
+
+/// `[k, −c/k]`.
+pub(super) fn values(beta: &[f64]) -> Vec<f64> {
+    vec![beta[0], -beta[1] / beta[0]]
+}
