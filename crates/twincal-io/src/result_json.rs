@@ -7,7 +7,8 @@ use crate::error::{Error, Result};
 use serde::Serialize;
 use twincal::Finding;
 use twincal::calibrate::{
-    Calibration, ComponentSummary, Group, LikelihoodUsed, LogSummary, SweepPoint, TermSummary, Verdict,
+    Calibration, ComponentSummary, Group, LikelihoodUsed, LogSummary, SweepPoint, TermSummary,
+    Verdict,
 };
 use twincal::likelihood::JointNoise;
 use twincal::posterior::Method;

@@ -4,6 +4,7 @@ use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::posterior::random::Random;
 use twincal::robot::*;
 use twincal::signal::{Auto, Channels, Payload, Recording};
+use twincal::term::Family;
 
 /// A planar arm of two links of 0.5 m that carry 3 kg and `fore` kg at their ends.
 pub(crate) fn arm(fore: f64) -> twincal::Result<Robot> {
@@ -67,15 +68,15 @@ pub(crate) fn study() -> twincal::Result<Calibration> {
     let heldout = log("held-out", 1.9, &real, &mut noise);
     let mut settings = CalibrationSettings::default();
     settings.library.terms = vec!["sin(q1 - q2)".into()];
-    (settings.library.coulomb, settings.library.offset) = (false, false);
+    settings.library.families = vec![Family::Payload, Family::Viscous, Family::MotorInertia];
     settings.signal.cutoff_hz = Auto::Value(0.0); // exact motion: nothing to filter
     calibrate(&nominal, &[training], &[heldout], &settings, &|_| {})
 }
 
 fn main() -> twincal::Result<()> {
     let result = study()?;
-    for term in result.terms.iter().filter(|term| term.selected) {
-        println!("PIP {:.3}  {}", term.pip.unwrap_or(0.0), term.words);
+    for found in result.components.iter().filter(|found| found.selected) {
+        println!("PIP {:.3}  {}", found.pip.unwrap_or(0.0), found.words);
     }
     let scores = &result.validation.filtered;
     let (before, after) = (scores.rmse_nominal, scores.rmse_calibrated);

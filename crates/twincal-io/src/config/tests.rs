@@ -3,6 +3,7 @@
 use super::*;
 use twincal::prior::Inclusion;
 use twincal::signal::{Auto, Payload};
+use twincal::term::Family;
 
 fn message(text: &str) -> String {
     match Config::parse("twincal.toml", text).and_then(|config| config.settings()) {
@@ -16,7 +17,7 @@ fn empty_config_gives_the_documented_defaults() {
     let settings = Config::parse("x", "").unwrap().settings().unwrap();
     assert_eq!(settings.calibration.signal.cutoff_hz, Auto::Auto);
     assert_eq!(settings.calibration.library.coulomb_velocity, 0.02);
-    assert!(settings.calibration.library.viscous && settings.calibration.library.coulomb);
+    assert_eq!(settings.calibration.library.families, Family::DEFAULT);
     assert_eq!(
         (
             settings.calibration.inference.chains,

@@ -60,8 +60,8 @@ fn summary(
     };
     (summary.pip, summary.pip_mcse) = (first.pip, first.pip_mcse);
     summary.verdict = verdict(&live);
-    summary.selected = first.pip.is_some_and(|pip| pip >= 0.5)
-        && summary.verdict != Some(Verdict::NotSeen);
+    summary.selected =
+        first.pip.is_some_and(|pip| pip >= 0.5) && summary.verdict != Some(Verdict::NotSeen);
     summary.parameters = parameters(library, component, index, &own, posterior, all, seed);
     let estimates: Vec<Estimate> = summary
         .parameters
@@ -79,7 +79,9 @@ fn summary(
 
 /// The verdict that all columns share, except that one seen column is enough for the component to be seen.
 fn verdict(live: &[&TermSummary]) -> Option<Verdict> {
-    let seen = live.iter().find(|term| term.verdict != Some(Verdict::NotSeen));
+    let seen = live
+        .iter()
+        .find(|term| term.verdict != Some(Verdict::NotSeen));
     seen.or(live.first()).and_then(|term| term.verdict)
 }
 
@@ -154,11 +156,19 @@ fn parameters(
 /// The posterior given that a component is in.
 fn given(posterior: &Posterior, holds: &dyn Fn(&Model) -> bool) -> Posterior {
     let mut given = Posterior {
-        models: posterior.models.iter().filter(|m| holds(m)).cloned().collect(),
+        models: posterior
+            .models
+            .iter()
+            .filter(|m| holds(m))
+            .cloned()
+            .collect(),
         ..posterior.clone()
     };
     let total: f64 = given.models.iter().map(|model| model.weight).sum();
-    given.models.iter_mut().for_each(|model| model.weight /= total);
+    given
+        .models
+        .iter_mut()
+        .for_each(|model| model.weight /= total);
     given
 }
 
@@ -167,11 +177,7 @@ fn given(posterior: &Posterior, holds: &dyn Fn(&Model) -> bool) -> Posterior {
 /// Two components belong together if they are single columns that are alike in the data (cosine above 0.95), or if their
 /// inclusions exclude each other (correlation below −0.4 over the models); chained. Only sets whose members share
 /// posterior mass are told: at least two with PIP between 0.02 and 0.98, and one of them in with probability ≥ 0.2.
-pub(super) fn groups(
-    problem: &Problem,
-    posterior: &Posterior,
-    library: &Library,
-) -> Vec<Group> {
+pub(super) fn groups(problem: &Problem, posterior: &Posterior, library: &Library) -> Vec<Group> {
     let columns = problem.prior.columns();
     let count = columns.len();
     let holds: Vec<Vec<bool>> = posterior
@@ -189,7 +195,10 @@ pub(super) fn groups(
         let models = posterior.models.iter().zip(&holds);
         models.filter(|(_, h)| test(h)).map(|(m, _)| m.weight).sum()
     };
-    let pip: Vec<f64> = columns.iter().map(|own| posterior.inclusion[own[0]]).collect();
+    let pip: Vec<f64> = columns
+        .iter()
+        .map(|own| posterior.inclusion[own[0]])
+        .collect();
     let unsure: Vec<bool> = pip.iter().map(|p| (0.02..0.98).contains(p)).collect();
     let mut label: Vec<usize> = (0..count).collect();
     for a in 0..count {
@@ -205,7 +214,9 @@ pub(super) fn groups(
     }
     let name = |component: usize| {
         let term = library.columns()[columns[component][0]];
-        library.components()[library.terms()[term].component].name.clone()
+        library.components()[library.terms()[term].component]
+            .name
+            .clone()
     };
     (0..count)
         .filter_map(|first| {

@@ -227,7 +227,7 @@ fn columns_of(robot: &Robot, library: &Library, nonnegative: bool) -> Columns {
         component: Vec::new(),
         family: Vec::new(),
         families: Vec::new(),
-        scale: library.column_scales(),
+        prior_sd: library.prior_sds(),
         lower: Vec::new(),
     };
     let mut last = None;

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::gram::Gram;
 use crate::posterior::Problem;
 use crate::prior::{Inclusion, Prior, PriorSettings};
+use crate::signal::Auto;
 use crate::term::Family;
 use serde::{Deserialize, Serialize};
 
@@ -64,6 +65,8 @@ pub struct PlugIn {
     pub tempering: f64,
     /// v of each family, in the order of [`Columns::families`].
     pub scaled_variance: Vec<f64>,
+    /// φ that turns the prior sd of a physical coefficient into its slab variance; 0 until a first fit has told it.
+    pub noise: f64,
 }
 
 /// The columns of a regression, as the likelihood needs them.
@@ -77,8 +80,8 @@ pub struct Columns {
     pub family: Vec<usize>,
     /// Families that occur.
     pub families: Vec<Family>,
-    /// Size u_k of each coefficient relative to the others of its component (1 kg beside 0.1 kg·m), K.
-    pub scale: Vec<f64>,
+    /// Prior sd of each coefficient where physics says one (`slab` is then sd²/φ); `None`: v of the family, learned, K.
+    pub prior_sd: Vec<Option<f64>>,
     /// Least value of each coefficient; −∞ where any is allowed, K.
     pub lower: Vec<f64>,
 }
@@ -89,24 +92,18 @@ impl Columns {
         self.family[self.component[column]]
     }
 
-    /// What a column's prior variance is multiplied with to be v: `r_k = (mean over the component of u² rms²) / u_k²`.
-    /// The mean square of a column that is a component of its own.
-    ///
-    /// Within a component the prior keeps the shape u: a direction that the data do not see stays as narrow as its
-    /// neighbours, and turning the link's frame changes nothing.
+    /// What a column's prior variance is multiplied with to be v: the mean of rms² over the columns of its component, so
+    /// that a direction that the data hardly see stays as narrow as its neighbours. For a column that is a component of
+    /// its own that is its mean square (method section 6).
     pub fn references(&self, mean_square: &[f64]) -> Vec<f64> {
         let components = self.family.len();
         let (mut sum, mut count) = (vec![0.0; components], vec![0.0; components]);
-        for (k, &component) in self.component.iter().enumerate() {
-            sum[component] += self.scale[k] * self.scale[k] * mean_square[k];
+        for (&component, square) in self.component.iter().zip(mean_square) {
+            sum[component] += square;
             count[component] += 1.0;
         }
-        (0..self.names.len())
-            .map(|k| {
-                let component = self.component[k];
-                sum[component] / count[component] / (self.scale[k] * self.scale[k])
-            })
-            .collect()
+        let mean = |&component: &usize| sum[component] / count[component];
+        self.component.iter().map(mean).collect()
     }
 }
 
@@ -119,6 +116,7 @@ impl PlugIn {
             autocorrelation_time: vec![1.0; joints],
             tempering: 1.0,
             scaled_variance: vec![v; families],
+            noise: 0.0,
         }
     }
 
@@ -155,8 +153,9 @@ pub fn mean_squares(grams: &Gram, columns: usize, weight: &[f64]) -> Vec<f64> {
 /// The weighted regression and its prior: all that inference sees.
 ///
 /// ```text
-/// G = Σ_j w_j/(c τ_j) G_j(ρ_j)    n = Σ_j n_j/(c τ_j)    v_k = v_family / r_k
+/// G = Σ_j w_j/(c τ_j) G_j(ρ_j)    n = Σ_j n_j/(c τ_j)    v_k = v_family / r_k, or sd_k² / φ
 /// ```
+/// with r_k of [`Columns::references`]. A prior sd that physics says gives way to a scale that the user gives.
 ///
 /// # Errors
 /// [`crate::Error::Setting`] if the prior's numbers are impossible for K columns.
@@ -187,17 +186,25 @@ pub fn assemble(
         log_constant += 0.5 * temper * joint.starts * (-rho * rho).ln_1p();
     }
     let mean_square = mean_squares(grams, count, &plug_in.weight);
+    let noise = if plug_in.noise > 0.0 {
+        plug_in.noise
+    } else {
+        scale_of_residual(yy / n.max(f64::MIN_POSITIVE))
+    };
     let slab = columns
         .references(&mean_square)
         .iter()
         .enumerate()
-        .map(|(k, reference)| plug_in.scaled_variance[columns.family_of(k)] / reference)
+        .map(|(k, reference)| match columns.prior_sd[k] {
+            Some(sd) if settings.scaled_variance == Auto::Auto => sd * sd / noise,
+            _ => plug_in.scaled_variance[columns.family_of(k)] / reference,
+        })
         .collect();
     let (shape, scale) = match settings.noise {
         Some(given) => given,
         None => (
             AUTO_SHAPE,
-            AUTO_SHAPE * scale_of_residual(grams, plug_in, yy / n.max(f64::MIN_POSITIVE)),
+            AUTO_SHAPE * scale_of_residual(yy / n.max(f64::MIN_POSITIVE)),
         ),
     };
     Ok(Problem {
@@ -224,8 +231,7 @@ pub fn assemble(
 pub const AUTO_SHAPE: f64 = 1e-3;
 
 /// Mean square of the residual torque, with a floor at rounding: an exactly perfect model must not make b0 zero.
-fn scale_of_residual(grams: &Gram, plug_in: &PlugIn, mean_square: f64) -> f64 {
-    let _ = (grams, plug_in);
+fn scale_of_residual(mean_square: f64) -> f64 {
     mean_square.max(1e-24)
 }
 

@@ -102,6 +102,9 @@ pub fn fit(
         }
         if settings.prior.scaled_variance == Auto::Auto {
             next.scaled_variance = slab_scales(&gram, columns, &plug_in, &problem, &posterior);
+            if posterior.noise.is_finite() {
+                next.noise = posterior.noise;
+            }
         }
         let converged = largest_change(&plug_in, &next) < TOLERANCE;
         if converged || rounds == moving.rounds() {
@@ -210,13 +213,12 @@ fn slab_scales(
     problem: &Problem,
     posterior: &Posterior,
 ) -> Vec<f64> {
-    let reference_of =
-        columns.references(&mean_squares(gram, columns.names.len(), &now.weight));
+    let reference_of = columns.references(&mean_squares(gram, columns.names.len(), &now.weight));
     let noise = posterior.noise.max(f64::MIN_POSITIVE);
     let reference = (problem.yy / problem.n / noise).clamp(SLAB_BOUNDS.0, SLAB_BOUNDS.1);
     let mut sum = vec![reference; columns.families.len()];
     let mut count = vec![1.0; columns.families.len()];
-    for k in 0..columns.names.len() {
+    for k in (0..columns.names.len()).filter(|&k| columns.prior_sd[k].is_none()) {
         let second = posterior.sd[k] * posterior.sd[k] + posterior.mean[k] * posterior.mean[k];
         let family = columns.family_of(k);
         sum[family] += second * reference_of[k] / noise;
@@ -239,4 +241,5 @@ fn largest_change(a: &PlugIn, b: &PlugIn) -> f64 {
         .max(relative(&a.rho, &b.rho))
         .max(relative(&a.autocorrelation_time, &b.autocorrelation_time))
         .max(relative(&a.scaled_variance, &b.scaled_variance))
+        .max((a.noise - b.noise).abs() / a.noise.max(b.noise).max(f64::MIN_POSITIVE))
 }

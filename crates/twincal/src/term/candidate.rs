@@ -65,8 +65,8 @@ pub(super) struct Candidate {
     pub(super) image: Vec<(usize, Id)>,
     /// Torque that is made from the robot model instead; then `image` is empty.
     pub(super) model: Option<ModelColumn>,
-    /// Size of this coefficient relative to the others of its component: what one prior means for kg and for kg·m².
-    pub(super) scale: f64,
+    /// Prior sd of β in its own unit where physics says one (a fifth of the link's mass); `None`: learned from the data.
+    pub(super) prior_sd: Option<f64>,
 }
 
 impl Candidate {
@@ -86,7 +86,7 @@ impl Candidate {
             lagrangian: None,
             image,
             model: None,
-            scale: 1.0,
+            prior_sd: None,
         }
     }
 
@@ -119,9 +119,12 @@ impl Candidate {
         }
     }
 
-    /// The same with another size relative to the others of its component.
-    pub(super) fn scaled(self, scale: f64) -> Self {
-        Self { scale, ..self }
+    /// The same with a prior sd that physics says.
+    pub(super) fn within(self, prior_sd: f64) -> Self {
+        Self {
+            prior_sd: Some(prior_sd),
+            ..self
+        }
     }
 }
 

@@ -3,9 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Which family a component belongs to; each family has its own Beta–Binomial inclusion prior and slab scale.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Family {
     /// The user's own expressions.
@@ -128,19 +126,12 @@ impl Family {
         }
     }
 
-    /// Prior odds of its components relative to the others': below 1 for what is rare or can imitate others.
+    /// Prior odds of its components relative to the others'. The payload is one story where a changed last link is two
+    /// (mass moments and tensor): it is preferred.
     #[must_use]
     pub fn prior_odds(self) -> f64 {
         match self {
-            Self::Payload => 2.0,
-            Self::Potential
-            | Self::Tilt
-            | Self::Gain
-            | Self::EncoderZero
-            | Self::Stribeck
-            | Self::LoadFriction
-            | Self::Asymmetry
-            | Self::Ripple => 0.2,
+            Self::Payload => 4.0,
             _ => 1.0,
         }
     }

@@ -25,8 +25,8 @@ pub struct Library {
     components: Vec<Component>,
     /// "viscous friction on elbow", one per term.
     stories: Vec<String>,
-    /// Size of the coefficient relative to the others of its component, one per term.
-    scales: Vec<f64>,
+    /// Prior sd of the coefficient where physics says one, one per term.
+    prior_sds: Vec<Option<f64>>,
     /// φ of each term that is a Lagrangian written as an expression.
     lagrangians: Vec<Option<Id>>,
     /// `(joint, torque)` of each term that is an expression, zero entries left out.
@@ -107,7 +107,7 @@ impl Library {
             terms: Vec::new(),
             components,
             stories: Vec::new(),
-            scales: Vec::new(),
+            prior_sds: Vec::new(),
             lagrangians: Vec::new(),
             images: Vec::new(),
             sources: Vec::new(),
@@ -127,7 +127,7 @@ impl Library {
                 component: home[index],
             });
             library.stories.push(candidate.story);
-            library.scales.push(candidate.scale);
+            library.prior_sds.push(candidate.prior_sd);
             library.lagrangians.push(candidate.lagrangian);
             library.images.push(candidate.image);
             library
@@ -183,9 +183,12 @@ impl Library {
         &self.components
     }
 
-    /// Size of each column's coefficient relative to the others of its component: the shape of their joint prior.
-    pub fn column_scales(&self) -> Vec<f64> {
-        self.columns.iter().map(|&term| self.scales[term]).collect()
+    /// Prior sd of each column's coefficient in its own unit where physics says one.
+    pub fn prior_sds(&self) -> Vec<Option<f64>> {
+        self.columns
+            .iter()
+            .map(|&term| self.prior_sds[term])
+            .collect()
     }
 
     /// The parameters that people know a component by.

@@ -11,8 +11,8 @@ pub(super) const COLUMNS: [(&str, &str); 4] =
 /// `<link>.mass_moments`: columns `.m`, `.mx`, `.my`, `.mz`: differences of mass and mass × centre of mass from the model,
 /// in the link's frame, the tensor about the frame's origin unchanged.
 ///
-/// `reach` is the distance in m that makes a first moment out of a mass, for the prior.
-pub(super) fn proposal(link: &LinkFrame, reach: f64) -> Proposal {
+/// `mass` is the prior sd of the mass, kg, and `reach` the distance in m that makes a first moment out of it.
+pub(super) fn proposal(link: &LinkFrame, mass: f64, reach: f64) -> Proposal {
     let name = format!("{}.mass_moments", link.name);
     let columns = COLUMNS
         .into_iter()
@@ -25,7 +25,7 @@ pub(super) fn proposal(link: &LinkFrame, reach: f64) -> Proposal {
                 format!("mass and centre of mass of {}", link.name),
                 link.column(parameter),
             )
-            .scaled(if parameter == 0 { 1.0 } else { reach })
+            .within(if parameter == 0 { mass } else { mass * reach })
         })
         .collect();
     Proposal { name, columns }

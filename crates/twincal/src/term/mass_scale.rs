@@ -4,6 +4,9 @@ use super::Family;
 use super::candidate::Candidate;
 use super::model_column::{LinkFrame, ModelColumn};
 
+/// A model is off by about a fifth where it is off.
+const PRIOR_SD: f64 = 0.2;
+
 /// `<link>.mass_scale`: torque of the link's own nominal inertia, dimensionless: 0.1 means 10 % more of everything.
 ///
 /// `nominal` are the ten nominal parameters of the body that the link belongs to, in the body's frame.
@@ -18,4 +21,5 @@ pub(super) fn candidate(link: &LinkFrame, nominal: [f64; 10]) -> Candidate {
             weights: nominal,
         },
     )
+    .within(PRIOR_SD)
 }

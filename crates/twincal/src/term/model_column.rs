@@ -143,7 +143,11 @@ impl ModelColumns {
     /// Writes every column: `out[joint][row * len + sample]`.
     pub(super) fn evaluate(&self, motion: Motion<'_>, out: &mut [Vec<f64>], scratch: &mut Scratch) {
         self.of_nominal_torque(motion, out, scratch);
-        if !self.outputs.iter().any(|output| output.column.is_blockwise()) {
+        if !self
+            .outputs
+            .iter()
+            .any(|output| output.column.is_blockwise())
+        {
             return;
         }
         let blocks = scratch.blocks.get_or_insert_with(|| Blocks {
@@ -201,7 +205,8 @@ impl ModelColumns {
         let any = |test: fn(&ModelColumn) -> bool| self.outputs.iter().any(|o| test(&o.column));
         if any(|column| matches!(column, ModelColumn::Inertia { .. })) {
             let block = &mut blocks.regressor;
-            self.regressor.evaluate(robot, motion, samples.clone(), block);
+            self.regressor
+                .evaluate(robot, motion, samples.clone(), block);
         }
         if any(|column| matches!(column, ModelColumn::Gravity { .. })) {
             let (workspace, gravity) = (&mut blocks.workspace, &mut blocks.gravity);

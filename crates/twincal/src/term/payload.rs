@@ -6,12 +6,9 @@ use super::component::Parameter;
 use super::model_column::LinkFrame;
 use super::{mass_moments, tensor};
 
-/// Distance that makes a first moment out of a mass, m, for the prior: tools and workpieces are about this large.
-const REACH: f64 = 0.1;
-
 /// `payload`: columns `.m`, `.mx`, `.my`, `.mz`, `.ixx` … `.izz` in the frame of the link `frame`: a rigid body that the model
-/// does not have. Its prior is that of something about 10 cm large.
-pub(super) fn proposal(frame: &LinkFrame) -> Proposal {
+/// does not have. `mass` is the prior sd of its mass, kg, and `reach` its size in m, for the other sds.
+pub(super) fn proposal(frame: &LinkFrame, mass: f64, reach: f64) -> Proposal {
     let name = "payload".to_owned();
     let moments = mass_moments::COLUMNS.into_iter();
     let columns = moments
@@ -25,10 +22,10 @@ pub(super) fn proposal(frame: &LinkFrame) -> Proposal {
                 format!("payload at {}", frame.name),
                 frame.column(parameter),
             )
-            .scaled(match parameter {
-                0 => 1.0,
-                1..=3 => REACH,
-                _ => REACH * REACH,
+            .within(match parameter {
+                0 => mass,
+                1..=3 => mass * reach,
+                _ => mass * reach * reach,
             })
         })
         .collect();
@@ -48,6 +45,12 @@ pub(super) fn values(beta: &[f64]) -> Vec<f64> {
     let mass = beta[0];
     beta.iter()
         .enumerate()
-        .map(|(k, value)| if (1..=3).contains(&k) { value / mass } else { *value })
+        .map(|(k, value)| {
+            if (1..=3).contains(&k) {
+                value / mass
+            } else {
+                *value
+            }
+        })
         .collect()
 }

@@ -16,23 +16,20 @@ pub(super) fn proposal(graph: &mut Graph, joint: &Joint, periods: f64) -> Propos
     };
     let q = joint.position(graph);
     let angle = graph.scaled(order, q);
-    let columns = [
-        ("sin", Function::Cos, 1.0),
-        ("cos", Function::Sin, -1.0),
-    ]
-    .into_iter()
-    .map(|(column, function, sign)| {
-        let wave = graph.function(function, angle);
-        let phi = graph.scaled(sign / order, wave);
-        Candidate::lagrangian(
-            graph,
-            format!("{name}.{column}"),
-            Family::Ripple,
-            joint.torque_unit(),
-            story.clone(),
-            phi,
-        )
-    })
-    .collect();
+    let columns = [("sin", Function::Cos, 1.0), ("cos", Function::Sin, -1.0)]
+        .into_iter()
+        .map(|(column, function, sign)| {
+            let wave = graph.function(function, angle);
+            let phi = graph.scaled(sign / order, wave);
+            Candidate::lagrangian(
+                graph,
+                format!("{name}.{column}"),
+                Family::Ripple,
+                joint.torque_unit(),
+                story.clone(),
+                phi,
+            )
+        })
+        .collect();
     Proposal { name, columns }
 }

@@ -9,7 +9,9 @@ pub(super) const COLUMNS: [&str; 6] = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]
 
 /// `<link>.tensor`: columns `.ixx` … `.izz`: differences of the inertia tensor from the model, kg·m², axes of the link's
 /// frame. With mass and first moments unchanged, the difference about the centre of mass is the same.
-pub(super) fn proposal(link: &LinkFrame) -> Proposal {
+///
+/// `inertia` is the prior sd of every entry, kg·m².
+pub(super) fn proposal(link: &LinkFrame, inertia: f64) -> Proposal {
     let name = format!("{}.tensor", link.name);
     let columns = COLUMNS
         .into_iter()
@@ -22,6 +24,7 @@ pub(super) fn proposal(link: &LinkFrame) -> Proposal {
                 format!("inertia tensor of {}", link.name),
                 link.column(4 + k),
             )
+            .within(inertia)
         })
         .collect();
     Proposal { name, columns }

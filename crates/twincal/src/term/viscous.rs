@@ -18,5 +18,9 @@ pub(super) fn candidate(graph: &mut Graph, joint: &Joint) -> Candidate {
 
 /// Unit of a viscous coefficient.
 pub(super) fn unit(joint: &Joint) -> &'static str {
-    if joint.slides { "N·s/m" } else { "N·m·s/rad" }
+    if joint.slides {
+        "N·s/m"
+    } else {
+        "N·m·s/rad"
+    }
 }

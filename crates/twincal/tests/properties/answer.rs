@@ -67,8 +67,11 @@ impl Data {
     fn problem(&self, gram: &Gram, weight: [f64; 2]) -> Problem {
         let columns = Columns {
             names: (0..self.columns).map(|k| format!("x{k}")).collect(),
+            component: (0..self.columns).collect(),
             family: (0..self.columns).map(|k| k % 2).collect(),
             families: vec![Family::User, Family::Generic],
+            prior_sd: vec![None; self.columns],
+            lower: vec![f64::NEG_INFINITY; self.columns],
         };
         let mut plug_in = PlugIn::start(2, 2, 30.0);
         plug_in.weight = weight.to_vec();

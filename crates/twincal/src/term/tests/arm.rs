@@ -1,7 +1,7 @@
 //! The library of a real `Robot`: Φ times the coefficients of its Lagrangian is its inverse dynamics.
 
-use super::super::Library;
 use super::super::aliases::dependent;
+use super::super::{Family, Library};
 use super::all;
 use crate::robot::{
     Inertia, JointDescription, JointKind, LinkDescription, Motion, Robot, RobotDescription,
@@ -170,7 +170,7 @@ fn generic_family_spans_the_inverse_dynamics_of_any_chain() {
         let robot = chain(&joints);
         assert_eq!(robot.is_planar(), parallel);
         let mut settings = all(&[]);
-        (settings.viscous, settings.coulomb, settings.offset) = (false, false, false);
+        settings.families = vec![Family::MotorInertia];
         let (library, _) = Library::propose(&robot, &settings).unwrap();
         let (n, len) = (joints.len(), 260);
         let wave = |f: f64| -> Vec<f64> {

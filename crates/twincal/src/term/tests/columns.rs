@@ -1,10 +1,8 @@
 //! Order, names, units and values of the columns.
 
 use super::super::candidate::Joint;
-use super::super::expression::{
-    Graph, Slot, Tape, TapeScratch as Scratch, Variable, bounded_values, parse,
-};
-use super::super::{Family, Library, Status, Term};
+use super::super::expression::{Graph, Slot, Tape, TapeScratch, Variable, bounded_values, parse};
+use super::super::{Family, Scratch, Status, Term};
 use super::{all, bare, joints, only, planar};
 use crate::robot::Motion;
 
@@ -214,7 +212,7 @@ fn the_tape_computes_what_the_graph_says() {
             qdd: &qdd,
         },
         &mut out,
-        &mut Scratch::default(),
+        &mut TapeScratch::default(),
     );
     for sample in 0..len {
         let values = bounded_values(&graph, |variable| match variable {

@@ -1,5 +1,6 @@
 //! What the grammar takes, and how it refuses.
 
+use super::super::Family;
 use super::super::expression::{Graph, Variable, bounded_values, parse};
 use super::{only, planar};
 use crate::error::Error;
@@ -152,7 +153,7 @@ fn random_text_never_panics() {
     runner
         .run(&proptest::string::string_regex(piece).unwrap(), |text| {
             let mut settings = only(&[&text]);
-            settings.motor_inertia = true;
+            settings.families = vec![Family::MotorInertia];
             match planar(2, &settings) {
                 Ok((library, _)) => assert_eq!(library.terms()[0].name, text),
                 Err(error) => assert!(matches!(error, Error::Term { .. }), "{text}: {error}"),

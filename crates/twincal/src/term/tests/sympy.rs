@@ -1,10 +1,10 @@
 //! Torque images and Lagrangians against SymPy (`tests/reference/term/make.py`).
 
-use super::super::{Family, LibrarySettings};
 use super::super::euler_lagrange::euler_lagrange;
 use super::super::expression::{
     Graph, Slot, Tape, TapeScratch as Scratch, Variable, bounded_values, parse,
 };
+use super::super::{Family, LibrarySettings};
 use super::{only, planar};
 use crate::robot::Motion;
 use serde::Deserialize;
