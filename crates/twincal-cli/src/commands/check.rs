@@ -189,6 +189,7 @@ mod tests {
             rmse_calibrated: rmse,
             coverage95: coverage,
             mean_width95: 0.4,
+            torque_sd: 5.0,
         };
         Scores {
             rmse_nominal: 1.0,

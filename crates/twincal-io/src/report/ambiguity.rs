@@ -2,16 +2,8 @@
 
 use super::text::{fixed, list, percent, probability};
 use super::view::Joint;
-use twincal::calibrate::Calibration;
-use twincal::posterior::Model;
-use twincal::term::Status;
+use twincal::calibrate::{Calibration, Group};
 
-/// At least one of the two must be this probable for a pair to be named.
-const ANY: f64 = 0.9;
-/// Both together must be less probable than this.
-const BOTH: f64 = 0.1;
-/// Neither of the two may be more probable than this: then it would be clear which one it is.
-const ALONE: f64 = 0.95;
 /// Two coefficients whose draws correlate this much are known as a combination.
 const CORRELATED: f64 = 0.95;
 /// A joint that stood still for more than this share of the rows hardly moved.
@@ -63,44 +55,16 @@ pub(super) fn standstill(calibration: &Calibration, j: usize) -> f64 {
     stood as f64 / (moved + stood) as f64
 }
 
-/// Pairs of which one is almost surely there, rarely both.
+/// Sets of effects of which one is there, and these data cannot tell which.
 fn either_or(calibration: &Calibration) -> Vec<String> {
-    let models = &calibration.twin.posterior.models;
-    let columns: Vec<&str> = calibration
-        .terms
-        .iter()
-        .filter(|t| t.term.status == Status::Candidate)
-        .map(|t| t.term.name.as_str())
-        .collect();
-    let open: Vec<u32> = (0..columns.len() as u32)
-        .filter(|&k| {
-            let p = mass(models, |z| z.contains(&k));
-            p > 1.0 - ALONE && p < ALONE
-        })
-        .collect();
-    let mut out = Vec::new();
-    for (i, &a) in open.iter().enumerate() {
-        for &b in &open[i + 1..] {
-            let any = mass(models, |z| z.contains(&a) || z.contains(&b));
-            if any >= ANY && mass(models, |z| z.contains(&a) && z.contains(&b)) < BOTH {
-                out.push(format!(
-                    "Either {} or {}: one of them is there with probability {}, but these data cannot tell which.",
-                    columns[a as usize],
-                    columns[b as usize],
-                    probability(any)
-                ));
-            }
-        }
-    }
-    out
-}
-
-fn mass(models: &[Model], holds: impl Fn(&[u32]) -> bool) -> f64 {
-    models
-        .iter()
-        .filter(|model| holds(&model.members))
-        .map(|model| model.weight)
-        .sum()
+    let sentence = |group: &Group| {
+        format!(
+            "{}: at least one of them is there with probability {}, but these data cannot tell which.",
+            list(&group.members),
+            probability(group.pip)
+        )
+    };
+    calibration.groups.iter().map(sentence).collect()
 }
 
 #[cfg(test)]
@@ -109,44 +73,18 @@ mod tests {
     use crate::report::{fixture, view};
 
     #[test]
-    fn two_effects_that_exclude_each_other_are_named_together() {
+    fn effects_that_stand_for_each_other_are_named_together() {
         let mut calibration = fixture::two_joints();
-        let template = calibration.twin.posterior.models[0].clone();
-        // Column 7 in every model; either column 0 or column 2 beside it.
-        calibration.twin.posterior.models =
-            [(vec![0, 7], 0.55), (vec![2, 7], 0.43), (vec![7], 0.02)]
-                .map(|(members, weight)| Model {
-                    members,
-                    weight,
-                    ..template.clone()
-                })
-                .to_vec();
+        assert_eq!(either_or(&calibration), Vec::<String>::new());
+        calibration.groups.push(Group {
+            members: vec!["elbow.spring".into(), "elbow.potential".into()],
+            pip: 0.98,
+        });
         let open = either_or(&calibration);
-        assert_eq!(open.len(), 1, "{open:?}");
-        // Column 1 of the library is a dropped term: column 2 of the regression is its fourth term.
         assert!(
-            open[0].contains("Either q2^2 or qd2^2") && open[0].contains("0.98"),
+            open.len() == 1 && open[0].contains("elbow.potential") && open[0].contains("0.98"),
             "{open:?}"
         );
-    }
-
-    #[test]
-    fn both_together_or_one_alone_is_no_either_or() {
-        let mut calibration = fixture::two_joints();
-        let template = calibration.twin.posterior.models[0].clone();
-        for models in [
-            [(vec![0, 2], 0.9), (vec![], 0.1)],
-            [(vec![0], 0.99), (vec![2], 0.01)],
-        ] {
-            calibration.twin.posterior.models = models
-                .map(|(members, weight)| Model {
-                    members,
-                    weight,
-                    ..template.clone()
-                })
-                .to_vec();
-            assert_eq!(either_or(&calibration), Vec::<String>::new());
-        }
     }
 
     #[test]

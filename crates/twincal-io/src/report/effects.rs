@@ -1,10 +1,11 @@
-//! The effects found, the ones that cannot be excluded, the ones that are absent, and the terms that were dropped.
+//! The effects found, the ones that cannot be excluded, the ones that are absent, and the terms that were dropped. An
+//! effect is a component: one physical story with all its columns.
 
 use super::figures::inclusion::family_name;
 use super::text::{interval, probability};
 use super::verdict::plus_minus;
 use serde::Serialize;
-use twincal::calibrate::{Calibration, TermSummary};
+use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary, TermSummary, Verdict};
 use twincal::term::Status;
 
 /// Below this probability an effect that was not kept is called absent.
@@ -29,14 +30,24 @@ pub(super) struct Effect {
     pub(super) words: String,
     pub(super) name: String,
     pub(super) family: &'static str,
-    pub(super) unit: String,
     pub(super) pip: String,
-    /// Given that it is there.
-    pub(super) value: String,
-    /// Unconditional.
-    pub(super) interval: String,
+    /// What it is known by, given that it is there.
+    pub(super) parameters: Vec<Parameter>,
     /// The sampler cannot tell on which side of 0.5 it lies.
     pub(super) undecided: bool,
+    /// The data say nothing about it.
+    pub(super) not_seen: bool,
+    /// No motion of this robot can tell it from these.
+    pub(super) alias_of: Vec<String>,
+}
+
+/// One physical parameter of an effect.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Parameter {
+    pub(super) name: String,
+    pub(super) value: String,
+    pub(super) unit: String,
+    pub(super) interval: String,
 }
 
 /// A term that is no column.
@@ -46,60 +57,69 @@ pub(super) struct Dropped {
     pub(super) reason: String,
 }
 
-/// Sorts the terms of `calibration`.
+/// Sorts the components of `calibration`.
 pub(super) fn sort(calibration: &Calibration) -> Effects {
-    let mut live: Vec<(&TermSummary, f64)> = calibration
-        .terms
+    let mut live: Vec<(&ComponentSummary, f64)> = calibration
+        .components
         .iter()
-        .filter_map(|t| Some((t, t.pip?)))
+        .filter_map(|c| Some((c, c.pip?)))
         .collect();
-    let strength =
-        |t: &TermSummary| match (t.conditional_mean.or(t.mean), t.conditional_sd.or(t.sd)) {
-            (Some(mean), Some(sd)) if sd > 0.0 => (mean / sd).abs(),
-            _ => 0.0,
-        };
+    let strength = |c: &ComponentSummary| {
+        let clear = |p: &ParameterSummary| (p.mean / p.sd).abs();
+        let all = c.parameters.iter().map(clear).filter(|x| x.is_finite());
+        all.fold(0.0, f64::max)
+    };
     // Ties keep the library's order: the sort is stable.
     live.sort_by(|a, b| {
         b.1.total_cmp(&a.1)
             .then(strength(b.0).total_cmp(&strength(a.0)))
     });
-    let pick = |keep: &dyn Fn(&TermSummary, f64) -> bool| {
+    let pick = |keep: &dyn Fn(&ComponentSummary, f64) -> bool| {
         live.iter()
-            .filter(|(t, p)| keep(t, *p))
-            .map(|(t, p)| effect(t, *p))
+            .filter(|(c, p)| keep(c, *p))
+            .map(|(c, p)| effect(c, *p))
             .collect()
     };
     Effects {
-        found: pick(&|t, _| t.selected),
-        possible: pick(&|t, p| !t.selected && p >= ABSENT),
-        absent: pick(&|t, p| !t.selected && (p < ABSENT || p.is_nan())),
+        found: pick(&|c, _| c.selected),
+        possible: pick(&|c, p| !c.selected && p >= ABSENT),
+        absent: pick(&|c, p| !c.selected && (p < ABSENT || p.is_nan())),
         dropped: calibration.terms.iter().filter_map(dropped).collect(),
     }
 }
 
-fn effect(term: &TermSummary, pip: f64) -> Effect {
-    let value = match (
-        term.conditional_mean.or(term.mean),
-        term.conditional_sd.or(term.sd),
-    ) {
-        (Some(mean), Some(sd)) => plus_minus(mean, sd),
-        _ => "–".into(),
-    };
+fn effect(component: &ComponentSummary, pip: f64) -> Effect {
     Effect {
-        words: if term.words.is_empty() {
-            term.term.name.clone()
+        words: if component.words.is_empty() {
+            component.name.clone()
         } else {
-            term.words.clone()
+            component.words.clone()
         },
-        name: term.term.name.clone(),
-        family: family_name(term.term.family),
-        unit: term.term.unit.clone(),
+        name: component.name.clone(),
+        family: family_name(component.family),
         pip: probability(pip),
-        value,
-        interval: term.interval95.map_or("–".into(), interval),
-        undecided: term
+        parameters: component.parameters.iter().map(parameter).collect(),
+        undecided: component
             .pip_mcse
             .is_some_and(|e| e > 0.0 && (pip - 0.5).abs() < 3.0 * e),
+        not_seen: component.verdict == Some(Verdict::NotSeen),
+        alias_of: component.alias_of.clone(),
+    }
+}
+
+fn parameter(parameter: &ParameterSummary) -> Parameter {
+    let unit = match parameter.unit.as_str() {
+        "1" => "",
+        unit => unit,
+    };
+    Parameter {
+        name: match parameter.name.as_str() {
+            "value" => String::new(),
+            name => name.replace('_', " "),
+        },
+        value: plus_minus(parameter.mean, parameter.sd),
+        unit: unit.into(),
+        interval: interval(parameter.interval95),
     }
 }
 
@@ -135,7 +155,7 @@ mod tests {
                 + effects.possible.len()
                 + effects.absent.len()
                 + effects.dropped.len();
-            assert_eq!(listed, calibration.terms.len());
+            assert_eq!(listed, calibration.components.len());
         }
     }
 
@@ -162,11 +182,11 @@ mod tests {
     fn within_three_standard_errors_of_one_half_is_undecided() {
         let mut calibration = fixture::gibbs();
         calibration
-            .terms
+            .components
             .iter_mut()
-            .for_each(|t| t.pip_mcse = t.pip.map(|_| 0.02));
-        calibration.terms[0].pip = Some(0.55);
-        calibration.terms[1].pip = Some(0.57);
+            .for_each(|c| c.pip_mcse = c.pip.map(|_| 0.02));
+        calibration.components[0].pip = Some(0.55);
+        calibration.components[1].pip = Some(0.57);
         let effects = sort(&calibration);
         let by_name = |name: &str| {
             effects
@@ -179,7 +199,7 @@ mod tests {
                 .undecided
         };
         assert!(
-            by_name(&calibration.terms[0].term.name) && !by_name(&calibration.terms[1].term.name)
+            by_name(&calibration.components[0].name) && !by_name(&calibration.components[1].name)
         );
     }
 }

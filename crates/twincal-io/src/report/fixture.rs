@@ -412,6 +412,7 @@ fn validation(traces: Vec<Trace>, names: &[&str]) -> Validation {
                 rmse_calibrated,
                 coverage95,
                 mean_width95,
+                torque_sd: 10.0 * rmse_nominal,
             }
         })
         .collect();

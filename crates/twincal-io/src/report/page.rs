@@ -104,7 +104,7 @@ fn gather<'a>(
         joints: joints.iter().map(|j| j.name).collect(),
         verdict: verdict::judge(calibration, joints),
         effects: effects::sort(calibration),
-        inclusion: figures::inclusion::figure(terms),
+        inclusion: figures::inclusion::figure(&calibration.components),
         pairs: figures::pairs::figure(&calibration.draws, terms),
         torque: joints.iter().filter_map(figures::torque::figure).collect(),
         other_torque: joints

@@ -43,7 +43,7 @@ pub(super) struct Verdict {
 /// Judges `calibration`.
 pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict {
     let scores = &calibration.validation.filtered;
-    let found = calibration.terms.iter().filter(|t| t.selected).count();
+    let found = calibration.components.iter().filter(|c| c.selected).count();
     let rows: u64 = scores.joints.iter().map(|j| j.rows).sum();
     if rows == 0 || !(scores.rmse_nominal.is_finite() && scores.rmse_calibrated.is_finite()) {
         return Verdict {
@@ -334,7 +334,7 @@ mod tests {
             (
                 |c| {
                     c.validation.filtered.rmse_calibrated = c.validation.filtered.rmse_nominal;
-                    c.terms.iter_mut().for_each(|t| t.selected = false);
+                    c.components.iter_mut().for_each(|t| t.selected = false);
                 },
                 Grade::Care,
                 "Nothing to correct",

@@ -5,7 +5,7 @@ use crate::likelihood::{JointNoise, NoiseModel};
 use crate::prior::Inclusion;
 use crate::term::{Family, Term};
 use crate::twin::Twin;
-use crate::validate::Validation;
+use crate::validate::{Validation, nan_if_null, nans_if_null};
 use serde::{Deserialize, Serialize};
 
 /// One row of `result.json` `terms[]`; numbers are `None` for dropped terms.
@@ -73,11 +73,14 @@ pub struct ParameterSummary {
     pub name: String,
     /// SI unit.
     pub unit: String,
-    /// Mean.
+    /// Mean; NaN here and `null` in JSON where it does not exist (the centre of no mass).
+    #[serde(deserialize_with = "nan_if_null")]
     pub mean: f64,
     /// Standard deviation.
+    #[serde(deserialize_with = "nan_if_null")]
     pub sd: f64,
     /// Central 95 % interval.
+    #[serde(deserialize_with = "nans_if_null")]
     pub interval95: [f64; 2],
 }
 

@@ -162,12 +162,6 @@ impl Robot {
         self.planar
     }
 
-    /// Distance of every moving body's frame from its parent body's (the base's for the first), m.
-    pub fn joint_distances(&self) -> Vec<f64> {
-        let bodies = self.bodies.iter();
-        bodies.map(|body| spatial::norm(body.translation)).collect()
-    }
-
     /// What the model file says.
     pub fn description(&self) -> &RobotDescription {
         &self.description

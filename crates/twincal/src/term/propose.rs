@@ -15,11 +15,13 @@ use crate::robot::{Robot, did_you_mean, to_body_frame};
 const TERM_LIMIT: usize = 1000;
 /// Joints up to which the generic family is proposed unasked.
 const GENERIC_JOINTS: usize = 3;
-/// Prior sd of a mass as a share of the mass.
-const SHARE: f64 = 0.2;
+/// Prior sd of what a link's mass is off, as a share of it.
+const LINK_SHARE: f64 = 0.5;
+/// Prior sd of a payload as a share of all moving mass.
+const PAYLOAD_SHARE: f64 = 0.2;
 /// Share of all moving mass that counts for links that the model gives less.
 const LEAST_MASS_SHARE: f64 = 0.02;
-/// Length for robots whose joints all sit at one point, m.
+/// Length that makes first moments and tensors out of masses, m.
 const REACH: f64 = 0.2;
 
 /// Everything about a robot that the families ask for; `robot` is absent where a library is made for joints alone.
@@ -134,15 +136,14 @@ pub(super) fn proposals(
 
 /// Payload and, link by link, mass moments, tensor and mass scale: of the link that each moving joint carries.
 ///
-/// Their prior is physical: a link's mass is off by a fifth of it where it is off at all (of at least 2 % of all mass),
-/// a payload weighs a fifth of all that moves, and lengths are half the mean distance between joints.
+/// Their prior is physical: a link's mass is off by half of it where it is off at all (of at least 2 % of all mass), a
+/// payload weighs a fifth of all that moves, and lengths are 0.2 m.
 fn inertial(robot: &Robot, settings: &LibrarySettings) -> Result<Vec<Proposal>> {
     let names = robot.bodies();
     let parameters: Vec<[f64; 10]> = (0..names.len())
         .map(|body| robot.parameters_of_body(body))
         .collect();
     let total: f64 = parameters.iter().map(|parameters| parameters[0]).sum();
-    let reach = reach(robot);
     let links: Vec<LinkFrame> = names
         .into_iter()
         .filter_map(|link| {
@@ -156,33 +157,29 @@ fn inertial(robot: &Robot, settings: &LibrarySettings) -> Result<Vec<Proposal>> 
         .collect();
     let mass = |link: &LinkFrame| {
         let own = parameters[link.body][0].max(LEAST_MASS_SHARE * total);
-        if own > 0.0 { SHARE * own } else { 1.0 }
+        if own > 0.0 { LINK_SHARE * own } else { 1.0 }
     };
     let mut all = Vec::new();
     if settings.has(Family::Payload) {
         let frame = payload_frame(robot, settings)?;
-        let mass = if total > 0.0 { SHARE * total } else { 1.0 };
-        all.push(payload::proposal(&frame, mass, reach));
+        let mass = if total > 0.0 {
+            PAYLOAD_SHARE * total
+        } else {
+            1.0
+        };
+        all.push(payload::proposal(&frame, mass, REACH));
     }
     let links = || links.iter();
     if settings.has(Family::MassMoments) {
-        all.extend(links().map(|link| mass_moments::proposal(link, mass(link), reach)));
+        all.extend(links().map(|link| mass_moments::proposal(link, mass(link), REACH)));
     }
     if settings.has(Family::Tensor) {
-        all.extend(links().map(|link| tensor::proposal(link, mass(link) * reach * reach)));
+        all.extend(links().map(|link| tensor::proposal(link, mass(link) * REACH * REACH)));
     }
     if settings.has(Family::MassScale) {
         all.extend(links().map(|link| mass_scale::candidate(link, parameters[link.body]).into()));
     }
     Ok(all)
-}
-
-/// Half the mean distance between the origins of consecutive bodies, m: how far off a centre of mass may be.
-fn reach(robot: &Robot) -> f64 {
-    let distances: Vec<f64> = robot.joint_distances();
-    let count = distances.len().max(1) as f64;
-    let mean = distances.iter().sum::<f64>() / count;
-    if mean > 0.0 { 0.5 * mean } else { REACH }
 }
 
 /// The frame of `payload_frame`, or of the last link.

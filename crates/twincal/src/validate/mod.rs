@@ -29,6 +29,9 @@ pub struct JointScore {
     /// Mean width of that interval, N·m.
     #[serde(deserialize_with = "nan_if_null")]
     pub mean_width95: f64,
+    /// Standard deviation of the measured torque over these rows, N·m: what an RMSE is to be compared with.
+    #[serde(deserialize_with = "nan_if_null")]
+    pub torque_sd: f64,
 }
 
 /// Scores over a set of rows: pooled over all rows of all joints, and per joint. Without rows the numbers are NaN here and
@@ -109,6 +112,14 @@ pub struct Validation {
 }
 
 /// JSON has no NaN: a score without rows is written as `null` and read back as NaN.
-fn nan_if_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+pub(crate) fn nan_if_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
+}
+
+/// [`nan_if_null`] for the two ends of an interval.
+pub(crate) fn nans_if_null<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<[f64; 2], D::Error> {
+    let ends = <[Option<f64>; 2]>::deserialize(deserializer)?;
+    Ok(ends.map(|end| end.unwrap_or(f64::NAN)))
 }

@@ -12,6 +12,8 @@ struct Sums {
     square_calibrated: f64,
     inside: u64,
     width: f64,
+    measured: f64,
+    square_measured: f64,
 }
 
 impl AddAssign for Sums {
@@ -21,6 +23,8 @@ impl AddAssign for Sums {
         self.square_calibrated += other.square_calibrated;
         self.inside += other.inside;
         self.width += other.width;
+        self.measured += other.measured;
+        self.square_measured += other.square_measured;
     }
 }
 
@@ -38,6 +42,9 @@ impl Sums {
             rmse_calibrated: self.mean(self.square_calibrated).sqrt(),
             coverage95: self.mean(self.inside as f64),
             mean_width95: self.mean(self.width),
+            torque_sd: (self.mean(self.square_measured) - self.mean(self.measured).powi(2))
+                .max(0.0)
+                .sqrt(),
         }
     }
 }
@@ -87,6 +94,8 @@ impl ScoreKeeper {
                 square_calibrated: (measured - torque.calibrated[row]).powi(2),
                 inside: u64::from(measured >= low && measured <= high),
                 width: high - low,
+                measured,
+                square_measured: measured * measured,
             };
         }
     }

@@ -4,7 +4,7 @@ use crate::report::figure::{Figure, Image, Legend};
 use crate::report::scale::Scale;
 use crate::report::svg::{Anchor, Svg};
 use crate::report::text::{count, probability, shorten};
-use twincal::calibrate::TermSummary;
+use twincal::calibrate::ComponentSummary;
 use twincal::term::Family;
 
 /// Above this many candidates only those that stand out are drawn one by one.
@@ -15,20 +15,20 @@ const ROW: f64 = 18.0;
 
 enum Row<'a> {
     Family(&'static str),
-    Term(&'a TermSummary, f64),
+    Term(&'a ComponentSummary, f64),
     Rest(usize),
 }
 
 /// The figure; `None` without candidates.
-pub(in crate::report) fn figure(terms: &[TermSummary]) -> Option<Figure> {
-    let live = terms.iter().filter(|t| t.pip.is_some()).count();
+pub(in crate::report) fn figure(components: &[ComponentSummary]) -> Option<Figure> {
+    let live = components.iter().filter(|t| t.pip.is_some()).count();
     if live == 0 {
         return None;
     }
-    let rows = rows(terms, live);
-    let selected = terms.iter().filter(|t| t.selected).count();
+    let rows = rows(components, live);
+    let selected = components.iter().filter(|t| t.selected).count();
     let label = format!(
-        "Bar chart of the inclusion probabilities of {live} candidate terms; {selected} reach one half and are kept."
+        "Bar chart of the inclusion probabilities of {live} candidates; {selected} reach one half and are kept."
     );
     Some(Figure {
         title: "Which effects the data support".into(),
@@ -44,20 +44,20 @@ pub(in crate::report) fn figure(terms: &[TermSummary]) -> Option<Figure> {
     })
 }
 
-fn rows<'a>(terms: &'a [TermSummary], live: usize) -> Vec<Row<'a>> {
+fn rows<'a>(components: &'a [ComponentSummary], live: usize) -> Vec<Row<'a>> {
     let mut rows = Vec::new();
-    let mut families: Vec<Family> = terms
+    let mut families: Vec<Family> = components
         .iter()
         .filter(|t| t.pip.is_some())
-        .map(|t| t.term.family)
+        .map(|t| t.family)
         .collect();
     families.sort();
     families.dedup();
     for family in families {
         rows.push(Row::Family(family_name(family)));
-        let members = terms
+        let members = components
             .iter()
-            .filter(|t| t.term.family == family)
+            .filter(|t| t.family == family)
             .filter_map(|t| Some((t, t.pip?)));
         let mut rest = 0;
         for (term, pip) in members {
@@ -103,12 +103,12 @@ fn draw(rows: &[Row<'_>], width: f64, label: &str) -> String {
             }
             Row::Term(term, pip) => {
                 let class = if term.selected { "kept" } else { "left" };
-                let hint = format!("{}: {}", term.term.name, probability(*pip));
+                let hint = format!("{}: {}", term.name, probability(*pip));
                 svg.text(
                     "name",
                     (left - 6.0, base),
                     Anchor::End,
-                    &shorten(&term.term.name, left - 12.0, 12.0),
+                    &shorten(&term.name, left - 12.0, 12.0),
                 );
                 // A bar of one pixel shows that there is a candidate.
                 svg.rect(
@@ -173,7 +173,7 @@ mod tests {
 
     #[test]
     fn bars_are_as_long_as_their_probability() {
-        let mut term = fixture::two_joints().terms[0].clone();
+        let mut term = fixture::two_joints().components[0].clone();
         term.pip = Some(0.25);
         let svg = draw(&[Row::Term(&term, 0.25)], 880.0, "");
         // From 250 to 880 − 52.
@@ -186,13 +186,13 @@ mod tests {
     #[test]
     fn many_absent_terms_are_counted_instead_of_drawn() {
         let calibration = fixture::two_joints();
-        let mut terms = calibration.terms.clone();
+        let mut terms = calibration.components.clone();
         let mut absent = terms
             .iter()
             .find(|t| t.pip.is_some_and(|p| p < LEAST))
             .unwrap()
             .clone();
-        absent.term.family = Family::Generic;
+        absent.family = Family::Generic;
         terms.extend(std::iter::repeat_n(absent, 100));
         let figure = figure(&terms).unwrap();
         assert!(figure.images[0].wide.matches("<rect").count() < 40);
