@@ -59,6 +59,13 @@ Examples:
   twincal predict job.csv --twin twincal-out | head
 ")]
     Predict(Predict),
+    /// What changed between two twins of the same robot.
+    #[command(before_help = "\
+Examples:
+  twincal diff before after
+  twincal diff before after --json
+")]
+    Diff(Diff),
     /// Write report.html anew from the stored result.
     #[command(before_help = "Example:\n  twincal report --twin twincal-out\n")]
     Report(Report),
@@ -125,6 +132,19 @@ pub(crate) struct Inspect {
     pub(crate) allow: Vec<Allow>,
     #[command(flatten)]
     pub(crate) log: LogFlags,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Diff {
+    /// Folder of the earlier twin.
+    #[arg(value_name = "BEFORE")]
+    pub(crate) before: PathBuf,
+    /// Folder of the later twin.
+    #[arg(value_name = "AFTER")]
+    pub(crate) after: PathBuf,
+    /// Print the result as JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -25,6 +25,7 @@ pub mod likelihood;
 pub mod infer;
 pub mod plug_in;
 pub mod twin;
+pub mod compare;
 pub mod validate;
 pub mod calibrate;
 

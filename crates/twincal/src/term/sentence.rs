@@ -17,6 +17,14 @@ pub struct Estimate {
     pub sd: f64,
 }
 
+impl std::fmt::Display for Estimate {
+    /// "+1.740 ± 0.004 kg".
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let unit = if self.unit == "1" { "" } else { &self.unit };
+        write!(f, "{} {unit}", estimate(self.mean, self.sd))
+    }
+}
+
 /// Parameters of a component that are told at most; the rest stands in the tables.
 const TOLD: usize = 3;
 /// A parameter further from 0 than this many sds is worth telling.

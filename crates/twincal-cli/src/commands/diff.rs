@@ -1,0 +1,55 @@
+//! `twincal diff`: what changed between two twins of the same robot.
+
+use super::print_json;
+use super::summary::paragraph;
+use crate::args::Diff;
+use crate::failure::Outcome;
+use crate::terminal::Terminal;
+use serde::Serialize;
+use std::path::Path;
+use twincal::compare::{Change, compare};
+use twincal_io::artifact::Artifact;
+use twincal_io::twin_json::StoredTwin;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Difference {
+    schema: u64,
+    before: String,
+    after: String,
+    components: Vec<Change>,
+}
+
+pub(super) fn run(flags: &Diff, terminal: &mut Terminal) -> Outcome<u8> {
+    let read = |folder: &Path| StoredTwin::read(&Artifact::open(folder)?, false);
+    let (before, after) = (read(&flags.before)?, read(&flags.after)?);
+    let changes = compare(&before.calibration.twin, &after.calibration.twin)?;
+    if flags.json {
+        let difference = Difference {
+            schema: 1,
+            before: flags.before.to_string_lossy().into_owned(),
+            after: flags.after.to_string_lossy().into_owned(),
+            components: changes,
+        };
+        print_json(terminal, &difference)?;
+    } else {
+        print(&changes, terminal);
+    }
+    Ok(0)
+}
+
+fn print(changes: &[Change], terminal: &mut Terminal) {
+    terminal.heading("What changed (after - before)");
+    let (changed, same): (Vec<_>, Vec<_>) = changes.iter().partition(|change| change.changed);
+    if changed.is_empty() {
+        terminal.say("  nothing that these logs can tell");
+    }
+    for change in changed {
+        paragraph(&change.words, terminal);
+    }
+    if !same.is_empty() {
+        let names: Vec<&str> = same.iter().map(|change| change.name.as_str()).collect();
+        paragraph(&format!("as before: {}", names.join(", ")), terminal);
+    }
+    terminal.say("");
+}
