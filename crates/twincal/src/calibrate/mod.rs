@@ -20,7 +20,6 @@ use crate::observations::Part;
 use crate::plug_in::{
     Fit, FitSettings, LeftOut, Moving, fit, fit_tempered, residual_correlation_time, start,
 };
-use crate::posterior::Method;
 use crate::prior::PriorSettings;
 use crate::robot::Robot;
 use crate::self_check::self_check;
@@ -133,8 +132,8 @@ pub fn calibrate(
         .iter()
         .map(|log| log.observations.whole())
         .collect();
-    let fitted = estimate(&training, &columns, settings)?;
-    require_agreement(&fitted.fit, settings)?;
+    let mut fitted = estimate(&training, &columns, settings)?;
+    fitted.fit.posterior = infer(&fitted.fit.problem, &settings.inference)?;
     findings.extend(findings_of_fit(robot, &fitted, settings, &training));
     let mean = &fitted.fit.posterior.mean;
     findings.extend(heavy_tails::findings(robot, &training, mean));
@@ -180,11 +179,9 @@ fn estimate(
     columns: &Columns,
     settings: &CalibrationSettings,
 ) -> Result<Fitted> {
-    let inference = lenient(&settings.inference);
     let fit_settings = FitSettings {
         noise: settings.noise,
         prior: &settings.prior,
-        inference: &inference,
     };
     match settings.noise.model {
         NoiseModel::Tempered => {
@@ -197,27 +194,11 @@ fn estimate(
         NoiseModel::Iid | NoiseModel::Ar1 => {
             let start = start(training, columns, &settings.prior);
             Ok(Fitted {
-                fit: fit(training, columns, fit_settings, &start, Moving::All)?,
+                fit: fit(training, columns, fit_settings, &start, Moving::All, None)?,
                 left_out: None,
             })
         }
     }
-}
-
-/// On the way to the answer, and around it, chains may disagree; the answer itself is judged by [`require_agreement`].
-fn lenient(inference: &InferenceSettings) -> InferenceSettings {
-    InferenceSettings {
-        allow_disagreement: true,
-        ..inference.clone()
-    }
-}
-
-/// Refuses a sampled answer whose chains disagree, unless that is allowed (cases 90 and 91).
-fn require_agreement(fit: &Fit, settings: &CalibrationSettings) -> Result<()> {
-    if matches!(fit.posterior.method, Method::Gibbs { .. }) {
-        infer(&fit.problem, &settings.inference)?;
-    }
-    Ok(())
 }
 
 /// The live columns with their components, families and bounds.

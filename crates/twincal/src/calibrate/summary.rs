@@ -6,9 +6,9 @@ use super::result::{
     Calibration, ComponentSummary, Draws, Group, LikelihoodUsed, PriorUsed, SweepPoint,
     TermSummary, Verdict,
 };
-use super::{CalibrationSettings, Fitted, lenient, refuse};
+use super::{CalibrationSettings, Fitted, refuse};
 use crate::error::{Finding, Result, Severity};
-use crate::infer::infer;
+use crate::infer::approximate;
 use crate::likelihood::{Columns, mean_squares};
 use crate::observations::Part;
 use crate::plug_in::{residual_runs, total};
@@ -70,7 +70,7 @@ pub(super) fn summarise(
         .into_iter()
         .map(f64::sqrt)
         .collect();
-    let sensitivity = sensitivity(&fit.problem, settings)?;
+    let sensitivity = sensitivity(&fit.problem, &fit.posterior)?;
     let terms = terms(library, &fit.posterior, &fit.problem, &rms, &sensitivity);
     let components = components(library, &fit.posterior, &terms, settings.inference.seed);
     let groups = groups(&fit.problem, &fit.posterior, library);
@@ -140,7 +140,7 @@ pub(super) fn summarise(
 }
 
 /// PIPs under slab variance × 0.1, 1, 10 and expected terms (or prior odds) × 0.5, 2: five values per column.
-fn sensitivity(problem: &Problem, settings: &CalibrationSettings) -> Result<Vec<Vec<f64>>> {
+fn sensitivity(problem: &Problem, posterior: &Posterior) -> Result<Vec<Vec<f64>>> {
     let mut variants = Vec::new();
     for factor in [0.1, 1.0, 10.0] {
         let mut variant = problem.clone();
@@ -156,7 +156,7 @@ fn sensitivity(problem: &Problem, settings: &CalibrationSettings) -> Result<Vec<
     let pips: Vec<Vec<f64>> = variants
         .iter()
         .map(|variant| {
-            infer(variant, &lenient(&settings.inference)).map(|posterior| posterior.inclusion)
+            approximate(variant, Some(posterior)).map(|posterior| posterior.inclusion)
         })
         .collect::<Result<_>>()?;
     Ok((0..problem.names.len())

@@ -2,9 +2,9 @@
 
 use super::data::Data;
 use super::result::SweepPoint;
-use super::{CalibrationSettings, lenient};
+use super::CalibrationSettings;
 use crate::error::{Finding, Result, Severity};
-use crate::infer::infer;
+use crate::infer::approximate;
 use crate::likelihood::{Columns, assemble};
 use crate::observations::Part;
 use crate::plug_in::{Fit, total};
@@ -54,7 +54,7 @@ pub(super) fn cutoff(
             continue;
         }
         let problem = assemble(&total(&parts), columns, &fit.plug_in, &settings.prior)?;
-        let posterior = infer(&problem, &lenient(&settings.inference))?;
+        let posterior = approximate(&problem, Some(&fit.posterior))?;
         points.push(SweepPoint {
             cutoff_hz: scaled.cutoff_hz,
             mean: posterior.mean,

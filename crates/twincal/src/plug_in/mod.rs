@@ -12,7 +12,7 @@ pub use tempering::{LeftOut, fit_tempered};
 use crate::diagnostics::integrated_autocorrelation_time;
 use crate::error::Result;
 use crate::gram::Gram;
-use crate::infer::{InferenceSettings, infer};
+use crate::infer::approximate;
 use crate::likelihood::{Columns, NoiseModel, NoiseSettings, PlugIn, assemble, mean_squares};
 use crate::observations::Part;
 use crate::posterior::{Posterior, Problem};
@@ -37,8 +37,6 @@ pub struct FitSettings<'a> {
     pub noise: NoiseSettings,
     /// `[prior]`.
     pub prior: &'a PriorSettings,
-    /// `[inference]`.
-    pub inference: &'a InferenceSettings,
 }
 
 /// A posterior with the plug-ins that it was computed from.
@@ -48,7 +46,7 @@ pub struct Fit {
     pub plug_in: PlugIn,
     /// The regression and prior that they make.
     pub problem: Problem,
-    /// Its posterior.
+    /// Its posterior, by [`approximate`]: what is reported is inferred once more from `problem`.
     pub posterior: Posterior,
     /// Rounds until nothing moved.
     pub rounds: usize,
@@ -78,24 +76,26 @@ impl Moving {
 
 /// Iterates the plug-ins to their fixed point on the training parts.
 ///
-/// τ and c of `start` are kept as they are.
+/// τ and c of `start` are kept as they are. `known` is the posterior of a similar problem, to start the search from.
 ///
 /// # Errors
-/// Those of [`assemble`] and [`infer`].
+/// Those of [`assemble`] and [`approximate`].
 pub fn fit(
     training: &[Part<'_>],
     columns: &Columns,
     settings: FitSettings<'_>,
     start: &PlugIn,
     moving: Moving,
+    known: Option<&Posterior>,
 ) -> Result<Fit> {
     let gram = total(training);
     let mut plug_in = start.clone();
+    let mut known = known.cloned();
     let mut rounds = 0;
     loop {
         rounds += 1;
         let problem = assemble(&gram, columns, &plug_in, settings.prior)?;
-        let posterior = infer(&problem, settings.inference)?;
+        let posterior = approximate(&problem, known.as_ref())?;
         let mut next = plug_in.clone();
         if moving == Moving::All {
             move_noise(&mut next, training, &gram, settings.noise, &posterior);
@@ -117,6 +117,7 @@ pub fn fit(
             });
         }
         plug_in = next;
+        known = Some(posterior);
     }
 }
 

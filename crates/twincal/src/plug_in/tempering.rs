@@ -5,7 +5,7 @@
 
 use super::{Fit, FitSettings, Moving, fit, residual_correlation_time, start, total};
 use crate::error::Result;
-use crate::infer::infer;
+use crate::infer::approximate;
 use crate::likelihood::{Columns, PlugIn, assemble};
 use crate::observations::{Observations, Part};
 use crate::posterior::Posterior;
@@ -55,12 +55,14 @@ pub fn fit_tempered(
         settings,
         &start(training, columns, settings.prior),
         Moving::All,
+        None,
     )?;
+    let known = Some(&white.posterior);
     let correlated = PlugIn {
         autocorrelation_time: (0..white.plug_in.weight.len())
             .map(|joint| residual_correlation_time(training, joint, &white.posterior.mean))
             .collect(),
-        ..white.plug_in
+        ..white.plug_in.clone()
     };
     let folds = folds(training);
     let mut candidates = Vec::new();
@@ -75,8 +77,9 @@ pub fn fit_tempered(
             settings,
             &plug_in,
             Moving::SlabScaleRoughly,
+            known,
         )?;
-        let predicted = predict_left_out(&folds, columns, settings, &fitted.plug_in)?;
+        let predicted = predict_left_out(&folds, columns, settings, &fitted)?;
         let score = score(&predicted, &fitted.plug_in);
         candidates.push((fitted, predicted, score));
     }
@@ -97,6 +100,7 @@ pub fn fit_tempered(
         settings,
         &rough.plug_in,
         Moving::SlabScale,
+        Some(&rough.posterior),
     )?;
     let interval_factor = interval_factors(&predicted, &fitted.plug_in);
     Ok((
@@ -150,12 +154,13 @@ fn predict_left_out(
     folds: &[(Vec<Part<'_>>, Vec<Part<'_>>)],
     columns: &Columns,
     settings: FitSettings<'_>,
-    plug_in: &PlugIn,
+    whole: &Fit,
 ) -> Result<Vec<Prediction>> {
+    let plug_in = &whole.plug_in;
     let mut all = Vec::new();
     for (kept, out) in folds {
         let problem = assemble(&total(kept), columns, plug_in, settings.prior)?;
-        let posterior = infer(&problem, settings.inference)?;
+        let posterior = approximate(&problem, Some(&whole.posterior))?;
         let covariance = posterior.covariance();
         let joints = plug_in.weight.len();
         let mut rows = vec![Vec::new(); joints];

@@ -5,6 +5,7 @@ use super::candidate::{Candidate, Joint, Proposal};
 use super::component::{Component, Meaning, Parameter};
 use super::expression::{Graph, Id, Slot, Tape, Variable, bounded_values};
 use super::model_column::{ModelColumn, ModelColumns};
+use super::overlaps;
 use super::propose::{About, proposals};
 use super::sentence::{Estimate, sentence};
 use super::{Family, LibrarySettings, Status, Term, user};
@@ -142,6 +143,10 @@ impl Library {
                 remedy: "add terms, or allow friction, offset, motor inertia or the generic family"
                     .to_owned(),
             });
+        }
+        let names = overlaps::spanning(&library, joints.len(), &random_motions(joints.len()));
+        for (component, names) in library.components.iter_mut().zip(names) {
+            component.alias_of = names;
         }
         Ok((library, findings))
     }

@@ -38,6 +38,7 @@ mod status;
 mod component;
 mod sentence;
 mod propose;
+mod overlaps;
 mod library;
 #[cfg(test)]
 mod tests;

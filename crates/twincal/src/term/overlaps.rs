@@ -1,0 +1,127 @@
+//! Which components no motion of this robot can tell from others: their torque lies in the others' span.
+
+use super::component::Component;
+use super::{Family, Library};
+use crate::robot::Motion;
+
+/// A column that leaves less than this part of its length outside a span lies in it.
+const TOLERANCE: f64 = 1e-9;
+/// Directions shorter than this part of a column are rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// Per component the names of those that can say the same: one other component whose columns span its columns at every
+/// state, or mass moments and tensor of one link together (a payload at that link).
+pub(super) fn spanning(library: &Library, joints: usize, states: &[Vec<[f64; 3]>]) -> Vec<Vec<String>> {
+    let columns = columns(library, joints, states);
+    let components = library.components();
+    let mut stories: Vec<(Vec<usize>, Vec<Vec<f64>>)> = (0..components.len())
+        .map(|c| (vec![c], basis(columns[c].iter())))
+        .collect();
+    for (a, b) in links(components) {
+        let both = columns[a].iter().chain(&columns[b]);
+        stories.push((vec![a, b], basis(both)));
+    }
+    (0..components.len())
+        .map(|own| {
+            let mut names: Vec<String> = Vec::new();
+            let others = stories.iter().filter(|(members, _)| !members.contains(&own));
+            for (members, basis) in others {
+                let new = members.iter().any(|&m| !names.contains(&components[m].name));
+                if new && !columns[own].is_empty() && columns[own].iter().all(|c| within(c, basis)) {
+                    names.extend(members.iter().map(|&m| components[m].name.clone()));
+                }
+            }
+            names.dedup();
+            names
+        })
+        .collect()
+}
+
+/// Mass moments and tensor of the same link.
+fn links(components: &[Component]) -> Vec<(usize, usize)> {
+    let of = |family: Family| {
+        let all = components.iter().enumerate();
+        all.filter(move |(_, c)| c.family == family)
+    };
+    let link = |c: &Component| c.name.rsplit_once('.').map(|(link, _)| link.to_owned());
+    of(Family::MassMoments)
+        .filter_map(|(a, moments)| {
+            let mut tensors = of(Family::Tensor);
+            let (b, _) = tensors.find(|(_, tensor)| link(tensor) == link(moments))?;
+            Some((a, b))
+        })
+        .collect()
+}
+
+/// Torque of the columns of each component, `[state * joints + joint]`; components that are no number at a state have none.
+fn columns(library: &Library, joints: usize, states: &[Vec<[f64; 3]>]) -> Vec<Vec<Vec<f64>>> {
+    let len = states.len();
+    let channel = |k: usize| -> Vec<f64> {
+        let joints = 0..joints;
+        let values = joints.flat_map(|joint| states.iter().map(move |state| state[joint][k]));
+        values.collect()
+    };
+    let (q, qd, qdd) = (channel(0), channel(1), channel(2));
+    let motion = Motion {
+        len,
+        q: &q,
+        qd: &qd,
+        qdd: &qdd,
+    };
+    let mut out = vec![Vec::new(); joints];
+    library.evaluate(motion, &mut out);
+    let mut dense = vec![vec![0.0; len * joints]; library.columns().len()];
+    for joint in 0..joints {
+        for (row, &column) in library.columns_of_joint(joint).iter().enumerate() {
+            for state in 0..len {
+                dense[column][state * joints + joint] = out[joint][row * len + state];
+            }
+        }
+    }
+    let mut by_component = vec![Vec::new(); library.components().len()];
+    for (column, &term) in dense.into_iter().zip(library.columns()) {
+        by_component[library.terms()[term].component].push(column);
+    }
+    for columns in &mut by_component {
+        if columns.iter().flatten().any(|value| !value.is_finite()) {
+            columns.clear();
+        }
+    }
+    by_component
+}
+
+/// Orthonormal directions of a span, by modified Gram–Schmidt, twice.
+fn basis<'a>(columns: impl Iterator<Item = &'a Vec<f64>>) -> Vec<Vec<f64>> {
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for column in columns {
+        let length = norm(column);
+        let rest = outside(column, &basis);
+        let left = norm(&rest);
+        if left > ROUNDING * length {
+            basis.push(rest.iter().map(|value| value / left).collect());
+        }
+    }
+    basis
+}
+
+fn within(column: &[f64], basis: &[Vec<f64>]) -> bool {
+    norm(&outside(column, basis)) < TOLERANCE * norm(column)
+}
+
+/// What of a column lies outside the span.
+fn outside(column: &[f64], basis: &[Vec<f64>]) -> Vec<f64> {
+    let mut rest = column.to_vec();
+    for _ in 0..2 {
+        for direction in basis {
+            let along: f64 = direction.iter().zip(&rest).map(|(a, b)| a * b).sum();
+            for (value, d) in rest.iter_mut().zip(direction) {
+                *value -= along * d;
+            }
+        }
+    }
+    rest
+}
+
+fn norm(column: &[f64]) -> f64 {
+    column.iter().map(|value| value * value).sum::<f64>().sqrt()
+}
