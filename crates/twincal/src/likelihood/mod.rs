@@ -217,7 +217,7 @@ pub fn assemble(
             slab,
             component: columns.component.clone(),
             family: columns.family.clone(),
-            odds: columns.families.iter().map(|f| f.prior_odds()).collect(),
+            odds: odds(columns, settings.inclusion),
             lower: columns.lower.clone(),
             inclusion: inclusion(settings.inclusion, columns.family.len())?,
             shape,
@@ -226,6 +226,21 @@ pub fn assemble(
         names: columns.names.clone(),
     })
 }
+
+/// r_f of every family: b_f = (C/m0 − 1)/r_f. With an inclusion prior that the user gives all are equal but for the
+/// family's own preference; unasked, b_f = 1 for what nearly every geared joint has (P(z = 1) = ½).
+fn odds(columns: &Columns, given: Option<Inclusion>) -> Vec<f64> {
+    let expected = DEFAULT_EXPECTED.min(columns.family.len() as f64 / 2.0);
+    let even = columns.family.len() as f64 / expected - 1.0;
+    let odds = |family: &Family| match given {
+        None if family.is_usual() => even,
+        _ => family.prior_odds(),
+    };
+    columns.families.iter().map(odds).collect()
+}
+
+/// Components that are expected where nothing is said.
+const DEFAULT_EXPECTED: f64 = 5.0;
 
 /// a0 of the automatic noise prior; b0 = a0 · mean(y²).
 pub const AUTO_SHAPE: f64 = 1e-3;
@@ -241,7 +256,7 @@ fn scale_of_residual(mean_square: f64) -> f64 {
 /// [`Error::Setting`] for a probability outside (0, 1) or an expected number that is not below C.
 pub fn inclusion(given: Option<Inclusion>, columns: usize) -> Result<Inclusion> {
     match given {
-        None => Ok(Inclusion::ExpectedTerms((columns as f64 / 2.0).min(5.0))),
+        None => Ok(Inclusion::ExpectedTerms((columns as f64 / 2.0).min(DEFAULT_EXPECTED))),
         Some(Inclusion::Probability(p)) if p > 0.0 && p < 1.0 => Ok(Inclusion::Probability(p)),
         Some(Inclusion::Probability(p)) => Err(Error::Setting {
             key: "prior.inclusion.probability".into(),

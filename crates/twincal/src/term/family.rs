@@ -136,6 +136,12 @@ impl Family {
         }
     }
 
+    /// True for what nearly every geared joint has: in or out is even before the data.
+    #[must_use]
+    pub fn is_usual(self) -> bool {
+        matches!(self, Self::Viscous | Self::Coulomb | Self::MotorInertia)
+    }
+
     /// True for everything that dissipates.
     #[must_use]
     pub fn is_friction(self) -> bool {
