@@ -74,8 +74,15 @@ pub fn compare(before: &Twin, after: &Twin) -> Result<Vec<Change>> {
     }
     let sides = [Side::new(before, STREAMS.0)?, Side::new(after, STREAMS.1)?];
     let mut names: Vec<&str> = sides[0].names().collect();
-    names.extend(sides[1].names().filter(|name| sides[0].find(name).is_none()));
-    Ok(names.into_iter().filter_map(|name| change(name, &sides)).collect())
+    names.extend(
+        sides[1]
+            .names()
+            .filter(|name| sides[0].find(name).is_none()),
+    );
+    Ok(names
+        .into_iter()
+        .filter_map(|name| change(name, &sides))
+        .collect())
 }
 
 /// A twin with its library and draws.
@@ -99,7 +106,10 @@ impl Side {
     }
 
     fn find(&self, name: &str) -> Option<usize> {
-        self.library.components().iter().position(|c| c.name == name)
+        self.library
+            .components()
+            .iter()
+            .position(|c| c.name == name)
     }
 
     /// Column of each term of a component.
@@ -143,7 +153,8 @@ fn change(name: &str, sides: &[Side; 2]) -> Option<Change> {
         match at[side] {
             Some(component) => {
                 let columns = sides[side].columns(component);
-                rows.map(|row| sides[side].values(component, &columns, row)).collect()
+                rows.map(|row| sides[side].values(component, &columns, row))
+                    .collect()
             }
             None => rows.map(|_| vec![0.0; parameters.len()]).collect(),
         }
@@ -153,7 +164,12 @@ fn change(name: &str, sides: &[Side; 2]) -> Option<Change> {
         .enumerate()
         .map(|(p, parameter)| {
             let of = |side: usize| table[side].iter().map(move |row| row[p]);
-            parameter_change(parameter.name, parameter.unit, of(0).collect(), of(1).collect())
+            parameter_change(
+                parameter.name,
+                parameter.unit,
+                of(0).collect(),
+                of(1).collect(),
+            )
         })
         .collect();
     let changed = parameters.iter().any(|p| p.certainty > 1.0 - DOUBT);
@@ -181,9 +197,8 @@ fn parameter_change(
     let centre = mean(&difference);
     let square: f64 = difference.iter().map(|d| (d - centre) * (d - centre)).sum();
     let quantile = |level: f64| difference[((count - 1.0) * level).round() as usize];
-    let share = |test: fn(f64) -> bool| {
-        difference.iter().filter(|d| test(**d)).count() as f64 / count
-    };
+    let share =
+        |test: fn(f64) -> bool| difference.iter().filter(|d| test(**d)).count() as f64 / count;
     ParameterChange {
         name,
         unit,
@@ -198,8 +213,10 @@ fn parameter_change(
 /// The surest changes of a component in one sentence.
 fn words(story: &str, parameters: &[ParameterChange]) -> String {
     let clearness = |p: &ParameterChange| p.difference.abs() / p.sd.max(f64::MIN_POSITIVE);
-    let mut order: Vec<&ParameterChange> =
-        parameters.iter().filter(|p| p.difference.is_finite()).collect();
+    let mut order: Vec<&ParameterChange> = parameters
+        .iter()
+        .filter(|p| p.difference.is_finite())
+        .collect();
     order.sort_by(|a, b| clearness(b).total_cmp(&clearness(a)));
     order.truncate(2);
     let told: Vec<String> = order

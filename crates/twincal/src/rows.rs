@@ -12,8 +12,8 @@ mod unfiltered;
 
 use crate::error::Result;
 use crate::robot::Robot;
-use crate::signal::{Pipeline, Trajectory};
-use crate::term::Library;
+use crate::signal::{Payload, Pipeline, Trajectory};
+use crate::term::{Library, Scratch};
 
 /// Which rows [`visit_rows`] gives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,12 +69,14 @@ pub const MAX_BLOCK: usize = 256;
 
 /// Visits all rows of a trajectory in order, in blocks of at most [`MAX_BLOCK`] rows.
 ///
+/// A known payload of the log is part of the nominal torque; where the payload component does not act its columns are 0.
+///
 /// With the pipeline off both signals are the input rows. Otherwise [`RowSignal::Filtered`] keeps every m-th sample of
 /// the segment's inner part, m = max(1, round(log rate / `rate_hz`)), from the first sample where F fits; a segment shorter than
 /// F gives none. Memory is that of one chunk; the values do not depend on how the work was cut.
 ///
 /// # Errors
-/// What `visit` returns; visiting stops there.
+/// What `visit` returns; visiting stops there. Those of [`Robot::carrying`].
 pub fn visit_rows(
     robot: &Robot,
     library: &Library,
@@ -83,14 +85,35 @@ pub fn visit_rows(
     signal: RowSignal,
     visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
 ) -> Result<()> {
+    // A known payload is part of the robot in this log.
+    let loaded = match trajectory.payload {
+        Payload::Known { mass, com } => {
+            let robot = robot.carrying(library.payload_frame(robot), mass, com)?;
+            Some((library.on(&robot), robot))
+        }
+        Payload::None | Payload::Unknown => None,
+    };
+    let (library, robot) = match &loaded {
+        Some((library, robot)) => (library, robot),
+        None => (library, robot),
+    };
     let columns: Vec<&[usize]> = (0..trajectory.dof)
         .map(|joint| library.columns_of_joint(joint))
         .collect();
+    let absent = if trajectory.payload_acts {
+        Vec::new()
+    } else {
+        library.payload_entries()
+    };
+    let mut scratch = Scratch::default();
     let mut model = evaluate::Model {
         columns,
         evaluate: &mut |motion, nominal, out| {
             crate::robot::nominal_torque(robot, motion, nominal);
-            library.evaluate(motion, out);
+            library.evaluate_with(motion, out, &mut scratch);
+            for &(joint, row) in &absent {
+                out[joint][row * motion.len..(row + 1) * motion.len].fill(0.0);
+            }
         },
     };
     visit_model(&mut model, pipeline, trajectory, signal, visit)

@@ -8,7 +8,7 @@ use crate::failure::{GATE, Outcome};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use serde::Serialize;
-use twincal::signal::{Recording, align};
+use twincal::signal::Recording;
 use twincal::twin::Twin;
 use twincal::validate::{HeldOut, Scores, Split, Validation};
 use twincal::{Finding, Result};
@@ -107,7 +107,7 @@ fn score(twin: &Twin, logs: &LogInput, findings: &mut Vec<Finding>) -> Result<Va
     let mut scores = HeldOut::new(names.clone());
     for recording in &logs.recordings {
         require_torque(recording, &names)?;
-        let (trajectory, more) = align(&twin.robot, recording, &twin.pipeline)?;
+        let (trajectory, more) = twin.align(recording)?;
         findings.extend(more);
         scores.score(
             &twin.robot,

@@ -10,7 +10,7 @@ use crate::terminal::Terminal;
 use serde::Serialize;
 use std::io::{self, BufWriter, Write};
 use twincal::rows::{RowSignal, visit_rows};
-use twincal::signal::{Recording, align};
+use twincal::signal::Recording;
 use twincal::term::Library;
 use twincal::twin::{Predictor, TorqueSignal, Twin};
 use twincal::{Finding, Result, Severity};
@@ -169,7 +169,7 @@ impl Prediction {
         recording: &Recording,
         table: &mut TableWriter<W>,
     ) -> Result<io::Result<()>> {
-        let (trajectory, more) = align(&twin.robot, recording, &twin.pipeline)?;
+        let (trajectory, more) = twin.align(recording)?;
         self.findings.extend(more);
         let mut written = Ok(());
         visit_rows(

@@ -10,10 +10,10 @@ mod settings;
 mod unknown_keys;
 
 pub use file::{
-    Allow, AutoWord, BaseTable, CheckTable, ColumnsTable, ConfigFile, FamilyWord, Friction, InclusionTable,
-    InferenceTable, LibraryTable, LogEntry, LogTable, MethodWord, ModelTable, NoisePrior,
-    NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PriorTable, SignalTable, Slab,
-    UnknownWord,
+    Allow, AutoWord, BaseTable, CheckTable, ColumnsTable, ConfigFile, FamilyWord, Friction,
+    InclusionTable, InferenceTable, LibraryTable, LogEntry, LogTable, MethodWord, ModelTable,
+    NoisePrior, NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PriorTable,
+    SignalTable, Slab, UnknownWord,
 };
 pub use settings::{Gates, LogSettings, OneLog, Settings};
 

@@ -230,6 +230,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
                 .enumerate()
                 .map(|(j, _)| [-1.2, 1.4 + 0.1 * j as f64, -3.1, 3.0, -14.2, 13.9])
                 .collect(),
+            payload_where_unknown: false,
         },
         components: components(&terms),
         terms,

@@ -3,10 +3,11 @@
 use super::refuse;
 use super::result::LogSummary;
 use crate::error::{Finding, Result, Severity};
+use crate::likelihood::Columns;
 use crate::observations::{Observations, observe};
 use crate::robot::Robot;
 use crate::rows::{RowSignal, visit_rows};
-use crate::signal::{Pipeline, Recording, Trajectory, align};
+use crate::signal::{Payload, Pipeline, Recording, Trajectory, align};
 use crate::term::Library;
 
 /// A column whose root mean square is below this share of the largest of its joints' torque is zero on these data.
@@ -38,10 +39,12 @@ impl Data {
         heldout: &[Recording],
     ) -> Result<Self> {
         let mut findings = Vec::new();
+        let unknown = carry_something(logs.iter().chain(heldout));
         let mut read = |logs: &[Recording], role: &str| -> Result<Vec<Log>> {
             logs.iter()
                 .map(|recording| {
-                    let (trajectory, mut more) = align(robot, recording, pipeline)?;
+                    let (mut trajectory, mut more) = align(robot, recording, pipeline)?;
+                    trajectory.payload_acts = !unknown || recording.payload == Payload::Unknown;
                     findings.append(&mut more);
                     let observations = observe(robot, library, pipeline, &trajectory)?;
                     let summary = summary(robot, recording, role, &trajectory, &observations);
@@ -108,16 +111,19 @@ impl Data {
     }
 
     /// Refuses a question with fewer rows than it needs.
-    pub(super) fn require_enough(&self, robot: &Robot) -> Result<()> {
+    ///
+    /// Columns with a physical prior do not count: what the data do not say about an inertia, the prior does.
+    pub(super) fn require_enough(&self, robot: &Robot, asking: &Columns) -> Result<()> {
         let names = robot.joint_names();
         let (mut rows, mut columns, mut culprit) = (0, 0, 0);
         for joint in 0..names.len() {
             let kept: u64 = self.fit.iter().map(|log| log.summary.rows[joint]).sum();
             rows = rows.max(kept as usize);
-            let count = self
-                .fit
-                .first()
-                .map_or(0, |log| log.observations.joints[joint].columns.len());
+            let asks = |column: &&usize| asking.prior_sd[**column].is_none();
+            let count = self.fit.first().map_or(0, |log| {
+                let columns = &log.observations.joints[joint].columns;
+                columns.iter().filter(asks).count()
+            });
             if count > columns {
                 (columns, culprit) = (count, joint);
             }
@@ -208,6 +214,11 @@ impl Data {
             })
             .collect()
     }
+}
+
+/// True if some log says that the robot carried something unknown: then the payload component acts in those logs only.
+pub(super) fn carry_something<'a>(mut logs: impl Iterator<Item = &'a Recording>) -> bool {
+    logs.any(|log| log.payload == Payload::Unknown)
 }
 
 /// Adds the squares of the moving rows to `(sum, count)`.

@@ -121,12 +121,12 @@ pub fn calibrate(
     let mut data = Data::read(robot, &library, &pipeline, logs, heldout)?;
     findings.extend(self_check(robot, &pipeline, data.trajectories())?);
     let (library, zero_columns) = data.drop_zero_columns(library);
-    data.require_enough(robot)?;
+    let columns = columns_of(robot, &library, settings.library.nonnegative);
+    data.require_enough(robot, &columns)?;
     findings.append(&mut data.findings);
 
     // eq. (5): sparse regression with everything that is plugged in at its fixed point
     progress(Stage::Inference);
-    let columns = columns_of(robot, &library, settings.library.nonnegative);
     let training: Vec<Part<'_>> = data
         .fit
         .iter()
@@ -148,6 +148,7 @@ pub fn calibrate(
         posterior: fitted.fit.posterior.clone(),
         noise: noise_of(robot, &fitted, &training, &out_of_band),
         hull: data.hull(robot),
+        payload_where_unknown: data::carry_something(logs.iter().chain(heldout)),
     };
     let validation = held_out::validate(&skeleton, &library, &data, &columns, settings, progress)?;
 

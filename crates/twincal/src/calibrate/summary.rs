@@ -155,9 +155,7 @@ fn sensitivity(problem: &Problem, posterior: &Posterior) -> Result<Vec<Vec<f64>>
     }
     let pips: Vec<Vec<f64>> = variants
         .iter()
-        .map(|variant| {
-            approximate(variant, Some(posterior)).map(|posterior| posterior.inclusion)
-        })
+        .map(|variant| approximate(variant, Some(posterior)).map(|posterior| posterior.inclusion))
         .collect::<Result<_>>()?;
     Ok((0..problem.names.len())
         .map(|k| pips.iter().map(|p| p[k]).collect())

@@ -1,8 +1,8 @@
 //! Does an estimate depend on the cut-off? The same fit at 0.7 and 1.4 times f_c (method section 1).
 
+use super::CalibrationSettings;
 use super::data::Data;
 use super::result::SweepPoint;
-use super::CalibrationSettings;
 use crate::error::{Finding, Result, Severity};
 use crate::infer::approximate;
 use crate::likelihood::{Columns, assemble};

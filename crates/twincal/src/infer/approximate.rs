@@ -2,15 +2,16 @@
 //!
 //! What is reported at the end comes from [`super::infer`].
 
+use super::EXACT_LIMIT;
 use super::answer::{Averages, Listed, posterior};
-use super::search::{self, Found, Start};
+use super::search::{self, Care, Found, Start};
 use super::standard::Standard;
 use super::{bounds, certain};
 use crate::error::Result;
 use crate::posterior::{Method, Posterior, Problem};
 
 /// Models that a search expands at most: many where the columns are few, so that the time is about the same.
-const BUDGET: (usize, usize) = (256, 3000);
+const BUDGET: (usize, usize) = (64, 3000);
 /// That many times K² between the two.
 const WORK: usize = 1_000_000;
 /// Share of the mass and most models in the list.
@@ -22,7 +23,12 @@ pub(super) fn approximate(problem: &Problem, warm: Option<&Posterior>) -> Result
     let standard = Standard::new(problem)?;
     let size = standard.size().max(1);
     let budget = (WORK / (size * size)).clamp(BUDGET.0, BUDGET.1);
-    let found = search(&standard, problem, warm, budget);
+    let care = if standard.blocks.len() > EXACT_LIMIT {
+        Care::Loop
+    } else {
+        Care::Full
+    };
+    let found = search(&standard, problem, warm, budget, care);
     let total = found.sums.total() / (1.0 - found.missing);
     let listed = Listed::new(
         &standard,
@@ -52,6 +58,7 @@ pub(super) fn search(
     problem: &Problem,
     warm: Option<&Posterior>,
     budget: usize,
+    care: Care,
 ) -> Found {
     let sure = certain::components(standard, &problem.prior);
     let (certain, active): (Vec<usize>, Vec<usize>) =
@@ -88,6 +95,7 @@ pub(super) fn search(
             active: &active,
             warm: &starts,
             budget,
+            care,
         },
     )
 }

@@ -17,6 +17,7 @@ mod propagation;
 
 use super::answer::{Averages, Listed};
 use super::approximate;
+use super::search::Care;
 use super::standard::{Standard, slab_mass};
 use crate::error::Result;
 use crate::linear_algebra::Cholesky;
@@ -121,7 +122,7 @@ pub(super) fn settle(
     if !standard.bounded {
         return Ok(listed);
     }
-    let found = approximate::search(standard, problem, None, BUDGET);
+    let found = approximate::search(standard, problem, None, BUDGET, Care::Full);
     let known: BTreeMap<Vec<u32>, f64> = listed
         .models
         .iter()

@@ -16,10 +16,14 @@ use std::collections::{BTreeMap, BinaryHeap};
 
 /// ln of the weight, relative to the heaviest model, below which a model is not kept.
 const NEGLIGIBLE: f64 = -28.0;
+/// The same for loops, where a third digit decides nothing.
+const NEGLIGIBLE_IN_LOOPS: f64 = -14.0;
 /// ln of the weight, relative to the heaviest model, above which exchanges are tried as well.
 const EXCHANGED: f64 = -4.6;
 /// Share of the mass that may be missing.
 const MISSING: f64 = 1e-6;
+/// The same for loops.
+const MISSING_IN_LOOPS: f64 = 1e-3;
 /// Weight of the last expansion beside the one after it, in the estimate of what is missing.
 const FORGET: f64 = 0.8;
 /// Models that are expanded at least: an estimate of what is missing needs a few.
@@ -48,6 +52,33 @@ pub(super) struct Start<'a> {
     pub(super) warm: &'a [Vec<usize>],
     /// Models that are expanded at most.
     pub(super) budget: usize,
+    /// How well the mass must be known.
+    pub(super) care: Care,
+}
+
+/// How well a search must know the mass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Care {
+    /// For a reported answer.
+    Full,
+    /// For fixed points and folds over many components.
+    Loop,
+}
+
+impl Care {
+    fn negligible(self) -> f64 {
+        match self {
+            Self::Full => NEGLIGIBLE,
+            Self::Loop => NEGLIGIBLE_IN_LOOPS,
+        }
+    }
+
+    fn missing(self) -> f64 {
+        match self {
+            Self::Full => MISSING,
+            Self::Loop => MISSING_IN_LOOPS,
+        }
+    }
 }
 
 /// Runs a search.
@@ -88,6 +119,7 @@ impl WithSimd for Run<'_> {
             walker,
             active: start.active,
             exchanges: &exchanges,
+            care: start.care,
         };
         search.begin(simd, start.warm);
         search.expand(simd, start.budget)
@@ -157,6 +189,7 @@ struct Search<'a> {
     queue: BinaryHeap<Candidate>,
     sums: Sums,
     best: f64,
+    care: Care,
 }
 
 impl Search<'_> {
@@ -236,7 +269,7 @@ impl Search<'_> {
             let block = self.active[index];
             let (gain, excess) = self.walker.flip_gain(block);
             // The bounds can only take weight away.
-            if now + gain < self.best + NEGLIGIBLE {
+            if now + gain < self.best + self.care.negligible() {
                 continue;
             }
             let mut other = set.to_vec();
@@ -246,7 +279,7 @@ impl Search<'_> {
             }
             let moments = after_flip(&self.walker, block, excess);
             let log_weight = now + gain + moments.log_mass(self.walker.standard);
-            if log_weight >= self.best + NEGLIGIBLE {
+            if log_weight >= self.best + self.care.negligible() {
                 self.sums.add(log_weight, &moments);
                 self.keep(other, log_weight);
             }
@@ -261,7 +294,7 @@ impl Search<'_> {
             let Some(step) = self.exchanges[index].step(&self.walker) else {
                 continue;
             };
-            if now + self.walker.exchange_gain(&step) < self.best + NEGLIGIBLE {
+            if now + self.walker.exchange_gain(&step) < self.best + self.care.negligible() {
                 continue;
             }
             self.walker.take(simd, &step);
@@ -300,7 +333,7 @@ impl Search<'_> {
             let waiting = (self.sums.total() - expanded).max(0.0);
             let rate = (brought / recent).min(1.0);
             missing = (waiting * rate / self.sums.total()).min(0.5);
-            if missing < MISSING && step >= LEAST_EXPANDED {
+            if missing < self.care.missing() && step >= LEAST_EXPANDED {
                 break;
             }
         }

@@ -256,7 +256,9 @@ fn scale_of_residual(mean_square: f64) -> f64 {
 /// [`Error::Setting`] for a probability outside (0, 1) or an expected number that is not below C.
 pub fn inclusion(given: Option<Inclusion>, columns: usize) -> Result<Inclusion> {
     match given {
-        None => Ok(Inclusion::ExpectedTerms((columns as f64 / 2.0).min(DEFAULT_EXPECTED))),
+        None => Ok(Inclusion::ExpectedTerms(
+            (columns as f64 / 2.0).min(DEFAULT_EXPECTED),
+        )),
         Some(Inclusion::Probability(p)) if p > 0.0 && p < 1.0 => Ok(Inclusion::Probability(p)),
         Some(Inclusion::Probability(p)) => Err(Error::Setting {
             key: "prior.inclusion.probability".into(),

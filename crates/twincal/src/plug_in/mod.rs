@@ -25,6 +25,12 @@ const ROUNDS: usize = 20;
 const ROUGH_ROUNDS: usize = 4;
 /// Relative change of every plug-in below which the iteration has converged.
 const TOLERANCE: f64 = 1e-6;
+/// Components beyond which a posterior in the loop is itself known to about 1e-3, and its fixed point no better.
+const MANY: usize = 28;
+/// The same three numbers with many components.
+const MANY_ROUNDS: usize = 8;
+const MANY_ROUGH_ROUNDS: usize = 2;
+const MANY_TOLERANCE: f64 = 3e-3;
 /// Bounds of a learned slab scale v.
 const SLAB_BOUNDS: (f64, f64) = (1e-2, 1e9);
 /// v before anything is known.
@@ -66,10 +72,12 @@ pub enum Moving {
 }
 
 impl Moving {
-    fn rounds(self) -> usize {
-        match self {
-            Self::All | Self::SlabScale => ROUNDS,
-            Self::SlabScaleRoughly => ROUGH_ROUNDS,
+    fn rounds(self, components: usize) -> usize {
+        match (self, components > MANY) {
+            (Self::All | Self::SlabScale, false) => ROUNDS,
+            (Self::All | Self::SlabScale, true) => MANY_ROUNDS,
+            (Self::SlabScaleRoughly, false) => ROUGH_ROUNDS,
+            (Self::SlabScaleRoughly, true) => MANY_ROUGH_ROUNDS,
         }
     }
 }
@@ -91,6 +99,12 @@ pub fn fit(
     let gram = total(training);
     let mut plug_in = start.clone();
     let mut known = known.cloned();
+    let components = columns.family.len();
+    let tolerance = if components > MANY {
+        MANY_TOLERANCE
+    } else {
+        TOLERANCE
+    };
     let mut rounds = 0;
     loop {
         rounds += 1;
@@ -106,8 +120,8 @@ pub fn fit(
                 next.noise = posterior.noise;
             }
         }
-        let converged = largest_change(&plug_in, &next) < TOLERANCE;
-        if converged || rounds == moving.rounds() {
+        let converged = largest_change(&plug_in, &next) < tolerance;
+        if converged || rounds == moving.rounds(components) {
             return Ok(Fit {
                 plug_in,
                 problem,

@@ -2,7 +2,7 @@
 
 use super::mixture::{Level, Mixture};
 use super::student::StudentT;
-use super::{Model, Posterior};
+use super::{Method, Model, Posterior};
 use crate::linear_algebra::Cholesky;
 
 /// What is known about the coefficient β_k of one column, in its own unit.
@@ -35,7 +35,15 @@ impl ColumnSummary {
     ) -> Self {
         let pip = posterior.inclusion[column].clamp(0.0, 1.0);
         let (mean, sd) = (posterior.mean[column], posterior.sd[column]);
+        let summed = matches!(posterior.method, Method::Exact { .. })
+            && posterior.models.iter().all(|model| model.sites.is_empty());
+        let from_models = components.moments(student).filter(|_| !summed);
         let conditional = (pip > 0.0).then(|| {
+            // Sums over all models are exact. Sampled or bounded ones round the three numbers each in its own way: their
+            // difference is no variance, the models' own is.
+            if let Some(moments) = from_models {
+                return moments;
+            }
             // E[β² | y] = pip · E[β² | y, z = 1], and the same for the mean.
             let conditional_mean = mean / pip;
             // sd² = pip·s² + pip(1 − pip)·m², solved for s² without the cancellation of raw second moments.
@@ -112,6 +120,23 @@ impl Components {
             self.locations.push(location);
             self.scales.push((model.scale / shape * variance).sqrt());
         }
+    }
+
+    /// Mean and sd given that the column is in; `None` without models that hold it.
+    fn moments(&self, student: &StudentT) -> Option<(f64, f64)> {
+        let freedom = student.dof();
+        let mass: f64 = self.weights.iter().sum();
+        if mass <= 0.0 || freedom <= 2.0 {
+            return None;
+        }
+        let average = |value: &dyn Fn(usize) -> f64| {
+            let terms = self.weights.iter().enumerate();
+            terms.map(|(i, w)| w * value(i)).sum::<f64>() / mass
+        };
+        let mean = average(&|i| self.locations[i]);
+        let within = average(&|i| self.scales[i] * self.scales[i]) * freedom / (freedom - 2.0);
+        let between = average(&|i| (self.locations[i] - mean) * (self.locations[i] - mean));
+        Some((mean, (within + between).sqrt()))
     }
 
     fn interval95(&self, student: &StudentT, spike: f64) -> [f64; 2] {

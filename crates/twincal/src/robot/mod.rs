@@ -12,6 +12,7 @@ mod tree;
 mod coordinates;
 mod bodies;
 mod parameters;
+mod carry;
 mod lane_vectors;
 mod recursion;
 mod dynamics;

@@ -4,7 +4,7 @@ use super::evaluate::Model;
 use super::*;
 use crate::robot::Motion;
 use crate::signal::fir::column_kernel;
-use crate::signal::{DerivedFrom, LoggedSamples, Segment};
+use crate::signal::{DerivedFrom, LoggedSamples, Payload, Segment};
 
 const COLUMNS: [&[usize]; 2] = [&[0, 2, 3], &[1, 2]];
 const BETA: [f64; 4] = [0.7, -1.3, 0.25, 2.0];
@@ -81,6 +81,8 @@ fn trajectory(samples: usize, interval: f64) -> Trajectory {
         name: "stand-in".into(),
         dof: 2,
         segments: vec![segment],
+        payload: Payload::None,
+        payload_acts: true,
     }
 }
 

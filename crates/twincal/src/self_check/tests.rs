@@ -4,7 +4,7 @@ use super::*;
 use crate::robot::{
     Inertia, JointDescription, LinkDescription, Motion, RobotDescription, nominal_torque,
 };
-use crate::signal::Segment;
+use crate::signal::{Payload, Segment};
 use std::collections::BTreeMap;
 
 const LEN: usize = 4000;
@@ -104,6 +104,8 @@ fn log(seed: f64) -> Trajectory {
         name: "run".into(),
         dof,
         segments: vec![segment],
+        payload: Payload::None,
+        payload_acts: true,
     }
 }
 

@@ -32,6 +32,8 @@ pub(crate) fn align(
         name: log.name.clone(),
         dof: joints.len(),
         segments: Vec::with_capacity(prepared.pieces.len()),
+        payload: log.payload,
+        payload_acts: true,
     };
     if every_row {
         trajectory.segments = prepared

@@ -157,6 +157,10 @@ pub struct Trajectory {
     pub dof: usize,
     /// In time order.
     pub segments: Vec<Segment>,
+    /// What the robot carried: a known payload enters the nominal torque.
+    pub payload: Payload,
+    /// False where the payload component does not act: in logs without a payload beside logs with an unknown one.
+    pub payload_acts: bool,
 }
 
 impl Pipeline {

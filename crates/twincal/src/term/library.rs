@@ -6,7 +6,7 @@ use super::component::{Component, Meaning, Parameter};
 use super::expression::{Graph, Id, Slot, Tape, Variable, bounded_values};
 use super::model_column::{ModelColumn, ModelColumns};
 use super::overlaps;
-use super::propose::{About, proposals};
+use super::propose::{About, last_link, proposals};
 use super::sentence::{Estimate, sentence};
 use super::{Family, LibrarySettings, Status, Term, user};
 use crate::error::{Error, Finding, Result, Severity};
@@ -39,6 +39,8 @@ pub struct Library {
     by_joint: Vec<Vec<usize>>,
     tape: Arc<Tape>,
     model: Option<Arc<ModelColumns>>,
+    /// As the settings say.
+    payload_frame: Option<String>,
 }
 
 impl Library {
@@ -117,6 +119,7 @@ impl Library {
             by_joint: vec![Vec::new(); joints.len()],
             tape: Arc::default(),
             model: model.map(Arc::new),
+            payload_frame: settings.payload_frame.clone(),
         };
         let judged = candidates.into_iter().zip(statuses).zip(acting);
         for (index, ((candidate, status), acting)) in judged.enumerate() {
@@ -219,6 +222,37 @@ impl Library {
     /// Values of [`Library::parameters`] at coefficients `beta`, one per term of the component (0 for dropped ones).
     pub fn parameter_values(&self, component: usize, beta: &[f64]) -> Vec<f64> {
         Meaning::of(self.components[component].family).values(beta)
+    }
+
+    /// The same library for a robot with other inertias and the same joints.
+    pub fn on(&self, robot: &Robot) -> Self {
+        Self {
+            model: self.model.as_ref().map(|model| Arc::new(model.on(robot))),
+            ..self.clone()
+        }
+    }
+
+    /// The link in whose frame payloads are described.
+    pub fn payload_frame<'a>(&'a self, robot: &'a Robot) -> &'a str {
+        match &self.payload_frame {
+            Some(name) => name,
+            None => last_link(robot),
+        }
+    }
+
+    /// `(joint, row in the joint's table)` of every column of the payload component.
+    pub fn payload_entries(&self) -> Vec<(usize, usize)> {
+        let is_payload = |column: usize| self.terms[self.columns[column]].family == Family::Payload;
+        let of_joint = |(joint, columns): (usize, &Vec<usize>)| -> Vec<(usize, usize)> {
+            let rows = columns.iter().enumerate();
+            let own = rows.filter(|(_, column)| is_payload(**column));
+            own.map(|(row, _)| (joint, row)).collect()
+        };
+        self.by_joint
+            .iter()
+            .enumerate()
+            .flat_map(of_joint)
+            .collect()
     }
 
     /// True if parameter `parameter` of a component is the coefficient of its term at the same place.

@@ -135,6 +135,14 @@ impl ModelColumns {
         }
     }
 
+    /// The same columns of a robot with other inertias.
+    pub(super) fn on(&self, robot: &Robot) -> Self {
+        Self {
+            outputs: self.outputs.clone(),
+            ..Self::new(Arc::new(robot.clone()))
+        }
+    }
+
     /// Adds a column.
     pub(super) fn push(&mut self, column: ModelColumn, slots: Vec<(usize, usize)>) {
         self.outputs.push(Output { column, slots });

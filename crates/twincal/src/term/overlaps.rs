@@ -11,7 +11,11 @@ const ROUNDING: f64 = 1e-12;
 
 /// Per component the names of those that can say the same: one other component whose columns span its columns at every
 /// state, or mass moments and tensor of one link together (a payload at that link).
-pub(super) fn spanning(library: &Library, joints: usize, states: &[Vec<[f64; 3]>]) -> Vec<Vec<String>> {
+pub(super) fn spanning(
+    library: &Library,
+    joints: usize,
+    states: &[Vec<[f64; 3]>],
+) -> Vec<Vec<String>> {
     let columns = columns(library, joints, states);
     let components = library.components();
     let mut stories: Vec<(Vec<usize>, Vec<Vec<f64>>)> = (0..components.len())
@@ -24,10 +28,15 @@ pub(super) fn spanning(library: &Library, joints: usize, states: &[Vec<[f64; 3]>
     (0..components.len())
         .map(|own| {
             let mut names: Vec<String> = Vec::new();
-            let others = stories.iter().filter(|(members, _)| !members.contains(&own));
+            let others = stories
+                .iter()
+                .filter(|(members, _)| !members.contains(&own));
             for (members, basis) in others {
-                let new = members.iter().any(|&m| !names.contains(&components[m].name));
-                if new && !columns[own].is_empty() && columns[own].iter().all(|c| within(c, basis)) {
+                let new = members
+                    .iter()
+                    .any(|&m| !names.contains(&components[m].name));
+                if new && !columns[own].is_empty() && columns[own].iter().all(|c| within(c, basis))
+                {
                     names.extend(members.iter().map(|&m| components[m].name.clone()));
                 }
             }

@@ -205,7 +205,7 @@ fn payload_frame(robot: &Robot, settings: &LibrarySettings) -> Result<LinkFrame>
 
 /// Where a tool is mounted: the last of the links that move with the last body of the longest chain. Frames without
 /// inertia (`tool0`, `flange`) come behind the link that carries them.
-fn last_link(robot: &Robot) -> &str {
+pub(super) fn last_link(robot: &Robot) -> &str {
     let last = robot.bodies().len().saturating_sub(1);
     robot.links_of_body(last).last().copied().unwrap_or("")
 }

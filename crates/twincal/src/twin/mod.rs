@@ -9,11 +9,11 @@ mod tests;
 
 pub use predictor::{JointInput, JointSetting, Predictor};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Finding, Result};
 use crate::likelihood::JointNoise;
 use crate::posterior::Posterior;
 use crate::robot::{JointKind, Robot};
-use crate::signal::Pipeline;
+use crate::signal::{Payload, Pipeline, Recording, Trajectory, align};
 use crate::term::{Family, Library, LibrarySettings};
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +34,8 @@ pub struct Twin {
     pub noise: Vec<JointNoise>,
     /// Range of the training motion per joint: `[q_min, q_max, qd_min, qd_max, qdd_min, qdd_max]`.
     pub hull: Vec<[f64; 6]>,
+    /// The payload component acts only in logs that say they carry something unknown.
+    pub payload_where_unknown: bool,
 }
 
 /// Torque of one joint over a batch of samples, with the central 95 % interval.
@@ -97,6 +99,17 @@ pub enum TorqueSignal {
 }
 
 impl Twin {
+    /// A log as a trajectory for this twin: the filters it was fitted with, and its payload only where it was carried.
+    ///
+    /// # Errors
+    /// Those of [`align`].
+    pub fn align(&self, recording: &Recording) -> Result<(Trajectory, Vec<Finding>)> {
+        let (mut trajectory, findings) = align(&self.robot, recording, &self.pipeline)?;
+        trajectory.payload_acts =
+            !self.payload_where_unknown || recording.payload == Payload::Unknown;
+        Ok((trajectory, findings))
+    }
+
     /// The library whose columns the posterior speaks of: proposed again from the settings, columns that were zero on the
     /// training data dropped.
     ///
