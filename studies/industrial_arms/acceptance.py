@@ -28,7 +28,7 @@ def link_of(truth, joint):
     import xml.etree.ElementTree as tree
 
     for element in tree.parse(truth["model"]).getroot().iter("joint"):
-        if element.get("name") == joint:
+        if element.get("name") == joint and element.find("child") is not None:
             return element.find("child").get("link")
     raise KeyError(joint)
 
@@ -37,7 +37,8 @@ def run(name, noise_time, folder, seed):
     """Truth and result.json of one study."""
     truth = simulate(name, folder, noise_time=noise_time, seed=seed)
     locked = ", ".join(f'"{joint}" = 0.0' for joint in truth["locked"])
-    (folder / "twincal.toml").write_text(f"[model]\nlocked = {{ {locked} }}\n[signal]\ncutoff_hz = 0\n")
+    (folder / "twincal.toml").write_text(f"[model]\nlocked = {{ {locked} }}\n[signal]\ncutoff_hz = 0\n"
+                                          "[library]\ncoulomb_velocity = 0.02\n")
     logs = [folder / f"train{k}.csv" for k in (1, 2, 3)]
     command = [PROGRAM, "fit", *logs, "--heldout", folder / "heldout.csv", "--model", truth["model"],
                "--config", folder / "twincal.toml", "-o", folder / "out", "--force"]

@@ -10,6 +10,7 @@ Fourier series; training and held-out logs have different ones. Every log holds 
 import argparse
 import json
 from dataclasses import dataclass
+from importlib import metadata
 from math import exp, pi
 from pathlib import Path
 
@@ -42,11 +43,9 @@ ROBOTS = {
 
 
 def model_file(name):
-    """Path of the robot's URDF in the installed package."""
-    import example_robot_data.path as place
-
-    root = Path(place.EXAMPLE_ROBOT_DATA_MODEL_DIR)
-    return root / ROBOTS[name].path
+    """Path of the robot's URDF in the installed package (which is data only)."""
+    root = metadata.distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots")
+    return Path(root) / ROBOTS[name].path
 
 
 def load(name):

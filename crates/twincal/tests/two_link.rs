@@ -11,36 +11,37 @@ use twincal::signal::align;
 use twincal::twin::Twin;
 use twincal::validate::{HeldOut, Split};
 
-/// 0.6 kg at the tip of both links of 0.5 m: ½·0.6·|velocity of the tip|² and −0.6·9.81·height, term by term. A motor's
-/// inertia is ½ I q̇², so that I is twice the coefficient of q̇².
-const TRUTH: [(&str, f64); 8] = [
-    ("sin(q1 - q2)", 0.8),
-    ("shoulder.motor_inertia", 0.6 * 0.5),
-    ("elbow.motor_inertia", 0.6 * 0.25),
-    ("qd1^2*cos(q2)", 0.6 * 0.25),
-    ("qd1*qd2", 0.6 * 0.25),
-    ("qd1*qd2*cos(q2)", 0.6 * 0.25),
-    ("sin(q1)", -0.6 * 9.81 * 0.5),
-    ("sin(q1+q2)", -0.6 * 9.81 * 0.5),
-];
-
 static STUDY: LazyLock<Calibration> = LazyLock::new(|| two_link::study().expect("a study"));
 
-/// False alarm below 1e-4: eight estimates within 4.5 sd, coverage of 4000 rows within 0.95 ± 5 sd; the seed is fixed.
+/// False alarm below 1e-4: four estimates within 4.5 sd, coverage of 4000 rows within 0.95 ± 5 sd; the seed is fixed.
 #[test]
 fn the_payload_and_the_hidden_effect_are_found_and_nothing_else() {
     let result = &*STUDY;
-    for term in result.terms.iter().filter(|term| term.pip.is_some()) {
-        let name = term.term.name.as_str();
-        let truth = TRUTH.iter().find(|(true_name, _)| *true_name == name);
-        assert_eq!(term.selected, truth.is_some(), "{name}: PIP {:?}", term.pip);
-        if let (Some((_, truth)), Some(mean), Some(sd)) = (truth, term.mean, term.sd) {
-            assert!(
-                (mean - truth).abs() < 4.5 * sd,
-                "{name}: {mean} ± {sd}, in truth {truth}"
-            );
-            assert!(term.pip > Some(0.99));
-        }
+    let found: Vec<&str> = result
+        .components
+        .iter()
+        .filter(|component| component.selected)
+        .map(|component| component.name.as_str())
+        .collect();
+    assert_eq!(found, ["sin(q1 - q2)", "payload"]);
+    // 0.6 kg more at the end of the fore link, which is 0.5 m from its joint.
+    for (component, parameter, truth) in [
+        ("sin(q1 - q2)", "value", 0.8),
+        ("payload", "mass", 0.6),
+        ("payload", "com_x", 0.5),
+        ("payload", "com_y", 0.0),
+    ] {
+        let summary = result.components.iter().find(|c| c.name == component);
+        let summary = summary.expect("a component");
+        assert!(summary.pip > Some(0.99));
+        let value = summary.parameters.iter().find(|p| p.name == parameter);
+        let value = value.expect("a parameter");
+        assert!(
+            (value.mean - truth).abs() < 4.5 * value.sd,
+            "{component} {parameter}: {} ± {}, in truth {truth}",
+            value.mean,
+            value.sd
+        );
     }
     let scores = &result.validation.filtered;
     assert!(

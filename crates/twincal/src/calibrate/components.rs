@@ -14,7 +14,7 @@ const STREAM: u64 = (1 << 32) + 1;
 /// Columns whose cosine over the rows is above this are hard to tell apart.
 const ALIKE: f64 = 0.95;
 /// Components whose inclusions are correlated below this stand for each other.
-const EXCLUSIVE: f64 = -0.4;
+const EXCLUSIVE: f64 = -0.5;
 /// Group probability below which nobody asks which member it was.
 const WORTH_TELLING: f64 = 0.2;
 
@@ -175,7 +175,7 @@ fn given(posterior: &Posterior, holds: &dyn Fn(&Model) -> bool) -> Posterior {
 /// Sets of components that these data cannot tell apart, with the probability that at least one is in.
 ///
 /// Two components belong together if they are single columns that are alike in the data (cosine above 0.95), or if their
-/// inclusions exclude each other (correlation below −0.4 over the models); chained. Only sets whose members share
+/// inclusions exclude each other (correlation below −0.5 over the models); chained. Only sets whose members share
 /// posterior mass are told: at least two with PIP between 0.02 and 0.98, and one of them in with probability ≥ 0.2.
 pub(super) fn groups(problem: &Problem, posterior: &Posterior, library: &Library) -> Vec<Group> {
     let columns = problem.prior.columns();

@@ -227,14 +227,14 @@ pub fn assemble(
     })
 }
 
-/// r_f of every family: b_f = (C/m0 − 1)/r_f. With an inclusion prior that the user gives all are equal but for the
-/// family's own preference; unasked, b_f = 1 for what nearly every geared joint has (P(z = 1) = ½).
+/// r_f of every family: b_f = (C/m0 − 1)/r_f. With an inclusion prior that the user gives all are equal; unasked, b_f = 1
+/// for what is as likely there as not (P(z = 1) = ½).
 fn odds(columns: &Columns, given: Option<Inclusion>) -> Vec<f64> {
     let expected = DEFAULT_EXPECTED.min(columns.family.len() as f64 / 2.0);
     let even = columns.family.len() as f64 / expected - 1.0;
     let odds = |family: &Family| match given {
         None if family.is_usual() => even,
-        _ => family.prior_odds(),
+        _ => 1.0,
     };
     columns.families.iter().map(odds).collect()
 }

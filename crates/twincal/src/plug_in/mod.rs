@@ -31,6 +31,8 @@ const MANY: usize = 28;
 const MANY_ROUNDS: usize = 8;
 const MANY_ROUGH_ROUNDS: usize = 2;
 const MANY_TOLERANCE: f64 = 3e-3;
+/// A residual below this share of the torque's squares is rounding.
+const ROUNDING: f64 = 1e-22;
 /// Bounds of a learned slab scale v.
 const SLAB_BOUNDS: (f64, f64) = (1e-2, 1e9);
 /// v before anything is known.
@@ -190,6 +192,14 @@ pub fn residual_runs(training: &[Part<'_>], joint: usize, beta: &[f64]) -> Vec<V
 /// Integrated autocorrelation time of a joint's residual, rows, at least 1.
 pub fn residual_correlation_time(training: &[Part<'_>], joint: usize, beta: &[f64]) -> f64 {
     let runs = residual_runs(training, joint, beta);
+    let measured = training.iter().flat_map(|part| {
+        let torque = &part.observations.joints[joint].measured;
+        torque[part.rows.clone()].iter().map(|tau| tau * tau)
+    });
+    let left: f64 = runs.iter().flatten().map(|r| r * r).sum();
+    if left <= ROUNDING * measured.sum::<f64>() {
+        return 1.0; // rounding has no memory that means anything
+    }
     let runs: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
     integrated_autocorrelation_time(&runs).max(1.0)
 }

@@ -50,6 +50,7 @@ pub struct Model {
     /// Lower Cholesky factor L of A_z = L Lᵀ, row-major, m × m.
     pub factor: Vec<f64>,
     /// Bounds that act on the coefficients; empty without bounds.
+    #[serde(default)]
     pub sites: Vec<Site>,
 }
 
@@ -104,6 +105,7 @@ pub enum Method {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Posterior {
     /// Component of each column (0..C), K.
+    #[serde(default)]
     pub component: Vec<usize>,
     /// P(z_k = 1 | y): that of the column's component, K.
     pub inclusion: Vec<f64>,

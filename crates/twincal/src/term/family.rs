@@ -126,20 +126,14 @@ impl Family {
         }
     }
 
-    /// Prior odds of its components relative to the others'. The payload is one story where a changed last link is two
-    /// (mass moments and tensor): it is preferred.
-    #[must_use]
-    pub fn prior_odds(self) -> f64 {
-        match self {
-            Self::Payload => 4.0,
-            _ => 1.0,
-        }
-    }
-
-    /// True for what nearly every geared joint has: in or out is even before the data.
+    /// True for what is as likely there as not before the data: what nearly every geared joint has, and a payload, which
+    /// is the usual reason why the last link is not what the model says.
     #[must_use]
     pub fn is_usual(self) -> bool {
-        matches!(self, Self::Viscous | Self::Coulomb | Self::MotorInertia)
+        matches!(
+            self,
+            Self::Viscous | Self::Coulomb | Self::MotorInertia | Self::Payload
+        )
     }
 
     /// True for everything that dissipates.

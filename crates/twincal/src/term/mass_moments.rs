@@ -8,8 +8,9 @@ use super::model_column::LinkFrame;
 pub(super) const COLUMNS: [(&str, &str); 4] =
     [("m", "kg"), ("mx", "kg·m"), ("my", "kg·m"), ("mz", "kg·m")];
 
-/// `<link>.mass_moments`: columns `.m`, `.mx`, `.my`, `.mz`: differences of mass and mass × centre of mass from the model,
-/// in the link's frame, the tensor about the frame's origin unchanged.
+/// `<link>.mass_moments`: columns `.m`, `.mx`, `.my`, `.mz`: differences of mass and first moments from the model, the
+/// moments about the model's centre of mass (mass × shift of the centre), axes of the link's frame; the tensor about that
+/// point is unchanged.
 ///
 /// `mass` is the prior sd of the mass, kg, and `reach` the distance in m that makes a first moment out of it.
 pub(super) fn proposal(link: &LinkFrame, mass: f64, reach: f64) -> Proposal {

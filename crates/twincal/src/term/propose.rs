@@ -9,7 +9,7 @@ use super::{
     ripple, spring, stribeck, tensor, user, viscous,
 };
 use crate::error::{Error, Finding, Result, Severity};
-use crate::robot::{Robot, did_you_mean, to_body_frame};
+use crate::robot::{Placement, Robot, did_you_mean, to_body_frame};
 
 /// Most columns a library may have.
 const TERM_LIMIT: usize = 1000;
@@ -19,6 +19,8 @@ const GENERIC_JOINTS: usize = 3;
 const LINK_SHARE: f64 = 0.5;
 /// Prior sd of a payload as a share of all moving mass.
 const PAYLOAD_SHARE: f64 = 0.2;
+/// Size of tools and workpieces, m.
+const PAYLOAD_REACH: f64 = 0.1;
 /// Share of all moving mass that counts for links that the model gives less.
 const LEAST_MASS_SHARE: f64 = 0.02;
 /// Length that makes first moments and tensors out of masses, m.
@@ -137,7 +139,7 @@ pub(super) fn proposals(
 /// Payload and, link by link, mass moments, tensor and mass scale: of the link that each moving joint carries.
 ///
 /// Their prior is physical: a link's mass is off by half of it where it is off at all (of at least 2 % of all mass), a
-/// payload weighs a fifth of all that moves, and lengths are 0.2 m.
+/// payload weighs a fifth of all that moves and is about 0.1 m large, and other lengths are 0.2 m.
 fn inertial(robot: &Robot, settings: &LibrarySettings) -> Result<Vec<Proposal>> {
     let names = robot.bodies();
     let parameters: Vec<[f64; 10]> = (0..names.len())
@@ -151,7 +153,7 @@ fn inertial(robot: &Robot, settings: &LibrarySettings) -> Result<Vec<Proposal>> 
             Some(LinkFrame {
                 name: link.to_owned(),
                 body,
-                to_body: to_body_frame(&placement),
+                to_body: to_body_frame(&at_centre_of_mass(robot, link, placement)),
             })
         })
         .collect();
@@ -167,7 +169,7 @@ fn inertial(robot: &Robot, settings: &LibrarySettings) -> Result<Vec<Proposal>> 
         } else {
             1.0
         };
-        all.push(payload::proposal(&frame, mass, REACH));
+        all.push(payload::proposal(&frame, mass, PAYLOAD_REACH));
     }
     let links = || links.iter();
     if settings.has(Family::MassMoments) {
@@ -180,6 +182,20 @@ fn inertial(robot: &Robot, settings: &LibrarySettings) -> Result<Vec<Proposal>> 
         all.extend(links().map(|link| mass_scale::candidate(link, parameters[link.body]).into()));
     }
     Ok(all)
+}
+
+/// The link's frame moved to the link's nominal centre of mass: about that point a change of mass, a shift of the centre
+/// and a change of the tensor are three things and not one (to first order).
+fn at_centre_of_mass(robot: &Robot, link: &str, placement: Placement) -> Placement {
+    let mut links = robot.description().links.iter();
+    let own = links.find(|other| other.name == link);
+    let inertia = own.and_then(|own| own.inertia.as_ref());
+    Placement {
+        translation: inertia.map_or(placement.translation, |inertia| {
+            placement.point(inertia.com)
+        }),
+        ..placement
+    }
 }
 
 /// The frame of `payload_frame`, or of the last link.

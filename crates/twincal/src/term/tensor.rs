@@ -7,8 +7,8 @@ use super::model_column::LinkFrame;
 /// Names of the six, in the order of the regressor's parameters 4…9.
 pub(super) const COLUMNS: [&str; 6] = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"];
 
-/// `<link>.tensor`: columns `.ixx` … `.izz`: differences of the inertia tensor from the model, kg·m², axes of the link's
-/// frame. With mass and first moments unchanged, the difference about the centre of mass is the same.
+/// `<link>.tensor`: columns `.ixx` … `.izz`: differences of the inertia tensor about the centre of mass from the model,
+/// kg·m², axes of the link's frame.
 ///
 /// `inertia` is the prior sd of every entry, kg·m².
 pub(super) fn proposal(link: &LinkFrame, inertia: f64) -> Proposal {

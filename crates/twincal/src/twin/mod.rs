@@ -35,6 +35,7 @@ pub struct Twin {
     /// Range of the training motion per joint: `[q_min, q_max, qd_min, qd_max, qdd_min, qdd_max]`.
     pub hull: Vec<[f64; 6]>,
     /// The payload component acts only in logs that say they carry something unknown.
+    #[serde(default)]
     pub payload_where_unknown: bool,
 }
 

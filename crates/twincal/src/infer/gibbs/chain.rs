@@ -6,6 +6,7 @@
 //! product Π(1 − f), says where the next flip is. A scan without flips is C/8 multiplications.
 //! Components that every model with weight holds ([`crate::infer::certain`]) are in from the start and stay.
 
+use super::jumps::Jumps;
 use super::random::Source;
 use super::swaps::Swaps;
 use crate::infer::exchanges::Exchange;
@@ -18,6 +19,8 @@ use std::collections::BTreeMap;
 
 /// Largest acceptance probability of a move: below 1, or a chain could alternate for ever.
 pub(super) const LAZY: f64 = 0.95;
+/// Exchanges that a scan proposes; most are void.
+const EXCHANGES: usize = 8;
 /// Ratios beyond this count as this.
 const RATIO_MAX: f64 = 1e300;
 
@@ -38,6 +41,8 @@ pub(super) struct Target<'a> {
     pub(super) certain: &'a [bool],
     /// Exchanges in which a component of several columns takes part.
     pub(super) exchanges: &'a [Exchange],
+    /// Models to jump between.
+    pub(super) jumps: &'a Jumps,
 }
 
 /// What a chain found. Arrays `[component * draws + draw]` (`beta`: position), natural units.
@@ -120,8 +125,11 @@ impl Run<'_> {
             visits: BTreeMap::new(),
             moves: 0,
         };
-        for _ in 0..length.warm_up * length.scans_per_draw {
+        for scan in 0..length.warm_up * length.scans_per_draw {
             state.scan(simd);
+            if scan % length.scans_per_draw == 0 {
+                state.jump(simd, target.jumps);
+            }
         }
         state.moves = 0;
         for draw in 0..length.draws {
@@ -129,6 +137,7 @@ impl Run<'_> {
             for _ in 0..length.scans_per_draw {
                 state.scan(simd);
             }
+            state.jump(simd, target.jumps);
             state.record(&mut trace, draw, length);
         }
         trace.moves = state.moves;
@@ -268,7 +277,9 @@ impl<'a> Chain<'a> {
             }
         }
         self.swap(simd);
-        self.exchange(simd);
+        for _ in 0..EXCHANGES {
+            self.exchange(simd);
+        }
     }
 
     /// Proposes one exchange, drawn uniformly; void unless one side is wholly in and the other wholly out, which it is
@@ -290,6 +301,36 @@ impl<'a> Chain<'a> {
             }
             self.moves += 1;
         }
+    }
+
+    /// The present model as a set of components, by place in `standard.blocks`.
+    fn set(&self) -> Vec<u64> {
+        let count = self.walker.standard.blocks.len();
+        let mut set = vec![0u64; count.div_ceil(64)];
+        for block in (0..count).filter(|&block| self.walker.tableau.holds(block)) {
+            set[block / 64] |= 1 << (block % 64);
+        }
+        set
+    }
+
+    /// A Gibbs step over the listed models, see [`Jumps`].
+    #[inline(always)]
+    fn jump<S: Simd>(&mut self, simd: S, jumps: &Jumps) {
+        if jumps.is_empty() {
+            return;
+        }
+        let (now, uniform) = (self.set(), self.source.uniform());
+        let Some(goal) = jumps.from(&now, uniform) else {
+            return;
+        };
+        for block in 0..self.walker.standard.blocks.len() {
+            if (now[block / 64] ^ goal[block / 64]) >> (block % 64) & 1 == 1 {
+                self.flip(simd, block);
+                self.moves -= 1;
+            }
+        }
+        self.moves += 1;
+        self.renew();
     }
 
     /// A new uniform number for the next flip.
@@ -372,10 +413,7 @@ impl<'a> Chain<'a> {
         } else {
             0.0
         };
-        let mut set = vec![0u64; standard.blocks.len().div_ceil(64)];
-        for block in (0..standard.blocks.len()).filter(|&block| tableau.holds(block)) {
-            set[block / 64] |= 1 << (block % 64);
-        }
+        let set = self.set();
         for &block in &self.certain {
             trace.conditional[block * length.draws + draw] = 1.0;
             trace.inclusion[block] += 1.0;

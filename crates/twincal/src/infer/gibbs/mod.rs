@@ -4,6 +4,7 @@
 //! with more scans per draw, and refused if that does not help.
 
 mod chain;
+mod jumps;
 mod random;
 mod swaps;
 
@@ -15,6 +16,7 @@ use crate::diagnostics::{ess_bulk, mcse_mean, r_hat};
 use crate::error::{Error, Result};
 use crate::posterior::{Method, Posterior, Problem};
 use chain::{Length, Target, Trace};
+use jumps::Jumps;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -22,10 +24,11 @@ use std::collections::BTreeMap;
 const R_HAT_LIMIT: f64 = 1.01;
 /// Largest difference of a PIP between chains that agree.
 const SPREAD_LIMIT: f64 = 0.1;
-/// Scans per draw, tried in this order.
-const SCANS_PER_DRAW: [usize; 4] = [4, 16, 64, 256];
-/// Multiplications after which no longer run is tried (some minutes).
-const WORK_LIMIT: f64 = 4e11;
+/// Scans per draw, tried in this order. The second run is as long as the first, but its chains know what the first ones
+/// found.
+const SCANS_PER_DRAW: [usize; 5] = [4, 4, 16, 64, 256];
+/// Multiplications after which no longer run is tried (about a minute).
+const WORK_LIMIT: f64 = 1e11;
 /// Fewest draws per chain that can be judged.
 const LEAST_DRAWS: usize = 100;
 
@@ -63,16 +66,23 @@ pub(super) fn sample(problem: &Problem, settings: &InferenceSettings) -> Result<
         });
     }
     let standard = Standard::new(problem)?;
-    let sure = certain::components(&standard, &problem.prior);
+    let jumps = Jumps::of(&standard, problem);
+    chains(problem, settings, &standard, jumps, true)
+}
+
+/// [`sample`] with a given list of models to jump between; with `share`, chains that disagree are run again and know what
+/// all of them visited.
+fn chains(
+    problem: &Problem,
+    settings: &InferenceSettings,
+    standard: &Standard,
+    mut jumps: Jumps,
+    share: bool,
+) -> Result<Posterior> {
+    let sure = certain::components(standard, &problem.prior);
     let certain: Vec<bool> = standard.blocks.iter().map(|b| sure[b.component]).collect();
     let active: Vec<usize> = (0..certain.len()).filter(|&b| !certain[b]).collect();
-    let exchanges = exchanges(&standard, &active, false);
-    let target = Target {
-        standard: &standard,
-        prior: &problem.prior,
-        certain: &certain,
-        exchanges: &exchanges,
-    };
+    let exchanges = exchanges(standard, &active, false);
     let mut best: Option<(Vec<Trace>, Agreement)> = None;
     for scans_per_draw in SCANS_PER_DRAW {
         let length = Length {
@@ -85,12 +95,23 @@ pub(super) fn sample(problem: &Problem, settings: &InferenceSettings) -> Result<
         if best.is_some() && work > WORK_LIMIT {
             break;
         }
+        let target = Target {
+            standard,
+            prior: &problem.prior,
+            certain: &certain,
+            exchanges: &exchanges,
+            jumps: &jumps,
+        };
         let traces: Vec<Trace> = (0..settings.chains)
             .into_par_iter()
             .map(|chain| chain::run(target, settings.seed, chain, length))
             .collect();
-        let agreement = judge(&standard, &traces, settings.draws);
-        let agree = disagreement(&standard, &agreement).is_none();
+        let agreement = judge(standard, &traces, settings.draws);
+        let agree = disagreement(standard, &agreement).is_none();
+        if share && !agree {
+            let visited = traces.iter().flat_map(|trace| trace.visits.keys().cloned());
+            jumps = jumps.joined(visited.collect(), standard, problem);
+        }
         best = Some((traces, agreement));
         if agree {
             break;
@@ -104,7 +125,7 @@ pub(super) fn sample(problem: &Problem, settings: &InferenceSettings) -> Result<
         });
     };
     if let Some((d, why)) =
-        disagreement(&standard, &agreement).filter(|_| !settings.allow_disagreement)
+        disagreement(standard, &agreement).filter(|_| !settings.allow_disagreement)
     {
         return Err(Error::Refused {
             problem: format!(
@@ -115,7 +136,7 @@ pub(super) fn sample(problem: &Problem, settings: &InferenceSettings) -> Result<
                 .into(),
         });
     }
-    summarise(problem, &standard, &traces, &agreement, settings)
+    summarise(problem, standard, &traces, &agreement, settings)
 }
 
 /// See [`super::scan`].
@@ -128,6 +149,7 @@ pub(super) fn scan(problem: &Problem, scans: usize, seed: u64) -> Result<u64> {
         prior: &problem.prior,
         certain: &certain,
         exchanges: &exchanges(&standard, &active, false),
+        jumps: &Jumps::none(),
     };
     let length = Length {
         warm_up: 1,
