@@ -103,16 +103,18 @@ def effects(n, seed):
 def log(model, real, rng, seconds, keep, noise_sd, noise_time, seed):
     """Columns of one log as a dict, and the exact noise."""
     samples = int(seconds * RATE)
-    t, q, qd, qdd = motion(rng, model.nq, samples)
+    t, q, qd, qdd = motion(rng, model.nv, samples)
     data = real.createData()
     rows = range(0, samples, keep)
-    viscous, coulomb = effects(model.nq, seed)
-    tau = np.array([pin.rnea(real, data, q[k], qd[k], qdd[k]) for k in rows])
+    viscous, coulomb = effects(model.nv, seed)
+    # joints without limits are circles to Pinocchio
+    point = lambda k: pin.integrate(model, pin.neutral(model), q[k])
+    tau = np.array([pin.rnea(real, data, point(k), qd[k], qdd[k]) for k in rows])
     tau += viscous * qd[::keep] + coulomb * np.tanh(qd[::keep] / COULOMB_VELOCITY)
     tau[:, 1] += SPRING[0] * (q[::keep, 1] - SPRING[1])
-    error = noise(rng, samples, model.nq, noise_sd, noise_time)[::keep]
+    error = noise(rng, samples, model.nv, noise_sd, noise_time)[::keep]
     columns = {"t": t[::keep]}
-    for j in range(model.nq):
+    for j in range(model.nv):
         for name, values in (("q", q), ("qd", qd), ("qdd", qdd)):
             columns[f"{name}{j + 1}"] = values[::keep, j]
         columns[f"tau{j + 1}"] = tau[:, j] + error[:, j]
@@ -138,11 +140,11 @@ def simulate(name, folder, noise_sd=0.1, noise_time=0.0, seed=1, seconds=20.0, k
         columns, error = log(model, real, rng, seconds, keep, noise_sd, noise_time, seed)
         write(folder / f"{which}.csv", columns)
         floor = (error**2).mean(0) ** 0.5
-    viscous, coulomb = effects(model.nq, seed)
-    joints = [model.names[j + 1] for j in range(model.nq)]
+    viscous, coulomb = effects(model.nv, seed)
+    joints = [model.names[j + 1] for j in range(model.nv)]
     truth = {
         "model": str(model_file(name)),
-        "locked": list(ROBOTS[name].locked),
+        "locked": [joint for joint in ROBOTS[name].locked if pin.buildModelFromUrdf(str(model_file(name))).existJointName(joint)],
         "joints": joints,
         "payload_mass": PAYLOAD_MASS,
         "friction": sorted([f"{j}.viscous" for j, v in zip(joints, viscous) if v] + [f"{j}.coulomb" for j, v in zip(joints, coulomb) if v]),

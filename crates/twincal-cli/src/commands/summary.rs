@@ -11,6 +11,8 @@ use twincal_io::result_json::status_word;
 
 /// Width of the terminal that everything fits.
 const WIDTH: u16 = 80;
+/// Dropped columns up to this number are named.
+const FEW: usize = 4;
 /// Terms below this probability are only counted.
 const MENTIONED: f64 = 0.05;
 
@@ -75,7 +77,12 @@ fn components(calibration: &Calibration, terminal: &mut Terminal) {
     if rare > 0 {
         terminal.say(&format!("  {rare} more below PIP {MENTIONED}"));
     }
-    if !dropped.is_empty() {
+    if dropped.len() > FEW {
+        terminal.say(&format!(
+            "  {} columns left out: no torque, or that of others (see the report)",
+            dropped.len()
+        ));
+    } else if !dropped.is_empty() {
         let reason = |term: &&TermSummary| match &term.term.status {
             Status::AliasOf(other) => format!("{} = {other}", term.term.name),
             status => format!(

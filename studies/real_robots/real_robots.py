@@ -1,6 +1,6 @@
 """What twincal reaches on real robots, with one command and no settings but the cut-off.
 
-    python studies/real_robots/acceptance.py [--data ../shared/data] [--only ur10]
+    python studies/real_robots/real_robots.py [--data ../shared/data] [--only ur10]
 
 Every row is one `twincal fit`. Held-out torque: RMSE divided by the standard deviation of the measured torque, joint by joint,
 low-passed like the training rows. The baseline is the nominal model plus least-squares viscous and Coulomb friction and
