@@ -148,6 +148,10 @@ pub(crate) struct Diff {
 }
 
 #[derive(Debug, Args)]
+#[allow(
+    rustdoc::broken_intra_doc_links,
+    reason = "[[log]] is a table of twincal.toml, and this text is printed as help"
+)]
 pub(crate) struct Fit {
     /// Logs to fit (CSV, Parquet); each is a trajectory of its own [default:
     /// those of [[log]] in the config].

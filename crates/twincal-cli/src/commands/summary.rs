@@ -107,13 +107,13 @@ fn terms_of<'a>(
 }
 
 fn row(component: &ComponentSummary, terms: &[TermSummary]) -> [String; 5] {
-    let (name, p) = (clean(&component.name).into(), pip(component.pip));
+    let (name, p) = (clean(&component.name), pip(component.pip));
     let own: Vec<&TermSummary> = terms_of(component, terms).collect();
     match own[..] {
         [term] => {
             let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
             let (mean, sd) = with_sd(number(term.mean), number(term.sd));
-            [name, p, mean, sd, clean(&term.term.unit).into()]
+            [name, p, mean, sd, clean(&term.term.unit)]
         }
         _ => {
             let live = own.iter().filter(|term| term.pip.is_some()).count();

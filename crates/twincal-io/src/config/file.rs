@@ -13,7 +13,7 @@ use twincal::term::Family;
 pub struct ConfigFile {
     /// The robot model.
     pub model: ModelTable,
-    /// The logs: settings for all of them, [log], or one entry per log, [[log]].
+    /// The logs: settings for all of them, `[log]`, or one entry per log, `[[log]]`.
     #[serde(
         deserialize_with = "super::log_forms::deserialize",
         serialize_with = "super::log_forms::serialize"

@@ -233,13 +233,11 @@ pub(super) fn groups(problem: &Problem, posterior: &Posterior, library: &Library
         .collect()
 }
 
+/// Posterior mass of the models that pass a test on which components they hold.
+type Share<'a> = dyn Fn(&dyn Fn(&[bool]) -> bool) -> f64 + 'a;
+
 /// Correlation of two inclusions over the models.
-fn correlation(
-    share: &dyn Fn(&dyn Fn(&[bool]) -> bool) -> f64,
-    pip: &[f64],
-    a: usize,
-    b: usize,
-) -> f64 {
+fn correlation(share: &Share<'_>, pip: &[f64], a: usize, b: usize) -> f64 {
     let both = share(&|holds: &[bool]| holds[a] && holds[b]);
     let variance = |p: f64| p * (1.0 - p);
     (both - pip[a] * pip[b]) / (variance(pip[a]) * variance(pip[b])).sqrt()
