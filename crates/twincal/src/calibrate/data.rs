@@ -10,7 +10,8 @@ use crate::rows::{RowSignal, visit_rows};
 use crate::signal::{Payload, Pipeline, Recording, Trajectory, align};
 use crate::term::Library;
 
-/// A column whose root mean square is below this share of the largest of its joints' torque is zero on these data.
+/// A column whose root mean square is below this share of what it is when the robot moves anyhow is zero on these data:
+/// a share of its own size, so that units do not matter (case 89).
 const ZERO: f64 = 1e-12;
 /// Rows per column of the largest joint below which nothing is fitted (case 7).
 const ROWS_PER_COLUMN: usize = 3;
@@ -90,9 +91,14 @@ impl Data {
                 }
             }
         }
-        let largest = square.iter().copied().fold(0.0, f64::max);
+        let lengths = self.fit.iter().map(|log| log.observations.len());
+        let cells = (lengths.sum::<usize>() * library.joints()).max(1) as f64;
+        let typical = library.typical_sizes();
         let zero: Vec<usize> = (0..square.len())
-            .filter(|&k| square[k] <= ZERO * ZERO * largest)
+            .filter(|&k| {
+                let size = (square[k] / cells).sqrt();
+                size == 0.0 || size <= ZERO * typical[k]
+            })
             .collect();
         for &column in &zero {
             let name = &library.terms()[library.columns()[column]].name;

@@ -191,6 +191,40 @@ impl Library {
         &self.components
     }
 
+    /// Number of moving joints.
+    pub fn joints(&self) -> usize {
+        self.by_joint.len()
+    }
+
+    /// Root mean square of each column over random states and all joints, N·m per unit of β: how large it is when joints
+    /// move. NaN for a column that is no number at some of them.
+    pub fn typical_sizes(&self) -> Vec<f64> {
+        let joints = self.by_joint.len();
+        let states = random_motions(joints);
+        let channel = |k: usize| -> Vec<f64> {
+            let joints = 0..joints;
+            let values = joints.flat_map(|joint| states.iter().map(move |state| state[joint][k]));
+            values.collect()
+        };
+        let (q, qd, qdd) = (channel(0), channel(1), channel(2));
+        let motion = Motion {
+            len: states.len(),
+            q: &q,
+            qd: &qd,
+            qdd: &qdd,
+        };
+        let mut out = vec![Vec::new(); joints];
+        self.evaluate(motion, &mut out);
+        let mut square = vec![0.0; self.columns.len()];
+        for (columns, out) in self.by_joint.iter().zip(&out) {
+            for (&column, values) in columns.iter().zip(out.chunks_exact(states.len())) {
+                square[column] += values.iter().map(|x| x * x).sum::<f64>();
+            }
+        }
+        let count = (states.len() * joints) as f64;
+        square.iter().map(|sum| (sum / count).sqrt()).collect()
+    }
+
     /// Prior sd of each column's coefficient in its own unit where physics says one.
     pub fn prior_sds(&self) -> Vec<Option<f64>> {
         self.columns

@@ -32,15 +32,16 @@ pub(super) fn spanning(
                 .iter()
                 .filter(|(members, _)| !members.contains(&own));
             for (members, basis) in others {
-                let new = members
-                    .iter()
-                    .any(|&m| !names.contains(&components[m].name));
-                if new && !columns[own].is_empty() && columns[own].iter().all(|c| within(c, basis))
-                {
-                    names.extend(members.iter().map(|&m| components[m].name.clone()));
+                let spanned = columns[own].iter().all(|column| within(column, basis));
+                if columns[own].is_empty() || !spanned {
+                    continue;
+                }
+                for &member in members {
+                    if !names.contains(&components[member].name) {
+                        names.push(components[member].name.clone());
+                    }
                 }
             }
-            names.dedup();
             names
         })
         .collect()
