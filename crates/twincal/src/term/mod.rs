@@ -39,6 +39,7 @@ mod component;
 mod sentence;
 mod propose;
 mod overlaps;
+mod verdicts;
 mod library;
 #[cfg(test)]
 mod tests;
