@@ -17,6 +17,9 @@ use pulp::Simd;
 
 /// Moves after which rounding is swept away by starting afresh.
 const MOVES_BETWEEN_SWEEPS: usize = 2000;
+/// Rounding that may have gathered in the rows before that: leaving a nearly singular model (A⁻¹)_jj large, takes that many
+/// digits from all that stays.
+const MOST_ROUNDING: f64 = 1e-11;
 
 /// Components of up to this many columns are eliminated on the stack.
 const SMALL: usize = 10;
@@ -47,6 +50,8 @@ pub(super) struct Tableau<'a> {
     /// Where the square of a component starts, by its place in `standard.blocks`; unused for single columns.
     square_of: Vec<usize>,
     moves: usize,
+    /// Estimate of the rounding in the rows: Σ of ε (A⁻¹)_jj over columns that left since the last sweep.
+    rounding: f64,
     scratch: Vec<f64>,
 }
 
@@ -77,6 +82,7 @@ impl<'a> Tableau<'a> {
             wide: Vec::new(),
             square_of: Vec::new(),
             moves: 0,
+            rounding: 0.0,
             scratch: vec![0.0; width],
         };
         let mut end = 0;
@@ -124,15 +130,14 @@ impl<'a> Tableau<'a> {
         self.includes(self.standard.blocks[block].start)
     }
 
-    /// Moves a component in or out.
+    /// Moves a component in or out. Where that made it start afresh: `ln |A_zz| Π v` of the model, free of rounding.
     #[inline(always)]
-    pub(super) fn flip_block<S: Simd>(&mut self, simd: S, block: usize) {
+    pub(super) fn flip_block<S: Simd>(&mut self, simd: S, block: usize) -> Option<f64> {
         for j in self.standard.blocks[block].range() {
             self.flip(simd, j);
         }
-        if self.moves >= MOVES_BETWEEN_SWEEPS {
-            self.sweep(simd);
-        }
+        (self.moves >= MOVES_BETWEEN_SWEEPS || self.rounding > MOST_ROUNDING)
+            .then(|| self.sweep(simd))
     }
 
     /// `(d, gradientᵀ block⁻¹ gradient)` of a component that is wholly in or out: moving it multiplies the weight by
@@ -247,16 +252,21 @@ impl<'a> Tableau<'a> {
         self.moves += 1;
     }
 
-    /// Starts afresh from the empty model with the same members.
+    /// Starts afresh from the empty model with the same members; their `ln |A_zz| Π v`.
     #[inline(always)]
-    fn sweep<S: Simd>(&mut self, simd: S) {
+    fn sweep<S: Simd>(&mut self, simd: S) -> f64 {
         let members = std::mem::take(&mut self.members);
         self.clear();
+        let mut log_determinant = 0.0;
         for &j in &members {
             self.include(simd, j);
+            // ln of pivot times v, `diagonal` being 1/pivot now
+            log_determinant -= (self.diagonal[j] * self.standard.precision[j]).ln();
         }
         self.recenter();
         self.moves = 0;
+        self.rounding = 0.0;
+        log_determinant
     }
 
     #[inline(always)]
@@ -324,6 +334,7 @@ impl<'a> Tableau<'a> {
 
         // A unit-diagonal A has (A⁻¹)_jj ≥ 1.
         let inverse = self.scratch[j].max(1.0);
+        self.rounding += f64::EPSILON * inverse;
         let pivot = 1.0 / inverse;
         let step = self.gradient[j] * pivot;
         self.excess += self.gradient[j] * step;

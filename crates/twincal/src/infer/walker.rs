@@ -9,9 +9,6 @@ use super::tableau::Tableau;
 use crate::prior::Prior;
 use pulp::Simd;
 
-/// Least value of 1 + c in units of the present one: rounding must not make it zero.
-const LEAST: f64 = f64::MIN_POSITIVE;
-
 /// See the module's text. Components are numbered by their place in `standard.blocks`.
 pub(super) struct Walker<'a> {
     pub(super) standard: &'a Standard,
@@ -63,7 +60,14 @@ impl<'a> Walker<'a> {
             self.members[own.family] += 1;
             self.log_slab += own.factor.ln();
         }
-        self.tableau.flip_block(simd, block);
+        if let Some(log_determinant) = self.tableau.flip_block(simd, block) {
+            let held = |b: &usize| self.tableau.holds(*b);
+            let factors: f64 = (0..self.standard.blocks.len())
+                .filter(held)
+                .map(|b| self.standard.blocks[b].factor.ln())
+                .sum();
+            self.log_slab = factors - 0.5 * log_determinant;
+        }
     }
 
     /// Takes a step.
@@ -153,6 +157,7 @@ impl<'a> Walker<'a> {
     /// 1 + c now and after a change of c.
     fn misfits(&self, change: f64) -> (f64, f64) {
         let misfit = 1.0 + self.tableau.excess;
-        (misfit, (misfit + change).max(misfit * LEAST))
+        // c ≥ 0: no model fits better than the full one does, whatever rounding says.
+        (misfit, (misfit + change).max(1.0))
     }
 }
