@@ -66,6 +66,17 @@ Examples:
   twincal diff before after --json
 ")]
     Diff(Diff),
+    /// The calibrated model: your own file with only the changed numbers changed,
+    /// or code that computes torque and interval.
+    #[command(before_help = "\
+Examples:
+  twincal export --twin twincal-out --to urdf -o calibrated.urdf
+  twincal export --twin twincal-out --to urdf --draws 64 -o models
+  twincal export --twin twincal-out --to urdf | diff arm.urdf -
+  twincal export --twin twincal-out --to c -o arm.c
+  twincal export --twin twincal-out --to c --beyond urdf -o rest.c
+")]
+    Export(Export),
     /// Write report.html anew from the stored result.
     #[command(before_help = "Example:\n  twincal report --twin twincal-out\n")]
     Report(Report),
@@ -207,6 +218,60 @@ pub(crate) struct Predict {
     pub(crate) force: bool,
     #[command(flatten)]
     pub(crate) log: LogFlags,
+}
+
+/// What a twin is written as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ExportFormat {
+    /// The URDF that was fitted, with inertias and friction.
+    Urdf,
+    /// The MJCF that was fitted; also motor inertia, springs and gravity.
+    Mjcf,
+    /// C99: torque, interval and "outside the data" in one function.
+    C,
+    /// Rust without its standard library.
+    Rust,
+    /// Python with NumPy.
+    Python,
+    /// The steps of the calculation, for other languages.
+    Json,
+}
+
+/// A model file that was exported.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Beyond {
+    /// What --to urdf cannot say.
+    Urdf,
+    /// What --to mjcf cannot say.
+    Mjcf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Export {
+    /// Folder that `twincal fit` wrote.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) twin: PathBuf,
+    /// What to write.
+    #[arg(long, value_name = "FORMAT", value_enum)]
+    pub(crate) to: ExportFormat,
+    /// Code for the rest only: what is missing in the exported model file.
+    #[arg(long, value_name = "FORMAT", value_enum)]
+    pub(crate) beyond: Option<Beyond>,
+    /// Write this many models drawn from the posterior; -o is then a folder.
+    #[arg(long, value_name = "N")]
+    pub(crate) draws: Option<usize>,
+    /// Seed of the draws [default: that of the fit].
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// File to write; without it the model goes to standard output.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// Replace an existing file or an earlier folder.
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Print what was written and what was not as JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]

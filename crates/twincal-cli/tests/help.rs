@@ -19,7 +19,7 @@ fn narrow(text: &str) -> &str {
 #[test]
 fn help_leads_with_examples() {
     for verb in [
-        "", "demo", "inspect", "fit", "check", "predict", "report", "schema",
+        "", "demo", "inspect", "fit", "check", "predict", "export", "report", "schema",
     ] {
         let arguments = [verb, "-h"].into_iter().filter(|word| !word.is_empty());
         let done = run(folder().path(), arguments).expect(0);

@@ -10,5 +10,6 @@ pub mod artifact;
 pub mod report;
 pub mod result_json;
 pub mod twin_json;
+pub mod export;
 
 pub use error::{Error, Place, Result};

@@ -28,5 +28,7 @@ pub mod twin;
 pub mod compare;
 pub mod validate;
 pub mod calibrate;
+pub mod evaluator;
+pub mod write_back;
 
 pub use error::{Error, Finding, Result, Severity};

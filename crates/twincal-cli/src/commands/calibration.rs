@@ -32,7 +32,7 @@ impl Job<'_> {
     pub(super) fn run(
         self,
         claim: Claim,
-        inputs: Vec<(&str, Vec<u8>)>,
+        mut inputs: Vec<(&str, Vec<u8>)>,
         progress: Progress,
         terminal: &mut Terminal,
     ) -> Outcome<u8> {
@@ -45,7 +45,9 @@ impl Job<'_> {
             calibration,
         };
         progress.step("writing the result");
-        stored.write(claim, self.maker, self.run_log(&stored), inputs)?;
+        let run_log = self.run_log(&stored);
+        inputs.push(self.robot.source);
+        stored.write(claim, self.maker, run_log, inputs)?;
         drop(progress);
         if self.settings.json {
             terminal.data(&stored.result_json()?);

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::robot::Robot;
 use twincal::signal::Recording;
-use twincal_io::artifact::{sha256, sha256_of_file};
+use twincal_io::artifact::{MODEL_MJCF, MODEL_URDF, sha256, sha256_of_file};
 use twincal_io::config::{LogSettings, Settings};
 use twincal_io::log::{parse_log, read_log};
-use twincal_io::model::{Model, read_model};
+use twincal_io::model::{Model, ModelFormat, read_model};
 use twincal_io::report::FileHash;
 use twincal_io::{Error, memory};
 
@@ -21,6 +21,8 @@ const DOUBLES_PER_SAMPLE: u64 = 24;
 pub(super) struct RobotInput {
     pub(super) robot: Robot,
     pub(super) file: FileHash,
+    /// Name in the artefact and bytes of the file.
+    pub(super) source: (&'static str, Vec<u8>),
     pub(super) findings: Vec<Finding>,
 }
 
@@ -36,9 +38,14 @@ impl RobotInput {
     pub(super) fn new(model: Model, name: String, settings: &Settings) -> Result<Self, Error> {
         let (robot, findings) = model.robot(&settings.locked)?;
         let sha256 = sha256(&model.bytes);
+        let stored = match model.format() {
+            ModelFormat::Urdf => MODEL_URDF,
+            ModelFormat::Mjcf => MODEL_MJCF,
+        };
         Ok(Self {
             robot,
             file: FileHash { name, sha256 },
+            source: (stored, model.bytes),
             findings,
         })
     }

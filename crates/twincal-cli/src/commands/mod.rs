@@ -4,6 +4,7 @@ mod calibration;
 mod check;
 mod demo;
 mod diff;
+mod export;
 mod fit;
 mod inputs;
 mod inspect;
@@ -27,6 +28,7 @@ pub(crate) fn run(command: &Command, terminal: &mut Terminal) -> Outcome<u8> {
         Command::Check(flags) => check::run(flags, terminal),
         Command::Predict(flags) => predict::run(flags, terminal),
         Command::Diff(flags) => diff::run(flags, terminal),
+        Command::Export(flags) => export::run(flags, terminal),
         Command::Report(flags) => report::run(flags, terminal),
         Command::Schema => {
             terminal.data(&twincal_io::config::schema());

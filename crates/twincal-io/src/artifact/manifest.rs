@@ -23,6 +23,8 @@ pub enum Maker {
     Fit,
     /// `twincal demo`.
     Demo,
+    /// `twincal export --draws`.
+    Export,
 }
 
 /// Size and checksum of one file.

@@ -4,6 +4,7 @@
 //! DIR/result.json       the answer, for programs
 //! DIR/report.html       the answer, for people
 //! DIR/twin.json         what check, predict and report need
+//! DIR/model.urdf        the user's model file as it was (model.xml for MJCF), for `export`
 //! DIR/run.log           when, where, how long (not reproducible, hence apart)
 //! DIR/manifest.json     format, who wrote it, SHA-256 of every other file
 //! ```
@@ -29,6 +30,10 @@ pub const RESULT: &str = "result.json";
 pub const REPORT: &str = "report.html";
 /// What `check`, `predict` and `report` need.
 pub const TWIN: &str = "twin.json";
+/// The user's URDF as it was fitted.
+pub const MODEL_URDF: &str = "model.urdf";
+/// The user's MJCF as it was fitted.
+pub const MODEL_MJCF: &str = "model.xml";
 /// When, where and how long.
 pub const RUN_LOG: &str = "run.log";
 /// Format, writer and checksums.

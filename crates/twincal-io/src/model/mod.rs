@@ -2,9 +2,9 @@
 //!
 //! Only kinematics, inertias and what makes nominal torque are read. Meshes are never opened.
 
-mod xml;
+pub(crate) mod xml;
 mod include;
-mod mjcf;
+pub(crate) mod mjcf;
 mod urdf;
 
 use crate::error::{Error, Place, Result};
@@ -29,6 +29,15 @@ pub struct ModelSettings {
     pub allow_unphysical: bool,
 }
 
+/// Which of the two a file is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ModelFormat {
+    /// `<robot>`.
+    Urdf,
+    /// `<mujoco>`.
+    Mjcf,
+}
+
 /// A model file as read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
@@ -40,6 +49,8 @@ pub struct Model {
     pub findings: Vec<Finding>,
     /// Where everything stands, for messages.
     document: Document,
+    /// Where MJCF bodies and joints stand, for export; empty for URDF.
+    sites: mjcf::Sites,
 }
 
 impl Model {
@@ -66,6 +77,29 @@ impl Model {
         }
     }
 
+    /// What kind of file it is.
+    pub fn format(&self) -> ModelFormat {
+        match self.document.elements.first() {
+            Some(root) if root.name == "mujoco" => ModelFormat::Mjcf,
+            _ => ModelFormat::Urdf,
+        }
+    }
+
+    /// Name of the main file, as shown to people.
+    pub fn name(&self) -> &str {
+        self.document.files.first().map_or("", |f| f.name.as_str())
+    }
+
+    /// Where its bodies and joints stand (MJCF).
+    pub(crate) fn sites(&self) -> &mjcf::Sites {
+        &self.sites
+    }
+
+    /// Its elements.
+    pub(crate) fn document(&self) -> &Document {
+        &self.document
+    }
+
     /// Where "link `x`" or "joint `x`" is defined (the last time, if twice); else the file.
     fn place(&self, culprit: &str) -> Place {
         let defines = |element: &&Element| {
@@ -81,7 +115,7 @@ impl Model {
         };
         match self.document.elements.iter().rfind(defines) {
             Some(element) => self.document.place(element),
-            None => Place::file(self.document.files.first().map_or("", |f| f.name.as_str())),
+            None => Place::file(self.name()),
         }
     }
 }
@@ -120,9 +154,14 @@ fn parse(
         include::expand(&mut document, path)?;
     }
     let root = &document.elements[0];
+    let mut sites = mjcf::Sites::default();
     let (mut description, findings) = match root.name.as_str() {
         "robot" => urdf::read(&document, settings)?,
-        "mujoco" => mjcf::read(&document)?,
+        "mujoco" => {
+            let (description, findings, where_they_stand) = mjcf::read(&document)?;
+            sites = where_they_stand;
+            (description, findings)
+        }
         "sdf" => {
             return Err(document.error(
                 root,
@@ -151,6 +190,7 @@ fn parse(
         bytes,
         findings,
         document,
+        sites,
     })
 }
 

@@ -33,6 +33,12 @@ pub(crate) struct Element {
     pub(crate) file: usize,
     /// Byte offset of its `<`.
     pub(crate) offset: usize,
+    /// First byte behind the `>` of its start tag.
+    pub(crate) inside: usize,
+    /// Byte offset of its end tag; `inside` where the start tag is all there is (`<x/>`).
+    pub(crate) close: usize,
+    /// First byte behind the element.
+    pub(crate) end: usize,
 }
 
 /// A file's name as shown to people, and its text.
@@ -102,6 +108,9 @@ impl Document {
                         children: Vec::new(),
                         file,
                         offset,
+                        inside: skip + reader.buffer_position() as usize,
+                        close: skip + reader.buffer_position() as usize,
+                        end: skip + reader.buffer_position() as usize,
                     };
                     let index = self.elements.len();
                     match open.last() {
@@ -121,7 +130,10 @@ impl Document {
                     }
                 }
                 Event::End(_) => {
-                    open.pop();
+                    if let Some(closed) = open.pop() {
+                        self.elements[closed].close = offset;
+                        self.elements[closed].end = skip + reader.buffer_position() as usize;
+                    }
                 }
                 Event::DocType(_) => {
                     return fail(

@@ -45,7 +45,8 @@ pub use parameters::{PARAMETERS, PINOCCHIO_ORDER, body_parameters, inertia_of, t
 pub use regressor::{Pair, Regressor, RegressorBlock};
 
 use crate::error::{Error, Finding, Result, Severity};
-use bodies::{Body, Home};
+pub(crate) use bodies::Body;
+use bodies::Home;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -161,6 +162,11 @@ impl Robot {
     /// True if the axes of all moving joints are parallel at q = 0 (a planar arm).
     pub fn is_planar(&self) -> bool {
         self.planar
+    }
+
+    /// Moving bodies as the algorithms see them, parents first.
+    pub(crate) fn layout(&self) -> &[Body] {
+        &self.bodies
     }
 
     /// What the model file says.

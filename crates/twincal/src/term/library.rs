@@ -330,6 +330,22 @@ impl Library {
         &self.columns
     }
 
+    /// `(joint, torque)` of a column that is an expression, nodes of [`Library::graph`].
+    pub(crate) fn image(&self, column: usize) -> &[(usize, Id)] {
+        &self.images[self.columns[column]]
+    }
+
+    /// All expressions.
+    pub(crate) fn graph(&self) -> &Graph {
+        &self.graph
+    }
+
+    /// What a column is made of where it comes from the robot model.
+    pub(crate) fn model_column(&self, column: usize) -> Option<&ModelColumn> {
+        let source = self.sources[self.columns[column]].as_ref();
+        source.map(|(source, _)| source)
+    }
+
     /// Columns that are not zero for every motion on `joint` (0-based), ascending.
     pub fn columns_of_joint(&self, joint: usize) -> &[usize] {
         &self.by_joint[joint]

@@ -45,8 +45,11 @@ mod library;
 mod tests;
 
 pub use component::{Component, Parameter};
+pub use expression::Function;
+pub(crate) use expression::{Graph, Id as GraphId, Node, Variable};
 pub use family::Family;
 pub use library::{Library, Scratch};
+pub(crate) use model_column::ModelColumn;
 pub use sentence::Estimate;
 pub use status::Status;
 

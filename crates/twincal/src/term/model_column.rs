@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// What a column of the robot model is.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum ModelColumn {
+pub(crate) enum ModelColumn {
     /// Σ weight_p · (column of parameter p of `body` in the joint-torque regressor).
     Inertia {
         /// Index of the body.

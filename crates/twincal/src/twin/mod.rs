@@ -9,6 +9,8 @@ mod tests;
 
 pub use predictor::{JointInput, JointSetting, Predictor};
 
+use predictor::widened;
+
 use crate::error::{Error, Finding, Result};
 use crate::likelihood::JointNoise;
 use crate::posterior::Posterior;
@@ -129,6 +131,21 @@ impl Twin {
             });
         }
         Ok(library)
+    }
+
+    /// Where a joint's motion is within the data: `[q_min, q_max, qd_min, qd_max, qdd_min, qdd_max]`, the training range with
+    /// its margin; ±[`f64::MAX`] where any position is.
+    ///
+    /// # Panics
+    /// If there is no such joint.
+    #[must_use]
+    pub fn limits(&self, joint: usize) -> [f64; 6] {
+        let hull = reachable(self.hull[joint], self.robot.joint_kind(joint));
+        let mut limits = widened(hull);
+        if hull[0] == f64::MIN {
+            (limits[0], limits[1]) = (f64::MIN, f64::MAX);
+        }
+        limits
     }
 
     /// Prepares predictions; `library` is that of [`Twin::library`].

@@ -314,7 +314,7 @@ impl Joint {
     }
 }
 
-fn widened(hull: [f64; 6]) -> [f64; 6] {
+pub(super) fn widened(hull: [f64; 6]) -> [f64; 6] {
     let mut wide = hull;
     for k in 0..3 {
         let margin = HULL_MARGIN * (hull[2 * k + 1] - hull[2 * k]);

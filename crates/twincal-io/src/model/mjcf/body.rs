@@ -7,6 +7,7 @@ use super::super::xml::{Document, Element, shorten};
 use super::compiler::Compiler;
 use super::defaults::{Defaults, View};
 use super::inertial::{moved, of_body, shift};
+use super::sites::{BodySite, JointSite, Sites};
 use crate::error::{Error, Result};
 use twincal::robot::spatial::{add, apply, axis_angle, norm, scale};
 use twincal::robot::{JointDescription, JointKind, Limits, LinkDescription, Placement};
@@ -33,6 +34,7 @@ pub(super) struct Tree<'a> {
     /// `ref` of each joint, rad or m; 0 for welds.
     pub(super) references: Vec<f64>,
     pub(super) findings: Vec<Finding>,
+    pub(super) sites: Sites,
     bodies: usize,
 }
 
@@ -63,6 +65,7 @@ impl<'a> Tree<'a> {
             joints: vec![],
             references: vec![],
             findings: vec![],
+            sites: Sites::default(),
             bodies: 0,
         }
     }
@@ -169,6 +172,18 @@ impl<'a> Tree<'a> {
             moves,
         )?;
         let inertia = inertia.map(|i| moved(i, origin));
+        let mut inertial = None;
+        for part in parts.iter().filter(|p| p.element.name == "inertial") {
+            let view = View::plain(self.document, part.element);
+            let own = self.compiler.placement(&view)?.rotation;
+            inertial = Some((part.element.offset, part.placement, own));
+        }
+        self.sites.bodies.push(BodySite {
+            link: name.clone(),
+            offset: element.offset,
+            inertial,
+            origin,
+        });
         self.links.push(LinkDescription {
             name: name.clone(),
             inertia,
@@ -312,6 +327,16 @@ impl<'a> Tree<'a> {
         joint.damping = view.linear("damping")?;
         joint.stiffness = view.linear("stiffness")?;
         joint.spring_reference = angle * view.number("springref")?.unwrap_or(0.0);
+        self.sites.joints.push(JointSite {
+            joint: name.clone(),
+            offset: part.element.offset,
+            angle,
+            damping: joint.damping,
+            armature: joint.armature,
+            frictionloss: view.number("frictionloss")?.unwrap_or(0.0),
+            stiffness: joint.stiffness,
+            spring_reference: joint.spring_reference,
+        });
         let range = view.numbers::<2>("range")?;
         let limited = view
             .flag("limited")

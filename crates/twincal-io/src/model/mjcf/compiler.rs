@@ -100,6 +100,17 @@ impl Compiler {
         Ok(settings)
     }
 
+    /// Why an `<inertial>` is not what the simulator uses, if it is not.
+    pub(super) fn overrides(&self) -> Option<&'static str> {
+        if self.inertia_from_geom == FromGeom::Yes {
+            Some("inertiafromgeom=\"true\"")
+        } else if self.total_mass > 0.0 {
+            Some("settotalmass")
+        } else {
+            None
+        }
+    }
+
     /// `pos` and the orientation of an element in its parent.
     ///
     /// # Errors

@@ -6,10 +6,13 @@ mod couplings;
 mod defaults;
 mod geom;
 mod inertial;
+mod sites;
 mod unknown;
 
 use super::xml::{Document, Element};
 use crate::error::Result;
+pub(crate) use sites::{BodySite, JointSite, Sites};
+
 use body::Tree;
 use compiler::Compiler;
 use defaults::{Defaults, View};
@@ -20,12 +23,14 @@ use twincal::{Finding, Severity};
 ///
 /// # Errors
 /// With the place of the element or attribute.
-pub(super) fn read(document: &Document) -> Result<(RobotDescription, Vec<Finding>)> {
+pub(super) fn read(document: &Document) -> Result<(RobotDescription, Vec<Finding>, Sites)> {
     let root = &document.elements[0];
     let compiler = Compiler::read(document, root)?;
     let defaults = Defaults::read(document, root)?;
     let total_mass = compiler.total_mass;
+    let overrides = compiler.overrides();
     let mut tree = Tree::new(document, compiler, defaults);
+    tree.sites.overrides = overrides;
     let gravity = option(document, root, &mut tree.findings)?;
     if document.child(root, "worldbody").is_none() {
         return Err(document.error(
@@ -62,6 +67,7 @@ pub(super) fn read(document: &Document) -> Result<(RobotDescription, Vec<Finding
             allow_unphysical: false,
         },
         tree.findings,
+        tree.sites,
     ))
 }
 

@@ -26,16 +26,26 @@ pub(crate) enum Variable {
 
 /// Functions of one argument.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) enum Function {
+pub enum Function {
+    /// sin x.
     Sin,
+    /// cos x.
     Cos,
+    /// tan x.
     Tan,
+    /// eˣ.
     Exp,
+    /// ln x.
     Log,
+    /// √x.
     Sqrt,
+    /// sinh x.
     Sinh,
+    /// cosh x.
     Cosh,
+    /// tanh x.
     Tanh,
+    /// atan x.
     Atan,
     /// −1, 0 or 1; only in Coulomb columns, not in the grammar.
     Sign,

@@ -9,6 +9,7 @@ mod tape;
 
 pub(crate) use bounds::{Bounded, bounded_values};
 pub(crate) use dimension::{Dimension, dimensions};
-pub(crate) use graph::{Function, Graph, Id, Node, Variable};
+pub use graph::Function;
+pub(crate) use graph::{Graph, Id, Node, Variable};
 pub(crate) use parse::parse;
 pub(crate) use tape::{Scratch as TapeScratch, Slot, Tape};

@@ -1,0 +1,393 @@
+//! `twincal export`: the calibrated model as a file of the user's own kind, or as code.
+
+use super::print_json;
+use super::summary::paragraph;
+use crate::args::{Beyond as BeyondFormat, Export, ExportFormat};
+use crate::failure::{Failure, Outcome};
+use crate::progress::Progress;
+use crate::terminal::Terminal;
+use serde::Serialize;
+use std::io::Write as _;
+use std::path::Path;
+use twincal::evaluator::{Beyond, Evaluator};
+use twincal::posterior::draws::draw;
+use twincal::write_back::{Holds, Residual, WriteBack, Writer};
+use twincal_io::artifact::{Artifact, Claim, MODEL_MJCF, MODEL_URDF, Maker, OutputFile, Replace};
+use twincal_io::export::code::{Language, source};
+use twincal_io::export::write_model;
+use twincal_io::model::{Model, ModelSettings, parse_model};
+use twincal_io::twin_json::StoredTwin;
+
+/// Random stream of the draws that are written.
+const STREAM: u64 = (1 << 32) + 2;
+/// Most models of one call.
+const MOST: usize = 100_000;
+/// Residual components that are told one by one; the rest is summed up.
+const TOLD: usize = 8;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Exported<'a> {
+    schema: u64,
+    output: String,
+    joints: Vec<&'a str>,
+    #[serde(flatten)]
+    change: &'a WriteBack,
+}
+
+/// What `--json` prints of draws.
+#[derive(Serialize)]
+struct Drawn {
+    schema: u64,
+    output: String,
+    models: usize,
+    seed: u64,
+    /// How many of them had an inertia that had to be made physical.
+    projected: usize,
+}
+
+/// What `--json` prints of code.
+#[derive(Serialize)]
+struct Coded<'a> {
+    schema: u64,
+    output: String,
+    joints: Vec<&'a str>,
+    /// Steps of the calculation.
+    steps: usize,
+    /// Columns of the interval.
+    kept: usize,
+    /// Largest error of an end of the interval, as a share of its width.
+    interval_error: f64,
+}
+
+pub(super) fn run(flags: &Export, terminal: &mut Terminal) -> Outcome<u8> {
+    if flags.output.is_none() && (flags.json || flags.draws.is_some()) {
+        return Err(Failure::usage(
+            "no place for what is exported",
+            "give -o FILE, or -o FOLDER with --draws",
+        ));
+    }
+    match (target(flags.to), flags.draws, &flags.output) {
+        (Target::Code(_), Some(_), _) => Err(Failure::usage(
+            "--draws writes model files, not code",
+            "give --to urdf, or leave out --draws",
+        )),
+        (Target::Code(language), None, _) => code(flags, language, terminal),
+        (Target::Model(_), ..) if flags.beyond.is_some() => Err(Failure::usage(
+            "--beyond is for code: it says what a model file cannot",
+            "give --to c, rust, python or json",
+        )),
+        (Target::Model(kind), Some(count), Some(folder)) => {
+            draws(flags, kind, count, folder, terminal)
+        }
+        (Target::Model(kind), ..) => one(flags, kind, terminal),
+    }
+}
+
+/// A kind of model file.
+#[derive(Clone, Copy)]
+struct Kind {
+    holds: Holds,
+    extension: &'static str,
+    stored: &'static str,
+}
+
+const URDF: Kind = Kind {
+    holds: Holds::URDF,
+    extension: "urdf",
+    stored: MODEL_URDF,
+};
+
+const MJCF: Kind = Kind {
+    holds: Holds::MJCF,
+    extension: "xml",
+    stored: MODEL_MJCF,
+};
+
+enum Target {
+    Model(Kind),
+    Code(Language),
+}
+
+fn target(format: ExportFormat) -> Target {
+    match format {
+        ExportFormat::Urdf => Target::Model(URDF),
+        ExportFormat::Mjcf => Target::Model(MJCF),
+        ExportFormat::C => Target::Code(Language::C),
+        ExportFormat::Rust => Target::Code(Language::Rust),
+        ExportFormat::Python => Target::Code(Language::Python),
+        ExportFormat::Json => Target::Code(Language::Json),
+    }
+}
+
+/// The file that takes the result; standard output where there is none.
+fn open(flags: &Export) -> Outcome<Option<OutputFile>> {
+    match &flags.output {
+        Some(path) => Ok(Some(OutputFile::create(path, flags.force)?)),
+        None => Ok(None),
+    }
+}
+
+/// Writes to the file, or to standard output; true if it was a file.
+fn write(output: Option<OutputFile>, bytes: &[u8], terminal: &mut Terminal) -> Outcome<bool> {
+    let Some(mut output) = output else {
+        let written = terminal.rows().write_all(bytes);
+        terminal.wrote(written);
+        return Ok(false);
+    };
+    let written = output.file().map_or(Ok(()), |file| file.write_all(bytes));
+    output.commit(written)?;
+    Ok(true)
+}
+
+fn shown(flags: &Export) -> String {
+    let path = flags.output.as_deref().unwrap_or(Path::new(""));
+    path.to_string_lossy().into_owned()
+}
+
+/// Code that computes torque and interval.
+fn code(flags: &Export, language: Language, terminal: &mut Terminal) -> Outcome<u8> {
+    let output = open(flags)?;
+    let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, true)?;
+    let twin = &stored.calibration.twin;
+    let mut about = vec![
+        format!(
+            "Calibrated torque of {}, by twincal {}.",
+            twin.robot.description().name,
+            stored.context.version
+        ),
+        format!("Nominal model {}.", stored.context.model),
+    ];
+    let evaluator = match flags.beyond {
+        None => Evaluator::new(twin, None)?,
+        Some(format) => {
+            let holds = match format {
+                BeyondFormat::Urdf => URDF.holds,
+                BeyondFormat::Mjcf => MJCF.holds,
+            };
+            about.push(format!(
+                "ONLY what the exported {} lacks: add it to that model's torque.",
+                holds.format
+            ));
+            let change = Writer::new(&stored.calibration, holds)?.mean()?;
+            let robot = change.robot(&twin.robot)?;
+            let friction: Vec<f64> = (twin.robot.joint_names().iter())
+                .map(|name| {
+                    let mut joints = change.joints.iter();
+                    let own = joints.find(|joint| joint.joint == *name);
+                    own.and_then(|joint| joint.friction).unwrap_or(0.0)
+                })
+                .collect();
+            let beyond = Beyond {
+                robot: &robot,
+                friction: &friction,
+            };
+            Evaluator::new(twin, Some(beyond))?
+        }
+    };
+    let text = source(&evaluator, language, &about)?;
+    if !write(output, text.as_bytes(), terminal)? {
+        return Ok(0);
+    }
+    if flags.json {
+        let coded = Coded {
+            schema: 1,
+            output: shown(flags),
+            joints: twin.robot.joint_names(),
+            steps: evaluator.steps.len(),
+            kept: evaluator.kept,
+            interval_error: evaluator.interval_error,
+        };
+        print_json(terminal, &coded)?;
+    } else {
+        let text = format!(
+            "{} joints, {} steps; the ends of the interval are within {} % of its width of those of `twincal predict` \
+             (one distribution for the mixture, from {} columns)",
+            evaluator.joints.len(),
+            evaluator.steps.len(),
+            short(100.0 * evaluator.interval_error),
+            evaluator.kept
+        );
+        paragraph(&text, terminal);
+        terminal.say(&shown(flags));
+    }
+    Ok(0)
+}
+
+/// The model average.
+fn one(flags: &Export, kind: Kind, terminal: &mut Terminal) -> Outcome<u8> {
+    let output = open(flags)?;
+    let (stored, model) = read(flags, kind)?;
+    let change = Writer::new(&stored.calibration, kind.holds)?.mean()?;
+    let bytes = write_model(&model, &change)?;
+    if !write(output, &bytes, terminal)? {
+        return Ok(0);
+    }
+    if flags.json {
+        let exported = Exported {
+            schema: 1,
+            output: shown(flags),
+            joints: stored.calibration.twin.robot.joint_names(),
+            change: &change,
+        };
+        print_json(terminal, &exported)?;
+    } else {
+        say(&change, kind.holds, terminal);
+        terminal.say(&shown(flags));
+    }
+    Ok(0)
+}
+
+/// Many models from the posterior.
+fn draws(
+    flags: &Export,
+    kind: Kind,
+    count: usize,
+    folder: &Path,
+    terminal: &mut Terminal,
+) -> Outcome<u8> {
+    if count == 0 || count > MOST {
+        return Err(Failure::usage(
+            format!("--draws {count}"),
+            format!("give 1 to {MOST}"),
+        ));
+    }
+    let replace = if flags.force {
+        Replace::Artifact
+    } else {
+        Replace::Never
+    };
+    let claim = Claim::new(folder, replace)?;
+    let (stored, model) = read(flags, kind)?;
+    let writer = Writer::new(&stored.calibration, kind.holds)?;
+    let seed = flags.seed.unwrap_or(stored.context.seed);
+    let drawn = draw(&stored.calibration.twin.posterior, count, seed, STREAM);
+    let progress = Progress::new();
+    let width = (count - 1).to_string().len();
+    let mut files = Vec::with_capacity(count);
+    let mut projected = 0;
+    for (number, beta) in drawn.beta.chunks_exact(drawn.columns).enumerate() {
+        progress.step(&format!("drawing model {} of {count}", number + 1));
+        let change = writer.draw(beta)?;
+        projected += usize::from(change.projection.is_some());
+        let name = format!("draw{number:0width$}.{}", kind.extension);
+        files.push((name, write_model(&model, &change)?));
+    }
+    let files = files
+        .iter()
+        .map(|(name, bytes)| (name.as_str(), bytes.clone()));
+    claim.commit(Maker::Export, files.collect())?;
+    drop(progress);
+    let output = folder.to_string_lossy().into_owned();
+    if flags.json {
+        let drawn = Drawn {
+            schema: 1,
+            output,
+            models: count,
+            seed,
+            projected,
+        };
+        print_json(terminal, &drawn)?;
+    } else {
+        let text = format!(
+            "{count} models from the posterior, seed {seed}; in {projected} of them inertias were made physical"
+        );
+        paragraph(&text, terminal);
+        terminal.say(&output);
+    }
+    Ok(0)
+}
+
+/// The twin, and the user's model as it was fitted.
+fn read(flags: &Export, kind: Kind) -> Outcome<(StoredTwin, Model)> {
+    let artifact = Artifact::open(&flags.twin)?;
+    let stored = StoredTwin::read(&artifact, true)?;
+    let other = [MODEL_URDF, MODEL_MJCF]
+        .into_iter()
+        .find(|name| *name != kind.stored);
+    if artifact.names().any(|name| Some(name) == other) {
+        return Err(Failure::usage(
+            format!(
+                "the twin was fitted with {}, which is not of that kind",
+                stored.context.model
+            ),
+            "export what was fitted: only its own numbers are changed",
+        ));
+    }
+    let bytes = artifact.read(kind.stored)?;
+    let settings = ModelSettings {
+        allow_unphysical: true,
+        ..ModelSettings::default()
+    };
+    let mut model = parse_model(&stored.context.model, &bytes, &settings)?;
+    // What counts as nominal was decided when it was fitted.
+    model.description = stored.calibration.twin.robot.description().clone();
+    Ok((stored, model))
+}
+
+/// What went in, what stays out and why.
+fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
+    let format = holds.format;
+    terminal.heading(&format!("In the {format} now"));
+    if change.written.is_empty() {
+        terminal.say("  nothing: no found effect has a place there; the file is as it was");
+    }
+    for written in &change.written {
+        paragraph(&format!("{} ({})", written.words, written.place), terminal);
+    }
+    terminal.say("");
+    let (told, rest): (Vec<&Residual>, Vec<&Residual>) = change
+        .residual
+        .iter()
+        .partition(|residual| residual.pip >= 0.5);
+    if !told.is_empty() {
+        terminal.heading("Stays beside it: the residual");
+    }
+    for residual in told.iter().take(TOLD) {
+        let text = format!(
+            "{}: {}; up to {} N·m rms",
+            residual.words,
+            residual.reason,
+            short(largest(&residual.torque))
+        );
+        paragraph(&text, terminal);
+    }
+    let small: Vec<&Residual> = told.iter().skip(TOLD).copied().chain(rest).collect();
+    if let Some(most) = small.iter().map(|r| largest(&r.torque)).reduce(f64::max) {
+        let text = format!(
+            "{} less sure or smaller components: none above {} N·m rms",
+            small.len(),
+            short(most)
+        );
+        paragraph(&text, terminal);
+    }
+    if let Some(projection) = &change.projection {
+        let text = format!(
+            "no body can have the inertia found for {}: the nearest physical one was taken, {} posterior sd away",
+            projection.links.join(", "),
+            short(projection.distance)
+        );
+        paragraph(&text, terminal);
+    }
+    let text = format!(
+        "of what went in, {} N·m rms was lost by making it physical; all effects together are {} N·m rms",
+        short(largest(&change.lost)),
+        short(largest(&change.correction))
+    );
+    paragraph(&text, terminal);
+    terminal.say("");
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |most, value| most.max(*value))
+}
+
+/// Three digits.
+fn short(value: f64) -> String {
+    if value == 0.0 || (1e-3..1e4).contains(&value.abs()) {
+        let decimals = (2.0 - value.abs().max(1e-3).log10().floor()).clamp(0.0, 5.0);
+        format!("{value:.*}", decimals as usize)
+    } else {
+        format!("{value:.1e}")
+    }
+}

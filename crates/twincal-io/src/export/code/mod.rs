@@ -1,0 +1,109 @@
+//! The calibrated twin as source code: one file, no dependencies, no allocation; the same steps in every language.
+
+mod c;
+mod json;
+mod python;
+mod rust;
+
+use crate::error::Result;
+use twincal::evaluator::{Evaluator, Step};
+
+/// A language that an [`Evaluator`] is printed in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Language {
+    /// C99 with `<math.h>`.
+    C,
+    /// Rust without its standard library.
+    Rust,
+    /// Python with NumPy, one state or arrays of states.
+    Python,
+    /// The steps themselves, for other languages.
+    Json,
+}
+
+/// The source text; `about` are lines of a comment that say where it comes from.
+///
+/// # Errors
+/// [`crate::Error::Content`] for a function that the language has not.
+pub fn source(evaluator: &Evaluator, language: Language, about: &[String]) -> Result<String> {
+    match language {
+        Language::C => Ok(c::source(evaluator, about)),
+        Language::Rust => rust::source(evaluator, about),
+        Language::Python => Ok(python::source(evaluator, about)),
+        Language::Json => json::source(evaluator, about),
+    }
+}
+
+/// What every file says of itself.
+fn notes(evaluator: &Evaluator, about: &[String]) -> Vec<String> {
+    let mut lines = about.to_vec();
+    let names: Vec<String> = (evaluator.joints.iter())
+        .map(|joint| clean(&format!("{} ({})", joint.name, joint.unit)))
+        .collect();
+    lines.push("In: position, velocity, acceleration per joint; rad or m, SI units.".into());
+    lines.push("Out: calibrated torque, and the ends of its 95 % interval for torque as".into());
+    lines.push("measured. 1 (true) outside the data that the twin was fitted to, else 0.".into());
+    lines.push("While a joint stands still, stiction may add up to its Coulomb friction.".into());
+    lines.push("Joints:".into());
+    lines.extend(
+        names
+            .iter()
+            .enumerate()
+            .map(|(k, name)| format!("  {k}: {name}")),
+    );
+    lines
+}
+
+/// Text that cannot end a comment or steer a terminal.
+fn clean(text: &str) -> String {
+    text.chars()
+        .map(|c| if c.is_control() { ' ' } else { c })
+        .collect::<String>()
+        .replace("*/", "* /")
+        .replace("\"\"\"", "'''")
+        .replace('\\', "/")
+}
+
+/// Every digit, read as a double in all languages.
+fn literal(value: f64) -> String {
+    let text = format!("{value:e}");
+    if value < 0.0 {
+        format!("({text})")
+    } else {
+        text
+    }
+}
+
+/// What a step is called where another uses it: numbers and inputs by themselves.
+fn operand(evaluator: &Evaluator, id: u32) -> String {
+    match evaluator.steps[id as usize] {
+        Step::Constant(value) => literal(value),
+        Step::Position(joint) => format!("q[{joint}]"),
+        Step::Velocity(joint) => format!("qd[{joint}]"),
+        Step::Acceleration(joint) => format!("qdd[{joint}]"),
+        _ => format!("t{id}"),
+    }
+}
+
+/// The four operations, the same in every language; `None` for inputs, numbers and functions.
+fn arithmetic(evaluator: &Evaluator, step: &Step) -> Option<String> {
+    let name = |id: &u32| operand(evaluator, *id);
+    Some(match step {
+        Step::Add(a, b) => format!("{} + {}", name(a), name(b)),
+        Step::Subtract(a, b) => format!("{} - {}", name(a), name(b)),
+        Step::Multiply(a, b) => format!("{} * {}", name(a), name(b)),
+        Step::Divide(a, b) => format!("{} / {}", name(a), name(b)),
+        Step::Negate(a) => format!("-{}", name(a)),
+        _ => return None,
+    })
+}
+
+/// Bounds that can be left: `(index in q, qd, qdd as 0, 1, 2, low, high)`.
+fn bounds(limits: &[f64; 6]) -> impl Iterator<Item = (usize, f64, f64)> {
+    (0..3)
+        .map(|k| (k, limits[2 * k], limits[2 * k + 1]))
+        .filter(|&(_, low, high)| low > f64::MIN && high < f64::MAX)
+}
+
+/// Names of the three inputs.
+const INPUTS: [&str; 3] = ["q", "qd", "qdd"];

@@ -1,0 +1,168 @@
+//! Columns of a library as steps.
+
+use super::dynamics::{self, Moving};
+use super::trace::{Id, Step, Trace};
+use crate::robot::Robot;
+use crate::term::{Function, Graph, GraphId, Library, ModelColumn, Node, Variable};
+use std::collections::HashMap;
+
+/// Everything that columns share.
+pub(super) struct Columns<'a> {
+    pub(super) robot: &'a Robot,
+    pub(super) library: &'a Library,
+    /// Nominal motion.
+    pub(super) moving: Vec<Moving>,
+    /// Screws of every body, once a column asks for them.
+    screws: Option<Vec<Vec<(usize, [[Id; 3]; 2])>>>,
+    /// Nominal torque, once a column asks for it.
+    nominal: Option<Vec<Id>>,
+    expressions: HashMap<GraphId, Id>,
+}
+
+impl<'a> Columns<'a> {
+    pub(super) fn new(t: &mut Trace, robot: &'a Robot, library: &'a Library) -> Self {
+        Self {
+            robot,
+            library,
+            moving: dynamics::motion(t, robot, robot.description().gravity, true),
+            screws: None,
+            nominal: None,
+            expressions: HashMap::new(),
+        }
+    }
+
+    /// Torque of one column per unit of its coefficient: `(joint, step)` where it is not zero by structure.
+    pub(super) fn column(&mut self, t: &mut Trace, column: usize) -> Vec<(usize, Id)> {
+        let mut all = self.on_all_joints(t, column);
+        let library = self.library;
+        all.retain(|(joint, _)| {
+            library
+                .columns_of_joint(*joint)
+                .binary_search(&column)
+                .is_ok()
+        });
+        all
+    }
+
+    fn on_all_joints(&mut self, t: &mut Trace, column: usize) -> Vec<(usize, Id)> {
+        match self.library.model_column(column) {
+            None => {
+                let image = self.library.image(column).to_vec();
+                let joints = image.into_iter();
+                joints
+                    .map(|(joint, id)| (joint, self.expression(t, id)))
+                    .collect()
+            }
+            Some(ModelColumn::Inertia { body, weights }) => {
+                let (robot, moving) = (self.robot, &self.moving);
+                let screws = self
+                    .screws
+                    .get_or_insert_with(|| dynamics::screws(t, robot, moving));
+                dynamics::column(t, &self.moving[*body], &screws[*body], weights)
+            }
+            Some(ModelColumn::Gravity { axis }) => {
+                let mut gravity = [0.0; 3];
+                gravity[*axis] = 1.0;
+                self.gravity(t, gravity)
+            }
+            Some(ModelColumn::Nominal { joint }) => vec![(*joint, self.nominal(t)[*joint])],
+            Some(ModelColumn::LoadFriction { joint, velocity }) => {
+                let torque = self.nominal(t)[*joint];
+                let size = t.step(Step::Absolute(torque));
+                let rate = t.step(Step::Velocity(*joint));
+                let sense = direction(t, rate, *velocity);
+                vec![(*joint, t.multiply(size, sense))]
+            }
+            Some(ModelColumn::PositionDerivative { joint }) => {
+                let nominal = self.nominal(t);
+                let change = t.position_derivative(*joint, &nominal);
+                change.into_iter().enumerate().collect()
+            }
+        }
+    }
+
+    /// Torque of this change of gravity on the nominal robot.
+    pub(super) fn gravity(&self, t: &mut Trace, gravity: [f64; 3]) -> Vec<(usize, Id)> {
+        let still = dynamics::motion(t, self.robot, gravity, false);
+        let parameters = nominal_parameters(self.robot);
+        let torque = dynamics::torque(t, self.robot, &still, &parameters);
+        torque.into_iter().enumerate().collect()
+    }
+
+    /// Nominal torque per joint.
+    pub(super) fn nominal(&mut self, t: &mut Trace) -> Vec<Id> {
+        let (robot, moving) = (self.robot, &self.moving);
+        let nominal = self.nominal.get_or_insert_with(|| {
+            let rigid = dynamics::torque(t, robot, moving, &nominal_parameters(robot));
+            let passive = dynamics::passive(t, robot, moving);
+            let both = rigid.into_iter().zip(passive);
+            both.map(|(a, b)| t.add(a, b)).collect()
+        });
+        nominal.clone()
+    }
+
+    /// A node of the library's expressions; operands stand before it, so recursion is bounded by their depth.
+    fn expression(&mut self, t: &mut Trace, id: GraphId) -> Id {
+        if let Some(&known) = self.expressions.get(&id) {
+            return known;
+        }
+        let library = self.library;
+        let graph: &Graph = library.graph();
+        let step = match graph.node(id) {
+            Node::Constant(value) => t.number(value.get()),
+            Node::Variable(Variable::Position(joint)) => t.step(Step::Position(*joint)),
+            Node::Variable(Variable::Velocity(joint)) => t.step(Step::Velocity(*joint)),
+            Node::Variable(Variable::Acceleration(joint)) => t.step(Step::Acceleration(*joint)),
+            Node::Sum(constant, parts) => {
+                let mut sum = t.number(constant.get());
+                for &(coefficient, part) in parts {
+                    let part = self.expression(t, part);
+                    let part = t.scale(coefficient.get(), part);
+                    sum = t.add(sum, part);
+                }
+                sum
+            }
+            Node::Product(factors) => {
+                let mut above = t.number(1.0);
+                let mut below = above;
+                for &(factor, exponent) in factors {
+                    let factor = self.expression(t, factor);
+                    let power = t.integer_power(factor, exponent.unsigned_abs());
+                    if exponent > 0 {
+                        above = t.multiply(above, power);
+                    } else {
+                        below = t.multiply(below, power);
+                    }
+                }
+                t.divide(above, below)
+            }
+            Node::Power(base, exponent) => {
+                let base = self.expression(t, *base);
+                t.step(Step::Power(base, exponent.get()))
+            }
+            Node::Function(function, argument) => {
+                let argument = self.expression(t, *argument);
+                t.apply(*function, argument)
+            }
+        };
+        self.expressions.insert(id, step);
+        step
+    }
+}
+
+/// Parameters of every body.
+pub(super) fn nominal_parameters(robot: &Robot) -> Vec<[f64; 10]> {
+    (0..robot.layout().len())
+        .map(|body| robot.parameters_of_body(body))
+        .collect()
+}
+
+/// tanh(rate/v_s), or the sign for v_s = 0.
+pub(super) fn direction(t: &mut Trace, rate: Id, velocity: f64) -> Id {
+    if velocity == 0.0 {
+        t.apply(Function::Sign, rate)
+    } else {
+        let relative = t.scale(1.0 / velocity, rate);
+        t.apply(Function::Tanh, relative)
+    }
+}

@@ -1,0 +1,114 @@
+//! Inertias of links: from coefficients of bodies to mass, centre of mass and tensor of the link that a file names.
+
+use super::projection::{Block, project};
+use super::{Place, Projection, Writer};
+use crate::error::Result;
+use crate::robot::spatial::{apply, scale, transpose};
+use crate::robot::{Inertia, Placement, body_parameters, inertia_of, to_body_frame};
+use crate::term::Family;
+use serde::Serialize;
+
+/// A link with a new inertia.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LinkChange {
+    /// Name of the link.
+    pub link: String,
+    /// As the nominal model has it.
+    pub before: Option<Inertia>,
+    /// As it is now: its pseudo-inertia is positive definite.
+    pub after: Inertia,
+}
+
+/// The link that takes up what changes on a body: the payload's own frame, else the link that the body is named
+/// after; where that has no inertia the heaviest link of the body.
+pub(super) fn home<'w>(writer: &'w Writer<'_>, body: usize, family: Family) -> &'w str {
+    let robot = &writer.calibration.twin.robot;
+    let named = if family == Family::Payload {
+        writer.library.payload_frame(robot)
+    } else {
+        robot.bodies()[body]
+    };
+    let mass = |link: &str| {
+        let mut links = robot.description().links.iter();
+        let found = links.find(|other| other.name == link);
+        found.and_then(|link| link.inertia).map_or(0.0, |i| i.mass)
+    };
+    if mass(named) > 0.0 {
+        return named;
+    }
+    let heaviest = robot
+        .links_of_body(body)
+        .into_iter()
+        .max_by(|a, b| mass(a).total_cmp(&mass(b)));
+    heaviest.filter(|link| mass(link) > 0.0).unwrap_or(named)
+}
+
+/// New inertias of all links that `held` columns change, physical ones.
+pub(super) fn changes(
+    writer: &Writer<'_>,
+    held: &[Option<Place>],
+    beta: &[f64],
+) -> Result<(Vec<LinkChange>, Option<Projection>)> {
+    let robot = &writer.calibration.twin.robot;
+    let columns: Vec<usize> = (0..held.len())
+        .filter(|&column| matches!(held[column], Some(Place::Inertia { .. })))
+        .collect();
+    let mut names: Vec<&str> = Vec::new();
+    let mut blocks: Vec<Block> = Vec::new();
+    for (at, &column) in columns.iter().enumerate() {
+        let Some(Place::Inertia { body, weights }) = &held[column] else {
+            continue;
+        };
+        let term = &writer.library.terms()[writer.library.columns()[column]];
+        let link = home(writer, *body, term.family);
+        let known = names.iter().position(|name| *name == link);
+        let index = known.unwrap_or_else(|| {
+            let nominal = robot.description().links.iter().find(|l| l.name == link);
+            let nominal = nominal.and_then(|link| link.inertia);
+            let parameters =
+                nominal.map_or([0.0; 10], |i| body_parameters(&i, &Placement::IDENTITY));
+            names.push(link);
+            blocks.push(Block::new(parameters, columns.len()));
+            names.len() - 1
+        });
+        let placement = robot
+            .body_of_link(link)
+            .map_or(Placement::IDENTITY, |(_, placement)| placement);
+        let map = to_body_frame(&inverse(&placement));
+        blocks[index].directions[at] = std::array::from_fn(|row| {
+            let terms = map[row].iter().zip(weights);
+            terms.map(|(a, w)| a * w).sum()
+        });
+    }
+    let own: Vec<f64> = columns.iter().map(|&column| beta[column]).collect();
+    let count = held.len();
+    let covariance: Vec<f64> = columns
+        .iter()
+        .flat_map(|&a| columns.iter().map(move |&b| (a, b)))
+        .map(|(a, b)| writer.covariance[a * count + b])
+        .collect();
+    let (parameters, projection) = project(&blocks, &own, &covariance, &names)?;
+    let mut changes: Vec<LinkChange> = Vec::new();
+    for link in &robot.description().links {
+        let Some(index) = names.iter().position(|name| *name == link.name) else {
+            continue;
+        };
+        if let Some(after) = inertia_of(&parameters[index]) {
+            changes.push(LinkChange {
+                link: link.name.clone(),
+                before: link.inertia,
+                after,
+            });
+        }
+    }
+    Ok((changes, projection))
+}
+
+/// The outer frame seen from the inner one.
+fn inverse(placement: &Placement) -> Placement {
+    let rotation = transpose(&placement.rotation);
+    Placement {
+        rotation,
+        translation: scale(-1.0, apply(&rotation, placement.translation)),
+    }
+}

@@ -1,0 +1,391 @@
+//! Back into the user's model: which of the found effects a model file can hold, and what stays beside it.
+//!
+//! A file holds inertias, friction and, in MJCF, motor inertia, springs and gravity. All of these are linear in the
+//! coefficients, so what is written is the posterior mean of exactly those columns; the rest is the residual.
+
+mod joints;
+mod links;
+mod pseudo_inertia;
+mod projection;
+mod lost;
+#[cfg(test)]
+mod tests;
+
+pub use joints::JointChange;
+pub use links::LinkChange;
+pub use projection::Projection;
+
+use crate::calibrate::Calibration;
+use crate::error::Result;
+use crate::evaluator::States;
+use crate::robot::{Robot, RobotDescription};
+use crate::term::{Family, Library, ModelColumn};
+use serde::Serialize;
+
+/// What a model format can hold beside inertias, viscous and dry friction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Holds {
+    /// Its name in messages.
+    pub format: &'static str,
+    /// Motor inertia, springs with rest position, and gravity.
+    pub more: bool,
+}
+
+impl Holds {
+    /// `<inertial>` and `<dynamics damping friction>`.
+    pub const URDF: Self = Self {
+        format: "URDF",
+        more: false,
+    };
+    /// Also joint `armature`, `stiffness`, `springref` and `<option gravity>`.
+    pub const MJCF: Self = Self {
+        format: "MJCF",
+        more: true,
+    };
+}
+
+/// A component that goes into the file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Written {
+    /// Name of the component.
+    pub component: String,
+    /// In physical words, with its parameters given that it is in.
+    pub words: String,
+    /// Probability that it is in; the file holds the model average, so this share of the parameters.
+    pub pip: f64,
+    /// Link or joint that changes; `gravity`.
+    pub place: String,
+}
+
+/// A component that the file cannot hold, or that is too uncertain to be written.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Residual {
+    /// Name of the component.
+    pub component: String,
+    /// In physical words.
+    pub words: String,
+    /// Probability that it is in.
+    pub pip: f64,
+    /// Why it stays out.
+    pub reason: String,
+    /// RMS of its model-averaged torque over states within the training range, per joint, N·m (N).
+    pub torque: Vec<f64>,
+    /// `(name of the column, E[β | y])`.
+    pub coefficients: Vec<(String, f64)>,
+}
+
+/// What changes in the model, and what stays beside it.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct WriteBack {
+    /// Links with a new inertia, in the model's order.
+    pub links: Vec<LinkChange>,
+    /// Joints with new friction, motor inertia or spring, in the model's order.
+    pub joints: Vec<JointChange>,
+    /// Gravity in the base frame, m/s², where it changes.
+    pub gravity: Option<[f64; 3]>,
+    /// Components that are in the file now.
+    pub written: Vec<Written>,
+    /// Components that are not, largest torque first.
+    pub residual: Vec<Residual>,
+    /// How inertias were made physical; `None` where they were already.
+    pub projection: Option<Projection>,
+    /// RMS of the torque by which the file differs from the written components, per joint, N·m (N): what making
+    /// inertias physical, friction non-negative and effects one model costs.
+    pub lost: Vec<f64>,
+    /// RMS of the torque that all components add to the nominal model, per joint, N·m (N).
+    pub correction: Vec<f64>,
+}
+
+/// Everything that a write-back needs of a calibration, worked out once for mean and draws.
+#[derive(Debug, Clone)]
+pub struct Writer<'a> {
+    calibration: &'a Calibration,
+    holds: Holds,
+    library: Library,
+    covariance: Vec<f64>,
+    states: States,
+}
+
+/// A component of a group that nobody can tell apart is written with the others from this probability on.
+const SHARE_OF_GROUP: f64 = 0.1;
+
+impl<'a> Writer<'a> {
+    /// Prepares the write-back of a calibration into a file that holds this.
+    ///
+    /// # Errors
+    /// Those of [`crate::twin::Twin::library`].
+    pub fn new(calibration: &'a Calibration, holds: Holds) -> Result<Self> {
+        let library = calibration.twin.library()?;
+        let states = States::new(&calibration.twin, &library);
+        Ok(Self {
+            calibration,
+            holds,
+            covariance: calibration.twin.posterior.covariance(),
+            library,
+            states,
+        })
+    }
+
+    /// The model average: every component with a probability of 0.5 or more that the data see, with E[β | y]. Where
+    /// several components cannot be told apart but one of them must be there, all of them that count.
+    ///
+    /// # Errors
+    /// [`crate::Error::Refused`] where no physical inertia can be found.
+    pub fn mean(&self) -> Result<WriteBack> {
+        let chosen = self.chosen();
+        self.write(&chosen, &self.calibration.twin.posterior.mean)
+    }
+
+    /// One draw of all coefficients: every component that is in it.
+    ///
+    /// `beta` has one value per column; 0 where the column is out.
+    ///
+    /// # Errors
+    /// As [`Writer::mean`].
+    pub fn draw(&self, beta: &[f64]) -> Result<WriteBack> {
+        let mut chosen = vec![false; self.library.components().len()];
+        for (&term, &value) in self.library.columns().iter().zip(beta) {
+            chosen[self.library.terms()[term].component] |= value != 0.0;
+        }
+        self.write(&chosen, beta)
+    }
+
+    /// Components that the data speak for.
+    fn chosen(&self) -> Vec<bool> {
+        let components = &self.calibration.components;
+        let mut chosen: Vec<bool> = components.iter().map(|c| c.selected).collect();
+        for group in self.calibration.groups.iter().filter(|g| g.pip >= 0.5) {
+            for (component, chosen) in components.iter().zip(&mut chosen) {
+                let counts = component.pip.unwrap_or(0.0) >= SHARE_OF_GROUP;
+                *chosen |= counts && group.members.contains(&component.name);
+            }
+        }
+        chosen
+    }
+
+    /// The write-back of coefficients `beta` for the `chosen` components.
+    fn write(&self, chosen: &[bool], beta: &[f64]) -> Result<WriteBack> {
+        let robot = &self.calibration.twin.robot;
+        let held: Vec<Option<Place>> = (0..beta.len())
+            .map(|column| {
+                self.place(column)
+                    .filter(|_| chosen[self.component(column)])
+            })
+            .collect();
+        // One column that does not fit keeps the whole story out.
+        let mut whole = chosen.to_vec();
+        for (column, place) in held.iter().enumerate() {
+            whole[self.component(column)] &= place.is_some();
+        }
+        let held: Vec<Option<Place>> = (held.into_iter().enumerate())
+            .map(|(column, place)| place.filter(|_| whole[self.component(column)]))
+            .collect();
+        let (links, projection) = links::changes(self, &held, beta)?;
+        let joints = joints::changes(robot, &held, beta, self.holds);
+        let gravity = gravity(robot, &held, beta);
+        let mut change = WriteBack {
+            links,
+            joints,
+            gravity,
+            written: Vec::new(),
+            residual: Vec::new(),
+            projection,
+            lost: Vec::new(),
+            correction: Vec::new(),
+        };
+        let after = change.robot(robot)?;
+        let written: Vec<f64> = (held.iter().zip(beta))
+            .map(|(place, beta)| if place.is_some() { *beta } else { 0.0 })
+            .collect();
+        change.lost = lost::lost(
+            &self.states,
+            [robot, &after],
+            &change.joints,
+            &held,
+            written,
+        );
+        change.correction = self.states.rms(beta);
+        self.tell(&mut change, &whole, chosen, beta, &held);
+        Ok(change)
+    }
+
+    /// Index of a column's component.
+    fn component(&self, column: usize) -> usize {
+        self.library.terms()[self.library.columns()[column]].component
+    }
+
+    /// Where a column's coefficient goes in a file of this format.
+    fn place(&self, column: usize) -> Option<Place> {
+        let term = &self.library.terms()[self.library.columns()[column]];
+        let joint = || {
+            let names = self.calibration.twin.robot.joint_names();
+            let component = &self.library.components()[term.component].name;
+            let own = component
+                .strip_suffix(term.family.word())?
+                .strip_suffix('.')?;
+            names.iter().position(|joint| *joint == own)
+        };
+        let more = self.holds.more;
+        match (term.family, self.library.model_column(column)) {
+            (_, Some(&ModelColumn::Inertia { body, weights })) => {
+                Some(Place::Inertia { body, weights })
+            }
+            (Family::Viscous, _) => joint().map(Place::Viscous),
+            (Family::Coulomb, _) => joint().map(Place::Coulomb),
+            (Family::MotorInertia, _) if more => joint().map(Place::Armature),
+            (Family::Spring, _) if more && term.name.ends_with(".stiffness") => {
+                joint().map(Place::Stiffness)
+            }
+            (Family::Spring, _) if more => joint().map(Place::Preload),
+            (_, Some(&ModelColumn::Gravity { axis })) if more => Some(Place::Gravity(axis)),
+            _ => None,
+        }
+    }
+
+    /// Says in words what went where.
+    fn tell(
+        &self,
+        change: &mut WriteBack,
+        whole: &[bool],
+        chosen: &[bool],
+        beta: &[f64],
+        held: &[Option<Place>],
+    ) {
+        let robot = &self.calibration.twin.robot;
+        for (index, component) in self.calibration.components.iter().enumerate() {
+            let own: Vec<usize> = (0..beta.len())
+                .filter(|&column| self.component(column) == index)
+                .collect();
+            let Some(pip) = component.pip.filter(|_| !own.is_empty()) else {
+                continue;
+            };
+            if whole[index] {
+                let place = own.iter().find_map(|&column| held[column].as_ref());
+                change.written.push(Written {
+                    component: component.name.clone(),
+                    words: component.words.clone(),
+                    pip,
+                    place: match place {
+                        Some(Place::Inertia { body, .. }) => {
+                            let link = links::home(self, *body, component.family);
+                            format!("link {link}")
+                        }
+                        Some(Place::Gravity(_)) | None => "gravity".into(),
+                        Some(
+                            Place::Viscous(joint)
+                            | Place::Coulomb(joint)
+                            | Place::Armature(joint)
+                            | Place::Stiffness(joint)
+                            | Place::Preload(joint),
+                        ) => format!("joint {}", robot.joint_names()[*joint]),
+                    },
+                });
+                continue;
+            }
+            let mut alone = vec![0.0; beta.len()];
+            own.iter().for_each(|&column| alone[column] = beta[column]);
+            change.residual.push(Residual {
+                component: component.name.clone(),
+                words: component.words.clone(),
+                pip,
+                reason: if chosen[index] {
+                    reason(component.family, self.holds.format)
+                } else {
+                    "its probability is below 0.5, or these data do not see it".into()
+                },
+                torque: self.states.rms(&alone),
+                coefficients: own
+                    .iter()
+                    .map(|&column| {
+                        let term = self.library.columns()[column];
+                        (self.library.terms()[term].name.clone(), beta[column])
+                    })
+                    .collect(),
+            });
+        }
+        let size = |residual: &Residual| residual.torque.iter().fold(0.0_f64, |m, x| m.max(*x));
+        change.residual.sort_by(|a, b| size(b).total_cmp(&size(a)));
+    }
+}
+
+/// Where one coefficient goes.
+#[derive(Debug, Clone, PartialEq)]
+enum Place {
+    /// Inertial parameters of a body, in its frame.
+    Inertia {
+        body: usize,
+        weights: [f64; 10],
+    },
+    Viscous(usize),
+    Coulomb(usize),
+    Armature(usize),
+    Stiffness(usize),
+    Preload(usize),
+    Gravity(usize),
+}
+
+impl WriteBack {
+    /// The nominal robot with the change.
+    ///
+    /// # Errors
+    /// Those of [`Robot::new`]: a changed number that is none.
+    pub fn robot(&self, nominal: &Robot) -> Result<Robot> {
+        let description = self.description(nominal.description());
+        Robot::new(description, nominal.locked()).map(|(robot, _)| robot)
+    }
+
+    /// The nominal description with the change; dry friction has no place in it.
+    #[must_use]
+    pub fn description(&self, nominal: &RobotDescription) -> RobotDescription {
+        let mut description = nominal.clone();
+        for link in &mut description.links {
+            if let Some(change) = self.links.iter().find(|change| change.link == link.name) {
+                link.inertia = Some(change.after);
+            }
+        }
+        for joint in &mut description.joints {
+            if let Some(change) = self.joints.iter().find(|change| change.joint == joint.name) {
+                change.apply(joint);
+            }
+        }
+        description.gravity = self.gravity.unwrap_or(description.gravity);
+        description
+    }
+}
+
+/// New gravity, where a column changes it.
+fn gravity(robot: &Robot, held: &[Option<Place>], beta: &[f64]) -> Option<[f64; 3]> {
+    let mut gravity = None;
+    for (place, beta) in held.iter().zip(beta) {
+        if let Some(Place::Gravity(axis)) = place {
+            gravity.get_or_insert(robot.description().gravity)[*axis] += beta;
+        }
+    }
+    gravity
+}
+
+/// Why a family has no place in a format.
+fn reason(family: Family, format: &str) -> String {
+    let what = match family {
+        Family::User | Family::Generic => "energy terms of your own",
+        Family::Offset => "a constant torque",
+        Family::MotorInertia => "motor inertia",
+        Family::Tilt => "gravity",
+        Family::Spring => "springs",
+        Family::Potential => "potentials of a joint",
+        Family::Asymmetry => "friction that depends on direction",
+        Family::Stribeck => "friction that falls with speed",
+        Family::LoadFriction => "friction that grows with the load",
+        Family::CoupledFriction => "friction of coupled motors",
+        Family::Gain => "torque gains",
+        Family::EncoderZero => "encoder zeros",
+        Family::Ripple => "gear ripple",
+        Family::Viscous
+        | Family::Coulomb
+        | Family::Payload
+        | Family::MassMoments
+        | Family::Tensor
+        | Family::MassScale => "this",
+    };
+    format!("a {format} cannot hold {what}")
+}
