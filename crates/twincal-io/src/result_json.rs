@@ -7,15 +7,15 @@ use crate::error::{Error, Result};
 use serde::Serialize;
 use twincal::Finding;
 use twincal::calibrate::{
-    Calibration, ComponentSummary, Group, LikelihoodUsed, LogSummary, SweepPoint, TermSummary,
-    Verdict,
+    Calibration, CompactTerm, ComponentSummary, Group, Halves, LikelihoodUsed, LogSummary, Repeat,
+    SweepPoint, TermSummary, Verdict,
 };
 use twincal::likelihood::JointNoise;
 use twincal::posterior::Method;
 use twincal::prior::Inclusion;
 use twincal::signal::Pipeline;
 use twincal::term::{Family, Status};
-use twincal::validate::{JointScore, Scores, Split, Validation};
+use twincal::validate::{Conformal, JointScore, Loss, Pit, Reliability, Scores, Split, Validation};
 
 /// Version of this layout.
 pub const SCHEMA: u64 = 1;
@@ -50,6 +50,9 @@ struct ResultFile<'a> {
     signal: SignalRow<'a>,
     inference: InferenceRow,
     validation: ValidationRow<'a>,
+    compact: Option<CompactRow<'a>>,
+    repeatability_halves: Option<Halves>,
+    repeatability: &'a [Repeat],
     logs: &'a [LogSummary],
     findings: &'a [Finding],
 }
@@ -71,6 +74,7 @@ struct TermRow<'a> {
     verdict: Option<Verdict>,
     column_rms: Option<f64>,
     pip_sensitivity: &'a [f64],
+    sandwich_sd: Option<f64>,
     words: &'a str,
 }
 
@@ -79,7 +83,16 @@ struct TermRow<'a> {
 struct PriorRow {
     slab: SlabRow,
     inclusion: Inclusion,
+    expected: Vec<ExpectedRow>,
+    forced: Vec<String>,
     noise: NoisePriorRow,
+}
+
+/// A family of which the user expects a number of components.
+#[derive(Serialize)]
+struct ExpectedRow {
+    family: Family,
+    components: f64,
 }
 
 #[derive(Serialize)]
@@ -127,6 +140,9 @@ struct ValidationRow<'a> {
     #[serde(flatten)]
     filtered: ScoresRow<'a>,
     coverage_levels: Vec<LevelRow>,
+    pit: &'a Pit,
+    reliability: Vec<ReliabilityRow<'a>>,
+    conformal: Option<&'a Conformal>,
     moving: ScoresRow<'a>,
     raw: ScoresRow<'a>,
 }
@@ -137,12 +153,46 @@ struct LevelRow {
     coverage: f64,
 }
 
+/// What one joint's intervals hold.
+#[derive(Serialize)]
+struct ReliabilityRow<'a> {
+    joint: &'a str,
+    rows: u64,
+    coverage_levels: Vec<LevelRow>,
+    pit: &'a Pit,
+}
+
+/// The compact twin: what it holds and what it loses.
+#[derive(Serialize)]
+struct CompactRow<'a> {
+    components: &'a [String],
+    terms: &'a [CompactTerm],
+    training_rmse: RivalRow<f64>,
+    /// Moving filtered rows; null without any.
+    heldout: Option<RivalRow<Loss>>,
+}
+
+/// The same number of the model average and of the compact twin.
+#[derive(Serialize)]
+struct RivalRow<T> {
+    average: T,
+    compact: T,
+}
+
+impl<T: Copy> RivalRow<T> {
+    fn of([average, compact]: [T; 2]) -> Self {
+        Self { average, compact }
+    }
+}
+
 /// Scores over one set of rows.
 #[derive(Serialize)]
 struct ScoresRow<'a> {
     rmse_nominal: f64,
     rmse_calibrated: f64,
     coverage95: f64,
+    interval_score95: f64,
+    epistemic_share: f64,
     joints: &'a [JointScore],
 }
 
@@ -165,6 +215,9 @@ impl<'a> ResultFile<'a> {
             },
             inference: InferenceRow::of(&calibration.twin.posterior.method, seed),
             validation: ValidationRow::of(&calibration.validation),
+            compact: CompactRow::of(calibration),
+            repeatability_halves: calibration.halves,
+            repeatability: &calibration.repeatability,
             logs: &calibration.logs,
             findings: &calibration.findings,
         }
@@ -189,6 +242,7 @@ impl<'a> TermRow<'a> {
             verdict: summary.verdict,
             column_rms: summary.column_rms,
             pip_sensitivity: &summary.pip_sensitivity,
+            sandwich_sd: summary.sandwich_sd,
             words: &summary.words,
         }
     }
@@ -222,6 +276,10 @@ impl PriorRow {
                     .collect(),
             },
             inclusion: prior.inclusion,
+            expected: (prior.families.iter())
+                .map(|&(family, components)| ExpectedRow { family, components })
+                .collect(),
+            forced: prior.forced.clone(),
             noise: NoisePriorRow {
                 shape: prior.shape,
                 scale: prior.scale,
@@ -275,12 +333,45 @@ impl<'a> ValidationRow<'a> {
             split: &validation.split,
             signal: "filtered",
             filtered: ScoresRow::of(&validation.filtered),
-            coverage_levels: (validation.coverage_levels.iter())
-                .map(|&(level, coverage)| LevelRow { level, coverage })
+            coverage_levels: levels(&validation.coverage_levels),
+            pit: &validation.pit,
+            reliability: validation
+                .reliability
+                .iter()
+                .map(ReliabilityRow::of)
                 .collect(),
+            conformal: validation.conformal.as_ref(),
             moving: ScoresRow::of(&validation.moving),
             raw: ScoresRow::of(&validation.raw),
         }
+    }
+}
+
+fn levels(levels: &[(f64, f64)]) -> Vec<LevelRow> {
+    let row = |&(level, coverage): &(f64, f64)| LevelRow { level, coverage };
+    levels.iter().map(row).collect()
+}
+
+impl<'a> ReliabilityRow<'a> {
+    fn of(reliability: &'a Reliability) -> Self {
+        Self {
+            joint: &reliability.joint,
+            rows: reliability.rows,
+            coverage_levels: levels(&reliability.coverage_levels),
+            pit: &reliability.pit,
+        }
+    }
+}
+
+impl<'a> CompactRow<'a> {
+    fn of(calibration: &'a Calibration) -> Option<Self> {
+        let compact = calibration.compact.as_ref()?;
+        Some(Self {
+            components: &compact.components,
+            terms: &compact.terms,
+            training_rmse: RivalRow::of(compact.training_rmse),
+            heldout: calibration.validation.compact.map(RivalRow::of),
+        })
     }
 }
 
@@ -290,6 +381,8 @@ impl<'a> ScoresRow<'a> {
             rmse_nominal: scores.rmse_nominal,
             rmse_calibrated: scores.rmse_calibrated,
             coverage95: scores.coverage95,
+            interval_score95: scores.interval_score95,
+            epistemic_share: scores.epistemic_share,
             joints: &scores.joints,
         }
     }

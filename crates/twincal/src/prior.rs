@@ -1,6 +1,7 @@
 //! What is believed before the data: spike and slab in the user's words (method section 6).
 
 use crate::signal::Auto;
+use crate::term::Family;
 use serde::{Deserialize, Serialize};
 
 /// `[prior] inclusion`.
@@ -22,7 +23,14 @@ pub struct PriorSettings {
     pub inclusion: Option<Inclusion>,
     /// `(a0, b0)` of `φ ~ InvGamma`; b0 in (N·m)²; `None`: `(1e-3, 1e-3 · mean(y²))`.
     pub noise: Option<(f64, f64)>,
+    /// Expected number of components of single families, instead of what `inclusion` says of them.
+    pub families: Vec<(Family, f64)>,
+    /// Names of components that are in, whatever the data say.
+    pub forced: Vec<String>,
 }
+
+/// Factor on prior odds that settles a component: what the data say weighs nothing beside it (e^690).
+pub const SETTLED: f64 = 1e300;
 
 /// The prior with every number filled in, for the K columns and C components of one problem.
 ///
@@ -66,6 +74,17 @@ impl Prior {
             inclusion,
             shape,
             scale,
+        }
+    }
+
+    /// The same slabs and bounds with the structure settled: the components in `inside` are in, all others out.
+    #[must_use]
+    pub fn settled(&self, inside: &[bool]) -> Self {
+        Self {
+            family: inside.iter().map(|&inside| usize::from(!inside)).collect(),
+            odds: vec![SETTLED, 1.0 / SETTLED],
+            inclusion: Inclusion::Probability(0.5),
+            ..self.clone()
         }
     }
 

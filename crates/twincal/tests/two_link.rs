@@ -54,6 +54,79 @@ fn the_payload_and_the_hidden_effect_are_found_and_nothing_else() {
     }
 }
 
+/// Intervals, guarantee, halves and compact twin of the same study. False alarm below 1e-3: 9 statistics at 4.5 sd or 95 %
+/// of a bound times 1.5; the seed is fixed.
+#[test]
+fn the_answer_comes_with_its_own_checks() {
+    let result = &*STUDY;
+    let validation = &result.validation;
+    for (joint, score) in validation
+        .reliability
+        .iter()
+        .zip(&validation.filtered.joints)
+    {
+        assert_eq!(joint.rows, 2000);
+        for (level, seen) in &joint.coverage_levels {
+            let sd = (level * (1.0 - level) / 2000.0).sqrt();
+            assert!((seen - level).abs() < 4.5 * sd, "{joint:?}");
+        }
+        assert!(joint.pit.distance < 1.5 * joint.pit.chance, "{joint:?}");
+        // Normal noise of 0.1 N·m and α = 0.05: (4/α) σ φ(1.96) = 0.4676, per row ± 0.45.
+        assert!(
+            (score.interval_score95 - 0.4676).abs() < 4.5 * 0.0101,
+            "{score:?}"
+        );
+        assert!((score.noise_sd - 0.1).abs() < 0.01, "{score:?}");
+        let both = score.epistemic_sd.powi(2) + score.noise_sd.powi(2);
+        let share = score.epistemic_sd.powi(2) / both;
+        assert!(
+            (score.epistemic_share - share).abs() < 1e-12 && share < 0.05,
+            "{score:?}"
+        );
+    }
+    let conformal = validation.conformal.as_ref().expect("a held-out log");
+    assert_eq!(
+        (
+            conformal.trajectories,
+            conformal.level,
+            conformal.guaranteed
+        ),
+        (1, 0.5, true)
+    );
+    assert!((conformal.factor - 1.0).abs() < 0.1, "{conformal:?}");
+    assert_eq!(result.repeatability.len(), 1 + 10 - dropped(result));
+    for repeat in result.repeatability.iter().filter_map(|repeat| repeat.z) {
+        assert!(repeat.abs() < 4.5, "{:?}", result.repeatability);
+    }
+    let compact = result.compact.as_ref().expect("a compact twin");
+    assert_eq!(compact.components, ["sin(q1 - q2)", "payload"]);
+    let [average, own] = validation.compact.expect("losses");
+    assert!(own.rmse < 1.01 * average.rmse && (own.log_score - average.log_score).abs() < 0.01);
+    // −½ ln(2πe σ²) = 0.8837 nats of normal noise of 0.1 N·m, per row ± 0.71.
+    assert!(
+        (average.log_score - 0.8837).abs() < 4.5 * 0.71 / 4000.0_f64.sqrt(),
+        "{average:?}"
+    );
+    for term in result
+        .terms
+        .iter()
+        .filter(|term| term.sandwich_sd.is_some())
+    {
+        let ratio = term.sandwich_sd.unwrap_or(0.0) / term.conditional_sd.unwrap_or(1.0);
+        assert!((0.4..1.6).contains(&ratio), "{} {ratio}", term.term.name);
+    }
+}
+
+/// Columns of the payload that a planar arm does not show.
+fn dropped(result: &Calibration) -> usize {
+    let payload = result.components.iter().find(|c| c.name == "payload");
+    let own = |name: &&String| {
+        let term = result.terms.iter().find(|term| term.term.name == **name);
+        term.is_some_and(|term| term.pip.is_none())
+    };
+    payload.map_or(0, |payload| payload.columns.iter().filter(own).count())
+}
+
 #[test]
 fn a_twin_from_json_predicts_the_same_bytes_and_scores_like_the_calibration() {
     let result = &*STUDY;
@@ -80,7 +153,7 @@ fn a_twin_from_json_predicts_the_same_bytes_and_scores_like_the_calibration() {
                 &twin.robot,
                 &library,
                 &twin.pipeline,
-                &predictor,
+                (&predictor).into(),
                 &trajectory,
                 f64::NEG_INFINITY,
             )

@@ -113,7 +113,7 @@ fn score(twin: &Twin, logs: &LogInput, findings: &mut Vec<Finding>) -> Result<Va
             &twin.robot,
             &library,
             &twin.pipeline,
-            &predictor,
+            (&predictor).into(),
             &trajectory,
             f64::NEG_INFINITY,
         )?;
@@ -190,11 +190,17 @@ mod tests {
             coverage95: coverage,
             mean_width95: 0.4,
             torque_sd: 5.0,
+            interval_score95: 0.5,
+            epistemic_sd: 0.01,
+            noise_sd: 0.1,
+            epistemic_share: 0.01,
         };
         Scores {
             rmse_nominal: 1.0,
             rmse_calibrated: rmse,
             coverage95: coverage,
+            interval_score95: 0.5,
+            epistemic_share: 0.01,
             joints: vec![joint],
         }
     }

@@ -57,6 +57,7 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
             terminal,
         );
     }
+    repeatability(calibration, terminal);
     terminal.say("");
 }
 
@@ -132,7 +133,76 @@ fn validation(calibration: &Calibration, terminal: &mut Terminal) {
     };
     terminal.heading(&format!("Held-out torque: {split}"));
     scores(&validation.filtered, terminal);
+    for line in reliability(calibration) {
+        paragraph(&line, terminal);
+    }
     terminal.say("");
+}
+
+/// How honest the intervals are, what is guaranteed, and what the compact twin costs.
+fn reliability(calibration: &Calibration) -> Vec<String> {
+    let validation = &calibration.validation;
+    let mut lines = Vec::new();
+    let levels: Vec<String> = validation
+        .coverage_levels
+        .iter()
+        .map(|(level, seen)| format!("{:.0} % interval {}", 100.0 * level, percent(*seen)))
+        .collect();
+    if !levels.is_empty() {
+        let share = percent(validation.filtered.epistemic_share);
+        lines.push(format!("held-out values inside: {}", levels.join(", ")));
+        lines.push(format!(
+            "{share} of the predicted variance is what coefficients leave open, the rest noise"
+        ));
+    }
+    if let Some(conformal) = &validation.conformal {
+        lines.push(format!(
+            "stretched by {}, they hold {:.0} % of the rows of the next such log with {} {} ({} logs)",
+            significant(conformal.factor, 3),
+            100.0 * conformal.rows,
+            if conformal.guaranteed { "guaranteed probability" } else { "probability about" },
+            percent(conformal.level),
+            conformal.trajectories
+        ));
+    }
+    if let (Some(compact), Some([average, own])) = (&calibration.compact, validation.compact) {
+        lines.push(format!(
+            "compact twin ({} effects): RMSE {} instead of {} on moving joints, log score {:+.3} nats per row",
+            compact.components.len(),
+            significant(own.rmse, 3),
+            significant(average.rmse, 3),
+            own.log_score - average.log_score
+        ));
+    }
+    lines
+}
+
+/// How many kept effects repeat on the two halves of the data, and which do not.
+fn repeatability(calibration: &Calibration, terminal: &mut Terminal) {
+    let Some(halves) = calibration.halves else {
+        return;
+    };
+    let (mut same, mut other) = (0, Vec::new());
+    for group in (calibration.repeatability).chunk_by(|a, b| a.component == b.component) {
+        let apart = group.iter().filter_map(|repeat| repeat.z).map(f64::abs);
+        let apart = apart.fold(f64::NAN, f64::max);
+        if apart >= 3.0 {
+            let name = clean(&group[0].component);
+            other.push(format!("{name} ({apart:.1} sd apart)"));
+        } else if apart < 3.0 {
+            same += 1;
+        }
+    }
+    let all = same + other.len();
+    if all == 0 {
+        return;
+    }
+    let (one, two) = halves.words();
+    let text = format!("{same} of {all} effects repeat from {one} to {two}");
+    paragraph(&text, terminal);
+    if !other.is_empty() {
+        paragraph(&format!("do not repeat: {}", other.join(", ")), terminal);
+    }
 }
 
 /// Scores per joint, and over all of them.

@@ -305,6 +305,12 @@ pub struct PriorTable {
     pub inclusion: Option<InclusionTable>,
     /// { shape = a0, scale = b0 } of φ ~ InvGamma(a0, b0), scale in (N·m)²; default "auto".
     pub noise: Option<NoisePrior>,
+    /// Expected number of components of single families, such as { spring = 0.5, potential = 0.2 }: more than 0 and fewer than
+    /// the family has candidates. The names are those of `terms[].family`.
+    #[schemars(extend("additionalProperties" = { "type": "number", "exclusiveMinimum": 0 }))]
+    pub families: BTreeMap<String, f64>,
+    /// Components that are in, whatever the data say, such as ["elbow.viscous"].
+    pub forced: Option<Vec<String>>,
 }
 
 /// The slab or "auto".
@@ -366,6 +372,12 @@ pub struct NoiseTable {
     pub model: Option<NoiseWord>,
     /// A variance per joint (default); false: one for all joints.
     pub per_joint: Option<bool>,
+    /// Outliers count less: rows are weighed as a Student-t likelihood with 4 degrees of freedom weighs them; with "tempered"
+    /// only; default false.
+    pub robust: Option<bool>,
+    /// The noise of a joint may change with its speed (learned from the residual, in intervals too); with "tempered" only;
+    /// default false.
+    pub varies_with_speed: Option<bool>,
 }
 
 /// A likelihood.

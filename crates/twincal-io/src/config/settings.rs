@@ -388,7 +388,30 @@ impl Config {
             scaled_variance,
             inclusion: self.inclusion()?,
             noise,
+            families: self.expected_families()?,
+            forced: table.forced.clone().unwrap_or_default(),
         })
+    }
+
+    /// `[prior] families`: words of families and expected numbers.
+    fn expected_families(&self) -> Result<Vec<(Family, f64)>> {
+        let known = || {
+            [Family::User, Family::Generic]
+                .into_iter()
+                .chain(Family::NAMED)
+        };
+        let mut out = Vec::new();
+        for (word, &expected) in &self.file.prior.families {
+            let key = format!("prior.families.{word}");
+            let Some(family) = known().find(|family| family.word() == word) else {
+                let words: Vec<&str> = known().map(Family::word).collect();
+                let remedy = format!("use one of {}", words.join(", "));
+                return Err(self.out_of_range(&key, format!("no family `{word}`"), &remedy));
+            };
+            let range = "a positive number of components";
+            out.push((family, self.number(&key, expected, |m| m > 0.0, range)?));
+        }
+        Ok(out)
     }
 
     fn inclusion(&self) -> Result<Option<Inclusion>> {
@@ -437,6 +460,8 @@ impl Config {
         NoiseSettings {
             model,
             per_joint: table.per_joint.unwrap_or(true),
+            robust: table.robust.unwrap_or(false),
+            varies_with_speed: table.varies_with_speed.unwrap_or(false),
         }
     }
 

@@ -104,6 +104,25 @@ fn zero_cutoff_makes_coulomb_the_sign_function() {
 }
 
 #[test]
+fn prior_of_families_and_forced_components() {
+    let text = "[prior]\nforced = [\"elbow.viscous\"]\nfamilies = { spring = 0.5, user = 2 }\n";
+    let settings = Config::parse("x", text).unwrap().settings().unwrap();
+    let prior = settings.calibration.prior;
+    assert_eq!(prior.families, [(Family::Spring, 0.5), (Family::User, 2.0)]);
+    assert_eq!(prior.forced, ["elbow.viscous"]);
+    let said = message("[prior]\nfamilies = { sprong = 0.5 }\n");
+    assert!(
+        said.contains("no family `sprong`") && said.contains("spring"),
+        "{said}"
+    );
+    let said = message("[prior]\nfamilies = { spring = 0 }\n");
+    assert!(
+        said.contains("prior.families.spring") && said.contains("positive"),
+        "{said}"
+    );
+}
+
+#[test]
 fn case_111_unknown_key_did_you_mean() {
     for (text, expected) in [
         (

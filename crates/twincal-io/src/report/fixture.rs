@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use twincal::calibrate::{
-    Calibration, ComponentSummary, Draws, LikelihoodUsed, LogSummary, ParameterSummary, PriorUsed,
-    TermSummary, Verdict,
+    Calibration, Compact, CompactTerm, ComponentSummary, Draws, Halves, LikelihoodUsed, LogSummary,
+    ParameterSummary, PriorUsed, Repeat, TermSummary, Verdict,
 };
 use twincal::likelihood::{JointNoise, NoiseModel};
 use twincal::posterior::{Method, Model, Posterior};
@@ -15,7 +15,10 @@ use twincal::robot::{
 use twincal::signal::Pipeline;
 use twincal::term::{Family, LibrarySettings, Status, Term};
 use twincal::twin::Twin;
-use twincal::validate::{JointScore, Scores, Split, Trace, Validation};
+use twincal::validate::{
+    Conformal, JointFactor, JointScore, Loss, PitKeeper, Reliability, Scores, Split, Trace,
+    Validation,
+};
 use twincal::{Finding, Severity};
 
 /// Rate of the kept rows, Hz.
@@ -202,6 +205,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
             autocorrelation_time: 2.4,
             interval_factor: 1.08,
             out_of_band: 0.021,
+            speed_profile: None,
         })
         .collect();
     let decay = |memory: f64| {
@@ -233,12 +237,17 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
             payload_where_unknown: false,
         },
         components: components(&terms),
+        repeatability: repeats(&terms),
+        halves: Some(Halves::EveryOtherLog),
+        compact: Some(compact(&terms)),
         terms,
         noise: joint_noise,
         prior: PriorUsed {
             scaled_variance: vec![(Family::Generic, 240.0)],
             learned: true,
             inclusion: Inclusion::ExpectedTerms(5.0),
+            families: Vec::new(),
+            forced: Vec::new(),
             shape: 1e-3,
             scale: 1e-4,
         },
@@ -414,6 +423,10 @@ fn validation(traces: Vec<Trace>, names: &[&str]) -> Validation {
                 coverage95,
                 mean_width95,
                 torque_sd: 10.0 * rmse_nominal,
+                interval_score95: 1.1 * mean_width95,
+                epistemic_sd: 0.03 * rmse_nominal,
+                noise_sd: 0.1 * rmse_nominal,
+                epistemic_share: 0.0825,
             }
         })
         .collect();
@@ -422,6 +435,8 @@ fn validation(traces: Vec<Trace>, names: &[&str]) -> Validation {
         rmse_nominal,
         rmse_calibrated,
         coverage95,
+        interval_score95: 0.4,
+        epistemic_share: 0.0825,
         joints,
     };
     let level = |level: f64| {
@@ -429,9 +444,53 @@ fn validation(traces: Vec<Trace>, names: &[&str]) -> Validation {
         let inside = pits().filter(|p| (**p - 0.5).abs() <= 0.5 * level).count();
         (level, inside as f64 / pits().count() as f64)
     };
+    let kept = |pick: &dyn Fn(&Trace) -> bool| {
+        let mut keeper = PitKeeper::default();
+        for t in traces.iter().filter(|t| pick(t)) {
+            keeper.push(&t.pit, 2.5);
+        }
+        keeper
+    };
+    let reliability = |name: &&str| {
+        let keeper = kept(&|t| t.joint == *name);
+        Reliability {
+            joint: (*name).into(),
+            rows: keeper.rows(),
+            coverage_levels: keeper.levels(),
+            pit: keeper.pit(),
+        }
+    };
+    let rows = kept(&|_| true).rows();
+    let loss = |rmse: f64, log_score: f64| Loss {
+        rows,
+        rmse,
+        log_score,
+    };
     Validation {
         split: Split::LeaveOneLogOut,
         coverage_levels: [0.5, 0.8, 0.9, 0.95].map(level).to_vec(),
+        pit: kept(&|_| true).pit(),
+        reliability: names.iter().map(reliability).collect(),
+        conformal: (rows > 0).then(|| Conformal {
+            trajectories: 3,
+            rows: 0.95,
+            level: 0.75,
+            guaranteed: false,
+            factor: 1.31,
+            joints: names
+                .iter()
+                .map(|name| JointFactor {
+                    joint: (*name).into(),
+                    factor: 1.1,
+                })
+                .collect(),
+        }),
+        compact: (rows > 0).then(|| {
+            [
+                loss(rmse_calibrated, 0.812),
+                loss(1.01 * rmse_calibrated, 0.805),
+            ]
+        }),
         filtered: scores.clone(),
         moving: scores.clone(),
         raw: scores,
@@ -474,6 +533,7 @@ fn terms(names: &[&str]) -> Vec<TermSummary> {
             } else {
                 Vec::new()
             },
+            sandwich_sd: some(1.3 * sd).filter(|_| pip >= 0.5),
             words: if live && pip >= 0.5 {
                 format!("{name}: {mean:+.3} ± {sd:.3} {unit}")
             } else {
@@ -555,6 +615,47 @@ fn terms(names: &[&str]) -> Vec<TermSummary> {
         }
     }
     out
+}
+
+/// The kept terms on two halves: the first one moves.
+fn repeats(terms: &[TermSummary]) -> Vec<Repeat> {
+    let kept = terms.iter().filter(|t| t.selected).enumerate();
+    kept.map(|(i, t)| {
+        let (mean, sd) = (
+            t.conditional_mean.unwrap_or(0.0),
+            1.4 * t.conditional_sd.unwrap_or(1.0),
+        );
+        let z = if i == 0 { 3.6 } else { 0.4 };
+        Repeat {
+            component: t.term.name.clone(),
+            term: t.term.name.clone(),
+            unit: t.term.unit.clone(),
+            first: mean,
+            first_sd: sd,
+            first_pip: 0.97,
+            second: mean + z * std::f64::consts::SQRT_2 * sd,
+            second_sd: sd,
+            second_pip: 0.99,
+            z: (i != 1).then_some(z),
+        }
+    })
+    .collect()
+}
+
+/// The kept terms.
+fn compact(terms: &[TermSummary]) -> Compact {
+    let kept: Vec<&TermSummary> = terms.iter().filter(|t| t.selected).collect();
+    let term = |t: &&TermSummary| CompactTerm {
+        name: t.term.name.clone(),
+        unit: t.term.unit.clone(),
+        mean: t.conditional_mean.unwrap_or(0.0),
+        sd: t.conditional_sd.unwrap_or(0.0),
+    };
+    Compact {
+        components: kept.iter().map(|t| t.term.name.clone()).collect(),
+        terms: kept.iter().map(term).collect(),
+        training_rmse: [0.1, 0.1003],
+    }
 }
 
 /// One component per term.

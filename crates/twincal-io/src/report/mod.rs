@@ -8,6 +8,7 @@ mod ambiguity;
 mod effects;
 mod figure;
 mod figures;
+mod honesty;
 #[cfg(test)]
 mod fixture;
 mod page;

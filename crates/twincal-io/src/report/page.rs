@@ -5,6 +5,7 @@ use super::ambiguity;
 use super::effects::{self, Effects};
 use super::figure::Figure;
 use super::figures;
+use super::honesty;
 use super::tables::{self, Said, Table};
 use super::text;
 use super::verdict::{self, Verdict};
@@ -34,6 +35,11 @@ struct Page<'a> {
     autocorrelation: Option<Figure>,
     coverage: Option<Figure>,
     pit: Option<Figure>,
+    reliability: Table,
+    guarantee: String,
+    repeats: Table,
+    halves: &'static str,
+    compact: Vec<String>,
     sensitivity: Option<Figure>,
     /// Terms whose selection depends on the prior, in one phrase; may be empty.
     sensitive: String,
@@ -117,6 +123,11 @@ fn gather<'a>(
         coverage: figures::coverage::figure(&validation.coverage_levels, independent),
         // Traces may be thinned: then there are fewer values than rows.
         pit: figures::pit::figure(&pit, independent.min(pit.len() as f64)),
+        reliability: honesty::reliability(validation),
+        guarantee: honesty::guarantee(validation),
+        repeats: honesty::repeats(calibration),
+        halves: honesty::halves(calibration),
+        compact: honesty::compact(calibration, joints),
         sensitivity: figures::sensitivity::figure(terms),
         sensitive: text::list(&sensitive.collect::<Vec<_>>()),
         scores: tables::scores(&validation.filtered, joints),

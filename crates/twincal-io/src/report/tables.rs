@@ -17,7 +17,7 @@ pub(super) struct Table {
 }
 
 impl Table {
-    fn new<const N: usize>(heads: [&str; N]) -> Self {
+    pub(super) fn new<const N: usize>(heads: [&str; N]) -> Self {
         Self {
             heads: heads.map(String::from).to_vec(),
             rows: Vec::new(),
@@ -36,6 +36,8 @@ pub(super) fn scores(scores: &Scores, joints: &[Joint<'_>]) -> Table {
         "of torque's sd",
         "95 % coverage",
         "mean width",
+        "interval score",
+        "from coefficients",
     ]);
     for score in scores.joints.iter() {
         let joint = joints.iter().find(|j| j.name == score.joint);
@@ -50,6 +52,8 @@ pub(super) fn scores(scores: &Scores, joints: &[Joint<'_>]) -> Table {
             percent(share),
             percent(score.coverage95),
             with_unit(score.mean_width95, unit),
+            with_unit(score.interval_score95, unit),
+            percent(score.epistemic_share),
         ]);
     }
     if scores.joints.len() > 1 {
@@ -63,6 +67,8 @@ pub(super) fn scores(scores: &Scores, joints: &[Joint<'_>]) -> Table {
             String::new(),
             percent(scores.coverage95),
             String::new(),
+            with_unit(scores.interval_score95, unit),
+            percent(scores.epistemic_share),
         ]);
     }
     table

@@ -15,7 +15,18 @@ const MEDIAN: f64 = 0.674_489_750_196_081_7;
 
 /// One finding per joint whose residual has heavy tails. The intervals hold with them, since σ contains them, but they are
 /// wider than the other rows need, and the estimates less sharp.
-pub(super) fn findings(robot: &Robot, training: &[Part<'_>], mean: &[f64]) -> Vec<Finding> {
+pub(super) fn findings(
+    robot: &Robot,
+    training: &[Part<'_>],
+    mean: &[f64],
+    robust: bool,
+) -> Vec<Finding> {
+    let advice = if robust {
+        "they count little in this fit (noise.robust); look at these times in the report"
+    } else {
+        "intervals hold but are wider than they need be: look at these times in the report and cut what is no free motion out \
+         of the log, or set noise.robust"
+    };
     let mut findings = Vec::new();
     for (joint, name) in robot.joint_names().into_iter().enumerate() {
         let residual: Vec<f64> = training
@@ -32,8 +43,7 @@ pub(super) fn findings(robot: &Robot, training: &[Part<'_>], mean: &[f64]) -> Ve
             name,
             format!(
                 "joint `{name}`: {count} of {} residuals ({:.1} %) are beyond {FAR} robust sd ({sd:.3e}), normal noise has 0.006 %: \
-                 contacts, dropped samples or missing physics; intervals hold but are wider than they need be: look at these \
-                 times in the report and cut what is no free motion out of the log",
+                 contacts, dropped samples or missing physics; {advice}",
                 residual.len(),
                 100.0 * count as f64 / residual.len() as f64
             ),

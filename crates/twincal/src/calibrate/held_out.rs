@@ -1,14 +1,15 @@
 //! Held-out truth: what to leave out, fit without it, predict it, score it.
 
 use super::data::{Data, Log};
-use super::{CalibrationSettings, Fitted, Stage, estimate, noise_of};
+use super::{CalibrationSettings, Fitted, Stage, compact, estimate, noise_of};
 use crate::error::Result;
 use crate::likelihood::Columns;
 use crate::observations::Part;
+use crate::posterior::Posterior;
 use crate::signal::Pipeline;
 use crate::term::Library;
 use crate::twin::Twin;
-use crate::validate::{HeldOut, Split, Validation};
+use crate::validate::{HeldOut, Predictors, Split, Validation};
 
 /// Share of a log that trains when there are one or two logs.
 const TRAINING_SHARE: f64 = 0.7;
@@ -22,35 +23,63 @@ struct Fold<'a> {
     held_out: Vec<(&'a Log, f64)>,
 }
 
-/// Scores the twin on data that it has not seen.
+/// The twin that was fitted to all logs, and the posterior of its compact form.
+#[derive(Clone, Copy)]
+pub(super) struct Own<'a> {
+    pub(super) twin: &'a Twin,
+    pub(super) compact: &'a Posterior,
+}
+
+/// Scores the twin and its compact form on data that it has not seen.
 ///
 /// Held-out logs are predicted by the twin itself. Otherwise every fold is fitted anew: plug-ins, tempering and all.
 pub(super) fn validate(
-    twin: &Twin,
+    own: Own<'_>,
     library: &Library,
     data: &Data,
     columns: &Columns,
     settings: &CalibrationSettings,
     progress: &dyn Fn(Stage),
 ) -> Result<Validation> {
+    let twin = own.twin;
     let (split, folds) = plan(data, &twin.pipeline);
     let mut held_out = HeldOut::new(twin.robot.joint_names());
     for (done, fold) in folds.iter().enumerate() {
         progress(Stage::Validation(done, folds.len()));
-        let predictor = match split {
-            Split::HeldoutLogs => twin.predictor(library)?,
+        let (average, compact) = match split {
+            Split::HeldoutLogs => (twin.clone(), own.compact.clone()),
             Split::LeaveOneLogOut | Split::LastThirty => {
                 let fitted: Fitted = estimate(&fold.training, columns, settings)?;
                 let out_of_band: Vec<f64> =
                     twin.noise.iter().map(|noise| noise.out_of_band).collect();
-                let noise = noise_of(&twin.robot, &fitted, &fold.training, &out_of_band);
-                Twin {
-                    posterior: fitted.fit.posterior,
+                let profiles: Vec<_> = twin.noise.iter().map(|n| n.speed_profile.clone()).collect();
+                let noise = noise_of(
+                    &twin.robot,
+                    &fitted,
+                    &fold.training,
+                    &out_of_band,
+                    &profiles,
+                );
+                let Fitted { fit, .. } = fitted;
+                let inside = compact::members(&fit.problem, &fit.posterior);
+                let compact = compact::refit(&fit.problem, &inside, &fit.posterior)?;
+                let average = Twin {
+                    posterior: fit.posterior,
                     noise,
                     ..twin.clone()
-                }
-                .predictor(library)?
+                };
+                (average, compact)
             }
+        };
+        let predictor = average.predictor(library)?;
+        let compact = Twin {
+            posterior: compact,
+            ..average
+        }
+        .predictor(library)?;
+        let predictors = Predictors {
+            twin: &predictor,
+            compact: Some(&compact),
         };
         for (log, from) in &fold.held_out {
             let trajectory = &log.trajectory;
@@ -58,7 +87,7 @@ pub(super) fn validate(
                 &twin.robot,
                 library,
                 &twin.pipeline,
-                &predictor,
+                predictors,
                 trajectory,
                 *from,
             )?;

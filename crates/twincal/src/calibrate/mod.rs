@@ -1,21 +1,29 @@
 //! The whole road, from a robot and its logs to a calibrated twin, in one function that reads like the paper.
 
+mod compact;
 mod components;
 mod data;
+mod drift;
 mod heavy_tails;
 mod held_out;
+mod repeat;
 mod result;
+mod sandwich;
+mod speed;
 mod summary;
 mod sweep;
+mod weigh;
+#[cfg(test)]
+mod testing;
 
 pub use result::{
-    Calibration, ComponentSummary, Draws, Group, LikelihoodUsed, LogSummary, ParameterSummary,
-    PriorUsed, SweepPoint, TermSummary, Verdict,
+    Calibration, Compact, CompactTerm, ComponentSummary, Draws, Group, Halves, LikelihoodUsed,
+    LogSummary, ParameterSummary, PriorUsed, Repeat, SweepPoint, TermSummary, Verdict,
 };
 
 use crate::error::{Error, Finding, Result, Severity};
 use crate::infer::{Choice, InferenceSettings, infer};
-use crate::likelihood::{Columns, JointNoise, NoiseModel, NoiseSettings};
+use crate::likelihood::{Columns, JointNoise, NoiseModel, NoiseSettings, SpeedProfile};
 use crate::observations::Part;
 use crate::plug_in::{
     Fit, FitSettings, LeftOut, Moving, fit, fit_tempered, residual_correlation_time, start,
@@ -61,10 +69,14 @@ impl Default for CalibrationSettings {
                 scaled_variance: Auto::Auto,
                 inclusion: None,
                 noise: None,
+                families: Vec::new(),
+                forced: Vec::new(),
             },
             noise: NoiseSettings {
                 model: NoiseModel::Tempered,
                 per_joint: true,
+                robust: false,
+                varies_with_speed: false,
             },
             inference: InferenceSettings {
                 method: Choice::Auto,
@@ -121,22 +133,30 @@ pub fn calibrate(
     let mut data = Data::read(robot, &library, &pipeline, logs, heldout)?;
     findings.extend(self_check(robot, &pipeline, data.trajectories())?);
     let (library, zero_columns) = data.drop_zero_columns(library);
-    let columns = columns_of(robot, &library, settings.library.nonnegative);
+    let columns = columns_of(robot, &library, settings)?;
     data.require_enough(robot, &columns)?;
     findings.append(&mut data.findings);
 
     // eq. (5): sparse regression with everything that is plugged in at its fixed point
     progress(Stage::Inference);
-    let training: Vec<Part<'_>> = data
-        .fit
-        .iter()
-        .map(|log| log.observations.whole())
-        .collect();
+    let profiles = weigh::weigh(robot, &mut data, &columns, settings, &mut findings)?;
+    let training = data.training();
     let mut fitted = estimate(&training, &columns, settings)?;
     fitted.fit.posterior = infer(&fitted.fit.problem, &settings.inference)?;
     findings.extend(findings_of_fit(robot, &fitted, settings, &training));
     let mean = &fitted.fit.posterior.mean;
-    findings.extend(heavy_tails::findings(robot, &training, mean));
+    findings.extend(heavy_tails::findings(
+        robot,
+        &training,
+        mean,
+        settings.noise.robust,
+    ));
+    findings.extend(drift::findings(robot, &training, mean));
+    if !settings.noise.varies_with_speed {
+        findings.extend(speed::findings(robot, &fitted.fit, &training));
+    }
+    let inside = compact::members(&fitted.fit.problem, &fitted.fit.posterior);
+    let compact = compact::refit(&fitted.fit.problem, &inside, &fitted.fit.posterior)?;
 
     // τ_calib = τ_nom + Φβ̂ with intervals, and held-out truth
     let out_of_band = data.out_of_band(robot, &library, &pipeline, &fitted.fit.posterior.mean)?;
@@ -146,11 +166,15 @@ pub fn calibrate(
         zero_columns,
         pipeline,
         posterior: fitted.fit.posterior.clone(),
-        noise: noise_of(robot, &fitted, &training, &out_of_band),
+        noise: noise_of(robot, &fitted, &training, &out_of_band, &profiles),
         hull: data.hull(robot),
         payload_where_unknown: data::carry_something(logs.iter().chain(heldout)),
     };
-    let validation = held_out::validate(&skeleton, &library, &data, &columns, settings, progress)?;
+    let own = held_out::Own {
+        twin: &skeleton,
+        compact: &compact,
+    };
+    let validation = held_out::validate(own, &library, &data, &columns, settings, progress)?;
 
     progress(Stage::Sensitivity);
     let sweep = sweep::cutoff(
@@ -163,8 +187,37 @@ pub fn calibrate(
         &fitted.fit,
     )?;
     findings.extend(sweep::findings(&sweep, &library, &fitted.fit.posterior));
+    let gap = (skeleton.pipeline.kernel_length() * skeleton.pipeline.rate_hz).ceil() as usize;
+    let halves = repeat::cut(&training, gap);
+    let repeats = match &halves {
+        None => Vec::new(),
+        Some(cut) => repeat::repeat(
+            cut,
+            &library,
+            &columns,
+            &settings.prior,
+            &fitted.fit,
+            &inside,
+        )?,
+    };
+    let halves = halves.map(|cut| cut.kind).filter(|_| !repeats.is_empty());
+    if let Some(kind) = halves {
+        findings.extend(repeat::findings(&repeats, kind));
+    }
+    let opinion = summary::SecondOpinion {
+        sandwich: sandwich::sds(&fitted.fit, &compact, &training),
+        compact: compact::summary(
+            &library,
+            &fitted.fit.problem,
+            &fitted.fit.posterior,
+            &compact,
+            &training,
+        ),
+        repeats,
+        halves,
+    };
     summary::summarise(
-        skeleton, &library, &data, &columns, settings, fitted, validation, sweep, findings,
+        skeleton, &library, &data, &columns, settings, fitted, validation, sweep, opinion, findings,
     )
 }
 
@@ -203,7 +256,11 @@ fn estimate(
 }
 
 /// The live columns with their components, families and bounds.
-fn columns_of(robot: &Robot, library: &Library, nonnegative: bool) -> Columns {
+///
+/// # Errors
+/// [`Error::Setting`] if a component that is forced in has no column.
+fn columns_of(robot: &Robot, library: &Library, settings: &CalibrationSettings) -> Result<Columns> {
+    let forced = &settings.prior.forced;
     let mut columns = Columns {
         names: Vec::new(),
         component: Vec::new(),
@@ -211,12 +268,17 @@ fn columns_of(robot: &Robot, library: &Library, nonnegative: bool) -> Columns {
         families: Vec::new(),
         prior_sd: library.prior_sds(),
         lower: Vec::new(),
+        forced: Vec::new(),
     };
+    let mut unknown: Vec<&String> = forced.iter().collect();
     let mut last = None;
     for &index in library.columns() {
         let term = &library.terms()[index];
         if last != Some(term.component) {
             last = Some(term.component);
+            let name = &library.components()[term.component].name;
+            columns.forced.push(forced.contains(name));
+            unknown.retain(|forced| *forced != name);
             let known = columns.families.iter().position(|f| *f == term.family);
             columns.family.push(known.unwrap_or_else(|| {
                 columns.families.push(term.family);
@@ -225,13 +287,22 @@ fn columns_of(robot: &Robot, library: &Library, nonnegative: bool) -> Columns {
         }
         columns.component.push(columns.family.len() - 1);
         columns.names.push(term.name.clone());
-        columns.lower.push(if nonnegative {
+        columns.lower.push(if settings.library.nonnegative {
             library.least_value(index, robot)
         } else {
             f64::NEG_INFINITY
         });
     }
-    columns
+    match unknown.first() {
+        None => Ok(columns),
+        Some(name) => Err(Error::Setting {
+            key: "prior.forced".into(),
+            problem: format!("no candidate `{name}` with torque of its own in these logs"),
+            remedy:
+                "give names of components as `twincal fit` prints them, such as \"elbow.viscous\""
+                    .into(),
+        }),
+    }
 }
 
 /// Noise per joint as reported; σ_j = √E[φ/(w_j(1−ρ_j²)) | y].
@@ -240,6 +311,7 @@ fn noise_of(
     fitted: &Fitted,
     training: &[Part<'_>],
     out_of_band: &[f64],
+    profiles: &[Option<SpeedProfile>],
 ) -> Vec<JointNoise> {
     let (plug_in, posterior) = (&fitted.fit.plug_in, &fitted.fit.posterior);
     let gram = crate::plug_in::total(training);
@@ -262,6 +334,7 @@ fn noise_of(
                     .as_ref()
                     .map_or(1.0, |l| l.interval_factor[j]),
                 out_of_band: out_of_band[j],
+                speed_profile: profiles[j].clone(),
             }
         })
         .collect()

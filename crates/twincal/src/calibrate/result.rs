@@ -35,6 +35,9 @@ pub struct TermSummary {
     pub column_rms: Option<f64>,
     /// PIP with the slab variance × 0.1, 1, 10 and expected terms × 0.5, 2 (method section 6).
     pub pip_sensitivity: Vec<f64>,
+    /// sd of β by block scores (A⁻¹BA⁻¹ over stretches of time), the second opinion on the likelihood; `None` unless PIP ≥ 0.5.
+    #[serde(default)]
+    pub sandwich_sd: Option<f64>,
     /// One sentence in physical words, e.g. "viscous friction on elbow: +0.12 ± 0.01 N·m·s/rad".
     pub words: String,
 }
@@ -73,11 +76,10 @@ pub struct ParameterSummary {
     pub name: String,
     /// SI unit.
     pub unit: String,
-    /// Mean, or median where the parameter is a ratio of coefficients (a centre of mass, a rest angle); NaN here and `null`
-    /// in JSON where it does not exist (the centre of no mass).
+    /// Mean; NaN here and `null` in JSON where it does not exist (the centre of no mass).
     #[serde(deserialize_with = "nan_if_null")]
     pub mean: f64,
-    /// Standard deviation; of a ratio half the width of its central 68.3 % interval.
+    /// Standard deviation.
     #[serde(deserialize_with = "nan_if_null")]
     pub sd: f64,
     /// Central 95 % interval.
@@ -117,6 +119,79 @@ pub struct SweepPoint {
     pub mean: Vec<f64>,
 }
 
+/// How the data were halved to see what repeats.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Halves {
+    /// First and second half of the one log.
+    OneLog,
+    /// Every other log.
+    EveryOtherLog,
+}
+
+impl Halves {
+    /// What the two halves are, in words.
+    pub fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Self::OneLog => ("the first half of the log", "the second"),
+            Self::EveryOtherLog => ("the first, third, … log", "the others"),
+        }
+    }
+}
+
+/// One coefficient of the compact twin on the two halves of the data (method section 5).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Repeat {
+    /// Component.
+    pub component: String,
+    /// Term.
+    pub term: String,
+    /// Its unit.
+    pub unit: String,
+    /// E[β | first half, the structure of the compact twin].
+    pub first: f64,
+    /// Its sd.
+    #[serde(deserialize_with = "nan_if_null")]
+    pub first_sd: f64,
+    /// Inclusion probability from the first half alone.
+    pub first_pip: f64,
+    /// The same of the second half.
+    pub second: f64,
+    /// Its sd.
+    #[serde(deserialize_with = "nan_if_null")]
+    pub second_sd: f64,
+    /// Inclusion probability from the second half alone.
+    pub second_pip: f64,
+    /// `(second − first)/√(sd₁² + sd₂²)`; `None` where a half does not see the coefficient.
+    pub z: Option<f64>,
+}
+
+/// The median-probability model (PIP ≥ 0.5) refitted jointly (Barbieri & Berger 2004); its held-out loss stands in
+/// [`Validation::compact`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Compact {
+    /// Names of its components.
+    pub components: Vec<String>,
+    /// Its coefficients.
+    pub terms: Vec<CompactTerm>,
+    /// RMSE over the moving training rows of all joints, N·m: of the model average, and of the compact twin.
+    pub training_rmse: [f64; 2],
+}
+
+/// One coefficient of the compact twin.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CompactTerm {
+    /// Term.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// E[β | y, the compact twin's structure].
+    pub mean: f64,
+    /// Its sd.
+    #[serde(deserialize_with = "nan_if_null")]
+    pub sd: f64,
+}
+
 /// The prior as used.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PriorUsed {
@@ -126,6 +201,12 @@ pub struct PriorUsed {
     pub learned: bool,
     /// Inclusion.
     pub inclusion: Inclusion,
+    /// Expected numbers of single families, as given.
+    #[serde(default)]
+    pub families: Vec<(Family, f64)>,
+    /// Components that were forced in.
+    #[serde(default)]
+    pub forced: Vec<String>,
     /// a0.
     pub shape: f64,
     /// b0, (N·m)².
@@ -194,6 +275,15 @@ pub struct Calibration {
     pub groups: Vec<Group>,
     /// Estimates at 0.7, 1 and 1.4 times the cut-off; empty with the filter off.
     pub sweep: Vec<SweepPoint>,
+    /// What repeats on the two halves of the data: every coefficient of the compact twin.
+    #[serde(default)]
+    pub repeatability: Vec<Repeat>,
+    /// How they were halved; `None` if they were not.
+    #[serde(default)]
+    pub halves: Option<Halves>,
+    /// The compact twin; `None` in files that are older than it.
+    #[serde(default)]
+    pub compact: Option<Compact>,
     /// Held-out scores.
     pub validation: Validation,
     /// Normalised residual autocorrelation at lags 0..=20 rows: entries 2j and 2j+1 are joint j before and after calibration.

@@ -6,7 +6,8 @@ use super::result::{
     Calibration, ComponentSummary, Draws, Group, LikelihoodUsed, PriorUsed, SweepPoint,
     TermSummary, Verdict,
 };
-use super::{CalibrationSettings, Fitted, refuse};
+use super::result::{Compact, Halves, Repeat};
+use super::{CalibrationSettings, Fitted, refuse, sandwich};
 use crate::error::{Finding, Result, Severity};
 use crate::infer::approximate;
 use crate::likelihood::{Columns, mean_squares};
@@ -30,6 +31,15 @@ const PAIR_PLOT: (usize, usize) = (8, 1000);
 /// Random stream of those draws.
 const DRAW_STREAM: u64 = 1 << 32;
 
+/// What was computed to check the answer.
+pub(super) struct SecondOpinion {
+    /// Per column.
+    pub(super) sandwich: Vec<Option<f64>>,
+    pub(super) compact: Compact,
+    pub(super) repeats: Vec<Repeat>,
+    pub(super) halves: Option<Halves>,
+}
+
 /// Everything a reader gets, from the pieces of [`super::calibrate`].
 #[expect(
     clippy::too_many_arguments,
@@ -44,6 +54,7 @@ pub(super) fn summarise(
     fitted: Fitted,
     validation: Validation,
     sweep: Vec<SweepPoint>,
+    opinion: SecondOpinion,
     mut findings: Vec<Finding>,
 ) -> Result<Calibration> {
     let Fitted { fit, left_out } = fitted;
@@ -71,9 +82,14 @@ pub(super) fn summarise(
         .map(f64::sqrt)
         .collect();
     let sensitivity = sensitivity(&fit.problem, &fit.posterior)?;
-    let terms = terms(library, &fit.posterior, &fit.problem, &rms, &sensitivity);
+    let mut terms = terms(library, &fit.posterior, &fit.problem, &rms, &sensitivity);
+    for (&index, sd) in library.columns().iter().zip(&opinion.sandwich) {
+        terms[index].sandwich_sd = *sd;
+    }
+    findings.extend(sandwich::findings(&terms));
     let components = components(library, &fit.posterior, &terms, settings.inference.seed);
     let groups = groups(&fit.problem, &fit.posterior, library);
+    findings.extend(settings.prior.forced.iter().map(forced));
     findings.extend(findings_of_posterior(
         &components,
         &groups,
@@ -116,6 +132,8 @@ pub(super) fn summarise(
                 .collect(),
             learned: settings.prior.scaled_variance == Auto::Auto,
             inclusion: fit.problem.prior.inclusion,
+            families: settings.prior.families.clone(),
+            forced: settings.prior.forced.clone(),
             shape: fit.problem.prior.shape,
             scale: fit.problem.prior.scale,
         },
@@ -127,6 +145,9 @@ pub(super) fn summarise(
         },
         groups,
         sweep,
+        repeatability: opinion.repeats,
+        halves: opinion.halves,
+        compact: Some(opinion.compact),
         validation,
         autocorrelation: autocorrelation(&training, &fit.posterior.mean),
         logs: data
@@ -137,6 +158,17 @@ pub(super) fn summarise(
             .collect(),
         findings,
     })
+}
+
+/// A probability that is nobody's evidence.
+fn forced(name: &String) -> Finding {
+    Finding::new(
+        Severity::Note,
+        "forced",
+        name.clone(),
+        format!("`{name}` is in because prior.forced says so: its probability of 1 is no evidence"),
+        0,
+    )
 }
 
 /// PIPs under slab variance × 0.1, 1, 10 and expected terms (or prior odds) × 0.5, 2: five values per column.
@@ -212,6 +244,7 @@ fn terms(
                 verdict: Some(verdict),
                 column_rms: Some(rms[k]),
                 pip_sensitivity: sensitivity[k].clone(),
+                sandwich_sd: None,
                 words: library.words(
                     index,
                     s.conditional_mean.unwrap_or(0.0),
@@ -236,6 +269,7 @@ fn dropped(term: &crate::term::Term) -> TermSummary {
         verdict: None,
         column_rms: None,
         pip_sensitivity: Vec::new(),
+        sandwich_sd: None,
         words: String::new(),
     }
 }

@@ -1,11 +1,11 @@
 //! Components that no model worth counting leaves out: decided before the tree is walked, each halves the work.
 //!
 //! In the units of [`Standard`] a model's weight is `p(z) Π factor (v_k p_k)^−½ (1 + c_z)^−a_n`, and every factor before
-//! the power is at most 1 but for those of the bounds. Without component B no model misfits less than the full model
-//! without B, so that
+//! the power but the prior's is at most 1 but for those of the bounds. Without component B no model misfits less than the
+//! full model without B, and the prior probabilities of all models without B sum to P(z_B = 0), so that
 //!
 //! ```text
-//! Σ_{z: B∉z} weight(z) ≤ Π factor (1 + c_B)^−a_n,     c_B = β̂_Bᵀ ((A⁻¹)_BB)⁻¹ β̂_B
+//! Σ_{z: B∉z} weight(z) ≤ P(z_B = 0) Π factor (1 + c_B)^−a_n,     c_B = β̂_Bᵀ ((A⁻¹)_BB)⁻¹ β̂_B
 //! ```
 //!
 //! Where that is below e^−40 of a single model that does hold B, all of them together are below rounding.
@@ -48,7 +48,8 @@ impl WithSimd for Certain<'_> {
         let reference = walker.log_weight() + present(&walker).log_mass(standard);
         let mut certain = vec![false; count];
         for (block, cost) in standard.blocks.iter().zip(costs) {
-            let bound = bounds - standard.shape * cost.ln_1p();
+            let (_, outside) = prior.next(block.family, 0, 0);
+            let bound = bounds + outside.ln() - standard.shape * cost.ln_1p();
             certain[block.component] = bound < reference + NEGLIGIBLE;
         }
         certain

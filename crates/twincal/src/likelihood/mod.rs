@@ -1,9 +1,14 @@
 //! Which rows count how much: iid, tempered and AR(1) noise, plug-ins by fixed point (method section 5).
 
-use crate::error::{Error, Result};
+mod speed_profile;
+mod structure;
+
+pub use speed_profile::SpeedProfile;
+
+use crate::error::Result;
 use crate::gram::Gram;
 use crate::posterior::Problem;
-use crate::prior::{Inclusion, Prior, PriorSettings};
+use crate::prior::{Prior, PriorSettings};
 use crate::signal::Auto;
 use crate::term::Family;
 use serde::{Deserialize, Serialize};
@@ -27,6 +32,10 @@ pub struct NoiseSettings {
     pub model: NoiseModel,
     /// One variance per joint; false: all w_j = 1.
     pub per_joint: bool,
+    /// Outliers count less: Student-t weights of rows; with [`NoiseModel::Tempered`] only.
+    pub robust: bool,
+    /// The noise of a joint may change with its speed; with [`NoiseModel::Tempered`] only.
+    pub varies_with_speed: bool,
 }
 
 /// Plug-in noise of one joint.
@@ -34,7 +43,7 @@ pub struct NoiseSettings {
 pub struct JointNoise {
     /// Joint name.
     pub joint: String,
-    /// √E[φ/(w_j(1−ρ_j²)) | y], N·m or N.
+    /// √E[φ/(w_j(1−ρ_j²)) | y], N·m or N; the root mean square over the training rows where it changes with speed.
     pub sigma: f64,
     /// AR(1) coefficient; 0 unless `ar1`.
     pub rho: f64,
@@ -44,12 +53,23 @@ pub struct JointNoise {
     pub n: f64,
     /// Rows after tempering: n/(c·τ_j); with ar1 n(1−ρ)/(1+ρ).
     pub n_eff: f64,
-    /// Integrated autocorrelation time τ_j of the residual, rows.
+    /// Integrated autocorrelation time τ_j of the residual, rows; with `noise.robust` times what weighing rows costs (≥ 1).
     pub autocorrelation_time: f64,
     /// Factor on the noise part of intervals from left-out blocks; 1 unless `tempered`.
     pub interval_factor: f64,
     /// sd of the torque outside the filter's band, measured on the training residual, N·m; 0 with the filter off.
     pub out_of_band: f64,
+    /// How the noise in the band changes with the joint's speed; `None`: it does not.
+    #[serde(default)]
+    pub speed_profile: Option<SpeedProfile>,
+}
+
+impl JointNoise {
+    /// Rows of the residual that count as one independent row, at least 1: τ_j, with ar1 (1+ρ)/(1−ρ).
+    pub fn memory(&self) -> f64 {
+        let rho = self.rho.clamp(-0.999_999, 0.999_999);
+        (self.autocorrelation_time * (1.0 + rho) / (1.0 - rho)).max(1.0)
+    }
 }
 
 /// Plug-in estimates of a likelihood: with these given, exact enumeration and Gibbs share one target.
@@ -84,6 +104,8 @@ pub struct Columns {
     pub prior_sd: Vec<Option<f64>>,
     /// Least value of each coefficient; −∞ where any is allowed, K.
     pub lower: Vec<f64>,
+    /// Components that are in, whatever the data say; empty: none, C.
+    pub forced: Vec<bool>,
 }
 
 impl Columns {
@@ -207,6 +229,7 @@ pub fn assemble(
             AUTO_SHAPE * scale_of_residual(yy / n.max(f64::MIN_POSITIVE)),
         ),
     };
+    let (families, odds, inclusion) = structure::structure(columns, settings)?;
     Ok(Problem {
         gram,
         xy,
@@ -216,10 +239,10 @@ pub fn assemble(
         prior: Prior {
             slab,
             component: columns.component.clone(),
-            family: columns.family.clone(),
-            odds: odds(columns, settings.inclusion),
+            family: families,
+            odds,
             lower: columns.lower.clone(),
-            inclusion: inclusion(settings.inclusion, columns.family.len())?,
+            inclusion,
             shape,
             scale,
         },
@@ -227,51 +250,10 @@ pub fn assemble(
     })
 }
 
-/// r_f of every family: b_f = (C/m0 − 1)/r_f. With an inclusion prior that the user gives all are equal; unasked, b_f = 1
-/// for what is as likely there as not (P(z = 1) = ½).
-fn odds(columns: &Columns, given: Option<Inclusion>) -> Vec<f64> {
-    let expected = DEFAULT_EXPECTED.min(columns.family.len() as f64 / 2.0);
-    let even = columns.family.len() as f64 / expected - 1.0;
-    let odds = |family: &Family| match given {
-        None if family.is_usual() => even,
-        _ => 1.0,
-    };
-    columns.families.iter().map(odds).collect()
-}
-
-/// Components that are expected where nothing is said.
-const DEFAULT_EXPECTED: f64 = 5.0;
-
 /// a0 of the automatic noise prior; b0 = a0 · mean(y²).
 pub const AUTO_SHAPE: f64 = 1e-3;
 
 /// Mean square of the residual torque, with a floor at rounding: an exactly perfect model must not make b0 zero.
 fn scale_of_residual(mean_square: f64) -> f64 {
     mean_square.max(1e-24)
-}
-
-/// The inclusion prior in force: as given, or 5 expected components (C/2 when there are fewer than 10).
-///
-/// # Errors
-/// [`Error::Setting`] for a probability outside (0, 1) or an expected number that is not below C.
-pub fn inclusion(given: Option<Inclusion>, columns: usize) -> Result<Inclusion> {
-    match given {
-        None => Ok(Inclusion::ExpectedTerms(
-            (columns as f64 / 2.0).min(DEFAULT_EXPECTED),
-        )),
-        Some(Inclusion::Probability(p)) if p > 0.0 && p < 1.0 => Ok(Inclusion::Probability(p)),
-        Some(Inclusion::Probability(p)) => Err(Error::Setting {
-            key: "prior.inclusion.probability".into(),
-            problem: format!("{p} is not between 0 and 1"),
-            remedy: "give a probability above 0 and below 1, e.g. 0.2".into(),
-        }),
-        Some(Inclusion::ExpectedTerms(m)) if m > 0.0 && m < columns as f64 => {
-            Ok(Inclusion::ExpectedTerms(m))
-        }
-        Some(Inclusion::ExpectedTerms(m)) => Err(Error::Setting {
-            key: "prior.inclusion.expected_terms".into(),
-            problem: format!("{m} terms expected of {columns} candidates"),
-            remedy: format!("give a number above 0 and below {columns}, or leave it out"),
-        }),
-    }
 }

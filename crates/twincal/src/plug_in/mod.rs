@@ -181,11 +181,11 @@ fn move_noise(
     }
 }
 
-/// Residuals `y − Xβ` of a joint over all parts, as runs of consecutive moving rows.
+/// Residuals `y − Xβ` of a joint over all parts, as the fit weighs them, as runs of consecutive moving rows.
 pub fn residual_runs(training: &[Part<'_>], joint: usize, beta: &[f64]) -> Vec<Vec<f64>> {
     training
         .iter()
-        .flat_map(|part| part.residual_runs(joint, beta))
+        .flat_map(|part| part.weighted_runs(joint, beta))
         .collect()
 }
 

@@ -16,6 +16,10 @@ const MULTIPLIERS: [f64; 3] = [1.0, 3.0, 10.0];
 const MARGIN: f64 = 2.0;
 /// Parts that one or two logs are cut into; three logs or more are left out one by one.
 const PARTS: usize = 5;
+/// Degrees of freedom of the t likelihood that robust rows have.
+const FREEDOM: f64 = 4.0;
+/// 1.96².
+const NORMAL95: f64 = 3.841_458_820_694_124;
 /// Left-out logs at most; more are grouped.
 const MOST_FOLDS: usize = 6;
 
@@ -28,10 +32,20 @@ pub struct LeftOut {
     pub interval_factor: Vec<f64>,
 }
 
+/// What became of one left-out row.
+#[derive(Clone, Copy)]
+struct LeftOutRow {
+    square: f64,
+    /// Epistemic variance `xᵀ Cov x`.
+    epistemic: f64,
+    /// Relative noise variance.
+    spread: f64,
+}
+
 /// One prediction of a left-out part, joint by joint.
 struct Prediction {
-    /// Per joint: squared error and its epistemic variance, per moving row.
-    rows: Vec<Vec<(f64, f64)>>,
+    /// Per joint, per moving row.
+    rows: Vec<Vec<LeftOutRow>>,
     /// √(E[φ]) of the fold that predicted.
     noise: f64,
 }
@@ -60,7 +74,10 @@ pub fn fit_tempered(
     let known = Some(&white.posterior);
     let correlated = PlugIn {
         autocorrelation_time: (0..white.plug_in.weight.len())
-            .map(|joint| residual_correlation_time(training, joint, &white.posterior.mean))
+            .map(|joint| {
+                residual_correlation_time(training, joint, &white.posterior.mean)
+                    * weighing(training, joint, settings.noise.robust)
+            })
             .collect(),
         ..white.plug_in.clone()
     };
@@ -80,7 +97,7 @@ pub fn fit_tempered(
             known,
         )?;
         let predicted = predict_left_out(&folds, columns, settings, &fitted)?;
-        let score = score(&predicted, &fitted.plug_in);
+        let score = score(&predicted, &fitted.plug_in, settings.noise.robust);
         candidates.push((fitted, predicted, score));
     }
     let scores: Vec<(f64, f64)> = MULTIPLIERS
@@ -102,7 +119,11 @@ pub fn fit_tempered(
         Moving::SlabScale,
         Some(&rough.posterior),
     )?;
-    let interval_factor = interval_factors(&predicted, &fitted.plug_in);
+    let interval_factor = if settings.noise.robust {
+        robust_factors(&predicted, &fitted.plug_in)
+    } else {
+        interval_factors(&predicted, &fitted.plug_in)
+    };
     Ok((
         fitted,
         LeftOut {
@@ -110,6 +131,39 @@ pub fn fit_tempered(
             interval_factor,
         },
     ))
+}
+
+/// What weighing rows costs: the variance of the t likelihood's estimate over the one that known weights would give, from
+/// the weights alone (t² = (ν+1)/u − ν); 1 without weights. With ψ = u t (Huber 1981, eq. 4.6.11)
+///
+/// ```text
+/// κ = E[ψ²]/E[ψ']² · E[u]/E[u t²],     ψ' = u² (ν − t²)/(ν + 1)
+/// ```
+fn weighing(training: &[Part<'_>], joint: usize, robust: bool) -> f64 {
+    if !robust {
+        return 1.0;
+    }
+    let (mut score, mut slope, mut known, mut square) = (0.0, 0.0, 0.0, 0.0);
+    let mut count = 0.0;
+    for part in training {
+        let rows = &part.observations.joints[joint];
+        let Some(weights) = rows.weight.get(part.rows.clone()) else {
+            continue;
+        };
+        for (row, weight) in part.rows.clone().zip(weights) {
+            if !rows.standstill[row] {
+                let u = weight * rows.spread.get(row).copied().unwrap_or(1.0);
+                let t2 = (FREEDOM + 1.0) / u - FREEDOM;
+                score += u * u * t2;
+                slope += u * u * (FREEDOM - t2) / (FREEDOM + 1.0);
+                known += u;
+                square += u * t2;
+                count += 1.0;
+            }
+        }
+    }
+    let cost = score * count / (slope * slope) * known / square;
+    if cost.is_finite() { cost.max(1.0) } else { 1.0 }
 }
 
 /// `(training, left out)` pairs: whole logs when there are three or more, otherwise equal parts of each log.
@@ -177,13 +231,13 @@ fn predict_left_out(
     Ok(all)
 }
 
-/// Squared error and epistemic variance `xᵀ Cov x` of every moving row of a joint.
+/// Squared error and variances of every moving row of a joint.
 fn squared_errors(
     part: &Part<'_>,
     joint: usize,
     posterior: &Posterior,
     covariance: &[f64],
-) -> Vec<(f64, f64)> {
+) -> Vec<LeftOutRow> {
     let (len, rows) = (part.observations.len(), &part.observations.joints[joint]);
     let count = posterior.mean.len();
     let residual = part.residual(joint, &posterior.mean, part.rows.clone());
@@ -201,33 +255,65 @@ fn squared_errors(
             }
         }
     }
-    let moving = part.rows.clone().map(|row| !rows.standstill[row]);
-    residual
-        .iter()
-        .zip(epistemic)
-        .zip(moving)
-        .filter(|(_, moving)| *moving)
-        .map(|((r, e), _)| (r * r, e.max(0.0)))
+    part.rows
+        .clone()
+        .zip(residual.iter().zip(epistemic))
+        .filter(|(row, _)| !rows.standstill[*row])
+        .map(|(row, (r, epistemic))| LeftOutRow {
+            square: r * r,
+            epistemic: epistemic.max(0.0),
+            spread: rows.spread.get(row).copied().unwrap_or(1.0),
+        })
         .collect()
 }
 
-/// Log predictive density of the left-out rows, each joint's sum divided by its autocorrelation time.
-fn score(predictions: &[Prediction], plug_in: &PlugIn) -> f64 {
+/// Log predictive density of the left-out rows, normal or Student-t, each joint's sum divided by its autocorrelation time.
+fn score(predictions: &[Prediction], plug_in: &PlugIn, robust: bool) -> f64 {
     let mut sum = 0.0;
     for prediction in predictions {
         for (joint, rows) in prediction.rows.iter().enumerate() {
             let noise = prediction.noise / plug_in.weight[joint];
             let density: f64 = rows
                 .iter()
-                .map(|(square, epistemic)| {
-                    let variance = (noise + epistemic).max(f64::MIN_POSITIVE);
-                    -0.5 * (std::f64::consts::TAU * variance).ln() - 0.5 * square / variance
+                .map(|row| {
+                    let square = row.square;
+                    let variance = (row.spread * noise + row.epistemic).max(f64::MIN_POSITIVE);
+                    let tail = if robust {
+                        (FREEDOM + 1.0) * (square / (FREEDOM * variance)).ln_1p()
+                    } else {
+                        square / variance
+                    };
+                    -0.5 * (std::f64::consts::TAU * variance).ln() - 0.5 * tail
                 })
                 .sum();
             sum += density / plug_in.autocorrelation_time[joint];
         }
     }
     sum
+}
+
+/// Factor that lets the 95 % interval of a normal distribution hold 95 % of the left-out rows, at least 1.
+fn robust_factors(predictions: &[Prediction], plug_in: &PlugIn) -> Vec<f64> {
+    (0..plug_in.weight.len())
+        .map(|joint| {
+            // |error| ≤ 1.96 √(f² noise + epistemic) where f² ≥ (error²/1.96² − epistemic)/noise.
+            let mut needed: Vec<f64> = predictions
+                .iter()
+                .flat_map(|prediction| {
+                    let noise = prediction.noise / plug_in.weight[joint];
+                    let rows = prediction.rows[joint].iter();
+                    rows.map(move |row| {
+                        (row.square / NORMAL95 - row.epistemic) / (row.spread * noise)
+                    })
+                })
+                .filter(|factor| factor.is_finite())
+                .collect();
+            needed.sort_by(f64::total_cmp);
+            let enough = (0.95 * needed.len() as f64).ceil() as usize;
+            let factor = needed.get(enough.saturating_sub(1)).copied();
+            factor.unwrap_or(1.0).max(1.0).sqrt()
+        })
+        .collect()
 }
 
 /// `f_j² = Σ (squared error − epistemic variance) / Σ noise variance`, at least 1: left-out data may say that the noise
@@ -237,9 +323,9 @@ fn interval_factors(predictions: &[Prediction], plug_in: &PlugIn) -> Vec<f64> {
         .map(|joint| {
             let (mut excess, mut noise) = (0.0, 0.0);
             for prediction in predictions {
-                for (square, epistemic) in &prediction.rows[joint] {
-                    excess += square - epistemic;
-                    noise += prediction.noise / plug_in.weight[joint];
+                for row in &prediction.rows[joint] {
+                    excess += row.square - row.epistemic;
+                    noise += row.spread * prediction.noise / plug_in.weight[joint];
                 }
             }
             if noise > 0.0 {
@@ -249,4 +335,35 @@ fn interval_factors(predictions: &[Prediction], plug_in: &PlugIn) -> Vec<f64> {
             }
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observations::JointObservations;
+    use statrs::distribution::{ContinuousCDF, StudentsT};
+
+    /// t rows: the Fisher information is (ν+1)/(ν+3) of what known weights would give, κ = 7/5.
+    #[test]
+    fn weighing_costs_what_the_information_says() {
+        let t = StudentsT::new(0.0, 1.0, FREEDOM).unwrap();
+        let count = 40_000;
+        let weight = (0..count)
+            .map(|i| t.inverse_cdf((i as f64 + 0.5) / count as f64))
+            .map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r))
+            .collect();
+        let mut observations = Observations {
+            joints: vec![JointObservations {
+                standstill: vec![false; count],
+                weight,
+                ..JointObservations::default()
+            }],
+            time: vec![0.0; count],
+            ..Observations::default()
+        };
+        let kappa = weighing(&[observations.whole()], 0, true);
+        assert!((kappa - 1.4).abs() < 2e-3, "{kappa}");
+        observations.joints[0].weight.clear();
+        assert_eq!(weighing(&[observations.whole()], 0, true), 1.0);
+    }
 }

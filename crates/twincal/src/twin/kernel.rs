@@ -38,6 +38,8 @@ pub(super) struct Group<'a> {
     pub(super) x: &'a [Lane],
     /// Measured minus nominal, where measured.
     pub(super) residual: Option<&'a Lane>,
+    /// Relative noise variance.
+    pub(super) spread: &'a Lane,
     /// Half width of the Coulomb band of rows that stand still; 0 elsewhere.
     pub(super) band: &'a Lane,
 }
@@ -51,6 +53,8 @@ pub(super) struct Bands {
     pub(super) epistemic: Lane,
     /// P(Y ≤ measured); NaN without measurement.
     pub(super) pit: Lane,
+    /// Density at the same place, 1/(N·m); NaN without measurement.
+    pub(super) density: Lane,
 }
 
 impl pulp::WithSimd for Group<'_> {
@@ -63,9 +67,10 @@ impl pulp::WithSimd for Group<'_> {
             scratch,
             x,
             residual,
+            spread,
             band,
         } = self;
-        locate(constants, scratch, x);
+        locate(constants, scratch, x, spread);
         let epistemic = epistemic(constants, scratch);
         let [mut low, mut high] = [
             quantile(constants, scratch, constants.levels[0]),
@@ -75,7 +80,7 @@ impl pulp::WithSimd for Group<'_> {
             low[lane] -= band[lane];
             high[lane] += band[lane];
         }
-        let mut pit = [f64::NAN; LANES];
+        let (mut pit, mut density) = ([f64::NAN; LANES], [f64::NAN; LANES]);
         if let Some(residual) = residual {
             let mut at = *residual;
             if band.iter().any(|&half| half > 0.0) {
@@ -92,20 +97,21 @@ impl pulp::WithSimd for Group<'_> {
                     at[lane] -= (at[lane] - median[lane]).clamp(-band[lane], band[lane]);
                 }
             }
-            pit = evaluate(constants, scratch, &at)[0];
+            [pit, density, _] = evaluate(constants, scratch, &at);
         }
         Bands {
             low,
             high,
             epistemic,
             pit,
+            density,
         }
     }
 }
 
 /// Location `xᵀμ` and `q = |R x|²` of each geometry, scale of each component.
 #[inline(always)]
-fn locate(constants: &Constants<'_>, scratch: &mut Scratch, x: &[Lane]) {
+fn locate(constants: &Constants<'_>, scratch: &mut Scratch, x: &[Lane], noise: &Lane) {
     scratch.locations.clear();
     scratch.spreads.clear();
     scratch.scales.clear();
@@ -137,8 +143,8 @@ fn locate(constants: &Constants<'_>, scratch: &mut Scratch, x: &[Lane]) {
         let spread = &scratch.spreads[component.geometry];
         let (mut scale, mut inverse) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {
-            let variance =
-                component.rate * (constants.noise_factor + spread[lane]) + constants.out_of_band;
+            let own = constants.noise_factor * noise[lane];
+            let variance = component.rate * (own + spread[lane]) + constants.out_of_band;
             // A point stays finite.
             scale[lane] = variance.max(1e-300).sqrt();
             inverse[lane] = 1.0 / scale[lane];

@@ -61,9 +61,31 @@ pub struct JointTorque {
     /// On rows that stand still the measured torque first moves by up to ± the Coulomb coefficient towards the median, so
     /// that `|pit − ½| ≤ 0.475` is the same as lying inside `low … high`.
     pub pit: Vec<f64>,
+    /// ln of the predictive density at the measured torque, nats per (N·m); empty without measurement. On rows that stand
+    /// still it is that at the torque that `pit` speaks of, which is no density of the measured one: score moving rows.
+    pub log_density: Vec<f64>,
+    /// sd of the noise part, N·m: √E[scale²] of what the coefficients do not explain.
+    pub noise: Vec<f64>,
 }
 
 impl JointTorque {
+    /// The rows from `first` on.
+    #[must_use]
+    pub fn after(&self, first: usize) -> Self {
+        let rest = |values: &[f64]| values.get(first..).unwrap_or(&[]).to_vec();
+        Self {
+            nominal: rest(&self.nominal),
+            calibrated: rest(&self.calibrated),
+            low: rest(&self.low),
+            high: rest(&self.high),
+            epistemic: rest(&self.epistemic),
+            extrapolating: self.extrapolating.get(first..).unwrap_or(&[]).to_vec(),
+            pit: rest(&self.pit),
+            log_density: rest(&self.log_density),
+            noise: rest(&self.noise),
+        }
+    }
+
     /// Puts the rows of `other` behind its own.
     pub fn append(&mut self, other: Self) {
         self.nominal.extend(other.nominal);
@@ -73,6 +95,8 @@ impl JointTorque {
         self.epistemic.extend(other.epistemic);
         self.extrapolating.extend(other.extrapolating);
         self.pit.extend(other.pit);
+        self.log_density.extend(other.log_density);
+        self.noise.extend(other.noise);
     }
 }
 

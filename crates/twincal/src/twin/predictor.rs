@@ -6,7 +6,7 @@ use super::kernel::{Bands, Constants, Group, Scratch};
 use super::{JointTorque, TorqueSignal};
 use crate::error::Result;
 use crate::lanes::{LANES, Lane};
-use crate::likelihood::JointNoise;
+use crate::likelihood::{JointNoise, SpeedProfile};
 use crate::posterior::Posterior;
 use crate::posterior::mixture::Level;
 use crate::posterior::student::StudentT;
@@ -69,6 +69,9 @@ struct Joint {
     /// `f²/(w_j (1−ρ_j²))`.
     noise_factor: f64,
     out_of_band: f64,
+    profile: Option<SpeedProfile>,
+    /// Rows that count as one: τ_j, with ar1 (1+ρ)/(1−ρ).
+    memory: f64,
     /// |E[β]| of the joint's Coulomb friction, N·m; 0 if it is no candidate.
     coulomb: f64,
     /// `[q_min, q_max, qd_min, qd_max, qdd_min, qdd_max]`, already widened by the margin.
@@ -122,6 +125,8 @@ impl Predictor {
                 noise_factor: joint.noise.interval_factor.powi(2)
                     / (joint.noise.weight * (1.0 - joint.noise.rho * joint.noise.rho)),
                 out_of_band: joint.noise.out_of_band.powi(2),
+                profile: joint.noise.speed_profile.clone(),
+                memory: joint.noise.memory(),
                 coulomb: joint.coulomb.map_or(0.0, |k| posterior.mean[k].abs()),
                 hull: widened(joint.hull),
             })
@@ -145,6 +150,12 @@ impl Predictor {
     #[must_use]
     pub fn columns(&self, joint: usize) -> &[usize] {
         &self.joints[joint].columns
+    }
+
+    /// Rows of `joint` that count as one independent row, at least 1.
+    #[must_use]
+    pub fn memory(&self, joint: usize) -> f64 {
+        self.joints[joint].memory
     }
 
     /// [`Predictor::torque`] of every joint of a block.
@@ -171,7 +182,7 @@ impl Predictor {
     /// tau | z, y ~ t_{2 a_n}( tau_nom + xᵀμ_z,  (b_n/a_n) (f²/(w_j(1−ρ_j²)) + xᵀA_z⁻¹x) [+ s_out²] ),  mixed over z
     /// calibrated = tau_nom + xᵀE[β | y]
     /// ```
-    /// f is the joint's interval factor. For [`TorqueSignal::Raw`] the variance s_out² of the torque outside the filter's
+    /// f is the joint's interval factor; where noise changes with speed, f² is multiplied by the profile's g(|q̇|). For [`TorqueSignal::Raw`] the variance s_out² of the torque outside the filter's
     /// band is added to scale² as it is: it was measured directly, φ does not multiply it. While a joint stands still,
     /// stiction holds any torque within ± its Coulomb coefficient: the interval is widened by that much on both sides.
     ///
@@ -248,7 +259,7 @@ impl Predictor {
         let mut scratch = Scratch::default();
         let mut torque = JointTorque::default();
         let mut x: Vec<Lane> = vec![[0.0; LANES]; joint.columns.len()];
-        let noise = self.noise * joint.noise_factor + constants.out_of_band;
+        let noise = |spread: f64| self.noise * joint.noise_factor * spread + constants.out_of_band;
         for start in rows.clone().step_by(LANES) {
             let count = LANES.min(rows.end - start);
             // A last group that is not full repeats its last row.
@@ -268,6 +279,7 @@ impl Predictor {
                     0.0
                 }
             });
+            let spread: Lane = std::array::from_fn(|lane| joint.spread(input, row_of(lane)));
             let residual: Option<Lane> = (!input.measured.is_empty()).then(|| {
                 std::array::from_fn(|lane| {
                     input.measured[row_of(lane)] - input.nominal[row_of(lane)]
@@ -278,11 +290,13 @@ impl Predictor {
                 high,
                 epistemic,
                 pit,
+                density,
             } = arch.dispatch(Group {
                 constants,
                 scratch: &mut scratch,
                 x: &x,
                 residual: residual.as_ref(),
+                spread: &spread,
                 band: &band,
             });
             for lane in 0..count {
@@ -293,11 +307,14 @@ impl Predictor {
                 torque.low.push(nominal + low[lane]);
                 torque.high.push(nominal + high[lane]);
                 torque.epistemic.push(epistemic[lane].sqrt());
+                let noise = noise(spread[lane]);
+                torque.noise.push(noise.sqrt());
                 torque
                     .extrapolating
                     .push(epistemic[lane] > noise || joint.leaves_hull(input, row));
                 if residual.is_some() {
                     torque.pit.push(pit[lane]);
+                    torque.log_density.push(density[lane].ln());
                 }
             }
         }
@@ -306,6 +323,14 @@ impl Predictor {
 }
 
 impl Joint {
+    /// Relative noise variance of a row; 1 where velocity or profile are unknown.
+    fn spread(&self, input: &JointInput<'_>, row: usize) -> f64 {
+        match (&self.profile, input.motion[1].get(row)) {
+            (Some(profile), Some(&velocity)) => profile.at(velocity),
+            _ => 1.0,
+        }
+    }
+
     fn leaves_hull(&self, input: &JointInput<'_>, row: usize) -> bool {
         (0..3).any(|k| {
             let value = input.motion[k].get(row);

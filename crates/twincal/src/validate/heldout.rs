@@ -1,17 +1,17 @@
-//! Scores one held-out trajectory after another: filtered, moving and raw rows, coverage, traces.
+//! Scores one held-out trajectory after another: filtered, moving and raw rows, coverage, guarantee, traces.
 
-use super::{CoverageKeeper, ScoreKeeper, Split, Trace, TraceRows, Validation};
+use super::conformal::stretch;
+use super::{
+    ConformalKeeper, PitKeeper, Reliability, RivalKeeper, ScoreKeeper, Split, Trace, TraceRows,
+    Validation,
+};
 use crate::error::Result;
 use crate::robot::Robot;
-use crate::rows::{RowBlock, RowSignal, slices, visit_slices};
+use crate::rows::{RowBlock, RowSignal, visit_rows};
 use crate::signal::{Pipeline, Trajectory};
 use crate::term::Library;
 use crate::twin::{JointTorque, Predictor, TorqueSignal};
-use rayon::prelude::*;
 use std::ops::AddAssign;
-
-/// Raw rows that one thread takes at a time.
-const SLICE: usize = 1 << 14;
 
 /// Everything held-out, while it is being collected; keepers of several folds add up.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,8 +20,37 @@ pub struct HeldOut {
     filtered: ScoreKeeper,
     moving: ScoreKeeper,
     raw: ScoreKeeper,
-    coverage: CoverageKeeper,
+    /// Per joint.
+    pit: Vec<PitKeeper>,
+    conformal: ConformalKeeper,
+    rivals: RivalKeeper,
     traces: Vec<Trace>,
+}
+
+/// Who predicts.
+#[derive(Debug, Clone, Copy)]
+pub struct Predictors<'a> {
+    /// The twin.
+    pub twin: &'a Predictor,
+    /// A rival on the same rows: the compact twin.
+    pub compact: Option<&'a Predictor>,
+}
+
+impl<'a> From<&'a Predictor> for Predictors<'a> {
+    /// The twin alone.
+    fn from(twin: &'a Predictor) -> Self {
+        Self {
+            twin,
+            compact: None,
+        }
+    }
+}
+
+/// What one trajectory collects while its blocks come in.
+struct Collected {
+    traces: Vec<Trace>,
+    /// Per joint and row: by how much the interval must be stretched.
+    stretches: Vec<Vec<f64>>,
 }
 
 impl HeldOut {
@@ -30,100 +59,109 @@ impl HeldOut {
         let names: Vec<String> = joints.into_iter().map(Into::into).collect();
         let keeper = ScoreKeeper::new(names.clone());
         Self {
+            pit: vec![PitKeeper::default(); names.len()],
             names,
             filtered: keeper.clone(),
             moving: keeper.clone(),
             raw: keeper,
-            coverage: CoverageKeeper::default(),
+            conformal: ConformalKeeper::default(),
+            rivals: RivalKeeper::default(),
             traces: Vec::new(),
         }
     }
 
-    /// Predicts the rows of a trajectory that were not used to fit `predictor`, those at or after the time `from` in s
+    /// Predicts the rows of a trajectory that were not used to fit the predictors, those at or after the time `from` in s
     /// (−∞: all of them), and scores them.
     ///
     /// # Errors
-    /// Those of [`visit_slices`].
+    /// Those of [`visit_rows`].
     pub fn score(
         &mut self,
         robot: &Robot,
         library: &Library,
         pipeline: &Pipeline,
-        predictor: &Predictor,
+        predictors: Predictors<'_>,
         trajectory: &Trajectory,
         from: f64,
     ) -> Result<()> {
-        let mut traces: Vec<Trace> = self
-            .names
-            .iter()
-            .map(|joint| Trace::new(&trajectory.name, joint))
-            .collect();
-        let filtered = slices(pipeline, trajectory, RowSignal::Filtered, from, usize::MAX);
-        visit_slices(
+        let named = |joint: &String| Trace::new(&trajectory.name, joint);
+        let mut collected = Collected {
+            traces: self.names.iter().map(named).collect(),
+            stretches: vec![Vec::new(); self.names.len()],
+        };
+        visit_rows(
             robot,
             library,
             pipeline,
             trajectory,
             RowSignal::Filtered,
-            &filtered,
             &mut |block| {
-                let torques = predictor.block(block, TorqueSignal::Filtered);
-                self.push_filtered(block, &torques, &mut traces);
+                let skip = block.time.partition_point(|time| *time < from);
+                if skip < block.len {
+                    self.push_filtered(block, skip, predictors, &mut collected);
+                }
                 Ok(())
             },
         )?;
-        for mut trace in traces {
+        self.conformal.push(collected.stretches);
+        for mut trace in collected.traces {
             trace.thin();
             self.traces.push(trace);
         }
-        let raw = slices(pipeline, trajectory, RowSignal::Raw, from, SLICE);
-        let keepers: Vec<ScoreKeeper> = raw
-            .into_par_iter()
-            .map(|slice| {
-                let mut keeper = ScoreKeeper::new(self.names.clone());
-                visit_slices(
-                    robot,
-                    library,
-                    pipeline,
-                    trajectory,
-                    RowSignal::Raw,
-                    &[slice],
-                    &mut |block| {
-                        let torques = predictor.block(block, TorqueSignal::Raw);
-                        for (joint, torque) in torques.iter().enumerate() {
-                            keeper.push(joint, block.joints[joint].measured, torque);
-                        }
-                        Ok(())
-                    },
-                )?;
-                Ok(keeper)
-            })
-            .collect::<Result<_>>()?;
-        keepers.iter().for_each(|keeper| self.raw += keeper);
-        Ok(())
+        visit_rows(
+            robot,
+            library,
+            pipeline,
+            trajectory,
+            RowSignal::Raw,
+            &mut |block| {
+                let skip = block.time.partition_point(|time| *time < from);
+                if skip < block.len {
+                    let torques = predictors.twin.block(block, TorqueSignal::Raw);
+                    for (joint, torque) in torques.iter().enumerate() {
+                        let measured = &block.joints[joint].measured[skip..];
+                        self.raw.push(joint, measured, &torque.after(skip));
+                    }
+                }
+                Ok(())
+            },
+        )
     }
 
     fn push_filtered(
         &mut self,
         block: &RowBlock<'_>,
-        torques: &[JointTorque],
-        traces: &mut [Trace],
+        skip: usize,
+        predictors: Predictors<'_>,
+        collected: &mut Collected,
     ) {
+        let torques = predictors.twin.block(block, TorqueSignal::Filtered);
+        let rival = |compact: &Predictor| compact.block(block, TorqueSignal::Filtered);
+        let compact: Option<Vec<JointTorque>> = predictors.compact.map(rival);
         for (joint, torque) in torques.iter().enumerate() {
             let rows = &block.joints[joint];
-            let own = joint * block.len..(joint + 1) * block.len;
-            let (measured, standstill) = (rows.measured, rows.standstill);
-            self.filtered.push(joint, measured, torque);
+            let own = joint * block.len + skip..(joint + 1) * block.len;
+            let torque = torque.after(skip);
+            let (measured, standstill) = (&rows.measured[skip..], &rows.standstill[skip..]);
+            self.filtered.push(joint, measured, &torque);
             self.moving
-                .push_where(joint, measured, torque, |row| !standstill[row]);
-            self.coverage.push(&torque.pit);
-            traces[joint].extend(&TraceRows {
-                time: block.time,
+                .push_where(joint, measured, &torque, |row| !standstill[row]);
+            self.pit[joint].push(&torque.pit, predictors.twin.memory(joint));
+            if let Some(compact) = &compact {
+                let compact = compact[joint].after(skip);
+                self.rivals
+                    .push(measured, &torque, &compact, |row| !standstill[row]);
+            }
+            collected.stretches[joint].extend(measured.iter().enumerate().map(|(row, &y)| {
+                stretch(torque.low[row], torque.calibrated[row], torque.high[row], y)
+            }));
+            collected.traces[joint].extend(&TraceRows {
+                time: &block.time[skip..],
                 q: &block.q[own.clone()],
                 qd: &block.qd[own],
                 measured,
                 standstill,
-                torque,
+                torque: &torque,
             });
         }
     }
@@ -131,12 +169,24 @@ impl HeldOut {
     /// The scores of everything seen.
     #[must_use]
     pub fn finish(self, split: Split) -> Validation {
+        let mut pooled = PitKeeper::default();
+        self.pit.iter().for_each(|joint| pooled += joint);
+        let reliability = |(joint, keeper): (&String, &PitKeeper)| Reliability {
+            joint: joint.clone(),
+            rows: keeper.rows(),
+            coverage_levels: keeper.levels(),
+            pit: keeper.pit(),
+        };
         Validation {
+            conformal: self.conformal.finish(&split, &self.names),
             split,
             filtered: self.filtered.scores(),
             moving: self.moving.scores(),
             raw: self.raw.scores(),
-            coverage_levels: self.coverage.levels(),
+            coverage_levels: pooled.levels(),
+            pit: pooled.pit(),
+            reliability: self.names.iter().zip(&self.pit).map(reliability).collect(),
+            compact: self.rivals.losses(),
             traces: self.traces,
         }
     }
@@ -151,7 +201,11 @@ impl AddAssign for HeldOut {
         self.filtered += &other.filtered;
         self.moving += &other.moving;
         self.raw += &other.raw;
-        self.coverage += &other.coverage;
+        for (own, more) in self.pit.iter_mut().zip(&other.pit) {
+            *own += more;
+        }
+        self.conformal.join(other.conformal);
+        self.rivals += other.rivals;
         self.traces.extend(other.traces);
     }
 }

@@ -1,10 +1,16 @@
 //! Held-out scores: how good the twin's torque is on data it has not seen (method section 8).
 
+mod conformal;
 mod heldout;
+mod pit;
+mod rivals;
 mod scores;
 mod trace;
 
-pub use heldout::HeldOut;
+pub use conformal::{Conformal, ConformalKeeper, JointFactor};
+pub use heldout::{HeldOut, Predictors};
+pub use pit::{Pit, PitKeeper, Reliability};
+pub use rivals::{Loss, RivalKeeper};
 pub use scores::{CoverageKeeper, ScoreKeeper};
 pub use trace::{MAX_POINTS, TraceRows};
 
@@ -32,6 +38,19 @@ pub struct JointScore {
     /// Standard deviation of the measured torque over these rows, N·m: what an RMSE is to be compared with.
     #[serde(deserialize_with = "nan_if_null")]
     pub torque_sd: f64,
+    /// Mean interval score of that interval, N·m: width plus 40 times the distance of what lies outside (Gneiting &
+    /// Raftery 2007, eq. 43, α = 0.05). Smaller is better.
+    #[serde(default = "nan", deserialize_with = "nan_if_null")]
+    pub interval_score95: f64,
+    /// Root mean square over the rows of the epistemic sd (from coefficients and structure), N·m.
+    #[serde(default = "nan", deserialize_with = "nan_if_null")]
+    pub epistemic_sd: f64,
+    /// Root mean square over the rows of the sd of the noise part, N·m.
+    #[serde(default = "nan", deserialize_with = "nan_if_null")]
+    pub noise_sd: f64,
+    /// Share of the epistemic part in the predictive variance, 0 … 1.
+    #[serde(default = "nan", deserialize_with = "nan_if_null")]
+    pub epistemic_share: f64,
 }
 
 /// Scores over a set of rows: pooled over all rows of all joints, and per joint. Without rows the numbers are NaN here and
@@ -47,6 +66,12 @@ pub struct Scores {
     /// Share of rows inside the 95 % interval.
     #[serde(deserialize_with = "nan_if_null")]
     pub coverage95: f64,
+    /// Mean interval score of the 95 % interval over all rows of all joints.
+    #[serde(default = "nan", deserialize_with = "nan_if_null")]
+    pub interval_score95: f64,
+    /// Share of the epistemic part in the predictive variance.
+    #[serde(default = "nan", deserialize_with = "nan_if_null")]
+    pub epistemic_share: f64,
     /// Per joint.
     pub joints: Vec<JointScore>,
 }
@@ -107,6 +132,18 @@ pub struct Validation {
     pub raw: Scores,
     /// Coverage at 50, 80, 90 and 95 % of the filtered rows, pooled.
     pub coverage_levels: Vec<(f64, f64)>,
+    /// PIT of the filtered rows of all joints.
+    #[serde(default)]
+    pub pit: Pit,
+    /// Coverage at the same levels and PIT, joint by joint.
+    #[serde(default)]
+    pub reliability: Vec<Reliability>,
+    /// How much wider intervals must be for a guarantee; `None` without a held-out trajectory.
+    #[serde(default)]
+    pub conformal: Option<Conformal>,
+    /// The model average against the compact twin on moving filtered rows; `None` if it was not asked for.
+    #[serde(default)]
+    pub compact: Option<[Loss; 2]>,
     /// For figures.
     pub traces: Vec<Trace>,
 }
@@ -114,6 +151,11 @@ pub struct Validation {
 /// JSON has no NaN: a score without rows is written as `null` and read back as NaN.
 pub(crate) fn nan_if_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
+}
+
+/// What a number is in a file that was written before it existed.
+pub(crate) fn nan() -> f64 {
+    f64::NAN
 }
 
 /// [`nan_if_null`] for the two ends of an interval.

@@ -12,6 +12,9 @@ struct Sums {
     square_calibrated: f64,
     inside: u64,
     width: f64,
+    interval_score: f64,
+    epistemic: f64,
+    noise: f64,
     measured: f64,
     square_measured: f64,
 }
@@ -23,6 +26,9 @@ impl AddAssign for Sums {
         self.square_calibrated += other.square_calibrated;
         self.inside += other.inside;
         self.width += other.width;
+        self.interval_score += other.interval_score;
+        self.epistemic += other.epistemic;
+        self.noise += other.noise;
         self.measured += other.measured;
         self.square_measured += other.square_measured;
     }
@@ -42,6 +48,10 @@ impl Sums {
             rmse_calibrated: self.mean(self.square_calibrated).sqrt(),
             coverage95: self.mean(self.inside as f64),
             mean_width95: self.mean(self.width),
+            interval_score95: self.mean(self.interval_score),
+            epistemic_sd: self.mean(self.epistemic).sqrt(),
+            noise_sd: self.mean(self.noise).sqrt(),
+            epistemic_share: self.epistemic / (self.epistemic + self.noise),
             torque_sd: (self.mean(self.square_measured) - self.mean(self.measured).powi(2))
                 .max(0.0)
                 .sqrt(),
@@ -94,6 +104,9 @@ impl ScoreKeeper {
                 square_calibrated: (measured - torque.calibrated[row]).powi(2),
                 inside: u64::from(measured >= low && measured <= high),
                 width: high - low,
+                interval_score: interval_score(low, high, measured),
+                epistemic: torque.epistemic[row].powi(2),
+                noise: torque.noise[row].powi(2),
                 measured,
                 square_measured: measured * measured,
             };
@@ -111,6 +124,8 @@ impl ScoreKeeper {
             rmse_nominal,
             rmse_calibrated,
             coverage95,
+            interval_score95,
+            epistemic_share,
             ..
         } = pooled.score("");
         let joints = self
@@ -123,9 +138,18 @@ impl ScoreKeeper {
             rmse_nominal,
             rmse_calibrated,
             coverage95,
+            interval_score95,
+            epistemic_share,
             joints,
         }
     }
+}
+
+/// Gneiting & Raftery's interval score of a central 95 % interval, N·m: its width, plus 40 times the distance of a
+/// measurement outside (2/α, α = 0.05). Proper: on average no interval scores lower than the true quantiles.
+fn interval_score(low: f64, high: f64, measured: f64) -> f64 {
+    let outside = (low - measured).max(0.0) + (measured - high).max(0.0);
+    (high - low) + 2.0 / 0.05 * outside
 }
 
 impl AddAssign<&ScoreKeeper> for ScoreKeeper {
@@ -196,6 +220,8 @@ mod tests {
             calibrated: vec![1.0; rows],
             low: vec![0.0; rows],
             high: vec![2.0; rows],
+            epistemic: vec![0.3; rows],
+            noise: vec![0.4; rows],
             ..JointTorque::default()
         }
     }
@@ -219,6 +245,16 @@ mod tests {
         close(scores.rmse_calibrated, (15.0_f64 / 5.0).sqrt());
         close(scores.coverage95, 0.6);
         assert_eq!((scores.joints[0].rows, scores.joints[1].rows), (2, 3));
+        // Width 2, and 40 times 1 and 2 outside.
+        close(scores.joints[0].interval_score95, 62.0);
+        close(scores.joints[1].interval_score95, 2.0);
+        close(scores.interval_score95, 26.0);
+        close(interval_score(0.0, 2.0, -0.5), 22.0);
+        let elbow = &scores.joints[1];
+        close(elbow.epistemic_sd, 0.3);
+        close(elbow.noise_sd, 0.4);
+        assert!((elbow.epistemic_share - 0.36).abs() < 1e-12);
+        assert!((scores.epistemic_share - 0.36).abs() < 1e-12);
     }
 
     #[test]

@@ -72,6 +72,7 @@ impl Data {
             families: vec![Family::User, Family::Generic],
             prior_sd: vec![None; self.columns],
             lower: vec![f64::NEG_INFINITY; self.columns],
+            forced: Vec::new(),
         };
         let mut plug_in = PlugIn::start(2, 2, 30.0);
         plug_in.weight = weight.to_vec();
@@ -79,6 +80,8 @@ impl Data {
             scaled_variance: Auto::Value(30.0),
             inclusion: None,
             noise: None,
+            families: Vec::new(),
+            forced: Vec::new(),
         };
         assemble(gram, &columns, &plug_in, &settings).expect("a possible prior")
     }

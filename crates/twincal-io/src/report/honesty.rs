@@ -1,0 +1,195 @@
+//! Can the numbers be believed: intervals joint by joint, a guarantee, what repeats, what the compact twin costs.
+
+use super::tables::Table;
+use super::text::{count, number, percent, probability};
+use super::verdict::plus_minus;
+use super::view::{Joint, pooled_unit};
+use twincal::calibrate::{Calibration, Halves};
+use twincal::validate::Validation;
+
+/// Sd between two halves from which a number is said not to repeat, and from which it is said to waver.
+const APART: (f64, f64) = (3.0, 2.0);
+
+/// Coverage at four levels and shape of the predictions per joint; no rows without held-out rows.
+pub(super) fn reliability(validation: &Validation) -> Table {
+    let mut table = Table::new([
+        "joint",
+        "in 50 %",
+        "in 80 %",
+        "in 90 %",
+        "in 95 %",
+        "off uniform (PIT)",
+        "by chance",
+    ]);
+    let mut add = |name: &str, levels: &[(f64, f64)], distance: f64, chance: f64| {
+        let mut row = vec![name.to_owned()];
+        row.extend(levels.iter().map(|(_, seen)| percent(*seen)));
+        row.extend([number(distance, 2), format!("below {}", number(chance, 2))]);
+        table.rows.push(row);
+    };
+    for joint in validation.reliability.iter().filter(|joint| joint.rows > 0) {
+        let pit = &joint.pit;
+        add(
+            &joint.joint,
+            &joint.coverage_levels,
+            pit.distance,
+            pit.chance,
+        );
+    }
+    if validation.reliability.len() > 1 && !validation.coverage_levels.is_empty() {
+        let pit = &validation.pit;
+        add(
+            "all joints",
+            &validation.coverage_levels,
+            pit.distance,
+            pit.chance,
+        );
+    }
+    table
+}
+
+/// What is guaranteed without believing the model, in one sentence.
+pub(super) fn guarantee(validation: &Validation) -> String {
+    let Some(conformal) = &validation.conformal else {
+        return "No guarantee without believing the model: that needs whole held-out logs (--heldout, or three logs or more)."
+            .into();
+    };
+    let each: Vec<String> = conformal
+        .joints
+        .iter()
+        .map(|joint| format!("{} {}", joint.joint, number(joint.factor, 3)))
+        .collect();
+    format!(
+        "Without believing the model: stretched by {}, the 95 % intervals of all joints hold {} of the rows of the next log          like these with probability {}/{} = {} {}. Joint by joint: {}.",
+        number(conformal.factor, 3),
+        percent(conformal.rows),
+        conformal.trajectories,
+        conformal.trajectories + 1,
+        percent(conformal.level),
+        if conformal.guaranteed {
+            "(split-conformal by trajectory, guaranteed)"
+        } else {
+            "(by logs left out one at a time: about, not guaranteed; give logs with --heldout for a guarantee)"
+        },
+        each.join(", ")
+    )
+}
+
+/// Every coefficient of the compact twin on the two halves of the data.
+pub(super) fn repeats(calibration: &Calibration) -> Table {
+    let mut table = Table::new([
+        "coefficient",
+        "first half",
+        "second half",
+        "unit",
+        "sd apart",
+        "probability in each half",
+        "",
+    ]);
+    for repeat in &calibration.repeatability {
+        let (apart, words) = match repeat.z {
+            None => ("–".into(), "not seen in both halves"),
+            Some(z) if z.abs() >= APART.0 => (number(z.abs(), 2), "does not repeat"),
+            Some(z) if z.abs() >= APART.1 => (number(z.abs(), 2), "wavers"),
+            Some(z) => (number(z.abs(), 2), "repeats"),
+        };
+        table.rows.push(vec![
+            repeat.term.clone(),
+            plus_minus(repeat.first, repeat.first_sd),
+            plus_minus(repeat.second, repeat.second_sd),
+            match repeat.unit.as_str() {
+                "1" => String::new(),
+                unit => unit.into(),
+            },
+            apart,
+            format!(
+                "{} / {}",
+                probability(repeat.first_pip),
+                probability(repeat.second_pip)
+            ),
+            words.into(),
+        ]);
+    }
+    table
+}
+
+/// What the two halves are.
+pub(super) fn halves(calibration: &Calibration) -> &'static str {
+    match calibration.halves {
+        Some(Halves::OneLog) => "the first and the second half of the log",
+        Some(Halves::EveryOtherLog) => "the first, third, … log and the others",
+        None => "",
+    }
+}
+
+/// The compact twin and what it costs, in sentences; none in results without it.
+pub(super) fn compact(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
+    let Some(compact) = &calibration.compact else {
+        return Vec::new();
+    };
+    let unit = pooled_unit(joints);
+    let mut out = vec![match compact.components.len() {
+        0 => "The compact twin, the effects with probability 0.5 or more fitted again together, is the nominal model.".into(),
+        n => format!(
+            "The compact twin holds the effects with probability 0.5 or more, fitted again together: {} with {}.",
+            if n == 1 { "one effect".into() } else { format!("{} effects", count(n as u64)) },
+            match compact.terms.len() {
+                1 => "one number".into(),
+                n => format!("{} numbers", count(n as u64)),
+            }
+        ),
+    }];
+    let [average, own] = compact.training_rmse;
+    if average.is_finite() && own.is_finite() {
+        out.push(format!(
+            "Training RMSE of moving joints: {} instead of {} {unit} of the model average.",
+            number(own, 4),
+            number(average, 4)
+        ));
+    }
+    if let Some([average, own]) = calibration.validation.compact {
+        out.push(format!(
+            "Held-out RMSE of moving joints: {} instead of {} {unit}; log score {} instead of {} nats per row (larger is better).",
+            number(own.rmse, 4),
+            number(average.rmse, 4),
+            number(own.log_score, 4),
+            number(average.log_score, 4)
+        ));
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::fixture;
+
+    #[test]
+    fn words_follow_the_distance_between_the_halves() {
+        let mut calibration = fixture::two_joints();
+        let words = |calibration: &Calibration| -> Vec<String> {
+            let rows = repeats(calibration).rows;
+            rows.iter().map(|row| row[6].clone()).collect()
+        };
+        assert_eq!(
+            words(&calibration)[..3],
+            ["does not repeat", "not seen in both halves", "repeats"]
+        );
+        calibration.repeatability[0].z = Some(-2.5);
+        assert_eq!(words(&calibration)[0], "wavers");
+    }
+
+    #[test]
+    fn a_guarantee_is_only_promised_with_held_out_logs() {
+        let mut validation = fixture::two_joints().validation;
+        assert!(guarantee(&validation).contains("not guaranteed"));
+        validation.conformal.as_mut().unwrap().guaranteed = true;
+        let text = guarantee(&validation);
+        assert!(
+            text.contains("3/4") && text.contains("trajectory, guaranteed)"),
+            "{text}"
+        );
+        validation.conformal = None;
+        assert!(guarantee(&validation).starts_with("No guarantee"));
+    }
+}

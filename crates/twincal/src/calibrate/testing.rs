@@ -1,0 +1,150 @@
+//! Small regressions with known truth for the tests of this module: one joint, white columns, no robot behind them.
+
+use super::compact::refit;
+use super::repeat::{cut, repeat};
+use super::result::Repeat;
+use crate::likelihood::{Columns, assemble};
+use crate::observations::{JointObservations, Observations, Part};
+use crate::plug_in::{Fit, start, total};
+use crate::posterior::Posterior;
+use crate::posterior::random::Random;
+use crate::prior::{Inclusion, PriorSettings};
+use crate::robot::{
+    Inertia, JointDescription, JointKind, LinkDescription, Robot, RobotDescription,
+};
+use crate::signal::Auto;
+use crate::term::{Family, Library, LibrarySettings};
+
+pub(super) struct Regression {
+    pub(super) random: Random,
+    rows: usize,
+}
+
+pub(super) fn part(log: &Observations) -> Part<'_> {
+    log.whole()
+}
+
+impl Regression {
+    pub(super) fn new(seed: u64, rows: usize) -> Self {
+        Self {
+            random: Random::new(seed, 0),
+            rows,
+        }
+    }
+
+    /// Rows `y = Xβ + σε` with standard normal X and ε.
+    pub(super) fn log(&mut self, beta: &[f64], sigma: f64) -> Observations {
+        let rows = self.rows;
+        let x: Vec<f64> = (0..rows * beta.len())
+            .map(|_| self.random.normal())
+            .collect();
+        let y: Vec<f64> = (0..rows)
+            .map(|row| {
+                let signal: f64 = (0..beta.len()).map(|k| beta[k] * x[k * rows + row]).sum();
+                signal + sigma * self.random.normal()
+            })
+            .collect();
+        Observations {
+            log: "log".into(),
+            time: (0..rows).map(|row| 0.01 * row as f64).collect(),
+            starts: vec![0],
+            q: vec![vec![0.0; rows]],
+            qd: vec![vec![1.0; rows]],
+            qdd: vec![vec![0.0; rows]],
+            joints: vec![JointObservations {
+                columns: (0..beta.len()).collect(),
+                x,
+                measured: y.clone(),
+                nominal: vec![0.0; rows],
+                y,
+                standstill: vec![false; rows],
+                weight: Vec::new(),
+                spread: Vec::new(),
+            }],
+        }
+    }
+
+    fn columns() -> Columns {
+        Columns {
+            names: vec!["q1".into(), "q1^2".into()],
+            component: vec![0, 1],
+            family: vec![0, 0],
+            families: vec![Family::User],
+            prior_sd: vec![None; 2],
+            lower: vec![f64::NEG_INFINITY; 2],
+            forced: Vec::new(),
+        }
+    }
+
+    fn prior() -> PriorSettings {
+        PriorSettings {
+            scaled_variance: Auto::Value(100.0),
+            inclusion: Some(Inclusion::Probability(0.5)),
+            noise: None,
+            families: Vec::new(),
+            forced: Vec::new(),
+        }
+    }
+
+    /// Independent rows, and the structure with both columns.
+    pub(super) fn fitted(&self, logs: &[Part<'_>]) -> (Fit, Posterior) {
+        let (columns, prior) = (Self::columns(), Self::prior());
+        let plug_in = start(logs, &columns, &prior);
+        let problem = assemble(&total(logs), &columns, &plug_in, &prior).unwrap();
+        let posterior = crate::infer::approximate(&problem, None).unwrap();
+        let compact = refit(&problem, &[true, true], &posterior).unwrap();
+        let fit = Fit {
+            plug_in,
+            problem,
+            posterior,
+            rounds: 1,
+            converged: true,
+        };
+        (fit, compact)
+    }
+
+    /// Both columns on two halves of the logs.
+    pub(super) fn repeats(&self, logs: &[Observations]) -> Vec<Repeat> {
+        let parts: Vec<Part<'_>> = logs.iter().map(part).collect();
+        let (fit, _) = self.fitted(&parts);
+        let halves = cut(&parts, 0).unwrap();
+        let (columns, prior) = (Self::columns(), Self::prior());
+        repeat(&halves, &library(), &columns, &prior, &fit, &[true, true]).unwrap()
+    }
+}
+
+/// A library with two columns of one joint.
+fn library() -> Library {
+    let settings = LibrarySettings {
+        terms: vec!["cos(q1)".into(), "sin(q1)".into()],
+        generic: Some(false),
+        families: Vec::new(),
+        ..LibrarySettings::default()
+    };
+    Library::propose(&pendulum(), &settings).unwrap().0
+}
+
+fn pendulum() -> Robot {
+    let link = |name: &str, inertia| LinkDescription {
+        name: name.into(),
+        inertia,
+    };
+    let inertia = Inertia {
+        mass: 1.0,
+        com: [0.1, 0.0, 0.0],
+        tensor: [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]],
+    };
+    let description = RobotDescription {
+        name: "pendulum".into(),
+        gravity: [0.0, 0.0, -9.81],
+        links: vec![link("base", None), link("arm", Some(inertia))],
+        joints: vec![JointDescription::new(
+            "hinge",
+            JointKind::Revolute,
+            "base",
+            "arm",
+        )],
+        allow_unphysical: false,
+    };
+    Robot::new(description, &Default::default()).unwrap().0
+}

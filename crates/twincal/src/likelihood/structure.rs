@@ -1,0 +1,224 @@
+//! From the user's words to the prior over structures: expected numbers, in total and per family, and what is forced in.
+
+use super::Columns;
+use crate::error::{Error, Result};
+use crate::prior::{Inclusion, PriorSettings, SETTLED};
+use crate::term::Family;
+
+/// Components that are expected where nothing is said.
+const DEFAULT_EXPECTED: f64 = 5.0;
+
+/// Family of every component, r_f of every family, and the inclusion prior, as [`crate::prior::Prior`] wants them.
+///
+/// With C free components (those that are not forced in) and C_f of family f
+///
+/// ```text
+/// b_f = C/m0 − 1             m0 components expected in total, families by their size
+/// b_f = C_f/m_f − 1          m_f expected of family f, where the user says so
+/// b_f = 1                    unasked, for what is as likely there as not (P(z = 1) = ½)
+/// ```
+/// Forced components are a family of their own, after the others, with odds that no data outweigh.
+///
+/// # Errors
+/// [`Error::Setting`] for a probability outside (0, 1), and an expected number that is not between 0 and the number of
+/// candidates.
+pub(super) fn structure(
+    columns: &Columns,
+    settings: &PriorSettings,
+) -> Result<(Vec<usize>, Vec<f64>, Inclusion)> {
+    let count = columns.family.len();
+    let forced = |c: usize| columns.forced.get(c).copied().unwrap_or(false);
+    let free = (0..count).filter(|&c| !forced(c)).count();
+    let inclusion = if free == 0 && count > 0 {
+        Inclusion::Probability(0.5) // of nothing
+    } else {
+        inclusion(settings.inclusion, free)?
+    };
+    let mut odds = Vec::with_capacity(columns.families.len() + 1);
+    for (index, &family) in columns.families.iter().enumerate() {
+        let own = (0..count).filter(|&c| columns.family[c] == index && !forced(c));
+        let size = own.count() as f64;
+        let given = settings.families.iter().find(|(f, _)| *f == family);
+        odds.push(match given {
+            Some(&(_, expected)) => wanted(inclusion, free, count, family, size, expected)?,
+            // A prior that the user gives holds for all families alike.
+            None if settings.inclusion.is_none() && family.is_usual() => {
+                reference(inclusion, count)
+            }
+            None => reference(inclusion, count) / reference(inclusion, free),
+        });
+    }
+    for (family, expected) in &settings.families {
+        if !columns.families.contains(family) {
+            return Err(Error::Setting {
+                key: format!("prior.families.{}", family.word()),
+                problem: format!(
+                    "{expected} components expected of a family that has no candidate here"
+                ),
+                remedy: "leave the key out, or ask for the family in [library]".into(),
+            });
+        }
+    }
+    let mut family = columns.family.clone();
+    if free < count {
+        (0..count)
+            .filter(|&c| forced(c))
+            .for_each(|c| family[c] = odds.len());
+        odds.push(SETTLED);
+    }
+    Ok((family, odds, inclusion))
+}
+
+/// b of a family with r = 1 among `count` components; 1 where components are independent, so that only ratios matter.
+fn reference(inclusion: Inclusion, count: usize) -> f64 {
+    match inclusion {
+        Inclusion::ExpectedTerms(m) => count as f64 / m - 1.0,
+        Inclusion::Probability(_) => 1.0,
+    }
+}
+
+/// r_f with which a family of `size` free components has the expected number that the user asks for.
+fn wanted(
+    inclusion: Inclusion,
+    free: usize,
+    count: usize,
+    family: Family,
+    size: f64,
+    expected: f64,
+) -> Result<f64> {
+    if size == 0.0 && free < count {
+        return Ok(1.0); // all of them are forced in
+    }
+    if !(expected > 0.0 && expected < size) {
+        return Err(Error::Setting {
+            key: format!("prior.families.{}", family.word()),
+            problem: format!("{expected} components expected of {size} candidates"),
+            remedy: format!("give a number above 0 and below {size}, or leave the key out"),
+        });
+    }
+    let own = size / expected - 1.0;
+    Ok(match inclusion {
+        Inclusion::ExpectedTerms(_) => reference(inclusion, count) / own,
+        Inclusion::Probability(p) => (1.0 - p) / p / own,
+    })
+}
+
+/// The inclusion prior in force over the free components: as given, or 5 expected components (C/2 when there are fewer than 10).
+///
+/// # Errors
+/// [`Error::Setting`] for a probability outside (0, 1) or an expected number that is not below C.
+fn inclusion(given: Option<Inclusion>, columns: usize) -> Result<Inclusion> {
+    match given {
+        None => Ok(Inclusion::ExpectedTerms(
+            (columns as f64 / 2.0).min(DEFAULT_EXPECTED),
+        )),
+        Some(Inclusion::Probability(p)) if p > 0.0 && p < 1.0 => Ok(Inclusion::Probability(p)),
+        Some(Inclusion::Probability(p)) => Err(Error::Setting {
+            key: "prior.inclusion.probability".into(),
+            problem: format!("{p} is not between 0 and 1"),
+            remedy: "give a probability above 0 and below 1, e.g. 0.2".into(),
+        }),
+        Some(Inclusion::ExpectedTerms(m)) if m > 0.0 && m < columns as f64 => {
+            Ok(Inclusion::ExpectedTerms(m))
+        }
+        Some(Inclusion::ExpectedTerms(m)) => Err(Error::Setting {
+            key: "prior.inclusion.expected_terms".into(),
+            problem: format!("{m} terms expected of {columns} candidates"),
+            remedy: format!("give a number above 0 and below {columns}, or leave it out"),
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::prior::Prior;
+    use crate::signal::Auto;
+
+    /// Nine components: four of `User`, three of `Offset`, two of `Viscous`.
+    fn columns(forced: &[usize]) -> Columns {
+        Columns {
+            names: (0..9).map(|k| format!("x{k}")).collect(),
+            component: (0..9).collect(),
+            family: vec![0, 1, 0, 2, 1, 0, 0, 2, 1],
+            families: vec![Family::User, Family::Offset, Family::Viscous],
+            prior_sd: vec![None; 9],
+            lower: vec![f64::NEG_INFINITY; 9],
+            forced: (0..9).map(|c| forced.contains(&c)).collect(),
+        }
+    }
+
+    fn settings(inclusion: Option<Inclusion>, families: &[(Family, f64)]) -> PriorSettings {
+        PriorSettings {
+            scaled_variance: Auto::Value(1.0),
+            inclusion,
+            noise: None,
+            families: families.to_vec(),
+            forced: Vec::new(),
+        }
+    }
+
+    /// Expected number of components in each of the three families, over all 2^9 models.
+    fn expected(columns: &Columns, settings: &PriorSettings) -> [f64; 3] {
+        let (family, odds, inclusion) = structure(columns, settings).unwrap();
+        let mut prior = Prior::single(vec![1.0; 9], family, inclusion, (1.0, 1.0));
+        prior.odds = odds;
+        let (mut total, mut sum) = (0.0, [0.0; 3]);
+        for model in 0u32..512 {
+            let mut members = vec![0; prior.families()];
+            let inside: Vec<usize> = (0..9).filter(|c| model >> c & 1 == 1).collect();
+            inside.iter().for_each(|&c| members[prior.family[c]] += 1);
+            let p = prior.log_model(&members).exp();
+            total += p;
+            inside.iter().for_each(|&c| sum[columns.family[c]] += p);
+        }
+        assert!((total - 1.0).abs() < 1e-12, "{total}");
+        sum
+    }
+
+    #[track_caller]
+    fn near(a: [f64; 3], b: [f64; 3]) {
+        let off = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-12, "{a:?} {b:?}");
+    }
+
+    #[test]
+    fn families_have_the_expected_numbers_that_the_user_gives() {
+        let free = columns(&[]);
+        // Unasked: m0 = 4.5 of 9, by size; viscous friction is as likely there as not.
+        near(expected(&free, &settings(None, &[])), [2.0, 1.5, 1.0]);
+        let mine = [(Family::Offset, 0.3), (Family::Viscous, 1.9)];
+        near(expected(&free, &settings(None, &mine)), [2.0, 0.3, 1.9]);
+        let terms = Some(Inclusion::ExpectedTerms(1.8));
+        near(expected(&free, &settings(terms, &[])), [0.8, 0.6, 0.4]);
+        near(expected(&free, &settings(terms, &mine)), [0.8, 0.3, 1.9]);
+        let half = Some(Inclusion::Probability(0.25));
+        near(expected(&free, &settings(half, &mine)), [1.0, 0.3, 1.9]);
+    }
+
+    #[test]
+    fn forced_components_are_in_and_count_for_nobody() {
+        let some = columns(&[0, 3]);
+        // Seven are free: m0 = 3.5 of 7 by size; one viscous is forced, the other at even odds.
+        near(expected(&some, &settings(None, &[])), [2.5, 1.5, 1.5]);
+        let terms = Some(Inclusion::ExpectedTerms(1.4));
+        near(expected(&some, &settings(terms, &[])), [1.6, 0.6, 1.2]);
+        let mine = [(Family::Offset, 0.3)];
+        near(expected(&some, &settings(None, &mine)), [2.5, 0.3, 1.5]);
+        let all = columns(&[0, 1, 2, 3, 4, 5, 6, 7, 8]);
+        near(expected(&all, &settings(None, &[])), [4.0, 3.0, 2.0]);
+    }
+
+    #[test]
+    fn impossible_numbers_name_their_key() {
+        for (family, number) in [
+            (Family::Offset, 3.0),
+            (Family::Offset, 0.0),
+            (Family::Payload, 1.0),
+        ] {
+            let error = structure(&columns(&[]), &settings(None, &[(family, number)]));
+            let text = error.unwrap_err().to_string();
+            assert!(text.contains(family.word()), "{text}");
+        }
+    }
+}
