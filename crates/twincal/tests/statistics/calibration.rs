@@ -83,6 +83,12 @@ fn simulate(source: &mut Source, inclusion: Inclusion) -> (Truth, Problem) {
     )
 }
 
+/// What is included in truth, and the data that came of it.
+pub(super) fn draw_problem(source: &mut Source, inclusion: Inclusion) -> ([bool; SIZE], Problem) {
+    let (truth, problem) = simulate(source, inclusion);
+    (truth.included, problem)
+}
+
 /// Predicted probabilities and what happened, in ten bins.
 #[derive(Default)]
 struct Reliability {

@@ -3,6 +3,7 @@
 
 mod calibration;
 mod enumeration;
+mod many;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
