@@ -3,9 +3,10 @@
 use crate::error::Result;
 use crate::gram::{Gram, JointAccumulator};
 use crate::robot::Robot;
-use crate::rows::{RowSignal, visit_rows};
+use crate::rows::{RowBlock, RowSignal, slices, visit_slices};
 use crate::signal::{Pipeline, Trajectory};
 use crate::term::Library;
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Rows of one joint. A column lies contiguous over all rows: `x[i * len + row]`.
@@ -57,62 +58,125 @@ pub struct Part<'a> {
     pub rows: Range<usize>,
 }
 
+/// Rows that one thread takes at a time; a few, or the samples that every slice evaluates for its first row add up.
+const SLICE: usize = 1024;
+
 /// Filters and decimates one trajectory into rows.
 ///
 /// # Errors
-/// Those of [`visit_rows`].
+/// Those of [`visit_slices`].
 pub fn observe(
     robot: &Robot,
     library: &Library,
     pipeline: &Pipeline,
     trajectory: &Trajectory,
 ) -> Result<Observations> {
-    let dof = robot.dof();
-    let mut out = Observations {
-        log: trajectory.name.clone(),
-        q: vec![Vec::new(); dof],
-        qd: vec![Vec::new(); dof],
-        qdd: vec![Vec::new(); dof],
-        joints: vec![JointObservations::default(); dof],
-        ..Observations::default()
-    };
-    let mut columns: Vec<Vec<Vec<f64>>> = (0..dof)
-        .map(|joint| vec![Vec::new(); library.columns_of_joint(joint).len()])
-        .collect();
-    visit_rows(
-        robot,
-        library,
-        pipeline,
-        trajectory,
-        RowSignal::Filtered,
-        &mut |block| {
-            let len = block.len;
-            if block.first {
-                out.starts.push(out.time.len());
-            }
-            out.time.extend_from_slice(block.time);
-            for joint in 0..dof {
-                out.q[joint].extend_from_slice(&block.q[joint * len..(joint + 1) * len]);
-                out.qd[joint].extend_from_slice(&block.qd[joint * len..(joint + 1) * len]);
-                out.qdd[joint].extend_from_slice(&block.qdd[joint * len..(joint + 1) * len]);
-                let (rows, kept) = (&block.joints[joint], &mut out.joints[joint]);
-                for (i, column) in columns[joint].iter_mut().enumerate() {
-                    column.extend_from_slice(&rows.x[i * rows.stride..i * rows.stride + len]);
-                }
-                kept.measured.extend_from_slice(rows.measured);
-                kept.nominal.extend_from_slice(rows.nominal);
-                kept.y
-                    .extend(rows.measured.iter().zip(rows.nominal).map(|(m, n)| m - n));
-                kept.standstill.extend_from_slice(rows.standstill);
-            }
-            Ok(())
-        },
-    )?;
-    for (joint, values) in columns.into_iter().enumerate() {
-        out.joints[joint].columns = library.columns_of_joint(joint).to_vec();
-        out.joints[joint].x = values.concat();
+    let signal = RowSignal::Filtered;
+    let slices = slices(pipeline, trajectory, signal, f64::NEG_INFINITY, SLICE);
+    let pieces: Vec<Piece> = slices
+        .into_par_iter()
+        .map(|slice| {
+            let mut piece = Piece::new(library, trajectory);
+            let mut add = |block: &RowBlock<'_>| {
+                piece.add(block);
+                Ok(())
+            };
+            let slice = [slice];
+            visit_slices(
+                robot, library, pipeline, trajectory, signal, &slice, &mut add,
+            )?;
+            Ok(piece)
+        })
+        .collect::<Result<_>>()?;
+    let mut out = Piece::new(library, trajectory);
+    pieces.into_iter().for_each(|piece| out.append(piece));
+    Ok(out.finish(library))
+}
+
+/// Rows while they are being collected: every column on its own.
+struct Piece {
+    rows: Observations,
+    /// `columns[joint][i]`.
+    columns: Vec<Vec<Vec<f64>>>,
+}
+
+impl Piece {
+    fn new(library: &Library, trajectory: &Trajectory) -> Self {
+        let dof = trajectory.dof;
+        Self {
+            rows: Observations {
+                log: trajectory.name.clone(),
+                q: vec![Vec::new(); dof],
+                qd: vec![Vec::new(); dof],
+                qdd: vec![Vec::new(); dof],
+                joints: vec![JointObservations::default(); dof],
+                ..Observations::default()
+            },
+            columns: (0..dof)
+                .map(|joint| vec![Vec::new(); library.columns_of_joint(joint).len()])
+                .collect(),
+        }
     }
-    Ok(out)
+
+    fn add(&mut self, block: &RowBlock<'_>) {
+        let (len, out) = (block.len, &mut self.rows);
+        if block.first {
+            out.starts.push(out.time.len());
+        }
+        out.time.extend_from_slice(block.time);
+        for (joint, rows) in block.joints.iter().enumerate() {
+            let own = joint * len..(joint + 1) * len;
+            out.q[joint].extend_from_slice(&block.q[own.clone()]);
+            out.qd[joint].extend_from_slice(&block.qd[own.clone()]);
+            out.qdd[joint].extend_from_slice(&block.qdd[own]);
+            for (i, column) in self.columns[joint].iter_mut().enumerate() {
+                column.extend_from_slice(&rows.x[i * rows.stride..i * rows.stride + len]);
+            }
+            let kept = &mut out.joints[joint];
+            kept.measured.extend_from_slice(rows.measured);
+            kept.nominal.extend_from_slice(rows.nominal);
+            kept.y
+                .extend(rows.measured.iter().zip(rows.nominal).map(|(m, n)| m - n));
+            kept.standstill.extend_from_slice(rows.standstill);
+        }
+    }
+
+    /// Puts what follows behind.
+    fn append(&mut self, next: Self) {
+        let len = self.rows.time.len();
+        let rows = &mut self.rows;
+        rows.starts
+            .extend(next.rows.starts.iter().map(|start| len + start));
+        rows.time.extend(next.rows.time);
+        for (to, from) in [
+            (&mut rows.q, next.rows.q),
+            (&mut rows.qd, next.rows.qd),
+            (&mut rows.qdd, next.rows.qdd),
+        ] {
+            to.iter_mut()
+                .zip(from)
+                .for_each(|(to, from)| to.extend(from));
+        }
+        for (to, from) in rows.joints.iter_mut().zip(next.rows.joints) {
+            to.measured.extend(from.measured);
+            to.nominal.extend(from.nominal);
+            to.y.extend(from.y);
+            to.standstill.extend(from.standstill);
+        }
+        for (to, from) in self.columns.iter_mut().zip(next.columns) {
+            to.iter_mut()
+                .zip(from)
+                .for_each(|(to, from)| to.extend(from));
+        }
+    }
+
+    fn finish(mut self, library: &Library) -> Observations {
+        for (joint, values) in self.columns.into_iter().enumerate() {
+            self.rows.joints[joint].columns = library.columns_of_joint(joint).to_vec();
+            self.rows.joints[joint].x = values.concat();
+        }
+        self.rows
+    }
 }
 
 impl Observations {

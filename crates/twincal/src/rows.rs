@@ -12,8 +12,9 @@ mod unfiltered;
 
 use crate::error::Result;
 use crate::robot::Robot;
-use crate::signal::{Payload, Pipeline, Trajectory};
+use crate::signal::{Payload, Pipeline, Segment, Trajectory};
 use crate::term::{Library, Scratch};
+use std::ops::Range;
 
 /// Which rows [`visit_rows`] gives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,6 +68,58 @@ pub struct RowBlock<'a> {
 /// Most rows in one block.
 pub const MAX_BLOCK: usize = 256;
 
+/// Consecutive rows of one segment: what can be computed on its own.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Slice {
+    /// Index of the segment in the trajectory.
+    pub segment: usize,
+    /// Rows of that segment.
+    pub rows: Range<usize>,
+}
+
+/// The rows at or after time `since` (s; −∞: all of them) of a trajectory, in order, in slices of about `most` rows.
+///
+/// How rows are cut into slices does not change them. Raw rows of an uneven clock stay together: their spline is one.
+pub fn slices(
+    pipeline: &Pipeline,
+    trajectory: &Trajectory,
+    signal: RowSignal,
+    since: f64,
+    most: usize,
+) -> Vec<Slice> {
+    let mut slices = Vec::new();
+    for (segment, samples) in trajectory.segments.iter().enumerate() {
+        let rows = rows_since(pipeline, samples, signal, since);
+        let is_one = signal == RowSignal::Raw && samples.logged.is_some();
+        let most = if is_one { usize::MAX } else { most };
+        let count = rows.len().div_ceil(most.max(1));
+        let cut = |i: usize| rows.start + i * rows.len() / count;
+        slices.extend((0..count).map(|i| Slice {
+            segment,
+            rows: cut(i)..cut(i + 1),
+        }));
+    }
+    slices
+}
+
+/// Rows of a segment whose time is not before `since`.
+fn rows_since(
+    pipeline: &Pipeline,
+    segment: &Segment,
+    signal: RowSignal,
+    since: f64,
+) -> Range<usize> {
+    if signal == RowSignal::Filtered && !pipeline.is_off() {
+        let plan = filtered::Plan::new(pipeline, segment);
+        return plan.first_since(segment, since)..plan.rows;
+    }
+    let time = match &segment.logged {
+        Some(logged) => &logged.time,
+        None => &segment.time,
+    };
+    time.partition_point(|t| *t < since)..time.len()
+}
+
 /// Visits all rows of a trajectory in order, in blocks of at most [`MAX_BLOCK`] rows.
 ///
 /// A known payload of the log is part of the nominal torque; where the payload component does not act its columns are 0.
@@ -83,6 +136,23 @@ pub fn visit_rows(
     pipeline: &Pipeline,
     trajectory: &Trajectory,
     signal: RowSignal,
+    visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
+) -> Result<()> {
+    let all = slices(pipeline, trajectory, signal, f64::NEG_INFINITY, usize::MAX);
+    visit_slices(robot, library, pipeline, trajectory, signal, &all, visit)
+}
+
+/// [`visit_rows`] for the rows of some [`slices`] only.
+///
+/// # Errors
+/// As [`visit_rows`].
+pub fn visit_slices(
+    robot: &Robot,
+    library: &Library,
+    pipeline: &Pipeline,
+    trajectory: &Trajectory,
+    signal: RowSignal,
+    slices: &[Slice],
     visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
 ) -> Result<()> {
     // A known payload is part of the robot in this log.
@@ -116,22 +186,24 @@ pub fn visit_rows(
             }
         },
     };
-    visit_model(&mut model, pipeline, trajectory, signal, visit)
+    visit_model(&mut model, pipeline, trajectory, signal, slices, visit)
 }
 
-/// [`visit_rows`] for any way to evaluate columns.
+/// [`visit_slices`] for any way to evaluate columns.
 fn visit_model(
     model: &mut evaluate::Model<'_, '_>,
     pipeline: &Pipeline,
     trajectory: &Trajectory,
     signal: RowSignal,
+    slices: &[Slice],
     visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
 ) -> Result<()> {
-    for (index, segment) in trajectory.segments.iter().enumerate() {
+    for slice in slices {
+        let segment = &trajectory.segments[slice.segment];
         if signal == RowSignal::Raw || pipeline.is_off() {
-            unfiltered::visit(model, index, segment, trajectory.dof, visit)?;
+            unfiltered::visit(model, slice, segment, trajectory.dof, visit)?;
         } else {
-            filtered::visit(model, pipeline, index, segment, trajectory.dof, None, visit)?;
+            filtered::visit(model, pipeline, slice, segment, trajectory.dof, None, visit)?;
         }
     }
     Ok(())
@@ -139,13 +211,7 @@ fn visit_model(
 
 /// Number of rows that [`visit_rows`] will give for a trajectory, without evaluating anything.
 pub fn count_rows(pipeline: &Pipeline, trajectory: &Trajectory, signal: RowSignal) -> usize {
-    let rows = |segment: &crate::signal::Segment| match &segment.logged {
-        _ if signal == RowSignal::Filtered && !pipeline.is_off() => {
-            filtered::Plan::new(pipeline, segment).rows
-        }
-        Some(logged) => logged.time.len(),
-        None => segment.time.len(),
-    };
+    let rows = |segment| rows_since(pipeline, segment, signal, f64::NEG_INFINITY).len();
     trajectory.segments.iter().map(rows).sum()
 }
 

@@ -9,6 +9,8 @@ use crate::term::{Component, Estimate, Library};
 const DRAWS: usize = 4000;
 /// Fewest of them that must hold a component; for rarer ones there are draws given that it is in.
 const ENOUGH: usize = 500;
+/// Levels one standard deviation below and above the middle of a normal distribution.
+const ONE_SD: [f64; 2] = [0.158_655, 0.841_345];
 /// Random stream of those draws.
 const STREAM: u64 = (1 << 32) + 1;
 /// Columns whose cosine over the rows is above this are hard to tell apart.
@@ -132,16 +134,18 @@ fn parameters(
             let mut column: Vec<f64> = values.iter().map(|row| row[p]).collect();
             column.sort_by(f64::total_cmp);
             let count = column.len() as f64;
-            let mean = column.iter().sum::<f64>() / count;
-            let square = column.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>();
             let quantile = |level: f64| {
                 let place = (level * (count - 1.0)).round().max(0.0) as usize;
                 column.get(place).copied().unwrap_or(f64::NAN)
             };
-            // A coefficient has exact moments; what is computed from several has those of the draws.
+            // A coefficient has exact moments. A ratio of coefficients has none where its denominator can be near zero.
             let exact = own.get(p).filter(|_| library.is_coefficient(index, p));
             let exact = exact.and_then(|term| term.conditional_mean.zip(term.conditional_sd));
-            let (mean, sd) = exact.unwrap_or((mean, (square / (count - 1.0)).sqrt()));
+            let middle = (
+                quantile(0.5),
+                0.5 * (quantile(ONE_SD[1]) - quantile(ONE_SD[0])),
+            );
+            let (mean, sd) = exact.unwrap_or(middle);
             ParameterSummary {
                 name: parameter.name,
                 unit: parameter.unit,

@@ -6,15 +6,19 @@ use crate::error::{Finding, Result, Severity};
 use crate::likelihood::Columns;
 use crate::observations::{Observations, Part, observe};
 use crate::robot::Robot;
-use crate::rows::{RowSignal, visit_rows};
+use crate::rows::{RowBlock, RowSignal, Slice, slices, visit_slices};
 use crate::signal::{Payload, Pipeline, Recording, Trajectory, align};
 use crate::term::Library;
+use rayon::prelude::*;
 
 /// A column whose root mean square is below this share of what it is when the robot moves anyhow is zero on these data:
 /// a share of its own size, so that units do not matter (case 89).
 const ZERO: f64 = 1e-12;
 /// Rows per column of the largest joint below which nothing is fitted (case 7).
 const ROWS_PER_COLUMN: usize = 3;
+/// Raw rows per log that the noise outside the band is measured on, about, and in pieces of how many.
+const MOST_RAW: usize = 1 << 16;
+const PIECE: usize = 1 << 10;
 
 /// One log, ready.
 pub(super) struct Log {
@@ -166,36 +170,23 @@ impl Data {
         }
         let (mut raw, mut in_band) = (vec![(0.0, 0.0); dof], vec![(0.0, 0.0); dof]);
         for log in &self.fit {
-            visit_rows(
-                robot,
-                library,
-                pipeline,
-                &log.trajectory,
-                RowSignal::Raw,
-                &mut |block| {
-                    for (joint, rows) in block.joints.iter().enumerate() {
-                        let mut residual: Vec<f64> = rows
-                            .measured
-                            .iter()
-                            .zip(rows.nominal)
-                            .map(|(m, n)| m - n)
-                            .collect();
-                        for (i, &column) in rows.columns.iter().enumerate() {
-                            let x = &rows.x[i * rows.stride..i * rows.stride + block.len];
-                            residual
-                                .iter_mut()
-                                .zip(x)
-                                .for_each(|(r, x)| *r -= beta[column] * x);
-                        }
-                        add_squares(&mut raw[joint], &residual, rows.standstill);
-                    }
-                    Ok(())
-                },
-            )?;
-            let whole = log.observations.whole();
+            let (slices, times) = spread(pipeline, &log.trajectory);
+            let sums: Vec<Vec<(f64, f64)>> = slices
+                .into_par_iter()
+                .map(|slice| raw_squares(robot, library, pipeline, log, slice, beta))
+                .collect::<Result<_>>()?;
+            for slice in sums {
+                for (sum, more) in raw.iter_mut().zip(slice) {
+                    *sum = (sum.0 + more.0, sum.1 + more.1);
+                }
+            }
+            let (rows, whole) = (&log.observations, log.observations.whole());
+            let seen: Vec<bool> = rows.time.iter().map(|t| within(&times, *t)).collect();
             for (joint, sum) in in_band.iter_mut().enumerate() {
-                let residual = whole.residual(joint, beta, 0..log.observations.len());
-                add_squares(sum, &residual, &log.observations.joints[joint].standstill);
+                let residual = whole.residual(joint, beta, 0..rows.len());
+                let still = rows.joints[joint].standstill.iter().zip(&seen);
+                let left_out: Vec<bool> = still.map(|(still, seen)| *still || !seen).collect();
+                add_squares(sum, &residual, &left_out);
             }
         }
         let mean = |sum: (f64, f64)| if sum.1 > 0.0 { sum.0 / sum.1 } else { 0.0 };
@@ -231,6 +222,79 @@ impl Data {
 /// True if some log says that the robot carried something unknown: then the payload component acts in those logs only.
 pub(super) fn carry_something<'a>(mut logs: impl Iterator<Item = &'a Recording>) -> bool {
     logs.any(|log| log.payload == Payload::Unknown)
+}
+
+/// Raw rows of a log that a standard deviation is measured on: all of a short one, evenly spread pieces of a long one; and
+/// the times that they cover, s.
+fn spread(pipeline: &Pipeline, trajectory: &Trajectory) -> (Vec<Slice>, Vec<[f64; 2]>) {
+    let all = slices(
+        pipeline,
+        trajectory,
+        RowSignal::Raw,
+        f64::NEG_INFINITY,
+        PIECE,
+    );
+    let rows: usize = all.iter().map(|slice| slice.rows.len()).sum();
+    if rows <= MOST_RAW {
+        return (all, vec![[f64::NEG_INFINITY, f64::INFINITY]]);
+    }
+    let kept: Vec<Slice> = (all.into_iter()).step_by(rows.div_ceil(MOST_RAW)).collect();
+    let times = kept
+        .iter()
+        .map(|slice| {
+            let segment = &trajectory.segments[slice.segment];
+            let time = match &segment.logged {
+                Some(logged) => &logged.time,
+                None => &segment.time,
+            };
+            [time[slice.rows.start], time[slice.rows.end - 1]]
+        })
+        .collect();
+    (kept, times)
+}
+
+/// Whether a time lies in one of the ranges, which ascend.
+fn within(ranges: &[[f64; 2]], time: f64) -> bool {
+    let after = ranges.partition_point(|range| range[0] <= time);
+    after > 0 && time <= ranges[after - 1][1]
+}
+
+/// `(Σ r², rows)` per joint of the raw residual over moving rows of a slice.
+fn raw_squares(
+    robot: &Robot,
+    library: &Library,
+    pipeline: &Pipeline,
+    log: &Log,
+    slice: Slice,
+    beta: &[f64],
+) -> Result<Vec<(f64, f64)>> {
+    let mut sums = vec![(0.0, 0.0); robot.dof()];
+    let mut add = |block: &RowBlock<'_>| {
+        for (rows, sum) in block.joints.iter().zip(&mut sums) {
+            let mut residual: Vec<f64> = (rows.measured.iter().zip(rows.nominal))
+                .map(|(measured, nominal)| measured - nominal)
+                .collect();
+            for (i, &column) in rows.columns.iter().enumerate() {
+                let x = &rows.x[i * rows.stride..i * rows.stride + block.len];
+                for (r, x) in residual.iter_mut().zip(x) {
+                    *r -= beta[column] * x;
+                }
+            }
+            add_squares(sum, &residual, rows.standstill);
+        }
+        Ok(())
+    };
+    let trajectory = &log.trajectory;
+    visit_slices(
+        robot,
+        library,
+        pipeline,
+        trajectory,
+        RowSignal::Raw,
+        &[slice],
+        &mut add,
+    )?;
+    Ok(sums)
 }
 
 /// Adds the squares of the moving rows to `(sum, count)`.

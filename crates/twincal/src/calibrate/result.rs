@@ -76,10 +76,11 @@ pub struct ParameterSummary {
     pub name: String,
     /// SI unit.
     pub unit: String,
-    /// Mean; NaN here and `null` in JSON where it does not exist (the centre of no mass).
+    /// Mean, or median where the parameter is a ratio of coefficients (a centre of mass, a rest angle); NaN here and `null`
+    /// in JSON where it does not exist (the centre of no mass).
     #[serde(deserialize_with = "nan_if_null")]
     pub mean: f64,
-    /// Standard deviation.
+    /// Standard deviation; of a ratio half the width of its central 68.3 % interval.
     #[serde(deserialize_with = "nan_if_null")]
     pub sd: f64,
     /// Central 95 % interval.

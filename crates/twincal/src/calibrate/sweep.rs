@@ -12,6 +12,7 @@ use crate::posterior::Posterior;
 use crate::robot::Robot;
 use crate::signal::{Pipeline, Recording};
 use crate::term::Library;
+use rayon::prelude::*;
 
 /// Factors on the cut-off.
 const FACTORS: [f64; 2] = [0.7, 1.4];
@@ -35,31 +36,35 @@ pub(super) fn cutoff(
         cutoff_hz: pipeline.cutoff_hz,
         mean: fit.posterior.mean.clone(),
     }];
-    for factor in FACTORS {
-        let scaled = Pipeline {
-            cutoff_hz: factor * pipeline.cutoff_hz,
-            motion_cutoff_hz: factor * pipeline.motion_cutoff_hz,
-            rate_hz: factor * pipeline.rate_hz,
-            ..pipeline.clone()
-        };
-        let Ok(data) = Data::read(robot, library, &scaled, logs, &[]) else {
-            continue;
-        };
-        let parts: Vec<Part<'_>> = data
-            .fit
-            .iter()
-            .map(|log| log.observations.whole())
-            .collect();
-        if parts.iter().all(|part| part.rows.is_empty()) {
-            continue;
-        }
-        let problem = assemble(&total(&parts), columns, &fit.plug_in, &settings.prior)?;
-        let posterior = approximate(&problem, Some(&fit.posterior))?;
-        points.push(SweepPoint {
-            cutoff_hz: scaled.cutoff_hz,
-            mean: posterior.mean,
-        });
-    }
+    let moved: Vec<Option<SweepPoint>> = FACTORS
+        .into_par_iter()
+        .map(|factor| {
+            let scaled = Pipeline {
+                cutoff_hz: factor * pipeline.cutoff_hz,
+                motion_cutoff_hz: factor * pipeline.motion_cutoff_hz,
+                rate_hz: factor * pipeline.rate_hz,
+                ..pipeline.clone()
+            };
+            let Ok(data) = Data::read(robot, library, &scaled, logs, &[]) else {
+                return Ok(None);
+            };
+            let parts: Vec<Part<'_>> = data
+                .fit
+                .iter()
+                .map(|log| log.observations.whole())
+                .collect();
+            if parts.iter().all(|part| part.rows.is_empty()) {
+                return Ok(None);
+            }
+            let problem = assemble(&total(&parts), columns, &fit.plug_in, &settings.prior)?;
+            let posterior = approximate(&problem, Some(&fit.posterior))?;
+            Ok(Some(SweepPoint {
+                cutoff_hz: scaled.cutoff_hz,
+                mean: posterior.mean,
+            }))
+        })
+        .collect::<Result<_>>()?;
+    points.extend(moved.into_iter().flatten());
     points.sort_by(|a, b| a.cutoff_hz.total_cmp(&b.cutoff_hz));
     Ok(points)
 }

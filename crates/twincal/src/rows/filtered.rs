@@ -1,7 +1,7 @@
 //! Rows of the regression: F over torque and columns, only where a row is kept (polyphase).
 
 use super::evaluate::{Model, Stretch};
-use super::{JointRows, MAX_BLOCK, RowBlock};
+use super::{JointRows, MAX_BLOCK, RowBlock, Slice};
 use crate::error::Result;
 use crate::signal::convolve::correlate;
 use crate::signal::fir::column_kernel;
@@ -32,6 +32,20 @@ impl Plan {
         };
         Self { kernel, step, rows }
     }
+
+    /// The first row whose centre is not before a time, s.
+    pub(super) fn first_since(&self, segment: &Segment, since: f64) -> usize {
+        let (mut low, mut high) = (0, self.rows);
+        while low < high {
+            let row = usize::midpoint(low, high);
+            if segment.time[self.kernel.len() / 2 + row * self.step] < since {
+                low = row + 1;
+            } else {
+                high = row;
+            }
+        }
+        low
+    }
 }
 
 /// Window of the log-rate channels of one joint: columns, then nominal, then measured, each `capacity` long.
@@ -39,11 +53,11 @@ struct Window {
     channels: Vec<Vec<f64>>,
 }
 
-/// Visits the filtered rows of one segment; `chunk` samples are evaluated at a time (no matter how many).
+/// Visits filtered rows of one segment; `chunk` samples are evaluated at a time (no matter how many).
 pub(super) fn visit(
     model: &mut Model<'_, '_>,
     pipeline: &Pipeline,
-    index: usize,
+    slice: &Slice,
     segment: &Segment,
     dof: usize,
     chunk: Option<usize>,
@@ -61,8 +75,11 @@ pub(super) fn visit(
         .collect();
     let mut rows = Rows::new(model, dof, has_tau);
     // Samples `start .. filled` of the segment are in the windows.
-    let (mut start, mut filled, mut next) = (0, 0, 0);
-    while next < plan.rows {
+    let mut next = slice.rows.start;
+    let (mut start, mut filled) = (next * plan.step, next * plan.step);
+    // No sample after the last row's window is looked at.
+    let total_seen = slice.rows.end.saturating_sub(1) * plan.step + taps;
+    while next < slice.rows.end {
         // Forget what no later row sees, then add a chunk.
         let keep_from = next * plan.step;
         let forget = (keep_from - start).min(filled - start);
@@ -76,7 +93,7 @@ pub(super) fn visit(
             start = skip;
             filled = skip;
         }
-        let len = chunk.min(total - filled);
+        let len = chunk.min(total_seen.min(total) - filled);
         stretch.load(filled, len, total, [&segment.q, &segment.qd, &segment.qdd]);
         stretch.evaluate(model);
         for (joint, window) in windows.iter_mut().enumerate() {
@@ -89,11 +106,11 @@ pub(super) fn visit(
         }
         filled += len;
         // Rows whose whole window is there.
-        while next < plan.rows && next * plan.step + taps <= filled {
+        while next < slice.rows.end && next * plan.step + taps <= filled {
             let ready = (filled - taps - next * plan.step) / plan.step + 1;
-            let count = ready.min(plan.rows - next).min(MAX_BLOCK);
+            let count = ready.min(slice.rows.end - next).min(MAX_BLOCK);
             rows.fill(&plan, segment, &windows, start, next, count);
-            visit(&rows.block(&model.columns, index, next == 0))?;
+            visit(&rows.block(&model.columns, slice.segment, next == 0))?;
             next += count;
         }
     }

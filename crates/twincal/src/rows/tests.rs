@@ -93,10 +93,22 @@ fn collect(
     signal: RowSignal,
     chunk: Option<usize>,
 ) -> Vec<Vec<Vec<f64>>> {
+    let all = slices(pipeline, trajectory, signal, f64::NEG_INFINITY, usize::MAX);
+    collect_slices(trajectory, pipeline, signal, chunk, &all)
+}
+
+/// [`collect`] of some slices.
+fn collect_slices(
+    trajectory: &Trajectory,
+    pipeline: &Pipeline,
+    signal: RowSignal,
+    chunk: Option<usize>,
+    slices: &[Slice],
+) -> Vec<Vec<Vec<f64>>> {
     let mut rows = vec![Vec::new(); 2];
     let mut seen_first = false;
     let mut gather = |block: &RowBlock<'_>| {
-        assert_eq!(block.first, !seen_first);
+        assert_eq!(block.first, !seen_first && slices[0].rows.start == 0);
         seen_first = true;
         assert!(block.len <= MAX_BLOCK && block.len == block.time.len());
         for (joint, data) in block.joints.iter().enumerate() {
@@ -121,14 +133,24 @@ fn collect(
         Some(chunk) => filtered::visit(
             &mut model,
             pipeline,
-            0,
+            &slices[0],
             &trajectory.segments[0],
             2,
             Some(chunk),
             &mut gather,
         )
         .unwrap(),
-        None => visit_model(&mut model, pipeline, trajectory, signal, &mut gather).unwrap(),
+        None => {
+            visit_model(
+                &mut model,
+                pipeline,
+                trajectory,
+                signal,
+                slices,
+                &mut gather,
+            )
+            .unwrap();
+        }
     }
     rows
 }
@@ -213,6 +235,38 @@ fn chunks_do_not_change_a_bit() {
 }
 
 #[test]
+fn slices_do_not_change_a_bit() {
+    let (trajectory, mut pipeline) = (trajectory(5000, 0.001), pipeline(5.0));
+    for (signal, rate) in [
+        (RowSignal::Filtered, 12.5),
+        (RowSignal::Filtered, 0.9),
+        (RowSignal::Raw, 12.5),
+    ] {
+        pipeline.rate_hz = rate;
+        let whole = collect(&trajectory, &pipeline, signal, None);
+        for most in [1, 2, 7, 1000] {
+            let all = slices(&pipeline, &trajectory, signal, f64::NEG_INFINITY, most);
+            let lengths: Vec<usize> = all.iter().map(|slice| slice.rows.len()).collect();
+            assert_eq!(lengths.iter().sum::<usize>(), whole[0].len());
+            assert!(lengths.iter().all(|&len| 0 < len && len <= most));
+            let mut joined = vec![Vec::new(); 2];
+            for slice in all {
+                let part = collect_slices(&trajectory, &pipeline, signal, None, &[slice]);
+                joined.iter_mut().zip(part).for_each(|(a, b)| a.extend(b));
+            }
+            assert!(joined == whole, "slices of {most} rows at {rate} Hz");
+        }
+        let since = 2.345;
+        let late = slices(&pipeline, &trajectory, signal, since, 100);
+        let rows = collect_slices(&trajectory, &pipeline, signal, None, &late);
+        let expected: Vec<_> = (whole[0].iter().filter(|row| row[0] >= since))
+            .cloned()
+            .collect();
+        assert!(rows[0] == expected);
+    }
+}
+
+#[test]
 fn raw_rows_are_every_sample_and_off_is_the_same() {
     let trajectory = trajectory(1000, 0.001);
     let raw = collect(&trajectory, &pipeline(5.0), RowSignal::Raw, None);
@@ -283,6 +337,10 @@ fn an_error_of_the_visitor_ends_the_visit() {
             &pipeline(5.0),
             &trajectory(3000, 0.001),
             RowSignal::Raw,
+            &[Slice {
+                segment: 0,
+                rows: 0..3000
+            }],
             &mut stop
         )
         .is_err()

@@ -1,7 +1,7 @@
 //! Rows as logged: for the pipeline off, for raw validation and for predictions.
 
 use super::evaluate::{Model, Stretch};
-use super::{JointRows, MAX_BLOCK, RowBlock};
+use super::{JointRows, MAX_BLOCK, RowBlock, Slice};
 use crate::error::Result;
 use crate::signal::Segment;
 use crate::signal::spline::resample;
@@ -51,10 +51,10 @@ fn nearest(segment: &Segment, t: f64) -> usize {
     (steps.max(0.0) as usize).min(segment.time.len() - 1)
 }
 
-/// Visits every logged sample of a segment.
+/// Visits logged samples of a segment.
 pub(super) fn visit(
     model: &mut Model<'_, '_>,
-    index: usize,
+    slice: &Slice,
     segment: &Segment,
     dof: usize,
     visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
@@ -73,9 +73,9 @@ pub(super) fn visit(
     };
     let total = time.len();
     let mut stretch = Stretch::default();
-    let mut from = 0;
-    while from < total {
-        let len = MAX_BLOCK.min(total - from);
+    let mut from = slice.rows.start;
+    while from < slice.rows.end {
+        let len = MAX_BLOCK.min(slice.rows.end - from);
         stretch.load(from, len, total, motion.map(Vec::as_slice));
         stretch.evaluate(model);
         let joints = (0..dof)
@@ -96,7 +96,7 @@ pub(super) fn visit(
             })
             .collect();
         visit(&RowBlock {
-            segment: index,
+            segment: slice.segment,
             first: from == 0,
             len,
             time: &time[from..from + len],

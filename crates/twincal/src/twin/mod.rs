@@ -69,23 +69,6 @@ pub struct JointTorque {
 }
 
 impl JointTorque {
-    /// The rows from `first` on.
-    #[must_use]
-    pub fn after(&self, first: usize) -> Self {
-        let rest = |values: &[f64]| values.get(first..).unwrap_or(&[]).to_vec();
-        Self {
-            nominal: rest(&self.nominal),
-            calibrated: rest(&self.calibrated),
-            low: rest(&self.low),
-            high: rest(&self.high),
-            epistemic: rest(&self.epistemic),
-            extrapolating: self.extrapolating.get(first..).unwrap_or(&[]).to_vec(),
-            pit: rest(&self.pit),
-            log_density: rest(&self.log_density),
-            noise: rest(&self.noise),
-        }
-    }
-
     /// Puts the rows of `other` behind its own.
     pub fn append(&mut self, other: Self) {
         self.nominal.extend(other.nominal);

@@ -7,11 +7,15 @@ use super::{
 };
 use crate::error::Result;
 use crate::robot::Robot;
-use crate::rows::{RowBlock, RowSignal, visit_rows};
+use crate::rows::{RowBlock, RowSignal, slices, visit_slices};
 use crate::signal::{Pipeline, Trajectory};
 use crate::term::Library;
 use crate::twin::{JointTorque, Predictor, TorqueSignal};
+use rayon::prelude::*;
 use std::ops::AddAssign;
+
+/// Raw rows that one thread takes at a time.
+const SLICE: usize = 1 << 14;
 
 /// Everything held-out, while it is being collected; keepers of several folds add up.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,7 +78,7 @@ impl HeldOut {
     /// (−∞: all of them), and scores them.
     ///
     /// # Errors
-    /// Those of [`visit_rows`].
+    /// Those of [`visit_slices`].
     pub fn score(
         &mut self,
         robot: &Robot,
@@ -89,17 +93,16 @@ impl HeldOut {
             traces: self.names.iter().map(named).collect(),
             stretches: vec![Vec::new(); self.names.len()],
         };
-        visit_rows(
+        let filtered = slices(pipeline, trajectory, RowSignal::Filtered, from, usize::MAX);
+        visit_slices(
             robot,
             library,
             pipeline,
             trajectory,
             RowSignal::Filtered,
+            &filtered,
             &mut |block| {
-                let skip = block.time.partition_point(|time| *time < from);
-                if skip < block.len {
-                    self.push_filtered(block, skip, predictors, &mut collected);
-                }
+                self.push_filtered(block, predictors, &mut collected);
                 Ok(())
             },
         )?;
@@ -108,30 +111,36 @@ impl HeldOut {
             trace.thin();
             self.traces.push(trace);
         }
-        visit_rows(
-            robot,
-            library,
-            pipeline,
-            trajectory,
-            RowSignal::Raw,
-            &mut |block| {
-                let skip = block.time.partition_point(|time| *time < from);
-                if skip < block.len {
-                    let torques = predictors.twin.block(block, TorqueSignal::Raw);
-                    for (joint, torque) in torques.iter().enumerate() {
-                        let measured = &block.joints[joint].measured[skip..];
-                        self.raw.push(joint, measured, &torque.after(skip));
-                    }
-                }
-                Ok(())
-            },
-        )
+        let raw = slices(pipeline, trajectory, RowSignal::Raw, from, SLICE);
+        let keepers: Vec<ScoreKeeper> = raw
+            .into_par_iter()
+            .map(|slice| {
+                let mut keeper = ScoreKeeper::new(self.names.clone());
+                visit_slices(
+                    robot,
+                    library,
+                    pipeline,
+                    trajectory,
+                    RowSignal::Raw,
+                    &[slice],
+                    &mut |block| {
+                        let torques = predictors.twin.block(block, TorqueSignal::Raw);
+                        for (joint, torque) in torques.iter().enumerate() {
+                            keeper.push(joint, block.joints[joint].measured, torque);
+                        }
+                        Ok(())
+                    },
+                )?;
+                Ok(keeper)
+            })
+            .collect::<Result<_>>()?;
+        keepers.iter().for_each(|keeper| self.raw += keeper);
+        Ok(())
     }
 
     fn push_filtered(
         &mut self,
         block: &RowBlock<'_>,
-        skip: usize,
         predictors: Predictors<'_>,
         collected: &mut Collected,
     ) {
@@ -140,28 +149,26 @@ impl HeldOut {
         let compact: Option<Vec<JointTorque>> = predictors.compact.map(rival);
         for (joint, torque) in torques.iter().enumerate() {
             let rows = &block.joints[joint];
-            let own = joint * block.len + skip..(joint + 1) * block.len;
-            let torque = torque.after(skip);
-            let (measured, standstill) = (&rows.measured[skip..], &rows.standstill[skip..]);
-            self.filtered.push(joint, measured, &torque);
+            let own = joint * block.len..(joint + 1) * block.len;
+            let (measured, standstill) = (rows.measured, rows.standstill);
+            self.filtered.push(joint, measured, torque);
             self.moving
-                .push_where(joint, measured, &torque, |row| !standstill[row]);
+                .push_where(joint, measured, torque, |row| !standstill[row]);
             self.pit[joint].push(&torque.pit, predictors.twin.memory(joint));
             if let Some(compact) = &compact {
-                let compact = compact[joint].after(skip);
                 self.rivals
-                    .push(measured, &torque, &compact, |row| !standstill[row]);
+                    .push(measured, torque, &compact[joint], |row| !standstill[row]);
             }
             collected.stretches[joint].extend(measured.iter().enumerate().map(|(row, &y)| {
                 stretch(torque.low[row], torque.calibrated[row], torque.high[row], y)
             }));
             collected.traces[joint].extend(&TraceRows {
-                time: &block.time[skip..],
+                time: block.time,
                 q: &block.q[own.clone()],
                 qd: &block.qd[own],
                 measured,
                 standstill,
-                torque: &torque,
+                torque,
             });
         }
     }
