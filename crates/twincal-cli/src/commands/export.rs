@@ -370,7 +370,7 @@ fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
         paragraph(&text, terminal);
     }
     let text = format!(
-        "of what went in, {} N·m rms was lost by making it physical; all effects together are {} N·m rms",
+        "of what went in, {} N·m rms is lost in one physical model; all effects together are {} N·m rms",
         short(largest(&change.lost)),
         short(largest(&change.correction))
     );

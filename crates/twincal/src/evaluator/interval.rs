@@ -14,13 +14,15 @@ use crate::posterior::student::StudentT;
 use crate::term::Library;
 use crate::twin::{JointInput, TorqueSignal, Twin};
 
-/// Share of the variance that the columns left out may make anywhere in the training range.
-const LEFT_OUT: f64 = 0.01;
+/// Share of the variance (that of the noise included) by which a joint's approximation may be off in the training range.
+const LEFT_OUT: f64 = 0.05;
 
 /// Everything about the interval.
 pub(super) struct Interval {
-    /// Columns that count, ascending.
-    pub(super) kept: Vec<usize>,
+    /// Columns that count on each joint, ascending.
+    kept: Vec<Vec<usize>>,
+    /// Mean variance of the others on each joint, (N·m)².
+    rest: Vec<f64>,
     /// Cov[β | y], K × K.
     covariance: Vec<f64>,
     columns: usize,
@@ -40,12 +42,14 @@ impl Interval {
         let ratio = (posterior.shape - 1.0) / posterior.shape;
         let own: Vec<f64> = (twin.noise.iter())
             .map(|n| {
-                posterior.noise * n.interval_factor.powi(2) / (n.weight * (1.0 - n.rho * n.rho))
+                let factor = n.interval_factor.powi(2) / (n.weight * (1.0 - n.rho * n.rho));
+                posterior.noise * factor
             })
             .collect();
         let out: Vec<f64> = twin.noise.iter().map(|n| n.out_of_band.powi(2)).collect();
         let mut interval = Self {
             kept: Vec::new(),
+            rest: Vec::new(),
             covariance: posterior.covariance(),
             columns: library.columns().len(),
             noise: own.iter().zip(&out).map(|(a, b)| a + b).collect(),
@@ -54,86 +58,104 @@ impl Interval {
             ratio,
             error: 0.0,
         };
-        interval.kept = interval.columns_that_count(states);
-        interval.error = interval.measured_error(twin, library, states)?;
+        let mut variances = Vec::new();
+        for joint in 0..own.len() {
+            let (kept, rest, variance) = interval.columns_that_count(states, joint);
+            interval.kept.push(kept);
+            interval.rest.push(rest);
+            variances.push(variance);
+        }
+        interval.error = interval.measured_error(twin, library, states, &variances)?;
         Ok(interval)
     }
 
-    /// The fewest columns, by their share of the variance, that leave out at most [`LEFT_OUT`] of it.
-    fn columns_that_count(&self, states: &States) -> Vec<usize> {
-        let mut share = vec![0.0_f64; self.columns];
-        for joint in 0..self.noise.len() {
-            let (columns, x) = states.columns(joint);
-            for (&column, x) in columns.iter().zip(x.chunks_exact(STATES)) {
-                let square = x.iter().fold(0.0_f64, |m, x| m.max(x * x));
-                let variance = self.covariance[column * (self.columns + 1)] * square;
-                share[column] = share[column].max(variance / self.noise[joint]);
-            }
-        }
-        let mut order: Vec<usize> = (0..self.columns).collect();
-        order.sort_by(|&a, &b| share[b].total_cmp(&share[a]).then(a.cmp(&b)));
-        let full = self.variances(states, &order);
-        let enough = |count: usize| {
-            let some = self.variances(states, &order[..count]);
-            (0..self.noise.len()).all(|joint| {
-                let rows = joint * STATES..(joint + 1) * STATES;
-                full[rows.clone()]
-                    .iter()
-                    .zip(&some[rows])
-                    .all(|(full, some)| {
-                        (full - some).abs() <= LEFT_OUT * (self.noise[joint] + full)
-                    })
-            })
-        };
-        // More columns are not always nearer, but nearly: a bisection finds a count that is enough.
-        let (mut low, mut high) = (0, self.columns);
-        while low < high {
-            let middle = low.midpoint(high);
-            if enough(middle) {
-                high = middle;
-            } else {
-                low = middle + 1;
-            }
-        }
-        let mut kept = order[..high].to_vec();
-        kept.sort_unstable();
-        kept
+    /// How many columns count on some joint.
+    pub(super) fn count(&self) -> usize {
+        let all: std::collections::BTreeSet<usize> = self.kept.iter().flatten().copied().collect();
+        all.len()
     }
 
-    /// xᵀ C x per joint and state over some columns, `joint * STATES + state`.
-    fn variances(&self, states: &States, columns: &[usize]) -> Vec<f64> {
-        let mut place = vec![false; self.columns];
-        columns.iter().for_each(|&column| place[column] = true);
-        let mut all = Vec::with_capacity(self.noise.len() * STATES);
-        for joint in 0..self.noise.len() {
-            let (own, x) = states.columns(joint);
-            let mut sum = vec![0.0; STATES];
-            let own: Vec<(usize, &[f64])> = (own.iter().copied().zip(x.chunks_exact(STATES)))
-                .filter(|(column, _)| place[*column])
-                .collect();
-            let mut along = vec![0.0; STATES];
-            for (i, &(a, x)) in own.iter().enumerate() {
-                along.fill(0.0);
-                for (k, &(b, other)) in own.iter().enumerate().skip(i) {
-                    let twice = if k == i { 1.0 } else { 2.0 };
-                    let c = twice * self.covariance[a * self.columns + b];
-                    for (along, other) in along.iter_mut().zip(other) {
-                        *along += c * other;
-                    }
+    /// Columns are left out one by one, always the one that is missed least, while the others and a constant stay within
+    /// [`LEFT_OUT`] of the variance everywhere: what stays, the constant, and the variance that they give per state.
+    fn columns_that_count(&self, states: &States, joint: usize) -> (Vec<usize>, f64, Vec<f64>) {
+        let (columns, x) = states.columns(joint);
+        let x: Vec<&[f64]> = x.chunks_exact(STATES).collect();
+        let c = |i: usize, k: usize| self.covariance[columns[i] * self.columns + columns[k]];
+        // (C x)_i per state, over the columns that are still there.
+        let mut along: Vec<Vec<f64>> = (0..columns.len())
+            .map(|i| {
+                let mut row = vec![0.0; STATES];
+                for (k, x) in x.iter().enumerate() {
+                    row.iter_mut()
+                        .zip(*x)
+                        .for_each(|(sum, x)| *sum += c(i, k) * x);
                 }
-                for ((sum, x), along) in sum.iter_mut().zip(x).zip(&along) {
-                    *sum += x * along;
+                row
+            })
+            .collect();
+        let mut full = vec![0.0; STATES];
+        for (x, along) in x.iter().zip(&along) {
+            let products = x.iter().zip(along);
+            full.iter_mut()
+                .zip(products)
+                .for_each(|(sum, (x, a))| *sum += x * a);
+        }
+        let allowed: Vec<f64> = full
+            .iter()
+            .map(|full| LEFT_OUT * (self.noise[joint] + full))
+            .collect();
+        let mut kept: Vec<usize> = (0..columns.len()).collect();
+        let mut missing = vec![0.0; STATES];
+        let mut rest = 0.0;
+        while !kept.is_empty() {
+            let mut best: Option<(f64, f64, usize)> = None;
+            for (at, &i) in kept.iter().enumerate() {
+                let own = |s: usize| missing[s] + x[i][s] * (2.0 * along[i][s] - c(i, i) * x[i][s]);
+                let mean = (0..STATES).map(own).sum::<f64>() / STATES as f64;
+                let worst = (0..STATES)
+                    .map(|s| (own(s) - mean).abs() / allowed[s])
+                    .fold(0.0, f64::max);
+                if best.is_none_or(|(least, ..)| worst < least) {
+                    best = Some((worst, mean, at));
                 }
             }
-            all.extend(sum);
+            let Some((worst, mean, at)) = best.filter(|(worst, ..)| *worst <= 1.0) else {
+                break;
+            };
+            debug_assert!(worst.is_finite());
+            let i = kept.remove(at);
+            rest = mean;
+            for s in 0..STATES {
+                missing[s] += x[i][s] * (2.0 * along[i][s] - c(i, i) * x[i][s]);
+            }
+            for &k in &kept {
+                let factor = c(k, i);
+                along[k]
+                    .iter_mut()
+                    .zip(x[i])
+                    .for_each(|(sum, x)| *sum -= factor * x);
+            }
         }
-        all
+        let variance = full
+            .iter()
+            .zip(&missing)
+            .map(|(full, missing)| full - missing + rest);
+        (
+            kept.iter().map(|&i| columns[i]).collect(),
+            rest,
+            variance.collect(),
+        )
     }
 
     /// Largest difference of an interval's end from the mixture's, as a share of its width.
-    fn measured_error(&self, twin: &Twin, library: &Library, states: &States) -> Result<f64> {
+    fn measured_error(
+        &self,
+        twin: &Twin,
+        library: &Library,
+        states: &States,
+        variances: &[Vec<f64>],
+    ) -> Result<f64> {
         let predictor = twin.predictor(library)?;
-        let variance = self.variances(states, &self.kept);
         let nominal = vec![0.0; STATES];
         let mut worst = 0.0_f64;
         for joint in 0..self.noise.len() {
@@ -148,8 +170,7 @@ impl Interval {
             };
             let torque = predictor.torque(joint, &input, TorqueSignal::Raw);
             for state in 0..STATES {
-                let scale =
-                    self.ratio * variance[joint * STATES + state].max(0.0) + self.base[joint];
+                let scale = self.ratio * variances[joint][state].max(0.0) + self.base[joint];
                 let half = self.quantile * scale.sqrt();
                 let (low, high) = (torque.low[state], torque.high[state]);
                 let centre = torque.calibrated[state];
@@ -162,31 +183,32 @@ impl Interval {
         Ok(worst)
     }
 
-    /// xᵀ C x over the columns that count, as steps.
+    /// xᵀ C x over the columns that count and the constant, as steps.
     pub(super) fn variance(&self, t: &mut Trace, columns: &mut Columns<'_>) -> Vec<Id> {
-        let joints = self.noise.len();
-        let mut by_joint: Vec<Vec<(usize, Id)>> = vec![Vec::new(); joints];
-        for &column in &self.kept {
-            for (joint, x) in columns.column(t, column) {
-                by_joint[joint].push((column, x));
+        let mut variance = Vec::with_capacity(self.kept.len());
+        for (joint, kept) in self.kept.iter().enumerate() {
+            let mut own: Vec<(usize, Id)> = Vec::new();
+            for &column in kept {
+                let all = columns.column(t, column);
+                own.extend(
+                    all.into_iter()
+                        .filter(|(j, _)| *j == joint)
+                        .map(|(_, x)| (column, x)),
+                );
             }
-        }
-        by_joint
-            .into_iter()
-            .map(|own| {
-                let mut sum = t.number(0.0);
-                for (i, &(a, x)) in own.iter().enumerate() {
-                    let mut along = t.number(0.0);
-                    for (k, &(b, other)) in own.iter().enumerate().skip(i) {
-                        let twice = if k == i { 1.0 } else { 2.0 };
-                        let part = t.scale(twice * self.covariance[a * self.columns + b], other);
-                        along = t.add(along, part);
-                    }
-                    let part = t.multiply(x, along);
-                    sum = t.add(sum, part);
+            let mut sum = t.number(self.rest[joint]);
+            for (i, &(a, x)) in own.iter().enumerate() {
+                let mut along = t.number(0.0);
+                for (k, &(b, other)) in own.iter().enumerate().skip(i) {
+                    let twice = if k == i { 1.0 } else { 2.0 };
+                    let part = t.scale(twice * self.covariance[a * self.columns + b], other);
+                    along = t.add(along, part);
                 }
-                sum
-            })
-            .collect()
+                let part = t.multiply(x, along);
+                sum = t.add(sum, part);
+            }
+            variance.push(sum);
+        }
+        variance
     }
 }

@@ -56,7 +56,7 @@ pub struct Evaluator {
     pub quantile: f64,
     /// From the variance over noise levels to the square of the t scale: (a − 1)/a.
     pub ratio: f64,
-    /// Columns that the interval is made of; the others add less than it shows.
+    /// Columns that the interval is made of; the others enter as a constant.
     pub kept: usize,
     /// Largest error of an end of the interval over 512 states within the training range, as a share of its width.
     pub interval_error: f64,
@@ -116,7 +116,7 @@ impl Evaluator {
             variance,
             quantile: interval.quantile,
             ratio: interval.ratio,
-            kept: interval.kept.len(),
+            kept: interval.count(),
             interval_error: interval.error,
         })
     }

@@ -17,7 +17,7 @@ pub use projection::Projection;
 
 use crate::calibrate::Calibration;
 use crate::error::Result;
-use crate::evaluator::States;
+use crate::evaluator::{States, rms};
 use crate::robot::{Robot, RobotDescription};
 use crate::term::{Family, Library, ModelColumn};
 use serde::Serialize;
@@ -89,8 +89,8 @@ pub struct WriteBack {
     pub residual: Vec<Residual>,
     /// How inertias were made physical; `None` where they were already.
     pub projection: Option<Projection>,
-    /// RMS of the torque by which the file differs from the written components, per joint, N·m (N): what making
-    /// inertias physical, friction non-negative and effects one model costs.
+    /// RMS of the torque by which the file differs from the written components, per joint, N·m (N): what it costs that
+    /// inertias are physical, friction is not negative, and changed gravity acts on changed inertias.
     pub lost: Vec<f64>,
     /// RMS of the torque that all components add to the nominal model, per joint, N·m (N).
     pub correction: Vec<f64>,
@@ -193,17 +193,19 @@ impl<'a> Writer<'a> {
             lost: Vec::new(),
             correction: Vec::new(),
         };
-        let after = change.robot(robot)?;
-        let written: Vec<f64> = (held.iter().zip(beta))
-            .map(|(place, beta)| if place.is_some() { *beta } else { 0.0 })
-            .collect();
-        change.lost = lost::lost(
-            &self.states,
-            [robot, &after],
-            &change.joints,
-            &held,
-            written,
-        );
+        let difference = |change: &WriteBack| -> Result<Vec<f64>> {
+            let robots = [robot, &change.robot(robot)?];
+            Ok(lost::difference(
+                &self.states,
+                robots,
+                &change.joints,
+                &held,
+                beta,
+            ))
+        };
+        let rest = difference(&change)?;
+        change.gravity = lost::fitted_gravity(&self.states, robot, &change, &rest)?;
+        change.lost = rms(&difference(&change)?);
         change.correction = self.states.rms(beta);
         self.tell(&mut change, &whole, chosen, beta, &held);
         Ok(change)
@@ -387,5 +389,6 @@ fn reason(family: Family, format: &str) -> String {
         | Family::Tensor
         | Family::MassScale => "this",
     };
-    format!("a {format} cannot hold {what}")
+    let article = if format.starts_with('M') { "an" } else { "a" };
+    format!("{article} {format} cannot hold {what}")
 }

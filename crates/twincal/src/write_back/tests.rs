@@ -137,3 +137,61 @@ fn a_point_mass_gets_a_body() {
     assert!((parameters[0][0] - 1.5).abs() < 1e-3);
     assert!(factor(&pseudo_inertia(&parameters[0])).is_some());
 }
+
+/// Brute force: 20 000 points that are nearer than the answer in the metric, none of them a body. Six coefficients on two
+/// links at once, correlated.
+#[test]
+fn nothing_nearer_is_physical() {
+    let mut state = 7_u64;
+    let mut uniform = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let nominal = points(&[
+        (1.0, [0.1, 0.0, 0.0]),
+        (1.0, [0.0, 0.12, 0.0]),
+        (1.0, [0.0, 0.0, 0.08]),
+        (1.0, [-0.1, -0.1, -0.1]),
+    ]);
+    let mut blocks = [Block::new(nominal, 6), Block::new(nominal, 6)];
+    for k in 0..3 {
+        blocks[0].directions[k][4 + [0, 3, 5][k]] = 1.0;
+        blocks[1].directions[3 + k][1 + k] = 1.0;
+    }
+    let root: Vec<f64> = (0..36).map(|_| 0.05 * uniform()).collect();
+    let covariance: Vec<f64> = (0..36)
+        .map(|at| {
+            let (i, j) = (at / 6, at % 6);
+            let sum: f64 = (0..6).map(|k| root[6 * i + k] * root[6 * j + k]).sum();
+            sum + if i == j { 1e-4 } else { 0.0 }
+        })
+        .collect();
+    let beta = [-0.04, 0.02, -0.05, 0.2, -0.25, 0.1];
+    let names = ["a", "b"];
+    let (answer, projection) = project(&blocks, &beta, &covariance, &names).unwrap();
+    let projection = projection.unwrap();
+    assert_eq!(projection.links.len(), 2);
+    assert!(answer.iter().all(|p| factor(&pseudo_inertia(p)).is_some()));
+    let lower = crate::linear_algebra::Cholesky::new(&covariance, 6).unwrap();
+    for _ in 0..20_000 {
+        let direction: Vec<f64> = (0..6).map(|_| uniform() + uniform() + uniform()).collect();
+        let length = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let radius = 0.999 * projection.distance * (uniform() + 0.5).powf(1.0 / 6.0);
+        let moved: Vec<f64> = (0..6)
+            .map(|i| {
+                let along = (0..=i).map(|k| lower.lower()[6 * i + k] * direction[k]);
+                beta[i] + radius / length * along.sum::<f64>()
+            })
+            .collect();
+        let body = |l: usize| {
+            let p: [f64; 10] = std::array::from_fn(|k| {
+                let terms = blocks[l].directions.iter().zip(&moved);
+                nominal[k] + terms.map(|(d, b)| d[k] * b).sum::<f64>()
+            });
+            factor(&pseudo_inertia(&p)).is_some()
+        };
+        assert!(!(body(0) && body(1)), "nearer and physical: {moved:?}");
+    }
+}
