@@ -25,6 +25,9 @@ const MOST: usize = 100_000;
 /// Residual components that are told one by one; the rest is summed up.
 const TOLD: usize = 8;
 
+/// Said of twins whose payload acts in some logs only.
+const CARRIED: &str = "With the payload of the logs that carried something unknown.";
+
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Exported<'a> {
@@ -158,6 +161,9 @@ fn code(flags: &Export, language: Language, terminal: &mut Terminal) -> Outcome<
         ),
         format!("Nominal model {}.", stored.context.model),
     ];
+    if twin.payload_where_unknown {
+        about.push(CARRIED.into());
+    }
     let evaluator = match flags.beyond {
         None => Evaluator::new(twin, None)?,
         Some(format) => {
@@ -233,6 +239,10 @@ fn one(flags: &Export, kind: Kind, terminal: &mut Terminal) -> Outcome<u8> {
         print_json(terminal, &exported)?;
     } else {
         say(&change, kind.holds, terminal);
+        if stored.calibration.twin.payload_where_unknown {
+            paragraph(CARRIED, terminal);
+            terminal.say("");
+        }
         terminal.say(&shown(flags));
     }
     Ok(0)

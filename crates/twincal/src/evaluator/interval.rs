@@ -15,7 +15,7 @@ use crate::term::Library;
 use crate::twin::{JointInput, TorqueSignal, Twin};
 
 /// Share of the variance (that of the noise included) by which a joint's approximation may be off in the training range.
-const LEFT_OUT: f64 = 0.05;
+const LEFT_OUT: f64 = 0.08;
 
 /// Everything about the interval.
 pub(super) struct Interval {
