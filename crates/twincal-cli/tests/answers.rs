@@ -29,7 +29,7 @@ fn case_89_the_scale_of_a_candidate_does_not_matter() {
             .collect::<Vec<_>>()
     };
     let plain = fitted("sin(q2)");
-    for scale in [1e-9, 1e9] {
+    for scale in [1e-12, 1e12] {
         let scaled = fitted(&format!("{scale}*sin(q2)"));
         assert_eq!(scaled.len(), plain.len());
         for (index, (a, b)) in plain.iter().zip(&scaled).enumerate() {
