@@ -19,6 +19,7 @@ pub mod term;
 pub mod rows;
 pub mod gram;
 pub mod observations;
+pub mod excitation;
 pub mod prior;
 pub mod posterior;
 pub mod likelihood;

@@ -1,5 +1,6 @@
 //! `twincal inspect`: what a model and logs hold, before anything is fitted.
 
+use self::library::{BaseRow, ComponentRow, base_row, component_rows};
 use super::inputs::{LogInput, RobotInput};
 use super::summary::{Notes, findings, paragraph, print_table, significant, table};
 use super::{code_of, print_json, require_strict, settings, start_threads};
@@ -8,12 +9,17 @@ use crate::failure::Outcome;
 use crate::progress::Progress;
 use crate::terminal::{Terminal, clean};
 use serde::Serialize;
+use twincal::calibrate::{Outlook, outlook};
+use twincal::excitation::Unseen;
 use twincal::robot::{JointKind, Mimic, Robot};
 use twincal::self_check::self_check;
 use twincal::signal::{
-    LogOverview, SignalSettings, Trajectory, align, choose_pipeline, describe, hardly_driven,
+    LogOverview, Pipeline, SignalSettings, Trajectory, align, choose_pipeline, describe,
+    hardly_driven,
 };
 use twincal::{Finding, Severity};
+
+mod library;
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -24,6 +30,13 @@ struct Inspection {
     /// Moving joints q1…qn in order, then those that mimic one of them.
     joints: Vec<JointRow>,
     links: Vec<LinkRow>,
+    base_parameters: BaseRow,
+    /// What `fit` would weigh, in order.
+    components: Vec<ComponentRow>,
+    /// Independent directions of all columns: over all motions of the robot, and in these logs; null without logs.
+    directions: Option<[usize; 2]>,
+    /// What these logs do not show and another motion would, most important first.
+    unseen: Vec<UnseenRow>,
     logs: Vec<LogOverview>,
     findings: Vec<Finding>,
 }
@@ -46,6 +59,13 @@ struct JointRow {
 struct LinkRow {
     name: String,
     mass: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct UnseenRow {
+    #[serde(flatten)]
+    unseen: Unseen,
+    words: String,
 }
 
 pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
@@ -73,14 +93,20 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
         found.extend(more);
     }
     found.extend(hardly_driven(&robot.robot, &logs.recordings));
-    for finding in compare(&robot.robot, &logs, &settings.calibration.signal)? {
+    let (mut aligned, more) = compare(&robot.robot, &logs, &settings.calibration.signal)?;
+    for finding in more {
         if !found.contains(&finding) {
             found.push(finding);
         }
     }
+    let aligned = aligned
+        .as_mut()
+        .map(|(pipeline, all)| (&*pipeline, &mut all[..]));
+    let outlook = outlook(&robot.robot, &settings.calibration.library, aligned)?;
+    found.extend(outlook.findings.iter().cloned());
     require_strict(settings.log.strict, &found)?;
     let code = code_of(&found);
-    let inspection = inspection(&robot.robot, robot.file.name, overviews, found);
+    let inspection = inspection(&robot.robot, robot.file.name, &outlook, overviews, found);
     if settings.json {
         print_json(terminal, &inspection)?;
     } else {
@@ -90,9 +116,13 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
 }
 
 /// What the filters would warn of, and what log and model disagree about; nothing for logs that no pipeline fits (too short, standing still): `fit` says why.
-fn compare(robot: &Robot, logs: &LogInput, signal: &SignalSettings) -> Outcome<Vec<Finding>> {
+fn compare(
+    robot: &Robot,
+    logs: &LogInput,
+    signal: &SignalSettings,
+) -> Outcome<(Option<Aligned>, Vec<Finding>)> {
     let Ok((pipeline, _)) = choose_pipeline(robot, &logs.recordings, signal) else {
-        return Ok(Vec::new());
+        return Ok((None, Vec::new()));
     };
     let mut trajectories: Vec<Trajectory> = Vec::new();
     let mut found = Vec::new();
@@ -104,12 +134,16 @@ fn compare(robot: &Robot, logs: &LogInput, signal: &SignalSettings) -> Outcome<V
     }
     let more = self_check(robot, &pipeline, &trajectories);
     found.extend(more.map_err(|error| logs.as_given(error))?);
-    Ok(found)
+    Ok((Some((pipeline, trajectories)), found))
 }
+
+/// The logs as a fit would filter them.
+type Aligned = (Pipeline, Vec<Trajectory>);
 
 fn inspection(
     robot: &Robot,
     model: String,
+    outlook: &Outlook,
     logs: Vec<LogOverview>,
     findings: Vec<Finding>,
 ) -> Inspection {
@@ -139,12 +173,21 @@ fn inspection(
         mass: link.inertia.as_ref().map(|inertia| inertia.mass),
     };
     let links = description.links.iter().map(link).collect();
+    let excitation = outlook.excitation.as_ref();
+    let unseen = |unseen: &Unseen| UnseenRow {
+        unseen: unseen.clone(),
+        words: twincal::excitation::sentence(unseen),
+    };
     Inspection {
         schema: 1,
         model,
         gravity: description.gravity,
         joints,
         links,
+        base_parameters: base_row(robot),
+        components: component_rows(&outlook.library, excitation),
+        directions: excitation.map(|e| e.directions),
+        unseen: excitation.map_or_else(Vec::new, |e| e.unseen.iter().map(unseen).collect()),
         logs,
         findings,
     }
@@ -179,6 +222,7 @@ fn print(inspection: &Inspection, terminal: &mut Terminal) {
     }
     print_table(&joints, terminal);
     terminal.say("");
+    library::print(inspection, terminal);
     for log in &inspection.logs {
         terminal.heading(&format!("{}: {} rows", log.name, log.samples));
         let clock = if log.resampled {

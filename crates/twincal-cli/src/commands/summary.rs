@@ -47,15 +47,17 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
             paragraph(&format!("{words}: {}", names.join(", ")), terminal);
         }
     }
-    for group in &calibration.groups {
-        let members = group.members.join(", ");
-        paragraph(
-            &format!(
-                "cannot be told apart: {members} (any of them: PIP {})",
-                pip(Some(group.pip))
-            ),
-            terminal,
+    for group in calibration.groups.iter().filter(|group| !group.settled) {
+        paragraph(&group.words, terminal);
+    }
+    let settled = calibration.groups.iter().filter(|group| group.settled);
+    let settled: Vec<String> = settled.map(|group| group.members.join(" = ")).collect();
+    if !settled.is_empty() {
+        let text = format!(
+            "same torque, told apart by the prior alone (the first is preferred): {}",
+            settled.join("; ")
         );
+        paragraph(&text, terminal);
     }
     repeatability(calibration, terminal);
     terminal.say("");

@@ -1,8 +1,8 @@
 //! "A or B, the data cannot tell": pairs of effects that stand in for each other, joints that hardly moved.
 
-use super::text::{fixed, list, percent, probability};
+use super::text::{fixed, list, percent};
 use super::view::Joint;
-use twincal::calibrate::{Calibration, Group};
+use twincal::calibrate::Calibration;
 
 /// Two coefficients whose draws correlate this much are known as a combination.
 const CORRELATED: f64 = 0.95;
@@ -40,7 +40,28 @@ pub(super) fn sentences(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<
             list(&still)
         ));
     }
+    let unseen = calibration
+        .findings
+        .iter()
+        .filter(|f| f.code == "unseen_motion");
+    out.extend(
+        unseen
+            .take(MOTIONS)
+            .map(|finding| sentence(&finding.message)),
+    );
     out
+}
+
+/// Sentences on what another motion would show, at most.
+const MOTIONS: usize = 4;
+
+/// A message as a sentence of its own.
+fn sentence(message: &str) -> String {
+    let mut letters = message.chars();
+    match letters.next() {
+        Some(first) => format!("{}{}.", first.to_uppercase(), letters.as_str()),
+        None => String::new(),
+    }
 }
 
 /// Share of the fitted rows of joint `j` at standstill; NaN without rows.
@@ -55,22 +76,29 @@ pub(super) fn standstill(calibration: &Calibration, j: usize) -> f64 {
     stood as f64 / (moved + stood) as f64
 }
 
-/// Sets of effects of which one is there, and these data cannot tell which.
+/// Sets of effects of which one is there and the data cannot tell which; those that only the prior tells apart in one
+/// sentence.
 fn either_or(calibration: &Calibration) -> Vec<String> {
-    let sentence = |group: &Group| {
-        format!(
-            "{}: at least one of them is there with probability {}, but these data cannot tell which.",
-            list(&group.members),
-            probability(group.pip)
-        )
-    };
-    calibration.groups.iter().map(sentence).collect()
+    let groups = || calibration.groups.iter();
+    let open = groups().filter(|group| !group.settled);
+    let mut out: Vec<String> = open.map(|group| sentence(&group.words)).collect();
+    let settled = groups().filter(|group| group.settled);
+    let settled: Vec<String> = settled.map(|group| group.members.join(" = ")).collect();
+    if !settled.is_empty() {
+        out.push(format!(
+            "The same torque, told apart by the prior alone (the first is preferred): {}.",
+            settled.join("; ")
+        ));
+    }
+    out
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::report::{fixture, view};
+    use twincal::calibrate::{Alike, Group};
+    use twincal::{Finding, Severity};
 
     #[test]
     fn effects_that_stand_for_each_other_are_named_together() {
@@ -79,12 +107,31 @@ mod tests {
         calibration.groups.push(Group {
             members: vec!["elbow.spring".into(), "elbow.potential".into()],
             pip: 0.98,
+            alike: Alike::TheseLogs,
+            settled: false,
+            words: "elbow.spring or elbow.potential, with probability 0.98".into(),
         });
         let open = either_or(&calibration);
         assert!(
             open.len() == 1 && open[0].contains("elbow.potential") && open[0].contains("0.98"),
             "{open:?}"
         );
+    }
+
+    #[test]
+    fn what_another_motion_would_show_is_told() {
+        let mut calibration = fixture::two_joints();
+        let message = "move `elbow` more: these logs show nothing of elbow.viscous";
+        calibration.findings.push(Finding::new(
+            Severity::Note,
+            "unseen_motion",
+            "elbow",
+            message,
+            1,
+        ));
+        let said = sentences(&calibration, &view::joints(&calibration));
+        let wanted = format!("M{}.", &message[1..]);
+        assert!(said.contains(&wanted), "{said:?}");
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! From the posterior over columns to physical stories: one line per component, with parameters that people know.
 
-use super::result::{ComponentSummary, Group, ParameterSummary, TermSummary, Verdict};
+use super::result::{ComponentSummary, ParameterSummary, TermSummary, Verdict};
 use crate::posterior::draws::{CoefficientDraws, draw};
-use crate::posterior::{Model, Posterior, Problem};
+use crate::posterior::{Model, Posterior};
 use crate::term::{Component, Estimate, Library};
 
 /// Draws that the parameters are worked out from.
@@ -13,12 +13,6 @@ const ENOUGH: usize = 500;
 const ONE_SD: [f64; 2] = [0.158_655, 0.841_345];
 /// Random stream of those draws.
 const STREAM: u64 = (1 << 32) + 1;
-/// Columns whose cosine over the rows is above this are hard to tell apart.
-const ALIKE: f64 = 0.95;
-/// Components whose inclusions are correlated below this stand for each other.
-const EXCLUSIVE: f64 = -0.5;
-/// Group probability below which nobody asks which member it was.
-const WORTH_TELLING: f64 = 0.2;
 
 /// One summary per component of the library, in order. `terms` are the finished summaries of its terms.
 pub(super) fn components(
@@ -174,83 +168,4 @@ fn given(posterior: &Posterior, holds: &dyn Fn(&Model) -> bool) -> Posterior {
         .iter_mut()
         .for_each(|model| model.weight /= total);
     given
-}
-
-/// Sets of components that these data cannot tell apart, with the probability that at least one is in.
-///
-/// Two components belong together if they are single columns that are alike in the data (cosine above 0.95), or if their
-/// inclusions exclude each other (correlation below −0.5 over the models); chained. Only sets whose members share
-/// posterior mass are told: at least two with PIP between 0.02 and 0.98, and one of them in with probability ≥ 0.2.
-pub(super) fn groups(problem: &Problem, posterior: &Posterior, library: &Library) -> Vec<Group> {
-    let columns = problem.prior.columns();
-    let count = columns.len();
-    let holds: Vec<Vec<bool>> = posterior
-        .models
-        .iter()
-        .map(|model| {
-            let mut holds = vec![false; count];
-            for &member in &model.members {
-                holds[problem.prior.component[member as usize]] = true;
-            }
-            holds
-        })
-        .collect();
-    let share = |test: &dyn Fn(&[bool]) -> bool| -> f64 {
-        let models = posterior.models.iter().zip(&holds);
-        models.filter(|(_, h)| test(h)).map(|(m, _)| m.weight).sum()
-    };
-    let pip: Vec<f64> = columns
-        .iter()
-        .map(|own| posterior.inclusion[own[0]])
-        .collect();
-    let unsure: Vec<bool> = pip.iter().map(|p| (0.02..0.98).contains(p)).collect();
-    let mut label: Vec<usize> = (0..count).collect();
-    for a in 0..count {
-        for b in 0..a {
-            if alike(problem, &columns[a], &columns[b])
-                || (unsure[a] && unsure[b] && correlation(&share, &pip, a, b) < EXCLUSIVE)
-            {
-                let (from, to) = (label[a].max(label[b]), label[a].min(label[b]));
-                let labels = label.iter_mut().filter(|l| **l == from);
-                labels.for_each(|l| *l = to);
-            }
-        }
-    }
-    let name = |component: usize| {
-        let term = library.columns()[columns[component][0]];
-        library.components()[library.terms()[term].component]
-            .name
-            .clone()
-    };
-    (0..count)
-        .filter_map(|first| {
-            let members: Vec<usize> = (first..count).filter(|&k| label[k] == first).collect();
-            if members.iter().filter(|&&k| unsure[k]).count() < 2 {
-                return None;
-            }
-            let any = share(&|holds: &[bool]| members.iter().any(|&k| holds[k]));
-            (any >= WORTH_TELLING).then(|| Group {
-                members: members.iter().map(|&k| name(k)).collect(),
-                pip: any,
-            })
-        })
-        .collect()
-}
-
-/// Posterior mass of the models that pass a test on which components they hold.
-type Share<'a> = dyn Fn(&dyn Fn(&[bool]) -> bool) -> f64 + 'a;
-
-/// Correlation of two inclusions over the models.
-fn correlation(share: &Share<'_>, pip: &[f64], a: usize, b: usize) -> f64 {
-    let both = share(&|holds: &[bool]| holds[a] && holds[b]);
-    let variance = |p: f64| p * (1.0 - p);
-    (both - pip[a] * pip[b]) / (variance(pip[a]) * variance(pip[b])).sqrt()
-}
-
-/// Two single columns that point the same way over the rows.
-fn alike(problem: &Problem, a: &[usize], b: &[usize]) -> bool {
-    let (&[a], &[b]) = (a, b) else { return false };
-    let count = problem.names.len();
-    let at = |i: usize, j: usize| problem.gram[i * count + j];
-    (at(a, b) / (at(a, a) * at(b, b)).sqrt()).abs() > ALIKE
 }

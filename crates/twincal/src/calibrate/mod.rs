@@ -4,30 +4,37 @@ mod compact;
 mod components;
 mod data;
 mod drift;
+mod groups;
 mod heavy_tails;
 mod held_out;
+mod outlook;
 mod repeat;
 mod result;
 mod sandwich;
 mod speed;
 mod summary;
 mod sweep;
+mod unphysical;
+mod unseen;
 mod weigh;
 #[cfg(test)]
 mod testing;
 
+pub use outlook::{Outlook, outlook};
 pub use result::{
-    Calibration, Compact, CompactTerm, ComponentSummary, Draws, Group, Halves, LikelihoodUsed,
-    LogSummary, ParameterSummary, PriorUsed, Repeat, SweepPoint, TermSummary, Verdict,
+    Alike, Calibration, Compact, CompactTerm, ComponentSummary, Draws, Group, Halves,
+    LikelihoodUsed, LogSummary, ParameterSummary, PriorUsed, Repeat, SweepPoint, TermSummary,
+    Verdict,
 };
 
 use crate::error::{Error, Finding, Result, Severity};
-use crate::infer::{Choice, InferenceSettings, infer};
+use crate::infer::{Choice, InferenceSettings, R_HAT_LIMIT, infer};
 use crate::likelihood::{Columns, JointNoise, NoiseModel, NoiseSettings, SpeedProfile};
 use crate::observations::Part;
 use crate::plug_in::{
     Fit, FitSettings, LeftOut, Moving, fit, fit_tempered, residual_correlation_time, start,
 };
+use crate::posterior::Method;
 use crate::prior::PriorSettings;
 use crate::robot::Robot;
 use crate::self_check::self_check;
@@ -132,6 +139,7 @@ pub fn calibrate(
     // eq. (1)–(4): residual torque and Euler–Lagrange columns, filtered alike
     let mut data = Data::read(robot, &library, &pipeline, logs, heldout)?;
     findings.extend(self_check(robot, &pipeline, data.trajectories())?);
+    let every_candidate = library.clone();
     let (library, zero_columns) = data.drop_zero_columns(library);
     let columns = columns_of(robot, &library, settings)?;
     data.require_enough(robot, &columns)?;
@@ -216,9 +224,15 @@ pub fn calibrate(
         repeats,
         halves,
     };
-    summary::summarise(
+    let excitation = unseen::excitation(robot, &every_candidate, &skeleton.zero_columns, &data);
+    let mut calibration = summary::summarise(
         skeleton, &library, &data, &columns, settings, fitted, validation, sweep, opinion, findings,
-    )
+    )?;
+    unseen::tell(&mut calibration, &excitation);
+    let seed = settings.inference.seed;
+    let unphysical = unphysical::findings(robot, &library, &calibration, seed);
+    calibration.findings.extend(unphysical);
+    Ok(calibration)
 }
 
 /// A fit together with what left-out training data said of it.
@@ -348,6 +362,20 @@ fn findings_of_fit(
     training: &[Part<'_>],
 ) -> Vec<Finding> {
     let mut findings = Vec::new();
+    if let Method::Gibbs { chains, r_hat, .. } = fitted.fit.posterior.method
+        && r_hat > R_HAT_LIMIT
+    {
+        findings.push(Finding::new(
+            Severity::Warning,
+            "chains_disagree",
+            "",
+            format!(
+                "the {chains} chains disagree (R-hat {r_hat:.3}, limit {R_HAT_LIMIT}) and were accepted as allowed: \
+                 probabilities and coefficients may change with the seed; raise inference.draws"
+            ),
+            chains as u64,
+        ));
+    }
     if !fitted.fit.converged {
         findings.push(Finding::new(
             Severity::Warning,

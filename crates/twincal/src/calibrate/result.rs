@@ -102,13 +102,33 @@ pub enum Verdict {
     NotSeen,
 }
 
+/// Why the members of a [`Group`] cannot be told apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Alike {
+    /// Their torque is the same for every motion of this robot: only the prior prefers one.
+    EveryMotion,
+    /// Their torque is the same in these logs; another motion would separate them.
+    #[default]
+    TheseLogs,
+}
+
 /// Components that these data cannot tell apart.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Group {
-    /// Names of the components.
+    /// Names of the components, the likeliest first.
     pub members: Vec<String>,
     /// Probability that at least one of them is in.
     pub pip: f64,
+    /// Why.
+    #[serde(default)]
+    pub alike: Alike,
+    /// True if it is clear which member is in, by the prior's preference for the simpler story.
+    #[serde(default)]
+    pub settled: bool,
+    /// In a sentence.
+    #[serde(default)]
+    pub words: String,
 }
 
 /// How an estimate moves when the cut-off does (method section 1).

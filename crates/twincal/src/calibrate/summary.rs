@@ -1,7 +1,8 @@
 //! From posterior to what people read: terms, verdicts, groups, sensitivity, autocorrelation.
 
-use super::components::{components, groups};
+use super::components::components;
 use super::data::Data;
+use super::groups::groups;
 use super::result::{
     Calibration, ComponentSummary, Draws, Group, LikelihoodUsed, PriorUsed, SweepPoint,
     TermSummary, Verdict,
@@ -310,15 +311,16 @@ fn findings_of_posterior(
         ));
     }
     for group in groups {
+        let severity = if group.settled {
+            Severity::Note
+        } else {
+            Severity::Warning
+        };
         findings.push(Finding::new(
-            Severity::Warning,
+            severity,
             "alike_in_data",
             group.members.join(", "),
-            format!(
-                "these data cannot tell {} apart: at least one is in with probability {:.3}; another motion would separate them",
-                group.members.join(", "),
-                group.pip
-            ),
+            group.words.clone(),
             group.members.len() as u64,
         ));
     }
@@ -335,15 +337,6 @@ fn findings_of_posterior(
                 ),
                 0,
             )),
-            Some(Verdict::NotSeen) if component.pip.is_some_and(|p| p > 0.2) => {
-                findings.push(Finding::new(
-                    Severity::Note,
-                    "not_seen",
-                    name.clone(),
-                    format!("these data say nothing about `{name}`: its coefficients are as wide as before"),
-                    0,
-                ));
-            }
             _ => {}
         }
     }

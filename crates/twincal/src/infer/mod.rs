@@ -17,6 +17,8 @@ mod walker;
 #[cfg(test)]
 mod testing;
 
+pub use gibbs::R_HAT_LIMIT;
+
 use crate::error::{Error, Result};
 use crate::posterior::{Posterior, Problem};
 use standard::Standard;

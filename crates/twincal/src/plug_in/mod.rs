@@ -239,6 +239,9 @@ fn slab_scales(
     posterior: &Posterior,
 ) -> Vec<f64> {
     let reference_of = columns.references(&mean_squares(gram, columns.names.len(), &now.weight));
+    if !posterior.noise.is_finite() {
+        return now.scaled_variance.clone(); // less than two effective rows know no scale
+    }
     let noise = posterior.noise.max(f64::MIN_POSITIVE);
     let reference = (problem.yy / problem.n / noise).clamp(SLAB_BOUNDS.0, SLAB_BOUNDS.1);
     let mut sum = vec![reference; columns.families.len()];

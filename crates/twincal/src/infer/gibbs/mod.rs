@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Largest R̂ of chains that agree.
-const R_HAT_LIMIT: f64 = 1.01;
+pub const R_HAT_LIMIT: f64 = 1.01;
 /// Largest difference of a PIP between chains that agree.
 const SPREAD_LIMIT: f64 = 0.1;
 /// Scans per draw, tried in this order. The second run is as long as the first, but its chains know what the first ones

@@ -1,0 +1,293 @@
+//! Which components say the same: in these logs, or for every motion of this robot.
+
+use super::result::{Alike, Group};
+use crate::linear_algebra::Cholesky;
+use crate::posterior::{Posterior, Problem};
+use crate::term::{Family, Library};
+
+/// Columns whose cosine over the rows is above this are hard to tell apart.
+const ALIKE: f64 = 0.95;
+/// Components whose inclusions are correlated below this stand for each other.
+const EXCLUSIVE: f64 = -0.5;
+/// Probability below which nobody asks which member it was.
+const WORTH_TELLING: f64 = 0.2;
+/// Nats by which another component may explain the same torque worse and still stand in for it.
+const WORSE: f64 = 1.0;
+/// Nats by which a component must explain torque better than nothing before others can stand in for it.
+const CLEAR: f64 = 10.0;
+/// Names that a sentence holds at most.
+const TOLD: usize = 6;
+
+/// Sets of components that cannot be told apart, with the probability that at least one is in; what the data leave open
+/// first.
+///
+/// Two components belong together
+/// - if they are single columns that are alike in the data (cosine above 0.95) and both have a PIP between 0.02 and 0.98;
+/// - if their inclusions exclude each other (correlation below −0.5 over the models);
+/// - if one is in (PIP ≥ 0.2) and both span the same torques in every motion: a payload, and mass moments with tensor of
+///   the last link;
+/// - if the torque that one explains (PIP ≥ 0.2) another one would explain as well, its prior included:
+///
+/// ```text
+/// min_b ½|Φ_A β_A − Φ_B b|²/φ + ½ bᵀV_B⁻¹b/φ  is at most 1 nat above the same for A itself
+/// ```
+/// where B is one component or mass moments and tensor of one link, and A explains at least 10 nats. This holds also where
+/// the prior is sure which one it is; the set is `settled` then.
+pub(super) fn groups(problem: &Problem, posterior: &Posterior, library: &Library) -> Vec<Group> {
+    let all = Candidates::new(problem, posterior, library);
+    let count = all.columns.len();
+    let mut label: Vec<usize> = (0..count).collect();
+    // Whether every link of a set holds for all motions; by label.
+    let mut structural = vec![true; count];
+    let mut join = |a: usize, b: usize, every_motion: bool| {
+        let (from, to) = (label[a].max(label[b]), label[a].min(label[b]));
+        structural[to] &= structural[from] && every_motion;
+        let labels = label.iter_mut().filter(|l| **l == from);
+        labels.for_each(|l| *l = to);
+    };
+    for a in 0..count {
+        for b in 0..a {
+            let unsure = all.unsure(a) && all.unsure(b);
+            if unsure && (all.alike(a, b) || all.correlation(a, b) < EXCLUSIVE) {
+                join(a, b, all.is_alias(a, b) || all.is_alias(b, a));
+            }
+        }
+        if all.pip[a] >= WORTH_TELLING {
+            for other in all.others(a) {
+                if all.same_span(a, &other) || all.stands_in(a, &other) {
+                    other.iter().for_each(|&b| join(a, b, all.is_alias(a, b)));
+                }
+            }
+        }
+    }
+    let mut groups: Vec<Group> = (0..count)
+        .filter_map(|first| {
+            let members: Vec<usize> = (first..count).filter(|&k| label[k] == first).collect();
+            if members.len() < 2 {
+                return None;
+            }
+            all.group(&members, structural[first])
+        })
+        .collect();
+    groups.sort_by_key(|group| group.settled);
+    groups
+}
+
+/// The components that have columns, numbered as in the problem's prior.
+struct Candidates<'a> {
+    problem: &'a Problem,
+    posterior: &'a Posterior,
+    library: &'a Library,
+    columns: Vec<Vec<usize>>,
+    /// Index in the library.
+    component: Vec<usize>,
+    pip: Vec<f64>,
+    /// Per listed model, which components it holds.
+    holds: Vec<Vec<bool>>,
+}
+
+impl<'a> Candidates<'a> {
+    fn new(problem: &'a Problem, posterior: &'a Posterior, library: &'a Library) -> Self {
+        let columns = problem.prior.columns();
+        let holds = |members: &[u32]| {
+            let mut holds = vec![false; columns.len()];
+            for &member in members {
+                holds[problem.prior.component[member as usize]] = true;
+            }
+            holds
+        };
+        Self {
+            holds: posterior.models.iter().map(|m| holds(&m.members)).collect(),
+            component: (columns.iter())
+                .map(|own| library.terms()[library.columns()[own[0]]].component)
+                .collect(),
+            pip: columns
+                .iter()
+                .map(|own| posterior.inclusion[own[0]])
+                .collect(),
+            columns,
+            problem,
+            posterior,
+            library,
+        }
+    }
+
+    fn name(&self, k: usize) -> &str {
+        &self.library.components()[self.component[k]].name
+    }
+
+    fn unsure(&self, k: usize) -> bool {
+        (0.02..0.98).contains(&self.pip[k])
+    }
+
+    /// No motion tells what `a` does from what `b`, maybe with others, can do.
+    fn is_alias(&self, a: usize, b: usize) -> bool {
+        let names = &self.library.components()[self.component[a]].alias_of;
+        names.iter().any(|name| name == self.name(b))
+    }
+
+    /// Every motion gives both sides the same torques: payload, and mass moments with tensor of the last link.
+    fn same_span(&self, own: usize, others: &[usize]) -> bool {
+        let both = |&b: &usize| self.is_alias(own, b) && self.is_alias(b, own);
+        others.iter().all(both)
+    }
+
+    /// Posterior mass of the models that pass a test on which components they hold.
+    fn share(&self, test: &dyn Fn(&[bool]) -> bool) -> f64 {
+        let models = self.posterior.models.iter().zip(&self.holds);
+        models.filter(|(_, h)| test(h)).map(|(m, _)| m.weight).sum()
+    }
+
+    /// Correlation of two inclusions over the models.
+    fn correlation(&self, a: usize, b: usize) -> f64 {
+        let both = self.share(&|holds| holds[a] && holds[b]);
+        let variance = |k: usize| self.pip[k] * (1.0 - self.pip[k]);
+        (both - self.pip[a] * self.pip[b]) / (variance(a) * variance(b)).sqrt()
+    }
+
+    /// Two single columns that point the same way over the rows.
+    fn alike(&self, a: usize, b: usize) -> bool {
+        let (&[a], &[b]) = (&self.columns[a][..], &self.columns[b][..]) else {
+            return false;
+        };
+        let at = |i: usize, j: usize| self.gram(i, j);
+        (at(a, b) / (at(a, a) * at(b, b)).sqrt()).abs() > ALIKE
+    }
+
+    fn gram(&self, i: usize, j: usize) -> f64 {
+        self.problem.gram[i * self.problem.names.len() + j]
+    }
+
+    /// What could stand in for a component: any other, or mass moments and tensor of one link.
+    fn others(&self, own: usize) -> Vec<Vec<usize>> {
+        let family = |k: usize| self.library.components()[self.component[k]].family;
+        let link = |k: usize| self.name(k).rsplit_once('.').map(|(link, _)| link);
+        let mut others: Vec<Vec<usize>> = Vec::new();
+        for k in (0..self.columns.len()).filter(|&k| k != own) {
+            others.push(vec![k]);
+            if family(k) == Family::MassMoments {
+                let tensor = (0..self.columns.len())
+                    .find(|&t| t != own && family(t) == Family::Tensor && link(t) == link(k));
+                others.extend(tensor.map(|tensor| vec![k, tensor]));
+            }
+        }
+        others
+    }
+
+    /// Whether others would explain what a component explains.
+    fn stands_in(&self, own: usize, others: &[usize]) -> bool {
+        let own = &self.columns[own];
+        // Given that it is in, about.
+        let inside = |&k: &usize| self.posterior.mean[k] / self.posterior.inclusion[k];
+        let beta: Vec<f64> = own.iter().map(inside).collect();
+        let columns: Vec<usize> = others
+            .iter()
+            .flat_map(|&k| self.columns[k].iter().copied())
+            .collect();
+        let loss = |columns: &[usize]| self.loss(own, &beta, columns);
+        match (loss(own), loss(&columns), loss(&[])) {
+            (Some(itself), Some(other), Some(nothing)) => {
+                other <= itself + WORSE && nothing > itself + CLEAR
+            }
+            _ => false,
+        }
+    }
+
+    /// Nats that are lost when `columns`, under their prior, explain the torque Φ_own β.
+    fn loss(&self, own: &[usize], beta: &[f64], columns: &[usize]) -> Option<f64> {
+        let product = |k: usize| -> f64 {
+            let pairs = own.iter().zip(beta);
+            pairs.map(|(&i, b)| self.gram(k, i) * b).sum()
+        };
+        let energy: f64 = own.iter().zip(beta).map(|(&i, b)| b * product(i)).sum();
+        let mut normal = Vec::with_capacity(columns.len() * columns.len());
+        for &i in columns {
+            normal.extend(columns.iter().map(|&j| self.gram(i, j)));
+        }
+        for (place, &k) in columns.iter().enumerate() {
+            normal[place * columns.len() + place] += 1.0 / self.problem.prior.slab[k];
+        }
+        let mut half: Vec<f64> = columns.iter().map(|&k| product(k)).collect();
+        Cholesky::new(&normal, columns.len())
+            .ok()?
+            .solve_lower(&mut half);
+        let explained: f64 = half.iter().map(|x| x * x).sum();
+        Some(0.5 * (energy - explained).max(0.0) / self.posterior.noise)
+    }
+
+    fn group(&self, members: &[usize], every_motion: bool) -> Option<Group> {
+        let pip = self.share(&|holds: &[bool]| members.iter().any(|&k| holds[k]));
+        let most = members.iter().fold(0.0_f64, |m, &k| m.max(self.pip[k]));
+        // The listed models may miss what the members' own probabilities have.
+        let pip = pip.max(most);
+        if pip < WORTH_TELLING {
+            return None;
+        }
+        let settled = members.iter().all(|&k| !self.unsure(k));
+        let alike = if every_motion {
+            Alike::EveryMotion
+        } else {
+            Alike::TheseLogs
+        };
+        let mut order = members.to_vec();
+        order.sort_by(|&a, &b| self.pip[b].total_cmp(&self.pip[a]));
+        let told: Vec<&str> = order.iter().map(|&k| self.name(k)).collect();
+        let words = words(&told, pip, alike, settled);
+        let names = told.into_iter().map(str::to_owned).collect();
+        Some(Group {
+            members: names,
+            pip,
+            alike,
+            settled,
+            words,
+        })
+    }
+}
+
+/// "payload and link_6.tensor are one direction here: …", the likeliest name first.
+fn words(names: &[&str], pip: f64, alike: Alike, settled: bool) -> String {
+    let list = match names {
+        [] => String::new(),
+        _ if names.len() > TOLD => format!(
+            "{} and {} more",
+            names[..TOLD].join(", "),
+            names.len() - TOLD
+        ),
+        [others @ .., last] => format!("{} and {last}", others.join(", ")),
+    };
+    let same = match alike {
+        Alike::EveryMotion => "have the same torque in every motion of this robot",
+        Alike::TheseLogs => "say the same in these logs",
+    };
+    let pip = if pip > 0.999 {
+        "> 0.999".to_owned()
+    } else {
+        format!("{pip:.3}")
+    };
+    let which = match (settled, alike) {
+        (true, _) => format!("the prior alone prefers `{}`", names[0]),
+        (false, Alike::EveryMotion) => "which one is open".to_owned(),
+        (false, Alike::TheseLogs) => "another motion would tell which".to_owned(),
+    };
+    format!("{list} {same}: any of them is in with probability {pip}; {which}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_set_in_words() {
+        let names = ["payload", "fore.tensor"];
+        assert_eq!(
+            words(&names, 0.9999, Alike::EveryMotion, true),
+            "payload and fore.tensor have the same torque in every motion of this robot: any of them is in with \
+             probability > 0.999; the prior alone prefers `payload`"
+        );
+        let open = words(&names, 0.98, Alike::TheseLogs, false);
+        assert!(
+            open.ends_with("0.980; another motion would tell which"),
+            "{open}"
+        );
+    }
+}

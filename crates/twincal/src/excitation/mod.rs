@@ -1,0 +1,249 @@
+//! What a robot can show of its components, what the logs do show, and which joint should move more for the rest.
+//!
+//! ```text
+//! S = ⟨Φᵀ W Φ⟩ over random states     T = ⟨Φᵀ W Φ⟩ over the rows of the logs that the fit uses
+//! null(S): no motion shows it         range(S) with cᵀTc < ε cᵀSc: the robot could show it, these logs do not
+//! ```
+//! Columns are scaled to torque of size 1 at random states and joints to nominal torque of size 1, so units do not matter.
+
+mod directions;
+mod states;
+mod words;
+#[cfg(test)]
+mod tests;
+
+pub use states::{States, random_states};
+pub use words::{sentence, sentences};
+
+use crate::gram::Gram;
+use crate::robot::Robot;
+use crate::term::Library;
+use directions::{Directions, Spectrum};
+use serde::{Deserialize, Serialize};
+
+/// Power of a direction's torque in the logs, as a share of its power at random states, below which the logs do not show
+/// it: torque a hundredth as large as in ordinary motion.
+const UNSEEN: f64 = 1e-4;
+/// The same at random states of one more joint: from here on that joint shows the direction.
+const SHOWN: f64 = 1e-3;
+/// A direction is what the robot could show if its torque is this share of what its columns have one by one; less is
+/// left where angles in the model file are rounded.
+const ROBOT_SHOWS: f64 = 1e-3;
+/// Random states for S, and rows of the logs that one joint's motion is added to.
+pub const STATES: usize = 256;
+/// Shares of a direction's torque above which a component takes part in it.
+const TAKES_PART: f64 = 0.1;
+
+/// How much of a component the logs show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Seen {
+    /// Everything that the robot can show of it, apart from all others.
+    Fully,
+    /// A part, or only together with others.
+    Partly,
+    /// Nothing.
+    NotAtAll,
+    /// No motion of this robot shows it.
+    Never,
+}
+
+/// One component in the logs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ComponentExcitation {
+    /// Name of the component.
+    pub name: String,
+    /// How much the logs show.
+    pub seen: Seen,
+    /// rms of its torque per unit of β in the logs, as a share of that at random states (positions within the limits or ±π,
+    /// 2 rad/s, 5 rad/s²).
+    pub excitation: f64,
+    /// Independent columns on its own: over all motions of the robot, and in the logs.
+    pub directions: [usize; 2],
+}
+
+/// What the robot could show and the logs do not, by the joint that would show it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Unseen {
+    /// The joint that should move more, or further; `None` where it takes several at once.
+    pub joint: Option<String>,
+    /// Independent directions that would become visible.
+    pub directions: usize,
+    /// Components of which the logs show nothing.
+    pub nothing_of: Vec<String>,
+    /// Components that the logs show only together.
+    pub not_apart: Vec<String>,
+}
+
+/// What logs show of a library.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Excitation {
+    /// Independent directions of all columns: over all motions of the robot (structural rank), and in the logs.
+    pub directions: [usize; 2],
+    /// One per component of the library.
+    pub components: Vec<ComponentExcitation>,
+    /// What another motion would show, most first.
+    pub unseen: Vec<Unseen>,
+}
+
+/// Compares what the robot can show with what the rows in `gram` show. `rows` are some of the logs' states: one joint's
+/// motion is added to them to find the joint that should move more.
+///
+/// `gram` belongs to the columns of `library` and counts the rows that the fit uses, standstill left out. Columns that are
+/// no number at some random state are not judged.
+///
+/// # Source
+/// Gautier & Khalil 1990 (structural against trajectory rank of the regressor); generalised eigenvalues of (T, S).
+pub fn excitation(robot: &Robot, library: &Library, gram: &Gram, rows: &States) -> Excitation {
+    let all = random_states(robot, STATES);
+    let reference = states::reference(robot, library, &all);
+    let columns: Vec<usize> = (0..library.columns().len())
+        .filter(|&k| reference.size[k].is_finite() && reference.size[k] > 0.0)
+        .collect();
+    let robot_shows = reference.power(library, &columns, &all);
+    let logs_show = reference.power_of_gram(&columns, gram);
+    let home = |k: usize| library.terms()[library.columns()[columns[k]]].component;
+    let count = library.components().len();
+    let mut own = vec![Vec::new(); count];
+    (0..columns.len()).for_each(|k| own[home(k)].push(k));
+
+    let spectrum = Spectrum::new(&robot_shows, &logs_show, columns.len());
+    // What one more joint would show, in the coordinates of the spectrum.
+    let with_joint: Vec<Vec<f64>> = (0..robot.dof())
+        .map(|joint| {
+            let moved = rows.with_random(joint, &all);
+            spectrum.whitened(&reference.power(library, &columns, &moved))
+        })
+        .collect();
+
+    let hidden = spectrum.all_hidden();
+    let every: Vec<usize> = (0..robot.dof()).collect();
+    let mut plan = Plan::default();
+    for (joint, shown) in hidden.by_joint(&with_joint, &every) {
+        plan.steps.push(Step {
+            joint,
+            directions: shown.count(),
+            ..Step::default()
+        });
+    }
+    let allowed: Vec<usize> = plan.steps.iter().filter_map(|step| step.joint).collect();
+
+    let mut components = Vec::with_capacity(count);
+    let mut alone = Directions::empty(spectrum.rank());
+    for (index, columns) in own.iter().enumerate() {
+        let part = Spectrum::new(
+            &directions::block(&robot_shows, columns),
+            &directions::block(&logs_show, columns),
+            columns.len(),
+        );
+        let hidden = part.hidden(columns, &spectrum);
+        let directions = [part.rank(), part.rank() - hidden.count()];
+        let ratio = columns.iter().map(|&k| {
+            let at = k * spectrum.size() + k;
+            logs_show[at] / robot_shows[at]
+        });
+        let excitation = (ratio.sum::<f64>() / columns.len().max(1) as f64).sqrt();
+        components.push(ComponentExcitation {
+            name: library.components()[index].name.clone(),
+            seen: match directions {
+                [0, _] => Seen::Never,
+                [_, 0] => Seen::NotAtAll,
+                [all, some] if some < all => Seen::Partly,
+                _ => Seen::Fully,
+            },
+            excitation,
+            directions,
+        });
+        for (joint, _) in hidden.by_joint(&with_joint, &allowed) {
+            plan.add(joint, index, directions[1] == 0);
+        }
+        alone.join(&hidden);
+    }
+    // What is left are directions in which several components cancel.
+    for (joint, shown) in hidden.without(&alone).by_joint(&with_joint, &allowed) {
+        let torque: Vec<f64> = own
+            .iter()
+            .map(|columns| spectrum.torque(&shown, columns))
+            .collect();
+        let most = torque.iter().fold(0.0_f64, |m, t| m.max(*t));
+        for index in 0..count {
+            if torque[index] > TAKES_PART * most && components[index].directions[1] > 0 {
+                components[index].seen = Seen::Partly;
+                plan.add(joint, index, false);
+            }
+        }
+    }
+    Excitation {
+        directions: [spectrum.rank(), spectrum.rank() - hidden.count()],
+        components,
+        unseen: plan.finish(robot, library),
+    }
+}
+
+/// What moving one joint more would show.
+#[derive(Default)]
+struct Step {
+    joint: Option<usize>,
+    directions: usize,
+    nothing_of: Vec<usize>,
+    not_apart: Vec<usize>,
+}
+
+/// One step after the other.
+#[derive(Default)]
+struct Plan {
+    steps: Vec<Step>,
+}
+
+impl Plan {
+    fn add(&mut self, joint: Option<usize>, member: usize, nothing: bool) {
+        let known = self.steps.iter().position(|step| step.joint == joint);
+        let at = known.unwrap_or_else(|| {
+            self.steps.push(Step {
+                joint,
+                ..Step::default()
+            });
+            self.steps.len() - 1
+        });
+        let step = &mut self.steps[at];
+        let list = if nothing {
+            &mut step.nothing_of
+        } else {
+            &mut step.not_apart
+        };
+        if !list.contains(&member) {
+            list.push(member);
+        }
+    }
+
+    fn finish(mut self, robot: &Robot, library: &Library) -> Vec<Unseen> {
+        let joints = robot.joint_names();
+        let names = |list: &[usize]| -> Vec<String> {
+            let names = list.iter().map(|&c| library.components()[c].name.clone());
+            names.collect()
+        };
+        self.steps
+            .retain(|step| !(step.nothing_of.is_empty() && step.not_apart.is_empty()));
+        self.steps.sort_by_key(|step| {
+            (
+                std::cmp::Reverse(step.nothing_of.len()),
+                std::cmp::Reverse(step.directions),
+                step.joint.unwrap_or(usize::MAX),
+            )
+        });
+        let steps = self.steps.into_iter();
+        steps
+            .map(|mut step| {
+                step.not_apart.sort_unstable();
+                step.not_apart
+                    .retain(|member| !step.nothing_of.contains(member));
+                Unseen {
+                    joint: step.joint.map(|joint| joints[joint].to_owned()),
+                    directions: step.directions,
+                    nothing_of: names(&step.nothing_of),
+                    not_apart: names(&step.not_apart),
+                }
+            })
+            .collect()
+    }
+}
