@@ -294,7 +294,7 @@ pub struct Calibration {
     pub likelihood: LikelihoodUsed,
     /// Terms that these data cannot tell apart.
     pub groups: Vec<Group>,
-    /// Estimates at 0.7, 1 and 1.4 times the cut-off; empty with the filter off.
+    /// Estimates at 0.7, 1 and 1.4 times the cut-off; empty with the filter off or weighed rows.
     pub sweep: Vec<SweepPoint>,
     /// What repeats on the two halves of the data: every coefficient of the compact twin.
     #[serde(default)]

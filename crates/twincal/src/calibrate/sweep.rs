@@ -17,7 +17,8 @@ use rayon::prelude::*;
 /// Factors on the cut-off.
 const FACTORS: [f64; 2] = [0.7, 1.4];
 
-/// Posterior means at 0.7, 1 and 1.4 f_c with the plug-ins of the fit; empty with the filter off.
+/// Posterior means at 0.7, 1 and 1.4 f_c with the plug-ins of the fit; empty with the filter off, and where rows are weighed
+/// (`noise.robust`, `noise.varies_with_speed`): rows of another cut-off have no weights.
 ///
 /// A cut-off at which the logs cannot be used (too short for the kernel) is left out.
 pub(super) fn cutoff(
@@ -29,7 +30,7 @@ pub(super) fn cutoff(
     settings: &CalibrationSettings,
     fit: &Fit,
 ) -> Result<Vec<SweepPoint>> {
-    if pipeline.cutoff_hz == 0.0 {
+    if pipeline.cutoff_hz == 0.0 || settings.noise.robust || settings.noise.varies_with_speed {
         return Ok(Vec::new());
     }
     let mut points = vec![SweepPoint {
