@@ -248,3 +248,18 @@ fn exit_code_70_is_our_bug_and_says_so() {
     }
     assert!(!folder.path().join("out").exists());
 }
+
+/// One candidate of all that the arm lacks: what is left stays alike for 870 of 2000 rows, and a larger c leaves nothing.
+#[test]
+fn a_residual_with_a_long_memory_is_fitted_all_the_same() {
+    let folder = folder();
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies/planar_arm/assets");
+    let config = "[library]\nterms = [\"sin(q2)\"]\ngeneric = false\nfamilies = []\n[signal]\ncutoff_hz = 0\n";
+    fs::write(folder.path().join("one.toml"), config).unwrap();
+    let (log, model) = (assets.join("train1.parquet"), assets.join("arm.urdf"));
+    let paths = [log.to_str().unwrap(), "--model", model.to_str().unwrap()];
+    let rest = ["--config", "one.toml", "-o", "out"];
+    run(folder.path(), ["fit"].iter().chain(&paths).chain(&rest)).expect(0);
+    let noise = &result(folder.path())["noise"];
+    assert!(noise[1]["sigma"].as_f64().unwrap() > 0.0);
+}

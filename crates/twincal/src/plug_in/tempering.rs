@@ -26,7 +26,7 @@ const MOST_FOLDS: usize = 6;
 /// What predicting left-out training data says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeftOut {
-    /// `(c, log score)` of each multiplier tried.
+    /// `(c, log score)` of each multiplier that leaves rows enough to predict.
     pub scores: Vec<(f64, f64)>,
     /// Factor per joint on the noise sd of an interval so that left-out residuals have the stated variance.
     pub interval_factor: Vec<f64>,
@@ -98,6 +98,10 @@ pub fn fit_tempered(
         )?;
         let predicted = predict_left_out(&folds, columns, settings, &fitted)?;
         let score = score(&predicted, &fitted.plug_in, settings.noise.robust);
+        // Where c leaves two rows or fewer the noise has no mean: it predicts nothing, and larger ones do not either.
+        if !score.is_finite() && !candidates.is_empty() {
+            break;
+        }
         candidates.push((fitted, predicted, score));
     }
     let scores: Vec<(f64, f64)> = MULTIPLIERS
