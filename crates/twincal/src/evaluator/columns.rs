@@ -1,6 +1,6 @@
 //! Columns of a library as steps.
 
-use super::dynamics::{self, Moving};
+use super::dynamics::{self, Moving, Screw};
 use super::trace::{Id, Step, Trace};
 use crate::robot::Robot;
 use crate::term::{Function, Graph, GraphId, Library, ModelColumn, Node, Variable};
@@ -13,7 +13,7 @@ pub(super) struct Columns<'a> {
     /// Nominal motion.
     pub(super) moving: Vec<Moving>,
     /// Screws of every body, once a column asks for them.
-    screws: Option<Vec<Vec<(usize, [[Id; 3]; 2])>>>,
+    screws: Option<Vec<Vec<Screw>>>,
     /// Nominal torque, once a column asks for it.
     nominal: Option<Vec<Id>>,
     expressions: HashMap<GraphId, Id>,

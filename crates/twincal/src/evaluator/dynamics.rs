@@ -255,7 +255,7 @@ pub(super) fn passive(t: &mut Trace, robot: &Robot, moving: &[Moving]) -> Vec<Id
 }
 
 /// Axis and velocity of a body's origin per unit of each coordinate that moves it, in the body's frame.
-type Screw = (usize, [Vector; 2]);
+pub(super) type Screw = (usize, [Vector; 2]);
 
 /// The screws of every body, as in `robot/regressor.rs`.
 pub(super) fn screws(t: &mut Trace, robot: &Robot, moving: &[Moving]) -> Vec<Vec<Screw>> {
