@@ -17,9 +17,8 @@ use pulp::Simd;
 
 /// Moves after which rounding is swept away by starting afresh.
 const MOVES_BETWEEN_SWEEPS: usize = 2000;
-/// Rounding that may have gathered in the rows before that: leaving a nearly singular model (A⁻¹)_jj large, takes that many
-/// digits from all that stays.
-const MOST_ROUNDING: f64 = 1e-11;
+/// What rounding may do to the log weight of a model before everything starts afresh as well, worst case.
+const MOST_WRONG: f64 = 0.1;
 
 /// Components of up to this many columns are eliminated on the stack.
 const SMALL: usize = 10;
@@ -50,8 +49,12 @@ pub(super) struct Tableau<'a> {
     /// Where the square of a component starts, by its place in `standard.blocks`; unused for single columns.
     square_of: Vec<usize>,
     moves: usize,
-    /// Estimate of the rounding in the rows: Σ of ε (A⁻¹)_jj over columns that left since the last sweep.
+    /// Estimate of the rounding in the rows: Σ of ε (A⁻¹)_jj over columns that left since the last sweep. Leaving a nearly
+    /// singular model takes that many digits from all that stays.
     rounding: f64,
+    /// How large it may become: a gradient that is wrong by `rounding · max |β̂|` changes a_n c by `MOST_WRONG` where the
+    /// pivot is the smallest possible, the slab's part.
+    most_rounding: f64,
     scratch: Vec<f64>,
 }
 
@@ -83,6 +86,7 @@ impl<'a> Tableau<'a> {
             square_of: Vec::new(),
             moves: 0,
             rounding: 0.0,
+            most_rounding: most_rounding(standard),
             scratch: vec![0.0; width],
         };
         let mut end = 0;
@@ -136,7 +140,7 @@ impl<'a> Tableau<'a> {
         for j in self.standard.blocks[block].range() {
             self.flip(simd, j);
         }
-        (self.moves >= MOVES_BETWEEN_SWEEPS || self.rounding > MOST_ROUNDING)
+        (self.moves >= MOVES_BETWEEN_SWEEPS || self.rounding > self.most_rounding)
             .then(|| self.sweep(simd))
     }
 
@@ -436,6 +440,13 @@ impl<'a> Tableau<'a> {
             };
         }
     }
+}
+
+/// See [`Tableau`]: `max |β̂| δ = √(MOST_WRONG · min pivot / a_n)`.
+fn most_rounding(standard: &Standard) -> f64 {
+    let largest = standard.center.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
+    let pivot = standard.precision.iter().copied().fold(1.0, f64::min);
+    (MOST_WRONG * pivot / standard.shape.max(1.0)).sqrt() / largest
 }
 
 /// Determinant of a symmetric matrix in units and `rhsᵀ matrix⁻¹ rhs`, both destroyed; `least(i)` is the least pivot and
