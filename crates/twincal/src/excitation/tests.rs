@@ -3,9 +3,10 @@
 
 use super::*;
 use crate::gram::JointAccumulator;
-use crate::posterior::random::Random;
 use crate::robot::{Inertia, JointDescription, JointKind, LinkDescription, RobotDescription};
 use crate::term::{Family, LibrarySettings};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 
 const INERTIAL: [Family; 2] = [Family::MassMoments, Family::Tensor];
@@ -39,11 +40,12 @@ fn arm(joints: usize, gravity: [f64; 3]) -> Robot {
 
 /// 400 states; `moves` and `turns` say which joints have a velocity and acceleration, and which change their position.
 fn states(dof: usize, moves: &[bool], turns: &[bool], mask_still: bool) -> States {
-    let (mut random, len) = (Random::new(1, 0), 400);
+    let (mut random, len) = (ChaCha8Rng::seed_from_u64(7), 400);
     let mut values = |which: &[bool], scale: f64, rest: f64| -> Vec<f64> {
         (0..dof * len)
             .map(|i| {
-                let value = scale * random.normal();
+                // variance scale²
+                let value = scale * 12f64.sqrt() * (random.random::<f64>() - 0.5);
                 if which[i / len] { value } else { rest }
             })
             .collect()
