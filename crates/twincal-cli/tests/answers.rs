@@ -249,6 +249,25 @@ fn exit_code_70_is_our_bug_and_says_so() {
     assert!(!folder.path().join("out").exists());
 }
 
+/// An effect that the user's own prior holds for impossible is estimated between the two, and that is said.
+#[test]
+fn case_96_a_prior_that_the_data_contradict_is_told() {
+    let conflicts = |prior: &str| -> Vec<Value> {
+        let folder = folder();
+        fs::write(folder.path().join("quick.toml"), format!("{QUICK}{prior}")).unwrap();
+        fit(folder.path(), &["-o", "out"]).expect(0);
+        let findings = result(folder.path())["findings"].clone();
+        let findings = findings.as_array().unwrap().iter();
+        let told = findings.filter(|f| f["code"] == "prior_conflict");
+        told.map(|f| f["subject"].clone()).collect()
+    };
+    let narrow = "[prior]\nslab = { scaled_variance = 0.01 }\n";
+    assert!(conflicts(narrow).contains(&Value::from("sin(q2)")));
+    let noisy = "[prior]\nnoise = { shape = 50.0, scale = 5000.0 }\n";
+    assert_eq!(conflicts(noisy), ["prior.noise"]);
+    assert!(conflicts("").is_empty());
+}
+
 /// One candidate of all that the arm lacks: what is left stays alike for 870 of 2000 rows, and a larger c leaves nothing.
 #[test]
 fn a_residual_with_a_long_memory_is_fitted_all_the_same() {

@@ -8,6 +8,7 @@ mod groups;
 mod heavy_tails;
 mod held_out;
 mod outlook;
+mod prior_conflict;
 mod repeat;
 mod result;
 mod sandwich;

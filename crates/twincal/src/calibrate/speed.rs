@@ -15,10 +15,10 @@ pub(super) fn findings(robot: &Robot, fit: &Fit, training: &[Part<'_>]) -> Vec<F
     for (joint, name) in robot.joint_names().into_iter().enumerate() {
         let memory = residual_correlation_time(training, joint, &fit.posterior.mean);
         let rows = super::weigh::moving(training, joint, &fit.posterior.mean);
-        if let Some(profile) = SpeedProfile::of_rows(rows, memory) {
-            if profile.ratio() > WORTH {
-                found.push((name, profile.ratio()));
-            }
+        if let Some(profile) = SpeedProfile::of_rows(rows, memory)
+            && profile.ratio() > WORTH
+        {
+            found.push((name, profile.ratio()));
         }
     }
     found.sort_by(|a, b| b.1.total_cmp(&a.1));

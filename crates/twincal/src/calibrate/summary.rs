@@ -8,7 +8,7 @@ use super::result::{
     TermSummary, Verdict,
 };
 use super::result::{Compact, Halves, Repeat};
-use super::{CalibrationSettings, Fitted, refuse, sandwich};
+use super::{CalibrationSettings, Fitted, prior_conflict, refuse, sandwich};
 use crate::error::{Finding, Result, Severity};
 use crate::infer::approximate;
 use crate::likelihood::{Columns, mean_squares};
@@ -88,6 +88,20 @@ pub(super) fn summarise(
         terms[index].sandwich_sd = *sd;
     }
     findings.extend(sandwich::findings(&terms));
+    let conditional: Vec<(f64, f64)> = (library.columns().iter())
+        .map(|&index| {
+            let number = |value: Option<f64>| value.unwrap_or(0.0);
+            let term = &terms[index];
+            (number(term.conditional_mean), number(term.conditional_sd))
+        })
+        .collect();
+    findings.extend(prior_conflict::findings(
+        columns,
+        &settings.prior,
+        &fit.problem,
+        &fit.posterior,
+        &conditional,
+    ));
     let components = components(library, &fit.posterior, &terms, settings.inference.seed);
     let groups = groups(&fit.problem, &fit.posterior, library);
     findings.extend(settings.prior.forced.iter().map(forced));
@@ -326,8 +340,8 @@ fn findings_of_posterior(
     }
     for component in components {
         let name = &component.name;
-        match component.verdict {
-            Some(Verdict::Undecided) => findings.push(Finding::new(
+        if component.verdict == Some(Verdict::Undecided) {
+            findings.push(Finding::new(
                 Severity::Note,
                 "undecided",
                 name.clone(),
@@ -336,8 +350,7 @@ fn findings_of_posterior(
                     component.pip.unwrap_or(f64::NAN)
                 ),
                 0,
-            )),
-            _ => {}
+            ));
         }
     }
     findings

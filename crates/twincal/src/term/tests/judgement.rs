@@ -9,7 +9,7 @@ fn alias(of: &str) -> Status {
 }
 
 #[test]
-fn fault_85_identical_columns_keep_the_users_expression_then_friction_then_generic() {
+fn case_85_identical_columns_keep_the_users_expression_then_friction_then_generic() {
     let (library, findings) = planar(2, &all(&["2*q1", "qd2^2*cos(q2)", "qd2^2*cos(q2)"])).unwrap();
     assert_eq!(status_of(&library, "qd1^2"), &alias("joint1.motor_inertia"));
     assert_eq!(status_of(&library, "qd2^2"), &alias("joint2.motor_inertia"));
@@ -50,7 +50,7 @@ fn fault_85_identical_columns_keep_the_users_expression_then_friction_then_gener
 }
 
 #[test]
-fn fault_86_total_derivatives_are_nulls_with_a_reason() {
+fn case_86_total_derivatives_are_nulls_with_a_reason() {
     let terms = [
         "qd1",
         "4",
