@@ -64,7 +64,7 @@ pub struct JointTorque {
     /// ln of the predictive density at the measured torque, nats per (N·m); empty without measurement. On rows that stand
     /// still it is that at the torque that `pit` speaks of, which is no density of the measured one: score moving rows.
     pub log_density: Vec<f64>,
-    /// sd of the noise part, N·m: √E[scale²] of what the coefficients do not explain.
+    /// sd of the noise part, N·m: √E(scale²) of what the coefficients do not explain.
     pub noise: Vec<f64>,
 }
 

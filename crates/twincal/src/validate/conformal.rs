@@ -45,7 +45,7 @@ pub struct ConformalKeeper {
 }
 
 impl ConformalKeeper {
-    /// Adds a trajectory: per joint, `|y − calibrated| / half width` of each row ([`stretch`]). One without rows is left out.
+    /// Adds a trajectory: per joint, `|y − calibrated| / half width` of each row (`stretch`). One without rows is left out.
     pub fn push(&mut self, stretches: Vec<Vec<f64>>) {
         if stretches.iter().any(|rows| rows.is_empty()) || stretches.is_empty() {
             return;
