@@ -254,7 +254,8 @@ fn exit_code_70_is_our_bug_and_says_so() {
 fn case_96_a_prior_that_the_data_contradict_is_told() {
     let conflicts = |prior: &str| -> Vec<Value> {
         let folder = folder();
-        fs::write(folder.path().join("quick.toml"), format!("{QUICK}{prior}")).unwrap();
+        let config = format!("{QUICK}[noise]\nmodel = \"iid\"\n{prior}");
+        fs::write(folder.path().join("quick.toml"), config).unwrap();
         fit(folder.path(), &["-o", "out"]).expect(0);
         let findings = result(folder.path())["findings"].clone();
         let findings = findings.as_array().unwrap().iter();
