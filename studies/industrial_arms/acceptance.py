@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simulate import ROBOTS, simulate
+from simulate_arms import ROBOTS, simulate
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = Path(os.environ.get("TWINCAL", ROOT / "target/release/twincal"))

@@ -2,7 +2,7 @@
 
     python studies/industrial_arms/export_speed.py [--robot panda]
 
-Simulates an arm (simulate.py), fits it with default candidates, exports C, compiles it with `cc -O2` and times calls on the
+Simulates an arm (simulate_arms.py), fits it with default candidates, exports C, compiles it with `cc -O2` and times calls on the
 held-out states; the fastest of ten rounds, processor time of one core.
 """
 
@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from acceptance import PROGRAM, run
-from simulate import ROBOTS
+from simulate_arms import ROBOTS
 
 HARNESS = r"""
 #include <stdio.h>

@@ -24,7 +24,7 @@ import pyarrow.parquet as pq
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "studies/industrial_arms"))
-import simulate as arms  # noqa: E402
+import simulate_arms as arms  # noqa: E402
 
 PROGRAM = Path(os.environ.get("TWINCAL", ROOT / "target/release/twincal"))
 

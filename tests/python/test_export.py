@@ -20,7 +20,7 @@ from conftest import ASSETS, ROOT, SHARED, fit, program, twincal
 from test_dynamics import ROBOTS, configuration
 
 sys.path.insert(0, str(ROOT / "studies" / "industrial_arms"))
-import simulate as industrial  # noqa: E402
+import simulate_arms as industrial  # noqa: E402
 
 PENDULUM = SHARED / "double_pendulum"
 

@@ -10,7 +10,7 @@ from conftest import ROOT, twincal
 
 sys.path.insert(0, str(ROOT / "studies" / "industrial_arms"))
 pin = pytest.importorskip("pinocchio")
-import simulate  # noqa: E402
+import simulate_arms  # noqa: E402
 
 STILL = 3  # index of the joint that stands still
 
@@ -32,16 +32,16 @@ def rank(matrix):
 
 @pytest.mark.parametrize("name", ["ur5", "panda", "xarm7"])
 def test_ranks_and_the_joint_to_move(name, tmp_path):
-    model = simulate.load(name)
+    model = simulate_arms.load(name)
     n = model.nv
     rng = np.random.default_rng(3)
     random = [scale * rng.uniform(-1, 1, (200, n)) for scale in (np.pi, 2.0, 5.0)]
     every = rank(regressor(model, *random, list(range(n))))
 
-    t, q, qd, qdd = simulate.motion(rng, n, 20000)
+    t, q, qd, qdd = simulate_arms.motion(rng, n, 20000)
     config = tmp_path / "twincal.toml"
     names = [model.names[j + 1] for j in range(n)]
-    locked = ", ".join(f'"{joint}" = 0.0' for joint in simulate.ROBOTS[name].locked)
+    locked = ", ".join(f'"{joint}" = 0.0' for joint in simulate_arms.ROBOTS[name].locked)
     config.write_text(f"[model]\nlocked = {{ {locked} }}\n[signal]\ncutoff_hz = 0\n"
                       '[library]\nfamilies = ["mass_moments", "tensor", "viscous", "coulomb"]\ngeneric = false\n')
     for still in (False, True):
@@ -51,8 +51,8 @@ def test_ranks_and_the_joint_to_move(name, tmp_path):
         for j in range(n):
             columns |= {f"q{j + 1}": q[::20, j], f"qd{j + 1}": qd[::20, j], f"qdd{j + 1}": qdd[::20, j]}
             columns[f"tau{j + 1}"] = rng.normal(size=len(t[::20]))
-        simulate.write(tmp_path / "run.csv", columns)
-        done = twincal("inspect", simulate.model_file(name), tmp_path / "run.csv", "--config", config, "--json")
+        simulate_arms.write(tmp_path / "run.csv", columns)
+        done = twincal("inspect", simulate_arms.model_file(name), tmp_path / "run.csv", "--config", config, "--json")
         told = json.loads(done.stdout)
         assert told["base_parameters"]["count"] == every
         # viscous and Coulomb friction of every joint are directions of their own

@@ -1,6 +1,6 @@
 """Simulated logs of industrial arms with known defects: what twincal must find, and what it must not.
 
-    python simulate.py --robot ur5 -o folder [--noise-time 0.02] [--seed 1]
+    python simulate_arms.py --robot ur5 -o folder [--noise-time 0.02] [--seed 1]
 
 The robots are those of the PyPI package `example-robot-data`; Pinocchio computes the torque of the REAL arm, which differs
 from the model file by a payload, a drifted link 3, a spring on joint 2 and friction on some joints. Joints move on
