@@ -20,6 +20,8 @@ from conftest import ASSETS, ROOT, SHARED, fit, program, twincal
 from test_dynamics import ROBOTS, configuration
 
 sys.path.insert(0, str(ROOT / "studies" / "industrial_arms"))
+sys.path.insert(0, str(ROOT / "studies" / "real_robots"))
+import roll_out  # noqa: E402
 import simulate_arms as industrial  # noqa: E402
 
 PENDULUM = SHARED / "double_pendulum"
@@ -318,21 +320,7 @@ def test_mujoco_has_the_torque_that_the_format_can_hold(planar):
 
 def rolled_out(model, log, seconds=1.0, every=50):
     """RMS position error per joint after the recorded torque has driven the model for a while, rad."""
-    data = mujoco.MjData(model)
-    q, qd, tau = (np.column_stack([log[f"{kind}{j}"] for j in (1, 2)]) for kind in ("q", "qd", "tau"))
-    interval = log["t"][1] - log["t"][0]
-    rows, steps = round(seconds / interval), round(interval / model.opt.timestep)
-    errors = []
-    for start in range(0, len(q) - rows - 1, every):
-        mujoco.mj_resetData(model, data)
-        data.qpos[:], data.qvel[:] = q[start], qd[start]
-        for row in range(start, start + rows):
-            for k in range(steps):
-                share = (k + 0.5) / steps
-                data.qfrc_applied[:] = (1 - share) * tau[row] + share * tau[row + 1]
-                mujoco.mj_step(model, data)
-        errors.append(data.qpos - q[start + rows])
-    return np.sqrt(np.mean(np.square(errors), axis=0))
+    return np.sqrt(np.mean(np.square(roll_out.roll_out(model, log, 0, seconds, every)), axis=0))
 
 
 def test_the_simulator_follows_the_robot_for_a_second(planar):

@@ -16,7 +16,7 @@ const NOT_SEEN: f64 = 0.9;
 /// Shape of a noise prior from which it says anything about size.
 const SAYS_SOMETHING: f64 = 1.0;
 
-/// Findings on coefficients with a prior that was not learned, and on a noise prior that the user gave.
+/// How far a coefficient lies from its prior, in sds of what the prior predicts for its estimate.
 ///
 /// The least-squares estimate b of a coefficient with prior N(0, s²) is `N(0, s² + e²)` before the data, e its standard error;
 /// by the posterior's mean m and sd p that is
@@ -27,6 +27,12 @@ const SAYS_SOMETHING: f64 = 1.0;
 ///
 /// # Source
 /// Box 1980; Evans & Moshonov 2006: prior predictive check.
+fn score(mean: f64, sd: f64, prior: f64) -> f64 {
+    mean / (prior * prior - sd * sd).sqrt()
+}
+
+/// Findings on coefficients with a prior that was not learned, and on a noise prior that the user gave; `conditional` are mean
+/// and sd of each column's coefficient given that it is in.
 pub(super) fn findings(
     columns: &Columns,
     settings: &PriorSettings,
@@ -44,7 +50,7 @@ pub(super) fn findings(
         if posterior.inclusion[k] < 0.5 || sd > NOT_SEEN * prior {
             continue;
         }
-        let z = mean / (prior * prior - sd * sd).sqrt();
+        let z = score(mean, sd, prior);
         if z.abs() > CONFLICT {
             let name = &columns.names[k];
             findings.push(Finding::new(
@@ -86,12 +92,14 @@ pub(super) fn findings(
 
 #[cfg(test)]
 mod tests {
+    use super::score;
+
     /// m / √(s² − p²) is b / √(s² + e²) for the conjugate normal: posterior by hand.
     #[test]
     fn the_predictive_score_is_that_of_the_estimate() {
         let (b, e, s) = (3.0f64, 0.5f64, 0.7f64);
         let p2 = 1.0 / (1.0 / (s * s) + 1.0 / (e * e));
         let m = p2 * b / (e * e);
-        assert!((m / (s * s - p2).sqrt() - b / (s * s + e * e).sqrt()).abs() < 1e-12);
+        assert!((score(m, p2.sqrt(), s) - b / (s * s + e * e).sqrt()).abs() < 1e-12);
     }
 }

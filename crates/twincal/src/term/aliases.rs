@@ -4,6 +4,7 @@ use super::candidate::Candidate;
 use super::expression::{Bounded, Graph, Variable, bounded_values};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use std::borrow::Borrow;
 
 /// A column that leaves less than this part of its length outside the span of the columns before it is an alias.
 const TOLERANCE: f64 = 1e-9;
@@ -31,6 +32,15 @@ pub(super) enum Verdict {
 
 /// Position, velocity and acceleration of every joint.
 pub(super) type Motions = Vec<[f64; 3]>;
+
+/// Positions, velocities and accelerations of all states, `joint * states + state`.
+pub(super) fn channels<S: Borrow<Motions>>(states: &[S], joints: usize) -> [Vec<f64>; 3] {
+    std::array::from_fn(|k| {
+        (0..joints)
+            .flat_map(|joint| states.iter().map(move |state| state.borrow()[joint][k]))
+            .collect()
+    })
+}
 
 /// Torque of the candidates that are made from the robot model, `(candidate, torque)` with `torque[state * joints + joint]`.
 pub(super) type ModelTorques<'a> = dyn Fn(&[&Motions]) -> Vec<(usize, Vec<f64>)> + 'a;

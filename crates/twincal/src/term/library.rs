@@ -1,6 +1,6 @@
 //! The library: all candidates of one robot in order, judged, compiled into one tape and one pass over the model.
 
-use super::aliases::{Motions, judge};
+use super::aliases::{Motions, channels, judge};
 use super::candidate::{Candidate, Joint, Proposal};
 use super::component::{Component, Meaning, Parameter};
 use super::expression::{Graph, Id, Slot, Tape, Variable, bounded_values};
@@ -202,12 +202,7 @@ impl Library {
     pub fn typical_sizes(&self) -> Vec<f64> {
         let joints = self.by_joint.len();
         let states = random_motions(joints);
-        let channel = |k: usize| -> Vec<f64> {
-            let joints = 0..joints;
-            let values = joints.flat_map(|joint| states.iter().map(move |state| state[joint][k]));
-            values.collect()
-        };
-        let (q, qd, qdd) = (channel(0), channel(1), channel(2));
+        let [q, qd, qdd] = channels(&states, joints);
         let motion = Motion {
             len: states.len(),
             q: &q,
@@ -470,12 +465,7 @@ fn torques(
         let slots = (0..joints).map(|joint| (joint, row)).collect();
         all.push(source.clone(), slots);
     }
-    let channel = |k: usize| -> Vec<f64> {
-        (0..joints)
-            .flat_map(|joint| motions.iter().map(move |motion| motion[joint][k]))
-            .collect()
-    };
-    let (q, qd, qdd) = (channel(0), channel(1), channel(2));
+    let [q, qd, qdd] = channels(motions, joints);
     let motion = Motion {
         len,
         q: &q,

@@ -1,5 +1,6 @@
 //! Which components no motion of this robot can tell from others: their torque lies in the others' span.
 
+use super::aliases::{Motions, channels};
 use super::component::Component;
 use super::{Family, Library};
 use crate::robot::Motion;
@@ -11,11 +12,7 @@ const ROUNDING: f64 = 1e-12;
 
 /// Per component the names of those that can say the same: one other component whose columns span its columns at every
 /// state, or mass moments and tensor of one link together (a payload at that link).
-pub(super) fn spanning(
-    library: &Library,
-    joints: usize,
-    states: &[Vec<[f64; 3]>],
-) -> Vec<Vec<String>> {
+pub(super) fn spanning(library: &Library, joints: usize, states: &[Motions]) -> Vec<Vec<String>> {
     let columns = columns(library, joints, states);
     let components = library.components();
     let mut stories: Vec<(Vec<usize>, Vec<Vec<f64>>)> = (0..components.len())
@@ -64,14 +61,9 @@ fn links(components: &[Component]) -> Vec<(usize, usize)> {
 }
 
 /// Torque of the columns of each component, `[state * joints + joint]`; components that are no number at a state have none.
-fn columns(library: &Library, joints: usize, states: &[Vec<[f64; 3]>]) -> Vec<Vec<Vec<f64>>> {
+fn columns(library: &Library, joints: usize, states: &[Motions]) -> Vec<Vec<Vec<f64>>> {
     let len = states.len();
-    let channel = |k: usize| -> Vec<f64> {
-        let joints = 0..joints;
-        let values = joints.flat_map(|joint| states.iter().map(move |state| state[joint][k]));
-        values.collect()
-    };
-    let (q, qd, qdd) = (channel(0), channel(1), channel(2));
+    let [q, qd, qdd] = channels(states, joints);
     let motion = Motion {
         len,
         q: &q,
