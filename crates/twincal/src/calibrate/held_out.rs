@@ -10,11 +10,18 @@ use crate::signal::Pipeline;
 use crate::term::Library;
 use crate::twin::Twin;
 use crate::validate::{HeldOut, Predictors, Split, Validation};
+use rayon::prelude::*;
 
 /// Share of a log that trains when there are one or two logs.
 const TRAINING_SHARE: f64 = 0.7;
 /// Least gap between training and held-out rows of one log, s.
 const LEAST_GAP: f64 = 1.0;
+
+/// What is left out, how, and by which fits.
+pub(super) struct Plan<'a> {
+    split: Split,
+    folds: Vec<Fold<'a>>,
+}
 
 /// One fit and what it has to predict.
 struct Fold<'a> {
@@ -30,46 +37,41 @@ pub(super) struct Own<'a> {
     pub(super) compact: &'a Posterior,
 }
 
-/// Scores the twin and its compact form on data that it has not seen.
-///
-/// Held-out logs are predicted by the twin itself. Otherwise every fold is fitted anew: plug-ins, tempering and all.
+impl Plan<'_> {
+    /// The fits that do not know what is held out, plug-ins, tempering and all, fold by fold; none where whole logs are
+    /// held out, which the twin itself predicts.
+    pub(super) fn fits(
+        &self,
+        columns: &Columns,
+        settings: &CalibrationSettings,
+    ) -> Result<Vec<Fitted>> {
+        match self.split {
+            Split::HeldoutLogs => Ok(Vec::new()),
+            Split::LeaveOneLogOut | Split::LastThirty => self
+                .folds
+                .par_iter()
+                .map(|fold| estimate(&fold.training, columns, settings))
+                .collect(),
+        }
+    }
+}
+
+/// Scores the twin and its compact form on data that it has not seen; `fits` are those of [`Plan::fits`].
 pub(super) fn validate(
     own: Own<'_>,
     library: &Library,
-    data: &Data,
-    columns: &Columns,
-    settings: &CalibrationSettings,
+    plan: Plan<'_>,
+    fits: Vec<Fitted>,
     progress: &dyn Fn(Stage),
 ) -> Result<Validation> {
     let twin = own.twin;
-    let (split, folds) = plan(data, &twin.pipeline);
     let mut held_out = HeldOut::new(twin.robot.joint_names());
-    for (done, fold) in folds.iter().enumerate() {
-        progress(Stage::Validation(done, folds.len()));
-        let (average, compact) = match split {
-            Split::HeldoutLogs => (twin.clone(), own.compact.clone()),
-            Split::LeaveOneLogOut | Split::LastThirty => {
-                let fitted: Fitted = estimate(&fold.training, columns, settings)?;
-                let out_of_band: Vec<f64> =
-                    twin.noise.iter().map(|noise| noise.out_of_band).collect();
-                let profiles: Vec<_> = twin.noise.iter().map(|n| n.speed_profile.clone()).collect();
-                let noise = noise_of(
-                    &twin.robot,
-                    &fitted,
-                    &fold.training,
-                    &out_of_band,
-                    &profiles,
-                );
-                let Fitted { fit, .. } = fitted;
-                let inside = compact::members(&fit.problem, &fit.posterior);
-                let compact = compact::refit(&fit.problem, &inside, &fit.posterior)?;
-                let average = Twin {
-                    posterior: fit.posterior,
-                    noise,
-                    ..twin.clone()
-                };
-                (average, compact)
-            }
+    let mut fits = fits.into_iter();
+    for (done, fold) in plan.folds.iter().enumerate() {
+        progress(Stage::Validation(done, plan.folds.len()));
+        let (average, compact) = match fits.next() {
+            None => (twin.clone(), own.compact.clone()),
+            Some(fitted) => refitted(twin, &fold.training, fitted)?,
         };
         let predictor = average.predictor(library)?;
         let compact = Twin {
@@ -93,18 +95,37 @@ pub(super) fn validate(
             )?;
         }
     }
-    Ok(held_out.finish(split))
+    Ok(held_out.finish(plan.split))
+}
+
+/// `twin` with the posterior and noise of a fit to `training`, and the posterior of its compact form.
+fn refitted(twin: &Twin, training: &[Part<'_>], fitted: Fitted) -> Result<(Twin, Posterior)> {
+    let out_of_band: Vec<f64> = twin.noise.iter().map(|noise| noise.out_of_band).collect();
+    let profiles: Vec<_> = twin.noise.iter().map(|n| n.speed_profile.clone()).collect();
+    let noise = noise_of(&twin.robot, &fitted, training, &out_of_band, &profiles);
+    let Fitted { fit, .. } = fitted;
+    let inside = compact::members(&fit.problem, &fit.posterior);
+    let compact = compact::refit(&fit.problem, &inside, &fit.posterior)?;
+    let average = Twin {
+        posterior: fit.posterior,
+        noise,
+        ..twin.clone()
+    };
+    Ok((average, compact))
 }
 
 /// Which rows train and which are held out.
-fn plan<'a>(data: &'a Data, pipeline: &Pipeline) -> (Split, Vec<Fold<'a>>) {
+pub(super) fn plan<'a>(data: &'a Data, pipeline: &Pipeline) -> Plan<'a> {
     if !data.heldout.is_empty() {
         let held_out = data.heldout.iter().map(|log| (log, f64::NEG_INFINITY));
         let fold = Fold {
             training: Vec::new(),
             held_out: held_out.collect(),
         };
-        return (Split::HeldoutLogs, vec![fold]);
+        return Plan {
+            split: Split::HeldoutLogs,
+            folds: vec![fold],
+        };
     }
     if data.fit.len() >= 3 {
         let folds = (0..data.fit.len()).map(|out| Fold {
@@ -114,7 +135,10 @@ fn plan<'a>(data: &'a Data, pipeline: &Pipeline) -> (Split, Vec<Fold<'a>>) {
                 .collect(),
             held_out: vec![(&data.fit[out], f64::NEG_INFINITY)],
         });
-        return (Split::LeaveOneLogOut, folds.collect());
+        return Plan {
+            split: Split::LeaveOneLogOut,
+            folds: folds.collect(),
+        };
     }
     let gap = pipeline.kernel_length().max(LEAST_GAP);
     let mut fold = Fold {
@@ -129,7 +153,10 @@ fn plan<'a>(data: &'a Data, pipeline: &Pipeline) -> (Split, Vec<Fold<'a>>) {
         });
         fold.held_out.push((log, from));
     }
-    (Split::LastThirty, vec![fold])
+    Plan {
+        split: Split::LastThirty,
+        folds: vec![fold],
+    }
 }
 
 /// End of the training rows, and the time from which on a log is held out: 30 % of its duration, after a gap.

@@ -150,7 +150,12 @@ pub fn calibrate(
     progress(Stage::Inference);
     let profiles = weigh::weigh(robot, &mut data, &columns, settings, &mut findings)?;
     let training = data.training();
-    let mut fitted = estimate(&training, &columns, settings)?;
+    let plan = held_out::plan(&data, &pipeline);
+    let (fitted, fits_of_folds) = rayon::join(
+        || estimate(&training, &columns, settings),
+        || plan.fits(&columns, settings),
+    );
+    let (mut fitted, fits_of_folds) = (fitted?, fits_of_folds?);
     fitted.fit.posterior = infer(&fitted.fit.problem, &settings.inference)?;
     findings.extend(findings_of_fit(robot, &fitted, settings, &training));
     let mean = &fitted.fit.posterior.mean;
@@ -183,7 +188,7 @@ pub fn calibrate(
         twin: &skeleton,
         compact: &compact,
     };
-    let validation = held_out::validate(own, &library, &data, &columns, settings, progress)?;
+    let validation = held_out::validate(own, &library, plan, fits_of_folds, progress)?;
 
     progress(Stage::Sensitivity);
     let sweep = sweep::cutoff(

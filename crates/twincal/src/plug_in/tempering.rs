@@ -9,6 +9,7 @@ use crate::infer::approximate;
 use crate::likelihood::{Columns, PlugIn, assemble};
 use crate::observations::{Observations, Part};
 use crate::posterior::Posterior;
+use rayon::prelude::*;
 
 /// The multipliers that compete.
 const MULTIPLIERS: [f64; 3] = [1.0, 3.0, 10.0];
@@ -82,8 +83,7 @@ pub fn fit_tempered(
         ..white.plug_in.clone()
     };
     let folds = folds(training);
-    let mut candidates = Vec::new();
-    for c in MULTIPLIERS {
+    let weigh = |c: f64| -> Result<(Fit, Vec<Prediction>, f64)> {
         let plug_in = PlugIn {
             tempering: c,
             ..correlated.clone()
@@ -98,11 +98,17 @@ pub fn fit_tempered(
         )?;
         let predicted = predict_left_out(&folds, columns, settings, &fitted)?;
         let score = score(&predicted, &fitted.plug_in, settings.noise.robust);
+        Ok((fitted, predicted, score))
+    };
+    let weighed: Vec<_> = MULTIPLIERS.into_par_iter().map(weigh).collect();
+    let mut candidates = Vec::new();
+    for candidate in weighed {
+        let candidate = candidate?;
         // Where c leaves two rows or fewer the noise has no mean: it predicts nothing, and larger ones do not either.
-        if !score.is_finite() && !candidates.is_empty() {
+        if !candidate.2.is_finite() && !candidates.is_empty() {
             break;
         }
-        candidates.push((fitted, predicted, score));
+        candidates.push(candidate);
     }
     let scores: Vec<(f64, f64)> = MULTIPLIERS
         .iter()
@@ -215,24 +221,25 @@ fn predict_left_out(
     whole: &Fit,
 ) -> Result<Vec<Prediction>> {
     let plug_in = &whole.plug_in;
-    let mut all = Vec::new();
-    for (kept, out) in folds {
-        let problem = assemble(&total(kept), columns, plug_in, settings.prior)?;
-        let posterior = approximate(&problem, Some(&whole.posterior))?;
-        let covariance = posterior.covariance();
-        let joints = plug_in.weight.len();
-        let mut rows = vec![Vec::new(); joints];
-        for part in out {
-            for (joint, rows) in rows.iter_mut().enumerate() {
-                rows.extend(squared_errors(part, joint, &posterior, &covariance));
+    folds
+        .par_iter()
+        .map(|(kept, out)| {
+            let problem = assemble(&total(kept), columns, plug_in, settings.prior)?;
+            let posterior = approximate(&problem, Some(&whole.posterior))?;
+            let covariance = posterior.covariance();
+            let joints = plug_in.weight.len();
+            let mut rows = vec![Vec::new(); joints];
+            for part in out {
+                for (joint, rows) in rows.iter_mut().enumerate() {
+                    rows.extend(squared_errors(part, joint, &posterior, &covariance));
+                }
             }
-        }
-        all.push(Prediction {
-            rows,
-            noise: posterior.noise,
-        });
-    }
-    Ok(all)
+            Ok(Prediction {
+                rows,
+                noise: posterior.noise,
+            })
+        })
+        .collect()
 }
 
 /// Squared error and variances of every moving row of a joint.
