@@ -7,8 +7,8 @@ use crate::error::{Error, Result};
 use serde::Serialize;
 use twincal::Finding;
 use twincal::calibrate::{
-    Calibration, CompactTerm, ComponentSummary, Group, Halves, LikelihoodUsed, LogSummary, Repeat,
-    SweepPoint, TermSummary, Verdict,
+    Calibration, CompactTerm, ComponentSummary, Curve, Group, Halves, LikelihoodUsed, LogSummary,
+    Repeat, SweepPoint, TermSummary, Verdict,
 };
 use twincal::likelihood::JointNoise;
 use twincal::posterior::Method;
@@ -53,6 +53,7 @@ struct ResultFile<'a> {
     compact: Option<CompactRow<'a>>,
     repeatability_halves: Option<Halves>,
     repeatability: &'a [Repeat],
+    curves: &'a [Curve],
     logs: &'a [LogSummary],
     findings: &'a [Finding],
 }
@@ -218,6 +219,7 @@ impl<'a> ResultFile<'a> {
             compact: CompactRow::of(calibration),
             repeatability_halves: calibration.halves,
             repeatability: &calibration.repeatability,
+            curves: &calibration.curves,
             logs: &calibration.logs,
             findings: &calibration.findings,
         }

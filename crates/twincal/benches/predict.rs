@@ -63,6 +63,7 @@ fn main() {
         autocorrelation_time: 1.0,
         interval_factor: 1.0,
         speed_profile: None,
+        sampled: None,
         out_of_band: 0.0,
     };
     let columns: Vec<usize> = (0..COLUMNS).collect();

@@ -378,6 +378,19 @@ pub struct NoiseTable {
     /// The noise of a joint may change with its speed (learned from the residual, in intervals too); with "tempered" only;
     /// default false.
     pub varies_with_speed: Option<bool>,
+    /// "plug_in" (default): noise and autocorrelation at their estimates; "sampled": drawn together with structure and
+    /// coefficients, with "ar1" and "iid" only.
+    pub uncertainty: Option<UncertaintyWord>,
+}
+
+/// How the noise itself is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum UncertaintyWord {
+    /// At its estimate.
+    PlugIn,
+    /// Drawn like everything else.
+    Sampled,
 }
 
 /// A likelihood.

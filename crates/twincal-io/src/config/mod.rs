@@ -13,7 +13,7 @@ pub use file::{
     Allow, AutoWord, BaseTable, CheckTable, ColumnsTable, ConfigFile, FamilyWord, Friction,
     InclusionTable, InferenceTable, LibraryTable, LogEntry, LogTable, MethodWord, ModelTable,
     NoisePrior, NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PriorTable,
-    SignalTable, Slab, UnknownWord,
+    SignalTable, Slab, UncertaintyWord, UnknownWord,
 };
 pub use settings::{Gates, LogSettings, OneLog, Settings};
 

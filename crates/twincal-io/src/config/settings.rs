@@ -2,6 +2,7 @@
 
 use super::{
     Allow, Config, Friction, MethodWord, NoisePrior, NoiseWord, NumberOrAuto, PayloadKey, Slab,
+    UncertaintyWord,
 };
 use crate::error::Result;
 use crate::log::LogOptions;
@@ -11,7 +12,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use twincal::calibrate::CalibrationSettings;
 use twincal::infer::{Choice, InferenceSettings};
-use twincal::likelihood::{NoiseModel, NoiseSettings};
+use twincal::likelihood::{NoiseModel, NoiseSettings, NoiseUncertainty};
 use twincal::prior::{Inclusion, PriorSettings};
 use twincal::signal::{Auto, Payload, SignalSettings};
 use twincal::term::{Family, LibrarySettings};
@@ -462,6 +463,10 @@ impl Config {
             per_joint: table.per_joint.unwrap_or(true),
             robust: table.robust.unwrap_or(false),
             varies_with_speed: table.varies_with_speed.unwrap_or(false),
+            uncertainty: match table.uncertainty {
+                None | Some(UncertaintyWord::PlugIn) => NoiseUncertainty::PlugIn,
+                Some(UncertaintyWord::Sampled) => NoiseUncertainty::Sampled,
+            },
         }
     }
 

@@ -9,7 +9,7 @@ use held_out::{trace, validation};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use twincal::calibrate::{
-    Calibration, Draws, Halves, LikelihoodUsed, LogSummary, PriorUsed, TermSummary,
+    Along, Calibration, Curve, Draws, Halves, LikelihoodUsed, LogSummary, PriorUsed, TermSummary,
 };
 use twincal::likelihood::{JointNoise, NoiseModel};
 use twincal::posterior::{Method, Model, Posterior};
@@ -208,6 +208,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
             interval_factor: 1.08,
             out_of_band: 0.021,
             speed_profile: None,
+            sampled: None,
         })
         .collect();
     let decay = |memory: f64| {
@@ -217,6 +218,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
     };
     Calibration {
         draws: draws(&terms, &mut noise),
+        curves: curves(names),
         twin: Twin {
             robot: robot(names),
             library: LibrarySettings::default(),
@@ -299,6 +301,27 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
             ),
         ],
     }
+}
+
+/// A counterbalance over the second joint's position, where there is one.
+fn curves(names: &[&str]) -> Vec<Curve> {
+    let Some(name) = names.get(1) else {
+        return Vec::new();
+    };
+    let x: Vec<f64> = (0..80).map(|i| -1.2 + 0.03 * f64::from(i)).collect();
+    let torque = |offset: f64| x.iter().map(|q| -3.0 * q.sin() + offset).collect();
+    vec![Curve {
+        joint: (*name).into(),
+        along: Along::Position,
+        components: vec![
+            format!("{name}.gravity_compensation"),
+            format!("{name}.offset"),
+        ],
+        mean: torque(0.0),
+        low95: torque(-0.4),
+        high95: torque(0.3),
+        x,
+    }]
 }
 
 /// A chain of equal links, each turning about y; a joint named `rail` slides.

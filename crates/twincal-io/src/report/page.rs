@@ -28,6 +28,7 @@ struct Page<'a> {
     effects: Effects,
     inclusion: Option<Figure>,
     pairs: Option<Figure>,
+    curves: Option<Figure>,
     torque: Vec<Figure>,
     other_torque: Vec<Figure>,
     residual_time: Option<Figure>,
@@ -112,6 +113,7 @@ fn gather<'a>(
         effects: effects::sort(calibration),
         inclusion: figures::inclusion::figure(&calibration.components),
         pairs: figures::pairs::figure(&calibration.draws, terms),
+        curves: figures::curves::figure(&calibration.curves, joints),
         torque: joints.iter().filter_map(figures::torque::figure).collect(),
         other_torque: joints
             .iter()

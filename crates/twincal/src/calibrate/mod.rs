@@ -2,6 +2,7 @@
 
 mod compact;
 mod components;
+mod curves;
 mod data;
 mod drift;
 mod groups;
@@ -23,14 +24,18 @@ mod testing;
 
 pub use outlook::{Outlook, outlook};
 pub use result::{
-    Alike, Calibration, Compact, CompactTerm, ComponentSummary, Draws, Group, Halves,
+    Alike, Along, Calibration, Compact, CompactTerm, ComponentSummary, Curve, Draws, Group, Halves,
     LikelihoodUsed, LogSummary, ParameterSummary, PriorUsed, Repeat, SweepPoint, TermSummary,
     Verdict,
 };
 
 use crate::error::{Error, Finding, Result, Severity};
-use crate::infer::{Choice, InferenceSettings, R_HAT_LIMIT, infer};
-use crate::likelihood::{Columns, JointNoise, NoiseModel, NoiseSettings, SpeedProfile};
+use crate::infer::{
+    Choice, Given, InferenceSettings, R_HAT_LIMIT, infer, sample, sampled_likelihood,
+};
+use crate::likelihood::{
+    Columns, JointNoise, NoiseInterval, NoiseModel, NoiseSettings, NoiseUncertainty, SpeedProfile,
+};
 use crate::observations::Part;
 use crate::plug_in::{
     Fit, FitSettings, LeftOut, Moving, fit, fit_tempered, residual_correlation_time, start,
@@ -85,6 +90,7 @@ impl Default for CalibrationSettings {
                 per_joint: true,
                 robust: false,
                 varies_with_speed: false,
+                uncertainty: NoiseUncertainty::PlugIn,
             },
             inference: InferenceSettings {
                 method: Choice::Auto,
@@ -156,7 +162,9 @@ pub fn calibrate(
         || plan.fits(&columns, settings),
     );
     let (mut fitted, fits_of_folds) = (fitted?, fits_of_folds?);
-    fitted.fit.posterior = infer(&fitted.fit.problem, &settings.inference)?;
+    if fitted.sampled.is_empty() {
+        fitted.fit.posterior = infer(&fitted.fit.problem, &settings.inference)?;
+    }
     findings.extend(findings_of_fit(robot, &fitted, settings, &training));
     let mean = &fitted.fit.posterior.mean;
     findings.extend(heavy_tails::findings(
@@ -236,6 +244,15 @@ pub fn calibrate(
     )?;
     unseen::tell(&mut calibration, &excitation);
     let seed = settings.inference.seed;
+    let twin = &calibration.twin;
+    calibration.curves = curves::curves(
+        robot,
+        &library,
+        &calibration.components,
+        &twin.posterior,
+        &twin.hull,
+        seed,
+    );
     let unphysical = unphysical::findings(robot, &library, &calibration, seed);
     calibration.findings.extend(unphysical);
     Ok(calibration)
@@ -245,6 +262,8 @@ pub fn calibrate(
 struct Fitted {
     fit: Fit,
     left_out: Option<LeftOut>,
+    /// What draws say of each joint's noise; empty where it is a plug-in.
+    sampled: Vec<NoiseInterval>,
 }
 
 /// Fixed point, and for the tempered likelihood the choice of c.
@@ -257,19 +276,46 @@ fn estimate(
         noise: settings.noise,
         prior: &settings.prior,
     };
+    let draws_noise = settings.noise.uncertainty == NoiseUncertainty::Sampled;
+    if draws_noise {
+        sampled_likelihood(settings.noise.model)?;
+    }
     match settings.noise.model {
         NoiseModel::Tempered => {
             let (fit, left_out) = fit_tempered(training, columns, fit_settings)?;
             Ok(Fitted {
                 fit,
                 left_out: Some(left_out),
+                sampled: Vec::new(),
             })
         }
         NoiseModel::Iid | NoiseModel::Ar1 => {
             let start = start(training, columns, &settings.prior);
+            let mut fit = fit(training, columns, fit_settings, &start, Moving::All, None)?;
+            let mut noise = Vec::new();
+            if draws_noise {
+                let given = Given {
+                    grams: &crate::plug_in::total(training),
+                    columns,
+                    plug_in: &fit.plug_in,
+                    problem: &fit.problem,
+                    posterior: &fit.posterior,
+                    prior: &settings.prior,
+                    noise: settings.noise,
+                };
+                let sampled = sample(given, &settings.inference)?;
+                noise = sampled.noise;
+                fit = Fit {
+                    plug_in: sampled.plug_in,
+                    problem: sampled.problem,
+                    posterior: sampled.posterior,
+                    ..fit
+                };
+            }
             Ok(Fitted {
-                fit: fit(training, columns, fit_settings, &start, Moving::All, None)?,
+                fit,
                 left_out: None,
+                sampled: noise,
             })
         }
     }
@@ -355,6 +401,7 @@ fn noise_of(
                     .map_or(1.0, |l| l.interval_factor[j]),
                 out_of_band: out_of_band[j],
                 speed_profile: profiles[j].clone(),
+                sampled: fitted.sampled.get(j).copied(),
             }
         })
         .collect()

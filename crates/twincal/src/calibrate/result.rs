@@ -277,6 +277,35 @@ pub struct Draws {
     pub values: Vec<Vec<f64>>,
 }
 
+/// Of which coordinate of a joint a [`Curve`] is a function.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Along {
+    /// q, rad or m.
+    Position,
+    /// q̇, rad/s or m/s.
+    Velocity,
+}
+
+/// Torque that was found on one joint as a function of its own position or velocity, over the range in the logs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Curve {
+    /// Joint.
+    pub joint: String,
+    /// Coordinate.
+    pub along: Along,
+    /// Components that make the curve, with a PIP of 0.1 or more.
+    pub components: Vec<String>,
+    /// The coordinate, SI.
+    pub x: Vec<f64>,
+    /// Mean over all models, N·m or N.
+    pub mean: Vec<f64>,
+    /// Central 95 % interval of the draws from the posterior.
+    pub low95: Vec<f64>,
+    /// Its upper end.
+    pub high95: Vec<f64>,
+}
+
 /// The result of a calibration; `twincal-io` writes it as files.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
@@ -311,6 +340,9 @@ pub struct Calibration {
     pub autocorrelation: Vec<Vec<f64>>,
     /// Draws for figures.
     pub draws: Draws,
+    /// Found laws of one coordinate.
+    #[serde(default)]
+    pub curves: Vec<Curve>,
     /// Logs.
     pub logs: Vec<LogSummary>,
     /// Everything that must be said.

@@ -58,7 +58,7 @@ pub(super) fn summarise(
     opinion: SecondOpinion,
     mut findings: Vec<Finding>,
 ) -> Result<Calibration> {
-    let Fitted { fit, left_out } = fitted;
+    let Fitted { fit, left_out, .. } = fitted;
     let effective = twin
         .noise
         .iter()
@@ -120,6 +120,7 @@ pub(super) fn summarise(
     );
     Ok(Calibration {
         noise: twin.noise.clone(),
+        curves: Vec::new(),
         draws: Draws {
             terms: selected.iter().map(|&k| columns.names[k].clone()).collect(),
             values: selected

@@ -201,7 +201,7 @@ fn count(
 
 /// Truncates one model: its mean and factor become those of the matched normal. Returns ln of what its weight, as it
 /// stands, must be multiplied with.
-fn truncate(
+pub(super) fn truncate(
     standard: &Standard,
     model: &mut Model,
     positions: &[usize],

@@ -10,6 +10,7 @@ mod exact;
 mod exchanges;
 mod gibbs;
 mod moments;
+mod sampled;
 mod search;
 mod standard;
 mod tableau;
@@ -18,6 +19,7 @@ mod walker;
 mod testing;
 
 pub use gibbs::R_HAT_LIMIT;
+pub use sampled::{Given, Sampled, sample, sampled_likelihood};
 
 use crate::error::{Error, Result};
 use crate::posterior::{Posterior, Problem};

@@ -25,6 +25,26 @@ pub enum NoiseModel {
     Ar1,
 }
 
+/// `[noise] uncertainty`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoiseUncertainty {
+    /// Weights and autocorrelation at their estimates.
+    #[default]
+    PlugIn,
+    /// Drawn together with structure and coefficients; with [`NoiseModel::Ar1`] and [`NoiseModel::Iid`].
+    Sampled,
+}
+
+/// What draws say of the noise of a joint.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct NoiseInterval {
+    /// Central 95 % of the stationary sd √(σ²/(1−ρ²)), N·m or N.
+    pub sigma95: [f64; 2],
+    /// Central 95 % of ρ; `None` unless `ar1`.
+    pub rho95: Option<[f64; 2]>,
+}
+
 /// `[noise]`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseSettings {
@@ -36,6 +56,8 @@ pub struct NoiseSettings {
     pub robust: bool,
     /// The noise of a joint may change with its speed; with [`NoiseModel::Tempered`] only.
     pub varies_with_speed: bool,
+    /// Plug-in noise or sampled noise.
+    pub uncertainty: NoiseUncertainty,
 }
 
 /// Plug-in noise of one joint.
@@ -62,6 +84,9 @@ pub struct JointNoise {
     /// How the noise in the band changes with the joint's speed; `None`: it does not.
     #[serde(default)]
     pub speed_profile: Option<SpeedProfile>,
+    /// What draws say of sigma and ρ; `None` where they are plug-ins.
+    #[serde(default)]
+    pub sampled: Option<NoiseInterval>,
 }
 
 impl JointNoise {

@@ -106,7 +106,7 @@ impl Law {
                 let center = self.mean[place(a)] - pull / row[a];
                 let sd = (phi / row[a]).sqrt();
                 let lowest = (self.sites[a].lower - center) / sd;
-                x[a] = (center + sd * normal_above(lowest, random)).max(self.sites[a].lower);
+                x[a] = (center + sd * random.normal_above(lowest)).max(self.sites[a].lower);
             }
         }
         let gap: Vec<f64> = (0..count).map(|a| x[a] - beta[place(a)]).collect();
@@ -119,25 +119,6 @@ impl Law {
         }
         for (a, x) in x.into_iter().enumerate() {
             beta[place(a)] = x;
-        }
-    }
-}
-
-/// A standard normal number that is at least `lowest` (Robert 1995 in the tail).
-fn normal_above(lowest: f64, random: &mut Random) -> f64 {
-    if lowest < 0.5 {
-        loop {
-            let x = random.normal();
-            if x >= lowest {
-                return x;
-            }
-        }
-    }
-    let rate = 0.5 * (lowest + (lowest * lowest + 4.0).sqrt());
-    loop {
-        let x = lowest - (1.0 - random.uniform()).ln() / rate;
-        if random.uniform() <= (-0.5 * (x - rate) * (x - rate)).exp() {
-            return x;
         }
     }
 }
@@ -157,9 +138,7 @@ mod tests {
             (2.0, 2.373_215_532),
         ] {
             let n = 40_000.0f64;
-            let draws: Vec<f64> = (0..40_000)
-                .map(|_| normal_above(lowest, &mut random))
-                .collect();
+            let draws: Vec<f64> = (0..40_000).map(|_| random.normal_above(lowest)).collect();
             assert!(draws.iter().all(|&x| x >= lowest));
             let got = draws.iter().sum::<f64>() / n;
             let variance = 1.0 + lowest * mean - mean * mean;

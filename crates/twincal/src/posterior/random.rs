@@ -80,6 +80,25 @@ impl Random {
         }
     }
 
+    /// A standard normal number that is at least `lowest` (Robert 1995 in the tail).
+    pub fn normal_above(&mut self, lowest: f64) -> f64 {
+        if lowest < 0.5 {
+            loop {
+                let x = self.normal();
+                if x >= lowest {
+                    return x;
+                }
+            }
+        }
+        let rate = 0.5 * (lowest + (lowest * lowest + 4.0).sqrt());
+        loop {
+            let x = lowest - (1.0 - self.uniform()).ln() / rate;
+            if self.uniform() <= (-0.5 * (x - rate) * (x - rate)).exp() {
+                return x;
+            }
+        }
+    }
+
     /// φ ~ InvGamma(shape, scale), density ∝ φ^−(shape+1) e^(−scale/φ).
     pub fn inverse_gamma(&mut self, shape: f64, scale: f64) -> f64 {
         scale / self.gamma(shape)

@@ -2,6 +2,7 @@
 
 pub(super) mod autocorrelation;
 pub(super) mod coverage;
+pub(super) mod curves;
 pub(super) mod inclusion;
 pub(super) mod pairs;
 pub(super) mod pit;

@@ -1,0 +1,79 @@
+//! Torque that was found over a joint's own position or velocity: springs, counterbalances, friction laws.
+
+use crate::report::figure::{Figure, HALF, Image, Legend, legend};
+use crate::report::plot::{Frame, Panel};
+use crate::report::scale::extent;
+use crate::report::svg::Svg;
+use crate::report::text;
+use crate::report::view::Joint;
+use twincal::calibrate::{Along, Curve};
+
+const MEAN: Legend = Legend {
+    mark: "line",
+    class: "c",
+    label: "missing torque",
+};
+
+/// The figure over all curves; `None` if nothing of that kind was found.
+pub(in crate::report) fn figure(curves: &[Curve], joints: &[Joint<'_>]) -> Option<Figure> {
+    let images: Vec<Image> = curves
+        .iter()
+        .filter_map(|curve| {
+            let joint = joints.iter().find(|joint| joint.name == curve.joint)?;
+            Some(draw(curve, joint))
+        })
+        .collect();
+    (!images.is_empty()).then(|| Figure {
+        title: "Missing torque as a law of one joint".into(),
+        read: "Over the range in the logs: what the model lacks on a joint as a function of its own position (springs, \
+               counterbalances) or velocity (friction). Where the band is narrow the law is known, even if its coefficients \
+               cannot be told apart."
+            .into(),
+        legend: vec![MEAN, legend::BAND],
+        images,
+    })
+}
+
+fn draw(curve: &Curve, joint: &Joint<'_>) -> Image {
+    let ends = curve.low95.iter().chain(&curve.high95).copied();
+    let (low, high) = extent(ends.chain([0.0]));
+    let y = (low - 0.04 * (high - low), high + 0.04 * (high - low));
+    let height = 230.0;
+    let frame = Frame::inside(HALF, height, y);
+    let ends = |x: &[f64]| Some((*x.first()?, *x.last()?));
+    let x = ends(&curve.x).unwrap_or((0.0, 1.0));
+    let panel = Panel::new(frame, x, y);
+    let (quantity, unit) = match curve.along {
+        Along::Position => ("position", joint.units.position),
+        Along::Velocity => ("velocity", joint.units.velocity),
+    };
+    let mut svg = Svg::new(HALF, height);
+    panel.axes(
+        &mut svg,
+        &format!("{quantity} ({unit})"),
+        &format!("torque ({})", joint.units.torque),
+    );
+    let bounds = curve.low95.iter().zip(&curve.high95);
+    let band: Vec<(f64, f64, f64)> = curve
+        .x
+        .iter()
+        .zip(bounds)
+        .map(|(&x, (&low, &high))| (x, low, high))
+        .collect();
+    panel.band(&mut svg, "b", &band);
+    svg.line("a", panel.at(x.0, 0.0), panel.at(x.1, 0.0));
+    panel.line(
+        &mut svg,
+        "c",
+        curve.x.iter().copied().zip(curve.mean.iter().copied()),
+    );
+    let label = format!(
+        "Missing torque of joint {} over its {quantity}, with its 95 percent interval.",
+        joint.name
+    );
+    let names: Vec<&str> = curve.components.iter().map(String::as_str).collect();
+    Image::half(
+        format!("{} over {quantity}: {}", joint.name, text::list(&names)),
+        svg.finish(&label),
+    )
+}
