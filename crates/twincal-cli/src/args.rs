@@ -55,7 +55,7 @@ Examples:
     #[command(before_help = "\
 Examples:
   twincal predict job.csv --twin twincal-out -o torque.csv
-  twincal predict job.parquet --twin twincal-out -o torque.parquet
+  twincal predict job.mcap --twin twincal-out -o torque.mcap
   twincal predict job.csv --twin twincal-out | head
 ")]
     Predict(Predict),
@@ -210,7 +210,7 @@ pub(crate) struct Predict {
     /// Folder that `twincal fit` wrote.
     #[arg(long, value_name = "DIR")]
     pub(crate) twin: PathBuf,
-    /// .csv or .parquet; without it CSV goes to standard output.
+    /// .csv, .parquet or .mcap; without it CSV goes to standard output.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
     /// Replace an existing file.

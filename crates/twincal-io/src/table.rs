@@ -1,5 +1,8 @@
-//! Tables out: predictions as CSV or Parquet, written block by block.
+//! Tables out: predictions as CSV, Parquet or MCAP, written block by block.
 
+mod mcap;
+
+use self::mcap::McapTable;
 use crate::error::{Error, Result};
 use parquet::basic::{Compression, Repetition, Type as Physical, ZstdLevel};
 use parquet::data_type::{BoolType, DoubleType};
@@ -21,22 +24,25 @@ pub enum TableFormat {
     Csv,
     /// Parquet, doubles and booleans, Zstandard.
     Parquet,
+    /// MCAP, `JointState` messages on one topic per quantity, Zstandard.
+    Mcap,
 }
 
 impl TableFormat {
     /// From a file name's ending.
     ///
     /// # Errors
-    /// [`Error::Content`] if it is neither `.csv` nor `.parquet`.
+    /// [`Error::Content`] if it is none of `.csv`, `.parquet` and `.mcap`.
     pub fn of_path(path: &Path) -> Result<Self> {
         let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
         match ending.as_deref() {
             Some("csv") => Ok(Self::Csv),
             Some("parquet") => Ok(Self::Parquet),
+            Some("mcap") => Ok(Self::Mcap),
             _ => Err(Error::content(
                 crate::error::Place::file(path.display().to_string()),
                 "does not say its format",
-                "let the name end in .csv or .parquet",
+                "let the name end in .csv, .parquet or .mcap",
             )),
         }
     }
@@ -84,6 +90,7 @@ enum Sink<W: Write + Send> {
         writer: Box<SerializedFileWriter<W>>,
         waiting: Vec<Column>,
     },
+    Mcap(Box<McapTable<W>>),
 }
 
 /// One column's share of the row group that is being gathered.
@@ -142,6 +149,7 @@ impl<W: Write + Send> TableWriter<W> {
                     waiting,
                 }
             }
+            TableFormat::Mcap => Sink::Mcap(Box::new(McapTable::new(writer, columns)?)),
         };
         Ok(Self {
             columns: columns.to_vec(),
@@ -188,6 +196,7 @@ impl<W: Write + Send> TableWriter<W> {
                 }
                 Ok(())
             }
+            Sink::Mcap(table) => table.push(blocks, rows),
         }
     }
 
@@ -210,6 +219,7 @@ impl<W: Write + Send> TableWriter<W> {
                 }
                 writer.into_inner().map_err(io_error)
             }
+            Sink::Mcap(table) => table.finish(),
         }
     }
 }

@@ -9,7 +9,7 @@ use twincal::robot::Robot;
 use twincal::signal::Recording;
 use twincal_io::artifact::{MODEL_MJCF, MODEL_URDF, sha256, sha256_of_file};
 use twincal_io::config::{LogSettings, Settings};
-use twincal_io::log::{parse_log, read_log};
+use twincal_io::log::{files_of, parse_log, read_log};
 use twincal_io::model::{Model, ModelFormat, read_model};
 use twincal_io::report::FileHash;
 use twincal_io::{Error, memory};
@@ -87,7 +87,7 @@ impl LogInput {
             input.push(recording, findings, &name);
             input.files.push(FileHash {
                 name,
-                sha256: sha256_of_file(path)?,
+                sha256: sha256_of_log(path)?,
             });
         }
         Ok(input)
@@ -147,6 +147,19 @@ impl LogInput {
             other => other,
         }
     }
+}
+
+/// Checksum of a log; of a folder that of the lines `sha256sum` prints for its files, in the order of their recording.
+fn sha256_of_log(path: &Path) -> Result<String, Error> {
+    if !path.is_dir() {
+        return sha256_of_file(path);
+    }
+    let mut lines = String::new();
+    for file in files_of(path)? {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        lines += &format!("{}  {name}\n", sha256_of_file(&file)?);
+    }
+    Ok(sha256(lines.as_bytes()))
 }
 
 /// Candidate columns at most, for the estimate of memory.

@@ -39,7 +39,7 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
     if settings.json && flags.output.is_none() {
         return Err(Failure::usage(
             "--json needs a file for the rows",
-            "give -o FILE.csv or -o FILE.parquet",
+            "give -o FILE.csv, FILE.parquet or FILE.mcap",
         ));
     }
     let output = match &flags.output {

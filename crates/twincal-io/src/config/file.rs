@@ -90,6 +90,20 @@ pub struct LogTable {
     pub lenient: Option<bool>,
     /// Refuse a log (exit code 2) where data was lost or degraded beyond the stated limit (flag `--strict`).
     pub strict: Option<bool>,
+    /// Topics of a bag that are read: one, or a list from which each joint's channel is taken from the first that has it.
+    /// Default: the only one with joint states.
+    pub topic: Option<Topics>,
+    /// Whose recorder wrote the table: its column names are then known. [columns] goes first.
+    pub preset: Option<PresetWord>,
+    /// What the logged torque is; default "joint", with the preset ur-rtde "current".
+    pub torque: Option<TorqueWord>,
+    /// Turns of the motor per turn of the joint, by joint name; for torque = "motor" and "current".
+    pub gear_ratio: BTreeMap<String, f64>,
+    /// Motor torque per current, N·m/A, by joint name, for torque = "current"; without gear_ratio joint torque per current.
+    pub drive_constant: BTreeMap<String, f64>,
+    /// Take a column that holds the controller's own model of the torque, such as target_moment, for a measurement;
+    /// default false.
+    pub accept_model_torque: Option<bool>,
     /// The entries, where the file has `[[log]]` instead.
     #[serde(skip)]
     pub entries: Vec<LogEntry>,
@@ -112,6 +126,56 @@ pub struct LogEntry {
     pub rate_hz: Option<f64>,
     /// Drop and count rows that cannot be read instead of refusing the file (flag `--lenient`).
     pub lenient: Option<bool>,
+    /// Topics of a bag that are read: one, or a list from which each joint's channel is taken from the first that has it.
+    /// Default: the only one with joint states.
+    pub topic: Option<Topics>,
+    /// Whose recorder wrote the table: its column names are then known. [columns] goes first.
+    pub preset: Option<PresetWord>,
+    /// What the logged torque is; default "joint", with the preset ur-rtde "current".
+    pub torque: Option<TorqueWord>,
+    /// Turns of the motor per turn of the joint, by joint name; for torque = "motor" and "current".
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub gear_ratio: BTreeMap<String, f64>,
+    /// Motor torque per current, N·m/A, by joint name, for torque = "current"; without gear_ratio joint torque per current.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub drive_constant: BTreeMap<String, f64>,
+    /// Take a column that holds the controller's own model of the torque, such as target_moment, for a measurement;
+    /// default false.
+    pub accept_model_torque: Option<bool>,
+}
+
+/// One topic or several.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected a topic or a list of topics")]
+pub enum Topics {
+    /// One.
+    One(String),
+    /// Several.
+    Several(Vec<String>),
+}
+
+/// A recorder whose column names are known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PresetWord {
+    /// Universal Robots, RTDE: timestamp, actual_q_0, actual_qd_0, actual_current_0.
+    UrRtde,
+    /// Franka, libfranka: time in milliseconds, q[0], dq[0], tau_J[0].
+    Franka,
+}
+
+/// What the logged torque is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TorqueWord {
+    /// Torque on the joint's side of the gear, N·m or N.
+    Joint,
+    /// Torque on the motor's side of the gear, N·m: times gear_ratio.
+    Motor,
+    /// Motor current, A: times drive_constant and gear_ratio.
+    Current,
+    /// Left out: a log that is only to be predicted.
+    None,
 }
 
 /// The word "unknown".

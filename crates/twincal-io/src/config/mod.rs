@@ -12,10 +12,10 @@ mod unknown_keys;
 pub use file::{
     Allow, AutoWord, BaseTable, CheckTable, ColumnsTable, ConfigFile, FamilyWord, Friction,
     InclusionTable, InferenceTable, LibraryTable, LogEntry, LogTable, MethodWord, ModelTable,
-    NoisePrior, NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PriorTable,
-    SignalTable, Slab, UncertaintyWord, UnknownWord,
+    NoisePrior, NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PresetWord,
+    PriorTable, SignalTable, Slab, Topics, TorqueWord, UncertaintyWord, UnknownWord,
 };
-pub use settings::{Gates, LogSettings, OneLog, Settings};
+pub use settings::{Gates, LogForm, LogSettings, OneLog, Settings};
 
 use crate::error::{Error, Place, Result};
 use std::path::{Path, PathBuf};

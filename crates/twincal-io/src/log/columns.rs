@@ -9,7 +9,7 @@
 //! Time is `t`, `time`, `timestamp`, `stamp`, `sec`, `secs` or `seconds`, a unit may follow (`time_s`, `time [s]`, `t_ms`). Letter case is
 //! free where that leaves one column.
 
-use super::{LogOptions, MAX_COLUMNS};
+use super::{LogOptions, MAX_COLUMNS, preset};
 use crate::error::{Error, Place, Result};
 use std::collections::BTreeMap;
 use twincal::robot::{Robot, did_you_mean};
@@ -25,6 +25,9 @@ const WORDS: [&[&str]; 4] = [
 const QUANTITIES: [&str; 4] = ["position", "velocity", "acceleration", "torque"];
 const TIME_WORDS: [&str; 7] = ["t", "time", "timestamp", "stamp", "sec", "secs", "seconds"];
 const UNITS: [&str; 8] = ["s", "sec", "secs", "seconds", "ms", "us", "ns", "µs"];
+
+/// Words in names of columns that hold what the controller computed: UR's and Franka's.
+const MODEL_TORQUE: [&str; 3] = ["target_moment", "target_torque", "tau_j_d"];
 
 /// A column of the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -162,7 +165,9 @@ pub fn match_columns(
     robot: &Robot,
     options: &LogOptions,
 ) -> Result<Selection> {
-    let header = Header::new(file, header)?;
+    let mut names = header.to_vec();
+    let options = &*preset::fill_in(&mut names, robot, options);
+    let header = Header::new(file, &names)?;
     let joints = robot.joint_names();
     let tables = [
         &options.columns.q,
@@ -200,6 +205,7 @@ pub fn match_columns(
     }
     refuse_foreign_joints(&header, robot, &matched)?;
     refuse_missing_joints(&header, &joints, &matched)?;
+    refuse_model_torque(file, &joints, &matched, options)?;
     let findings = vec![say(file, &joints, &time, &matched)];
     Ok(Selection {
         time,
@@ -408,6 +414,35 @@ fn refuse_missing_joints(
         );
     }
     Err(Error::content(Place::file(header.file), problem, remedy))
+}
+
+/// Torque that is the controller's own model, not a measurement (faults.md case 31).
+fn refuse_model_torque(
+    file: &str,
+    joints: &[&str],
+    matched: &[[Option<Channel>; 4]],
+    options: &LogOptions,
+) -> Result<()> {
+    if options.torque.accept_model_torque {
+        return Ok(());
+    }
+    for (joint, channels) in joints.iter().zip(matched) {
+        let Some(torque) = &channels[3] else {
+            continue;
+        };
+        let lower = torque.name.to_lowercase();
+        if MODEL_TORQUE.iter().any(|word| lower.contains(word)) {
+            return Err(Error::content(
+                Place::file(file),
+                format!(
+                    "column `{}`, the torque of joint `{joint}`, is the controller's own model of the robot, not a measurement: fitted to it, a twin learns that model",
+                    torque.name
+                ),
+                "use measured torque, or motor currents with [log] torque = \"current\" and drive_constant; if you mean it, say [log] accept_model_torque = true",
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// A joint name as a TOML key.

@@ -1,23 +1,33 @@
-//! Logs in: CSV and Parquet tables become a [`Recording`] in the robot's joint order.
+//! Logs in: tables (CSV, Parquet, NPZ) and bags of ROS (MCAP, rosbag2) become a [`Recording`] in the robot's joint order.
 //!
 //! | step | file |
 //! |---|---|
 //! | which column is which channel | `columns.rs` |
+//! | names of well-known recorders | `preset.rs` |
 //! | text tables | `csv/` |
 //! | Parquet | `parquet.rs`, checked first by `pages.rs` |
+//! | NPZ | `npz.rs` |
+//! | MCAP, rosbag2 | `bag/` |
+//! | what the logged torque is | `torque.rs` |
 
+mod bag;
 mod columns;
 mod csv;
+mod npz;
 mod pages;
 mod parquet;
+mod preset;
+mod torque;
 
 pub use columns::{Channel, Selection, match_columns};
+pub use preset::Preset;
+pub use torque::{TorqueOptions, TorqueSource};
 
 use crate::config::ColumnsTable;
 use crate::error::{Error, Place, Result};
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
-use std::path::Path;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
 use twincal::robot::Robot;
 use twincal::signal::{Channels, Payload, Recording};
 use twincal::{Finding, Severity};
@@ -36,6 +46,12 @@ pub struct LogOptions {
     pub lenient: bool,
     /// Which column is which channel where the names do not say it (`[columns]`).
     pub columns: ColumnsTable,
+    /// Whose recorder wrote the table (`[log] preset`).
+    pub preset: Option<Preset>,
+    /// Topics of a bag (`[log] topic`); none: the only one with joint states.
+    pub topics: Vec<String>,
+    /// What the logged torque is (`[log] torque`).
+    pub torque: TorqueOptions,
     /// What the robot carried (`[[log]] payload`); handed on as it is.
     pub payload: Payload,
 }
@@ -51,9 +67,10 @@ pub(crate) struct Cells {
     pub(crate) first_dropped: Option<String>,
 }
 
-/// Reads one log file: CSV with any delimiter, or Parquet (told by its first four bytes, not by its name).
+/// Reads one log: CSV with any delimiter, Parquet, NPZ, MCAP, a SQLite bag (told by their first bytes, not by their names) or the folder of a
+/// rosbag2.
 ///
-/// Values are taken as they are, NaN included; joints come out in the robot's order.
+/// Values are taken as they are, NaN included, and torque as `[log] torque` says; joints come out in the robot's order.
 ///
 /// # Errors
 /// [`Error::System`] if the file cannot be read; [`Error::Content`] with `file:line[:column]` for everything in it that cannot
@@ -69,31 +86,78 @@ pub fn read_log(
     let mut file = File::open(path).map_err(|e| system(&e))?;
     let metadata = file.metadata().map_err(|e| system(&e))?;
     if metadata.is_dir() {
-        return Err(Error::content(
-            Place::file(&name),
-            "is a folder",
-            "give a CSV or Parquet file",
-        ));
+        return finish(bag::read(path, robot, options)?, robot, options);
     }
-    let mut magic = [0; 4];
-    let mut known = 0;
-    while known < 4 {
-        match file.read(&mut magic[known..]).map_err(|e| system(&e))? {
-            0 => break,
-            n => known += n,
-        }
-    }
-    if metadata.is_file() && magic == *b"PAR1" {
+    let mut head = Vec::new();
+    (&mut file)
+        .take(Kind::HEAD as u64)
+        .read_to_end(&mut head)
+        .map_err(|e| system(&e))?;
+    // A pipe cannot be rewound: it is text.
+    let kind = if metadata.is_file() {
+        Kind::of(&head)
+    } else {
+        Kind::Text
+    };
+    refuse_false_name(path, &name, &head, kind)?;
+    if kind != Kind::Text {
         file.seek(SeekFrom::Start(0)).map_err(|e| system(&e))?;
-        let pages = file.try_clone().map_err(|e| system(&e))?;
-        return parquet::read(file, pages, &name, robot, options);
     }
-    // The bytes already taken go first: a pipe cannot be rewound.
-    let head = std::io::Cursor::new(magic[..known].to_vec());
-    read_csv(head.chain(file), metadata.len(), &name, robot, options)
+    let read = match kind {
+        Kind::Parquet => {
+            let pages = file.try_clone().map_err(|e| system(&e))?;
+            parquet::read(file, pages, &name, robot, options)?
+        }
+        Kind::Npz => npz::read(BufReader::new(file), &name, robot, options)?,
+        Kind::Mcap | Kind::Sqlite | Kind::Zstd => bag::read(path, robot, options)?,
+        Kind::LfsPointer => return Err(lfs_pointer(&name)),
+        // The bytes already taken go first.
+        Kind::Text => {
+            let head = std::io::Cursor::new(head);
+            csv_table(head.chain(file), metadata.len(), &name, robot, options)?
+        }
+    };
+    finish(read, robot, options)
 }
 
-/// Reads a log from memory: CSV or Parquet; `name` is what messages call it.
+/// The files that a log consists of: itself, or what a rosbag2 folder names.
+///
+/// # Errors
+/// [`Error::Content`] for a folder that is no bag.
+pub fn files_of(path: &Path) -> Result<Vec<PathBuf>> {
+    bag::files(path).map(|(files, _)| files)
+}
+
+/// A file whose name says more than its content holds.
+fn refuse_false_name(path: &Path, name: &str, head: &[u8], kind: Kind) -> Result<()> {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    let (claimed, word) = match ending.as_deref() {
+        Some("mcap") => (Kind::Mcap, "an MCAP file"),
+        Some("db3") => (Kind::Sqlite, "a SQLite bag"),
+        Some("npz") => (Kind::Npz, "an NPZ file"),
+        Some("parquet") => (Kind::Parquet, "a Parquet file"),
+        _ => return Ok(()),
+    };
+    if kind != Kind::Text || kind == claimed || head.is_empty() {
+        return Ok(());
+    }
+    Err(Error::content(
+        Place::file(name),
+        format!("does not begin as {word} does"),
+        "copy it again, or give it the ending of what it is",
+    ))
+}
+
+/// What Git leaves in the place of a large file that was not fetched.
+fn lfs_pointer(name: &str) -> Error {
+    Error::content(
+        Place::file(name),
+        "this is a Git LFS pointer, not the log itself",
+        "fetch the log with `git lfs pull`",
+    )
+}
+
+/// Reads a log from memory: CSV, Parquet, NPZ or MCAP; `name` is what messages call it.
 ///
 /// # Errors
 /// Like [`read_log`].
@@ -103,17 +167,61 @@ pub fn parse_log(
     robot: &Robot,
     options: &LogOptions,
 ) -> Result<(Recording, Vec<Finding>)> {
-    if bytes.starts_with(b"PAR1") {
-        let pages = std::io::Cursor::new(bytes);
-        return parquet::read(
-            bytes::Bytes::from_static(bytes),
-            pages,
-            name,
-            robot,
-            options,
-        );
+    let read = match Kind::of(bytes) {
+        Kind::Parquet => {
+            let pages = std::io::Cursor::new(bytes);
+            let bytes = bytes::Bytes::from_static(bytes);
+            parquet::read(bytes, pages, name, robot, options)?
+        }
+        Kind::Mcap => bag::read_mcap(&mut std::io::Cursor::new(bytes), name, robot, options)?,
+        Kind::Npz => npz::read(std::io::Cursor::new(bytes), name, robot, options)?,
+        Kind::LfsPointer => return Err(lfs_pointer(name)),
+        Kind::Text | Kind::Sqlite | Kind::Zstd => {
+            csv_table(bytes, bytes.len() as u64, name, robot, options)?
+        }
+    };
+    finish(read, robot, options)
+}
+
+/// What a file is by its first bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Text,
+    Parquet,
+    Npz,
+    Mcap,
+    Sqlite,
+    Zstd,
+    LfsPointer,
+}
+
+impl Kind {
+    /// Bytes that tell.
+    const HEAD: usize = 32;
+
+    fn of(head: &[u8]) -> Self {
+        let kinds: [(&[u8], Self); 7] = [
+            (b"PAR1", Self::Parquet),
+            (b"PK\x03\x04", Self::Npz),
+            (b"PK\x05\x06", Self::Npz),
+            (b"\x89MCAP", Self::Mcap),
+            (b"SQLite format 3\0", Self::Sqlite),
+            (b"\x28\xB5\x2F\xFD", Self::Zstd),
+            (b"version https://git-lfs", Self::LfsPointer),
+        ];
+        let found = kinds.iter().find(|(magic, _)| head.starts_with(magic));
+        found.map_or(Self::Text, |(_, kind)| *kind)
     }
-    read_csv(bytes, bytes.len() as u64, name, robot, options)
+}
+
+/// What is done to every log, whatever its form.
+fn finish(
+    (mut recording, mut findings): (Recording, Vec<Finding>),
+    robot: &Robot,
+    options: &LogOptions,
+) -> Result<(Recording, Vec<Finding>)> {
+    torque::to_joint_torque(&mut recording, robot, options, &mut findings)?;
+    Ok((recording, findings))
 }
 
 /// Reads a CSV log from any source; `name` is what messages call it, `bytes` its length if known (else 0).
@@ -121,6 +229,17 @@ pub fn parse_log(
 /// # Errors
 /// Like [`read_log`].
 pub fn read_csv(
+    source: impl Read,
+    bytes: u64,
+    name: &str,
+    robot: &Robot,
+    options: &LogOptions,
+) -> Result<(Recording, Vec<Finding>)> {
+    let read = csv_table(source, bytes, name, robot, options)?;
+    finish(read, robot, options)
+}
+
+fn csv_table(
     source: impl Read,
     bytes: u64,
     name: &str,
@@ -210,7 +329,19 @@ pub(crate) fn assemble(
             }
             (0..rows).map(|row| row as f64 / rate).collect()
         }
-        None => take(positions.time).unwrap_or_default(),
+        None => {
+            let mut time = take(positions.time).unwrap_or_default();
+            if let Some(preset) = options.preset.filter(|preset| preset.ticks() != 1.0) {
+                time.iter_mut().for_each(|time| *time /= preset.ticks());
+                let message = format!(
+                    "time stamps were divided by {} as the preset `{}` says",
+                    preset.ticks(),
+                    preset.name()
+                );
+                findings.push(Finding::new(Severity::Note, "time_unit", name, message, 0));
+            }
+            time
+        }
     };
     let joints = positions
         .joints

@@ -1,0 +1,629 @@
+//! From messages to a recording: topics, joints by name, order by `header.stamp`, partial messages brought together.
+//!
+//! Messages of one topic that name the same joints make a *part*; most logs are one part. A message that comes late is put where its
+//! stamp belongs, if that is at most half a second and 1024 messages back; what is further back is a step of the clock and stays.
+
+use super::joint_state::{Encoding, decode};
+use super::merge::{Part, merge};
+use crate::error::{Error, Place, Result};
+use crate::log::{Cells, Channel, LogOptions, Selection, TorqueSource, assemble};
+use crate::memory;
+use std::fmt::Write as _;
+use twincal::robot::{Robot, did_you_mean};
+use twincal::signal::Recording;
+use twincal::{Finding, Severity};
+
+/// Message types that are read.
+const KINDS: [&str; 3] = [
+    "sensor_msgs/msg/JointState",
+    "sensor_msgs/JointState",
+    "sensor_msgs::msg::dds_::JointState_",
+];
+/// How far back a late message is put in its place, ns and messages.
+const LATE_NS: i64 = 500_000_000;
+const LATE_MESSAGES: usize = 1024;
+/// Share of late messages beyond which they are worth a warning.
+const LATE_SHARE: f64 = 0.01;
+/// Rows between two looks at the memory that is left.
+const LOOK: usize = 1 << 16;
+/// Most lists of names of one topic.
+const MAX_LAYOUTS: usize = 256;
+/// Words for the lists of a message.
+const LISTS: [&str; 3] = ["position[]", "velocity[]", "effort[]"];
+const CHANNELS: [&str; 3] = ["position", "velocity", "effort"];
+
+/// A topic of a log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct TopicId(usize);
+
+struct Topic {
+    name: String,
+    kind: Option<String>,
+    encoding: String,
+    read_as: Option<Encoding>,
+    messages: u64,
+    layouts: Vec<Layout>,
+    last: usize,
+}
+
+/// One list of names as it stands in messages.
+struct Layout {
+    names: Vec<u8>,
+    part: usize,
+    /// Which entry of the message each joint of the part is.
+    entries: Vec<usize>,
+    joints_named: usize,
+}
+
+/// Gathers the messages of one log.
+pub(super) struct JointStates<'a> {
+    file: &'a str,
+    robot: &'a Robot,
+    options: &'a LogOptions,
+    /// Name in messages of each moving joint.
+    wanted: Vec<String>,
+    topics: Vec<Topic>,
+    parts: Vec<Part>,
+    part_topics: Vec<usize>,
+    foreign: Vec<String>,
+    ambiguous: bool,
+    rows: usize,
+    dropped: u64,
+    first_dropped: Option<String>,
+    late: u64,
+    latest: i64,
+    lag: f64,
+}
+
+impl<'a> JointStates<'a> {
+    pub(super) fn new(file: &'a str, robot: &'a Robot, options: &'a LogOptions) -> Self {
+        let wanted = robot
+            .joint_names()
+            .iter()
+            .map(|joint| match options.columns.q.get(*joint) {
+                Some(name) => name.clone(),
+                None => (*joint).to_owned(),
+            })
+            .collect();
+        Self {
+            file,
+            robot,
+            options,
+            wanted,
+            topics: Vec::new(),
+            parts: Vec::new(),
+            part_topics: Vec::new(),
+            foreign: Vec::new(),
+            ambiguous: false,
+            rows: 0,
+            dropped: 0,
+            first_dropped: None,
+            late: 0,
+            latest: 0,
+            lag: 0.0,
+        }
+    }
+
+    fn refuse(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
+        Error::content(Place::file(self.file), problem, remedy)
+    }
+
+    /// Makes a topic known; `kind` is the message type, `None` if its schema is missing.
+    ///
+    /// # Errors
+    /// [`Error::Content`] if the config asks for it and it cannot be read.
+    pub(super) fn topic(
+        &mut self,
+        name: &str,
+        kind: Option<&str>,
+        encoding: &str,
+    ) -> Result<TopicId> {
+        let clean = |text: &str| text.chars().filter(|c| !c.is_control()).collect::<String>();
+        let name = clean(name);
+        if let Some(known) = self.topics.iter().position(|topic| topic.name == name) {
+            return Ok(TopicId(known));
+        }
+        let asked = self.options.topics.contains(&name);
+        let joint_state = kind.is_some_and(|kind| KINDS.contains(&kind));
+        let encoded = match encoding {
+            "cdr" => Some(Encoding::Cdr),
+            "ros1" => Some(Encoding::Ros1),
+            _ => None,
+        };
+        let topic = Topic {
+            read_as: encoded.filter(|_| joint_state && (asked || self.options.topics.is_empty())),
+            name,
+            kind: kind.map(clean),
+            encoding: clean(encoding),
+            messages: 0,
+            layouts: Vec::new(),
+            last: 0,
+        };
+        if asked && topic.read_as.is_none() {
+            let problem = match &topic.kind {
+                None => format!(
+                    "topic {}: its schema is missing from the file",
+                    topic.words()
+                ),
+                Some(_) => format!("topic {} cannot be read", topic.words()),
+            };
+            return Err(self.refuse(problem, CONVERT));
+        }
+        self.topics.push(topic);
+        Ok(TopicId(self.topics.len() - 1))
+    }
+
+    /// Whether messages of a topic are read.
+    pub(super) fn reads(&self, id: TopicId) -> bool {
+        self.topics[id.0].read_as.is_some()
+    }
+
+    /// Takes one message.
+    ///
+    /// # Errors
+    /// [`Error::Content`] with topic and message number for lists that do not fit the names, and where memory ends.
+    pub(super) fn message(&mut self, id: TopicId, log_time: u64, data: &[u8]) -> Result<()> {
+        let topic = &mut self.topics[id.0];
+        topic.messages += 1;
+        let Some(encoding) = topic.read_as else {
+            return Ok(());
+        };
+        let number = topic.messages;
+        if number == 1 && self.options.topics.is_empty() {
+            let others = &self.topics;
+            self.ambiguous |= (others.iter().enumerate())
+                .any(|(at, other)| at != id.0 && other.read_as.is_some() && other.messages > 0);
+        }
+        if self.ambiguous {
+            return Ok(());
+        }
+        let topic = &self.topics[id.0];
+        let known = topic.layouts.get(topic.last);
+        let state = match decode(encoding, data, known.map_or(&[], |layout| &layout.names)) {
+            Ok(state) => state,
+            Err(problem) => {
+                let name = topic.name.clone();
+                self.drop(|| format!("message {number} on `{name}`: {problem}"));
+                return Ok(());
+            }
+        };
+        let names = state.names.bytes();
+        let at = match known {
+            Some(layout) if layout.names == names => topic.last,
+            _ => match topic
+                .layouts
+                .iter()
+                .position(|layout| layout.names == names)
+            {
+                Some(at) => at,
+                None => {
+                    let lengths = state.values.map(|list| list.len() > 0);
+                    let named = state.names.decode();
+                    match self.layout(id.0, number, names, &named, lengths)? {
+                        Some(at) => at,
+                        None => return Ok(()),
+                    }
+                }
+            },
+        };
+        self.topics[id.0].last = at;
+        let layout = &self.topics[id.0].layouts[at];
+        let part = &mut self.parts[layout.part];
+        for list in 0..3 {
+            let (found, expected) = (
+                state.values[list].len(),
+                if part.has[list] {
+                    layout.joints_named
+                } else {
+                    0
+                },
+            );
+            if found != expected {
+                let name = &self.topics[id.0].name;
+                let problem = if found == 0 || expected == 0 {
+                    format!(
+                        "message {number} on `{name}`: {} has {found} values, the messages before it had {expected}",
+                        LISTS[list]
+                    )
+                } else {
+                    format!(
+                        "message {number} on `{name}`: {} has {found} values for {} names",
+                        LISTS[list], self.topics[id.0].layouts[at].joints_named
+                    )
+                };
+                return self.unfit(problem);
+            }
+        }
+        let stamp = state.stamp;
+        self.lag += log_time as f64 - stamp as f64;
+        let late = part.place(stamp, LATE_NS, LATE_MESSAGES);
+        if let Some(lateness) = late.lateness {
+            self.late += 1;
+            self.latest = self.latest.max(lateness);
+        }
+        part.insert(late.at, stamp, &layout.entries, &state.values);
+        self.rows += 1;
+        if self.rows.is_multiple_of(LOOK) {
+            // Growing vectors hold up to three times their content while they move.
+            let bytes: u64 = self.parts.iter().map(Part::bytes).sum();
+            memory::require(
+                self.file,
+                bytes,
+                "read a shorter log, or one with fewer joints",
+            )?;
+        }
+        Ok(())
+    }
+
+    fn drop(&mut self, words: impl FnOnce() -> String) {
+        self.dropped += 1;
+        self.first_dropped.get_or_insert_with(words);
+    }
+
+    /// A message whose lists do not fit: refused, or dropped when told to be lenient.
+    fn unfit(&mut self, problem: String) -> Result<()> {
+        if self.options.lenient {
+            self.drop(|| problem);
+            return Ok(());
+        }
+        Err(self.refuse(
+            problem,
+            "mend the publisher, or drop and count such messages with --lenient",
+        ))
+    }
+
+    /// Learns a new list of names; `None` if the message is left out.
+    fn layout(
+        &mut self,
+        topic: usize,
+        number: u64,
+        bytes: &[u8],
+        named: &[String],
+        has: [bool; 3],
+    ) -> Result<Option<usize>> {
+        let name = self.topics[topic].name.clone();
+        if named.is_empty() {
+            self.unfit(format!(
+                "message {number} on `{name}`: name[] is empty, so nobody knows whose values these are"
+            ))?;
+            return Ok(None);
+        }
+        let mut sorted: Vec<&String> = named.iter().collect();
+        sorted.sort_unstable();
+        if let Some(twice) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+            self.unfit(format!(
+                "message {number} on `{name}`: joint `{}` stands twice in name[]",
+                twice[0]
+            ))?;
+            return Ok(None);
+        }
+        if self.topics[topic].layouts.len() == MAX_LAYOUTS {
+            return Err(self.refuse(
+                format!("topic `{name}` has more than {MAX_LAYOUTS} different lists of names"),
+                "record joint states under fixed names",
+            ));
+        }
+        let (mut joints, mut entries) = (Vec::new(), Vec::new());
+        for (joint, wanted) in self.wanted.iter().enumerate() {
+            if let Some(entry) = named.iter().position(|name| name == wanted) {
+                joints.push(joint);
+                entries.push(entry);
+            }
+        }
+        for name in named {
+            if !self.wanted.contains(name) && !self.foreign.contains(name) {
+                self.foreign.push(name.clone());
+            }
+        }
+        let same =
+            |(part, of): (&Part, &usize)| *of == topic && part.joints == joints && part.has == has;
+        let part = match self.parts.iter().zip(&self.part_topics).position(same) {
+            Some(part) => part,
+            None => {
+                self.parts.push(Part::new(joints, has));
+                self.part_topics.push(topic);
+                self.parts.len() - 1
+            }
+        };
+        let layouts = &mut self.topics[topic].layouts;
+        layouts.push(Layout {
+            names: bytes.to_vec(),
+            part,
+            entries,
+            joints_named: named.len(),
+        });
+        Ok(Some(layouts.len() - 1))
+    }
+
+    /// The recording, with all that was assumed.
+    ///
+    /// # Errors
+    /// [`Error::Content`] if no topic or more than one can be read, joints of the model are missing, effort is missing or the parts do
+    /// not overlap in time.
+    pub(super) fn finish(
+        mut self,
+        mut findings: Vec<Finding>,
+    ) -> Result<(Recording, Vec<Finding>)> {
+        self.check_topics()?;
+        let messages = self.rows as f64;
+        if self.rows == 0 {
+            let problem = match (&self.first_dropped, self.dropped) {
+                (Some(first), count) => {
+                    format!("not one of {count} messages could be read: {first}")
+                }
+                _ => "has no message of joint states".into(),
+            };
+            return Err(self.refuse(problem, "record it again, or copy it again"));
+        }
+        let parts = self.choose()?;
+        self.say(&mut findings, messages);
+        let (time, columns) = merge(
+            self.file,
+            &mut self.parts,
+            &parts,
+            |part| self.topics[self.part_topics[part]].name.as_str(),
+            self.robot,
+            &mut findings,
+        )?;
+        // Columns as they stand in a table: time, then what is there of each joint.
+        let mut cells = Cells {
+            columns: vec![time],
+            dropped: self.dropped,
+            first_dropped: self.first_dropped.take(),
+        };
+        let mut channel = |name: String, values: Vec<f64>| {
+            cells.columns.push(values);
+            Channel {
+                index: cells.columns.len() - 1,
+                name,
+            }
+        };
+        let joints: Vec<[Option<Channel>; 4]> = (columns.into_iter().zip(&parts).enumerate())
+            .map(|(joint, (values, parts))| {
+                let named = |list: usize, part: Option<usize>| {
+                    let topic = part.map_or("", |part| &self.topics[self.part_topics[part]].name);
+                    format!("{topic} {}[{}]", CHANNELS[list], self.wanted[joint])
+                };
+                let [q, qd, tau] = values;
+                [
+                    q.map(|q| channel(named(0, parts[0]), q)),
+                    qd.map(|qd| channel(named(1, parts[1]), qd)),
+                    None,
+                    tau.map(|tau| channel(named(2, parts[2]), tau)),
+                ]
+            })
+            .collect();
+        let selection = Selection {
+            time: Some(Channel {
+                index: 0,
+                name: "header.stamp".into(),
+            }),
+            joints,
+            findings: Vec::new(),
+        };
+        let rows = cells.columns[0].len();
+        let recording = assemble(
+            self.file,
+            rows,
+            cells,
+            &selection,
+            self.options,
+            &mut findings,
+        )?;
+        Ok((recording, findings))
+    }
+
+    fn check_topics(&self) -> Result<()> {
+        for asked in &self.options.topics {
+            if !self.topics.iter().any(|topic| topic.name == *asked) {
+                let names = self.topics.iter().map(|topic| topic.name.as_str());
+                return Err(self.refuse(
+                    format!(
+                        "has no topic `{asked}`, which [log] topic names; it has {}",
+                        self.list(|_| true)
+                    ),
+                    did_you_mean(asked, names),
+                ));
+            }
+        }
+        if self.ambiguous {
+            let list = self.list(|topic| topic.read_as.is_some() && topic.messages > 0);
+            return Err(self.refuse(
+                format!("has joint states on more than one topic: {list}"),
+                "say which with [log] topic = \"…\"; a list of topics takes each joint's channel from the first that has it",
+            ));
+        }
+        if !self.topics.iter().any(|topic| topic.read_as.is_some()) {
+            let list = self.list(|_| true);
+            let problem = if list.is_empty() {
+                "has no topic at all".to_owned()
+            } else {
+                format!("has no topic with {} in CDR; it has {list}", KINDS[0])
+            };
+            return Err(self.refuse(problem, CONVERT));
+        }
+        Ok(())
+    }
+
+    fn list(&self, which: impl Fn(&Topic) -> bool) -> String {
+        const SHOWN: usize = 12;
+        let chosen: Vec<&Topic> = self.topics.iter().filter(|topic| which(topic)).collect();
+        let mut text = String::new();
+        for topic in chosen.iter().take(SHOWN) {
+            let comma = if text.is_empty() { "" } else { ", " };
+            // Writing to a String cannot fail.
+            let _ = write!(text, "{comma}{}", topic.words());
+        }
+        if chosen.len() > SHOWN {
+            let _ = write!(text, " and {} more", chosen.len() - SHOWN);
+        }
+        text
+    }
+
+    /// Which part each joint's position, velocity and effort come from.
+    fn choose(&self) -> Result<Vec<[Option<usize>; 3]>> {
+        let order = |part: usize| {
+            let topic = &self.topics[self.part_topics[part]].name;
+            let place = self.options.topics.iter().position(|asked| asked == topic);
+            (place, usize::MAX - self.parts[part].stamps.len(), part)
+        };
+        let mut by_preference: Vec<usize> = (0..self.parts.len())
+            .filter(|&part| !self.parts[part].stamps.is_empty())
+            .collect();
+        by_preference.sort_by_key(|&part| order(part));
+        let joints = self.wanted.len();
+        let chosen: Vec<[Option<usize>; 3]> = (0..joints)
+            .map(|joint| {
+                let of = |list: usize, home: Option<usize>| {
+                    let has = |part: &usize| {
+                        let part = &self.parts[*part];
+                        part.has[list] && part.joints.contains(&joint)
+                    };
+                    home.filter(has)
+                        .or_else(|| by_preference.iter().copied().find(has))
+                };
+                let q = of(0, None);
+                [q, of(1, q), of(2, q)]
+            })
+            .collect();
+        self.refuse_missing_joints(&chosen)?;
+        self.refuse_missing_effort(&chosen)?;
+        Ok(chosen)
+    }
+
+    fn refuse_missing_joints(&self, chosen: &[[Option<usize>; 3]]) -> Result<()> {
+        let Some(first) = chosen.iter().position(|parts| parts[0].is_none()) else {
+            return Ok(());
+        };
+        let missing: Vec<&str> = (chosen.iter().zip(&self.wanted))
+            .filter(|(parts, _)| parts[0].is_none())
+            .map(|(_, name)| name.as_str())
+            .collect();
+        let named = self.parts.iter().flat_map(|part| part.joints.iter());
+        if named.clone().any(|joint| *joint == first) {
+            return Err(self.refuse(
+                format!(
+                    "topic {}: position[] of joint `{}` is empty in all messages",
+                    self.read_topics(),
+                    missing.join("`, `")
+                ),
+                "record positions too",
+            ));
+        }
+        let shown: Vec<&str> = self.foreign.iter().take(16).map(String::as_str).collect();
+        let names = if shown.is_empty() {
+            String::new()
+        } else {
+            format!("; it names `{}`", shown.join("`, `"))
+        };
+        Err(self.refuse(
+            format!(
+                "topic {} has no joint `{}` of the model{names}",
+                self.read_topics(),
+                missing.join("`, `")
+            ),
+            format!(
+                "{}; map names with [columns] q = {{ joint = \"name in the log\" }}, or fix a joint that does not move with [model] locked",
+                did_you_mean(missing[0], shown.iter().copied())
+            ),
+        ))
+    }
+
+    fn refuse_missing_effort(&self, chosen: &[[Option<usize>; 3]]) -> Result<()> {
+        if self.options.torque_source() == TorqueSource::None {
+            return Ok(());
+        }
+        let missing: Vec<&str> = (chosen.iter().zip(&self.wanted))
+            .filter(|(parts, _)| parts[2].is_none())
+            .map(|(_, name)| name.as_str())
+            .collect();
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let whose = if missing.len() == chosen.len() {
+            String::new()
+        } else {
+            format!(" of joint `{}`", missing.join("`, `"))
+        };
+        Err(self.refuse(
+            format!(
+                "topic {}: effort[]{whose} is empty in all messages",
+                self.read_topics()
+            ),
+            "record a topic with effort, name it too in [log] topic = [\"…\", \"…\"], or say [log] torque = \"none\" for a log that is only to be predicted",
+        ))
+    }
+
+    fn read_topics(&self) -> String {
+        let names: Vec<String> = (self.topics.iter())
+            .filter(|topic| topic.read_as.is_some() && topic.messages > 0)
+            .map(|topic| format!("`{}`", topic.name))
+            .collect();
+        names.join(", ")
+    }
+
+    fn say(&self, findings: &mut Vec<Finding>, messages: f64) {
+        let mut say = |severity, code: &str, message: String, count| {
+            findings.push(Finding::new(severity, code, self.file, message, count));
+        };
+        say(
+            Severity::Note,
+            "time_source",
+            format!(
+                "time is header.stamp on topic {}, not the recorder's clock, which is later by {:.3} ms on average",
+                self.read_topics(),
+                self.lag / messages / 1e6
+            ),
+            0,
+        );
+        if self.options.torque_source() == TorqueSource::Joint {
+            say(
+                Severity::Note,
+                "effort_is_joint_torque",
+                "effort[] counts as torque on the joint's side of the gear, N·m (N for sliders); if it is of the motor or a current, say so with [log] torque".into(),
+                0,
+            );
+        }
+        if self.late > 0 {
+            let severity = if self.late as f64 > LATE_SHARE * messages {
+                Severity::Warning
+            } else {
+                Severity::Note
+            };
+            say(
+                severity,
+                "late_messages",
+                format!(
+                    "{} of {messages} messages came late, by at most {:.3} ms, and were put in the order of header.stamp",
+                    self.late,
+                    self.latest as f64 / 1e6
+                ),
+                self.late,
+            );
+        }
+        if !self.foreign.is_empty() {
+            let shown: Vec<&str> = self.foreign.iter().take(16).map(String::as_str).collect();
+            say(
+                Severity::Note,
+                "joints_left_out",
+                format!(
+                    "joints that do not move in the model were left out: `{}`",
+                    shown.join("`, `")
+                ),
+                self.foreign.len() as u64,
+            );
+        }
+    }
+}
+
+const CONVERT: &str = "record or convert it to sensor_msgs/msg/JointState in CDR, or export the joint states to CSV, Parquet or NPZ";
+
+impl Topic {
+    fn words(&self) -> String {
+        let kind = self.kind.as_deref().unwrap_or("no schema");
+        format!(
+            "`{}` ({kind}, {}, {} messages)",
+            self.name, self.encoding, self.messages
+        )
+    }
+}

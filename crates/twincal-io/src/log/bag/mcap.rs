@@ -1,0 +1,372 @@
+//! The container MCAP: records one by one, chunks unpacked one at a time, limits before allocations, damaged chunks skipped and counted.
+//!
+//! Format: <https://mcap.dev/spec>. A record is an opcode, a length of 8 bytes and the content.
+
+use super::joint_states::{JointStates, TopicId};
+use crate::error::{Error, Place, Result};
+use mcap::records::{Record, op};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io::{Read, Seek, SeekFrom};
+use twincal::{Finding, Severity};
+
+/// Largest record, and largest chunk when unpacked, bytes.
+pub(in super::super) const MAX_RECORD: u64 = 256 << 20;
+/// Bytes of a record before its content.
+const RECORD_HEAD: usize = 9;
+/// Bytes of a message before its data: channel, sequence, two times.
+const MESSAGE_HEAD: usize = 22;
+
+/// What goes wrong inside a chunk: the chunk alone is lost, or the file is refused.
+enum Damage {
+    Chunk(String),
+    File(Error),
+}
+
+impl From<Error> for Damage {
+    fn from(error: Error) -> Self {
+        Self::File(error)
+    }
+}
+
+struct Reader<'a, 'b> {
+    file: &'a str,
+    sink: &'a mut JointStates<'b>,
+    /// Name of the message type by schema.
+    schemas: BTreeMap<u16, String>,
+    channels: BTreeMap<u16, TopicId>,
+    /// Channel of the last message and its topic: most messages come from the same.
+    last: Option<(u16, TopicId)>,
+    unpacked: Vec<u8>,
+    chunks: u64,
+    damaged: u64,
+    first_damage: Option<String>,
+}
+
+/// Hands all messages of JointState topics in `source` to `sink`.
+///
+/// # Errors
+/// [`Error::System`] if reading fails; [`Error::Content`] for what is no MCAP file, for records and chunks above 256 MiB and unknown
+/// compressions. Damaged chunks and a missing end are findings.
+pub(super) fn read(
+    source: &mut (impl Read + Seek),
+    file: &str,
+    sink: &mut JointStates<'_>,
+) -> Result<Vec<Finding>> {
+    let mut reader = Reader {
+        file,
+        sink,
+        schemas: BTreeMap::new(),
+        channels: BTreeMap::new(),
+        last: None,
+        unpacked: Vec::new(),
+        chunks: 0,
+        damaged: 0,
+        first_damage: None,
+    };
+    let end = reader.records(source)?;
+    let mut findings = Vec::new();
+    if reader.damaged > 0 {
+        let message = format!(
+            "{} of {} chunks are damaged and were left out with their messages; the first: {}; record or copy the file again",
+            reader.damaged,
+            reader.chunks,
+            reader.first_damage.unwrap_or_default()
+        );
+        findings.push(Finding::new(
+            Severity::Degraded,
+            "damaged_chunks",
+            file,
+            message,
+            reader.damaged,
+        ));
+    }
+    let cut = match end {
+        End::Whole => None,
+        End::BehindData => Some((
+            Severity::Warning,
+            "the file ends behind its messages, without its index; none was lost".to_owned(),
+        )),
+        End::Cut(byte) => Some((
+            Severity::Degraded,
+            format!(
+                "the file is cut off at byte {byte}: what stood whole before was read; `mcap recover` makes a whole file of it"
+            ),
+        )),
+    };
+    if let Some((severity, message)) = cut {
+        findings.push(Finding::new(severity, "truncated", file, message, 0));
+    }
+    Ok(findings)
+}
+
+enum End {
+    Whole,
+    BehindData,
+    Cut(u64),
+}
+
+impl Reader<'_, '_> {
+    fn refuse(&self, problem: String, remedy: &str) -> Error {
+        Error::content(Place::file(self.file), problem, remedy)
+    }
+
+    fn records(&mut self, source: &mut (impl Read + Seek)) -> Result<End> {
+        let system = |e: &std::io::Error| {
+            Error::system(
+                self.file,
+                "read",
+                e,
+                "check the disk or copy the file again",
+            )
+        };
+        let mut magic = Vec::new();
+        (&mut *source)
+            .take(mcap::MAGIC.len() as u64)
+            .read_to_end(&mut magic)
+            .map_err(|e| system(&e))?;
+        if magic != mcap::MAGIC {
+            return Err(self.refuse(
+                "does not begin as an MCAP file does".into(),
+                "give an MCAP file, a rosbag2 folder, CSV, Parquet or NPZ",
+            ));
+        }
+        let mut position = magic.len() as u64;
+        let (mut body, mut head) = (Vec::new(), Vec::with_capacity(RECORD_HEAD));
+        let mut behind_data = false;
+        loop {
+            head.clear();
+            (&mut *source)
+                .take(RECORD_HEAD as u64)
+                .read_to_end(&mut head)
+                .map_err(|e| Error::system(self.file, "read", &e, "check the disk"))?;
+            let ended = if behind_data {
+                End::BehindData
+            } else {
+                End::Cut(position)
+            };
+            let Some((opcode, length)) = record_head(&head) else {
+                return Ok(ended);
+            };
+            let wanted = matches!(
+                opcode,
+                op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK | op::HEADER
+            );
+            if wanted && length > MAX_RECORD {
+                return Err(self.refuse(
+                    format!("the record at byte {position} (opcode {opcode:#04x}) claims {length} bytes, the limit is {MAX_RECORD}"),
+                    "copy the file again, or write smaller chunks",
+                ));
+            }
+            body.clear();
+            let read = if wanted {
+                (&mut *source)
+                    .take(length)
+                    .read_to_end(&mut body)
+                    .map(|n| n as u64)
+            } else {
+                std::io::copy(&mut (&mut *source).take(length), &mut std::io::sink())
+            };
+            let read = read.map_err(|e| Error::system(self.file, "read", &e, "check the disk"))?;
+            if read < length {
+                return Ok(ended);
+            }
+            match opcode {
+                op::CHUNK => {
+                    let damaged = self.damaged;
+                    self.chunk(&body, position)?;
+                    if damaged == 0 && self.damaged > 0 {
+                        // What it declared is declared once more behind the data.
+                        self.declared_later(source)
+                            .map_err(|e| Error::system(self.file, "read", &e, "check the disk"))?;
+                    }
+                }
+                op::DATA_END => behind_data = true,
+                op::FOOTER => return Ok(End::Whole),
+                _ if wanted => match self.record(opcode, &body) {
+                    Ok(()) => {}
+                    Err(Damage::File(error)) => return Err(error),
+                    Err(Damage::Chunk(problem)) => {
+                        return Err(self.refuse(
+                            format!("the record at byte {position}: {problem}"),
+                            "copy the file again",
+                        ));
+                    }
+                },
+                _ => {}
+            }
+            position += RECORD_HEAD as u64 + length;
+        }
+    }
+
+    /// Schemas and channels outside chunks from here to the end; the position stays.
+    fn declared_later(&mut self, source: &mut (impl Read + Seek)) -> std::io::Result<()> {
+        let start = source.stream_position()?;
+        let mut body = Vec::new();
+        let mut head = [0; RECORD_HEAD];
+        while source.read_exact(&mut head).is_ok() {
+            let Some((opcode, length)) = record_head(&head) else {
+                break;
+            };
+            if matches!(opcode, op::SCHEMA | op::CHANNEL) && length <= MAX_RECORD {
+                body.clear();
+                (&mut *source).take(length).read_to_end(&mut body)?;
+                // A broken one is met again on the way, and told there.
+                let _ = self.record(opcode, &body);
+                continue;
+            }
+            let Ok(length) = i64::try_from(length) else {
+                break;
+            };
+            source.seek(SeekFrom::Current(length))?;
+        }
+        source.seek(SeekFrom::Start(start))?;
+        Ok(())
+    }
+
+    /// A chunk; damage in it is counted.
+    fn chunk(&mut self, body: &[u8], position: u64) -> Result<()> {
+        self.chunks += 1;
+        let mut unpacked = std::mem::take(&mut self.unpacked);
+        let result = self
+            .unpack(body, &mut unpacked)
+            .and_then(|records| self.records_of_chunk(records));
+        self.unpacked = unpacked;
+        match result {
+            Ok(()) => Ok(()),
+            Err(Damage::File(error)) => Err(error),
+            Err(Damage::Chunk(problem)) => {
+                self.damaged += 1;
+                self.first_damage
+                    .get_or_insert_with(|| format!("at byte {position}, {problem}"));
+                Ok(())
+            }
+        }
+    }
+
+    /// The records of a chunk, unpacked into `unpacked` where they are packed.
+    fn unpack<'c>(
+        &self,
+        body: &'c [u8],
+        unpacked: &'c mut Vec<u8>,
+    ) -> std::result::Result<&'c [u8], Damage> {
+        let Ok(Record::Chunk {
+            header,
+            data: Cow::Borrowed(data),
+        }) = mcap::parse_record(op::CHUNK, body)
+        else {
+            return Err(Damage::Chunk("its header is broken".into()));
+        };
+        let size = header.uncompressed_size;
+        if size > MAX_RECORD {
+            return Err(self
+                .refuse(
+                    format!("a chunk claims {size} bytes when unpacked, the limit is {MAX_RECORD}"),
+                    "record it again with smaller chunks",
+                )
+                .into());
+        }
+        let damaged = |e: std::io::Error| Damage::Chunk(format!("cannot be unpacked: {e}"));
+        let records: &'c [u8] = match header.compression.as_str() {
+            "" => data,
+            "zstd" | "lz4" => {
+                unpacked.clear();
+                unpacked.reserve_exact(size as usize);
+                if header.compression == "zstd" {
+                    zstd::bulk::Decompressor::new()
+                        .and_then(|mut zstd| zstd.decompress_to_buffer(data, unpacked))
+                        .map_err(damaged)?;
+                } else {
+                    lz4_flex::frame::FrameDecoder::new(data)
+                        .take(size + 1)
+                        .read_to_end(unpacked)
+                        .map_err(damaged)?;
+                }
+                &unpacked[..]
+            }
+            other => {
+                return Err(self
+                    .refuse(
+                        format!("a chunk is compressed with `{other}`, known are zstd and lz4"),
+                        "`mcap compress` writes it anew",
+                    )
+                    .into());
+            }
+        };
+        if records.len() as u64 != size {
+            return Err(Damage::Chunk(format!(
+                "it unpacks to {} bytes and claims {size}",
+                records.len()
+            )));
+        }
+        if header.uncompressed_crc != 0 && crc32fast::hash(records) != header.uncompressed_crc {
+            return Err(Damage::Chunk("its checksum is wrong".into()));
+        }
+        Ok(records)
+    }
+
+    fn records_of_chunk(&mut self, mut rest: &[u8]) -> std::result::Result<(), Damage> {
+        while !rest.is_empty() {
+            let cut = || Damage::Chunk("it ends within a record".into());
+            let (head, behind) = rest.split_at_checked(RECORD_HEAD).ok_or_else(cut)?;
+            let (opcode, length) = record_head(head).ok_or_else(cut)?;
+            let length = usize::try_from(length).map_err(|_| cut())?;
+            let (body, behind) = behind.split_at_checked(length).ok_or_else(cut)?;
+            if matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
+                self.record(opcode, body)?;
+            }
+            rest = behind;
+        }
+        Ok(())
+    }
+
+    fn record(&mut self, opcode: u8, body: &[u8]) -> std::result::Result<(), Damage> {
+        if opcode == op::MESSAGE {
+            return self.message(body);
+        }
+        match mcap::parse_record(opcode, body) {
+            Ok(Record::Schema { header, .. }) => {
+                self.schemas.insert(header.id, header.name);
+            }
+            Ok(Record::Channel(channel)) if !self.channels.contains_key(&channel.id) => {
+                let kind = self.schemas.get(&channel.schema_id).map(String::as_str);
+                let topic = self
+                    .sink
+                    .topic(&channel.topic, kind, &channel.message_encoding)?;
+                self.channels.insert(channel.id, topic);
+            }
+            Ok(_) => {}
+            Err(e) => return Err(Damage::Chunk(format!("a record is broken: {e}"))),
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn message(&mut self, body: &[u8]) -> std::result::Result<(), Damage> {
+        let (&[a, b, _, _, _, _, t0, t1, t2, t3, t4, t5, t6, t7, ..], Some(data)) =
+            (body, body.get(MESSAGE_HEAD..))
+        else {
+            return Err(Damage::Chunk("a message is shorter than its head".into()));
+        };
+        let channel = u16::from_le_bytes([a, b]);
+        let log_time = u64::from_le_bytes([t0, t1, t2, t3, t4, t5, t6, t7]);
+        let topic = match self.last {
+            Some((last, topic)) if last == channel => topic,
+            _ => {
+                let Some(&topic) = self.channels.get(&channel) else {
+                    return Err(Damage::Chunk(format!(
+                        "a message is of channel {channel}, which is not declared"
+                    )));
+                };
+                self.last = Some((channel, topic));
+                topic
+            }
+        };
+        Ok(self.sink.message(topic, log_time, data)?)
+    }
+}
+
+fn record_head(head: &[u8]) -> Option<(u8, u64)> {
+    let (&opcode, length) = head.split_first()?;
+    Some((opcode, u64::from_le_bytes(length.try_into().ok()?)))
+}

@@ -1,0 +1,264 @@
+//! Parts of a log: rows in the order of their stamps, and several parts on the stamps of the slowest.
+
+use super::joint_state::Doubles;
+use crate::error::{Error, Place, Result};
+use crate::memory;
+use std::collections::BTreeSet;
+use twincal::robot::{JointKind, Robot};
+use twincal::{Finding, Severity};
+
+/// Neighbours further apart than this many median steps are not joined by a line.
+const GAP: f64 = 5.0;
+/// Least share of the slowest part's rows that the others have to cover.
+const COVERED: f64 = 0.5;
+
+/// Messages of one topic that name the same joints.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Part {
+    /// Moving joints of the model.
+    pub(super) joints: Vec<usize>,
+    /// Whether position, velocity, effort are there.
+    pub(super) has: [bool; 3],
+    /// `header.stamp`, ns.
+    pub(super) stamps: Vec<i64>,
+    /// Three per joint; empty where not there.
+    columns: Vec<Vec<f64>>,
+    /// First row behind the last step back of the clock.
+    floor: usize,
+}
+
+/// Where a message goes.
+pub(super) struct Placed {
+    pub(super) at: usize,
+    /// ns behind the latest before it, if it came late.
+    pub(super) lateness: Option<i64>,
+}
+
+impl Part {
+    pub(super) fn new(joints: Vec<usize>, has: [bool; 3]) -> Self {
+        let columns = vec![Vec::new(); 3 * joints.len()];
+        Self {
+            joints,
+            has,
+            columns,
+            ..Self::default()
+        }
+    }
+
+    /// Memory of the rows while they grow, bytes.
+    pub(super) fn bytes(&self) -> u64 {
+        let lists = self.has.iter().filter(|has| **has).count();
+        (self.stamps.len() * (self.joints.len() * lists + 1)) as u64 * 8 * 3
+    }
+
+    /// The row of a message: the end, or further up if it came late by at most `within` and `messages`.
+    #[inline]
+    pub(super) fn place(&mut self, stamp: i64, within: i64, messages: usize) -> Placed {
+        let len = self.stamps.len();
+        let end = Placed {
+            at: len,
+            lateness: None,
+        };
+        let Some(&last) = self.stamps.last().filter(|last| **last > stamp) else {
+            return end;
+        };
+        let lateness = last.saturating_sub(stamp);
+        let lowest = self.floor.max(len.saturating_sub(messages));
+        let back = self.stamps[lowest..].iter().rev();
+        let at = len - back.take_while(|earlier| **earlier > stamp).count();
+        let fits = at > lowest || lowest == self.floor;
+        if lateness > within || !fits {
+            self.floor = len;
+            return end;
+        }
+        Placed {
+            at,
+            lateness: Some(lateness),
+        }
+    }
+
+    /// Adds a row.
+    #[inline]
+    pub(super) fn insert(
+        &mut self,
+        at: usize,
+        stamp: i64,
+        entries: &[usize],
+        values: &[Doubles<'_>; 3],
+    ) {
+        let end = at == self.stamps.len();
+        if end {
+            self.stamps.push(stamp);
+        } else {
+            self.stamps.insert(at, stamp);
+        }
+        for (columns, &entry) in self.columns.chunks_exact_mut(3).zip(entries) {
+            for ((column, list), has) in columns.iter_mut().zip(values).zip(self.has) {
+                if !has {
+                    continue;
+                }
+                let value = list.get(entry);
+                if end {
+                    column.push(value);
+                } else {
+                    column.insert(at, value);
+                }
+            }
+        }
+    }
+
+    fn column(&self, joint: usize, list: usize) -> Option<usize> {
+        let at = self.joints.iter().position(|j| *j == joint)?;
+        Some(3 * at + list)
+    }
+
+    fn median_step(&self) -> f64 {
+        let mut steps: Vec<i64> = self.stamps.windows(2).map(|w| w[1] - w[0]).collect();
+        if steps.is_empty() {
+            return f64::INFINITY;
+        }
+        let middle = steps.len() / 2;
+        *steps.select_nth_unstable(middle).1 as f64
+    }
+
+    /// Values of a column at `stamps`, linear between neighbours; NaN outside and in gaps. Angles that jump by more than half a turn
+    /// between neighbours (a wrap) take the nearer one.
+    fn at(&self, column: usize, is_angle: bool, stamps: &[i64], gap: f64) -> Vec<f64> {
+        let values = &self.columns[column];
+        let mut next = 0;
+        stamps
+            .iter()
+            .map(|&stamp| {
+                while next < self.stamps.len() && self.stamps[next] < stamp {
+                    next += 1;
+                }
+                let Some(&right) = self.stamps.get(next) else {
+                    return f64::NAN;
+                };
+                if right == stamp {
+                    return values[next];
+                }
+                let Some(&left) = next.checked_sub(1).and_then(|left| self.stamps.get(left)) else {
+                    return f64::NAN;
+                };
+                let step = (right - left) as f64;
+                if step > gap {
+                    return f64::NAN;
+                }
+                let share = (stamp - left) as f64 / step;
+                let (a, b) = (values[next - 1], values[next]);
+                if is_angle && (b - a).abs() > std::f64::consts::PI {
+                    return if share < 0.5 { a } else { b };
+                }
+                a + share * (b - a)
+            })
+            .collect()
+    }
+}
+
+/// Position, velocity and effort of each joint.
+type Columns = Vec<[Option<Vec<f64>>; 3]>;
+
+/// Time in seconds and the columns of each joint, all on the stamps of the slowest part that is used.
+pub(super) fn merge<'t>(
+    file: &str,
+    parts: &mut [Part],
+    chosen: &[[Option<usize>; 3]],
+    topic: impl Fn(usize) -> &'t str,
+    robot: &Robot,
+    findings: &mut Vec<Finding>,
+) -> Result<(Vec<f64>, Columns)> {
+    let used: BTreeSet<usize> = chosen.iter().flatten().flatten().copied().collect();
+    let seconds = |stamps: &[i64]| stamps.iter().map(|&ns| ns as f64 / 1e9).collect();
+    let slowest = used
+        .iter()
+        .copied()
+        .min_by_key(|&part| parts[part].stamps.len());
+    let slowest = slowest.unwrap_or(0);
+    if used.len() <= 1 {
+        let part = &mut parts[slowest];
+        let columns = (chosen.iter().enumerate())
+            .map(|(joint, lists)| {
+                [0, 1, 2].map(|list| {
+                    let column = lists[list].and_then(|_| part.column(joint, list))?;
+                    Some(std::mem::take(&mut part.columns[column]))
+                })
+            })
+            .collect();
+        return Ok((seconds(&part.stamps), columns));
+    }
+    let names = robot.joint_names();
+    let describe = |part: usize| {
+        let joints: Vec<&str> = parts[part].joints.iter().map(|&j| names[j]).collect();
+        format!(
+            "`{}` of `{}` ({} messages, every {:.3} ms)",
+            joints.join("`, `"),
+            topic(part),
+            parts[part].stamps.len(),
+            parts[part].median_step() / 1e6
+        )
+    };
+    if let Some(&back) = used.iter().find(|&&part| parts[part].floor > 0) {
+        return Err(Error::content(
+            Place::file(file),
+            format!(
+                "header.stamp of {} steps back in time, so its joints cannot be brought together with the others",
+                describe(back)
+            ),
+            "cut the log where the clock was set, or publish all joints in one message",
+        ));
+    }
+    let bytes: u64 = used.iter().map(|&part| parts[part].bytes()).sum();
+    memory::require(file, bytes, "read a shorter log")?;
+    let stamps = parts[slowest].stamps.clone();
+    let gaps: Vec<f64> = parts.iter().map(|part| GAP * part.median_step()).collect();
+    let columns: Columns = (chosen.iter().enumerate())
+        .map(|(joint, lists)| {
+            let is_angle = robot.joint_kind(joint) != JointKind::Prismatic;
+            [0, 1, 2].map(|list| {
+                let part = lists[list]?;
+                let column = parts[part].column(joint, list)?;
+                if part == slowest {
+                    return Some(parts[part].columns[column].clone());
+                }
+                Some(parts[part].at(column, list == 0 && is_angle, &stamps, gaps[part]))
+            })
+        })
+        .collect();
+    let outside = |row: usize| {
+        let row = columns.iter().flatten().flatten().map(|column| column[row]);
+        row.into_iter().any(f64::is_nan)
+    };
+    let lost = (0..stamps.len()).filter(|&row| outside(row)).count();
+    let list: Vec<String> = used
+        .iter()
+        .filter(|&&part| part != slowest)
+        .map(|&part| describe(part))
+        .collect();
+    if (lost as f64) > (1.0 - COVERED) * stamps.len() as f64 {
+        return Err(Error::content(
+            Place::file(file),
+            format!(
+                "joints come in messages of their own that hardly overlap in time: {lost} of {} stamps of {} have no values of {}",
+                stamps.len(),
+                describe(slowest),
+                list.join(" and ")
+            ),
+            "check the publishers' clocks, or fix joints that do not move with [model] locked",
+        ));
+    }
+    let message = format!(
+        "joints come in messages of their own: {} brought to the stamps of {} by linear interpolation; {lost} of {} rows lie outside or in gaps and are NaN",
+        list.join(" and "),
+        describe(slowest),
+        stamps.len()
+    );
+    findings.push(Finding::new(
+        Severity::Warning,
+        "parts_merged",
+        file,
+        message,
+        lost as u64,
+    ));
+    Ok((seconds(&stamps), columns))
+}

@@ -1,0 +1,110 @@
+//! Logs of ROS: MCAP files, SQLite bags and rosbag2 folders with `sensor_msgs/JointState`.
+//!
+//! | step | file |
+//! |---|---|
+//! | which files a folder has | `folder.rs` |
+//! | containers | `mcap.rs`, `sqlite.rs`, unpacked by `unpack.rs` |
+//! | one message | `joint_state.rs` |
+//! | topics, joints, order in time | `joint_states.rs` |
+//! | messages with some of the joints | `merge.rs` |
+
+mod folder;
+mod joint_state;
+mod joint_states;
+mod mcap;
+mod merge;
+mod sqlite;
+mod unpack;
+
+use super::{Kind, LogOptions};
+use crate::error::{Error, Place, Result};
+use joint_states::JointStates;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
+use std::path::{Path, PathBuf};
+use twincal::Finding;
+use twincal::robot::Robot;
+use twincal::signal::Recording;
+
+/// Bytes read from a file at a time.
+const BUFFER: usize = 1 << 18;
+
+/// Reads an MCAP file.
+pub(super) fn read_mcap(
+    source: &mut (impl Read + Seek),
+    file: &str,
+    robot: &Robot,
+    options: &LogOptions,
+) -> Result<(Recording, Vec<Finding>)> {
+    let mut states = JointStates::new(file, robot, options);
+    let findings = mcap::read(source, file, &mut states)?;
+    states.finish(findings)
+}
+
+/// Reads a bag: one file, packed or not, or a folder.
+pub(super) fn read(
+    path: &Path,
+    robot: &Robot,
+    options: &LogOptions,
+) -> Result<(Recording, Vec<Finding>)> {
+    let name = path.display().to_string();
+    let mut states = JointStates::new(&name, robot, options);
+    let (files, mut findings) = files(path)?;
+    for file in files {
+        findings.extend(read_file(&file, &mut states)?);
+    }
+    states.finish(findings)
+}
+
+/// The files that a log consists of: itself, or the files of a folder.
+///
+/// # Errors
+/// [`Error::Content`] for a folder that is no bag.
+pub(super) fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<Finding>)> {
+    if path.is_dir() {
+        return folder::files(path);
+    }
+    Ok((vec![path.to_owned()], Vec::new()))
+}
+
+fn read_file(path: &Path, states: &mut JointStates<'_>) -> Result<Vec<Finding>> {
+    let name = path.display().to_string();
+    match kind(path, &name)? {
+        Kind::Zstd => {
+            let packed = open(path, &name)?;
+            let unpacked = unpack::unpack(packed, &name)?;
+            read_unpacked(unpacked.path(), &name, states)
+        }
+        _ => read_unpacked(path, &name, states),
+    }
+}
+
+fn read_unpacked(path: &Path, name: &str, states: &mut JointStates<'_>) -> Result<Vec<Finding>> {
+    match kind(path, name)? {
+        Kind::Mcap => {
+            let mut file = BufReader::with_capacity(BUFFER, open(path, name)?);
+            mcap::read(&mut file, name, states)
+        }
+        Kind::Sqlite => sqlite::read(path, name, states).map(|()| Vec::new()),
+        Kind::LfsPointer => Err(super::lfs_pointer(name)),
+        _ => Err(Error::content(
+            Place::file(name),
+            "is neither an MCAP file nor a SQLite bag",
+            "copy it again",
+        )),
+    }
+}
+
+fn open(path: &Path, name: &str) -> Result<File> {
+    File::open(path)
+        .map_err(|e| Error::system(name, "read", &e, "check the path and its permissions"))
+}
+
+fn kind(path: &Path, name: &str) -> Result<Kind> {
+    let mut head = Vec::new();
+    open(path, name)?
+        .take(Kind::HEAD as u64)
+        .read_to_end(&mut head)
+        .map_err(|e| Error::system(name, "read", &e, "check the disk"))?;
+    Ok(Kind::of(&head))
+}

@@ -1,0 +1,169 @@
+//! Containers that are cut, damaged, or claim too much.
+
+use super::write::{Bag, JOINT_STATE, Message, bag, both, plain};
+use super::{contains, is_the_motion, read, read_bytes, refused, says};
+use std::fs;
+use twincal::Severity;
+
+/// Byte ranges of the contents of all records outside chunks with this opcode.
+fn records(bytes: &[u8], opcode: u8) -> Vec<std::ops::Range<usize>> {
+    let (mut at, mut found) = (8, Vec::new());
+    while at + 9 <= bytes.len() - 8 {
+        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) as usize;
+        if bytes[at] == opcode {
+            found.push(at + 9..at + 9 + length);
+        }
+        at += 9 + length;
+    }
+    found
+}
+
+const CHUNK: u8 = 0x06;
+
+#[test]
+fn case_52_a_truncated_file_gives_what_is_whole() {
+    let bytes = bag(&both());
+    let chunks = records(&bytes, CHUNK);
+    assert!(chunks.len() > 3, "{} chunks", chunks.len());
+    let (recording, findings) = read_bytes(&bytes[..chunks[2].start + 40]).unwrap();
+    let rows = recording.time.len();
+    assert!((20..180).contains(&rows), "{rows}");
+    is_the_motion(&recording, rows, 1.0);
+    let said = says(&findings, "truncated");
+    assert_eq!(said.severity, Severity::Degraded);
+    contains(&said.message, &["cut off at byte", "mcap recover"]);
+    // behind the messages nothing is lost
+    let (recording, findings) = read_bytes(&bytes[..bytes.len() - 30]).unwrap();
+    is_the_motion(&recording, 200, 1.0);
+    assert_eq!(says(&findings, "truncated").severity, Severity::Warning);
+    // within the first chunk there is nothing
+    contains(
+        &refused(read_bytes(&bytes[..chunks[0].start + 40])),
+        &["no topic at all"],
+    );
+}
+
+#[test]
+fn case_53_a_damaged_chunk_is_left_out_and_counted() {
+    for make in [bag, plain] {
+        let bytes = make(&both());
+        let chunks = records(&bytes, CHUNK);
+        // also the first, which declares the topic: the summary declares it again
+        for number in [0, 2] {
+            let mut spoiled = bytes.clone();
+            spoiled[chunks[number].end - 20] ^= 0x40;
+            let (recording, findings) = read_bytes(&spoiled).unwrap();
+            assert!(recording.time.len() < 200 && recording.time.len() > 100);
+            let said = says(&findings, "damaged_chunks");
+            assert_eq!((said.severity, said.count), (Severity::Degraded, 1));
+            contains(
+                &said.message,
+                &[&format!("1 of {} chunks", chunks.len()), "at byte"],
+            );
+        }
+    }
+}
+
+/// Where the uncompressed size of the first chunk stands, and its compression's name.
+fn chunk_fields(bytes: &[u8]) -> (usize, usize) {
+    let start = records(bytes, CHUNK)[0].start;
+    (start + 16, start + 32)
+}
+
+#[test]
+fn case_54_a_chunk_that_claims_eight_gibibytes_is_refused() {
+    let mut bytes = bag(&both());
+    let (size, _) = chunk_fields(&bytes);
+    bytes[size..size + 8].copy_from_slice(&(8_u64 << 30).to_le_bytes());
+    contains(
+        &refused(read_bytes(&bytes)),
+        &["a chunk claims 8589934592 bytes", "the limit is 268435456"],
+    );
+    let mut bytes = bag(&both());
+    let start = records(&bytes, CHUNK)[0].start;
+    bytes[start - 8..start].copy_from_slice(&(8_u64 << 30).to_le_bytes());
+    contains(
+        &refused(read_bytes(&bytes)),
+        &["claims 8589934592 bytes", "the limit is 268435456"],
+    );
+    // a claim below the limit that is not true costs the chunk
+    let mut bytes = bag(&both());
+    bytes[size..size + 8].copy_from_slice(&(9_u64 << 20).to_le_bytes());
+    let (_, findings) = read_bytes(&bytes).unwrap();
+    contains(
+        &says(&findings, "damaged_chunks").message,
+        &["claims 9437184"],
+    );
+}
+
+#[test]
+fn case_55_an_unknown_compression_is_refused() {
+    let mut bytes = bag(&both());
+    let (_, compression) = chunk_fields(&bytes);
+    assert_eq!(&bytes[compression..compression + 4], b"zstd");
+    bytes[compression..compression + 4].copy_from_slice(b"lzma");
+    contains(
+        &refused(read_bytes(&bytes)),
+        &["compressed with `lzma`", "zstd and lz4"],
+    );
+}
+
+#[test]
+fn case_56_pointers_and_other_files_are_told() {
+    let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
+    contains(
+        &refused(read_bytes(pointer)),
+        &["this is a Git LFS pointer", "git lfs pull"],
+    );
+    contains(
+        &refused(read_bytes(b"t,q1\n0,1\n")),
+        &["does not begin as an MCAP file does"],
+    );
+    contains(&refused(read_bytes(b"")), &["is empty (0 bytes)"]);
+    contains(
+        &refused(read_bytes(b"\x89MCAP9\r\n and more")),
+        &["does not begin as an MCAP file does"],
+    );
+}
+
+#[test]
+fn case_57_a_missing_schema_is_refused() {
+    let mut states = Bag::new(None);
+    states.topic("/joint_states", None, "cdr");
+    states.raw("/joint_states", 0, &Message::moving(0, &["shoulder"]).cdr());
+    let bytes = states.finish();
+    contains(
+        &refused(read_bytes(&bytes)),
+        &["`/joint_states` (no schema, cdr, 1 messages)"],
+    );
+    let options = twincal_io::log::LogOptions {
+        topics: vec!["/joint_states".into()],
+        ..Default::default()
+    };
+    contains(
+        &refused(super::read_bytes_with(&bytes, &options)),
+        &["topic `/joint_states`", "its schema is missing"],
+    );
+}
+
+#[test]
+fn a_packed_file_is_unpacked_within_a_limit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap.zstd");
+    fs::write(&path, zstd::encode_all(&plain(&both())[..], 3).unwrap()).unwrap();
+    is_the_motion(&read(&path).unwrap().0, 200, 1.0);
+    let mut zeros = plain(&both());
+    zeros.resize(80 << 20, 0);
+    fs::write(&path, zstd::encode_all(&zeros[..], 3).unwrap()).unwrap();
+    contains(&refused(read(&path)), &["refusing to expand"]);
+}
+
+#[test]
+fn an_empty_bag_is_refused() {
+    let mut states = Bag::new(None);
+    states.topic("/joint_states", Some(JOINT_STATE), "cdr");
+    contains(
+        &refused(read_bytes(&states.finish())),
+        &["has no message of joint states"],
+    );
+}

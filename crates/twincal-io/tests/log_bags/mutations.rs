@@ -1,0 +1,50 @@
+//! Bytes changed at random: any answer but a crash, and what is read stays small.
+
+use super::logs::arm;
+use super::write::{Message, plain};
+use proptest::prelude::*;
+use twincal_io::log::{LogOptions, parse_log};
+
+fn small() -> Vec<u8> {
+    let messages: Vec<Message> = (0..20)
+        .map(|i| Message::moving(i, &["shoulder", "elbow"]))
+        .collect();
+    plain(&messages)
+}
+
+/// Checksums of chunks are set to "none": damage reaches the messages.
+fn without_checksum(mut bytes: Vec<u8>) -> Vec<u8> {
+    let mut at = 8;
+    while at + 9 <= bytes.len() - 8 {
+        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) as usize;
+        if bytes[at] == 0x06 {
+            bytes[at + 9 + 24..at + 9 + 28].fill(0);
+        }
+        at += 9 + length;
+    }
+    bytes
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_bytes_in_a_bag_are_answered(
+        changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+        cut in proptest::option::of(any::<prop::sample::Index>()),
+    ) {
+        let mut bytes = without_checksum(small());
+        for (at, value) in changes {
+            let at = at.index(bytes.len());
+            bytes[at] = value;
+        }
+        if let Some(cut) = cut {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        // The memory of one small bag per case: `parse_log` borrows for good.
+        let read = parse_log("run.mcap", bytes.leak(), &arm(), &LogOptions::default());
+        if let Ok((recording, _)) = read {
+            prop_assert!(recording.time.len() <= 20);
+        }
+    }
+}
