@@ -118,7 +118,8 @@ fn case_32_an_empty_effort_is_bad_input() {
 fn case_52_a_truncated_bag_is_degraded() {
     let bytes = bag(&messages(2000));
     let (folder, done) = fit_bytes(&bytes[..bytes.len() / 2], &[]);
-    done.expect(3).says(&["cut off at byte", "mcap recover"]);
+    let done = done.expect(3);
+    assert!(done.out.contains("cut off at byte"), "{}", done.out);
     assert!(codes(folder.path()).contains(&"truncated".to_owned()));
 }
 
@@ -128,7 +129,8 @@ fn case_53_a_damaged_chunk_is_degraded_and_with_strict_bad_input() {
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
     let (folder, done) = fit_bytes(&bytes, &[]);
-    done.expect(3).says(&["damaged"]);
+    let done = done.expect(3);
+    assert!(done.out.contains("damaged"), "{}", done.out);
     assert!(codes(folder.path()).contains(&"damaged_chunks".to_owned()));
     let (folder, done) = fit_bytes(&bytes, &["--strict"]);
     done.expect(2);
