@@ -1,4 +1,5 @@
 //! Bags of ROS: other people's files are read to the numbers that were written, broken ones are refused or told.
+#![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
 #[path = "../common/logs.rs"]
 #[allow(
