@@ -5,6 +5,7 @@
 //! [`Config::file`] before that: a flag overrides its key.
 
 mod file;
+mod log_form;
 mod log_forms;
 mod settings;
 mod unknown_keys;
@@ -15,7 +16,8 @@ pub use file::{
     NoisePrior, NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PresetWord,
     PriorTable, SignalTable, Slab, Topics, TorqueWord, UncertaintyWord, UnknownWord,
 };
-pub use settings::{Gates, LogForm, LogSettings, OneLog, Settings};
+pub use log_form::LogForm;
+pub use settings::{Gates, LogSettings, OneLog, Settings};
 
 use crate::error::{Error, Place, Result};
 use std::path::{Path, PathBuf};

@@ -1,0 +1,102 @@
+//! Which part each channel of each joint comes from, and what is missing.
+
+use super::JointStates;
+use crate::error::Result;
+use crate::log::TorqueSource;
+use twincal::robot::did_you_mean;
+
+impl JointStates<'_> {
+    /// Which part each joint's position, velocity and effort come from.
+    pub(super) fn choose(&self) -> Result<Vec<[Option<usize>; 3]>> {
+        let order = |part: usize| {
+            let topic = &self.topics[self.part_topics[part]].name;
+            let place = self.options.topics.iter().position(|asked| asked == topic);
+            (place, usize::MAX - self.parts[part].stamps.len(), part)
+        };
+        let mut by_preference: Vec<usize> = (0..self.parts.len())
+            .filter(|&part| !self.parts[part].stamps.is_empty())
+            .collect();
+        by_preference.sort_by_key(|&part| order(part));
+        let joints = self.wanted.len();
+        let chosen: Vec<[Option<usize>; 3]> = (0..joints)
+            .map(|joint| {
+                let of = |list: usize, home: Option<usize>| {
+                    let has = |part: &usize| {
+                        let part = &self.parts[*part];
+                        part.has[list] && part.joints.contains(&joint)
+                    };
+                    home.filter(has)
+                        .or_else(|| by_preference.iter().copied().find(has))
+                };
+                let q = of(0, None);
+                [q, of(1, q), of(2, q)]
+            })
+            .collect();
+        self.refuse_missing_joints(&chosen)?;
+        self.refuse_missing_effort(&chosen)?;
+        Ok(chosen)
+    }
+
+    fn refuse_missing_joints(&self, chosen: &[[Option<usize>; 3]]) -> Result<()> {
+        let Some(first) = chosen.iter().position(|parts| parts[0].is_none()) else {
+            return Ok(());
+        };
+        let missing: Vec<&str> = (chosen.iter().zip(&self.wanted))
+            .filter(|(parts, _)| parts[0].is_none())
+            .map(|(_, name)| name.as_str())
+            .collect();
+        let named = self.parts.iter().flat_map(|part| part.joints.iter());
+        if named.clone().any(|joint| *joint == first) {
+            return Err(self.refuse(
+                format!(
+                    "topic {}: position[] of joint `{}` is empty in all messages",
+                    self.read_topics(),
+                    missing.join("`, `")
+                ),
+                "record positions too",
+            ));
+        }
+        let shown: Vec<&str> = self.foreign.iter().take(16).map(String::as_str).collect();
+        let names = if shown.is_empty() {
+            String::new()
+        } else {
+            format!("; it names `{}`", shown.join("`, `"))
+        };
+        Err(self.refuse(
+            format!(
+                "topic {} has no joint `{}` of the model{names}",
+                self.read_topics(),
+                missing.join("`, `")
+            ),
+            format!(
+                "{}; map names with [columns] q = {{ joint = \"name in the log\" }}, or fix a joint that does not move with [model] locked",
+                did_you_mean(missing[0], shown.iter().copied())
+            ),
+        ))
+    }
+
+    fn refuse_missing_effort(&self, chosen: &[[Option<usize>; 3]]) -> Result<()> {
+        if self.options.torque_source() == TorqueSource::None {
+            return Ok(());
+        }
+        let missing: Vec<&str> = (chosen.iter().zip(&self.wanted))
+            .filter(|(parts, _)| parts[2].is_none())
+            .map(|(_, name)| name.as_str())
+            .collect();
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let whose = if missing.len() == chosen.len() {
+            String::new()
+        } else {
+            format!(" of joint `{}`", missing.join("`, `"))
+        };
+        Err(self.refuse(
+            format!(
+                "topic {}: effort[]{whose} is empty in all messages",
+                self.read_topics()
+            ),
+            "record a topic with effort, name it too in [log] topic = [\"…\", \"…\"], or say [log] torque = \"none\" for a log that is only to be predicted",
+        ))
+    }
+}
