@@ -11,6 +11,7 @@
 //! proposal draws one column after the other (Geweke 1991; Hajivassiliou & McFadden 1998), see [`super::orthant`].
 
 use super::orthant::Orthant;
+use super::planted::planted;
 use super::sweep::Sweep;
 use super::target::{Noise, Squares, Target};
 use crate::error::Result;
@@ -135,7 +136,7 @@ impl<'a> Chain<'a> {
         let sign = if self.holds[component] { -1.0 } else { 1.0 };
         if let [k] = columns[..] {
             let (d, g) = (sign * self.sweep.at(k, k), self.sweep.rhs[k]);
-            return 0.5 * (g * g / d - sign * d.ln());
+            return 0.5 * (g * g / d - sign * planted!(1, d, d * d).ln());
         }
         let mut g: Vec<f64> = columns.iter().map(|&k| self.sweep.rhs[k]).collect();
         match Cholesky::new(&self.block(component, sign), columns.len()) {
@@ -173,7 +174,8 @@ impl<'a> Chain<'a> {
     /// `P(z_c = 1)/P(z_c = 0)` given the others, a priori.
     fn odds(&self, component: usize) -> f64 {
         let family = self.target.prior.family[component];
-        let others = self.members[family] - usize::from(self.holds[component]);
+        let own = usize::from(self.holds[component]);
+        let others = self.members[family] - planted!(2, own, 0);
         let (p, q) = self
             .target
             .prior
@@ -283,7 +285,7 @@ impl<'a> Chain<'a> {
         self.leave(out);
         let gain = |component: usize| self.log_bayes(component) + self.odds(component).ln();
         let (lost, won) = (gain(out), gain(into));
-        let taken = self.random.uniform().ln() < won - lost;
+        let taken = self.random.uniform().ln() < won - planted!(3, lost, 0.0);
         self.enter(if taken { into } else { out });
     }
 
@@ -308,7 +310,8 @@ impl<'a> Chain<'a> {
             .iter()
             .map(|&i| {
                 let held = |k: &usize| self.matrix[i * size + k] * self.held[*k];
-                self.rhs[i] - fixed.iter().map(held).sum::<f64>()
+                let explained: f64 = fixed.iter().map(held).sum();
+                self.rhs[i] - planted!(7, explained, 0.0)
             })
             .collect();
         // L⁻ᵀ(L⁻¹ b + ε) = A⁻¹ b + L⁻ᵀ ε
@@ -338,16 +341,17 @@ impl<'a> Chain<'a> {
                     sum + squares[j].at(self.noise.rho[j]),
                 )
             });
-            self.noise.variance[g] = self
-                .random
-                .inverse_gamma(shape + 0.5 * rows, scale + 0.5 * sum);
+            self.noise.variance[g] = self.random.inverse_gamma(
+                shape + planted!(5, 0.5, 1.0) * rows,
+                planted!(11, scale, 0.0) + 0.5 * sum,
+            );
         }
         if !target.autoregressive {
             return;
         }
         for (j, squares) in squares.iter().enumerate() {
             let variance = self.noise.variance[target.group[j]];
-            let starts = target.grams[j].starts;
+            let starts = planted!(4, target.grams[j].starts, 0.0);
             let log_density =
                 |rho: f64| 0.5 * starts * (-rho * rho).ln_1p() - 0.5 * squares.at(rho) / variance;
             self.noise.rho[j] = slice(self.noise.rho[j], log_density, &mut self.random);
@@ -357,7 +361,8 @@ impl<'a> Chain<'a> {
 
 /// One step of a slice sampler on (−1, 1) that begins with the whole interval and shrinks it towards `now`.
 fn slice(now: f64, log_density: impl Fn(f64) -> f64, random: &mut Random) -> f64 {
-    let level = log_density(now) + random.uniform().ln();
+    let height = random.uniform().ln();
+    let level = log_density(now) + planted!(10, height, 0.0);
     let (mut low, mut high) = (-1.0, 1.0);
     for _ in 0..SHRINKS {
         let proposed = low + (high - low) * random.uniform();

@@ -5,6 +5,7 @@
 
 mod chain;
 mod orthant;
+mod planted;
 mod sweep;
 mod target;
 

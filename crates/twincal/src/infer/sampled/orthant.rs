@@ -4,6 +4,7 @@
 //! the later ones, cut off at its bound. What that proposal is short of the law itself is the product of the masses above the
 //! bounds (Geweke 1991; Hajivassiliou & McFadden 1998), whose mean over proposals is the mass of the orthant.
 
+use super::planted::planted;
 use crate::infer::moments::log_normal_mass;
 use crate::linear_algebra::Cholesky;
 use crate::posterior::random::Random;
@@ -27,7 +28,7 @@ impl Orthant {
         factor.solve_upper(&mut mean);
         let slab: f64 = lower.iter().map(|l| log_normal_mass(-l)).sum();
         Some(Self {
-            log_free: 0.5 * (square - factor.log_determinant()) - slab,
+            log_free: 0.5 * (square - factor.log_determinant()) - planted!(0, slab, 0.0),
             lower,
             mean,
             factor,
@@ -91,6 +92,7 @@ impl Orthant {
 
 /// A draw from `N(center, sd²)` above `lower`.
 fn above(center: f64, sd: f64, lower: f64, random: &mut Random) -> f64 {
+    let lower = planted!(8, lower, f64::NEG_INFINITY);
     (center + sd * random.normal_above((lower - center) / sd)).max(lower)
 }
 

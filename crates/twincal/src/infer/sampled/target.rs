@@ -8,6 +8,7 @@
 //! Unlike in [`crate::posterior::Problem`] the slab does not scale with the noise: several variances leave no single one
 //! to scale with.
 
+use super::planted::planted;
 use crate::gram::JointGram;
 use crate::prior::Prior;
 
@@ -88,7 +89,7 @@ impl<'a> Target<'a> {
         let size = self.size();
         let (mut matrix, mut rhs) = (vec![0.0; size * size], vec![0.0; size]);
         for (j, gram) in self.grams.iter().enumerate() {
-            let statistics = gram.stationary(at.rho[j]);
+            let statistics = gram.stationary(planted!(9, at.rho[j], 0.0));
             let factor = 1.0 / at.variance[self.group[j]];
             let last = gram.columns.len();
             for (a, &row) in gram.columns.iter().enumerate() {
@@ -148,6 +149,6 @@ impl Squares {
     pub(super) fn at(&self, rho: f64) -> f64 {
         (1.0 - rho) * (1.0 - rho) * self.all
             + rho * self.differences
-            + rho * (1.0 - rho) * self.ends
+            + planted!(6, rho * (1.0 - rho), 0.0) * self.ends
     }
 }
