@@ -8,7 +8,7 @@ use twincal::robot::nearest_names;
 const TOP: &str = "\
 Examples:
   twincal demo                                        the whole road, offline
-  twincal inspect run.csv --model arm.urdf            what is in this log?
+  twincal doctor run.csv --model arm.urdf             what is wrong with this log?
   twincal fit run*.csv --model arm.urdf               what does my model miss?
   twincal check heldout.csv --twin twincal-out        is the twin still right?
   twincal predict run.csv --twin twincal-out -o p.csv torque with intervals
@@ -36,6 +36,24 @@ Examples:
   twincal inspect run1.csv --model arm.urdf --json
 ")]
     Inspect(Inspect),
+    /// What is wrong with these logs or this model, and what to mend first.
+    #[command(
+        before_help = "\
+Examples:
+  twincal doctor run.csv --model arm.urdf
+  twincal doctor run1.csv run2.csv --model arm.urdf --json
+  twincal init run.csv --model arm.urdf      writes the proposed twincal.toml
+",
+        after_help = "The exit code is what `twincal fit` would end with for the same reason."
+    )]
+    Doctor(Doctor),
+    /// Write the twincal.toml that `doctor` proposes.
+    #[command(before_help = "\
+Examples:
+  twincal init run*.csv --model arm.urdf
+  twincal fit --config twincal.toml
+")]
+    Init(Init),
     /// Discover what the model misses, estimate it, validate on held-out data.
     #[command(before_help = "\
 Examples:
@@ -143,6 +161,38 @@ pub(crate) struct Inspect {
     pub(crate) allow: Vec<Allow>,
     #[command(flatten)]
     pub(crate) log: LogFlags,
+}
+
+/// Logs beside a model.
+#[derive(Debug, Args)]
+#[allow(
+    rustdoc::broken_intra_doc_links,
+    reason = "[[log]] is a table of twincal.toml, and this text is printed as help"
+)]
+pub(crate) struct Doctor {
+    /// Logs to look at (CSV, Parquet) [default: those of [[log]] in the config].
+    #[arg(value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
+    /// Robot model (URDF, MJCF).
+    #[arg(long, value_name = "MODEL")]
+    pub(crate) model: Option<PathBuf>,
+    /// Accept with a warning what would be refused.
+    #[arg(long, value_name = "WHAT", value_enum)]
+    pub(crate) allow: Vec<Allow>,
+    #[command(flatten)]
+    pub(crate) log: LogFlags,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Init {
+    #[command(flatten)]
+    pub(crate) look: Doctor,
+    /// File to write [default: twincal.toml].
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// Replace an existing file.
+    #[arg(long)]
+    pub(crate) force: bool,
 }
 
 #[derive(Debug, Args)]

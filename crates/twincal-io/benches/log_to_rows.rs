@@ -94,6 +94,7 @@ fn main() {
         cutoff_hz: Auto::Auto,
         rate_hz: Auto::Auto,
         coulomb_velocity: None,
+        corrections: twincal::signal::Corrections::default(),
     };
     let (seconds, pipeline) =
         shortest(|| choose_pipeline(&robot, &logs, &settings).expect("moves").0);

@@ -19,6 +19,10 @@ const AUTO: SignalSettings = SignalSettings {
     cutoff_hz: Auto::Auto,
     rate_hz: Auto::Auto,
     coulomb_velocity: None,
+    corrections: twincal::signal::Corrections {
+        lag: twincal::signal::Lag::Unsaid,
+        velocity_from_position: false,
+    },
 };
 
 /// Model and logs of a robot; `None` (and said) where the data are absent.

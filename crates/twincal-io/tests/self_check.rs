@@ -48,6 +48,7 @@ fn check(robot: &Robot, logs: &[Recording], cutoff: Auto) -> Result<Vec<Finding>
         cutoff_hz: cutoff,
         rate_hz: Auto::Auto,
         coulomb_velocity: None,
+        corrections: twincal::signal::Corrections::default(),
     };
     let (pipeline, _) = choose_pipeline(robot, logs, &settings)?;
     let mut trajectories = Vec::new();

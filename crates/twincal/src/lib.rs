@@ -15,6 +15,8 @@ pub mod diagnostics;
 pub mod robot;
 pub mod signal;
 pub mod self_check;
+pub mod lag;
+pub mod incidents;
 pub mod term;
 pub mod rows;
 pub mod gram;

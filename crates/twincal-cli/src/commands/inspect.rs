@@ -1,6 +1,7 @@
 //! `twincal inspect`: what a model and logs hold, before anything is fitted.
 
 use self::library::{BaseRow, ComponentRow, base_row, component_rows};
+use super::checkup::checkup;
 use super::inputs::{LogInput, RobotInput};
 use super::summary::{Notes, findings, paragraph, print_table, significant, table};
 use super::{code_of, print_json, require_strict, settings, start_threads};
@@ -9,17 +10,15 @@ use crate::failure::Outcome;
 use crate::progress::Progress;
 use crate::terminal::{Terminal, clean};
 use serde::Serialize;
+use twincal::Finding;
 use twincal::calibrate::{Outlook, outlook};
 use twincal::excitation::Unseen;
 use twincal::robot::{JointKind, Mimic, Robot};
-use twincal::self_check::self_check;
 use twincal::signal::{
-    LogOverview, Pipeline, SignalSettings, Trajectory, align, choose_pipeline, describe,
-    hardly_driven,
+    LogOverview, Pipeline, SignalSettings, Trajectory, choose_pipeline, describe, hardly_driven,
 };
-use twincal::{Finding, Severity};
 
-mod library;
+pub(super) mod library;
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -69,7 +68,7 @@ struct UnseenRow {
 }
 
 pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
-    let config = settings::of_inspect(flags, terminal)?;
+    let config = settings::of_look(&flags.model, &flags.allow, &flags.log, terminal)?;
     let settings = config.settings()?;
     start_threads(settings.threads)?;
     let progress = Progress::new();
@@ -124,17 +123,8 @@ fn compare(
     let Ok((pipeline, _)) = choose_pipeline(robot, &logs.recordings, signal) else {
         return Ok((None, Vec::new()));
     };
-    let mut trajectories: Vec<Trajectory> = Vec::new();
-    let mut found = Vec::new();
-    for recording in &logs.recordings {
-        if let Ok((trajectory, more)) = align(robot, recording, &pipeline) {
-            trajectories.push(trajectory);
-            found.extend(more.into_iter().filter(|f| f.severity > Severity::Note));
-        }
-    }
-    let more = self_check(robot, &pipeline, &trajectories);
-    found.extend(more.map_err(|error| logs.as_given(error))?);
-    Ok((Some((pipeline, trajectories)), found))
+    let found = checkup(robot, &logs.recordings, &pipeline).map_err(|e| logs.as_given(e))?;
+    Ok((Some((pipeline, found.trajectories)), found.findings))
 }
 
 /// The logs as a fit would filter them.
@@ -224,20 +214,7 @@ fn print(inspection: &Inspection, terminal: &mut Terminal) {
     terminal.say("");
     library::print(inspection, terminal);
     for log in &inspection.logs {
-        terminal.heading(&format!("{}: {} rows", log.name, log.samples));
-        let clock = if log.resampled {
-            "uneven clock"
-        } else {
-            "even clock"
-        };
-        let (seconds, rate) = (significant(log.duration, 4), significant(log.rate_hz, 5));
-        paragraph(
-            &format!(
-                "{seconds} s at {rate} Hz, {clock}, {} without a gap",
-                pieces(log.segments)
-            ),
-            terminal,
-        );
+        log_heading(log, terminal);
         let mut rows = table(&[
             "joint",
             "q from … to",
@@ -267,6 +244,22 @@ fn print(inspection: &Inspection, terminal: &mut Terminal) {
         terminal.say("");
     }
     findings(&inspection.findings, Notes::Shown, terminal);
+}
+
+/// Name, rows, length, rate and clock of a log.
+pub(super) fn log_heading(log: &LogOverview, terminal: &mut Terminal) {
+    terminal.heading(&format!("{}: {} rows", log.name, log.samples));
+    let clock = if log.resampled {
+        "uneven clock"
+    } else {
+        "even clock"
+    };
+    let (seconds, rate) = (significant(log.duration, 4), significant(log.rate_hz, 5));
+    let pieces = pieces(log.segments);
+    paragraph(
+        &format!("{seconds} s at {rate} Hz, {clock}, {pieces} without a gap"),
+        terminal,
+    );
 }
 
 fn pieces(segments: u64) -> String {

@@ -2,8 +2,10 @@
 
 mod calibration;
 mod check;
+mod checkup;
 mod demo;
 mod diff;
+mod doctor;
 mod export;
 mod fit;
 mod inputs;
@@ -24,6 +26,8 @@ pub(crate) fn run(command: &Command, terminal: &mut Terminal) -> Outcome<u8> {
     match command {
         Command::Demo(flags) => demo::run(flags, terminal),
         Command::Inspect(flags) => inspect::run(flags, terminal),
+        Command::Doctor(flags) => doctor::run(flags, terminal),
+        Command::Init(flags) => doctor::init(flags, terminal),
         Command::Fit(flags) => fit::run(flags, terminal),
         Command::Check(flags) => check::run(flags, terminal),
         Command::Predict(flags) => predict::run(flags, terminal),

@@ -1,9 +1,10 @@
 //! Flags over config: every flag has a key and overrides it.
 
-use crate::args::{Allow, Fit, Inspect, LogFlags};
+use crate::args::{Allow, Fit, LogFlags};
 use crate::failure::Outcome;
 use crate::terminal::Terminal;
 use std::path::Path;
+use std::path::PathBuf;
 use twincal_io::config::{self, Config};
 
 /// Name of a config that is found but not asked for.
@@ -46,10 +47,16 @@ pub(super) fn of_fit(flags: &Fit, terminal: &mut Terminal) -> Outcome<Config> {
     Ok(config)
 }
 
-pub(super) fn of_inspect(flags: &Inspect, terminal: &mut Terminal) -> Outcome<Config> {
-    let mut config = of_logs(&flags.log, terminal)?;
-    over(&mut config.file.model.file, flags.model.clone());
-    over(&mut config.file.model.allow, allowed(&flags.allow));
+/// The config of a command that looks at logs beside a model.
+pub(super) fn of_look(
+    model: &Option<PathBuf>,
+    allow: &[Allow],
+    flags: &LogFlags,
+    terminal: &mut Terminal,
+) -> Outcome<Config> {
+    let mut config = of_logs(flags, terminal)?;
+    over(&mut config.file.model.file, model.clone());
+    over(&mut config.file.model.allow, allowed(allow));
     Ok(config)
 }
 

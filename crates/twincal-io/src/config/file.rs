@@ -356,6 +356,32 @@ pub struct SignalTable {
     pub cutoff_hz: Option<NumberOrAuto>,
     /// Rate of the kept rows, Hz; default "auto" = 2.5 × cut-off.
     pub rate_hz: Option<NumberOrAuto>,
+    /// How much later than the motion torque was logged, s: torque is moved back by it. One number for all joints, or
+    /// { joint = seconds }; negative where torque comes first. 0 says that there is none: without this key a lag of more than one
+    /// sample counts as degraded data.
+    pub lag: Option<LagKey>,
+    /// Default "logged". "position": logged velocities are not used but derived from position.
+    pub velocity: Option<VelocityWord>,
+}
+
+/// A lag.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected seconds or { joint = seconds }")]
+pub enum LagKey {
+    /// Of all joints, s.
+    All(f64),
+    /// By joint name, s.
+    Joints(BTreeMap<String, f64>),
+}
+
+/// Where velocity comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum VelocityWord {
+    /// The log.
+    Logged,
+    /// The change of position.
+    Position,
 }
 
 /// `[prior]`

@@ -7,16 +7,19 @@
 mod file;
 mod log_form;
 mod log_forms;
+mod proposal;
 mod settings;
 mod unknown_keys;
 
 pub use file::{
     Allow, AutoWord, BaseTable, CheckTable, ColumnsTable, ConfigFile, FamilyWord, Friction,
-    InclusionTable, InferenceTable, LibraryTable, LogEntry, LogTable, MethodWord, ModelTable,
-    NoisePrior, NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PresetWord,
-    PriorTable, SignalTable, Slab, Topics, TorqueWord, UncertaintyWord, UnknownWord,
+    InclusionTable, InferenceTable, LagKey, LibraryTable, LogEntry, LogTable, MethodWord,
+    ModelTable, NoisePrior, NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey,
+    PresetWord, PriorTable, SignalTable, Slab, Topics, TorqueWord, UncertaintyWord, UnknownWord,
+    VelocityWord,
 };
 pub use log_form::LogForm;
+pub use proposal::Proposal;
 pub use settings::{Gates, LogSettings, OneLog, Settings};
 
 use crate::error::{Error, Place, Result};

@@ -1,8 +1,8 @@
 //! From keys to settings: defaults filled in, ranges checked.
 
 use super::{
-    Allow, Config, Friction, LogForm, MethodWord, NoisePrior, NoiseWord, NumberOrAuto, PayloadKey,
-    Slab, UncertaintyWord,
+    Allow, Config, Friction, LagKey, LogForm, MethodWord, NoisePrior, NoiseWord, NumberOrAuto,
+    PayloadKey, Slab, UncertaintyWord, VelocityWord,
 };
 use crate::error::Result;
 use crate::log::LogOptions;
@@ -14,7 +14,7 @@ use twincal::calibrate::CalibrationSettings;
 use twincal::infer::{Choice, InferenceSettings};
 use twincal::likelihood::{NoiseModel, NoiseSettings, NoiseUncertainty};
 use twincal::prior::{Inclusion, PriorSettings};
-use twincal::signal::{Auto, Payload, SignalSettings};
+use twincal::signal::{Auto, Corrections, Lag, Payload, SignalSettings};
 use twincal::term::{Family, LibrarySettings};
 
 /// `[log]` and `[columns]` with defaults.
@@ -290,6 +290,25 @@ impl Config {
                 "\"auto\" or a positive Hz",
             )?,
             coulomb_velocity: self.coulomb_velocity()?,
+            corrections: Corrections {
+                lag: self.lag()?,
+                velocity_from_position: table.velocity == Some(VelocityWord::Position),
+            },
+        })
+    }
+
+    fn lag(&self) -> Result<Lag> {
+        let range = "seconds between -1 and 1";
+        let number = |key: &str, lag: f64| self.number(key, lag, |lag| lag.abs() <= 1.0, range);
+        Ok(match &self.file.signal.lag {
+            None => Lag::Unsaid,
+            Some(LagKey::All(lag)) => Lag::All(number("signal.lag", *lag)?),
+            Some(LagKey::Joints(joints)) => {
+                for (joint, lag) in joints {
+                    number(&format!("signal.lag.{joint}"), *lag)?;
+                }
+                Lag::Joints(joints.clone())
+            }
         })
     }
 

@@ -214,6 +214,27 @@ pub fn match_columns(
     })
 }
 
+/// Moving joints of the model for which a file has no position column; empty where the header itself is refused.
+pub fn joints_without_column(
+    file: &str,
+    header: &[String],
+    robot: &Robot,
+    options: &LogOptions,
+) -> Vec<String> {
+    let Ok(header) = Header::new(file, header) else {
+        return Vec::new();
+    };
+    let joints = robot.joint_names().into_iter().enumerate();
+    joints
+        .filter(|(number, joint)| {
+            !options.columns.q.contains_key(*joint)
+                && by_joint(&header, joint, 0).is_none()
+                && by_number(&header, number + 1, 0).is_none()
+        })
+        .map(|(_, joint)| joint.to_owned())
+        .collect()
+}
+
 fn find_time(header: &Header<'_>, options: &LogOptions) -> Result<Option<Channel>> {
     if let Some(name) = &options.columns.time {
         return header.mapped("time", name).map(Some);

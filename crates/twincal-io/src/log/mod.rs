@@ -13,13 +13,15 @@
 mod bag;
 mod columns;
 mod csv;
+mod header;
 mod npz;
 mod pages;
 mod parquet;
 mod preset;
 mod torque;
 
-pub use columns::{Channel, Selection, match_columns};
+pub use columns::{Channel, Selection, joints_without_column, match_columns};
+pub use header::read_header;
 pub use preset::Preset;
 pub use torque::{TorqueOptions, TorqueSource};
 

@@ -3,6 +3,7 @@
 use super::refuse;
 use super::result::LogSummary;
 use crate::error::{Finding, Result, Severity};
+use crate::incidents::{incident_findings, incidents, leave_out};
 use crate::likelihood::Columns;
 use crate::observations::{Observations, Part, observe};
 use crate::robot::Robot;
@@ -51,6 +52,9 @@ impl Data {
                     let (mut trajectory, mut more) = align(robot, recording, pipeline)?;
                     trajectory.payload_acts = !unknown || recording.payload == Payload::Unknown;
                     findings.append(&mut more);
+                    let happened = incidents(robot, pipeline, &trajectory);
+                    leave_out(pipeline, &mut trajectory, &happened);
+                    findings.extend(incident_findings(&recording.name, &happened));
                     let observations = observe(robot, library, pipeline, &trajectory)?;
                     let summary = summary(robot, recording, role, &trajectory, &observations);
                     Ok(Log {

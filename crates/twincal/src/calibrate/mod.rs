@@ -33,6 +33,7 @@ use crate::error::{Error, Finding, Result, Severity};
 use crate::infer::{
     Choice, Given, InferenceSettings, R_HAT_LIMIT, infer, sample, sampled_likelihood,
 };
+use crate::lag::{LogLag, estimate_lag, lag_findings};
 use crate::likelihood::{
     Columns, JointNoise, NoiseInterval, NoiseModel, NoiseSettings, NoiseUncertainty, SpeedProfile,
 };
@@ -44,7 +45,7 @@ use crate::posterior::Method;
 use crate::prior::PriorSettings;
 use crate::robot::Robot;
 use crate::self_check::self_check;
-use crate::signal::{Auto, Recording, SignalSettings, choose_pipeline, hardly_driven};
+use crate::signal::{Auto, Corrections, Recording, SignalSettings, choose_pipeline, hardly_driven};
 use crate::term::{Family, Library, LibrarySettings};
 use crate::twin::Twin;
 use data::Data;
@@ -77,6 +78,7 @@ impl Default for CalibrationSettings {
                 cutoff_hz: Auto::Auto,
                 rate_hz: Auto::Auto,
                 coulomb_velocity: None,
+                corrections: Corrections::default(),
             },
             prior: PriorSettings {
                 scaled_variance: Auto::Auto,
@@ -146,6 +148,11 @@ pub fn calibrate(
     // eq. (1)–(4): residual torque and Euler–Lagrange columns, filtered alike
     let mut data = Data::read(robot, &library, &pipeline, logs, heldout)?;
     findings.extend(self_check(robot, &pipeline, data.trajectories())?);
+    let lags: Vec<LogLag> = data
+        .trajectories()
+        .filter_map(|trajectory| estimate_lag(robot, &pipeline, trajectory))
+        .collect();
+    findings.extend(lag_findings(&pipeline, &lags));
     let every_candidate = library.clone();
     let (library, zero_columns) = data.drop_zero_columns(library);
     let columns = columns_of(robot, &library, settings)?;

@@ -40,6 +40,7 @@ fn pipeline(cutoff_hz: f64) -> Pipeline {
         coulomb_velocity: 0.02,
         standstill_velocity: vec![0.02; 2],
         derived_from: vec![DerivedFrom::Position; 2],
+        corrections: crate::signal::Corrections::default(),
     }
 }
 

@@ -13,6 +13,7 @@ use crate::robot::{JointKind, Robot};
 use crate::signal::{Pipeline, Trajectory};
 use explain::{Explained, Reading, explain};
 use sample::Sample;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
 /// Torque that differs by this factor from the model's is not of the joint's side, or not in N·m.
@@ -39,6 +40,45 @@ pub fn self_check<'a>(
     pipeline: &Pipeline,
     trajectories: impl IntoIterator<Item = &'a Trajectory>,
 ) -> Result<Vec<Finding>> {
+    Ok(look(robot, pipeline, trajectories)?.findings)
+}
+
+/// What the nominal model and passive friction explain of a joint's torque, and the reading of the log that explains most.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct JointCheck {
+    /// Name of the joint.
+    pub joint: String,
+    /// Share of the torque's variance that model, friction and motor inertia explain as logged; `None` for a joint that says
+    /// nothing.
+    pub explained: Option<f64>,
+    /// The same without the model.
+    pub without_model: Option<f64>,
+    /// Factor at the nominal torque; 0 where friction alone explains more.
+    pub gain: Option<f64>,
+    /// The joint of the log whose motion explains most as this joint's, and its sign.
+    pub motion: (String, f64),
+    /// The same of torque.
+    pub torque: (String, f64),
+}
+
+/// What [`self_check`] says, with the numbers behind it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Look {
+    /// Every moving joint; empty without torque.
+    pub joints: Vec<JointCheck>,
+    /// Those of [`self_check`].
+    pub findings: Vec<Finding>,
+}
+
+/// [`self_check`] with the numbers behind it.
+///
+/// # Errors
+/// Like [`self_check`].
+pub fn look<'a>(
+    robot: &Robot,
+    pipeline: &Pipeline,
+    trajectories: impl IntoIterator<Item = &'a Trajectory>,
+) -> Result<Look> {
     let mut samples = Vec::new();
     for trajectory in trajectories {
         let Some(sample) = Sample::take(pipeline, trajectory) else {
@@ -49,13 +89,29 @@ pub fn self_check<'a>(
     }
     let sample = Sample::pool(&samples);
     if sample.len == 0 {
-        return Ok(Vec::new());
+        return Ok(Look::default());
     }
     let as_logged = explain(robot, &sample, &Reading::as_logged(robot.dof()));
     let (reading, explained) = mend::mend(robot, &sample, &as_logged);
     let mut findings = signs_and_order(robot, &reading, &as_logged, &explained);
     findings.extend(scales(robot, &explained));
-    Ok(findings)
+    let names = robot.joint_names();
+    let joints = names.iter().enumerate().map(|(joint, name)| {
+        let named = |(from, sign): (usize, f64)| (names[from].to_owned(), sign);
+        let own = as_logged[joint];
+        JointCheck {
+            joint: (*name).to_owned(),
+            explained: own.map(|e| 1.0 - e.left),
+            without_model: own.map(|e| 1.0 - e.left_without_model),
+            gain: own.map(|e| e.gain),
+            motion: named(reading.motion[joint]),
+            torque: named(reading.torque[joint]),
+        }
+    });
+    Ok(Look {
+        joints: joints.collect(),
+        findings,
+    })
 }
 
 /// Angles beyond a turn whose torque only makes sense when they are taken as degrees.
@@ -200,5 +256,7 @@ fn signs_and_order(
     findings
 }
 
+#[cfg(test)]
+pub(crate) mod testing;
 #[cfg(test)]
 mod tests;

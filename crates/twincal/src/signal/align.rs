@@ -1,5 +1,6 @@
 //! One recording through the motion filter: segments of smooth motion, raw torque and standstill flags.
 
+use super::agreement::{self, velocity_agreement};
 use super::choose::{COLUMN_LIMIT, MOTION_LIMIT, require_derivatives};
 use super::convolve::correlate;
 use super::fir::{MotionKernels, column_half_seconds, motion_half_samples, motion_half_seconds};
@@ -26,7 +27,7 @@ pub(crate) fn align(
     if every_row {
         require_derivatives(joints, log)?;
     }
-    let prepared = prepare(joints, log, every_row, &mut findings)?;
+    let prepared = prepare(joints, log, every_row, &pipeline.corrections, &mut findings)?;
     let with_tau = log.joints.iter().all(|c| c.tau.is_some());
     let mut trajectory = Trajectory {
         name: log.name.clone(),
@@ -74,7 +75,7 @@ pub(crate) fn align(
     let (mut short, mut short_rows, mut total, mut used) = (0, 0, 0.0, 0.0);
     for piece in &prepared.pieces {
         total += piece.time.len() as f64 * piece.interval;
-        match smoothed(piece, pipeline, cutoff, log, with_tau) {
+        match smoothed(joints, piece, pipeline, cutoff, log, with_tau) {
             Some(segment) => {
                 let border = 2.0 * column_half_seconds(pipeline.cutoff_hz);
                 used += (segment.time.len() as f64 * piece.interval - border).max(0.0);
@@ -107,6 +108,9 @@ pub(crate) fn align(
         ),
         0,
     ));
+    let names: Vec<&str> = joints.iter().map(|facts| facts.name.as_str()).collect();
+    let agreement = velocity_agreement(&trajectory, &pipeline.standstill_velocity);
+    findings.extend(agreement::findings(&names, &log.name, &agreement));
     report_standstill(joints, log, &trajectory, &mut findings);
     Saturated::find(joints, log, pipeline).mask(log, &mut trajectory, &mut findings);
     Ok((trajectory, findings))
@@ -146,6 +150,7 @@ fn as_logged(piece: &Piece, with_tau: bool) -> Segment {
 
 /// Step 2 of method section 1; `None` if the piece does not hold the kernel and a few samples more.
 fn smoothed(
+    joints: &[JointFacts],
     piece: &Piece,
     pipeline: &Pipeline,
     cutoff: f64,
@@ -200,7 +205,9 @@ fn smoothed(
     let (input_rows, logged) = if piece.resampled {
         (
             Vec::new(),
-            Some(logged_samples(&time, &piece.rows, log, with_tau)),
+            Some(logged_samples(
+                joints, &time, piece, log, pipeline, with_tau,
+            )),
         )
     } else {
         (piece.rows[inner].to_vec(), None)
@@ -218,24 +225,44 @@ fn smoothed(
     })
 }
 
-/// The rows as logged that lie within the borders of a resampled segment.
-fn logged_samples(time: &[f64], rows: &[usize], log: &Recording, with_tau: bool) -> LoggedSamples {
-    let (first, last) = (time[0], time[time.len() - 1]);
-    let rows: Vec<usize> = rows
-        .iter()
-        .copied()
-        .filter(|&row| (first..=last).contains(&log.time[row]))
-        .collect();
-    let tau = log
+/// The rows as logged that lie within the borders of a resampled segment; torque moved back by its lag.
+fn logged_samples(
+    joints: &[JointFacts],
+    time: &[f64],
+    piece: &Piece,
+    log: &Recording,
+    pipeline: &Pipeline,
+    with_tau: bool,
+) -> LoggedSamples {
+    let of_rows =
+        |values: &[f64]| -> Vec<f64> { piece.rows.iter().map(|&row| values[row]).collect() };
+    let stamps = of_rows(&log.time);
+    let logged: Vec<Channels> = log
         .joints
         .iter()
-        .filter_map(|c| c.tau.as_ref().filter(|_| with_tau));
+        .map(|channels| Channels {
+            q: Vec::new(),
+            qd: None,
+            qdd: None,
+            tau: channels.tau.as_deref().filter(|_| with_tau).map(of_rows),
+        })
+        .collect();
+    let mut moved = logged.clone();
+    let corrections = &pipeline.corrections;
+    if corrections.moves(joints) {
+        corrections.move_torque(joints, &stamps, &logged, &stamps, &mut moved);
+    }
+    let (first, last) = (time[0], time[time.len() - 1]);
+    let from = stamps.partition_point(|t| *t < first);
+    let to = stamps.partition_point(|t| *t <= last);
     LoggedSamples {
-        time: rows.iter().map(|&row| log.time[row]).collect(),
-        tau: tau
-            .flat_map(|tau| rows.iter().map(|&row| tau[row]))
+        time: stamps[from..to].to_vec(),
+        tau: moved
+            .iter()
+            .filter_map(|channels| channels.tau.as_deref())
+            .flat_map(|tau| tau[from..to].iter().copied())
             .collect(),
-        input_rows: rows,
+        input_rows: piece.rows[from..to].to_vec(),
     }
 }
 

@@ -38,17 +38,22 @@ pub(crate) fn choose(
             remedy: "give at least one log".into(),
         });
     }
+    let (corrections, is_off) = (
+        &settings.corrections,
+        settings.cutoff_hz == Auto::Value(0.0),
+    );
+    corrections.check(joints, is_off)?;
     // What is wrong with single logs is said when they are aligned.
     let mut unsaid = Vec::new();
-    if settings.cutoff_hz == Auto::Value(0.0) {
+    if is_off {
         for log in logs {
-            prepare(joints, log, true, &mut unsaid)?;
+            prepare(joints, log, true, corrections, &mut unsaid)?;
         }
         return off(joints, logs, settings);
     }
     let mut prepared = Vec::with_capacity(logs.len());
     for log in logs {
-        prepared.push(prepare(joints, log, false, &mut unsaid)?);
+        prepared.push(prepare(joints, log, false, corrections, &mut unsaid)?);
     }
     on(joints, logs, &prepared, settings)
 }
@@ -146,6 +151,7 @@ fn off(
         coulomb_velocity: settings.coulomb_velocity.unwrap_or(0.0),
         standstill_velocity: vec![0.0; joints.len()],
         derived_from: vec![DerivedFrom::Position; joints.len()],
+        corrections: settings.corrections.clone(),
     };
     Ok((pipeline, findings))
 }
@@ -238,6 +244,7 @@ fn on(
         derived_from: (0..joints.len())
             .map(|joint| derived_from(&of_joint(joint), cutoff))
             .collect(),
+        corrections: settings.corrections.clone(),
     };
     let mut still = Vec::with_capacity(joints.len());
     for (joint, facts) in joints.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! What a log holds, before anything is fitted: rates, cuts, motion and torque per joint.
 
-use super::Recording;
 use super::prepare::{joint_facts, prepare};
+use super::{Corrections, Recording};
 use crate::error::{Finding, Result, Severity};
 use crate::robot::Robot;
 use serde::{Deserialize, Serialize};
@@ -56,7 +56,7 @@ pub struct LogOverview {
 pub fn describe(robot: &Robot, log: &Recording) -> Result<(LogOverview, Vec<Finding>)> {
     let facts = joint_facts(robot);
     let mut findings = Vec::new();
-    let prepared = prepare(&facts, log, false, &mut findings)?;
+    let prepared = prepare(&facts, log, false, &Corrections::default(), &mut findings)?;
     let joints = facts
         .iter()
         .enumerate()

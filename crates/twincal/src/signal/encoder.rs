@@ -57,18 +57,35 @@ pub(crate) fn velocity_resolution(
     let step = quantum(channels().map(|c| c.q.as_slice()));
     let stepping = step.map_or(0.0, |step| 4.0 * pipeline.motion_cutoff_hz * step);
     if let Some(step) = step.filter(|_| stepping > pipeline.coulomb_velocity) {
+        let [velocity, acceleration] = quantisation_floor(step, spectra, pipeline);
         findings.push(Finding::new(
             Severity::Warning,
             "quantised_encoder",
             &facts.name,
             format!(
-                "joint `{}`: the encoder steps by {step:.3e}, so velocities below {stepping:.3e} per s cannot be told from standstill",
+                "joint `{}`: the encoder steps by {step:.3e}: quantisation alone leaves a noise of {velocity:.2e} in velocity and \
+                 {acceleration:.2e} in acceleration derived from position (SI units, after the motion filter), and velocities below \
+                 {stepping:.3e} per s cannot be told from standstill; log the encoder's full resolution, or lower [signal] cutoff_hz",
                 facts.name
             ),
             0,
         ));
     }
     stepping.max(3.0 * travel)
+}
+
+/// Noise that an encoder of this step leaves in velocity and acceleration after the motion filter: uniform rounding has
+/// sd `step / √12`.
+fn quantisation_floor(step: f64, spectra: &[&JointSpectra], pipeline: &Pipeline) -> [f64; 2] {
+    let sd = step / 12.0_f64.sqrt();
+    let mut floor = [0.0_f64; 2];
+    for log in spectra {
+        let kernels = MotionKernels::new(pipeline.motion_cutoff_hz, 1.0 / log.position_noise.rate);
+        for (floor, kernel) in floor.iter_mut().zip([&kernels.first, &kernels.second]) {
+            *floor = floor.max(sd * noise_gain(kernel));
+        }
+    }
+    floor
 }
 
 /// Step of a quantised channel: the smallest change, if changes are multiples of it and many are 0 or 1 steps.

@@ -1,9 +1,11 @@
 //! From a recording to uniform, finite, filtered motion and torque (method section 1).
 
+mod agreement;
 mod align;
 mod choose;
 mod clock;
 pub(crate) mod convolve;
+mod correct;
 mod cutoff;
 mod describe;
 mod encoder;
@@ -14,10 +16,14 @@ mod saturation;
 mod spectrum;
 pub(crate) mod spline;
 mod standstill;
+mod steps;
 mod units;
 mod unwrap;
 
+pub use agreement::{Agreement, velocity_agreement};
+pub use correct::{Corrections, Lag};
 pub use describe::{JointOverview, LogOverview, describe, hardly_driven};
+pub use steps::{Steps, steps};
 
 use crate::error::{Finding, Result};
 use crate::robot::Robot;
@@ -41,6 +47,8 @@ pub struct SignalSettings {
     pub rate_hz: Auto,
     /// v_s of Coulomb friction and of the standstill mask, rad/s or m/s; `None`: 0 with cut-off 0, else 0.02.
     pub coulomb_velocity: Option<f64>,
+    /// What is put right in every log first.
+    pub corrections: Corrections,
 }
 
 /// One joint's channels as logged, SI units, all of the recording's length.
@@ -112,6 +120,9 @@ pub struct Pipeline {
     pub standstill_velocity: Vec<f64>,
     /// What q̈ is derived from where it is not logged, per joint: the channel that leaves less noise.
     pub derived_from: Vec<DerivedFrom>,
+    /// What is put right in every log first.
+    #[serde(default, skip_serializing_if = "Corrections::is_default")]
+    pub corrections: Corrections,
 }
 
 /// A run of samples on one clock without a cut: finite, time increasing. Arrays are `joint * len + sample`.
@@ -173,6 +184,7 @@ impl Pipeline {
             coulomb_velocity: 0.0,
             standstill_velocity: vec![0.0; dof],
             derived_from: vec![DerivedFrom::Position; dof],
+            corrections: Corrections::default(),
         }
     }
 

@@ -4,7 +4,7 @@ use super::clock::{Run, even_interval, read_clock, report_jitter};
 use super::spline::resample;
 use super::units::refuse_degrees;
 use super::unwrap::unwrap_angle;
-use super::{Channels, Recording};
+use super::{Channels, Corrections, Recording};
 use crate::error::{Error, Finding, Result, Severity};
 use crate::robot::{JointKind, Robot};
 
@@ -57,6 +57,22 @@ pub(crate) struct Piece {
     pub(crate) joints: Vec<Channels>,
 }
 
+impl Piece {
+    /// Keeps these samples of the grid.
+    fn keep(&mut self, range: std::ops::Range<usize>) {
+        let cut = |values: &mut Vec<f64>| *values = values[range.clone()].to_vec();
+        cut(&mut self.time);
+        if !self.resampled {
+            self.rows = self.rows[range.clone()].to_vec();
+        }
+        for channels in &mut self.joints {
+            cut(&mut channels.q);
+            let others = [&mut channels.qd, &mut channels.qdd, &mut channels.tau];
+            others.into_iter().flatten().for_each(cut);
+        }
+    }
+}
+
 /// A log as pieces.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Prepared {
@@ -71,6 +87,7 @@ pub(crate) fn prepare(
     joints: &[JointFacts],
     log: &Recording,
     every_row: bool,
+    corrections: &Corrections,
     findings: &mut Vec<Finding>,
 ) -> Result<Prepared> {
     if log.joints.len() != joints.len() {
@@ -99,12 +116,13 @@ pub(crate) fn prepare(
             },
             |q| run.rows.iter().map(|&row| q[row]).collect(),
         ),
-        qd: pick(&log.joints[joint].qd, run),
+        qd: pick(&log.joints[joint].qd, run).filter(|_| !corrections.velocity_from_position),
         qdd: pick(&log.joints[joint].qdd, run),
         tau: pick(&log.joints[joint].tau, run),
     };
     let mut pieces = Vec::with_capacity(clock.runs.len());
     let (mut short, mut short_rows, mut resampled) = (0_u64, 0_u64, 0_u64);
+    let moves = corrections.moves(joints);
     for run in &clock.runs {
         if run.rows.len() < MINIMUM_RUN && !every_row {
             short += 1;
@@ -120,7 +138,8 @@ pub(crate) fn prepare(
         } else {
             even_interval(&stamps)
         };
-        pieces.push(match even {
+        let logged = moves.then(|| (stamps.clone(), values.clone()));
+        let mut piece = match even {
             Some(interval) => Piece {
                 time: stamps,
                 interval,
@@ -132,7 +151,18 @@ pub(crate) fn prepare(
                 resampled += stamps.len() as u64;
                 on_grid(&stamps, run, &values, clock.interval)
             }
-        });
+        };
+        if let Some((stamps, values)) = logged {
+            let (time, moved) = (&piece.time, &mut piece.joints);
+            let kept = corrections.move_torque(joints, &stamps, &values, time, moved);
+            piece.keep(kept);
+            if piece.time.len() < MINIMUM_RUN {
+                short += 1;
+                short_rows += piece.rows.len() as u64;
+                continue;
+            }
+        }
+        pieces.push(piece);
     }
     report_jitter(log, &clock.runs, clock.interval, resampled, findings);
     report_short(log, short, short_rows, findings);

@@ -78,6 +78,7 @@ fn settings(cutoff_hz: Auto) -> SignalSettings {
         cutoff_hz,
         rate_hz: Auto::Auto,
         coulomb_velocity: None,
+        corrections: Corrections::default(),
     }
 }
 

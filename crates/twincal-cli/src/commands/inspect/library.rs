@@ -36,7 +36,7 @@ struct ShareRow {
 
 /// One candidate.
 #[derive(Serialize)]
-pub(super) struct ComponentRow {
+pub(in super::super) struct ComponentRow {
     name: String,
     family: Family,
     story: String,
@@ -69,7 +69,7 @@ pub(super) fn base_row(robot: &Robot) -> BaseRow {
     }
 }
 
-pub(super) fn component_rows(
+pub(in super::super) fn component_rows(
     library: &Library,
     excitation: Option<&Excitation>,
 ) -> Vec<ComponentRow> {
@@ -101,12 +101,29 @@ pub(super) fn component_rows(
 
 /// One line per family, then which joint should move more.
 pub(super) fn print(inspection: &Inspection, terminal: &mut Terminal) {
-    let all = &inspection.components;
+    families(&inspection.components, terminal);
+    let base = &inspection.base_parameters;
+    paragraph(
+        &format!(
+            "of {} inertial parameters torque shows {} combinations; {} never act",
+            base.count + base.dependent.len() + base.unidentifiable.len(),
+            base.count,
+            base.unidentifiable.len()
+        ),
+        terminal,
+    );
+    terminal.say("");
+    let words = inspection.unseen.iter().map(|unseen| unseen.words.as_str());
+    directions(inspection.directions, words, terminal);
+}
+
+/// What `fit` would look for, by family.
+pub(in super::super) fn families(all: &[ComponentRow], terminal: &mut Terminal) {
     terminal.heading(&format!(
         "What fit would look for: {} components",
         all.len()
     ));
-    let with_logs = inspection.directions.is_some();
+    let with_logs = all.iter().any(|component| component.seen.is_some());
     let mut header = vec!["family", "components", "columns"];
     if with_logs {
         header.extend(["seen", "in part", "not seen"]);
@@ -140,31 +157,26 @@ pub(super) fn print(inspection: &Inspection, terminal: &mut Terminal) {
         rows.add_row(row);
     }
     print_table(&rows, terminal);
-    let base = &inspection.base_parameters;
-    paragraph(
-        &format!(
-            "of {} inertial parameters torque shows {} combinations; {} never act",
-            base.count + base.dependent.len() + base.unidentifiable.len(),
-            base.count,
-            base.unidentifiable.len()
-        ),
-        terminal,
-    );
-    terminal.say("");
-    let Some([robot, logs]) = inspection.directions else {
+}
+
+/// What logs show of that, and what another motion would; nothing without logs.
+pub(in super::super) fn directions<'a>(
+    directions: Option<[usize; 2]>,
+    unseen: impl ExactSizeIterator<Item = &'a str>,
+    terminal: &mut Terminal,
+) {
+    let Some([robot, logs]) = directions else {
         return;
     };
     terminal.heading(&format!(
         "What these logs show: {logs} of {robot} independent directions"
     ));
-    for unseen in inspection.unseen.iter().take(SHOWN) {
-        paragraph(&unseen.words, terminal);
+    let all = unseen.len();
+    for words in unseen.take(SHOWN) {
+        paragraph(words, terminal);
     }
-    if inspection.unseen.len() > SHOWN {
-        terminal.say(&format!(
-            "  and {} more (--json)",
-            inspection.unseen.len() - SHOWN
-        ));
+    if all > SHOWN {
+        terminal.say(&format!("  and {} more (--json)", all - SHOWN));
     }
     terminal.say("");
 }

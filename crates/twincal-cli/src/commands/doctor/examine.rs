@@ -1,0 +1,348 @@
+//! Everything that can be said of logs and a model before a fit, also of logs that `fit` refuses.
+
+use super::super::checkup::{Checkup, checkup};
+use super::super::inputs::{LogInput, RobotInput};
+use crate::failure::{Failure, Outcome};
+use crate::progress::Progress;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use twincal::Finding;
+use twincal::calibrate::{Outlook, outlook};
+use twincal::robot::{JointKind, Robot};
+use twincal::signal::{
+    LogOverview, Pipeline, Recording, Steps, choose_pipeline, describe, hardly_driven, steps,
+};
+use twincal_io::config::Settings;
+use twincal_io::log::{joints_without_column, match_columns, read_header};
+
+/// Radians per degree.
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+/// Why `fit` would stop.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Refusal {
+    pub(super) problem: String,
+    pub(super) remedy: String,
+    /// Exit code of `fit`.
+    pub(super) exit_code: u8,
+}
+
+impl From<Failure> for Refusal {
+    fn from(failure: Failure) -> Self {
+        let exit_code = failure.exit_code();
+        let (problem, remedy) = failure.words();
+        Self {
+            problem,
+            remedy: remedy.unwrap_or_default(),
+            exit_code,
+        }
+    }
+}
+
+/// Which column became which channel.
+#[derive(Debug, Clone, Default, Serialize)]
+pub(super) struct Mapping {
+    pub(super) time: Option<String>,
+    pub(super) joints: Vec<JointColumns>,
+    /// Columns that mean nothing to twincal.
+    pub(super) unused: Vec<String>,
+}
+
+#[derive(Debug, Clone, Default, Serialize)]
+pub(super) struct JointColumns {
+    pub(super) joint: String,
+    pub(super) position: Option<String>,
+    pub(super) velocity: Option<String>,
+    pub(super) acceleration: Option<String>,
+    pub(super) torque: Option<String>,
+}
+
+/// The examination.
+pub(super) struct Examination {
+    pub(super) robot: RobotInput,
+    pub(super) refusals: Vec<Refusal>,
+    /// By log; absent for what is no table.
+    pub(super) mappings: Vec<(String, Mapping)>,
+    /// Joints without a column, taken to stand still.
+    pub(super) locked: BTreeMap<String, f64>,
+    /// What was converted for the look, in words.
+    pub(super) converted: Vec<String>,
+    pub(super) overviews: Vec<LogOverview>,
+    pub(super) steps: Vec<Vec<Steps>>,
+    pub(super) pipeline: Option<Pipeline>,
+    pub(super) checkup: Checkup,
+    pub(super) outlook: Option<Outlook>,
+    pub(super) findings: Vec<Finding>,
+}
+
+/// Reads and looks; what `fit` would refuse becomes a [`Refusal`], and as much as possible is said all the same.
+pub(super) fn examine(
+    model: &Path,
+    paths: &[PathBuf],
+    settings: &Settings,
+    progress: &Progress,
+) -> Outcome<Examination> {
+    progress.step(&format!("reading {}", model.to_string_lossy()));
+    let mut settings = settings.clone();
+    let robot = RobotInput::read(model, &settings)?;
+    let mut all = Examination {
+        robot,
+        refusals: Vec::new(),
+        mappings: Vec::new(),
+        locked: BTreeMap::new(),
+        converted: Vec::new(),
+        overviews: Vec::new(),
+        steps: Vec::new(),
+        pipeline: None,
+        checkup: Checkup::default(),
+        outlook: None,
+        findings: Vec::new(),
+    };
+    all.lock_what_is_not_logged(model, paths, &mut settings)?;
+    all.map_columns(paths, &settings);
+    let read = LogInput::read(paths, &all.robot.robot, &settings.log, 0, progress);
+    all.findings.append(&mut all.robot.findings);
+    let mut logs = match read {
+        Ok(logs) => logs,
+        Err(failure) => {
+            all.refusals.push(failure.into());
+            return Ok(all);
+        }
+    };
+    all.findings.append(&mut logs.findings);
+    progress.step("comparing logs and model");
+    all.look(&mut logs, &settings);
+    let mut said: Vec<Finding> = Vec::with_capacity(all.findings.len());
+    for finding in std::mem::take(&mut all.findings) {
+        if !said.contains(&finding) {
+            said.push(finding);
+        }
+    }
+    all.findings = said;
+    Ok(all)
+}
+
+impl Examination {
+    /// Joints for which no log has a position are locked at 0 for the look, as the config would have to say.
+    fn lock_what_is_not_logged(
+        &mut self,
+        model: &Path,
+        paths: &[PathBuf],
+        settings: &mut Settings,
+    ) -> Outcome<()> {
+        let mut missing: Vec<String> = Vec::new();
+        for path in paths {
+            let Ok(Some(header)) = read_header(path) else {
+                continue;
+            };
+            let (name, options) = (path.to_string_lossy(), settings.log.options(path));
+            let lacks = joints_without_column(&name, &header, &self.robot.robot, &options);
+            missing.extend(lacks);
+        }
+        missing.sort_unstable();
+        missing.dedup();
+        if missing.is_empty() || missing.len() >= self.robot.robot.dof() {
+            return Ok(());
+        }
+        let locked = missing.iter().map(|joint| (joint.clone(), 0.0));
+        self.locked = locked.collect();
+        settings.locked.extend(self.locked.clone());
+        self.robot = RobotInput::read(model, settings)?;
+        let entries: Vec<String> = missing
+            .iter()
+            .map(|joint| format!("{joint} = 0.0"))
+            .collect();
+        self.refusals.push(Refusal {
+            problem: format!(
+                "the log has no position for {} moving joints of the model: `{}`",
+                missing.len(),
+                missing.join("`, `")
+            ),
+            remedy: format!(
+                "where they stand still, say so: [model] locked = {{ {} }}; here they are taken to",
+                entries.join(", ")
+            ),
+            exit_code: crate::failure::INPUT,
+        });
+        Ok(())
+    }
+
+    fn map_columns(&mut self, paths: &[PathBuf], settings: &Settings) {
+        let names = crate::names::display_names(paths);
+        for (path, name) in paths.iter().zip(names) {
+            let Ok(Some(header)) = read_header(path) else {
+                continue;
+            };
+            let given = path.to_string_lossy();
+            let options = settings.log.options(path);
+            let Ok(selection) = match_columns(&given, &header, &self.robot.robot, &options) else {
+                continue;
+            };
+            let used = selection.file_columns();
+            let joints = self.robot.robot.joint_names();
+            let joints = joints.iter().zip(&selection.joints);
+            let mapping = Mapping {
+                time: selection.time.as_ref().map(|column| column.name.clone()),
+                joints: joints
+                    .map(|(joint, channels)| {
+                        let [position, velocity, acceleration, torque] = channels
+                            .each_ref()
+                            .map(|column| column.as_ref().map(|column| column.name.clone()));
+                        JointColumns {
+                            joint: (*joint).to_owned(),
+                            position,
+                            velocity,
+                            acceleration,
+                            torque,
+                        }
+                    })
+                    .collect(),
+                unused: (header.iter().enumerate())
+                    .filter(|(index, name)| !used.contains(index) && !name.is_empty())
+                    .map(|(_, name)| name.clone())
+                    .collect(),
+            };
+            self.mappings.push((name, mapping));
+        }
+    }
+
+    /// Overviews, filters, comparison and outlook, as far as each of them goes.
+    fn look(&mut self, logs: &mut LogInput, settings: &Settings) {
+        let signal = &settings.calibration.signal;
+        let robot = &self.robot.robot;
+        for recording in &mut logs.recordings {
+            let Err(error) = alone(robot, recording, settings) else {
+                continue;
+            };
+            if let Some((mended, words)) = converted(robot, recording, &error, settings) {
+                self.converted.push(words);
+                *recording = mended;
+            }
+            self.refusals.push(Failure::from(error).into());
+        }
+        for recording in &logs.recordings {
+            match describe(robot, recording) {
+                Ok((overview, more)) => {
+                    self.overviews.push(overview);
+                    self.findings.extend(more);
+                }
+                // Said above.
+                Err(_) => continue,
+            }
+            self.steps.push(steps(robot, recording));
+        }
+        self.findings.extend(hardly_driven(robot, &logs.recordings));
+        let usable: Vec<Recording> = (logs.recordings.iter())
+            .filter(|recording| describe(robot, recording).is_ok())
+            .cloned()
+            .collect();
+        let pipeline = match choose_pipeline(robot, &usable, signal) {
+            Ok((pipeline, more)) => {
+                self.findings.extend(more);
+                pipeline
+            }
+            Err(error) => {
+                if self.refusals.is_empty() {
+                    self.refusals.push(Failure::from(error).into());
+                }
+                return;
+            }
+        };
+        match checkup(robot, &usable, &pipeline) {
+            Ok(mut found) => {
+                for error in std::mem::take(&mut found.refused) {
+                    if self.refusals.is_empty() {
+                        self.refusals.push(Failure::from(error).into());
+                    }
+                }
+                self.findings.append(&mut found.findings);
+                self.checkup = found;
+            }
+            Err(error) if self.refusals.is_empty() => {
+                self.refusals.push(Failure::from(error).into());
+            }
+            Err(_) => {}
+        }
+        let trajectories = &mut self.checkup.trajectories;
+        let logs = (!trajectories.is_empty()).then_some((&pipeline, &mut trajectories[..]));
+        match outlook(robot, &settings.calibration.library, logs) {
+            Ok(outlook) => {
+                self.findings.extend(outlook.findings.iter().cloned());
+                self.outlook = Some(outlook);
+            }
+            Err(error) => self.refusals.push(Failure::from(error).into()),
+        }
+        self.pipeline = Some(pipeline);
+    }
+}
+
+/// Whether one log alone comes as far as the comparison with the model.
+fn alone(robot: &Robot, recording: &Recording, settings: &Settings) -> twincal::Result<()> {
+    describe(robot, recording)?;
+    let one = std::slice::from_ref(recording);
+    match choose_pipeline(robot, one, &settings.calibration.signal) {
+        Ok((pipeline, _)) => checkup(robot, one, &pipeline)
+            .and_then(|mut found| found.refused.pop().map_or(Ok(()), Err)),
+        // A log in which nothing moves may still be one of several.
+        Err(twincal::Error::Refused { .. }) => Ok(()),
+        Err(error) => Err(error),
+    }
+}
+
+/// The log in units with which it comes further, and what was converted.
+fn converted(
+    robot: &Robot,
+    recording: &Recording,
+    error: &twincal::Error,
+    settings: &Settings,
+) -> Option<(Recording, String)> {
+    let twincal::Error::Log { problem, .. } = error else {
+        return None;
+    };
+    let works = |log: &Recording| alone(robot, log, settings).is_ok();
+    if problem.contains("look like") && problem.contains("time step") {
+        for (unit, size) in [
+            ("milliseconds", 1e-3),
+            ("microseconds", 1e-6),
+            ("nanoseconds", 1e-9),
+        ] {
+            if problem.contains(unit) {
+                let mut log = recording.clone();
+                log.time.iter_mut().for_each(|t| *t *= size);
+                let further = describe(robot, &log).is_ok();
+                return further
+                    .then(|| (log, format!("{}: time was taken as {unit}", recording.name)));
+            }
+        }
+    }
+    if problem.contains("degrees") {
+        for (what, channels) in [
+            (
+                "positions, velocities and accelerations",
+                [true, true, true],
+            ),
+            ("velocities", [false, true, false]),
+            ("positions", [true, false, false]),
+        ] {
+            let mut log = recording.clone();
+            for (joint, own) in log.joints.iter_mut().enumerate() {
+                if robot.joint_kind(joint) == JointKind::Prismatic {
+                    continue;
+                }
+                let values = [Some(&mut own.q), own.qd.as_mut(), own.qdd.as_mut()];
+                let wanted = values.into_iter().zip(channels).filter(|(_, take)| *take);
+                for value in wanted.filter_map(|(values, _)| values).flatten() {
+                    *value *= DEGREE;
+                }
+            }
+            if works(&log) {
+                return Some((
+                    log,
+                    format!("{}: {what} were taken as degrees", recording.name),
+                ));
+            }
+        }
+    }
+    None
+}

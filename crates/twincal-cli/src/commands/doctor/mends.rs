@@ -1,0 +1,187 @@
+//! What to mend, the most important first, each with a number and a line to type or to write.
+
+use super::examine::Examination;
+use serde::Serialize;
+use twincal::{Finding, Severity};
+
+/// One thing to mend.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Mend {
+    /// What is wrong, with its number.
+    pub(super) problem: String,
+    /// A command, a line of twincal.toml, or what to do where the log is made.
+    pub(super) how: String,
+    #[serde(skip)]
+    rank: usize,
+}
+
+/// Findings in the order in which they matter, with what mends them.
+const ORDER: [(&str, &str); 24] = [
+    (
+        "joint_order",
+        "map the columns in [columns.q], [columns.qd], [columns.tau] of twincal.toml",
+    ),
+    (
+        "sign_flip",
+        "turn the sign of the columns where the log is made, or the joint's <axis> in the model",
+    ),
+    (
+        "torque_scale",
+        "convert the torque columns to N·m at the joint where the log is made",
+    ),
+    (
+        "unphysical_inertia",
+        "correct the link's <inertial>, or accept it: --allow unphysical-inertia",
+    ),
+    (
+        "link_without_inertia",
+        "give the link an <inertial>, or let fit find it",
+    ),
+    (
+        "moves_no_mass",
+        "give the link an <inertial>, or fix the joint with [model] locked",
+    ),
+    ("torque_lag", "twincal.toml: [signal] lag = …"),
+    (
+        "velocity_mismatch",
+        "twincal.toml: [signal] velocity = \"position\"",
+    ),
+    (
+        "not_finite_rows",
+        "look at those rows in the log; --strict refuses them",
+    ),
+    (
+        "unreadable_rows",
+        "look at those rows in the log; --strict refuses them",
+    ),
+    (
+        "contradicting_duplicates",
+        "export each topic once; --strict refuses such logs",
+    ),
+    (
+        "time_steps_back",
+        "sort or cut the log where time steps back",
+    ),
+    (
+        "crowded_stamps",
+        "log the source's stamp, or give the rate: --rate HZ",
+    ),
+    (
+        "resampled",
+        "log the source's stamp, or give the rate: --rate HZ",
+    ),
+    ("slower_channels", "log all channels at one rate"),
+    ("short_segments", "record longer, or mend the gaps"),
+    (
+        "torque_spike",
+        "nothing: left out; cut the log there to be sure",
+    ),
+    (
+        "drives_off",
+        "nothing: left out; cut the log there to be sure",
+    ),
+    (
+        "saturated_torque",
+        "record a slower motion, with torque below the limit",
+    ),
+    (
+        "quantised_encoder",
+        "log the full resolution of the encoder, or lower [signal] cutoff_hz",
+    ),
+    (
+        "joint_not_excited",
+        "record a log in which that joint moves",
+    ),
+    (
+        "joint_stands_still",
+        "record a log in which that joint moves",
+    ),
+    (
+        "wrapped_angle",
+        "unfold the angles, or leave [signal] cutoff_hz at \"auto\"",
+    ),
+    (
+        "implausible_time_step",
+        "give time in seconds, or the rate: --rate HZ",
+    ),
+];
+
+/// All of them, ranked.
+pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
+    let mut all: Vec<Mend> = examination
+        .refusals
+        .iter()
+        .map(|refusal| Mend {
+            problem: refusal.problem.clone(),
+            how: refusal.remedy.clone(),
+            rank: 0,
+        })
+        .collect();
+    for finding in &examination.findings {
+        if finding.severity > Severity::Note {
+            all.push(of_finding(finding, examination));
+        }
+    }
+    if let Some(excitation) = examination
+        .outlook
+        .as_ref()
+        .and_then(|o| o.excitation.as_ref())
+        && let Some(unseen) = excitation.unseen.first()
+    {
+        let [robot, logs] = excitation.directions;
+        let joint = unseen.joint.as_deref().unwrap_or("several joints at once");
+        all.push(Mend {
+            problem: format!(
+                "the logs show {logs} of {robot} independent directions; {} more would come from moving {joint}",
+                unseen.directions
+            ),
+            how: format!("record a log: {}", twincal::excitation::sentence(unseen)),
+            rank: 40,
+        });
+    }
+    all.sort_by_key(|mend| mend.rank);
+    all
+}
+
+fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
+    let place = ORDER.iter().position(|(code, _)| *code == finding.code);
+    let how = match (finding.code.as_str(), place) {
+        ("torque_lag", _) => match lag(examination) {
+            Some(lag) => format!("twincal.toml: [signal] lag = {lag:?}"),
+            None => "one [signal] lag cannot mend logs that differ: fit them apart".into(),
+        },
+        (_, Some(place)) => ORDER[place].1.into(),
+        (_, None) => "read the message; the report of `twincal fit` repeats it".into(),
+    };
+    // What is degraded comes before what is only doubtful.
+    let rank = if finding.severity == Severity::Degraded {
+        1
+    } else {
+        2
+    };
+    Mend {
+        problem: if finding.subject.is_empty() || finding.message.contains(&finding.subject) {
+            finding.message.clone()
+        } else {
+            format!("{}: {}", finding.subject, finding.message)
+        },
+        how,
+        rank: rank + place.unwrap_or(ORDER.len()),
+    }
+}
+
+/// The lag to write into the config, s to a tenth of a millisecond: the mean of the logs that clearly have one, if they agree.
+pub(super) fn lag(examination: &Examination) -> Option<f64> {
+    let logs = examination.checkup.lags.values();
+    let clear: Vec<(f64, f64)> = logs
+        .filter_map(|log| Some((log.clear()?, log.interval)))
+        .collect();
+    if clear.is_empty() {
+        return None;
+    }
+    let mean = clear.iter().map(|(lag, _)| lag).sum::<f64>() / clear.len() as f64;
+    let agree = clear
+        .iter()
+        .all(|(lag, interval)| (lag - mean).abs() <= *interval);
+    agree.then_some((mean * 1e4).round() / 1e4)
+}

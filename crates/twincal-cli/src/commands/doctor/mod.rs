@@ -1,0 +1,239 @@
+//! `twincal doctor`: what is wrong with logs or model, what to mend first, and a config to begin with; `twincal init`
+//! writes that config.
+
+mod examine;
+mod mends;
+mod print;
+mod propose;
+
+use super::inspect::library::{ComponentRow, component_rows};
+use super::{code_of, print_json, require_strict, settings, start_threads};
+use crate::args;
+use crate::failure::{Failure, Outcome};
+use crate::progress::Progress;
+use crate::terminal::Terminal;
+use examine::{Examination, Mapping, Refusal, examine};
+use mends::{Mend, mends};
+use propose::propose;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use twincal::Finding;
+use twincal::incidents::Incident;
+use twincal::lag::LogLag;
+use twincal::self_check::JointCheck;
+use twincal::signal::{Agreement, LogOverview, Pipeline, Steps};
+use twincal_io::artifact::OutputFile;
+use twincal_io::config::Settings;
+
+/// Where `init` writes.
+const USUAL: &str = "twincal.toml";
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Diagnosis {
+    schema: u64,
+    model: String,
+    verdict: String,
+    /// Exit code of this command: what `fit` would end with for the same reason.
+    exit_code: u8,
+    refusals: Vec<Refusal>,
+    /// Units that were converted for the look alone.
+    converted: Vec<String>,
+    logs: Vec<LogRow>,
+    /// Log against model, over all logs.
+    joints: Vec<JointCheck>,
+    /// Filters as `fit` would choose them; null where it could not.
+    pipeline: Option<Pipeline>,
+    components: Vec<ComponentRow>,
+    /// Independent directions: over all motions of the robot, and in these logs.
+    directions: Option<[usize; 2]>,
+    unseen: Vec<String>,
+    /// Most important first.
+    mends: Vec<Mend>,
+    findings: Vec<Finding>,
+    /// The proposed twincal.toml.
+    config: String,
+}
+
+#[derive(Serialize)]
+struct LogRow {
+    #[serde(flatten)]
+    overview: LogOverview,
+    columns: Option<Mapping>,
+    steps: Vec<Steps>,
+    velocity: Vec<Option<Agreement>>,
+    lag: Option<LogLag>,
+    incidents: Vec<Incident>,
+}
+
+/// What the flags ask to look at.
+struct Asked {
+    settings: Settings,
+    model: PathBuf,
+    logs: Vec<PathBuf>,
+}
+
+impl Asked {
+    fn of(flags: &args::Doctor, verb: &str, terminal: &mut Terminal) -> Outcome<Self> {
+        let config = settings::of_look(&flags.model, &flags.allow, &flags.log, terminal)?;
+        let settings = config.settings()?;
+        let logs = if flags.logs.is_empty() {
+            settings.log.named()
+        } else {
+            flags.logs.clone()
+        };
+        let Some(model) = settings.model_file.clone() else {
+            return Err(super::no_model());
+        };
+        if logs.is_empty() {
+            return Err(Failure::usage(
+                "no log",
+                format!("give logs, as in `twincal {verb} run.csv --model arm.urdf`"),
+            ));
+        }
+        Ok(Self {
+            settings,
+            model,
+            logs,
+        })
+    }
+}
+
+pub(super) fn run(flags: &args::Doctor, terminal: &mut Terminal) -> Outcome<u8> {
+    let asked = Asked::of(flags, "doctor", terminal)?;
+    start_threads(asked.settings.threads)?;
+    let progress = Progress::new();
+    let examination = examine(&asked.model, &asked.logs, &asked.settings, &progress)?;
+    drop(progress);
+    let diagnosis = diagnosis(examination, &asked);
+    if asked.settings.json {
+        print_json(terminal, &diagnosis)?;
+    } else {
+        print::print(&diagnosis, terminal);
+    }
+    require_strict(asked.settings.log.strict, &diagnosis.findings)?;
+    Ok(diagnosis.exit_code)
+}
+
+pub(super) fn init(flags: &args::Init, terminal: &mut Terminal) -> Outcome<u8> {
+    let asked = Asked::of(&flags.look, "init", terminal)?;
+    let target = flags.output.clone().unwrap_or_else(|| USUAL.into());
+    let mut output = OutputFile::create(&target, flags.force)?;
+    start_threads(asked.settings.threads)?;
+    let progress = Progress::new();
+    let examination = examine(&asked.model, &asked.logs, &asked.settings, &progress)?;
+    drop(progress);
+    let nothing_read = examination.overviews.is_empty();
+    if let Some(refusal) = examination.refusals.last().filter(|_| nothing_read) {
+        return Err(Failure::usage(&refusal.problem, &refusal.remedy));
+    }
+    let folder = target.parent().unwrap_or(Path::new(""));
+    let proposal = propose(
+        &examination,
+        &asked.settings,
+        &asked.model,
+        &asked.logs,
+        folder,
+    );
+    let text = proposal.text();
+    let written = match output.file() {
+        Some(file) => std::io::Write::write_all(file, text.as_bytes()),
+        None => Ok(()),
+    };
+    output.commit(written)?;
+    let shown = target.to_string_lossy();
+    if asked.settings.json {
+        #[derive(Serialize)]
+        struct Written<'a> {
+            schema: u64,
+            output: &'a str,
+            config: &'a str,
+        }
+        let written = Written {
+            schema: 1,
+            output: &shown,
+            config: &text,
+        };
+        print_json(terminal, &written)?;
+    } else {
+        terminal.data(&text);
+        terminal.note(&format!(
+            "{shown} is written; next: twincal fit --config {shown}"
+        ));
+    }
+    Ok(code_of(&examination.findings))
+}
+
+fn diagnosis(examination: Examination, asked: &Asked) -> Diagnosis {
+    let mends = mends(&examination);
+    let folder = Path::new("");
+    let proposal = propose(
+        &examination,
+        &asked.settings,
+        &asked.model,
+        &asked.logs,
+        folder,
+    );
+    let refused = examination.refusals.iter().map(|refusal| refusal.exit_code);
+    let degraded = code_of(&examination.findings);
+    let exit_code = refused.clone().min().unwrap_or(degraded);
+    let warnings = mends.len() - examination.refusals.len();
+    let verdict = match (refused.count(), degraded) {
+        (0, 0) if warnings == 0 => "fit would go ahead".to_owned(),
+        (0, 0) => format!("fit would go ahead; {warnings} to mend"),
+        (0, _) => format!("fit would go ahead, but call the data degraded; {warnings} to mend"),
+        (all, _) => format!("fit would refuse; {} to mend", all + warnings),
+    };
+    let excitation = examination
+        .outlook
+        .as_ref()
+        .and_then(|o| o.excitation.as_ref());
+    let components = examination
+        .outlook
+        .as_ref()
+        .map_or_else(Vec::new, |o| component_rows(&o.library, excitation));
+    let (directions, unseen) = (
+        excitation.map(|e| e.directions),
+        excitation.map_or_else(Vec::new, twincal::excitation::sentences),
+    );
+    let Examination {
+        robot,
+        refusals,
+        mappings,
+        converted,
+        overviews,
+        steps,
+        pipeline,
+        mut checkup,
+        findings,
+        ..
+    } = examination;
+    let mut mappings: std::collections::BTreeMap<String, Mapping> = mappings.into_iter().collect();
+    let logs = overviews.into_iter().zip(steps);
+    Diagnosis {
+        schema: 1,
+        model: robot.file.name,
+        verdict,
+        exit_code,
+        refusals,
+        converted,
+        logs: logs
+            .map(|(overview, steps)| LogRow {
+                columns: mappings.remove(&overview.name),
+                velocity: checkup.agreement.remove(&overview.name).unwrap_or_default(),
+                lag: checkup.lags.remove(&overview.name),
+                incidents: checkup.incidents.remove(&overview.name).unwrap_or_default(),
+                overview,
+                steps,
+            })
+            .collect(),
+        joints: checkup.joints,
+        pipeline,
+        components,
+        directions,
+        unseen,
+        mends,
+        findings,
+        config: proposal.text(),
+    }
+}

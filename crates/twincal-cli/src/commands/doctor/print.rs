@@ -1,0 +1,174 @@
+//! The diagnosis as a person reads it.
+
+use super::super::inspect::library::{directions, families};
+use super::super::inspect::log_heading;
+use super::super::summary::{paragraph, percent, print_table, significant, table};
+use super::examine::Mapping;
+use super::{Diagnosis, LogRow};
+use crate::terminal::{Terminal, clean};
+use twincal::Severity;
+
+/// Mends that come first.
+const FIRST: usize = 3;
+/// Columns that are named where they are not used.
+const NAMED: usize = 8;
+/// What stands where nothing is known.
+const NOTHING: &str = "–";
+
+pub(super) fn print(diagnosis: &Diagnosis, terminal: &mut Terminal) {
+    terminal.heading(&format!("{}: {}", diagnosis.model, diagnosis.verdict));
+    for (number, mend) in diagnosis.mends.iter().take(FIRST).enumerate() {
+        paragraph(&format!("{}. {}", number + 1, mend.problem), terminal);
+        paragraph(&format!("   → {}", mend.how), terminal);
+    }
+    terminal.say("");
+    for words in &diagnosis.converted {
+        let text = format!("{words}, for this look alone: what follows belongs to that");
+        paragraph(&text, terminal);
+    }
+    for log in &diagnosis.logs {
+        print_log(log, terminal);
+    }
+    joints(diagnosis, terminal);
+    if !diagnosis.components.is_empty() {
+        families(&diagnosis.components, terminal);
+        terminal.say("");
+        let words = diagnosis.unseen.iter().map(String::as_str);
+        directions(diagnosis.directions, words, terminal);
+    }
+    if diagnosis.mends.len() > FIRST {
+        terminal.heading("Also");
+        for mend in &diagnosis.mends[FIRST..] {
+            paragraph(&mend.problem, terminal);
+            paragraph(&format!("   → {}", mend.how), terminal);
+        }
+        terminal.say("");
+    }
+    let notes = diagnosis.findings.iter();
+    let notes = notes.filter(|finding| finding.severity == Severity::Note);
+    let notes = notes.count();
+    if notes > 0 {
+        terminal.say(&format!("  {notes} notes are in the output of --json"));
+        terminal.say("");
+    }
+    terminal.heading("A twincal.toml to begin with (twincal init writes it)");
+    for line in diagnosis.config.lines() {
+        terminal.say(line);
+    }
+}
+
+fn print_log(log: &LogRow, terminal: &mut Terminal) {
+    log_heading(&log.overview, terminal);
+    if let Some(columns) = &log.columns {
+        mapping(columns, terminal);
+    }
+    let mut rows = table(&[
+        "joint",
+        "q from … to",
+        "q step",
+        "velocity rms",
+        "R² to dq/dt",
+        "torque rms",
+        "step",
+        "lag, ms",
+    ]);
+    for (index, joint) in log.overview.joints.iter().enumerate() {
+        let steps = log.steps.get(index);
+        let step = |step: Option<f64>| step.map_or(NOTHING.into(), |step| significant(step, 2));
+        let [low, high] = joint.q_range;
+        let agreement = log.velocity.get(index).copied().flatten();
+        let lag = log.lag.iter().flat_map(|lag| &lag.joints);
+        let lag = lag
+            .filter(|lag| lag.joint == joint.joint && lag.speaks)
+            .find_map(|lag| Some((lag.lag, lag.sd?)));
+        rows.add_row([
+            &*clean(&joint.joint),
+            &format!("{} … {}", significant(low, 3), significant(high, 3)),
+            &step(steps.and_then(|steps| steps.position)),
+            &significant(joint.qd_rms, 3),
+            &agreement.map_or(NOTHING.into(), |a| format!("{:.3}", a.r2)),
+            &(joint.tau_rms).map_or("not logged".into(), |tau| significant(tau, 3)),
+            &step(steps.and_then(|steps| steps.torque)),
+            &lag.map_or(NOTHING.into(), |(lag, sd)| {
+                format!("{:+.1} ± {:.1}", 1e3 * lag, 1e3 * sd)
+            }),
+        ]);
+    }
+    print_table(&rows, terminal);
+    if let Some(lag) = &log.lag {
+        let text = match lag.common {
+            Some([mean, sd]) => format!(
+                "torque is logged {:.2} ± {:.2} ms ({:.2} samples) {} the motion",
+                1e3 * mean.abs(),
+                1e3 * sd,
+                mean.abs() / lag.interval,
+                if mean < 0.0 { "before" } else { "after" }
+            ),
+            None => "the lag between motion and torque cannot be told: too few joints whose torque the model explains".into(),
+        };
+        paragraph(&text, terminal);
+    }
+    terminal.say("");
+}
+
+fn mapping(columns: &Mapping, terminal: &mut Terminal) {
+    let mut rows = table(&["joint", "position", "velocity", "acceleration", "torque"]);
+    let name = |column: &Option<String>| column.as_deref().map_or(NOTHING.into(), clean);
+    for joint in &columns.joints {
+        rows.add_row([
+            &*clean(&joint.joint),
+            &*name(&joint.position),
+            &name(&joint.velocity),
+            &name(&joint.acceleration),
+            &name(&joint.torque),
+        ]);
+    }
+    print_table(&rows, terminal);
+    let time = name(&columns.time);
+    let unused = match &columns.unused[..] {
+        [] => "every column is used".to_owned(),
+        names if names.len() <= NAMED => format!("not used: {}", names.join(", ")),
+        names => format!(
+            "not used: {} and {} more",
+            names[..NAMED].join(", "),
+            names.len() - NAMED
+        ),
+    };
+    paragraph(&format!("time: {time}; {unused}"), terminal);
+}
+
+fn joints(diagnosis: &Diagnosis, terminal: &mut Terminal) {
+    if diagnosis.joints.is_empty() {
+        return;
+    }
+    terminal.heading("Log against model: what explains the torque");
+    let mut rows = table(&[
+        "joint",
+        "model and friction",
+        "friction alone",
+        "factor at the model",
+        "read better as",
+    ]);
+    for joint in &diagnosis.joints {
+        let share = |share: Option<f64>| share.map_or(NOTHING.into(), percent);
+        let sign = |sign: f64| if sign < 0.0 { "−" } else { "" };
+        let (motion, torque) = (&joint.motion, &joint.torque);
+        let mut better = Vec::new();
+        if (motion.0.as_str(), motion.1) != (joint.joint.as_str(), 1.0) {
+            better.push(format!("motion {}{}", sign(motion.1), clean(&motion.0)));
+        }
+        if (torque.0.as_str(), torque.1) != (joint.joint.as_str(), 1.0) {
+            better.push(format!("torque {}{}", sign(torque.1), clean(&torque.0)));
+        }
+        let gain = joint.gain.filter(|gain| *gain != 0.0);
+        rows.add_row([
+            &*clean(&joint.joint),
+            &share(joint.explained),
+            &share(joint.without_model),
+            &gain.map_or(NOTHING.into(), |gain| significant(gain, 3)),
+            &better.join(", "),
+        ]);
+    }
+    print_table(&rows, terminal);
+    terminal.say("");
+}

@@ -1,0 +1,204 @@
+//! A `twincal.toml` to begin with: only the keys that a model and its logs ask for, each with the numbers behind it.
+
+use super::ColumnsTable;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Width of a comment.
+const WIDTH: usize = 78;
+
+/// What a first config says.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Proposal {
+    /// The command that gives it.
+    pub command: String,
+    /// Model file.
+    pub model: PathBuf,
+    /// Joints without a column, and where they are taken to stand.
+    pub locked: BTreeMap<String, f64>,
+    /// Accept inertia tensors that no body has.
+    pub allow_unphysical: bool,
+    /// Logs, each with a sampling rate that replaces its stamps.
+    pub logs: Vec<(PathBuf, Option<f64>)>,
+    /// Columns that were mapped by hand.
+    pub columns: ColumnsTable,
+    /// Cut-off: "auto" (`None`) or Hz, and a comment on it.
+    pub cutoff_hz: Option<f64>,
+    /// Why.
+    pub cutoff_comment: String,
+    /// Lag of torque, s, and a comment on it.
+    pub lag: Option<(f64, String)>,
+    /// Velocity from position, and a comment on it.
+    pub velocity_from_position: Option<String>,
+    /// What no key can mend, at the top.
+    pub remarks: Vec<String>,
+}
+
+impl Proposal {
+    /// The file. Every key in it is read by [`super::Config::parse`].
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        comment(&mut text, &format!("Proposed by `{}`.", self.command));
+        comment(
+            &mut text,
+            "A flag overrides its key; `twincal schema` prints every key.",
+        );
+        for remark in &self.remarks {
+            comment(&mut text, &format!("! {remark}"));
+        }
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "\n[model]\nfile = {}", path(&self.model));
+        if !self.locked.is_empty() {
+            let joints = self.locked.iter();
+            let joints: Vec<String> = joints
+                .map(|(j, at)| format!("{} = {at:?}", key(j)))
+                .collect();
+            comment(
+                &mut text,
+                "The log has no column for these; they are taken to stand still here (rad or m).",
+            );
+            let _ = writeln!(text, "locked = {{ {} }}", joints.join(", "));
+        }
+        if self.allow_unphysical {
+            text.push_str("allow = [\"unphysical_inertia\"]\n");
+        }
+        for (file, rate) in &self.logs {
+            let _ = writeln!(text, "\n[[log]]\nfile = {}", path(file));
+            if let Some(rate) = rate {
+                let _ = writeln!(text, "rate_hz = {rate:?}");
+            }
+        }
+        self.write_columns(&mut text);
+        text.push_str("\n[signal]\n");
+        comment(&mut text, &self.cutoff_comment);
+        match self.cutoff_hz {
+            None => text.push_str("cutoff_hz = \"auto\"\n"),
+            Some(hz) => {
+                let _ = writeln!(text, "cutoff_hz = {hz:?}");
+            }
+        }
+        if let Some((lag, why)) = &self.lag {
+            comment(&mut text, why);
+            let _ = writeln!(text, "lag = {lag:?}");
+        }
+        if let Some(why) = &self.velocity_from_position {
+            comment(&mut text, why);
+            text.push_str("velocity = \"position\"\n");
+        }
+        text
+    }
+
+    fn write_columns(&self, text: &mut String) {
+        let tables = [
+            ("q", &self.columns.q),
+            ("qd", &self.columns.qd),
+            ("qdd", &self.columns.qdd),
+            ("tau", &self.columns.tau),
+        ];
+        if let Some(time) = &self.columns.time {
+            let _ = writeln!(text, "\n[columns]\ntime = {}", string(time));
+        }
+        for (name, table) in tables.into_iter().filter(|(_, table)| !table.is_empty()) {
+            let _ = writeln!(text, "\n[columns.{name}]");
+            for (joint, column) in table {
+                let _ = writeln!(text, "{} = {}", key(joint), string(column));
+            }
+        }
+    }
+}
+
+/// Lines of a comment.
+fn comment(text: &mut String, words: &str) {
+    let mut line = String::from("#");
+    for word in words.split_whitespace() {
+        if line.len() > 1 && line.chars().count() + 1 + word.chars().count() > WIDTH {
+            text.push_str(&line);
+            text.push('\n');
+            line = String::from("#");
+        }
+        line.push(' ');
+        line.extend(word.chars().filter(|c| !c.is_control()));
+    }
+    if line.len() > 1 {
+        text.push_str(&line);
+        text.push('\n');
+    }
+}
+
+fn string(value: &str) -> String {
+    toml::Value::String(value.into()).to_string()
+}
+
+fn path(value: &Path) -> String {
+    string(&value.to_string_lossy())
+}
+
+/// A name as a key.
+fn key(name: &str) -> String {
+    let bare = |b: u8| b.is_ascii_alphanumeric() || b == b'_' || b == b'-';
+    if !name.is_empty() && name.bytes().all(bare) {
+        name.into()
+    } else {
+        // A basic string: toml may write a value over several lines, but not a key.
+        let escaped: String = name
+            .chars()
+            .map(|c| match c {
+                '"' | '\\' => format!("\\{c}"),
+                c if c.is_control() => format!("\\u{:04X}", u32::from(c)),
+                c => c.to_string(),
+            })
+            .collect();
+        format!("\"{escaped}\"")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Config, LagKey, VelocityWord};
+    use super::*;
+
+    #[test]
+    fn every_key_is_read_back() {
+        let odd = "a \"b\\\u{7}.c";
+        let proposal = Proposal {
+            command: "twincal init run.csv\n[evil]".into(),
+            model: "arm.urdf".into(),
+            locked: BTreeMap::from([("finger".into(), 0.0), (odd.into(), 0.5)]),
+            allow_unphysical: true,
+            logs: vec![
+                ("run \"1\".csv".into(), Some(500.0)),
+                ("b.csv".into(), None),
+            ],
+            columns: ColumnsTable {
+                time: Some("stamp".into()),
+                q: BTreeMap::from([(odd.into(), "angle\n1".into())]),
+                ..ColumnsTable::default()
+            },
+            cutoff_hz: None,
+            cutoff_comment: "gives 5 Hz. ".repeat(20),
+            lag: Some((0.008, "8 ms".into())),
+            velocity_from_position: Some("R² 0.5".into()),
+            remarks: vec!["turn the sign of `elbow`".into()],
+        };
+        let text = proposal.text();
+        assert!(
+            text.lines().all(|line| line.chars().count() <= 80),
+            "{text}"
+        );
+        let config = Config::parse("twincal.toml", &text).unwrap();
+        config.settings().unwrap();
+        let file = &config.file;
+        assert_eq!(file.model.locked, proposal.locked);
+        assert_eq!(file.columns, proposal.columns);
+        assert_eq!(file.signal.lag, Some(LagKey::All(0.008)));
+        assert_eq!(file.signal.velocity, Some(VelocityWord::Position));
+        let logs: Vec<_> = file
+            .log
+            .entries
+            .iter()
+            .map(|e| (e.file.clone(), e.rate_hz))
+            .collect();
+        assert_eq!(logs, proposal.logs);
+    }
+}

@@ -1,0 +1,191 @@
+//! What a user says of a log's channels: torque that comes later than the motion, a velocity that is not to be used.
+
+use super::Channels;
+use super::prepare::JointFacts;
+use super::spline::resample;
+use crate::error::{Error, Result};
+use crate::robot::did_you_mean;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// Largest lag that is believed, s.
+const LARGEST: f64 = 1.0;
+
+/// How much later than the motion torque is logged.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Lag {
+    /// Nothing was said: taken as none, and a lag that shows is a finding.
+    #[default]
+    Unsaid,
+    /// Of every joint, s; negative where torque comes first.
+    All(f64),
+    /// By joint name, s; none for the others.
+    Joints(BTreeMap<String, f64>),
+}
+
+/// What is put right in every log before anything else.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Corrections {
+    /// Torque is moved back by this.
+    pub lag: Lag,
+    /// The logged velocity is left out and derived from position.
+    pub velocity_from_position: bool,
+}
+
+impl Corrections {
+    /// True if nothing is put right and nothing was said.
+    pub fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The lag that was said of all joints, s; 0 where it was said joint by joint.
+    pub(crate) fn common_lag(&self) -> f64 {
+        match self.lag {
+            Lag::All(lag) => lag,
+            _ => 0.0,
+        }
+    }
+
+    /// Lag of a joint, s.
+    pub(crate) fn lag_of(&self, joint: &str) -> f64 {
+        match &self.lag {
+            Lag::Unsaid => 0.0,
+            Lag::All(lag) => *lag,
+            Lag::Joints(joints) => joints.get(joint).copied().unwrap_or(0.0),
+        }
+    }
+
+    /// Refuses lags of joints that do not move, lags that are no lags, and corrections without a filter.
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub(crate) fn check(&self, joints: &[JointFacts], off: bool) -> Result<()> {
+        let setting = |key: &str, problem: String, remedy: String| {
+            Err(Error::Setting {
+                key: key.into(),
+                problem,
+                remedy,
+            })
+        };
+        let lags: Vec<(String, f64)> = match &self.lag {
+            Lag::Unsaid => Vec::new(),
+            Lag::All(lag) => vec![("signal.lag".into(), *lag)],
+            Lag::Joints(of) => {
+                for joint in of.keys() {
+                    if !joints.iter().any(|facts| facts.name == *joint) {
+                        return setting(
+                            "signal.lag",
+                            format!("joint `{joint}` does not move in the model"),
+                            did_you_mean(joint, joints.iter().map(|facts| facts.name.as_str())),
+                        );
+                    }
+                }
+                let of = of.iter();
+                of.map(|(joint, lag)| (format!("signal.lag.{joint}"), *lag))
+                    .collect()
+            }
+        };
+        for (key, lag) in &lags {
+            if !(lag.abs() <= LARGEST) {
+                let problem = format!("{lag} s is out of range");
+                return setting(
+                    key,
+                    problem,
+                    format!("give seconds between -{LARGEST} and {LARGEST}"),
+                );
+            }
+        }
+        let filter = "leave cutoff_hz at \"auto\", or give channels that need no correction";
+        if off && lags.iter().any(|(_, lag)| *lag != 0.0) {
+            let problem = "with cutoff_hz = 0 every row stays as logged, so torque cannot be moved";
+            return setting("signal.lag", problem.into(), filter.into());
+        }
+        if off && self.velocity_from_position {
+            let problem = "with cutoff_hz = 0 nothing is derived from position";
+            return setting("signal.velocity", problem.into(), filter.into());
+        }
+        Ok(())
+    }
+
+    /// Whether the torque of any of these joints has to move.
+    pub(crate) fn moves(&self, joints: &[JointFacts]) -> bool {
+        joints.iter().any(|facts| self.lag_of(&facts.name) != 0.0)
+    }
+
+    /// Moves the torques of a run back by their lags: `tau(t) = logged(t + lag)` at the stamps of `grid`. Returns the part of
+    /// the grid for which every torque was logged.
+    ///
+    /// # Panics
+    /// With fewer than four stamps.
+    pub(crate) fn move_torque(
+        &self,
+        joints: &[JointFacts],
+        stamps: &[f64],
+        logged: &[Channels],
+        grid: &[f64],
+        moved: &mut [Channels],
+    ) -> Range<usize> {
+        let lags: Vec<f64> = joints.iter().map(|j| self.lag_of(&j.name)).collect();
+        let (least, most) = lags
+            .iter()
+            .fold((0.0_f64, 0.0_f64), |(l, m), lag| (l.min(*lag), m.max(*lag)));
+        let (first, last) = (stamps[0], stamps[stamps.len() - 1]);
+        let from = grid.partition_point(|t| t + least < first);
+        let to = grid.partition_point(|t| t + most <= last).max(from);
+        for ((lag, logged), moved) in lags.iter().zip(logged).zip(moved) {
+            let (Some(values), Some(tau)) = (&logged.tau, &mut moved.tau) else {
+                continue;
+            };
+            if *lag != 0.0 {
+                let at: Vec<f64> = grid[from..to].iter().map(|t| t + lag).collect();
+                tau[from..to].copy_from_slice(&resample(stamps, values, &at));
+            }
+        }
+        from..to
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::JointKind;
+
+    #[test]
+    fn torque_moves_back_by_its_lag_and_the_grid_loses_what_was_not_logged() {
+        let facts = [("a", 0.025), ("b", 0.0)].map(|(name, _)| JointFacts {
+            name: name.into(),
+            kind: JointKind::Revolute,
+            range: None,
+            effort: None,
+        });
+        let stamps: Vec<f64> = (0..100).map(|i| 0.01 * f64::from(i)).collect();
+        // a cubic passes through the spline exactly
+        let cubic = |t: f64| 3.0 - t + 2.0 * t * t * t;
+        let channels = |lag: f64| Channels {
+            q: vec![0.0; 100],
+            qd: None,
+            qdd: None,
+            tau: Some(stamps.iter().map(|t| cubic(t - lag)).collect()),
+        };
+        let logged = [channels(0.025), channels(0.0)];
+        let mut moved = logged.clone();
+        let corrections = Corrections {
+            lag: Lag::Joints(BTreeMap::from([("a".into(), 0.025)])),
+            velocity_from_position: false,
+        };
+        corrections.check(&facts, false).unwrap();
+        let kept = corrections.move_torque(&facts, &stamps, &logged, &stamps, &mut moved);
+        assert_eq!(kept, 0..97);
+        for joint in &moved {
+            for (i, t) in stamps[..97].iter().enumerate() {
+                assert!((joint.tau.as_ref().unwrap()[i] - cubic(*t)).abs() < 1e-12);
+            }
+        }
+        assert!(corrections.check(&facts, true).is_err());
+        assert!(corrections.check(&facts[1..], false).is_err());
+        assert!(corrections.moves(&facts) && !corrections.moves(&facts[1..]));
+    }
+}
