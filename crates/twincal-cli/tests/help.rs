@@ -19,7 +19,8 @@ fn narrow(text: &str) -> &str {
 #[test]
 fn help_leads_with_examples() {
     for verb in [
-        "", "demo", "inspect", "fit", "check", "predict", "export", "report", "schema",
+        "", "demo", "inspect", "doctor", "init", "fit", "check", "predict", "export", "report",
+        "schema",
     ] {
         let arguments = [verb, "-h"].into_iter().filter(|word| !word.is_empty());
         let done = run(folder().path(), arguments).expect(0);
@@ -77,6 +78,7 @@ fn summaries_fit_eighty_columns() {
     for arguments in [
         ["check", "run.csv", "--twin", "twin"],
         ["inspect", "run.csv", "--model", "arm.urdf"],
+        ["doctor", "run.csv", "--model", "arm.urdf"],
     ] {
         narrow(&run(folder.path(), arguments).expect(0).out);
     }

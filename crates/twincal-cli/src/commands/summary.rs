@@ -316,11 +316,14 @@ fn about(subjects: &[&str], message: &str) -> String {
 
 /// An indented paragraph of at most 80 columns.
 pub(super) fn paragraph(text: &str, terminal: &mut Terminal) {
-    for (number, line) in wrapped(text, 76).iter().enumerate() {
-        terminal.say(&format!(
-            "{}{line}",
-            if number == 0 { "  " } else { "    " }
-        ));
+    indented(text, ["  ", "    "], terminal);
+}
+
+/// A paragraph of at most 80 columns whose first line and other lines begin like this.
+pub(super) fn indented(text: &str, begin: [&str; 2], terminal: &mut Terminal) {
+    let width = 80 - begin[0].chars().count().max(begin[1].chars().count());
+    for (number, line) in wrapped(text, width).iter().enumerate() {
+        terminal.say(&format!("{}{line}", begin[usize::from(number > 0)]));
     }
 }
 

@@ -6,6 +6,8 @@
 //! Differences from sample to sample, because what the model misses is slow and a slow error looks like a lag of many
 //! samples; both sides have passed the motion filter. The share of Δτ that is left has its minimum at the lag; a parabola
 //! through the three lowest points gives parts of a sample, leaving out one piece of the log after the other its error.
+//! A lag is the same at all frequencies, what the model misses is not: differences over a quarter of the cut-off's period
+//! are looked at too, and what they disagree by counts as error.
 //!
 //! Source: cross-correlation of prewhitened series (Box, Jenkins & Reinsel, ch. 12); delete-one jackknife (Efron 1982);
 //! joints are pooled with random effects (DerSimonian & Laird 1986).
@@ -33,10 +35,16 @@ const FEWEST_PIECES: usize = 8;
 const SHORTEST: usize = 30;
 /// A joint speaks if no more than this share of its torque's changes is left at the lag.
 const EXPLAINED: f64 = 0.4;
+/// The same where it is the only joint that speaks: no other can contradict it.
+const EXPLAINED_ALONE: f64 = 0.15;
 /// Error of the parabola, samples.
 const PARABOLA: f64 = 0.05;
 /// A lag must be longer than a sample by this many standard deviations.
 const CLEARLY: f64 = 3.0;
+/// Step of the slow differences, in periods of the cut-off; in samples without filter, at least and at most.
+const SLOW: f64 = 0.25;
+const SLOW_SAMPLES: usize = 10;
+const SLOWEST: usize = 200;
 /// Velocities of the friction's shapes, rad/s or m/s.
 const DRY: [f64; 2] = [0.02, 0.2];
 
@@ -90,16 +98,24 @@ pub fn estimate_lag(robot: &Robot, pipeline: &Pipeline, trajectory: &Trajectory)
         let cutoff = pipeline.motion_cutoff_hz.min(0.45 / interval);
         MotionKernels::new(cutoff, interval).smooth
     };
-    let pieces = pieces(&trajectory.segments, reach + kernel.len() / 2)?;
-    let products: Vec<Vec<Products>> = pieces
+    let slow = if pipeline.is_off() {
+        SLOW_SAMPLES
+    } else {
+        let samples = SLOW / pipeline.cutoff_hz / interval;
+        (samples.round() as usize).clamp(2, SLOWEST)
+    };
+    let pieces = pieces(&trajectory.segments, reach + kernel.len() / 2, slow)?;
+    let products: Vec<Vec<[Products; 2]>> = pieces
         .par_iter()
         .map(|piece| piece.products(robot, reach, &kernel))
         .collect();
     let names = robot.joint_names();
     let joints: Vec<JointLag> = (0..robot.dof())
         .filter_map(|joint| {
-            let parts: Vec<&Products> = products.iter().map(|piece| &piece[joint]).collect();
-            joint_lag(names[joint], &parts, reach, interval)
+            let [fast, slow] = [0, 1].map(|step| -> Vec<&Products> {
+                products.iter().map(|piece| &piece[joint][step]).collect()
+            });
+            joint_lag(names[joint], &fast, &slow, reach, interval)
         })
         .collect();
     let common = common(&joints, interval);
@@ -146,11 +162,13 @@ struct Piece<'a> {
     from: usize,
     len: usize,
     margin: usize,
+    /// Step of the slow differences.
+    slow: usize,
 }
 
 /// Evenly spread pieces of one length.
-fn pieces(segments: &[Segment], margin: usize) -> Option<Vec<Piece<'_>>> {
-    let inner = |segment: &Segment| (segment.time.len()).saturating_sub(2 * margin + 1);
+fn pieces(segments: &[Segment], margin: usize, slow: usize) -> Option<Vec<Piece<'_>>> {
+    let inner = |segment: &Segment| (segment.time.len()).saturating_sub(2 * margin + slow);
     let total: usize = segments.iter().map(inner).sum();
     let len = PIECE.min(total / FEWEST_PIECES);
     if len < SHORTEST {
@@ -164,6 +182,7 @@ fn pieces(segments: &[Segment], margin: usize) -> Option<Vec<Piece<'_>>> {
                 from: margin + k * len,
                 len,
                 margin,
+                slow,
             })
         })
         .collect();
@@ -178,9 +197,9 @@ fn pieces(segments: &[Segment], margin: usize) -> Option<Vec<Piece<'_>>> {
 }
 
 impl Piece<'_> {
-    /// Sums of products of every joint.
-    fn products(&self, robot: &Robot, reach: usize, kernel: &[f64]) -> Vec<Products> {
-        let (dof, all, len) = (robot.dof(), self.segment.time.len(), self.len + 1);
+    /// Sums of products of every joint, of differences over one sample and of slow ones.
+    fn products(&self, robot: &Robot, reach: usize, kernel: &[f64]) -> Vec<[Products; 2]> {
+        let (dof, all, len) = (robot.dof(), self.segment.time.len(), self.len + self.slow);
         let stacked = |values: &[f64]| -> Vec<f64> {
             (0..dof)
                 .flat_map(|joint| &values[joint * all + self.from..joint * all + self.from + len])
@@ -197,10 +216,6 @@ impl Piece<'_> {
                 let own = joint * len..(joint + 1) * len;
                 let (n, v, a) = (&nominal[own.clone()], &qd[own.clone()], &qdd[own]);
                 let still = &self.segment.standstill[joint * all + self.from..][..len];
-                let moves: Vec<f64> = still
-                    .windows(2)
-                    .map(|s| if s[0] || s[1] { 0.0 } else { 1.0 })
-                    .collect();
                 let shapes: [&dyn Fn(usize) -> f64; profile::COLUMNS] = [
                     &|i| n[i],
                     &|i| v[i],
@@ -209,36 +224,58 @@ impl Piece<'_> {
                     &|i| v[i].abs() * v[i],
                     &|i| a[i],
                 ];
-                let columns = shapes.map(|shape| -> Vec<f64> {
-                    let values: Vec<f64> = (0..len).map(shape).collect();
-                    let differences = values.windows(2).zip(&moves);
-                    differences.map(|(w, m)| m * (w[1] - w[0])).collect()
-                });
+                let columns = shapes.map(|shape| (0..len).map(shape).collect::<Vec<f64>>());
                 let raw = self.from - self.margin..self.from + len + self.margin;
                 let raw = &self.segment.tau[joint * all..(joint + 1) * all][raw];
                 let mut tau = vec![0.0; len + 2 * reach];
                 correlate(kernel, raw, 1, &mut tau);
-                let changes: Vec<f64> = tau.windows(2).map(|w| w[1] - w[0]).collect();
-                Products::new(&columns, &moves, &changes, reach)
+                [1, self.slow].map(|step| {
+                    let moves: Vec<f64> = (0..self.len)
+                        .map(|i| {
+                            if still[i] || still[i + step] {
+                                0.0
+                            } else {
+                                1.0
+                            }
+                        })
+                        .collect();
+                    let differences = |values: &[f64]| -> Vec<f64> {
+                        let pairs = values.iter().zip(&values[step..]);
+                        pairs.map(|(before, after)| after - before).collect()
+                    };
+                    let columns = columns.each_ref().map(|values| -> Vec<f64> {
+                        let moved = differences(values).into_iter().zip(&moves);
+                        moved.map(|(x, moves)| moves * x).collect()
+                    });
+                    Products::new(&columns, &moves, &differences(&tau), reach)
+                })
             })
             .collect()
     }
 }
 
 /// The lag of one joint; `None` where it hardly moves.
-fn joint_lag(name: &str, parts: &[&Products], reach: usize, interval: f64) -> Option<JointLag> {
+fn joint_lag(
+    name: &str,
+    parts: &[&Products],
+    slow: &[&Products],
+    reach: usize,
+    interval: f64,
+) -> Option<JointLag> {
     let left = profile::left(parts, None)?;
     let at = profile::lowest(&left);
     let inside = at.filter(|at| (0.0..=2.0 * reach as f64).contains(at));
     let without: Option<Vec<f64>> = (0..parts.len())
         .map(|part| profile::lowest(&profile::left(parts, Some(part))?))
         .collect();
+    let slow = profile::lowest(&profile::left(slow, None)?);
     let lowest = left.iter().copied().fold(f64::INFINITY, f64::min);
-    let sd = inside.and(without).map(|at| {
+    let apart = inside.zip(slow).map(|(fast, slow)| fast - slow);
+    let sd = apart.zip(without).map(|(apart, at)| {
         let count = at.len() as f64;
         let mean = at.iter().sum::<f64>() / count;
         let squares: f64 = at.iter().map(|at| (at - mean).powi(2)).sum();
-        ((count - 1.0) / count * squares + PARABOLA * PARABOLA).sqrt()
+        ((count - 1.0) / count * squares + apart * apart + PARABOLA * PARABOLA).sqrt()
     });
     let end = left.iter().position(|l| *l == lowest).unwrap_or(reach) as f64;
     Some(JointLag {
@@ -257,7 +294,9 @@ fn common(joints: &[JointLag], interval: f64) -> Option<[f64; 2]> {
         .filter(|joint| joint.speaks)
         .filter_map(|joint| Some([joint.lag, joint.sd?.max(PARABOLA * interval)]))
         .collect();
-    if 2 * speak.len() <= joints.len() {
+    let alone = speak.len() == 1;
+    let doubtful = |joint: &&JointLag| joint.speaks && joint.left[1] > EXPLAINED_ALONE;
+    if 2 * speak.len() <= joints.len() || alone && joints.iter().any(|j| doubtful(&j)) {
         return None;
     }
     let pooled = |between: f64| -> (f64, f64, f64) {

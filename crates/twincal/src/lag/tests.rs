@@ -34,8 +34,8 @@ fn late(seed: f64, lag: f64) -> Trajectory {
     trajectory
 }
 
-/// 20 seeds: the common lag is within 4 of its standard deviations (false alarm below 1e-3 for all of them together) and
-/// within a fifth of a sample.
+/// 20 seeds: the common lag is within 4 of its standard deviations (which also hold what fast and slow differences disagree
+/// by; false alarm below 1e-3 for all of them together) and within a fifth of a sample.
 #[test]
 fn case_17_a_planted_lag_comes_back_in_parts_of_a_sample() {
     for seed in 0..20 {

@@ -209,39 +209,38 @@ impl Examination {
 
     /// Overviews, filters, comparison and outlook, as far as each of them goes.
     fn look(&mut self, logs: &mut LogInput, settings: &Settings) {
-        let signal = &settings.calibration.signal;
         let robot = &self.robot.robot;
-        for recording in &mut logs.recordings {
-            let Err(error) = alone(robot, recording, settings) else {
-                continue;
-            };
-            if let Some((mended, words)) = converted(robot, recording, &error, settings) {
-                self.converted.push(words);
-                *recording = mended;
+        let mut together = filtered(robot, &logs.recordings, settings);
+        if together.is_err() {
+            // Which of them it is, and whether other units help.
+            for recording in &mut logs.recordings {
+                let one = std::slice::from_ref(recording);
+                let Err(error) = filtered(robot, one, settings) else {
+                    continue;
+                };
+                // A log in which nothing moves may still be one of several.
+                if matches!(error, twincal::Error::Refused { .. }) {
+                    continue;
+                }
+                if let Some((mended, words)) = converted(robot, recording, &error, settings) {
+                    self.converted.push(words);
+                    *recording = mended;
+                }
+                self.refusals.push(Failure::from(error).into());
             }
-            self.refusals.push(Failure::from(error).into());
+            (logs.recordings).retain(|recording| describe(robot, recording).is_ok());
+            together = filtered(robot, &logs.recordings, settings);
         }
         for recording in &logs.recordings {
-            match describe(robot, recording) {
-                Ok((overview, more)) => {
-                    self.overviews.push(overview);
-                    self.findings.extend(more);
-                }
-                // Said above.
-                Err(_) => continue,
+            if let Ok((overview, more)) = describe(robot, recording) {
+                self.overviews.push(overview);
+                self.steps.push(steps(robot, recording));
+                self.findings.extend(more);
             }
-            self.steps.push(steps(robot, recording));
         }
         self.findings.extend(hardly_driven(robot, &logs.recordings));
-        let usable: Vec<Recording> = (logs.recordings.iter())
-            .filter(|recording| describe(robot, recording).is_ok())
-            .cloned()
-            .collect();
-        let pipeline = match choose_pipeline(robot, &usable, signal) {
-            Ok((pipeline, more)) => {
-                self.findings.extend(more);
-                pipeline
-            }
+        let (pipeline, more, mut checkup) = match together {
+            Ok(filtered) => filtered,
             Err(error) => {
                 if self.refusals.is_empty() {
                     self.refusals.push(Failure::from(error).into());
@@ -249,44 +248,36 @@ impl Examination {
                 return;
             }
         };
-        match checkup(robot, &usable, &pipeline) {
-            Ok(mut found) => {
-                for error in std::mem::take(&mut found.refused) {
-                    if self.refusals.is_empty() {
-                        self.refusals.push(Failure::from(error).into());
-                    }
-                }
-                self.findings.append(&mut found.findings);
-                self.checkup = found;
-            }
-            Err(error) if self.refusals.is_empty() => {
-                self.refusals.push(Failure::from(error).into());
-            }
-            Err(_) => {}
-        }
-        let trajectories = &mut self.checkup.trajectories;
-        let logs = (!trajectories.is_empty()).then_some((&pipeline, &mut trajectories[..]));
-        match outlook(robot, &settings.calibration.library, logs) {
+        self.findings.extend(more);
+        self.findings.append(&mut checkup.findings);
+        let aligned = Some((&pipeline, &mut checkup.trajectories[..]));
+        match outlook(robot, &settings.calibration.library, aligned) {
             Ok(outlook) => {
                 self.findings.extend(outlook.findings.iter().cloned());
                 self.outlook = Some(outlook);
             }
             Err(error) => self.refusals.push(Failure::from(error).into()),
         }
+        self.checkup = checkup;
         self.pipeline = Some(pipeline);
     }
 }
 
-/// Whether one log alone comes as far as the comparison with the model.
-fn alone(robot: &Robot, recording: &Recording, settings: &Settings) -> twincal::Result<()> {
-    describe(robot, recording)?;
-    let one = std::slice::from_ref(recording);
-    match choose_pipeline(robot, one, &settings.calibration.signal) {
-        Ok((pipeline, _)) => checkup(robot, one, &pipeline)
-            .and_then(|mut found| found.refused.pop().map_or(Ok(()), Err)),
-        // A log in which nothing moves may still be one of several.
-        Err(twincal::Error::Refused { .. }) => Ok(()),
-        Err(error) => Err(error),
+/// Logs as far as the comparison with the model.
+fn filtered(
+    robot: &Robot,
+    recordings: &[Recording],
+    settings: &Settings,
+) -> twincal::Result<(Pipeline, Vec<Finding>, Checkup)> {
+    for recording in recordings {
+        describe(robot, recording)?;
+    }
+    let signal = &settings.calibration.signal;
+    let (pipeline, findings) = choose_pipeline(robot, recordings, signal)?;
+    let mut checkup = checkup(robot, recordings, &pipeline)?;
+    match checkup.refused.pop() {
+        Some(error) => Err(error),
+        None => Ok((pipeline, findings, checkup)),
     }
 }
 
@@ -300,7 +291,7 @@ fn converted(
     let twincal::Error::Log { problem, .. } = error else {
         return None;
     };
-    let works = |log: &Recording| alone(robot, log, settings).is_ok();
+    let works = |log: &Recording| filtered(robot, std::slice::from_ref(log), settings).is_ok();
     if problem.contains("look like") && problem.contains("time step") {
         for (unit, size) in [
             ("milliseconds", 1e-3),

@@ -2,6 +2,7 @@
 
 use super::examine::Examination;
 use serde::Serialize;
+use std::fmt::Write as _;
 use twincal::{Finding, Severity};
 
 /// One thing to mend.
@@ -11,6 +12,9 @@ pub(super) struct Mend {
     pub(super) problem: String,
     /// A command, a line of twincal.toml, or what to do where the log is made.
     pub(super) how: String,
+    /// Something is wrong, not only missing.
+    #[serde(skip)]
+    pub(super) wrong: bool,
     #[serde(skip)]
     rank: usize,
 }
@@ -114,12 +118,29 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
         .map(|refusal| Mend {
             problem: refusal.problem.clone(),
             how: refusal.remedy.clone(),
+            wrong: true,
             rank: 0,
         })
         .collect();
-    for finding in &examination.findings {
-        if finding.severity > Severity::Note {
-            all.push(of_finding(finding, examination));
+    let mut said: Vec<(&str, usize)> = Vec::new();
+    for finding in examination
+        .findings
+        .iter()
+        .filter(|f| f.severity > Severity::Note)
+    {
+        // One of a kind is enough to know what to do.
+        match said.iter_mut().find(|(code, _)| *code == finding.code) {
+            Some((_, more)) => *more += 1,
+            None => {
+                said.push((&finding.code, 0));
+                all.push(of_finding(finding, examination));
+            }
+        }
+    }
+    let first = examination.refusals.len();
+    for ((_, more), mend) in said.iter().zip(&mut all[first..]) {
+        if *more > 0 {
+            let _ = write!(mend.problem, " ({more} more like this, --json)");
         }
     }
     if let Some(excitation) = examination
@@ -136,6 +157,7 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
                 unseen.directions
             ),
             how: format!("record a log: {}", twincal::excitation::sentence(unseen)),
+            wrong: false,
             rank: 40,
         });
     }
@@ -149,6 +171,12 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
         ("torque_lag", _) => match lag(examination) {
             Some(lag) => format!("twincal.toml: [signal] lag = {lag:?}"),
             None => "one [signal] lag cannot mend logs that differ: fit them apart".into(),
+        },
+        ("quantised_encoder", _) => match slower(examination) {
+            Some(hz) => format!(
+                "twincal.toml: [signal] cutoff_hz = {hz:?}, or log the encoder's full resolution"
+            ),
+            None => "log the full resolution of the encoder".into(),
         },
         (_, Some(place)) => ORDER[place].1.into(),
         (_, None) => "read the message; the report of `twincal fit` repeats it".into(),
@@ -166,6 +194,7 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
             format!("{}: {}", finding.subject, finding.message)
         },
         how,
+        wrong: true,
         rank: rank + place.unwrap_or(ORDER.len()),
     }
 }
@@ -184,4 +213,16 @@ pub(super) fn lag(examination: &Examination) -> Option<f64> {
         .iter()
         .all(|(lag, interval)| (lag - mean).abs() <= *interval);
     agree.then_some((mean * 1e4).round() / 1e4)
+}
+
+/// A cut-off at which a tenth of each joint's velocity can be told from standstill: an encoder of step s resolves `16 f_c s`.
+fn slower(examination: &Examination) -> Option<f64> {
+    let now = examination.pipeline.as_ref()?.cutoff_hz;
+    let logs = examination.overviews.iter().zip(&examination.steps);
+    let joints = logs.flat_map(|(log, steps)| log.joints.iter().zip(steps));
+    let wanted = joints
+        .filter_map(|(joint, steps)| Some(0.1 * joint.qd_rms / (16.0 * steps.position?)))
+        .fold(f64::INFINITY, f64::min);
+    let hz = (wanted * 10.0).floor() / 10.0;
+    (hz >= 0.5 && hz < now).then_some(hz)
 }

@@ -177,7 +177,8 @@ fn diagnosis(examination: Examination, asked: &Asked) -> Diagnosis {
     let refused = examination.refusals.iter().map(|refusal| refusal.exit_code);
     let degraded = code_of(&examination.findings);
     let exit_code = refused.clone().min().unwrap_or(degraded);
-    let warnings = mends.len() - examination.refusals.len();
+    let wrong = mends.iter().filter(|mend| mend.wrong).count();
+    let warnings = wrong - examination.refusals.len();
     let verdict = match (refused.count(), degraded) {
         (0, 0) if warnings == 0 => "fit would go ahead".to_owned(),
         (0, 0) => format!("fit would go ahead; {warnings} to mend"),

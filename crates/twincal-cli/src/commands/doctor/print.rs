@@ -2,7 +2,7 @@
 
 use super::super::inspect::library::{directions, families};
 use super::super::inspect::log_heading;
-use super::super::summary::{paragraph, percent, print_table, significant, table};
+use super::super::summary::{indented, paragraph, percent, print_table, significant, table};
 use super::examine::Mapping;
 use super::{Diagnosis, LogRow};
 use crate::terminal::{Terminal, clean};
@@ -12,14 +12,27 @@ use twincal::Severity;
 const FIRST: usize = 3;
 /// Columns that are named where they are not used.
 const NAMED: usize = 8;
+/// How lines begin that say what mends.
+const HOW: [&str; 2] = ["     → ", "       "];
+/// Notes on a log that are shown with it.
+const OF_LOG: [&str; 5] = [
+    "gaps",
+    "duplicate_rows",
+    "resampled",
+    "wrapped_angle",
+    "time_replaced",
+];
+/// Share of torque by which the model must explain more than friction for its factor to mean anything.
+const MEANS: f64 = 0.01;
 /// What stands where nothing is known.
 const NOTHING: &str = "–";
 
 pub(super) fn print(diagnosis: &Diagnosis, terminal: &mut Terminal) {
     terminal.heading(&format!("{}: {}", diagnosis.model, diagnosis.verdict));
     for (number, mend) in diagnosis.mends.iter().take(FIRST).enumerate() {
-        paragraph(&format!("{}. {}", number + 1, mend.problem), terminal);
-        paragraph(&format!("   → {}", mend.how), terminal);
+        let number = format!("  {}. ", number + 1);
+        indented(&mend.problem, [&number, "     "], terminal);
+        indented(&mend.how, HOW, terminal);
     }
     terminal.say("");
     for words in &diagnosis.converted {
@@ -28,6 +41,13 @@ pub(super) fn print(diagnosis: &Diagnosis, terminal: &mut Terminal) {
     }
     for log in &diagnosis.logs {
         print_log(log, terminal);
+        for finding in &diagnosis.findings {
+            let own = finding.subject == log.overview.name && finding.severity == Severity::Note;
+            if own && OF_LOG.contains(&finding.code.as_str()) {
+                paragraph(&finding.message, terminal);
+            }
+        }
+        terminal.say("");
     }
     joints(diagnosis, terminal);
     if !diagnosis.components.is_empty() {
@@ -39,8 +59,8 @@ pub(super) fn print(diagnosis: &Diagnosis, terminal: &mut Terminal) {
     if diagnosis.mends.len() > FIRST {
         terminal.heading("Also");
         for mend in &diagnosis.mends[FIRST..] {
-            paragraph(&mend.problem, terminal);
-            paragraph(&format!("   → {}", mend.how), terminal);
+            indented(&mend.problem, ["  - ", "    "], terminal);
+            indented(&mend.how, HOW, terminal);
         }
         terminal.say("");
     }
@@ -64,12 +84,11 @@ fn print_log(log: &LogRow, terminal: &mut Terminal) {
     }
     let mut rows = table(&[
         "joint",
-        "q from … to",
+        "q from…to",
         "q step",
-        "velocity rms",
-        "R² to dq/dt",
+        "velocity: R² to dq/dt",
         "torque rms",
-        "step",
+        "torque step",
         "lag, ms",
     ]);
     for (index, joint) in log.overview.joints.iter().enumerate() {
@@ -83,14 +102,13 @@ fn print_log(log: &LogRow, terminal: &mut Terminal) {
             .find_map(|lag| Some((lag.lag, lag.sd?)));
         rows.add_row([
             &*clean(&joint.joint),
-            &format!("{} … {}", significant(low, 3), significant(high, 3)),
+            &format!("{}…{}", significant(low, 3), significant(high, 3)),
             &step(steps.and_then(|steps| steps.position)),
-            &significant(joint.qd_rms, 3),
             &agreement.map_or(NOTHING.into(), |a| format!("{:.3}", a.r2)),
             &(joint.tau_rms).map_or("not logged".into(), |tau| significant(tau, 3)),
             &step(steps.and_then(|steps| steps.torque)),
             &lag.map_or(NOTHING.into(), |(lag, sd)| {
-                format!("{:+.1} ± {:.1}", 1e3 * lag, 1e3 * sd)
+                format!("{:+.1}±{:.1}", 1e3 * lag, 1e3 * sd)
             }),
         ]);
     }
@@ -108,7 +126,6 @@ fn print_log(log: &LogRow, terminal: &mut Terminal) {
         };
         paragraph(&text, terminal);
     }
-    terminal.say("");
 }
 
 fn mapping(columns: &Mapping, terminal: &mut Terminal) {
@@ -134,7 +151,10 @@ fn mapping(columns: &Mapping, terminal: &mut Terminal) {
             names.len() - NAMED
         ),
     };
-    paragraph(&format!("time: {time}; {unused}"), terminal);
+    paragraph(
+        &format!("time: {time}; torque: taken as N·m (N) at the joint; {unused}"),
+        terminal,
+    );
 }
 
 fn joints(diagnosis: &Diagnosis, terminal: &mut Terminal) {
@@ -160,7 +180,9 @@ fn joints(diagnosis: &Diagnosis, terminal: &mut Terminal) {
         if (torque.0.as_str(), torque.1) != (joint.joint.as_str(), 1.0) {
             better.push(format!("torque {}{}", sign(torque.1), clean(&torque.0)));
         }
-        let gain = joint.gain.filter(|gain| *gain != 0.0);
+        let model = joint.explained.zip(joint.without_model);
+        let means = model.is_some_and(|(with, without)| with - without > MEANS);
+        let gain = joint.gain.filter(|gain| *gain != 0.0 && means);
         rows.add_row([
             &*clean(&joint.joint),
             &share(joint.explained),
