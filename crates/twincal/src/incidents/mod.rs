@@ -10,8 +10,6 @@ use crate::robot::Robot;
 use crate::signal::{Pipeline, Trajectory};
 use serde::{Deserialize, Serialize};
 
-/// Time on either side of an incident that is left out with it, in periods of the cut-off.
-const MARGIN: f64 = 1.0;
 /// Incidents that a message lists.
 const LISTED: usize = 5;
 
@@ -53,11 +51,8 @@ pub fn incidents(robot: &Robot, pipeline: &Pipeline, trajectory: &Trajectory) ->
 
 /// Takes the incidents of a log out of the fit, for all joints: what hits a link acts on every joint before it.
 pub fn leave_out(pipeline: &Pipeline, trajectory: &mut Trajectory, incidents: &[Incident]) {
-    let margin = if pipeline.is_off() {
-        0.0
-    } else {
-        MARGIN / pipeline.cutoff_hz
-    };
+    // No row that is left shares a sample with an incident.
+    let margin = pipeline.filter_half_length() + pipeline.motion_half_length();
     for segment in &mut trajectory.segments {
         let len = segment.time.len();
         for [first, last] in incidents.iter().map(|incident| incident.span) {

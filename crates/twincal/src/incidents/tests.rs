@@ -6,6 +6,7 @@ use crate::self_check::testing::{INTERVAL, LEN, arm, log};
 fn pipeline() -> Pipeline {
     Pipeline {
         cutoff_hz: 5.0,
+        motion_cutoff_hz: 20.0,
         standstill_velocity: vec![0.02; 4],
         ..Pipeline::off(4)
     }

@@ -55,6 +55,8 @@ pub struct JointLag {
     pub joint: String,
     /// How much later torque is logged than the motion, s; negative where it is first.
     pub lag: f64,
+    /// The same from slow differences, s; `None` where the log does not say it.
+    pub slow: Option<f64>,
     /// Its standard deviation, s; `None` where the log does not say it.
     pub sd: Option<f64>,
     /// Share of the changes of torque that is not explained: as logged, and with torque moved back by the lag.
@@ -270,49 +272,52 @@ fn joint_lag(
         .collect();
     let slow = profile::lowest(&profile::left(slow, None)?);
     let lowest = left.iter().copied().fold(f64::INFINITY, f64::min);
-    let apart = inside.zip(slow).map(|(fast, slow)| fast - slow);
-    let sd = apart.zip(without).map(|(apart, at)| {
+    let sd = inside.and(without).map(|at| {
         let count = at.len() as f64;
         let mean = at.iter().sum::<f64>() / count;
         let squares: f64 = at.iter().map(|at| (at - mean).powi(2)).sum();
-        ((count - 1.0) / count * squares + apart * apart + PARABOLA * PARABOLA).sqrt()
+        ((count - 1.0) / count * squares + PARABOLA * PARABOLA).sqrt()
     });
     let end = left.iter().position(|l| *l == lowest).unwrap_or(reach) as f64;
     Some(JointLag {
         joint: name.to_owned(),
         lag: (inside.unwrap_or(end) - reach as f64) * interval,
+        slow: slow.map(|slow| (slow - reach as f64) * interval),
         sd: sd.map(|sd| sd * interval),
         left: [left[reach], lowest],
-        speaks: sd.is_some() && lowest < EXPLAINED,
+        speaks: sd.is_some() && slow.is_some() && lowest < EXPLAINED,
     })
 }
 
-/// Mean over the joints that speak, if they are more than half of those that move; what they disagree by counts.
+/// Mean over the joints that speak, if they are more than half of those that move; what they disagree by counts, and what
+/// slow differences say otherwise.
 fn common(joints: &[JointLag], interval: f64) -> Option<[f64; 2]> {
-    let speak: Vec<[f64; 2]> = joints
+    let speak: Vec<[f64; 3]> = joints
         .iter()
         .filter(|joint| joint.speaks)
-        .filter_map(|joint| Some([joint.lag, joint.sd?.max(PARABOLA * interval)]))
+        .filter_map(|joint| Some([joint.lag, joint.sd?.max(PARABOLA * interval), joint.slow?]))
         .collect();
     let alone = speak.len() == 1;
     let doubtful = |joint: &&JointLag| joint.speaks && joint.left[1] > EXPLAINED_ALONE;
     if 2 * speak.len() <= joints.len() || alone && joints.iter().any(|j| doubtful(&j)) {
         return None;
     }
-    let pooled = |between: f64| -> (f64, f64, f64) {
-        let weights = speak.iter().map(|[_, sd]| 1.0 / (sd * sd + between));
-        let (mut sum, mut squares, mut mean) = (0.0, 0.0, 0.0);
-        for (weight, [lag, _]) in weights.zip(&speak) {
-            sum += weight;
-            squares += weight * weight;
-            mean += weight * lag;
+    // Sum of weights and of their squares, mean lag and mean of the slow ones.
+    let pooled = |between: f64| -> [f64; 4] {
+        let mut sums = [0.0; 4];
+        for [lag, sd, slow] in &speak {
+            let weight = 1.0 / (sd * sd + between);
+            let terms = [weight, weight * weight, weight * lag, weight * slow];
+            sums.iter_mut()
+                .zip(terms)
+                .for_each(|(sum, term)| *sum += term);
         }
-        (mean / sum, sum, squares)
+        [sums[0], sums[1], sums[2] / sums[0], sums[3] / sums[0]]
     };
-    let (mean, sum, squares) = pooled(0.0);
+    let [sum, squares, mean, _] = pooled(0.0);
     let q: f64 = speak
         .iter()
-        .map(|[lag, sd]| ((lag - mean) / sd).powi(2))
+        .map(|[lag, sd, _]| ((lag - mean) / sd).powi(2))
         .sum();
     let beyond = q - (speak.len() - 1) as f64;
     let between = if speak.len() > 1 {
@@ -320,8 +325,8 @@ fn common(joints: &[JointLag], interval: f64) -> Option<[f64; 2]> {
     } else {
         0.0
     };
-    let (mean, sum, _) = pooled(between);
-    Some([mean, sum.sqrt().recip()])
+    let [sum, _, mean, slow] = pooled(between);
+    Some([mean, (1.0 / sum + (mean - slow).powi(2)).sqrt()])
 }
 
 #[cfg(test)]

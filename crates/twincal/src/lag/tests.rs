@@ -72,6 +72,7 @@ fn joints_that_disagree_have_no_clear_lag() {
     let joint = |lag: f64, speaks: bool| JointLag {
         joint: "j".into(),
         lag,
+        slow: Some(lag),
         sd: Some(1e-4),
         left: [0.5, 0.1],
         speaks,
