@@ -1,6 +1,7 @@
 //! A `twincal.toml` to begin with: only the keys that a model and its logs ask for, each with the numbers behind it.
 
-use super::ColumnsTable;
+use super::{ColumnsTable, LogEntry};
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -19,8 +20,8 @@ pub struct Proposal {
     pub locked: BTreeMap<String, f64>,
     /// Accept inertia tensors that no body has.
     pub allow_unphysical: bool,
-    /// Logs, each with a sampling rate that replaces its stamps.
-    pub logs: Vec<(PathBuf, Option<f64>)>,
+    /// Logs with what is known of each.
+    pub logs: Vec<LogEntry>,
     /// Columns that were mapped by hand.
     pub columns: ColumnsTable,
     /// Cut-off: "auto" (`None`) or Hz, and a comment on it.
@@ -63,11 +64,10 @@ impl Proposal {
         if self.allow_unphysical {
             text.push_str("allow = [\"unphysical_inertia\"]\n");
         }
-        for (file, rate) in &self.logs {
-            let _ = writeln!(text, "\n[[log]]\nfile = {}", path(file));
-            if let Some(rate) = rate {
-                let _ = writeln!(text, "rate_hz = {rate:?}");
-            }
+        let logs = Logs { log: &self.logs };
+        // Only a path that is no text cannot be written, and then the log could not be named either.
+        if let Ok(logs) = toml::to_string(&logs) {
+            let _ = write!(text, "\n{logs}");
         }
         self.write_columns(&mut text);
         text.push_str("\n[signal]\n");
@@ -106,6 +106,12 @@ impl Proposal {
             }
         }
     }
+}
+
+/// The entries `[[log]]`.
+#[derive(Serialize)]
+struct Logs<'a> {
+    log: &'a [LogEntry],
 }
 
 /// Lines of a comment.
@@ -155,7 +161,7 @@ fn key(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Config, LagKey, VelocityWord};
+    use super::super::{Config, LagKey, TorqueWord, VelocityWord};
     use super::*;
 
     #[test]
@@ -167,8 +173,17 @@ mod tests {
             locked: BTreeMap::from([("finger".into(), 0.0), (odd.into(), 0.5)]),
             allow_unphysical: true,
             logs: vec![
-                ("run \"1\".csv".into(), Some(500.0)),
-                ("b.csv".into(), None),
+                LogEntry {
+                    file: "run \"1\".csv".into(),
+                    rate_hz: Some(500.0),
+                    torque: Some(TorqueWord::Motor),
+                    gear_ratio: BTreeMap::from([("elbow".into(), 50.0)]),
+                    ..LogEntry::default()
+                },
+                LogEntry {
+                    file: "b.csv".into(),
+                    ..LogEntry::default()
+                },
             ],
             columns: ColumnsTable {
                 time: Some("stamp".into()),
@@ -193,12 +208,6 @@ mod tests {
         assert_eq!(file.columns, proposal.columns);
         assert_eq!(file.signal.lag, Some(LagKey::All(0.008)));
         assert_eq!(file.signal.velocity, Some(VelocityWord::Position));
-        let logs: Vec<_> = file
-            .log
-            .entries
-            .iter()
-            .map(|e| (e.file.clone(), e.rate_hz))
-            .collect();
-        assert_eq!(logs, proposal.logs);
+        assert_eq!(file.log.entries, proposal.logs);
     }
 }

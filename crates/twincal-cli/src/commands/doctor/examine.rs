@@ -14,7 +14,9 @@ use twincal::signal::{
     LogOverview, Pipeline, Recording, Steps, choose_pipeline, describe, hardly_driven, steps,
 };
 use twincal_io::config::Settings;
-use twincal_io::log::{joints_without_column, match_columns, read_header};
+use twincal_io::log::{
+    LogOptions, Preset, TorqueSource, joints_without_column, match_columns, read_header,
+};
 
 /// Radians per degree.
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
@@ -44,6 +46,8 @@ impl From<Failure> for Refusal {
 #[derive(Debug, Clone, Default, Serialize)]
 pub(super) struct Mapping {
     pub(super) time: Option<String>,
+    /// What the torque columns are taken as.
+    pub(super) torque: &'static str,
     pub(super) joints: Vec<JointColumns>,
     /// Columns that mean nothing to twincal.
     pub(super) unused: Vec<String>,
@@ -184,6 +188,7 @@ impl Examination {
             let joints = joints.iter().zip(&selection.joints);
             let mapping = Mapping {
                 time: selection.time.as_ref().map(|column| column.name.clone()),
+                torque: taken_as(&options),
                 joints: joints
                     .map(|(joint, channels)| {
                         let [position, velocity, acceleration, torque] = channels
@@ -260,6 +265,20 @@ impl Examination {
         }
         self.checkup = checkup;
         self.pipeline = Some(pipeline);
+    }
+}
+
+/// What `[log] torque` makes of the torque columns.
+fn taken_as(options: &LogOptions) -> &'static str {
+    let unsaid = match options.preset {
+        Some(Preset::UrRtde) => TorqueSource::Current,
+        _ => TorqueSource::Joint,
+    };
+    match options.torque.source.unwrap_or(unsaid) {
+        TorqueSource::Joint => "N·m (N) at the joint",
+        TorqueSource::Motor => "N·m of the motor, times gear_ratio",
+        TorqueSource::Current => "current, times drive_constant",
+        TorqueSource::None => "no measurement",
     }
 }
 

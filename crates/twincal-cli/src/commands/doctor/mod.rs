@@ -23,7 +23,7 @@ use twincal::lag::LogLag;
 use twincal::self_check::JointCheck;
 use twincal::signal::{Agreement, LogOverview, Pipeline, Steps};
 use twincal_io::artifact::OutputFile;
-use twincal_io::config::Settings;
+use twincal_io::config::{Config, Settings};
 
 /// Where `init` writes.
 const USUAL: &str = "twincal.toml";
@@ -68,6 +68,7 @@ struct LogRow {
 
 /// What the flags ask to look at.
 struct Asked {
+    config: Config,
     settings: Settings,
     model: PathBuf,
     logs: Vec<PathBuf>,
@@ -92,6 +93,7 @@ impl Asked {
             ));
         }
         Ok(Self {
+            config,
             settings,
             model,
             logs,
@@ -128,13 +130,7 @@ pub(super) fn init(flags: &args::Init, terminal: &mut Terminal) -> Outcome<u8> {
         return Err(Failure::usage(&refusal.problem, &refusal.remedy));
     }
     let folder = target.parent().unwrap_or(Path::new(""));
-    let proposal = propose(
-        &examination,
-        &asked.settings,
-        &asked.model,
-        &asked.logs,
-        folder,
-    );
+    let proposal = propose(&examination, &asked, folder);
     let text = proposal.text();
     let written = match output.file() {
         Some(file) => std::io::Write::write_all(file, text.as_bytes()),
@@ -167,13 +163,7 @@ pub(super) fn init(flags: &args::Init, terminal: &mut Terminal) -> Outcome<u8> {
 fn diagnosis(examination: Examination, asked: &Asked) -> Diagnosis {
     let mends = mends(&examination);
     let folder = Path::new("");
-    let proposal = propose(
-        &examination,
-        &asked.settings,
-        &asked.model,
-        &asked.logs,
-        folder,
-    );
+    let proposal = propose(&examination, &asked, folder);
     let refused = examination.refusals.iter().map(|refusal| refusal.exit_code);
     let degraded = code_of(&examination.findings);
     let exit_code = refused.clone().min().unwrap_or(degraded);

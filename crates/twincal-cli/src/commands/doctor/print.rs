@@ -152,7 +152,10 @@ fn mapping(columns: &Mapping, terminal: &mut Terminal) {
         ),
     };
     paragraph(
-        &format!("time: {time}; torque: taken as N·m (N) at the joint; {unused}"),
+        &format!(
+            "time: {time}; torque: taken as {}; {unused}",
+            columns.torque
+        ),
         terminal,
     );
 }

@@ -1,18 +1,14 @@
 //! The config that logs and model ask for.
 
+use super::Asked;
 use super::examine::Examination;
 use super::mends::lag;
 use std::path::{Path, PathBuf};
-use twincal_io::config::{Proposal, Settings};
+use twincal_io::config::{Config, LogEntry, Proposal};
 
 /// What `doctor` prints and `init` writes; paths are seen from `folder`.
-pub(super) fn propose(
-    examination: &Examination,
-    settings: &Settings,
-    model: &Path,
-    logs: &[PathBuf],
-    folder: &Path,
-) -> Proposal {
+pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -> Proposal {
+    let (settings, model, logs) = (&asked.settings, &asked.model, &asked.logs);
     let seen_from = |path: &Path| -> PathBuf {
         if folder.as_os_str().is_empty() || path.is_absolute() {
             path.to_owned()
@@ -86,7 +82,10 @@ pub(super) fn propose(
         allow_unphysical: settings.model.allow_unphysical,
         logs: logs
             .iter()
-            .map(|log| (seen_from(log), settings.log.options(log).rate_hz))
+            .map(|log| LogEntry {
+                file: seen_from(log),
+                ..entry(&asked.config, log)
+            })
             .collect(),
         columns: settings.log.columns.clone(),
         cutoff_hz,
@@ -94,6 +93,30 @@ pub(super) fn propose(
         lag,
         velocity_from_position: (!velocity.is_empty()).then(|| velocity.join(" ")),
         remarks,
+    }
+}
+
+/// What the config says of a log: its own entry, else what holds for all.
+fn entry(config: &Config, log: &Path) -> LogEntry {
+    let table = &config.file.log;
+    let same = |entry: &&LogEntry| {
+        entry.file == log
+            || matches!((entry.file.canonicalize(), log.canonicalize()), (Ok(a), Ok(b)) if a == b)
+    };
+    let own = table.entries.iter().find(same).cloned();
+    let entry = own.unwrap_or_else(|| LogEntry {
+        topic: table.topic.clone(),
+        preset: table.preset,
+        torque: table.torque,
+        gear_ratio: table.gear_ratio.clone(),
+        drive_constant: table.drive_constant.clone(),
+        accept_model_torque: table.accept_model_torque,
+        ..LogEntry::default()
+    });
+    LogEntry {
+        rate_hz: table.rate_hz.or(entry.rate_hz),
+        lenient: table.lenient.or(entry.lenient),
+        ..entry
     }
 }
 
