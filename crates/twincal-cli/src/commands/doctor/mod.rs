@@ -69,6 +69,8 @@ struct LogRow {
 /// What the flags ask to look at.
 struct Asked {
     config: Config,
+    /// The file it came from.
+    given: Option<PathBuf>,
     settings: Settings,
     model: PathBuf,
     logs: Vec<PathBuf>,
@@ -94,6 +96,7 @@ impl Asked {
         }
         Ok(Self {
             config,
+            given: flags.log.config.clone(),
             settings,
             model,
             logs,

@@ -86,9 +86,9 @@ fn print_log(log: &LogRow, terminal: &mut Terminal) {
         "joint",
         "q from…to",
         "q step",
-        "velocity: R² to dq/dt",
+        "R²(q̇)",
         "torque rms",
-        "torque step",
+        "step",
         "lag, ms",
     ]);
     for (index, joint) in log.overview.joints.iter().enumerate() {

@@ -55,6 +55,10 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
     });
     let mut locked = settings.locked.clone();
     locked.extend(examination.locked.clone());
+    let beside = asked.given.iter().map(|file| {
+        let file = file.to_string_lossy();
+        format!("Other keys of {file}, such as gravity and candidates, are not repeated here.")
+    });
     let remarks = examination
         .refusals
         .iter()
@@ -72,6 +76,7 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
                 .filter(|f| ["sign_flip", "joint_order", "torque_scale"].contains(&f.code.as_str()))
                 .map(|finding| finding.message.clone()),
         )
+        .chain(beside)
         .collect();
     let shown = |path: &Path| path.to_string_lossy().into_owned();
     let names: Vec<String> = logs.iter().map(|log| shown(log)).collect();
