@@ -83,7 +83,7 @@ pub(super) fn left(parts: &[&Products], without: Option<usize>) -> Option<Vec<f6
     let live: Vec<usize> = (0..COLUMNS).filter(|&a| sum.xx[a][a] > 0.0).collect();
     let n = live.len();
     let moves = sum.count >= SAMPLES_PER_COLUMN * COLUMNS as f64;
-    if n == 0 || !moves || sum.yy.iter().any(|yy| !(*yy > 0.0)) {
+    if n == 0 || !moves || sum.yy.iter().any(|yy| yy.is_nan() || *yy <= 0.0) {
         return None;
     }
     let size: Vec<f64> = live.iter().map(|&a| sum.xx[a][a].sqrt()).collect();

@@ -89,7 +89,7 @@ impl Corrections {
             }
         };
         for (key, lag) in &lags {
-            if !(lag.abs() <= LARGEST) {
+            if lag.is_nan() || lag.abs() > LARGEST {
                 let problem = format!("{lag} s is out of range");
                 return setting(
                     key,

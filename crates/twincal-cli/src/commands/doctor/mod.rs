@@ -166,7 +166,7 @@ pub(super) fn init(flags: &args::Init, terminal: &mut Terminal) -> Outcome<u8> {
 fn diagnosis(examination: Examination, asked: &Asked) -> Diagnosis {
     let mends = mends(&examination);
     let folder = Path::new("");
-    let proposal = propose(&examination, &asked, folder);
+    let proposal = propose(&examination, asked, folder);
     let refused = examination.refusals.iter().map(|refusal| refusal.exit_code);
     let degraded = code_of(&examination.findings);
     let exit_code = refused.clone().min().unwrap_or(degraded);

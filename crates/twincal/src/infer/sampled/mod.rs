@@ -308,8 +308,11 @@ fn run(
     Ok(trace)
 }
 
+/// Which array of a [`Trace`].
+type Rows = fn(&Trace) -> &[f32];
+
 /// The chains' values of one row.
-fn rows(traces: &[Trace], draws: usize, row: usize, of: fn(&Trace) -> &[f32]) -> Vec<Vec<f64>> {
+fn rows(traces: &[Trace], draws: usize, row: usize, of: Rows) -> Vec<Vec<f64>> {
     traces
         .iter()
         .map(|trace| {
@@ -394,9 +397,7 @@ fn summarise(
 ) -> Result<Sampled> {
     let draws = settings.draws;
     let all = (traces.len() * draws) as f64;
-    let pooled = |row: usize, of: fn(&Trace) -> &[f32]| -> Vec<f64> {
-        rows(traces, draws, row, of).concat()
-    };
+    let pooled = |row: usize, of: Rows| -> Vec<f64> { rows(traces, draws, row, of).concat() };
     let (plug_in, phi) = mean_noise(given, target, &pooled);
     let mut problem = assemble(given.grams, given.columns, &plug_in, given.prior)?;
     problem.prior.slab = target.slab.iter().map(|s| s * s / phi).collect();
@@ -477,7 +478,7 @@ fn summarise(
 fn mean_noise(
     given: &Given<'_>,
     target: &Target<'_>,
-    pooled: &dyn Fn(usize, fn(&Trace) -> &[f32]) -> Vec<f64>,
+    pooled: &dyn Fn(usize, Rows) -> Vec<f64>,
 ) -> (PlugIn, f64) {
     let mut plug_in = given.plug_in.clone();
     let (mut sum, mut rows) = (0.0, 0.0);
