@@ -20,6 +20,10 @@ const JOINED_SAMPLES: f64 = 5.0;
 const BIN: f64 = 0.25;
 /// What is left beyond this many quantiles does not count in the regression.
 const CLIPPED: f64 = 3.0;
+/// Spikes that are always rare enough, and bins per spike beyond those: what happens more often is no contact but noise with heavy
+/// tails, which has its own finding.
+const FEW: usize = 3;
+const RARE: usize = 200;
 /// Fewest bins in which a joint moves.
 const FEWEST: usize = 60;
 /// Velocities of the friction's shapes, rad/s or m/s.
@@ -70,6 +74,10 @@ pub(super) fn spikes(
             }
             _ => merged.push((times, incident)),
         }
+    }
+    let all: usize = bins.iter().map(|bins| bins.spans.len()).sum();
+    if merged.len() > FEW && merged.len() * RARE > all {
+        return Vec::new();
     }
     merged.into_iter().map(|(_, incident)| incident).collect()
 }
