@@ -160,7 +160,7 @@ pub enum Topics {
 pub enum PresetWord {
     /// Universal Robots, RTDE: timestamp, actual_q_0, actual_qd_0, actual_current_0.
     UrRtde,
-    /// Franka, libfranka: time in milliseconds, q[0], dq[0], tau_J[0].
+    /// Franka, libfranka: time in milliseconds, `q[0]`, `dq[0]`, `tau_J[0]`.
     Franka,
 }
 
