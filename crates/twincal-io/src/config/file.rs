@@ -93,7 +93,7 @@ pub struct LogTable {
     /// Topics of a bag that are read: one, or a list from which each joint's channel is taken from the first that has it.
     /// Default: the only one with joint states.
     pub topic: Option<Topics>,
-    /// Whose recorder wrote the table: its column names are then known. [columns] goes first.
+    /// Whose recorder wrote the table: its column names are then known. `[columns]` goes first.
     pub preset: Option<PresetWord>,
     /// What the logged torque is; default "joint", with the preset ur-rtde "current".
     pub torque: Option<TorqueWord>,
@@ -129,7 +129,7 @@ pub struct LogEntry {
     /// Topics of a bag that are read: one, or a list from which each joint's channel is taken from the first that has it.
     /// Default: the only one with joint states.
     pub topic: Option<Topics>,
-    /// Whose recorder wrote the table: its column names are then known. [columns] goes first.
+    /// Whose recorder wrote the table: its column names are then known. `[columns]` goes first.
     pub preset: Option<PresetWord>,
     /// What the logged torque is; default "joint", with the preset ur-rtde "current".
     pub torque: Option<TorqueWord>,
