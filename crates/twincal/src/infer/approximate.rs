@@ -8,7 +8,8 @@ use super::search::{self, Care, Found, Start};
 use super::standard::Standard;
 use super::{bounds, certain};
 use crate::error::Result;
-use crate::posterior::{Method, Posterior, Problem};
+use crate::posterior::{Method, Model, Posterior, Problem};
+use std::collections::BTreeMap;
 
 /// Models that a search expands at most: many where the columns are few, so that the time is about the same.
 const BUDGET: (usize, usize) = (64, 3000);
@@ -30,24 +31,35 @@ pub(super) fn approximate(problem: &Problem, warm: Option<&Posterior>) -> Result
     };
     let found = search(&standard, problem, warm, budget, care);
     let total = found.sums.total() / (1.0 - found.missing);
-    let listed = Listed::new(
-        &standard,
-        shares(&standard, &found, total, LISTED_MODELS),
-        LISTED_MASS,
-        LISTED_MODELS,
-    )?;
+    let heaviest = shares(&standard, &found, total, LISTED_MODELS);
+    let all = total.ln() + found.sums.reference;
+    let log_weights: BTreeMap<Vec<u32>, f64> = (heaviest.iter().zip(&found.models))
+        .map(|((_, members, _), (log_weight, _))| (members.clone(), log_weight - all))
+        .collect();
+    let mass = if found.overrated {
+        f64::INFINITY
+    } else {
+        LISTED_MASS
+    };
+    let listed = Listed::new(&standard, heaviest, mass, LISTED_MODELS)?;
     let mut averages = averages(&standard, &found);
     let method = Method::Search {
         models: found.models.len() as u64,
         missing: found.missing,
     };
     let log_evidence = standard.log_evidence(total.ln() + found.sums.reference);
-    let listed = bounds::apply(&standard, &mut averages, listed, bounds::Weights::Guided)?;
+    let own = |model: &Model| log_weights.get(&model.members).copied();
+    let log_weights = (listed.models.iter())
+        .map(|model| own(model).unwrap_or_else(|| model.weight.ln()))
+        .collect();
+    let guided = bounds::Weights::Guided;
+    let (listed, log_growth) =
+        bounds::apply(&standard, &mut averages, listed, log_weights, guided)?;
     Ok(posterior(
         &standard,
         &averages,
         listed,
-        Some(log_evidence),
+        Some(log_evidence + log_growth),
         method,
     ))
 }

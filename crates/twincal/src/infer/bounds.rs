@@ -31,6 +31,8 @@ const FAR: f64 = 8.0;
 /// Models that the search beside another method expands, and how many of its models join the list.
 const BUDGET: usize = 1024;
 const JOINED: usize = 300;
+/// A model lighter than this share without bounds was not listed for its weight.
+const JOINED_SHARE: f64 = 1e-12;
 
 /// What the weights of listed models already contain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,34 +43,50 @@ pub(super) enum Weights {
     Guided,
 }
 
-/// Truncates the listed models and corrects the averages.
+/// Truncates the listed models and corrects the averages; also ln of what the bounds multiply the sum over all models with.
+///
+/// The logs of the weights count: a model that bounds favour may be too light without them for a number.
 pub(super) fn apply(
     standard: &Standard,
     averages: &mut Averages,
     listed: Listed,
+    mut log_weights: Vec<f64>,
     weights: Weights,
-) -> Result<Listed> {
+) -> Result<(Listed, f64)> {
     if !standard.bounded || listed.models.is_empty() {
-        return Ok(listed);
+        return Ok((listed, 0.0));
     }
     let before: Vec<Model> = listed.models.clone();
     let mut listed = listed;
     let mut acts = false;
-    for (model, positions) in listed.models.iter_mut().zip(&listed.positions) {
+    let rows = listed.models.iter_mut().zip(&listed.positions);
+    for ((model, positions), log_weight) in rows.zip(&mut log_weights) {
         let log_ratio = truncate(standard, model, positions, weights)?;
         acts |= log_ratio.abs() > 1e-12 || !model.sites.is_empty();
-        model.weight *= log_ratio.exp();
+        *log_weight += log_ratio;
     }
     if !acts {
-        return Ok(Listed {
-            models: before,
-            ..listed
-        });
+        let models = before;
+        return Ok((Listed { models, ..listed }, 0.0));
     }
-    let (old, new) = (before.iter().map(|m| m.weight).sum::<f64>(), listed.mass());
-    // Models that are not listed are scaled like the listed ones.
+    // Weights in units of the heaviest with bounds.
+    let unit = log_weights
+        .iter()
+        .copied()
+        .fold(f64::NEG_INFINITY, f64::max);
+    for (model, log_weight) in listed.models.iter_mut().zip(&log_weights) {
+        model.weight = (log_weight - unit).exp();
+    }
+    // Models that are not listed are scaled like those that a method without bounds listed.
+    let was_listed = |model: &&Model| model.weight > JOINED_SHARE;
+    let old: f64 = before.iter().filter(was_listed).map(|m| m.weight).sum();
+    let new: f64 = (before.iter().zip(&listed.models))
+        .filter(|(before, _)| was_listed(before))
+        .map(|(_, model)| model.weight)
+        .sum();
+    let all: f64 = before.iter().map(|m| m.weight).sum();
     let scale = new / old;
-    let total = new + scale * (1.0 - old).max(0.0);
+    let total = listed.mass() + scale * (1.0 - all).max(0.0);
     let size = standard.size();
     let mut sums = Averages {
         inclusion: averages.inclusion.clone(),
@@ -100,7 +118,7 @@ pub(super) fn apply(
             .total_cmp(&a.weight)
             .then_with(|| a.members.cmp(&b.members))
     });
-    Ok(Listed {
+    let listed = Listed {
         models: order
             .iter()
             .map(|&i| Model {
@@ -109,7 +127,8 @@ pub(super) fn apply(
             })
             .collect(),
         positions: order.iter().map(|&i| listed.positions[i].clone()).collect(),
-    })
+    };
+    Ok((listed, unit + total.ln()))
 }
 
 /// [`apply`] for a method that does not know the bounds: where they act, its list is joined by what a search finds.
@@ -118,9 +137,9 @@ pub(super) fn settle(
     standard: &Standard,
     averages: &mut Averages,
     mut listed: Listed,
-) -> Result<Listed> {
+) -> Result<(Listed, f64)> {
     if !standard.bounded {
-        return Ok(listed);
+        return Ok((listed, 0.0));
     }
     let found = approximate::search(standard, problem, None, BUDGET, Care::Full);
     let known: BTreeMap<Vec<u32>, f64> = listed
@@ -130,23 +149,25 @@ pub(super) fn settle(
         .collect();
     // Free weights of models that are not listed, relative to the heaviest listed one.
     let Some(heaviest) = listed.models.first() else {
-        return Ok(listed);
+        return Ok((listed, 0.0));
     };
-    let (reference, share) = (log_weight(problem, standard, heaviest), heaviest.weight);
-    let mut more = Vec::new();
+    let reference = log_weight(problem, standard, heaviest) - heaviest.weight.ln();
+    let mut log_weights: Vec<f64> = listed.models.iter().map(|m| m.weight.ln()).collect();
     for (_, members, positions) in approximate::shares(standard, &found, found.sums.total(), JOINED)
     {
         if known.contains_key(&members) {
             continue;
         }
-        let model = standard.model(&positions, 1.0)?;
-        let weight = share * (log_weight(problem, standard, &model) - reference).exp();
-        more.push((weight, members, positions));
+        let mut positions = positions;
+        positions.sort_unstable_by_key(|&d| standard.order[d]);
+        let mut model = standard.model(&positions, 1.0)?;
+        let log_weight = log_weight(problem, standard, &model) - reference;
+        model.weight = log_weight.exp();
+        log_weights.push(log_weight);
+        listed.models.push(model);
+        listed.positions.push(positions);
     }
-    let joined = Listed::new(standard, more, f64::INFINITY, JOINED)?;
-    listed.models.extend(joined.models);
-    listed.positions.extend(joined.positions);
-    apply(standard, averages, listed, Weights::Free)
+    apply(standard, averages, listed, log_weights, Weights::Free)
 }
 
 /// ln of a model's weight but for what all models share, from its own factor.

@@ -43,12 +43,14 @@ impl Exchange {
 /// Exchanges among `active` components: one for one, and one of several columns for two. `single` keeps those of two
 /// single columns as well.
 pub(super) fn exchanges(standard: &Standard, active: &[usize], single: bool) -> Vec<Exchange> {
+    let shared = Shared::new(standard, active);
     let mut all: Vec<Exchange> = Vec::new();
-    for &a in active {
+    for (place, &a) in active.iter().enumerate() {
         let mut alike: Vec<(f64, usize)> = active
             .iter()
-            .filter(|&&b| b != a)
-            .map(|&b| (shared(standard, a, b), b))
+            .enumerate()
+            .filter(|&(other, _)| other != place)
+            .map(|(other, &b)| (shared.of(place, other), b))
             .filter(|(share, _)| *share > ALIKE * ALIKE)
             .collect();
         alike.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
@@ -79,39 +81,63 @@ pub(super) fn exchanges(standard: &Standard, active: &[usize], single: bool) -> 
 }
 
 /// Share of the smaller component's columns that lies in the span of the other, slab included:
-/// `tr(A_aa⁻¹ A_ab A_bb⁻¹ A_ba) / min(|a|, |b|)`.
-fn shared(standard: &Standard, a: usize, b: usize) -> f64 {
-    let size = standard.size();
-    let (a, b) = (standard.blocks[a], standard.blocks[b]);
-    let at = |i: usize, j: usize| standard.matrix[i * size + j];
-    if a.len == 1 && b.len == 1 {
-        return at(a.start, b.start) * at(a.start, b.start);
-    }
-    let square = |block: &super::standard::Block| -> Option<Cholesky> {
-        let values: Vec<f64> = block
-            .range()
-            .flat_map(|i| block.range().map(move |j| at(i, j)))
+/// `tr(A_aa⁻¹ A_ab A_bb⁻¹ A_ba) / min(|a|, |b|)`, for all pairs.
+struct Shared {
+    count: usize,
+    /// By place in `active`.
+    shares: Vec<f64>,
+}
+
+impl Shared {
+    fn new(standard: &Standard, active: &[usize]) -> Self {
+        let (size, count) = (standard.size(), active.len());
+        let at = |i: usize, j: usize| standard.matrix[i * size + j];
+        let factors: Vec<Option<Cholesky>> = active
+            .iter()
+            .map(|&b| {
+                let block = &standard.blocks[b];
+                let values: Vec<f64> = block
+                    .range()
+                    .flat_map(|i| block.range().map(move |j| at(i, j)))
+                    .collect();
+                Cholesky::new(&values, block.len).ok()
+            })
             .collect();
-        Cholesky::new(&values, block.len).ok()
-    };
-    let (Some(own), Some(other)) = (square(&a), square(&b)) else {
-        return 1.0;
-    };
-    // Rows of L_a⁻¹ A_ab, each then through L_b⁻¹: the squared norm is the trace.
-    let mut cross = vec![0.0; a.len * b.len];
-    for (j, column) in b.range().enumerate() {
-        let mut x: Vec<f64> = a.range().map(|i| at(i, column)).collect();
-        own.solve_lower(&mut x);
-        for (i, x) in x.iter().enumerate() {
-            cross[i * b.len + j] = *x;
+        let mut shares = vec![1.0; count * count];
+        let (mut x, mut row) = (Vec::new(), Vec::new());
+        for a in 0..count {
+            let own = &standard.blocks[active[a]];
+            for b in 0..a {
+                let other = &standard.blocks[active[b]];
+                let (Some(left), Some(right)) = (&factors[a], &factors[b]) else {
+                    continue;
+                };
+                // L_a⁻¹ A_ab L_b⁻ᵀ: its squared norm is the trace
+                let mut cross = vec![0.0; own.len * other.len];
+                for (j, column) in other.range().enumerate() {
+                    x.clear();
+                    x.extend(own.range().map(|i| at(i, column)));
+                    left.solve_lower(&mut x);
+                    for (i, x) in x.iter().enumerate() {
+                        cross[i * other.len + j] = *x;
+                    }
+                }
+                let mut norm = 0.0;
+                for values in cross.chunks_exact(other.len) {
+                    row.clear();
+                    row.extend_from_slice(values);
+                    right.solve_lower(&mut row);
+                    norm += row.iter().map(|x| x * x).sum::<f64>();
+                }
+                let share = norm / own.len.min(other.len) as f64;
+                shares[a * count + b] = share;
+                shares[b * count + a] = share;
+            }
         }
+        Self { count, shares }
     }
-    let norm: f64 = cross
-        .chunks_exact_mut(b.len)
-        .map(|row| {
-            other.solve_lower(row);
-            row.iter().map(|x| x * x).sum::<f64>()
-        })
-        .sum();
-    norm / a.len.min(b.len) as f64
+
+    fn of(&self, a: usize, b: usize) -> f64 {
+        self.shares[a * self.count + b]
+    }
 }

@@ -10,6 +10,7 @@ mod exact;
 mod exchanges;
 mod gibbs;
 mod moments;
+mod pivot;
 mod sampled;
 mod search;
 mod standard;

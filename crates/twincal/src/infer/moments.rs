@@ -1,8 +1,9 @@
 //! Moments of one model's coefficients, read off the tableau, for the present model and for its neighbours; and their
 //! weighted sums.
 
+use super::pivot::Pivot;
 use super::standard::Standard;
-use super::walker::Walker;
+use super::walker::{Step, Walker};
 use crate::linear_algebra::Cholesky;
 use statrs::function::erf::erfc;
 
@@ -116,6 +117,47 @@ pub(super) fn after_flip(walker: &Walker<'_>, block: usize, excess: f64) -> Mome
     moments
 }
 
+/// Moments after an exchange; `excess` is c then. See [`Pivot`] for the formulas.
+pub(super) fn after_exchange(
+    walker: &Walker<'_>,
+    step: &Step,
+    pivot: &Pivot,
+    excess: f64,
+) -> Moments {
+    let (standard, tableau) = (walker.standard, &walker.tableau);
+    let mut moments = present(walker);
+    moments.excess = excess;
+    let (leaving, entering) = pivot.positions.split_at(pivot.leaving);
+    let mut v = vec![0.0; pivot.positions.len()];
+    for &i in &tableau.members {
+        let row = tableau.row(i);
+        v.iter_mut()
+            .zip(&pivot.positions)
+            .for_each(|(v, &k)| *v = row[k]);
+        let (shift, spread) = pivot.forms(&mut v);
+        moments.delta[i] -= shift;
+        moments.variance[i] = (moments.variance[i] - spread).max(1.0);
+    }
+    for &k in leaving {
+        moments.delta[k] = -standard.center[k];
+        moments.variance[k] = 0.0;
+    }
+    for (a, &k) in entering.iter().enumerate() {
+        v.fill(0.0);
+        v[pivot.leaving + a] = 1.0;
+        let (mean, variance) = pivot.forms(&mut v);
+        moments.delta[k] = mean - standard.center[k];
+        moments.variance[k] = (-variance).max(1.0);
+    }
+    for &block in step.leaving.iter().chain(&step.entering) {
+        moments.holds[block] ^= true;
+    }
+    moments
+}
+
+/// ln of how much heavier than the reference a model may be.
+const MOST_ABOVE: f64 = 100.0;
+
 /// Weighted sums over models; weights relative to `e^reference`.
 #[derive(Debug, Clone)]
 pub(super) struct Sums {
@@ -155,8 +197,22 @@ impl Sums {
         (log_weight - self.reference).min(690.0).exp()
     }
 
+    /// Moves the reference up where a model is too heavy for it.
+    fn rebase(&mut self, log_weight: f64) {
+        if log_weight <= self.reference + MOST_ABOVE {
+            return;
+        }
+        let factor = (self.reference - log_weight).exp();
+        self.reference = log_weight;
+        self.total *= factor;
+        self.misfit *= factor;
+        let sums = [&mut self.inclusion, &mut self.shift, &mut self.moment];
+        sums.into_iter().flatten().for_each(|sum| *sum *= factor);
+    }
+
     /// One more model.
     pub(super) fn add(&mut self, log_weight: f64, moments: &Moments) {
+        self.rebase(log_weight);
         let weight = self.weight(log_weight);
         let misfit = 1.0 + moments.excess;
         let phi = misfit * self.factor;

@@ -5,10 +5,11 @@
 //! Expansion ends when what a further one would add is negligible, or at a fixed number of models. No random numbers,
 //! one thread: the same bytes everywhere.
 
+use super::bounds::{Weights, truncate};
 use super::exchanges::{Exchange, exchanges};
-use super::moments::{Sums, after_flip, present};
+use super::moments::{Moments, Sums, after_exchange, after_flip, present};
 use super::standard::Standard;
-use super::walker::{Step, Walker};
+use super::walker::Walker;
 use crate::prior::Prior;
 use pulp::{Simd, WithSimd};
 use std::cmp::Ordering;
@@ -20,6 +21,10 @@ const NEGLIGIBLE: f64 = -28.0;
 const NEGLIGIBLE_IN_LOOPS: f64 = -14.0;
 /// ln of the weight, relative to the heaviest model, above which exchanges are tried as well.
 const EXCHANGED: f64 = -4.6;
+/// Nats that bounds cost a model from which on they are worth a closer look.
+const ACTING: f64 = 0.5;
+/// Nats by which the guide may rate a model too high before that is said.
+const OVERRATED: f64 = 3.0;
 /// Share of the mass that may be missing.
 const MISSING: f64 = 1e-6;
 /// The same for loops.
@@ -40,6 +45,8 @@ pub(super) struct Found {
     pub(super) models: Vec<(f64, Set)>,
     /// Estimated share of the mass that was not found.
     pub(super) missing: f64,
+    /// The guide rated some model far too high: others matter, however light they seem beside it.
+    pub(super) overrated: bool,
 }
 
 /// What a search is told.
@@ -116,6 +123,7 @@ impl WithSimd for Run<'_> {
             queue: BinaryHeap::new(),
             sums: Sums::new(standard),
             best: f64::NEG_INFINITY,
+            overrated: false,
             walker,
             active: start.active,
             exchanges: &exchanges,
@@ -148,7 +156,7 @@ pub(super) fn climb<S: Simd>(
         let step = exchanges
             .iter()
             .filter_map(|exchange| exchange.step(walker))
-            .map(|step| (walker.exchange_gain(&step), step))
+            .map(|step| (walker.exchange_gain(&step).0, step))
             .max_by(|a, b| a.0.total_cmp(&b.0));
         match step {
             Some((gain, step)) if gain > 1e-9 => walker.take(simd, &step),
@@ -189,6 +197,7 @@ struct Search<'a> {
     queue: BinaryHeap<Candidate>,
     sums: Sums,
     best: f64,
+    overrated: bool,
     care: Care,
 }
 
@@ -234,7 +243,7 @@ impl Search<'_> {
             found.push((self.walker.log_weight(), self.set()));
         }
         found.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
-        self.sums.reference = found.first().map_or(0.0, |f| f.0);
+        self.sums.reference = f64::NEG_INFINITY;
         for (_, set) in found {
             self.go(simd, &set);
             self.add_present();
@@ -246,14 +255,16 @@ impl Search<'_> {
         let set = self.set();
         if !self.known.contains_key(&set) {
             let moments = present(&self.walker);
-            let log_weight = self.walker.log_weight() + moments.log_mass(self.walker.standard);
+            let bounds = -moments.log_mass(self.walker.standard);
+            let log_weight = self.walker.log_weight() - bounds;
             self.sums.add(log_weight, &moments);
-            self.keep(set, log_weight);
+            self.keep(set, log_weight, bounds);
         }
     }
 
-    fn keep(&mut self, set: Set, log_weight: f64) {
-        self.best = self.best.max(log_weight);
+    /// `bounds`: what they cost, as the guide has it.
+    fn keep(&mut self, set: Set, log_weight: f64, bounds: f64) {
+        self.raise(&set, log_weight, bounds);
         self.queue.push(Candidate {
             log_weight,
             set: set.clone(),
@@ -278,34 +289,59 @@ impl Search<'_> {
                 continue;
             }
             let moments = after_flip(&self.walker, block, excess);
-            let log_weight = now + gain + moments.log_mass(self.walker.standard);
-            if log_weight >= self.best + self.care.negligible() {
-                self.sums.add(log_weight, &moments);
-                self.keep(other, log_weight);
-            }
+            self.add(other, now + gain, &moments);
         }
     }
 
-    /// All models one exchange away from the present one.
-    #[inline(always)]
-    fn exchanged<S: Simd>(&mut self, simd: S) {
+    /// Counts a model that is not known by its weight without bounds, unless with them it is negligible.
+    fn add(&mut self, set: Set, free: f64, moments: &Moments) {
+        let log_weight = free + moments.log_mass(self.walker.standard);
+        if log_weight >= self.best + self.care.negligible() {
+            self.sums.add(log_weight, moments);
+            self.keep(set, log_weight, free - log_weight);
+        }
+    }
+
+    /// The heaviest model sets what is negligible. Where bounds act, coefficients are no longer independent and the guide may
+    /// rate a model far too high: it counts with what the bounds really leave of it.
+    fn raise(&mut self, set: &[u64], log_weight: f64, bounds: f64) {
+        if log_weight <= self.best {
+            return;
+        }
+        let mut own = log_weight;
+        if bounds > ACTING {
+            let standard = self.walker.standard;
+            let (_, mut positions) = standard.members(set);
+            positions.sort_unstable_by_key(|&d| standard.order[d]);
+            let truncated = standard
+                .model(&positions, 1.0)
+                .and_then(|mut model| truncate(standard, &mut model, &positions, Weights::Guided));
+            let log_ratio = truncated.map_or(f64::NEG_INFINITY, |log_ratio| log_ratio.min(0.0));
+            self.overrated |= log_ratio < -OVERRATED;
+            own += log_ratio;
+        }
+        self.best = self.best.max(own);
+    }
+
+    /// All models one exchange away from the present one, which is `set`.
+    fn exchanged(&mut self, set: &[u64]) {
         let now = self.walker.log_weight();
         for index in 0..self.exchanges.len() {
             let Some(step) = self.exchanges[index].step(&self.walker) else {
                 continue;
             };
-            if now + self.walker.exchange_gain(&step) < self.best + self.care.negligible() {
+            let mut other = set.to_vec();
+            for &block in step.leaving.iter().chain(&step.entering) {
+                other[block / 64] ^= 1 << (block % 64);
+            }
+            if self.known.contains_key(&other) {
                 continue;
             }
-            self.walker.take(simd, &step);
-            self.add_present();
-            self.walker.take(
-                simd,
-                &Step {
-                    leaving: step.entering,
-                    entering: step.leaving,
-                },
-            );
+            let (gain, excess, pivot) = self.walker.exchange_gain(&step);
+            if now + gain >= self.best + self.care.negligible() {
+                let moments = after_exchange(&self.walker, &step, &pivot, excess);
+                self.add(other, now + gain, &moments);
+            }
         }
     }
 
@@ -320,10 +356,17 @@ impl Search<'_> {
                 break;
             };
             self.go(simd, &next.set);
-            let before = self.sums.total();
+            let (mut before, reference) = (self.sums.total(), self.sums.reference);
             self.neighbours(&next.set);
             if next.log_weight > self.best + EXCHANGED {
-                self.exchanged(simd);
+                self.exchanged(&next.set);
+            }
+            if self.sums.reference > reference {
+                // far heavier models than any before: everything so far in the new unit
+                let unit = (reference - self.sums.reference).exp();
+                for sum in [&mut before, &mut expanded, &mut recent, &mut brought] {
+                    *sum *= unit;
+                }
             }
             let own = self.sums.weight(next.log_weight);
             expanded += own;
@@ -331,7 +374,11 @@ impl Search<'_> {
             brought = FORGET * brought + self.sums.total() - before;
             // What waits brings as much per mass as what was expanded lately.
             let waiting = (self.sums.total() - expanded).max(0.0);
-            let rate = (brought / recent).min(1.0);
+            let rate = if recent > 0.0 {
+                (brought / recent).min(1.0)
+            } else {
+                1.0
+            };
             missing = (waiting * rate / self.sums.total()).min(0.5);
             if missing < self.care.missing() && step >= LEAST_EXPANDED {
                 break;
@@ -347,6 +394,7 @@ impl Search<'_> {
             sums: self.sums,
             models,
             missing,
+            overrated: self.overrated,
         }
     }
 }

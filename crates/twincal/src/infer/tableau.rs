@@ -175,7 +175,7 @@ impl<'a> Tableau<'a> {
 
     /// The smallest pivot that a position can have, and the factor that takes a pivot's units away.
     #[inline(always)]
-    fn least(&self, j: usize, inside: bool) -> (f64, f64) {
+    pub(super) fn least(&self, j: usize, inside: bool) -> (f64, f64) {
         let precision = self.standard.precision[j];
         if inside {
             (1.0, precision)
@@ -184,52 +184,8 @@ impl<'a> Tableau<'a> {
         }
     }
 
-    /// The same as [`Tableau::block`] for an exchange: `leaving` and `entering` are positions.
-    pub(super) fn exchange(&self, leaving: &[usize], entering: &[usize]) -> (f64, f64) {
-        let (out, into) = (leaving.len(), entering.len());
-        let all = out + into;
-        // [C T; Tᵀ −S] with [β; −u]: eliminating the members leaves −(S + TᵀC⁻¹T) and −(u + TᵀC⁻¹β).
-        let mut matrix = vec![0.0; all * all];
-        let mut rhs = vec![0.0; all];
-        for (a, &i) in leaving.iter().enumerate() {
-            let row = self.row(i);
-            rhs[a] = self.gradient[i];
-            for (b, &k) in leaving.iter().chain(entering).enumerate() {
-                matrix[a * all + b] = row[k];
-            }
-        }
-        for (a, &j) in entering.iter().enumerate() {
-            rhs[out + a] = -self.gradient[j];
-            for (b, &k) in entering.iter().enumerate().skip(a) {
-                matrix[(out + a) * all + out + b] = -self.schur(j, k);
-            }
-        }
-        // Rows of the entering part left of the diagonal are never read; their first columns are eliminated by symmetry.
-        let (mut d, mut lost) = (1.0, 0.0);
-        for i in 0..all {
-            let (position, inside) = if i < out {
-                (leaving[i], true)
-            } else {
-                (entering[i - out], false)
-            };
-            let (least, unit) = self.least(position, inside);
-            let sign = if inside { 1.0 } else { -1.0 };
-            let pivot = (sign * matrix[i * all + i]).max(least);
-            d *= pivot * unit;
-            lost += sign * rhs[i] * rhs[i] / pivot;
-            for l in i + 1..all {
-                let factor = sign * matrix[i * all + l] / pivot;
-                for k in l..all {
-                    matrix[l * all + k] -= factor * matrix[i * all + k];
-                }
-                rhs[l] -= factor * rhs[i];
-            }
-        }
-        (d, lost)
-    }
-
     /// Schur complement of two excluded positions.
-    fn schur(&self, j: usize, k: usize) -> f64 {
+    pub(super) fn schur(&self, j: usize, k: usize) -> f64 {
         if j == k {
             return self.diagonal[j];
         }
@@ -366,16 +322,23 @@ impl<'a> Tableau<'a> {
     /// ```text
     /// both out: −step s sᵀ     otherwise: +step s sᵀ     row of j: s/|pivot|, negative towards members that j leaves
     /// ```
+    #[inline(always)]
     fn update_squares(&mut self, j: usize, diagonal: f64, step: f64) {
         for &(start, len, at) in &self.wide {
             let row = &self.scratch[start..start + len];
             let sign = &self.sign[start..start + len];
             let square = &mut self.squares[at..at + len * len];
-            for i in 0..len {
-                let factor = step * row[i];
-                for k in 0..len {
-                    let out = sign[i] < 0.0 && sign[k] < 0.0;
-                    square[i * len + k] += if out { -factor } else { factor } * row[k];
+            for ((values, own), inside) in square.chunks_exact_mut(len).zip(row).zip(sign) {
+                let factor = step * own;
+                if *inside > 0.0 {
+                    for (value, other) in values.iter_mut().zip(row) {
+                        *value += factor * other;
+                    }
+                } else {
+                    // both out: −, otherwise +
+                    for ((value, other), sign) in values.iter_mut().zip(row).zip(sign) {
+                        *value += factor * sign * other;
+                    }
                 }
             }
             if (start..start + len).contains(&j) {
@@ -397,6 +360,7 @@ impl<'a> Tableau<'a> {
     }
 
     /// Recomputes c, coefficients and gradients of the present members from A, h and β̂: sums of small numbers.
+    #[inline(always)]
     fn recenter(&mut self) {
         let (size, width) = (self.standard.size(), self.width);
         let mut delta = vec![0.0; width];
@@ -409,7 +373,7 @@ impl<'a> Tableau<'a> {
         }
         let slope = |delta: &[f64], k: usize| -> f64 {
             let row = &self.matrix[k * width..(k + 1) * width];
-            self.standard.offset[k] + row.iter().zip(delta).map(|(a, d)| a * d).sum::<f64>()
+            self.standard.offset[k] + dot(row, delta)
         };
         // One step of refinement: at the members the slope must vanish.
         let rest: Vec<f64> = self.members.iter().map(|&k| slope(&delta, k)).collect();
@@ -478,6 +442,19 @@ fn eliminate(
         }
     }
     (determinant, square)
+}
+
+/// xᵀy of whole lanes, in one fixed order.
+#[inline(always)]
+fn dot(x: &[f64], y: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let ((x, _), (y, _)) = (x.as_chunks::<LANES>(), y.as_chunks::<LANES>());
+    for (x, y) in x.iter().zip(y) {
+        for lane in 0..LANES {
+            sums[lane] += x[lane] * y[lane];
+        }
+    }
+    sums.iter().sum()
 }
 
 /// y += a x.

@@ -4,6 +4,7 @@
 //! ln weight(z) = ln p(z) + Σ ln factor − ½ ln |A_zz| Π v − a_n ln(1 + c_z)
 //! ```
 
+use super::pivot::Pivot;
 use super::standard::Standard;
 use super::tableau::Tableau;
 use crate::prior::Prior;
@@ -115,18 +116,10 @@ impl<'a> Walker<'a> {
         }
     }
 
-    /// ln of the weight's growth of an exchange.
-    pub(super) fn exchange_gain(&self, step: &Step) -> f64 {
-        let positions = |blocks: &[usize]| -> Vec<usize> {
-            blocks
-                .iter()
-                .flat_map(|&b| self.standard.blocks[b].range())
-                .collect()
-        };
-        let (d, change) = self
-            .tableau
-            .exchange(&positions(&step.leaving), &positions(&step.entering));
-        let (misfit, after) = self.misfits(change);
+    /// (ln of the weight's growth, c after, the pivot) of an exchange.
+    pub(super) fn exchange_gain(&self, step: &Step) -> (f64, f64, Pivot) {
+        let pivot = Pivot::new(&self.tableau, &step.leaving, &step.entering);
+        let (misfit, after) = self.misfits(pivot.change);
         let mut members = self.members.clone();
         let mut log_factor = 0.0;
         for &block in &step.leaving {
@@ -138,7 +131,10 @@ impl<'a> Walker<'a> {
             log_factor += self.standard.blocks[block].factor.ln();
         }
         let prior = self.log_prior_change(&members);
-        prior + log_factor - 0.5 * d.ln() - self.standard.shape * (after / misfit).ln()
+        let gain = prior + log_factor
+            - 0.5 * pivot.determinant.ln()
+            - self.standard.shape * (after / misfit).ln();
+        (gain, after - 1.0, pivot)
     }
 
     /// `ln p(z') − ln p(z)` by the members of each family, one urn draw per difference.

@@ -1,9 +1,11 @@
 //! Truncated posteriors against brute force.
 
-use crate::infer::testing::{grouped, normal, sampled};
+use crate::infer::moments::log_normal_mass;
+use crate::infer::testing::{grouped, normal, problem, sampled};
 use crate::infer::{approximate, exact};
 use crate::posterior::draws::draw;
 use crate::posterior::{Posterior, Problem};
+use crate::prior::Inclusion;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -125,4 +127,80 @@ fn distant_bounds_change_nothing() {
     );
     assert_eq!(a.inclusion, b.inclusion);
     assert_eq!(a.models, b.models);
+}
+
+/// One coefficient: with a bound at 0 its model counts by Φ(t)/½, evidence and probability in closed form. Also where the
+/// effect has the wrong sign by hundreds of standard deviations, which no number holds without logarithms.
+#[test]
+fn one_bounded_coefficient_in_closed_form() {
+    let mut problem = problem(4, 1, 2000, 0.0, Inclusion::Probability(0.2));
+    let (gram, rows) = (problem.gram[0], problem.n);
+    for score in [3.0, 0.5, -0.7, -3.0, -8.0, -40.0, -400.0, -4000.0] {
+        // residual variance 1, least-squares estimate `score` standard errors from 0
+        problem.xy[0] = score * gram.sqrt();
+        problem.yy = rows + score * score;
+        problem.prior.lower[0] = f64::NEG_INFINITY;
+        let free = exact::enumerate(&problem).unwrap();
+        problem.prior.lower[0] = 0.0;
+        let got = exact::enumerate(&problem).unwrap();
+        let by_search = approximate(&problem, None).unwrap();
+        let pip = free.inclusion[0];
+        let (mean, sd) = (free.mean[0] / pip, {
+            let second = (free.sd[0].powi(2) + free.mean[0].powi(2)) / pip;
+            (second - (free.mean[0] / pip).powi(2)).max(0.0).sqrt()
+        });
+        let odds_free = pip / (1.0 - pip);
+        for (name, got) in [("exact", &got), ("search", &by_search)] {
+            assert!(
+                got.inclusion[0].is_finite() && got.mean[0].is_finite(),
+                "{name} at {score}: {} {}",
+                got.inclusion[0],
+                got.mean[0]
+            );
+            if score.abs() < 5.0 {
+                let factor = 2.0 * log_normal_mass(mean / sd).exp();
+                let odds = odds_free * factor;
+                let expected = odds / (1.0 + odds);
+                let off = (got.inclusion[0] - expected).abs();
+                assert!(off < 2e-3, "{name} at {score}: {off}");
+                let grown = ((1.0 - pip) + pip * factor).ln();
+                let off = got.log_evidence.unwrap() - free.log_evidence.unwrap() - grown;
+                assert!(off.abs() < 5e-3, "{name} at {score}: evidence {off}");
+            } else {
+                assert!(
+                    got.inclusion[0] < 0.05,
+                    "{name} at {score}: {}",
+                    got.inclusion[0]
+                );
+                let limit = free.log_evidence.unwrap() + 1.0;
+                assert!(got.log_evidence.unwrap() < limit, "{name} at {score}");
+            }
+        }
+    }
+}
+
+/// Two columns almost alike whose sum is wanted negative: taken as independent each is barely outside, together they are
+/// impossible. The model without them must not be lost.
+#[test]
+fn alike_columns_on_the_wrong_side_are_left_out() {
+    let mut problem = problem(4, 2, 4000, 0.0, Inclusion::Probability(0.2));
+    let (a, rho) = (1000.0, 0.98);
+    problem.gram = vec![a, rho * a, rho * a, a];
+    // y = −0.5 (x₁ + x₂) + noise of variance 1
+    let xy = -0.5 * a * (1.0 + rho);
+    problem.xy = vec![xy, xy];
+    problem.yy = problem.n + 0.5 * a * (1.0 + rho);
+    problem.prior.slab = vec![1.0; 2];
+    problem.prior.lower = vec![0.0; 2];
+    for (name, got) in [
+        ("exact", exact::enumerate(&problem).unwrap()),
+        ("search", approximate(&problem, None).unwrap()),
+    ] {
+        let models: Vec<_> = got.models.iter().map(|m| (&m.members, m.weight)).collect();
+        assert!(
+            got.inclusion.iter().all(|pip| *pip < 0.2),
+            "{name}: {:?} of {models:?}",
+            got.inclusion
+        );
+    }
 }

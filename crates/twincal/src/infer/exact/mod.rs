@@ -71,14 +71,14 @@ pub(super) fn sum(problem: &Problem, certain: &[bool]) -> Result<Posterior> {
         })
         .collect();
     let listed = Listed::new(&standard, found, LISTED_MASS, LISTED_MODELS)?;
-    let listed = bounds::settle(problem, &standard, &mut averages, listed)?;
+    let (listed, log_growth) = bounds::settle(problem, &standard, &mut averages, listed)?;
     let log_evidence = standard.log_evidence(weight.ln() - tree::LOG_REFERENCE);
     let models = 1u64.checked_shl(order.len() as u32).unwrap_or(u64::MAX);
     Ok(posterior(
         &standard,
         &averages,
         listed,
-        Some(log_evidence),
+        Some(log_evidence + log_growth),
         Method::Exact { models },
     ))
 }

@@ -293,7 +293,7 @@ impl<'a> Chain<'a> {
         let Some(step) = self.exchanges[index].step(&self.walker) else {
             return;
         };
-        let gain = self.walker.exchange_gain(&step);
+        let (gain, ..) = self.walker.exchange_gain(&step);
         if self.source.uniform() < LAZY * gain.exp() {
             for &block in step.leaving.iter().chain(&step.entering) {
                 self.flip(simd, block);

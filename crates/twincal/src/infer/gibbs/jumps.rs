@@ -11,12 +11,15 @@ use crate::infer::standard::Standard;
 use crate::infer::walker::Walker;
 use crate::posterior::Problem;
 use pulp::{Simd, WithSimd};
+use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Models in the list at most.
 const MODELS: usize = 1000;
 /// Models that the search expands.
 const BUDGET: usize = 256;
+/// Models that are weighed on one walk.
+const PIECE: usize = 256;
 
 /// Models with their share of the list's mass.
 pub(super) struct Jumps {
@@ -57,13 +60,20 @@ impl Jumps {
     }
 
     /// The list of the heaviest of these models, weighed as the chain weighs them.
-    fn heaviest(models: Vec<Set>, standard: &Standard, problem: &Problem) -> Self {
-        let weights = pulp::Arch::new().dispatch(Weights {
-            standard,
-            problem,
-            models: &models,
-        });
-        let mut weighed: Vec<(f64, Set)> = weights.into_iter().zip(models).collect();
+    fn heaviest(mut models: Vec<Set>, standard: &Standard, problem: &Problem) -> Self {
+        // Neighbours in this order differ by few components; a piece has its own walk, whatever the threads.
+        models.sort_unstable();
+        let mut weighed: Vec<(f64, Set)> = models
+            .par_chunks(PIECE)
+            .flat_map_iter(|models| {
+                let weights = pulp::Arch::new().dispatch(Weights {
+                    standard,
+                    problem,
+                    models,
+                });
+                weights.into_iter().zip(models.iter().cloned())
+            })
+            .collect();
         weighed.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
         weighed.truncate(MODELS);
         if weighed.len() < 2 {

@@ -23,12 +23,14 @@ use std::collections::BTreeMap;
 /// Largest R̂ of chains that agree.
 pub const R_HAT_LIMIT: f64 = 1.01;
 /// Largest difference of a PIP between chains that agree.
-const SPREAD_LIMIT: f64 = 0.1;
-/// Scans per draw, tried in this order. The second run is as long as the first, but its chains know what the first ones
-/// found.
-const SCANS_PER_DRAW: [usize; 5] = [4, 4, 16, 64, 256];
+pub(super) const SPREAD_LIMIT: f64 = 0.1;
+/// Scans per draw, tried in this order. A run that knows what the ones before it found is tried at the same length once more.
+const SCANS_PER_DRAW: [usize; 6] = [1, 4, 4, 16, 64, 256];
+/// The shortest run counts only if it is far better than chains that agree have to be: share of independent draws among
+/// all of them, and standard error of the probabilities.
+const MIXED: (f64, f64) = (0.25, 0.004);
 /// Multiplications after which no longer run is tried (about a minute).
-const WORK_LIMIT: f64 = 1e11;
+pub(super) const WORK_LIMIT: f64 = 1e11;
 /// Fewest draws per chain that can be judged.
 const LEAST_DRAWS: usize = 100;
 
@@ -43,31 +45,44 @@ struct Agreement {
     spread: Vec<f64>,
 }
 
+impl Agreement {
+    /// Draws that are nearly independent, see [`MIXED`].
+    fn mixed(&self, draws: f64) -> bool {
+        let independent = self.ess.iter().copied().fold(draws, f64::min);
+        let error = self.mcse.iter().copied().fold(0.0, f64::max);
+        independent >= MIXED.0 * draws && error <= MIXED.1
+    }
+}
+
 /// The posterior by Markov chains.
 ///
 /// # Errors
 /// Those of [`super::infer`].
 pub(super) fn sample(problem: &Problem, settings: &InferenceSettings) -> Result<Posterior> {
-    if settings.chains == 0 || settings.draws < LEAST_DRAWS {
-        let key = if settings.chains == 0 {
-            "inference.chains"
-        } else {
-            "inference.draws"
-        };
-        return Err(Error::Setting {
-            key: key.into(),
-            problem: format!(
-                "{} chains of {} draws cannot be judged",
-                settings.chains, settings.draws
-            ),
-            remedy: format!(
-                "use at least 1 chain (better 4) and {LEAST_DRAWS} draws (better 5000)"
-            ),
-        });
-    }
+    require_draws(settings)?;
     let standard = Standard::new(problem)?;
     let jumps = Jumps::of(&standard, problem);
     chains(problem, settings, &standard, jumps, true)
+}
+
+/// Refuses chains that nobody could judge.
+///
+/// # Errors
+/// [`Error::Setting`] naming `inference.chains` or `inference.draws`.
+pub(super) fn require_draws(settings: &InferenceSettings) -> Result<()> {
+    let key = match (settings.chains, settings.draws) {
+        (0, _) => "inference.chains",
+        (_, draws) if draws < LEAST_DRAWS => "inference.draws",
+        _ => return Ok(()),
+    };
+    Err(Error::Setting {
+        key: key.into(),
+        problem: format!(
+            "{} chains of {} draws cannot be judged",
+            settings.chains, settings.draws
+        ),
+        remedy: format!("use at least 1 chain (better 4) and {LEAST_DRAWS} draws (better 5000)"),
+    })
 }
 
 /// [`sample`] with a given list of models to jump between; with `share`, chains that disagree are run again and know what
@@ -86,7 +101,7 @@ fn chains(
     let mut best: Option<(Vec<Trace>, Agreement)> = None;
     for scans_per_draw in SCANS_PER_DRAW {
         let length = Length {
-            warm_up: settings.draws / 2,
+            warm_up: settings.draws / 4,
             draws: settings.draws,
             scans_per_draw,
         };
@@ -107,7 +122,10 @@ fn chains(
             .map(|chain| chain::run(target, settings.seed, chain, length))
             .collect();
         let agreement = judge(standard, &traces, settings.draws);
-        let agree = disagreement(standard, &agreement).is_none();
+        let mut agree = disagreement(standard, &agreement).is_none();
+        if scans_per_draw == SCANS_PER_DRAW[0] {
+            agree &= agreement.mixed((settings.chains * settings.draws) as f64);
+        }
         if share && !agree {
             let visited = traces.iter().flat_map(|trace| trace.visits.keys().cloned());
             jumps = jumps.joined(visited.collect(), standard, problem);
@@ -194,8 +212,10 @@ fn judge(standard: &Standard, traces: &[Trace], draws: usize) -> Agreement {
         .map(|b| {
             let conditional = rows(traces, draws, b, |t| &t.conditional);
             let pips = traces.iter().map(|t| t.inclusion[b] / draws as f64);
-            let spread = pips.clone().fold(0.0, f64::max) - pips.fold(1.0, f64::min);
-            (mcse_mean(&conditional), spread.max(0.0))
+            let spread = pips.clone().fold(0.0, f64::max) - pips.clone().fold(1.0, f64::min);
+            // What the memory of the chains says, or the scatter of their means: rare visits hide from the first.
+            let error = mcse_mean(&conditional).max(standard_error(pips));
+            (error, spread.max(0.0))
         })
         .unzip();
     Agreement {
@@ -204,6 +224,17 @@ fn judge(standard: &Standard, traces: &[Trace], draws: usize) -> Agreement {
         mcse,
         spread,
     }
+}
+
+/// Standard error of the mean of independent values; 0 for one alone.
+fn standard_error(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let count = values.clone().count() as f64;
+    if count < 2.0 {
+        return 0.0;
+    }
+    let mean = values.clone().sum::<f64>() / count;
+    let square: f64 = values.map(|x| (x - mean) * (x - mean)).sum();
+    (square / (count * (count - 1.0))).sqrt()
 }
 
 /// The position that the chains disagree about most, and in which words.
@@ -260,7 +291,7 @@ fn summarise(
         LISTED_MASS,
         LISTED_MODELS,
     )?;
-    let listed = bounds::settle(problem, standard, &mut averages, listed)?;
+    let (listed, _) = bounds::settle(problem, standard, &mut averages, listed)?;
     let method = Method::Gibbs {
         chains: settings.chains,
         draws: settings.draws,

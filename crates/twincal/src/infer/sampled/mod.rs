@@ -9,13 +9,16 @@ mod planted;
 mod sweep;
 mod target;
 
+use super::gibbs::{R_HAT_LIMIT, SPREAD_LIMIT, WORK_LIMIT, require_draws};
 use super::standard::Standard;
-use super::{InferenceSettings, R_HAT_LIMIT, bounds};
+use super::{InferenceSettings, bounds};
 use crate::diagnostics::{ess_bulk, mcse_mean, r_hat};
 use crate::error::{Error, Result};
 use crate::gram::Gram;
 use crate::infer::answer::{LISTED_MASS, LISTED_MODELS, Listed};
-use crate::likelihood::{Columns, NoiseInterval, NoiseModel, NoiseSettings, PlugIn, assemble};
+use crate::likelihood::{
+    AUTO_SHAPE, Columns, NoiseInterval, NoiseModel, NoiseSettings, PlugIn, assemble,
+};
 use crate::linear_algebra::Cholesky;
 use crate::posterior::random::Random;
 use crate::posterior::{Method, Model, Posterior, Problem};
@@ -27,14 +30,6 @@ use target::{Noise, Target};
 
 /// Transitions per draw, tried in this order until the chains agree.
 const STEPS_PER_DRAW: [usize; 3] = [1, 4, 16];
-/// Multiplications after which no longer run is tried (about a minute).
-const WORK_LIMIT: f64 = 1e11;
-/// Largest difference of a PIP between chains that agree.
-const SPREAD_LIMIT: f64 = 0.1;
-/// Fewest draws per chain that can be judged.
-const LEAST_DRAWS: usize = 100;
-/// a0 of the automatic noise prior of a group; b0 = a0 · mean(y²).
-const AUTO_SHAPE: f64 = 1e-3;
 /// Factors on the noise variance at which chains start.
 const STARTS: [f64; 4] = [1.0, 4.0, 0.25, 2.0];
 /// Draws from which a column's spread is taken.
@@ -146,16 +141,7 @@ pub fn sampled_likelihood(model: NoiseModel) -> Result<()> {
 
 fn check(given: &Given<'_>, settings: &InferenceSettings) -> Result<()> {
     sampled_likelihood(given.noise.model)?;
-    if settings.chains == 0 || settings.draws < LEAST_DRAWS {
-        return Err(Error::Setting {
-            key: "inference.draws".into(),
-            problem: format!(
-                "{} chains of {} draws cannot be judged",
-                settings.chains, settings.draws
-            ),
-            remedy: format!("use 4 chains and at least {LEAST_DRAWS} draws"),
-        });
-    }
+    require_draws(settings)?;
     let prior = &given.problem.prior;
     let bounded = |k: &usize| prior.lower[*k] > f64::NEG_INFINITY;
     let mixed = |columns: &Vec<usize>| columns.iter().any(bounded) && !columns.iter().all(bounded);

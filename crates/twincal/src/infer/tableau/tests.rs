@@ -1,6 +1,7 @@
 //! The tableau against factorisations of whole models.
 
 use super::*;
+use crate::infer::pivot::Pivot;
 use crate::infer::testing::{grouped, problem};
 use crate::linear_algebra::Cholesky;
 use crate::posterior::Problem;
@@ -122,15 +123,11 @@ fn compare_blocks(tableau: &Tableau<'_>, standard: &Standard) {
     }
     let (inside, outside): (Vec<usize>, Vec<usize>) = (0..count).partition(|&b| tableau.holds(b));
     if let (Some(&leaves), [first, rest @ ..]) = (inside.last(), &outside[..]) {
-        let mut entering: Vec<usize> = standard.blocks[*first].range().collect();
-        let mut moved = vec![leaves, *first];
-        if let Some(&second) = rest.first() {
-            entering.extend(standard.blocks[second].range());
-            moved.push(second);
-        }
-        let leaving: Vec<usize> = standard.blocks[leaves].range().collect();
-        let then = model(&|b| tableau.holds(b) != moved.contains(&b));
-        check(then, tableau.exchange(&leaving, &entering), "exchange");
+        let entering: Vec<usize> = [first].into_iter().chain(rest.first()).copied().collect();
+        let moved = |b: usize| b == leaves || entering.contains(&b);
+        let then = model(&|b| tableau.holds(b) != moved(b));
+        let pivot = Pivot::new(tableau, &[leaves], &entering);
+        check(then, (pivot.determinant, pivot.change), "exchange");
     }
 }
 

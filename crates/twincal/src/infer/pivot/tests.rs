@@ -1,0 +1,69 @@
+//! Moments after an exchange against those of a tableau that walked there.
+
+use crate::infer::moments::{Moments, after_exchange, present};
+use crate::infer::standard::Standard;
+use crate::infer::testing::grouped;
+use crate::infer::walker::{Step, Walker};
+
+/// Every exchange that a random walk passes, of one component for one or two.
+#[test]
+fn the_moments_are_those_of_the_model_after_the_walk() {
+    let problem = grouped(2, &[3, 1, 2, 10, 1, 4], 60, true).problem;
+    let standard = Standard::new(&problem).unwrap();
+    let mut walker = Walker::new(&standard, &problem.prior);
+    let blocks = standard.blocks.len();
+    let (mut state, mut compared) = (99u64, 0);
+    for _ in 0..60 {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        walker.flip(pulp::Scalar::new(), (state >> 33) as usize % blocks);
+        let (inside, outside): (Vec<usize>, Vec<usize>) =
+            (0..blocks).partition(|&b| walker.tableau.holds(b));
+        for &leaves in &inside {
+            for entering in outside.windows(1).chain(outside.windows(2)) {
+                let step = Step {
+                    leaving: vec![leaves],
+                    entering: entering.to_vec(),
+                };
+                compare(&mut walker, &step);
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 300, "{compared}");
+}
+
+fn compare(walker: &mut Walker<'_>, step: &Step) {
+    let before = walker.log_weight();
+    let (gain, excess, pivot) = walker.exchange_gain(step);
+    let got = after_exchange(walker, step, &pivot, excess);
+    walker.take(pulp::Scalar::new(), step);
+    let (then, truth) = (walker.log_weight(), present(walker));
+    let back = Step {
+        leaving: step.entering.clone(),
+        entering: step.leaving.clone(),
+    };
+    walker.take(pulp::Scalar::new(), &back);
+    assert!(
+        (before + gain - then).abs() < 1e-7 * (1.0 + then.abs()),
+        "{step:?}: weight off by {}",
+        before + gain - then
+    );
+    alike(&got, &truth, step);
+}
+
+fn alike(got: &Moments, truth: &Moments, step: &Step) {
+    assert_eq!(got.holds, truth.holds, "{step:?}");
+    let close = |a: f64, b: f64| (a - b).abs() < 1e-7 * (1.0 + b.abs());
+    assert!(close(got.excess, truth.excess), "{step:?}: c");
+    for k in 0..got.delta.len() {
+        assert!(close(got.delta[k], truth.delta[k]), "{step:?}: mean of {k}");
+        assert!(
+            close(got.variance[k], truth.variance[k]),
+            "{step:?}: variance of {k}, {} {}",
+            got.variance[k],
+            truth.variance[k]
+        );
+    }
+}
