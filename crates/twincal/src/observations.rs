@@ -235,6 +235,7 @@ impl Part<'_> {
     /// Sufficient statistics of these rows; standstill rows are left out and end a run.
     pub fn gram(&self) -> Gram {
         let joints = (0..self.observations.joints.len())
+            .into_par_iter()
             .map(|joint| self.joint_gram(joint))
             .collect();
         Gram { joints }

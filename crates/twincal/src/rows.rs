@@ -4,7 +4,8 @@
 //! F τ_meas − F τ_nom = (F Φ) β + F ε
 //! ```
 //! One symmetric filter F goes over torque, nominal torque and every column, so the relation stays exactly linear. Φ is
-//! never held: columns are evaluated at the log's rate in chunks, and F only at the samples that are kept.
+//! never held: the parts that columns are combinations of are evaluated at the log's rate, a block of samples at a time, and
+//! added to the rows whose window holds them.
 
 mod evaluate;
 mod filtered;
@@ -14,6 +15,7 @@ use crate::error::Result;
 use crate::robot::Robot;
 use crate::signal::{Payload, Pipeline, Segment, Trajectory};
 use crate::term::{Library, Scratch};
+use evaluate::{OfLibrary, Source};
 use std::ops::Range;
 
 /// Which rows [`visit_rows`] gives.
@@ -102,6 +104,20 @@ pub fn slices(
     slices
 }
 
+/// Raw rows of a log that a standard deviation or a coverage is measured on, about: beyond that more rows say nothing new.
+const MOST_RAW: usize = 1 << 16;
+/// In pieces of how many.
+const RAW_PIECE: usize = 1 << 10;
+
+/// Raw rows at or after time `since` (s): all of a short log, evenly spread pieces of a long one, 65 536 rows in all.
+pub fn spread_raw(pipeline: &Pipeline, trajectory: &Trajectory, since: f64) -> Vec<Slice> {
+    let all = slices(pipeline, trajectory, RowSignal::Raw, since, RAW_PIECE);
+    let rows: usize = all.iter().map(|slice| slice.rows.len()).sum();
+    all.into_iter()
+        .step_by(rows.div_ceil(MOST_RAW).max(1))
+        .collect()
+}
+
 /// Rows of a segment whose time is not before `since`.
 fn rows_since(
     pipeline: &Pipeline,
@@ -167,31 +183,22 @@ pub fn visit_slices(
         Some((library, robot)) => (library, robot),
         None => (library, robot),
     };
-    let columns: Vec<&[usize]> = (0..trajectory.dof)
-        .map(|joint| library.columns_of_joint(joint))
-        .collect();
-    let absent = if trajectory.payload_acts {
-        Vec::new()
-    } else {
-        library.payload_entries()
-    };
-    let mut scratch = Scratch::default();
-    let mut model = evaluate::Model {
-        columns,
-        evaluate: &mut |motion, nominal, out| {
-            crate::robot::nominal_torque(robot, motion, nominal);
-            library.evaluate_with(motion, out, &mut scratch);
-            for &(joint, row) in &absent {
-                out[joint][row * motion.len..(row + 1) * motion.len].fill(0.0);
-            }
+    let mut source = OfLibrary {
+        robot,
+        library,
+        absent: if trajectory.payload_acts {
+            Vec::new()
+        } else {
+            library.payload_entries()
         },
+        scratch: Scratch::default(),
     };
-    visit_model(&mut model, pipeline, trajectory, signal, slices, visit)
+    visit_source(&mut source, pipeline, trajectory, signal, slices, visit)
 }
 
 /// [`visit_slices`] for any way to evaluate columns.
-fn visit_model(
-    model: &mut evaluate::Model<'_, '_>,
+fn visit_source(
+    source: &mut dyn Source,
     pipeline: &Pipeline,
     trajectory: &Trajectory,
     signal: RowSignal,
@@ -199,11 +206,11 @@ fn visit_model(
     visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
 ) -> Result<()> {
     for slice in slices {
-        let segment = &trajectory.segments[slice.segment];
+        let (segment, dof) = (&trajectory.segments[slice.segment], trajectory.dof);
         if signal == RowSignal::Raw || pipeline.is_off() {
-            unfiltered::visit(model, slice, segment, trajectory.dof, visit)?;
+            unfiltered::visit(source, slice, segment, dof, visit)?;
         } else {
-            filtered::visit(model, pipeline, slice, segment, trajectory.dof, None, visit)?;
+            filtered::visit(source, pipeline, slice, segment, dof, None, visit)?;
         }
     }
     Ok(())

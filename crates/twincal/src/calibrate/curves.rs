@@ -34,8 +34,11 @@ pub(super) fn curves(
     hull: &[[f64; 6]],
     seed: u64,
 ) -> Vec<Curve> {
-    let draws = draw(posterior, DRAWS, seed, STREAM);
     let mut curves = Vec::new();
+    if posterior.models.is_empty() {
+        return curves; // nothing to draw from
+    }
+    let draws = draw(posterior, DRAWS, seed, STREAM);
     for joint in 0..robot.dof() {
         for along in [Along::Position, Along::Velocity] {
             let Some(x) = grid(&hull[joint], along, robot.joint_kind(joint)) else {

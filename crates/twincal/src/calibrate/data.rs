@@ -7,7 +7,7 @@ use crate::incidents::{incident_findings, incidents, leave_out};
 use crate::likelihood::Columns;
 use crate::observations::{Observations, Part, observe};
 use crate::robot::Robot;
-use crate::rows::{RowBlock, RowSignal, Slice, slices, visit_slices};
+use crate::rows::{RowBlock, RowSignal, Slice, count_rows, spread_raw, visit_slices};
 use crate::signal::{Payload, Pipeline, Recording, Trajectory, align};
 use crate::term::Library;
 use rayon::prelude::*;
@@ -17,9 +17,6 @@ use rayon::prelude::*;
 const ZERO: f64 = 1e-12;
 /// Rows per column of the largest joint below which nothing is fitted (case 7).
 const ROWS_PER_COLUMN: usize = 3;
-/// Raw rows per log that the noise outside the band is measured on, about, and in pieces of how many.
-const MOST_RAW: usize = 1 << 16;
-const PIECE: usize = 1 << 10;
 
 /// One log, ready.
 pub(super) struct Log {
@@ -228,21 +225,13 @@ pub(super) fn carry_something<'a>(mut logs: impl Iterator<Item = &'a Recording>)
     logs.any(|log| log.payload == Payload::Unknown)
 }
 
-/// Raw rows of a log that a standard deviation is measured on: all of a short one, evenly spread pieces of a long one; and
-/// the times that they cover, s.
+/// Raw rows of a log that a standard deviation is measured on, and the times that they cover, s.
 fn spread(pipeline: &Pipeline, trajectory: &Trajectory) -> (Vec<Slice>, Vec<[f64; 2]>) {
-    let all = slices(
-        pipeline,
-        trajectory,
-        RowSignal::Raw,
-        f64::NEG_INFINITY,
-        PIECE,
-    );
-    let rows: usize = all.iter().map(|slice| slice.rows.len()).sum();
-    if rows <= MOST_RAW {
-        return (all, vec![[f64::NEG_INFINITY, f64::INFINITY]]);
+    let kept = spread_raw(pipeline, trajectory, f64::NEG_INFINITY);
+    let rows: usize = kept.iter().map(|slice| slice.rows.len()).sum();
+    if rows == count_rows(pipeline, trajectory, RowSignal::Raw) {
+        return (kept, vec![[f64::NEG_INFINITY, f64::INFINITY]]);
     }
-    let kept: Vec<Slice> = (all.into_iter()).step_by(rows.div_ceil(MOST_RAW)).collect();
     let times = kept
         .iter()
         .map(|slice| {

@@ -256,7 +256,7 @@ fn words(names: &[&str], pip: f64, alike: Alike, settled: bool) -> String {
         [others @ .., last] => format!("{} and {last}", others.join(", ")),
     };
     let same = match alike {
-        Alike::EveryMotion => "have the same torque in every motion of this robot",
+        Alike::EveryMotion => "can explain the same torque in every motion of this robot",
         Alike::TheseLogs => "say the same in these logs",
     };
     let pip = if pip > 0.999 {
@@ -281,7 +281,7 @@ mod tests {
         let names = ["payload", "fore.tensor"];
         assert_eq!(
             words(&names, 0.9999, Alike::EveryMotion, true),
-            "payload and fore.tensor have the same torque in every motion of this robot: any of them is in with \
+            "payload and fore.tensor can explain the same torque in every motion of this robot: any of them is in with \
              probability > 0.999; the prior alone prefers `payload`"
         );
         let open = words(&names, 0.98, Alike::TheseLogs, false);

@@ -22,10 +22,10 @@ pub(super) fn findings(
     robust: bool,
 ) -> Vec<Finding> {
     let advice = if robust {
-        "they count little in this fit (noise.robust); look at these times in the report"
+        "they count little in this fit (noise.robust)"
     } else {
-        "intervals hold but are wider than they need be: look at these times in the report and cut what is no free motion out \
-         of the log, or set noise.robust"
+        "intervals hold but are wider than they need be: cut what is no free motion (contacts, stops) out of the log, or set \
+         noise.robust"
     };
     let mut findings = Vec::new();
     for (joint, name) in robot.joint_names().into_iter().enumerate() {

@@ -136,6 +136,9 @@ pub fn calibrate(
 ) -> Result<Calibration> {
     // the same filters for every log, and candidates for this robot
     progress(Stage::Rows);
+    for log in logs.iter().chain(heldout) {
+        log.require_torque(&robot.joint_names())?;
+    }
     let (pipeline, mut findings) = choose_pipeline(robot, logs, &settings.signal)?;
     findings.extend(hardly_driven(robot, logs.iter().chain(heldout)));
     let library_settings = LibrarySettings {

@@ -230,7 +230,7 @@ impl Piece<'_> {
                 let raw = self.from - self.margin..self.from + len + self.margin;
                 let raw = &self.segment.tau[joint * all..(joint + 1) * all][raw];
                 let mut tau = vec![0.0; len + 2 * reach];
-                correlate(kernel, raw, 1, &mut tau);
+                correlate(kernel, raw, &mut tau);
                 [1, self.slow].map(|step| {
                     let moves: Vec<f64> = (0..self.len)
                         .map(|i| {

@@ -1,14 +1,20 @@
-//! Rows of the regression: F over torque and columns, only where a row is kept (polyphase).
+//! Rows of the regression: F over torque and the columns' parts, only where a row is kept.
 
-use super::evaluate::{Model, Stretch};
+use super::evaluate::{Source, Stretch};
 use super::{JointRows, MAX_BLOCK, RowBlock, Slice};
 use crate::error::Result;
-use crate::signal::convolve::correlate;
+use crate::robot::BLOCK;
+use crate::signal::decimate::Decimator;
 use crate::signal::fir::column_kernel;
 use crate::signal::{Pipeline, Segment};
+use std::ops::Range;
 
-/// Fewest samples that are evaluated at a time; at least two kernels, so that moving the window on costs little.
-const CHUNK: usize = 512;
+/// Samples that are evaluated at a time.
+const STRETCH: usize = BLOCK;
+/// Rows that are computed together, at least; and so many windows long, so that the samples before the first row's centre
+/// and behind the last one's, which the next rows need again, add little.
+const LEAST_BATCH: usize = 1024;
+const WINDOWS: usize = 8;
 
 /// Which samples of a segment become rows.
 pub(super) struct Plan {
@@ -48,199 +54,172 @@ impl Plan {
     }
 }
 
-/// Window of the log-rate channels of one joint: columns, then nominal, then measured, each `capacity` long.
-struct Window {
-    channels: Vec<Vec<f64>>,
-}
-
-/// Visits filtered rows of one segment; `chunk` samples are evaluated at a time (no matter how many).
+/// Visits filtered rows of one segment; `batch` rows are computed at a time (no matter how many).
 pub(super) fn visit(
-    model: &mut Model<'_, '_>,
+    source: &mut dyn Source,
     pipeline: &Pipeline,
     slice: &Slice,
     segment: &Segment,
     dof: usize,
-    chunk: Option<usize>,
+    batch: Option<usize>,
     visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
 ) -> Result<()> {
     let plan = Plan::new(pipeline, segment);
-    let (taps, total) = (plan.kernel.len(), segment.time.len());
-    let chunk = chunk.unwrap_or(CHUNK.max(2 * taps));
-    let has_tau = !segment.tau.is_empty();
-    let mut stretch = Stretch::default();
-    let mut windows: Vec<Window> = (0..dof)
-        .map(|joint| Window {
-            channels: vec![Vec::with_capacity(taps + chunk); model.columns[joint].len() + 1],
-        })
-        .collect();
-    let mut rows = Rows::new(model, dof, has_tau);
-    // Samples `start .. filled` of the segment are in the windows.
+    let batch = batch.unwrap_or(LEAST_BATCH.max(WINDOWS * plan.kernel.len() / plan.step));
     let mut next = slice.rows.start;
-    let (mut start, mut filled) = (next * plan.step, next * plan.step);
-    // No sample after the last row's window is looked at.
-    let total_seen = slice.rows.end.saturating_sub(1) * plan.step + taps;
     while next < slice.rows.end {
-        // Forget what no later row sees, then add a chunk.
-        let keep_from = next * plan.step;
-        let forget = (keep_from - start).min(filled - start);
-        for channel in windows.iter_mut().flat_map(|w| &mut w.channels) {
-            channel.drain(..forget);
+        let end = slice.rows.end.min(next + batch);
+        let rows = Rows::new(source, &plan, segment, dof, next..end);
+        let mut from = 0;
+        while from < rows.len() {
+            let to = rows.len().min(from + MAX_BLOCK);
+            rows.give(source, slice.segment, from..to, visit)?;
+            from = to;
         }
-        start += forget;
-        let skip = keep_from.max(filled);
-        if start == filled {
-            // Between two rows further apart than F: samples that nobody sees.
-            start = skip;
-            filled = skip;
-        }
-        let len = chunk.min(total_seen.min(total) - filled);
-        stretch.load(filled, len, total, [&segment.q, &segment.qd, &segment.qdd]);
-        stretch.evaluate(model);
-        for (joint, window) in windows.iter_mut().enumerate() {
-            let width = window.channels.len() - 1;
-            for (i, channel) in window.channels[..width].iter_mut().enumerate() {
-                channel.extend_from_slice(&stretch.columns[joint][i * len..(i + 1) * len]);
-            }
-            window.channels[width]
-                .extend_from_slice(&stretch.nominal[joint * len..(joint + 1) * len]);
-        }
-        filled += len;
-        // Rows whose whole window is there.
-        while next < slice.rows.end && next * plan.step + taps <= filled {
-            let ready = (filled - taps - next * plan.step) / plan.step + 1;
-            let count = ready.min(slice.rows.end - next).min(MAX_BLOCK);
-            rows.fill(&plan, segment, &windows, start, next, count);
-            visit(&rows.block(&model.columns, slice.segment, next == 0))?;
-            next += count;
-        }
+        next = end;
     }
     Ok(())
 }
 
-/// Filtered rows of one block.
+/// Filtered rows that were computed together.
 struct Rows {
-    len: usize,
+    /// Rows of the segment.
+    range: Range<usize>,
     time: Vec<f64>,
     input_rows: Vec<usize>,
+    /// `joint * len + row`.
     q: Vec<f64>,
     qd: Vec<f64>,
     qdd: Vec<f64>,
-    x: Vec<Vec<f64>>,
-    nominal: Vec<f64>,
-    measured: Vec<f64>,
     standstill: Vec<bool>,
-    has_tau: bool,
-    dof: usize,
+    /// Columns of each joint, `i * len + row`.
+    x: Vec<Vec<f64>>,
+    nominal: Vec<Vec<f64>>,
+    /// Empty if the log has no torque.
+    measured: Vec<Vec<f64>>,
 }
 
 impl Rows {
-    fn new(model: &Model<'_, '_>, dof: usize, has_tau: bool) -> Self {
-        Self {
-            len: 0,
-            time: Vec::new(),
-            input_rows: Vec::new(),
-            q: Vec::new(),
-            qd: Vec::new(),
-            qdd: Vec::new(),
-            x: vec![Vec::new(); model.columns.len()],
-            nominal: Vec::new(),
-            measured: Vec::new(),
-            standstill: Vec::new(),
-            has_tau,
-            dof,
-        }
-    }
-
-    /// Computes rows `next .. next + count`; the windows begin at sample `start`.
-    fn fill(
-        &mut self,
+    fn new(
+        source: &mut dyn Source,
         plan: &Plan,
         segment: &Segment,
-        windows: &[Window],
-        start: usize,
-        next: usize,
-        count: usize,
-    ) {
+        dof: usize,
+        range: Range<usize>,
+    ) -> Self {
         let (half, total) = (plan.kernel.len() / 2, segment.time.len());
-        let centres = || (next..next + count).map(|row| half + row * plan.step);
-        self.len = count;
-        self.time.clear();
-        self.time.extend(centres().map(|i| segment.time[i]));
-        self.input_rows.clear();
-        self.input_rows
-            .extend(centres().map(|i| input_row(segment, i)));
-        for (to, from) in [
-            (&mut self.q, &segment.q),
-            (&mut self.qd, &segment.qd),
-            (&mut self.qdd, &segment.qdd),
-        ] {
-            to.clear();
-            to.extend(
-                (0..self.dof).flat_map(|joint| centres().map(move |i| from[joint * total + i])),
-            );
+        let centres = || range.clone().map(|row| half + row * plan.step);
+        let at_centres = |values: &[f64]| -> Vec<f64> {
+            values
+                .chunks_exact(total)
+                .flat_map(|joint| centres().map(|i| joint[i]))
+                .collect()
+        };
+        let mut rows = Self {
+            time: centres().map(|i| segment.time[i]).collect(),
+            input_rows: centres().map(|i| input_row(segment, i)).collect(),
+            q: at_centres(&segment.q),
+            qd: at_centres(&segment.qd),
+            qdd: at_centres(&segment.qdd),
+            standstill: segment
+                .standstill
+                .chunks_exact(total)
+                .flat_map(|joint| centres().map(|i| joint[i]))
+                .collect(),
+            x: vec![Vec::new(); dof],
+            nominal: Vec::with_capacity(dof),
+            measured: Vec::new(),
+            range: range.clone(),
+        };
+        rows.filter(source, plan, segment, dof);
+        rows
+    }
+
+    fn len(&self) -> usize {
+        self.range.len()
+    }
+
+    /// F over torque and columns. Per joint the signals are its parts, its nominal and its measured torque.
+    fn filter(&mut self, source: &mut dyn Source, plan: &Plan, segment: &Segment, dof: usize) {
+        let (len, total) = (self.len(), segment.time.len());
+        let has_tau = !segment.tau.is_empty();
+        let mut firsts = Vec::with_capacity(dof);
+        let mut signals = 0;
+        for joint in 0..dof {
+            firsts.push(signals);
+            signals += source.parts(joint) + 2;
         }
-        self.standstill.clear();
-        self.standstill.extend(
-            (0..self.dof)
-                .flat_map(|joint| centres().map(move |i| segment.standstill[joint * total + i])),
-        );
-        self.nominal.resize(self.dof * count, 0.0);
-        self.measured
-            .resize(if self.has_tau { self.dof * count } else { 0 }, 0.0);
-        let from = next * plan.step - start;
-        let first = next * plan.step;
-        for (joint, window) in windows.iter().enumerate() {
-            let (columns, rows) = (
-                window.channels.len() - 1,
-                joint * count..(joint + 1) * count,
-            );
-            self.x[joint].resize(columns * count, 0.0);
-            for (out, channel) in self.x[joint].chunks_exact_mut(count).zip(&window.channels) {
-                correlate(&plan.kernel, &channel[from..], plan.step, out);
+        let mut decimator = Decimator::new(&plan.kernel, plan.step, len, signals);
+        let begin = self.range.start * plan.step;
+        let end = begin + (len - 1) * plan.step + plan.kernel.len();
+        let mut stretch = Stretch::new(dof);
+        let mut from = begin;
+        while from < end {
+            let count = STRETCH.min(end - from);
+            stretch.load(from, count, total, [&segment.q, &segment.qd, &segment.qdd]);
+            stretch.evaluate_parts(source);
+            let mut at_hand: Vec<(usize, &[f64])> = Vec::with_capacity(3 * dof);
+            for (joint, &first) in firsts.iter().enumerate() {
+                let parts = source.parts(joint);
+                let own = joint * count..(joint + 1) * count;
+                at_hand.push((first, &stretch.values[joint]));
+                at_hand.push((first + parts, &stretch.nominal[own]));
+                if has_tau {
+                    let tau = &segment.tau[joint * total + from..][..count];
+                    at_hand.push((first + parts + 1, tau));
+                }
             }
-            correlate(
-                &plan.kernel,
-                &window.channels[columns][from..],
-                plan.step,
-                &mut self.nominal[rows.clone()],
-            );
-            if self.has_tau {
-                let tau = &segment.tau[joint * total + first..(joint + 1) * total];
-                correlate(&plan.kernel, tau, plan.step, &mut self.measured[rows]);
+            decimator.add(from - begin, count, &at_hand);
+            from += count;
+        }
+        for (joint, &first) in firsts.iter().enumerate() {
+            let parts = source.parts(joint);
+            let sums = decimator.sums(first, parts);
+            source.combine(joint, sums, decimator.stride(), len, &mut self.x[joint]);
+            let row = |signal: usize| decimator.sums(signal, 1)[..len].to_vec();
+            self.nominal.push(row(first + parts));
+            if has_tau {
+                self.measured.push(row(first + parts + 1));
             }
         }
     }
 
-    fn block<'a>(&'a self, columns: &[&'a [usize]], index: usize, first: bool) -> RowBlock<'a> {
-        let len = self.len;
-        let joints = (0..self.dof)
-            .map(|joint| {
-                let rows = joint * len..(joint + 1) * len;
-                JointRows {
-                    columns: columns[joint],
-                    stride: len,
-                    x: &self.x[joint],
-                    measured: if self.has_tau {
-                        &self.measured[rows.clone()]
-                    } else {
-                        &[]
-                    },
-                    nominal: &self.nominal[rows.clone()],
-                    standstill: &self.standstill[rows],
-                }
+    /// Shows some of the rows to a visitor.
+    fn give(
+        &self,
+        source: &dyn Source,
+        segment: usize,
+        rows: Range<usize>,
+        visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
+    ) -> Result<()> {
+        let (len, dof) = (self.len(), self.x.len());
+        let some = |values: &[f64]| -> Vec<f64> {
+            values
+                .chunks_exact(len)
+                .flat_map(|joint| joint[rows.clone()].iter().copied())
+                .collect()
+        };
+        let joints = (0..dof)
+            .map(|joint| JointRows {
+                columns: source.columns(joint),
+                stride: len,
+                x: self.x[joint].get(rows.start..).unwrap_or(&[]),
+                measured: self.measured.get(joint).map_or(&[], |m| &m[rows.clone()]),
+                nominal: &self.nominal[joint][rows.clone()],
+                standstill: &self.standstill[joint * len..(joint + 1) * len][rows.clone()],
             })
             .collect();
-        RowBlock {
-            segment: index,
-            first,
-            len,
-            time: &self.time,
-            input_rows: &self.input_rows,
-            q: &self.q,
-            qd: &self.qd,
-            qdd: &self.qdd,
+        visit(&RowBlock {
+            segment,
+            first: self.range.start + rows.start == 0,
+            len: rows.len(),
+            time: &self.time[rows.clone()],
+            input_rows: &self.input_rows[rows.clone()],
+            q: &some(&self.q),
+            qd: &some(&self.qd),
+            qdd: &some(&self.qdd),
             joints,
-        }
+        })
     }
 }
 

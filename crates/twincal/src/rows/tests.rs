@@ -1,6 +1,6 @@
 //! Rows against brute force: a stand-in model whose columns are known functions of the motion.
 
-use super::evaluate::Model;
+use super::evaluate::Source;
 use super::*;
 use crate::robot::Motion;
 use crate::signal::fir::column_kernel;
@@ -19,14 +19,67 @@ fn column(column: usize, q: f64, qd: f64, qdd: f64) -> f64 {
     }
 }
 
-fn stand_in(motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]) {
-    for joint in 0..2 {
-        for s in 0..motion.len {
-            let i = joint * motion.len + s;
-            nominal[i] = motion.q[i] * 3.0 - motion.qdd[i];
-            for (c, &k) in COLUMNS[joint].iter().enumerate() {
-                out[joint][c * motion.len + s] =
-                    column(k, motion.q[i], motion.qd[i], motion.qdd[i]);
+struct StandIn;
+
+/// What a part of a joint is: its columns in order, but the last one of joint 1 with the one before added.
+fn part(joint: usize, part: usize, state: [f64; 3]) -> f64 {
+    let value = |c: usize| column(COLUMNS[joint][c], state[0], state[1], state[2]);
+    if (joint, part) == (1, 1) {
+        value(1) + value(0)
+    } else {
+        value(part)
+    }
+}
+
+impl StandIn {
+    fn fill(
+        motion: Motion<'_>,
+        nominal: &mut [f64],
+        out: &mut [Vec<f64>],
+        of: impl Fn(usize, usize, [f64; 3]) -> f64,
+    ) {
+        for joint in 0..2 {
+            out[joint].resize(COLUMNS[joint].len() * motion.len, 0.0);
+            for s in 0..motion.len {
+                let i = joint * motion.len + s;
+                nominal[i] = motion.q[i] * 3.0 - motion.qdd[i];
+                for c in 0..COLUMNS[joint].len() {
+                    let state = [motion.q[i], motion.qd[i], motion.qdd[i]];
+                    out[joint][c * motion.len + s] = of(joint, c, state);
+                }
+            }
+        }
+    }
+}
+
+impl Source for StandIn {
+    fn columns(&self, joint: usize) -> &[usize] {
+        COLUMNS[joint]
+    }
+
+    fn parts(&self, joint: usize) -> usize {
+        COLUMNS[joint].len()
+    }
+
+    fn evaluate(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]) {
+        let of = |joint: usize, c: usize, s: [f64; 3]| column(COLUMNS[joint][c], s[0], s[1], s[2]);
+        Self::fill(motion, nominal, out, of);
+    }
+
+    fn evaluate_parts(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]) {
+        Self::fill(motion, nominal, out, part);
+    }
+
+    fn combine(&self, joint: usize, parts: &[f64], stride: usize, rows: usize, out: &mut Vec<f64>) {
+        out.clear();
+        for c in 0..COLUMNS[joint].len() {
+            for row in 0..rows {
+                let part = |part: usize| parts[part * stride + row];
+                out.push(if (joint, c) == (1, 1) {
+                    part(1) - part(0)
+                } else {
+                    part(c)
+                });
             }
         }
     }
@@ -126,13 +179,9 @@ fn collect_slices(
         }
         Ok(())
     };
-    let mut model = Model {
-        columns: COLUMNS.to_vec(),
-        evaluate: &mut stand_in,
-    };
     match chunk {
         Some(chunk) => filtered::visit(
-            &mut model,
+            &mut StandIn,
             pipeline,
             &slices[0],
             &trajectory.segments[0],
@@ -142,8 +191,8 @@ fn collect_slices(
         )
         .unwrap(),
         None => {
-            visit_model(
-                &mut model,
+            visit_source(
+                &mut StandIn,
                 pipeline,
                 trajectory,
                 signal,
@@ -328,13 +377,9 @@ fn an_error_of_the_visitor_ends_the_visit() {
             remedy: String::new(),
         })
     };
-    let mut model = Model {
-        columns: COLUMNS.to_vec(),
-        evaluate: &mut stand_in,
-    };
     assert!(
-        visit_model(
-            &mut model,
+        visit_source(
+            &mut StandIn,
             &pipeline(5.0),
             &trajectory(3000, 0.001),
             RowSignal::Raw,

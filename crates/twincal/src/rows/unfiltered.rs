@@ -1,6 +1,6 @@
 //! Rows as logged: for the pipeline off, for raw validation and for predictions.
 
-use super::evaluate::{Model, Stretch};
+use super::evaluate::{Source, Stretch};
 use super::{JointRows, MAX_BLOCK, RowBlock, Slice};
 use crate::error::Result;
 use crate::signal::Segment;
@@ -53,7 +53,7 @@ fn nearest(segment: &Segment, t: f64) -> usize {
 
 /// Visits logged samples of a segment.
 pub(super) fn visit(
-    model: &mut Model<'_, '_>,
+    source: &mut dyn Source,
     slice: &Slice,
     segment: &Segment,
     dof: usize,
@@ -72,19 +72,19 @@ pub(super) fn visit(
         None => ([&segment.q, &segment.qd, &segment.qdd], &segment.standstill),
     };
     let total = time.len();
-    let mut stretch = Stretch::default();
+    let mut stretch = Stretch::new(dof);
     let mut from = slice.rows.start;
     while from < slice.rows.end {
         let len = MAX_BLOCK.min(slice.rows.end - from);
         stretch.load(from, len, total, motion.map(Vec::as_slice));
-        stretch.evaluate(model);
+        stretch.evaluate(source);
         let joints = (0..dof)
             .map(|joint| {
                 let rows = joint * total + from..joint * total + from + len;
                 JointRows {
-                    columns: model.columns[joint],
+                    columns: source.columns(joint),
                     stride: len,
-                    x: &stretch.columns[joint],
+                    x: &stretch.values[joint],
                     measured: if tau.is_empty() {
                         &[]
                     } else {

@@ -2,13 +2,14 @@
 
 use super::agreement::{self, velocity_agreement};
 use super::choose::{COLUMN_LIMIT, MOTION_LIMIT, require_derivatives};
-use super::convolve::correlate;
+use super::convolve::{correlate, correlate_two};
 use super::fir::{MotionKernels, column_half_seconds, motion_half_samples, motion_half_seconds};
 use super::mask::Saturated;
 use super::prepare::{JointFacts, Piece, prepare, report_short};
 use super::standstill::standstill;
 use super::{Channels, DerivedFrom, LoggedSamples, Pipeline, Recording, Segment, Trajectory};
 use crate::error::{Error, Finding, Result, Severity};
+use rayon::prelude::*;
 
 /// Standstill has to last for this many periods of the cut-off.
 const STANDSTILL_PERIODS: f64 = 3.0;
@@ -166,41 +167,34 @@ fn smoothed(
     let kernels = MotionKernels::new(cutoff, piece.interval);
     let dof = piece.joints.len();
     let inner = half..half + len;
-    let (mut q, mut qd, mut qdd) = (
-        vec![0.0; dof * len],
-        vec![0.0; dof * len],
-        vec![0.0; dof * len],
-    );
-    let (mut tau, mut still) = (Vec::new(), Vec::with_capacity(dof * len));
-    for (joint, channels) in piece.joints.iter().enumerate() {
-        let range = joint * len..(joint + 1) * len;
-        correlate(&kernels.smooth, &channels.q, 1, &mut q[range.clone()]);
-        match &channels.qd {
-            Some(logged) => correlate(&kernels.smooth, logged, 1, &mut qd[range.clone()]),
-            None => correlate(&kernels.first, &channels.q, 1, &mut qd[range.clone()]),
-        }
-        let from_velocity = channels
-            .qd
-            .as_ref()
-            .filter(|_| pipeline.derived_from[joint] == DerivedFrom::Velocity);
-        match (&channels.qdd, from_velocity) {
-            (Some(logged), _) => correlate(&kernels.smooth, logged, 1, &mut qdd[range.clone()]),
-            (None, Some(logged)) => correlate(&kernels.first, logged, 1, &mut qdd[range.clone()]),
-            (None, None) => correlate(&kernels.second, &channels.q, 1, &mut qdd[range.clone()]),
-        }
-        if let Some(logged) = channels.tau.as_ref().filter(|_| with_tau) {
-            tau.extend_from_slice(&logged[inner.clone()]);
-        }
-        // Position tells standstill: a drive's velocity is often a difference of counts and far noisier at rest.
-        let mut travel = vec![0.0; len];
-        correlate(&kernels.first, &channels.q, 1, &mut travel);
-        still.extend(standstill(
-            &travel,
-            pipeline.standstill_velocity[joint],
-            STANDSTILL_PERIODS / pipeline.cutoff_hz,
-            piece.interval,
-        ));
-    }
+    let [mut q, mut qd, mut qdd] = [(); 3].map(|()| vec![0.0; dof * len]);
+    let mut still = vec![false; dof * len];
+    let of_joints = piece.joints.par_iter().enumerate();
+    of_joints
+        .zip(q.par_chunks_exact_mut(len))
+        .zip(qd.par_chunks_exact_mut(len))
+        .zip(qdd.par_chunks_exact_mut(len))
+        .zip(still.par_chunks_exact_mut(len))
+        .for_each(|(((((joint, channels), q), qd), qdd), still)| {
+            let travel = derivatives(
+                &kernels,
+                channels,
+                pipeline.derived_from[joint],
+                [q, qd, qdd],
+            );
+            // Position tells standstill: a drive's velocity is often a difference of counts and far noisier at rest.
+            still.copy_from_slice(&standstill(
+                travel.as_deref().unwrap_or(qd),
+                pipeline.standstill_velocity[joint],
+                STANDSTILL_PERIODS / pipeline.cutoff_hz,
+                piece.interval,
+            ));
+        });
+    let logged_torque = piece.joints.iter().filter_map(|c| c.tau.as_ref());
+    let tau = logged_torque
+        .filter(|_| with_tau)
+        .flat_map(|tau| tau[inner.clone()].iter().copied())
+        .collect();
     let time = piece.time[inner.clone()].to_vec();
     let (input_rows, logged) = if piece.resampled {
         (
@@ -223,6 +217,42 @@ fn smoothed(
         standstill: still,
         interval: piece.interval,
     })
+}
+
+/// Smooth position, velocity and acceleration of one joint; the derivative of its position, where that is not the velocity.
+fn derivatives(
+    kernels: &MotionKernels,
+    channels: &Channels,
+    derived: DerivedFrom,
+    [q, qd, qdd]: [&mut [f64]; 3],
+) -> Option<Vec<f64>> {
+    let Some(velocity) = &channels.qd else {
+        correlate_two([&kernels.smooth, &kernels.first], &channels.q, [q, qd]);
+        match &channels.qdd {
+            Some(logged) => correlate(&kernels.smooth, logged, qdd),
+            None => correlate(&kernels.second, &channels.q, qdd),
+        }
+        return None;
+    };
+    let mut travel = vec![0.0; q.len()];
+    correlate_two(
+        [&kernels.smooth, &kernels.first],
+        &channels.q,
+        [q, &mut travel],
+    );
+    match (&channels.qdd, derived) {
+        (None, DerivedFrom::Velocity) => {
+            correlate_two([&kernels.smooth, &kernels.first], velocity, [qd, qdd]);
+        }
+        (logged, _) => {
+            correlate(&kernels.smooth, velocity, qd);
+            match logged {
+                Some(logged) => correlate(&kernels.smooth, logged, qdd),
+                None => correlate(&kernels.second, &channels.q, qdd),
+            }
+        }
+    }
+    Some(travel)
 }
 
 /// The rows as logged that lie within the borders of a resampled segment; torque moved back by its lag.

@@ -80,13 +80,17 @@ fn check_settings(settings: &SignalSettings) -> Result<()> {
     })
 }
 
-fn unexcited(joints: &[JointFacts], still: &[bool]) -> Result<Vec<Finding>> {
+/// `limits`: how fast a joint must be to count as moving, rad/s or m/s; empty with the filter off.
+fn unexcited(joints: &[JointFacts], still: &[bool], limits: &[f64]) -> Result<Vec<Finding>> {
     let names = |wanted: bool| -> Vec<String> {
         joints
             .iter()
-            .zip(still)
-            .filter(|(_, s)| **s == wanted)
-            .map(|(j, _)| format!("`{}`", j.name))
+            .enumerate()
+            .filter(|(joint, _)| still[*joint] == wanted)
+            .map(|(joint, facts)| match limits.get(joint) {
+                Some(limit) => format!("`{}` below {limit:.3} rad/s (m/s)", facts.name),
+                None => format!("`{}`", facts.name),
+            })
             .collect()
     };
     if names(false).is_empty() {
@@ -95,7 +99,13 @@ fn unexcited(joints: &[JointFacts], still: &[bool]) -> Result<Vec<Finding>> {
                 "no excitation: every joint stands still in all training logs ({})",
                 names(true).join(", ")
             ),
-            remedy: "record logs in which the joints move".into(),
+            remedy: if limits.iter().any(|limit| *limit > COULOMB_VELOCITY) {
+                "a coarse encoder cannot tell slower motion from standing still: record faster motion, log the velocity, or \
+                 lower [signal] cutoff_hz"
+                    .into()
+            } else {
+                "record logs in which the joints move".into()
+            },
         });
     }
     Ok(joints
@@ -138,7 +148,7 @@ fn off(
             *still &= q.iter().all(|v| !v.is_finite() || *v == q[0]);
         }
     }
-    let findings = unexcited(joints, &still)?;
+    let findings = unexcited(joints, &still, &[])?;
     let intervals: Vec<f64> = logs
         .iter()
         .filter_map(|log| even_interval(&log.time))
@@ -260,7 +270,7 @@ fn on(
         still.push(!moves(joint, prepared, threshold, cutoff));
         pipeline.standstill_velocity.push(threshold);
     }
-    findings.extend(unexcited(joints, &still)?);
+    findings.extend(unexcited(joints, &still, &pipeline.standstill_velocity)?);
     let taps = column_kernel(cutoff, 1.0 / lowest_rate);
     findings.push(Finding::new(
         Severity::Note,

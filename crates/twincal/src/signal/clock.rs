@@ -391,6 +391,16 @@ pub(crate) fn even_interval(time: &[f64]) -> Option<f64> {
     (worst <= 0.51 * quantum && interval > 1.5 * quantum).then_some(interval)
 }
 
+/// "12", "0.35", "0.0021": two digits, however small.
+fn two_digits(value: f64) -> String {
+    let decimals = if value > 0.0 {
+        (1.0 - value.log10().floor()).clamp(0.0, 9.0) as usize
+    } else {
+        0
+    };
+    format!("{value:.decimals$}")
+}
+
 /// Says how uneven a resampled run is.
 pub(crate) fn report_jitter(
     log: &Recording,
@@ -424,10 +434,10 @@ pub(crate) fn report_jitter(
         "resampled",
         &log.name,
         format!(
-            "the clock is uneven: 99 % of the steps are within {:.1} % of the median ({:.3} Hz), the largest is off by {:.0} %, {beyond} by more than {:.0} %; resampled by a cubic spline{advice}",
-            100.0 * typical,
+            "the clock is uneven: 99 % of the steps are within {} % of the median ({:.3} Hz), the largest is off by {} %, {beyond} by more than {:.0} %; resampled by a cubic spline{advice}",
+            two_digits(100.0 * typical),
             1.0 / interval,
-            100.0 * largest,
+            two_digits(100.0 * largest),
             100.0 * JITTER
         ),
         resampled,

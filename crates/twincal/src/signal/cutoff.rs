@@ -13,6 +13,7 @@
 use super::DerivedFrom;
 use super::prepare::Prepared;
 use super::spectrum::{Noise, Spectrum};
+use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// What f_c never falls below without reason, Hz.
@@ -57,6 +58,7 @@ pub(crate) fn spectra(prepared: &Prepared) -> Option<Vec<JointSpectra>> {
     let dof = pieces.first()?.joints.len();
     let duration = pieces.iter().map(|p| p.time.len()).sum::<usize>() as f64 * interval;
     (0..dof)
+        .into_par_iter()
         .map(|joint| {
             let channels = || pieces.iter().map(move |p| &p.joints[joint]);
             let position = Spectrum::welch(channels().map(|c| c.q.as_slice()), interval)?;

@@ -5,6 +5,8 @@ mod align;
 mod choose;
 mod clock;
 pub(crate) mod convolve;
+pub(crate) mod decimate;
+mod fourier;
 mod correct;
 mod cutoff;
 mod describe;
@@ -25,7 +27,7 @@ pub use correct::{Corrections, Lag};
 pub use describe::{JointOverview, LogOverview, describe, hardly_driven};
 pub use steps::{Steps, steps};
 
-use crate::error::{Finding, Result};
+use crate::error::{Error, Finding, Result};
 use crate::robot::Robot;
 use serde::{Deserialize, Serialize};
 
@@ -93,6 +95,24 @@ pub struct Recording {
     pub joints: Vec<Channels>,
     /// What the robot carried.
     pub payload: Payload,
+}
+
+impl Recording {
+    /// A log can be predicted without torque, not fitted and not scored. `names`: moving joints in order.
+    ///
+    /// # Errors
+    /// [`Error::Log`] naming the first joint without.
+    pub fn require_torque(&self, names: &[&str]) -> Result<()> {
+        let without = |(channels, _): &(&Channels, &&str)| channels.tau.is_none();
+        match self.joints.iter().zip(names).find(without) {
+            Some((_, name)) => Err(Error::Log {
+                log: self.name.clone(),
+                problem: format!("has no torque of joint `{name}`"),
+                remedy: "measured torque is needed here; name its column in [columns] tau".into(),
+            }),
+            None => Ok(()),
+        }
+    }
 }
 
 /// What an acceleration that is not logged is derived from.

@@ -1,5 +1,6 @@
 //! Power spectra of logged motion (Welch) and the white noise under them.
 
+use super::fourier::Fourier;
 use std::f64::consts::PI;
 
 /// One-sided power density of a channel, corrected for the differencing that keeps slow motion from leaking.
@@ -70,22 +71,35 @@ impl Spectrum {
             .collect();
         let energy: f64 = window.iter().map(|w| w * w).sum();
         let mut density = vec![0.0; size / 2];
-        let mut pieces = 0.0;
+        // Two pieces at a time, one as real and one as imaginary part.
+        let starts: Vec<&[f64]> = runs
+            .flat_map(|run| {
+                let starts = (0..run.len()).step_by((piece / 2).max(1));
+                starts
+                    .take_while(|start| start + piece < run.len())
+                    .map(|start| &run[start..=start + piece])
+            })
+            .collect();
+        let pieces = starts.len() as f64;
+        let fourier = Fourier::new(size);
         let (mut re, mut im) = (vec![0.0; size], vec![0.0; size]);
-        for run in runs {
-            let mut start = 0;
-            while start + piece < run.len() {
-                re.fill(0.0);
-                im.fill(0.0);
-                for i in 0..piece {
-                    re[i] = (run[start + i + 1] - run[start + i]) * window[i];
+        for pair in starts.chunks(2) {
+            for (part, values) in [&mut re, &mut im]
+                .into_iter()
+                .zip([Some(pair[0]), pair.get(1).copied()])
+            {
+                part.fill(0.0);
+                let steps = values.into_iter().flat_map(|values| values.windows(2));
+                for ((cell, step), window) in part.iter_mut().zip(steps).zip(&window) {
+                    *cell = (step[1] - step[0]) * window;
                 }
-                fourier(&mut re, &mut im);
-                for (i, sum) in density.iter_mut().enumerate() {
-                    *sum += re[i + 1] * re[i + 1] + im[i + 1] * im[i + 1];
-                }
-                pieces += 1.0;
-                start += (piece / 2).max(1);
+            }
+            fourier.forward(&mut re, &mut im);
+            // |A|² + |B|² of Z = A + iB is (|Z_k|² + |Z_−k|²)/2
+            for (i, sum) in density.iter_mut().enumerate() {
+                let (k, mirror) = (i + 1, size - i - 1);
+                let square = |k: usize| re[k] * re[k] + im[k] * im[k];
+                *sum += 0.5 * (square(k) + square(mirror));
             }
         }
         let width = 1.0 / (size as f64 * interval);
@@ -134,42 +148,6 @@ fn median(density: &[f64], from: f64, to: f64) -> f64 {
     let mut band = density[(from * bins) as usize..(to * bins) as usize].to_vec();
     let middle = band.len() / 2;
     *band.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
-/// In-place radix-2 Fourier transform; the length is a power of two.
-fn fourier(re: &mut [f64], im: &mut [f64]) {
-    let n = re.len();
-    let bits = n.trailing_zeros();
-    for i in 0..n {
-        let j = i.reverse_bits() >> (usize::BITS - bits);
-        if i < j {
-            re.swap(i, j);
-            im.swap(i, j);
-        }
-    }
-    let turns: Vec<(f64, f64)> = (0..n / 2)
-        .map(|k| (-2.0 * PI * k as f64 / n as f64).sin_cos())
-        .collect();
-    let mut half = 1;
-    while half < n {
-        let stride = n / (2 * half);
-        for (re, im) in re
-            .chunks_exact_mut(2 * half)
-            .zip(im.chunks_exact_mut(2 * half))
-        {
-            let (re_a, re_b) = re.split_at_mut(half);
-            let (im_a, im_b) = im.split_at_mut(half);
-            for k in 0..half {
-                let (sin, cos) = turns[k * stride];
-                let (x, y) = (re_b[k] * cos - im_b[k] * sin, re_b[k] * sin + im_b[k] * cos);
-                re_b[k] = re_a[k] - x;
-                im_b[k] = im_a[k] - y;
-                re_a[k] += x;
-                im_a[k] += y;
-            }
-        }
-        half *= 2;
-    }
 }
 
 #[cfg(test)]

@@ -263,7 +263,7 @@ fn white_noise_gain_is_what_white_noise_shows() {
     };
     let kernel = fir::column_kernel(5.0, 1e-3);
     let mut out = vec![0.0; x.len() - kernel.len() + 1];
-    convolve::correlate(&kernel, &x, 1, &mut out);
+    convolve::correlate(&kernel, &x, &mut out);
     let sd = (out.iter().map(|v| v * v).sum::<f64>() / out.len() as f64).sqrt();
     assert!((sd / pipeline.noise_gain(1000.0) - 1.0).abs() < 0.2, "{sd}");
 }

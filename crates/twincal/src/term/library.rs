@@ -6,6 +6,7 @@ use super::component::{Component, Meaning, Parameter};
 use super::expression::{Graph, Id, Slot, Tape, Variable, bounded_values};
 use super::model_column::{ModelColumn, ModelColumns};
 use super::overlaps;
+use super::parts::{Parts, Torque};
 use super::propose::{About, last_link, proposals};
 use super::sentence::{Estimate, sentence};
 use super::verdicts::statuses;
@@ -40,6 +41,7 @@ pub struct Library {
     by_joint: Vec<Vec<usize>>,
     tape: Arc<Tape>,
     model: Option<Arc<ModelColumns>>,
+    parts: Arc<Parts>,
     /// As the settings say.
     payload_frame: Option<String>,
 }
@@ -120,6 +122,7 @@ impl Library {
             by_joint: vec![Vec::new(); joints.len()],
             tape: Arc::default(),
             model: model.map(Arc::new),
+            parts: Arc::default(),
             payload_frame: settings.payload_frame.clone(),
         };
         let judged = candidates.into_iter().zip(statuses).zip(acting);
@@ -180,6 +183,13 @@ impl Library {
         }
         self.tape = Arc::new(Tape::new(&self.graph, &outputs));
         self.model = model.map(Arc::new);
+        let torques = self.columns.iter().map(|&term| match &self.sources[term] {
+            Some((source, joints)) => Torque::Model(source, joints),
+            None => Torque::Expression(&self.images[term]),
+        });
+        let joints = self.by_joint.len();
+        let parts = Parts::new(&self.graph, self.model.as_deref(), joints, torques);
+        self.parts = Arc::new(parts);
     }
 
     /// All terms, dropped ones included, in order.
@@ -256,8 +266,10 @@ impl Library {
 
     /// The same library for a robot with other inertias and the same joints.
     pub fn on(&self, robot: &Robot) -> Self {
+        let model = self.model.as_ref().map(|model| Arc::new(model.on(robot)));
         Self {
-            model: self.model.as_ref().map(|model| Arc::new(model.on(robot))),
+            parts: Arc::new(self.parts.on(model.as_deref())),
+            model,
             ..self.clone()
         }
     }
@@ -377,6 +389,36 @@ impl Library {
         if let Some(model) = &self.model {
             model.evaluate(motion, out, scratch);
         }
+    }
+
+    /// How many signals the columns of a joint are combinations of, see [`Library::evaluate_parts`].
+    pub fn parts_of_joint(&self, joint: usize) -> usize {
+        self.parts.count(joint)
+    }
+
+    /// Evaluates the fewest signals whose fixed linear combinations are all columns: `out[j][part * motion.len + sample]`,
+    /// each vector resized. What is linear (a filter) is cheaper before [`Library::combine_parts`] than after.
+    ///
+    /// # Panics
+    /// As [`Library::evaluate`].
+    pub fn evaluate_parts(&self, motion: Motion<'_>, out: &mut [Vec<f64>], scratch: &mut Scratch) {
+        self.parts.evaluate(motion, out, scratch);
+    }
+
+    /// The columns of a joint from its parts: `parts[part * stride + row]` to `out[i * rows + row]` for the i-th entry of
+    /// `columns_of_joint(joint)`; `out` is resized.
+    ///
+    /// # Panics
+    /// If `parts` is too short.
+    pub fn combine_parts(
+        &self,
+        joint: usize,
+        parts: &[f64],
+        stride: usize,
+        rows: usize,
+        out: &mut Vec<f64>,
+    ) {
+        self.parts.combine(joint, parts, stride, rows, out);
     }
 
     /// φ(q, q̇) of a term (index into [`Library::terms`]) at one state, J per unit of β; `None` where the term

@@ -12,6 +12,7 @@ mod euler_lagrange;
 mod candidate;
 mod family;
 mod model_column;
+mod parts;
 mod viscous;
 mod coulomb;
 mod offset;

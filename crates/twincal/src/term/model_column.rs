@@ -107,6 +107,8 @@ struct Blocks {
 struct Output {
     column: ModelColumn,
     slots: Vec<(usize, usize)>,
+    /// Of an inertial column, per slot: pair, parameter, weight.
+    entries: Vec<Vec<(usize, usize, f64)>>,
 }
 
 /// All model columns of a library, ready to be evaluated.
@@ -137,15 +139,56 @@ impl ModelColumns {
 
     /// The same columns of a robot with other inertias.
     pub(super) fn on(&self, robot: &Robot) -> Self {
-        Self {
-            outputs: self.outputs.clone(),
-            ..Self::new(Arc::new(robot.clone()))
+        self.of(&Self::new(Arc::new(robot.clone())))
+    }
+
+    /// The same columns of another's robot.
+    pub(super) fn of(&self, other: &Self) -> Self {
+        let mut all = other.emptied();
+        for output in &self.outputs {
+            all.push(output.column.clone(), output.slots.clone());
         }
+        all
+    }
+
+    /// Whether parameter `k` of a body can act on a joint.
+    pub(super) fn acts(&self, joint: usize, body: usize, k: usize) -> bool {
+        self.pairs(joint, body).any(|(_, present)| present[k])
+    }
+
+    /// Pairs of a joint and a body: their index and which parameters can act.
+    fn pairs(&self, joint: usize, body: usize) -> impl Iterator<Item = (usize, [bool; 10])> {
+        let pairs = self.regressor.pairs().iter().enumerate();
+        pairs
+            .filter(move |(_, pair)| pair.body == body && pair.coordinate == joint)
+            .map(|(index, pair)| (index, pair.present))
     }
 
     /// Adds a column.
     pub(super) fn push(&mut self, column: ModelColumn, slots: Vec<(usize, usize)>) {
-        self.outputs.push(Output { column, slots });
+        let entries = match &column {
+            ModelColumn::Inertia { body, weights } => slots
+                .iter()
+                .map(|&(joint, _)| self.entries(*body, weights, joint))
+                .collect(),
+            _ => Vec::new(),
+        };
+        self.outputs.push(Output {
+            column,
+            slots,
+            entries,
+        });
+    }
+
+    /// `(pair, parameter, weight)` that make up an inertial column on a joint.
+    fn entries(&self, body: usize, weights: &[f64; 10], joint: usize) -> Vec<(usize, usize, f64)> {
+        self.pairs(joint, body)
+            .flat_map(|(pair, present)| {
+                (0..10)
+                    .filter(move |&k| present[k] && weights[k] != 0.0)
+                    .map(move |k| (pair, k, weights[k]))
+            })
+            .collect()
     }
 
     /// Writes every column: `out[joint][row * len + sample]`.
@@ -176,7 +219,7 @@ impl ModelColumns {
     fn of_nominal_torque(&self, motion: Motion<'_>, out: &mut [Vec<f64>], scratch: &mut Scratch) {
         let len = motion.len;
         let mut ready = false;
-        for Output { column, slots } in &self.outputs {
+        for Output { column, slots, .. } in &self.outputs {
             let friction = match column {
                 ModelColumn::Nominal { .. } => None,
                 ModelColumn::LoadFriction { velocity, .. } => Some(*velocity),
@@ -221,17 +264,18 @@ impl ModelColumns {
             gravity_regressor(robot, workspace, motion, samples.clone(), gravity);
         }
         let count = samples.len();
-        for Output { column, slots } in &self.outputs {
+        for output in &self.outputs {
+            let (column, slots) = (&output.column, &output.slots);
             if let ModelColumn::PositionDerivative { joint } = *column {
                 let (workspace, change) = (&mut blocks.workspace, &mut blocks.derivative);
                 position_derivative(robot, workspace, joint, motion, samples.clone(), change);
             }
-            for &(joint, row) in slots {
+            for (slot, &(joint, row)) in slots.iter().enumerate() {
                 let cells = row * motion.len + samples.start..row * motion.len + samples.end;
                 let cells = &mut out[joint][cells];
                 match column {
-                    ModelColumn::Inertia { body, weights } => {
-                        self.combine(&blocks.regressor, *body, weights, joint, cells);
+                    ModelColumn::Inertia { .. } => {
+                        combine(&blocks.regressor, &output.entries[slot], cells);
                     }
                     ModelColumn::Gravity { axis } => {
                         let start = (joint * 3 + axis) * STRIDE;
@@ -246,29 +290,19 @@ impl ModelColumns {
             }
         }
     }
+}
 
-    /// Σ_k weight_k · (column of parameter k) of one body on one joint.
-    fn combine(
-        &self,
-        block: &RegressorBlock,
-        body: usize,
-        weights: &[f64; 10],
-        joint: usize,
-        cells: &mut [f64],
-    ) {
-        cells.fill(0.0);
-        for (index, pair) in self.regressor.pairs().iter().enumerate() {
-            if pair.body != body || pair.coordinate != joint {
-                continue;
-            }
-            for (k, &weight) in weights.iter().enumerate() {
-                if weight == 0.0 || !pair.present[k] {
-                    continue;
-                }
-                for (cell, value) in cells.iter_mut().zip(block.column(index, k)) {
-                    *cell += weight * value;
-                }
-            }
+/// Σ weight · entry.
+fn combine(block: &RegressorBlock, entries: &[(usize, usize, f64)], cells: &mut [f64]) {
+    if let [(pair, k, 1.0)] = entries {
+        let len = cells.len();
+        cells.copy_from_slice(&block.column(*pair, *k)[..len]);
+        return;
+    }
+    cells.fill(0.0);
+    for &(pair, k, weight) in entries {
+        for (cell, value) in cells.iter_mut().zip(block.column(pair, k)) {
+            *cell += weight * value;
         }
     }
 }

@@ -98,6 +98,7 @@ fn angle(p: &Estimate) -> String {
 fn tilt(parameters: &[Estimate]) -> String {
     let values: Vec<String> = parameters
         .iter()
+        .filter(|p| p.mean != 0.0 || p.sd != 0.0) // an axis that no joint shows
         .map(|p| format!("{} {}", p.name, estimate(p.mean, p.sd)))
         .collect();
     format!("{} m/s²", values.join(", "))
@@ -111,6 +112,7 @@ fn hint(family: Family, parameters: &[Estimate]) -> &'static str {
         Family::Viscous | Family::Coulomb if negative => {
             " (negative: the model has too much friction there)"
         }
+        Family::Stribeck if negative => " (negative: friction grows with speed here)",
         Family::Payload if negative => " (negative: the model carries too much)",
         _ => "",
     }

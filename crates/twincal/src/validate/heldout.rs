@@ -7,15 +7,12 @@ use super::{
 };
 use crate::error::Result;
 use crate::robot::Robot;
-use crate::rows::{RowBlock, RowSignal, slices, visit_slices};
+use crate::rows::{RowBlock, RowSignal, slices, spread_raw, visit_slices};
 use crate::signal::{Pipeline, Trajectory};
 use crate::term::Library;
 use crate::twin::{JointTorque, Predictor, TorqueSignal};
 use rayon::prelude::*;
 use std::ops::AddAssign;
-
-/// Raw rows that one thread takes at a time.
-const SLICE: usize = 1 << 14;
 
 /// Everything held-out, while it is being collected; keepers of several folds add up.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,7 +72,7 @@ impl HeldOut {
     }
 
     /// Predicts the rows of a trajectory that were not used to fit the predictors, those at or after the time `from` in s
-    /// (−∞: all of them), and scores them.
+    /// (−∞: all of them), and scores them: raw rows of long logs in evenly spread pieces, see [`spread_raw`].
     ///
     /// # Errors
     /// Those of [`visit_slices`].
@@ -111,8 +108,7 @@ impl HeldOut {
             trace.thin();
             self.traces.push(trace);
         }
-        let raw = slices(pipeline, trajectory, RowSignal::Raw, from, SLICE);
-        let keepers: Vec<ScoreKeeper> = raw
+        let keepers: Vec<ScoreKeeper> = spread_raw(pipeline, trajectory, from)
             .into_par_iter()
             .map(|slice| {
                 let mut keeper = ScoreKeeper::new(self.names.clone());

@@ -369,7 +369,7 @@ fn gravity(robot: &Robot, held: &[Option<Place>], beta: &[f64]) -> Option<[f64; 
 /// Why a family has no place in a format.
 fn reason(family: Family, format: &str) -> String {
     let what = match family {
-        Family::User | Family::Generic => "energy terms of your own",
+        Family::User | Family::Generic => "energy terms",
         Family::Offset => "a constant torque",
         Family::MotorInertia => "motor inertia",
         Family::Tilt => "gravity",

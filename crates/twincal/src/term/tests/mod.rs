@@ -5,6 +5,7 @@ mod arm;
 mod columns;
 mod judgement;
 mod parser;
+mod parts;
 mod sympy;
 
 use super::candidate::Joint;

@@ -1,0 +1,104 @@
+//! Columns that are combined from parts are the columns that are evaluated at once.
+
+use super::super::{Family, Library, LibrarySettings, Scratch};
+use crate::robot::{
+    Inertia, JointDescription, JointKind, LinkDescription, Motion, Robot, RobotDescription,
+};
+use std::collections::BTreeMap;
+
+/// Three joints about x, y and z with a slider between, every link's inertia turned against its frame.
+fn arm(mass: f64) -> Robot {
+    let names = ["base", "one", "two", "three", "tool"];
+    let kinds = [
+        (JointKind::Revolute, [0.0, 0.0, 1.0]),
+        (JointKind::Revolute, [0.0, 1.0, 0.0]),
+        (JointKind::Prismatic, [1.0, 0.0, 0.0]),
+        (JointKind::Revolute, [0.6, 0.0, 0.8]),
+    ];
+    let link = |k: usize| LinkDescription {
+        name: names[k].into(),
+        inertia: (k > 0).then_some(Inertia {
+            mass: mass / k as f64,
+            com: [0.2, 0.03, -0.05 * k as f64],
+            tensor: [
+                [0.03, 0.004, 0.0],
+                [0.004, 0.035, -0.003],
+                [0.0, -0.003, 0.05],
+            ],
+        }),
+    };
+    let joint = |k: usize| {
+        let (kind, axis) = kinds[k];
+        let mut joint = JointDescription::new(&format!("joint{k}"), kind, names[k], names[k + 1]);
+        joint.axis = axis;
+        joint.placement.translation = [0.3, 0.1 * k as f64, 0.2];
+        joint
+    };
+    let description = RobotDescription {
+        name: "arm".into(),
+        gravity: [0.0, 0.0, -9.81],
+        links: (0..5).map(link).collect(),
+        joints: (0..4).map(joint).collect(),
+        allow_unphysical: false,
+    };
+    Robot::new(description, &BTreeMap::new()).unwrap().0
+}
+
+fn compare(library: &Library, joints: usize) {
+    let len = 70;
+    let wave = |a: f64| -> Vec<f64> {
+        (0..joints * len)
+            .map(|i| (a * (i as f64 + 0.5)).sin() * (1.0 + 0.01 * i as f64))
+            .collect()
+    };
+    let (q, qd, qdd) = (wave(0.37), wave(0.53), wave(0.71));
+    let motion = Motion {
+        len,
+        q: &q,
+        qd: &qd,
+        qdd: &qdd,
+    };
+    let (mut whole, mut parts) = (vec![Vec::new(); joints], vec![Vec::new(); joints]);
+    library.evaluate(motion, &mut whole);
+    library.evaluate_parts(motion, &mut parts, &mut Scratch::default());
+    let mut combined = Vec::new();
+    for joint in 0..joints {
+        assert_eq!(parts[joint].len(), library.parts_of_joint(joint) * len);
+        library.combine_parts(joint, &parts[joint], len, len, &mut combined);
+        assert_eq!(combined.len(), whole[joint].len());
+        for (i, &column) in library.columns_of_joint(joint).iter().enumerate() {
+            let expected = &whole[joint][i * len..(i + 1) * len];
+            let size = expected.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            assert!(size > 0.0, "column {column} is zero on joint {joint}");
+            for (got, expected) in combined[i * len..].iter().zip(expected) {
+                let off = (got - expected).abs();
+                let name = &library.terms()[library.columns()[column]].name;
+                assert!(off < 1e-12 * (1.0 + size), "{name} on joint {joint}: {off}");
+            }
+        }
+    }
+}
+
+/// All families, the ones from the model included; then the same library on a robot with other masses.
+#[test]
+fn parts_make_up_the_columns() {
+    let settings = LibrarySettings {
+        families: Family::NAMED.to_vec(),
+        generic: Some(false),
+        coulomb_velocity: 0.02,
+        ..LibrarySettings::default()
+    };
+    let robot = arm(4.0);
+    let (library, _) = Library::propose(&robot, &settings).unwrap();
+    compare(&library, 4);
+    compare(&library.on(&arm(5.0)), 4);
+    let without = library.without_columns(&[0, 7]);
+    compare(&without, 4);
+    // the point of it: fewer signals than columns
+    let count = |of: &dyn Fn(usize) -> usize| (0..4).map(of).sum::<usize>();
+    let (parts, columns) = (
+        count(&|joint| library.parts_of_joint(joint)),
+        count(&|joint| library.columns_of_joint(joint).len()),
+    );
+    assert!(parts < columns, "{parts} parts for {columns} columns");
+}
