@@ -1,9 +1,9 @@
 """How long a fit of a long log takes, and how much memory: from Parquet to result.json and report.
 
-    python studies/speed/long_log.py [--robot panda] [--minutes 10] [--threads 2] [--repeat 3]
+    python studies/speed/long_log.py [--robot panda] [--minutes 10] [--threads 2] [--repeat 3] [--families payload,tensor,…]
 
 The arm is that of studies/industrial_arms with its defects, logged at 1 kHz as joint positions, velocities and torques. Every repeat
-is one run of `twincal fit` with default settings in a new process; printed are the median wall time and the largest memory.
+is one run of `twincal fit` in a new process, with default settings or with the candidate families named; printed are the median wall time and the largest memory.
 The time of `simulate` is not counted.
 """
 
@@ -83,6 +83,7 @@ def main():
     arguments.add_argument("--threads", type=int, default=2)
     arguments.add_argument("--repeat", type=int, default=3)
     arguments.add_argument("--folder", type=Path, help="keep the log here and use it again")
+    arguments.add_argument("--families", help="[library] families, with commas between [default: all that are on by default]")
     given = arguments.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
         folder = given.folder or Path(temporary)
@@ -91,7 +92,10 @@ def main():
         if not file.exists():
             pq.write_table(pa.table(log(given.robot, given.minutes)), file)
         locked = ", ".join(f'"{joint}" = 0.0' for joint in arms.ROBOTS[given.robot].locked)
-        (folder / "twincal.toml").write_text(f"[model]\nlocked = {{ {locked} }}\n")
+        config = f"[model]\nlocked = {{ {locked} }}\n"
+        if given.families:
+            config += f"[library]\nfamilies = {json.dumps(given.families.split(','))}\n"
+        (folder / "twincal.toml").write_text(config)
         command = [PROGRAM, "fit", file, "--model", arms.model_file(given.robot), "--config", folder / "twincal.toml",
                    "-o", folder / "out", "--force", "--threads", str(given.threads)]
         runs = [measured([str(part) for part in command]) for _ in range(given.repeat)]

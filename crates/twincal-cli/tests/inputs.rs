@@ -308,13 +308,10 @@ fn a_base_on_the_ceiling_turns_gravity() {
 fn entries_of_the_config_are_the_logs_where_none_is_given() {
     let folder = folder();
     fs::create_dir(folder.path().join("logs")).unwrap();
-    for name in ["a.csv", "b.csv"] {
-        fs::copy(
-            folder.path().join("run.csv"),
-            folder.path().join("logs").join(name),
-        )
-        .unwrap();
-    }
+    let text = fs::read_to_string(folder.path().join("run.csv")).unwrap();
+    let shorter: Vec<&str> = text.lines().take(390).collect();
+    fs::write(folder.path().join("logs/a.csv"), &text).unwrap();
+    fs::write(folder.path().join("logs/b.csv"), shorter.join("\n")).unwrap();
     let config = format!(
         "{}[[log]]\nfile = \"logs/a.csv\"\npayload = {{ mass = 1.2, com = [0.0, 0.0, 0.06] }}\n\
          [[log]]\nfile = \"logs/b.csv\"\nheldout = true\n",

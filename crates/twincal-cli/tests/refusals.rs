@@ -507,3 +507,75 @@ fn schema_prints_the_published_file() {
     .unwrap();
     assert_eq!(run(folder().path(), ["schema"]).expect(0).out, published);
 }
+
+/// A log without torque can be predicted, not fitted and not held out; `doctor` says so before.
+#[test]
+fn logs_without_torque_are_refused_by_name() {
+    let folder = folder();
+    let text = csv(400, &|_, row: Row| row);
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let kept: Vec<usize> = (0..header.len())
+        .filter(|&i| !header[i].starts_with("tau"))
+        .collect();
+    assert!(kept.len() < header.len(), "{header:?}");
+    let bare: Vec<String> = text
+        .lines()
+        .map(|line| {
+            let cells: Vec<&str> = line.split(',').collect();
+            let kept: Vec<&str> = kept.iter().map(|&i| cells[i]).collect();
+            kept.join(",")
+        })
+        .collect();
+    fs::write(folder.path().join("bare.csv"), bare.join("\n")).unwrap();
+    let words = ["bare.csv", "has no torque of joint", "[columns] tau"];
+    let fits: [&[&str]; 3] = [
+        &["fit", "bare.csv", "--model", "arm.urdf", "-o", "out"],
+        &[
+            "fit", "run.csv", "bare.csv", "--model", "arm.urdf", "-o", "out",
+        ],
+        &[
+            "fit",
+            "run.csv",
+            "--heldout",
+            "bare.csv",
+            "--model",
+            "arm.urdf",
+            "-o",
+            "out",
+        ],
+    ];
+    for line in fits {
+        run(folder.path(), line).expect(2).says(&words);
+        assert!(!folder.path().join("out").exists(), "{line:?}");
+    }
+    let look = run(folder.path(), ["doctor", "bare.csv", "--model", "arm.urdf"]);
+    let look = look.expect(2);
+    for words in ["fit would refuse", "has no torque of joint"] {
+        assert!(look.out.contains(words), "{}", look.out);
+    }
+}
+
+/// A held-out log that was fitted proves nothing; a copy is no experiment of its own.
+#[test]
+fn every_log_counts_once() {
+    let folder = folder();
+    fs::copy(
+        folder.path().join("run.csv"),
+        folder.path().join("copy.csv"),
+    )
+    .unwrap();
+    let base = ["--model", "arm.urdf", "-o", "out"];
+    let heldout = [&["fit", "run.csv", "--heldout", "copy.csv"][..], &base].concat();
+    run(folder.path(), heldout)
+        .expect(2)
+        .says(&["`copy.csv` is fitted and held out", "does not see"]);
+    let twice = [&["fit", "run.csv", "copy.csv"][..], &base].concat();
+    run(folder.path(), twice)
+        .expect(2)
+        .says(&["`copy.csv` has the same bytes", "once"]);
+    let all = [&["fit", "--model", "arm.urdf", "--heldout", "run.csv"][..]].concat();
+    run(folder.path(), all)
+        .expect(2)
+        .says(&["no log to fit", "--heldout takes every path behind it"]);
+}

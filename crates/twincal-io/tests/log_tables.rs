@@ -1,6 +1,8 @@
 //! NPZ files, and tables of well-known recorders.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
+#[path = "common/refusals.rs"]
+mod refusals;
 #[path = "common/logs.rs"]
 #[allow(
     dead_code,
@@ -10,6 +12,7 @@ mod logs;
 
 use logs::{arm, motion, robot};
 use proptest::prelude::*;
+use refusals::{contains, refused};
 use std::fs;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
@@ -63,18 +66,6 @@ fn doubles(shape: &str, values: &[f64]) -> Vec<u8> {
     let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
     let data: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
     array(&header, &data)
-}
-
-#[track_caller]
-fn refused<T: std::fmt::Debug>(result: Result<T>) -> String {
-    result.expect_err("must be refused").to_string()
-}
-
-#[track_caller]
-fn contains(message: &str, parts: &[&str]) {
-    for part in parts {
-        assert!(message.contains(part), "`{part}` is missing in: {message}");
-    }
 }
 
 #[test]

@@ -8,7 +8,6 @@ use crate::failure::{GATE, Outcome};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use serde::Serialize;
-use twincal::signal::Recording;
 use twincal::twin::Twin;
 use twincal::validate::{HeldOut, Scores, Split, Validation};
 use twincal::{Finding, Result};
@@ -106,7 +105,7 @@ fn score(twin: &Twin, logs: &LogInput, findings: &mut Vec<Finding>) -> Result<Va
     let names = twin.robot.joint_names();
     let mut scores = HeldOut::new(names.clone());
     for recording in &logs.recordings {
-        require_torque(recording, &names)?;
+        recording.require_torque(&names)?;
         let (trajectory, more) = twin.align(recording)?;
         findings.extend(more);
         scores.score(
@@ -119,22 +118,6 @@ fn score(twin: &Twin, logs: &LogInput, findings: &mut Vec<Finding>) -> Result<Va
         )?;
     }
     Ok(scores.finish(Split::HeldoutLogs))
-}
-
-/// A log without torque can be predicted, not scored.
-fn require_torque(recording: &Recording, names: &[&str]) -> Result<()> {
-    match recording
-        .joints
-        .iter()
-        .position(|channels| channels.tau.is_none())
-    {
-        Some(joint) => Err(twincal::Error::Log {
-            log: recording.name.clone(),
-            problem: format!("has no torque of joint `{}`", names[joint]),
-            remedy: "check needs measured torque; name its column in [columns] tau".into(),
-        }),
-        None => Ok(()),
-    }
 }
 
 /// Two gates per joint.

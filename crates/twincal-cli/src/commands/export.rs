@@ -5,13 +5,14 @@ use super::summary::paragraph;
 use crate::args::{Beyond as BeyondFormat, Export, ExportFormat};
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
-use crate::terminal::Terminal;
+use crate::terminal::{Terminal, clean};
 use serde::Serialize;
 use std::io::Write as _;
 use std::path::Path;
 use twincal::evaluator::{Beyond, Evaluator};
 use twincal::posterior::draws::draw;
-use twincal::write_back::{Holds, Residual, WriteBack, Writer};
+use twincal::robot::Inertia;
+use twincal::write_back::{Holds, LinkChange, Residual, WriteBack, Writer};
 use twincal_io::artifact::{Artifact, Claim, MODEL_MJCF, MODEL_URDF, Maker, OutputFile, Replace};
 use twincal_io::export::code::{Language, source};
 use twincal_io::export::write_model;
@@ -321,7 +322,14 @@ fn read(flags: &Export, kind: Kind) -> Outcome<(StoredTwin, Model)> {
                 "the twin was fitted with {}, which is not of that kind",
                 stored.context.model
             ),
-            "export what was fitted: only its own numbers are changed",
+            format!(
+                "use --to {}: only the fitted file's own numbers are changed",
+                if kind.stored == MODEL_URDF {
+                    "mjcf"
+                } else {
+                    "urdf"
+                }
+            ),
         ));
     }
     let bytes = artifact.read(kind.stored)?;
@@ -344,6 +352,12 @@ fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
     }
     for written in &change.written {
         paragraph(&format!("{} ({})", written.words, written.place), terminal);
+    }
+    let changed: Vec<String> = change.links.iter().filter_map(change_of).collect();
+    if !changed.is_empty() {
+        terminal
+            .say("  links before -> after, where several effects share one or bodies limit them:");
+        changed.iter().for_each(|text| paragraph(text, terminal));
     }
     terminal.say("");
     let (told, rest): (Vec<&Residual>, Vec<&Residual>) = change
@@ -386,6 +400,29 @@ fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
     );
     paragraph(&text, terminal);
     terminal.say("");
+}
+
+/// "upper_arm_link: 12.9 -> 6.28 kg, centre (-0.28, 0, 0.136) -> (-0.31, 0, 0.14) m"; `None` for a link of its own.
+fn change_of(change: &LinkChange) -> Option<String> {
+    let before = change.before?;
+    let centre = |inertia: &Inertia| inertia.com.map(short).join(", ");
+    let (was, is) = (centre(&before), centre(&change.after));
+    let mut text = format!("{}: ", clean(&change.link));
+    let masses = (short(before.mass), short(change.after.mass));
+    text += &if masses.0 == masses.1 {
+        format!("{} kg as before", masses.0)
+    } else {
+        format!("{} -> {} kg", masses.0, masses.1)
+    };
+    text += &if was == is {
+        ", centre as before".to_owned()
+    } else {
+        format!(", centre ({was}) -> ({is}) m")
+    };
+    if before.tensor != change.after.tensor {
+        text += ", new inertia tensor";
+    }
+    Some(text)
 }
 
 fn largest(values: &[f64]) -> f64 {

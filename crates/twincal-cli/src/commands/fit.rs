@@ -21,10 +21,12 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
         &flags.logs
     };
     if given.is_empty() {
-        return Err(Failure::usage(
-            "no log",
-            "give logs, as in `twincal fit run.csv --model arm.urdf`, or [[log]] entries in the config",
-        ));
+        let remedy = if flags.heldout.is_empty() {
+            "give logs, as in `twincal fit run.csv --model arm.urdf`, or [[log]] entries in the config"
+        } else {
+            "--heldout takes every path behind it: put the logs to fit before it"
+        };
+        return Err(Failure::usage("no log to fit", remedy));
     }
     let Some(model) = &settings.model_file else {
         return Err(super::no_model());
@@ -50,6 +52,7 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
         terms,
         &progress,
     )?;
+    every_log_once(&logs, &heldout)?;
     let command = command(model, given, &settings.log.heldout, &config.in_force());
     let job = Job {
         maker: Maker::Fit,
@@ -64,4 +67,35 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     let code = job.run(claim, Vec::new(), progress, terminal)?;
     say_where(&settings.output, settings.json, terminal);
     Ok(code)
+}
+
+/// A log that is fitted says nothing of what was not, and counts for one experiment only.
+fn every_log_once(logs: &LogInput, heldout: &LogInput) -> Outcome<()> {
+    for (i, file) in heldout.files.iter().enumerate() {
+        if logs.files.iter().any(|log| log.sha256 == file.sha256) {
+            return Err(Failure::usage(
+                format!("`{}` is fitted and held out", file.name),
+                "hold out a log that the fit does not see, or leave --heldout away",
+            ));
+        }
+        if heldout.files[..i]
+            .iter()
+            .any(|log| log.sha256 == file.sha256)
+        {
+            return Err(twice(&file.name));
+        }
+    }
+    for (i, file) in logs.files.iter().enumerate() {
+        if logs.files[..i].iter().any(|log| log.sha256 == file.sha256) {
+            return Err(twice(&file.name));
+        }
+    }
+    Ok(())
+}
+
+fn twice(name: &str) -> Failure {
+    Failure::usage(
+        format!("`{name}` has the same bytes as another log"),
+        "give every log once: copies would count as experiments of their own",
+    )
 }

@@ -16,6 +16,9 @@ const FEW: usize = 4;
 /// Terms below this probability are only counted.
 const MENTIONED: f64 = 0.05;
 
+/// Probability that a half must give an effect for it to count as repeated.
+const HELD: f64 = 0.5;
+
 /// Prints the whole summary.
 pub(super) fn print(calibration: &Calibration, terminal: &mut Terminal) {
     effects(calibration, terminal);
@@ -31,16 +34,20 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
         terminal.say("  nothing: no candidate has a probability of 0.5 or more");
     }
     for component in all.iter().filter(|component| component.selected) {
-        let text = format!("{} (PIP {})", component.words, pip(component.pip));
+        let open = match component.verdict {
+            Some(Verdict::Undecided) => ", undecided",
+            _ => "",
+        };
+        let text = format!("{} (PIP {}{open})", component.words, pip(component.pip));
         paragraph(&text, terminal);
     }
     for (verdict, words) in [
-        (Verdict::Undecided, "undecided"),
+        (Verdict::Undecided, "undecided, below 0.5"),
         (Verdict::NotSeen, "not seen by these data"),
     ] {
         let names: Vec<&str> = all
             .iter()
-            .filter(|component| component.verdict == Some(verdict))
+            .filter(|component| component.verdict == Some(verdict) && !component.selected)
             .map(|component| component.name.as_str())
             .collect();
         if !names.is_empty() {
@@ -184,18 +191,20 @@ fn repeatability(calibration: &Calibration, terminal: &mut Terminal) {
     let Some(halves) = calibration.halves else {
         return;
     };
-    let (mut same, mut other) = (0, Vec::new());
+    let (mut same, mut other, mut weak) = (0, Vec::new(), Vec::new());
     for group in (calibration.repeatability).chunk_by(|a, b| a.component == b.component) {
         let apart = group.iter().filter_map(|repeat| repeat.z).map(f64::abs);
         let apart = apart.fold(f64::NAN, f64::max);
         if apart >= 3.0 {
             let name = clean(&group[0].component);
             other.push(format!("{name} ({apart:.1} sd apart)"));
+        } else if group.iter().any(|r| r.first_pip.min(r.second_pip) < HELD) {
+            weak.push(clean(&group[0].component));
         } else if apart < 3.0 {
             same += 1;
         }
     }
-    let all = same + other.len();
+    let all = same + other.len() + weak.len();
     if all == 0 {
         return;
     }
@@ -204,6 +213,10 @@ fn repeatability(calibration: &Calibration, terminal: &mut Terminal) {
     paragraph(&text, terminal);
     if !other.is_empty() {
         paragraph(&format!("do not repeat: {}", other.join(", ")), terminal);
+    }
+    if !weak.is_empty() {
+        let text = format!("a half alone does not show: {}", weak.join(", "));
+        paragraph(&text, terminal);
     }
 }
 

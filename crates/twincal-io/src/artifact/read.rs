@@ -1,7 +1,7 @@
 //! Reading an artefact: nothing is used before its checksum is verified.
 
 use super::manifest::{Manifest, sha256};
-use super::{MANIFEST, Maker};
+use super::{MANIFEST, Maker, REPORT};
 use crate::error::{Error, Place, Result};
 use std::path::{Path, PathBuf};
 
@@ -20,8 +20,12 @@ impl Artifact {
     pub fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(MANIFEST);
         let bytes = std::fs::read(&path).map_err(|e| {
-            let remedy = "give the folder that `twincal fit` wrote with --twin";
-            Error::system(folder.to_string_lossy(), "open as an artefact", &e, remedy)
+            let remedy = "give the folder that `twincal fit` wrote";
+            if e.kind() == std::io::ErrorKind::NotFound && folder.is_dir() {
+                let problem = format!("is no twin: there is no {MANIFEST} in it");
+                return Error::content(Place::file(folder.to_string_lossy()), problem, remedy);
+            }
+            Error::system(folder.to_string_lossy(), "open as a twin", &e, remedy)
         })?;
         let manifest = Manifest::parse(&path.to_string_lossy(), &bytes)?;
         Ok(Self {
@@ -47,7 +51,11 @@ impl Artifact {
     pub fn read(&self, name: &str) -> Result<Vec<u8>> {
         let path = self.folder.join(name);
         let shown = path.to_string_lossy();
-        let anew = "write the artefact anew with `twincal fit --force`";
+        let anew = if name == REPORT {
+            "write the report anew with `twincal report --force`"
+        } else {
+            "write the artefact anew with `twincal fit --force`"
+        };
         let Some(entry) = self.manifest.files.get(name) else {
             return Err(Error::content(
                 Place::file(shown),
@@ -69,14 +77,14 @@ impl Artifact {
         let damaged = |problem: String| Error::content(Place::file(&*shown), problem, anew);
         if size != entry.bytes {
             return Err(damaged(format!(
-                "checksum: has {size} bytes, the manifest says {}",
+                "was changed after it was written (checksum): {size} bytes instead of {}",
                 entry.bytes
             )));
         }
         let bytes = std::fs::read(&path).map_err(|e| Error::system(&*shown, "read", &e, anew))?;
         if sha256(&bytes) != entry.sha256 {
             return Err(damaged(
-                "checksum: the file was changed after it was written".into(),
+                "was changed after it was written (checksum)".into(),
             ));
         }
         Ok(bytes)

@@ -188,7 +188,7 @@ fn case_114_and_115_newer_and_damaged_artefacts_are_refused() {
         assert!(error.contains(words), "{error}");
     }
     let error = Artifact::open(folder.path()).unwrap_err().to_string();
-    assert!(error.contains("--twin"), "{error}");
+    assert!(error.contains("is no twin"), "{error}");
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Bags of ROS: other people's files are read to the numbers that were written, broken ones are refused or told.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
+#[path = "../common/refusals.rs"]
+mod refusals;
 #[path = "../common/logs.rs"]
 #[allow(
     dead_code,
@@ -14,6 +16,7 @@ mod mutations;
 mod write;
 
 use logs::{arm, motion};
+use refusals::{contains, refused};
 use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::signal::Recording;
@@ -47,18 +50,6 @@ fn read_bytes_with(bytes: &[u8], options: &LogOptions) -> Result<(Recording, Vec
     let path = folder.path().join("run.mcap");
     std::fs::write(&path, bytes).unwrap();
     read_with(&path, options)
-}
-
-#[track_caller]
-fn refused<T: std::fmt::Debug>(result: Result<T>) -> String {
-    result.expect_err("must be refused").to_string()
-}
-
-#[track_caller]
-fn contains(message: &str, parts: &[&str]) {
-    for part in parts {
-        assert!(message.contains(part), "`{part}` is missing in: {message}");
-    }
 }
 
 #[track_caller]

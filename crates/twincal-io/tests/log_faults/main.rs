@@ -1,5 +1,7 @@
 //! Broken logs, one test per numbered case of the fault list: what is refused, what goes on, and what is said.
 
+#[path = "../common/refusals.rs"]
+mod refusals;
 #[path = "../common/logs.rs"]
 #[allow(
     dead_code,
@@ -11,6 +13,7 @@ mod text;
 mod values;
 
 use logs::{arm, motion};
+use refusals::{contains, refused};
 use twincal::Finding;
 use twincal::signal::{Auto, Recording, SignalSettings, Trajectory, align, choose_pipeline};
 use twincal_io::Result;
@@ -49,10 +52,6 @@ fn run(text: &str) -> Result<(Trajectory, Vec<Finding>)> {
     Ok((trajectory, findings))
 }
 
-fn refused<T: std::fmt::Debug>(result: Result<T>) -> String {
-    result.expect_err("must be refused").to_string()
-}
-
 fn says<'a>(findings: &'a [Finding], code: &str) -> &'a Finding {
     findings
         .iter()
@@ -65,13 +64,6 @@ fn silent(findings: &[Finding], code: &str) {
         !findings.iter().any(|f| f.code == code),
         "unexpected `{code}` in {findings:#?}"
     );
-}
-
-#[track_caller]
-fn contains(message: &str, parts: &[&str]) {
-    for part in parts {
-        assert!(message.contains(part), "`{part}` is missing in: {message}");
-    }
 }
 
 /// Motion of a trajectory is the truth everywhere, so nothing was differentiated across a cut.

@@ -236,6 +236,10 @@ impl Examination {
             (logs.recordings).retain(|recording| describe(robot, recording).is_ok());
             together = filtered(robot, &logs.recordings, settings);
         }
+        let names = robot.joint_names();
+        let torque = logs.recordings.iter().map(|log| log.require_torque(&names));
+        let without = torque.filter_map(Result::err).map(Failure::from);
+        self.refusals.extend(without.map(Refusal::from));
         for recording in &logs.recordings {
             if let Ok((overview, more)) = describe(robot, recording) {
                 self.overviews.push(overview);
