@@ -134,8 +134,9 @@ fn judge(scores: &Scores, stored: &Scores, gates: &Gates) -> Vec<Gate> {
             value: rmse,
             limit: [None, Some(limit)],
             words: format!(
-                "joint `{name}`: RMSE {} is above the gate {} ({} × {} of the twin)",
+                "joint `{name}`: RMSE {} is {} the gate {} ({} × {} of the twin)",
                 significant(rmse, 4),
+                if rmse <= limit { "within" } else { "above" },
                 significant(limit, 4),
                 gates.rmse_ratio,
                 significant(stored.rmse_calibrated, 4)

@@ -292,8 +292,16 @@ impl Standard {
             .iter()
             .flat_map(|&i| members.iter().map(move |&j| self.matrix[i * size + j]))
             .collect();
-        let factor =
-            Cholesky::new(&block, count).map_err(|error| self.singular(members[error.pivot]))?;
+        // Columns that agree to the last digit: as in the full model.
+        let mut nudged = block.clone();
+        let factor = NUDGES
+            .iter()
+            .find_map(|nudge| {
+                (0..count).for_each(|k| nudged[k * count + k] = block[k * count + k] + nudge);
+                Cholesky::new(&nudged, count).ok()
+            })
+            .map_or_else(|| Cholesky::new(&nudged, count), Ok)
+            .map_err(|error| self.singular(members[error.pivot]))?;
         // min over δ_z of 2hᵀδ + δᵀAδ with δ = −β̂ outside z: A_zz δ_z = A_ze β̂_e − h_z.
         let mut delta: Vec<f64> = self.center.iter().map(|x| -x).collect();
         members.iter().for_each(|&d| delta[d] = 0.0);
@@ -340,12 +348,15 @@ pub(super) fn slab_mass(lower: f64, precision: f64, weight: f64) -> f64 {
     0.5 * erfc(lower * (0.5 * weight * precision).sqrt())
 }
 
+/// What is added to a unit diagonal until there is a factor: far below what data can tell.
+const NUDGES: [f64; 4] = [0.0, 1e-14, 1e-12, 1e-10];
+
 /// Posterior mean of the full model. Columns that agree to the last digit have no factor; a nudge of the diagonal far
 /// below what the data can tell makes one, and `h` accounts for it.
 fn full_model(matrix: &[f64], xy: &[f64], problem: &Problem) -> Result<Vec<f64>> {
     let size = xy.len();
     let mut nudged = matrix.to_vec();
-    for nudge in [0.0, 1e-14, 1e-12, 1e-10] {
+    for nudge in NUDGES {
         for k in 0..size {
             nudged[k * size + k] = 1.0 + nudge;
         }
