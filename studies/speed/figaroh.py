@@ -1,9 +1,9 @@
 """FIGAROH beside `twincal fit`: the same robot, the same long log, the same question but for selection, in one run.
 
-    python -m venv /tmp/figaroh
-    /tmp/figaroh/bin/pip install figaroh==1.0.2 pin==4.1.0 ndcurves==2.3.0 numpy==2.4.6 scipy==1.17.1 pandas==3.1.1 pyarrow==26.0.1 \
+    python -m venv figaroh-environment
+    figaroh-environment/bin/pip install figaroh==1.0.2 pin==4.1.0 ndcurves==2.3.0 numpy==2.4.6 scipy==1.17.1 pandas==3.1.1 pyarrow==26.0.1 \
         matplotlib==3.11.2 meshcat==0.3.2 numdifftools==0.11.2 picos==2.6.2 pyyaml==6.0.3 rospkg==1.6.3
-    python studies/speed/figaroh.py --figaroh-python /tmp/figaroh/bin/python [--minutes 10] [--threads 2] [--repeat 3] [--ways rows,log]
+    python studies/speed/figaroh.py --figaroh-python figaroh-environment/bin/python [--minutes 10] [--threads 2] [--repeat 3] [--ways rows,log]
 
 FIGAROH has an environment of its own and is no part of requirements-check.txt (cyipopt is not needed here). Robot and log are those of
 long_log.py; the question: inertia of every link, viscous and Coulomb friction, torque offset and motor inertia of every joint. FIGAROH

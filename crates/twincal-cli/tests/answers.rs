@@ -283,3 +283,65 @@ fn a_residual_with_a_long_memory_is_fitted_all_the_same() {
     let noise = &result(folder.path())["noise"];
     assert!(noise[1]["sigma"].as_f64().unwrap() > 0.0);
 }
+
+/// With the filter off every input row is one row, whatever happened there: no incident leaves rows out.
+#[test]
+fn with_the_filter_off_a_torque_spike_takes_no_row() {
+    let folder = folder();
+    let spiked = csv(2000, &|number, mut row| {
+        if number == 700 {
+            row[7] = "60".into();
+        }
+        row
+    });
+    fs::write(folder.path().join("run.csv"), spiked).unwrap();
+    fit(folder.path(), &["-o", "out"]).expect(0);
+    let noise = &result(folder.path())["noise"];
+    for joint in 0..2 {
+        assert_eq!(noise[joint]["n"].as_f64(), Some(2000.0), "{noise}");
+    }
+}
+
+/// A model that explains its log to the last digit, or but for 1e-9 N·m: nothing is missing, and every number is one.
+#[test]
+fn a_log_of_the_models_own_torque_lacks_nothing() {
+    let folder = folder();
+    fit(folder.path(), &["-o", "twin"]).expect(0);
+    let predict = ["predict", "run.csv", "--twin", "twin", "-o", "nominal.csv"];
+    run(folder.path(), predict).expect(0);
+    let column = |name: &str| -> Vec<String> {
+        let text = fs::read_to_string(folder.path().join("nominal.csv")).unwrap();
+        let mut lines = text.lines();
+        let place = lines.next().unwrap().split(',').position(|n| n == name);
+        lines
+            .map(|line| line.split(',').nth(place.unwrap()).unwrap().to_owned())
+            .collect()
+    };
+    let nominal = [column("shoulder.tau_nom"), column("elbow.tau_nom")];
+    for error in [0.0, 1e-9] {
+        let own = csv(400, &|number, mut row| {
+            let sign = if number * 7919 % 13 < 6 {
+                error
+            } else {
+                -error
+            };
+            for joint in 0..2 {
+                let torque: f64 = nominal[joint][number].parse().unwrap();
+                row[7 + joint] = (torque + sign).to_string();
+            }
+            row
+        });
+        fs::write(folder.path().join("own.csv"), own).unwrap();
+        for config in ["", "[signal]\ncutoff_hz = 0\n"] {
+            fs::write(folder.path().join("own.toml"), config).unwrap();
+            let rest = ["--config", "own.toml", "-o", "out", "--force"];
+            let command = ["fit", "own.csv", "--model", "arm.urdf"];
+            run(folder.path(), command.iter().chain(&rest)).expect(0);
+            let result = result(folder.path());
+            for term in result["terms"].as_array().unwrap() {
+                assert_eq!(term["selected"], false, "{error} {config} {term}");
+                assert!(term["pip"].is_null() || term["mean"].is_f64(), "{term}");
+            }
+        }
+    }
+}

@@ -66,7 +66,8 @@ impl StoredTwin {
         };
         let twin = serde_json::to_vec(self).map_err(|e| internal(e.to_string()))?;
         // What cannot be read back must not be written.
-        serde_json::from_slice::<Self>(&twin).map_err(|e| internal(e.to_string()))?;
+        serde_json::from_slice::<Self>(&twin)
+            .map_err(|e| internal(format!("{e}, after `{}`", before(&twin, e.column()))))?;
         let report = crate::report::render(&self.calibration, &self.context)?;
         let mut files = vec![
             (RESULT, self.result_json()?.into_bytes()),
@@ -90,4 +91,10 @@ impl StoredTwin {
         }
         claim.commit(artifact.made_by(), files)
     }
+}
+
+/// The text before a place of the one line: what a bug report needs to say.
+fn before(line: &[u8], column: usize) -> String {
+    let end = column.min(line.len());
+    String::from_utf8_lossy(&line[end.saturating_sub(120)..end]).into_owned()
 }

@@ -104,17 +104,22 @@ pub fn slices(
     slices
 }
 
-/// Raw rows of a log that a standard deviation or a coverage is measured on, about: beyond that more rows say nothing new.
+/// Raw rows of a log that a standard deviation or a coverage is measured on: beyond that more rows say nothing new.
 const MOST_RAW: usize = 1 << 16;
 /// In pieces of how many.
 const RAW_PIECE: usize = 1 << 10;
 
-/// Raw rows at or after time `since` (s): all of a short log, evenly spread pieces of a long one, 65 536 rows in all.
+/// Raw rows at or after time `since` (s): all of a log of at most 65 536 rows, evenly spread pieces of a longer one, of
+/// 1024 rows at most and about 65 536 together.
 pub fn spread_raw(pipeline: &Pipeline, trajectory: &Trajectory, since: f64) -> Vec<Slice> {
     let all = slices(pipeline, trajectory, RowSignal::Raw, since, RAW_PIECE);
     let rows: usize = all.iter().map(|slice| slice.rows.len()).sum();
-    all.into_iter()
-        .step_by(rows.div_ceil(MOST_RAW).max(1))
+    if rows <= MOST_RAW {
+        return all;
+    }
+    let kept = (all.len() * MOST_RAW).div_ceil(rows);
+    (0..kept)
+        .map(|i| all[i * all.len() / kept].clone())
         .collect()
 }
 

@@ -4,7 +4,9 @@ use super::logs::{LogText, arm, motion, robot};
 use super::{AUTO, contains, is_true_motion, options, read, refused, run, says, silent};
 use std::f64::consts::{PI, TAU};
 use twincal::robot::JointKind;
-use twincal::signal::{Auto, DerivedFrom, Pipeline, SignalSettings, align, choose_pipeline};
+use twincal::signal::{
+    Auto, DerivedFrom, Pipeline, SignalSettings, Trajectory, align, choose_pipeline,
+};
 use twincal::{Finding, Severity};
 use twincal_io::log::read_csv;
 
@@ -113,13 +115,50 @@ fn case_23_a_wrapped_angle_is_unfolded_and_counted_a_slider_never() {
     assert_eq!(said.len(), 1, "{findings:#?}");
     assert_eq!(said[0].count, turns);
     contains(&said[0].message, &["`spin`"]);
-    let segment = &trajectory.segments[0];
-    let len = segment.time.len();
-    for (i, &row) in segment.input_rows.iter().enumerate() {
-        assert!((segment.q[i] - turning(row)).abs() < 1e-6);
+    // The slider keeps its jumps: as no slider moves so, the log is cut there and says it.
+    let jumps: Vec<&Finding> = findings
+        .iter()
+        .filter(|f| f.code == "position_step")
+        .collect();
+    assert_eq!(jumps.len(), 1, "{findings:#?}");
+    assert_eq!(jumps[0].count, turns);
+    contains(&jumps[0].message, &["`slide`", "-6.28"]);
+    assert_eq!(trajectory.segments.len() as u64, turns + 1);
+    for segment in &trajectory.segments {
+        let len = segment.time.len();
+        for (i, &row) in segment.input_rows.iter().enumerate() {
+            assert!((segment.q[i] - turning(row)).abs() < 1e-6);
+            assert!((segment.q[len + i] - folded(row)).abs() < 1e-6);
+        }
     }
-    // the slider keeps its jumps, so its velocity has them
-    assert!(segment.qd[len..].iter().any(|v| v.abs() > 50.0));
+}
+
+#[test]
+fn a_position_that_is_wrong_in_one_sample_is_named_and_left_out() {
+    let mut log = LogText::moving(2, 200.0, 20.0).without(&["qd1", "qdd1", "qd2", "qdd2"]);
+    let (clean, _) = run(&log.csv()).unwrap();
+    log.map("q1", |i, q| {
+        let q: f64 = q.parse().unwrap();
+        format!("{:.12}", if i == 1503 { q + 0.5 } else { q })
+    });
+    let (trajectory, findings) = run(&log.csv()).unwrap();
+    let said = says(&findings, "motion_spike");
+    assert_eq!(said.count, 1);
+    contains(&said.message, &["position", "+5.0", "7.515 s", "once"]);
+    assert_eq!(trajectory.segments.len(), 2);
+    // What is left of motion and of its noise is as if it had not been there.
+    let still = |trajectory: &Trajectory| -> usize {
+        let all = trajectory.segments.iter().flat_map(|s| &s.standstill);
+        all.filter(|still| **still).count()
+    };
+    assert!(still(&trajectory) <= still(&clean));
+    let smooth = &clean.segments[0];
+    for segment in &trajectory.segments {
+        for (i, row) in segment.input_rows.iter().enumerate() {
+            let at = smooth.input_rows.binary_search(row).unwrap();
+            assert!((segment.q[i] - smooth.q[at]).abs() < 1e-6);
+        }
+    }
 }
 
 #[test]

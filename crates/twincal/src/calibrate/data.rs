@@ -49,12 +49,9 @@ impl Data {
                     let (mut trajectory, mut more) = align(robot, recording, pipeline)?;
                     trajectory.payload_acts = !unknown || recording.payload == Payload::Unknown;
                     findings.append(&mut more);
-                    // With the filter off every input row is one row, whatever happened there.
-                    if !pipeline.is_off() {
-                        let happened = incidents(robot, pipeline, &trajectory);
-                        leave_out(pipeline, &mut trajectory, &happened);
-                        findings.extend(incident_findings(&recording.name, &happened));
-                    }
+                    let happened = incidents(robot, pipeline, &trajectory);
+                    leave_out(pipeline, &mut trajectory, &happened);
+                    findings.extend(incident_findings(&recording.name, &happened));
                     let observations = observe(robot, library, pipeline, &trajectory)?;
                     let summary = summary(robot, recording, role, &trajectory, &observations);
                     Ok(Log {

@@ -38,9 +38,10 @@ pub struct Incident {
     pub samples: u64,
 }
 
-/// Finds the incidents of a log, in time order for each kind.
+/// Finds the incidents of a log, in time order for each kind; none with the pipeline off, where every input row is one
+/// row whatever happened there.
 pub fn incidents(robot: &Robot, pipeline: &Pipeline, trajectory: &Trajectory) -> Vec<Incident> {
-    if trajectory.segments.iter().any(|s| s.tau.is_empty()) {
+    if pipeline.is_off() || trajectory.segments.iter().any(|s| s.tau.is_empty()) {
         return Vec::new();
     }
     let mut found = stops::stops(robot, pipeline, trajectory);

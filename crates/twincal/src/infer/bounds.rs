@@ -18,12 +18,12 @@ mod propagation;
 use super::answer::{Averages, Listed};
 use super::approximate;
 use super::search::Care;
-use super::standard::{Standard, slab_mass};
+use super::standard::{Standard, nudged, slab_mass};
 use crate::error::Result;
 use crate::linear_algebra::Cholesky;
 use crate::posterior::{Model, Problem, Site};
 use propagation::propagate;
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 /// A bound this many standard deviations below the mean does not act: its mass is 1 − 6e-16.
 const FAR: f64 = 8.0;
@@ -142,10 +142,10 @@ pub(super) fn settle(
         return Ok((listed, 0.0));
     }
     let found = approximate::search(standard, problem, None, BUDGET, Care::Full);
-    let known: BTreeMap<Vec<u32>, f64> = listed
+    let known: BTreeSet<Vec<u32>> = listed
         .models
         .iter()
-        .map(|model| (model.members.clone(), model.weight))
+        .map(|model| model.members.clone())
         .collect();
     // Free weights of models that are not listed, relative to the heaviest listed one.
     let Some(heaviest) = listed.models.first() else {
@@ -155,7 +155,7 @@ pub(super) fn settle(
     let mut log_weights: Vec<f64> = listed.models.iter().map(|m| m.weight.ln()).collect();
     for (_, members, positions) in approximate::shares(standard, &found, found.sums.total(), JOINED)
     {
-        if known.contains_key(&members) {
+        if known.contains(&members) {
             continue;
         }
         let mut positions = positions;
@@ -299,7 +299,7 @@ pub(super) fn truncate(
         });
     }
     let factor =
-        Cholesky::new(&matrix, count).map_err(|error| standard.singular(positions[error.pivot]))?;
+        nudged(&matrix, count).map_err(|error| standard.singular(positions[error.pivot]))?;
     factor.solve(&mut right);
     model.mean = right;
     model.factor = factor.into_lower();

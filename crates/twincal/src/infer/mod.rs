@@ -62,6 +62,22 @@ pub struct InferenceSettings {
 /// [`crate::Error::Setting`] for an impossible setting, [`crate::Error::NotFinite`] naming the column,
 /// [`crate::Error::Refused`] when chains disagree.
 pub fn infer(problem: &Problem, settings: &InferenceSettings) -> Result<Posterior> {
+    let posterior = by_method(problem, settings)?;
+    let wrong = posterior.mean.iter().position(|mean| !mean.is_finite());
+    match wrong {
+        None => Ok(posterior),
+        Some(k) => Err(Error::NotFinite {
+            what: "the posterior mean".into(),
+            column: problem.names[k].clone(),
+            remedy: "columns depend on each other and the slab is too wide to tell them apart: give prior.slab a smaller \
+                     scaled_variance, or leave a candidate out"
+                .into(),
+        }),
+    }
+}
+
+/// The posterior by the chosen method, whatever its numbers are.
+fn by_method(problem: &Problem, settings: &InferenceSettings) -> Result<Posterior> {
     if settings.method == Choice::Gibbs {
         return gibbs::sample(problem, settings);
     }

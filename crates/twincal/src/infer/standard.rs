@@ -11,7 +11,7 @@
 
 use super::check::check;
 use crate::error::{Error, Result};
-use crate::linear_algebra::Cholesky;
+use crate::linear_algebra::{Cholesky, NotPositiveDefinite};
 use crate::posterior::{Model, Problem};
 use statrs::function::erf::erfc;
 use statrs::function::gamma::ln_gamma;
@@ -43,6 +43,8 @@ impl Block {
 pub(super) struct Standard {
     /// Column of each position.
     pub(super) order: Vec<usize>,
+    /// Its name.
+    names: Vec<String>,
     /// Component of each column.
     pub(super) component: Vec<usize>,
     /// Components in the order of their positions.
@@ -126,7 +128,8 @@ impl Standard {
             .zip(&scale)
             .map(|(&k, scale)| problem.xy[k] / scale)
             .collect();
-        let center = full_model(&matrix, &xy, problem)?;
+        let names: Vec<String> = order.iter().map(|&k| problem.names[k].clone()).collect();
+        let center = full_model(&matrix, &xy, &names)?;
         let product = multiply(&matrix, &center);
         let offset: Vec<f64> = product
             .iter()
@@ -182,6 +185,7 @@ impl Standard {
             .collect();
         Ok(Self {
             order,
+            names,
             component: prior.component.clone(),
             blocks,
             bounded: lower.iter().any(|&l| l > f64::NEG_INFINITY),
@@ -259,7 +263,7 @@ impl Standard {
     pub(super) fn singular(&self, d: usize) -> Error {
         Error::NotFinite {
             what: "Cholesky factor of a model".into(),
-            column: format!("{}", self.order[d]),
+            column: self.names[d].clone(),
             remedy: "remove one of the columns that are equal on these data".into(),
         }
     }
@@ -292,16 +296,7 @@ impl Standard {
             .iter()
             .flat_map(|&i| members.iter().map(move |&j| self.matrix[i * size + j]))
             .collect();
-        // Columns that agree to the last digit: as in the full model.
-        let mut nudged = block.clone();
-        let factor = NUDGES
-            .iter()
-            .find_map(|nudge| {
-                (0..count).for_each(|k| nudged[k * count + k] = block[k * count + k] + nudge);
-                Cholesky::new(&nudged, count).ok()
-            })
-            .map_or_else(|| Cholesky::new(&nudged, count), Ok)
-            .map_err(|error| self.singular(members[error.pivot]))?;
+        let factor = nudged(&block, count).map_err(|error| self.singular(members[error.pivot]))?;
         // min over δ_z of 2hᵀδ + δᵀAδ with δ = −β̂ outside z: A_zz δ_z = A_ze β̂_e − h_z.
         let mut delta: Vec<f64> = self.center.iter().map(|x| -x).collect();
         members.iter().for_each(|&d| delta[d] = 0.0);
@@ -348,41 +343,52 @@ pub(super) fn slab_mass(lower: f64, precision: f64, weight: f64) -> f64 {
     0.5 * erfc(lower * (0.5 * weight * precision).sqrt())
 }
 
-/// What is added to a unit diagonal until there is a factor: far below what data can tell.
+/// Shares that a diagonal grows by until there is a factor: far below what data can tell.
 const NUDGES: [f64; 4] = [0.0, 1e-14, 1e-12, 1e-10];
 
-/// Posterior mean of the full model. Columns that agree to the last digit have no factor; a nudge of the diagonal far
-/// below what the data can tell makes one, and `h` accounts for it.
-fn full_model(matrix: &[f64], xy: &[f64], problem: &Problem) -> Result<Vec<f64>> {
-    let size = xy.len();
+/// Factor of a matrix that is positive definite but for rounding: columns that agree to the last digit have none, and
+/// the least nudge of the diagonal that makes one is taken.
+///
+/// # Errors
+/// [`NotPositiveDefinite`] with the last nudge.
+pub(super) fn nudged(
+    matrix: &[f64],
+    size: usize,
+) -> std::result::Result<Cholesky, NotPositiveDefinite> {
     let mut nudged = matrix.to_vec();
+    let mut failed = NotPositiveDefinite { pivot: 0 };
     for nudge in NUDGES {
-        for k in 0..size {
-            nudged[k * size + k] = 1.0 + nudge;
-        }
-        if let Ok(factor) = Cholesky::new(&nudged, size) {
-            let mut center = xy.to_vec();
-            factor.solve(&mut center);
-            // One step of refinement; with a nudge it also removes most of it.
-            let mut rest: Vec<f64> = multiply(matrix, &center)
-                .iter()
-                .zip(xy)
-                .map(|(p, xy)| xy - p)
-                .collect();
-            factor.solve(&mut rest);
-            center
-                .iter_mut()
-                .zip(&rest)
-                .for_each(|(x, step)| *x += step);
-            return Ok(center);
+        (0..size).for_each(|k| nudged[k * size + k] = matrix[k * size + k] * (1.0 + nudge));
+        match Cholesky::new(&nudged, size) {
+            Ok(factor) => return Ok(factor),
+            Err(error) => failed = error,
         }
     }
-    Err(Error::NotFinite {
+    Err(failed)
+}
+
+/// Posterior mean of the full model; `h` accounts for a nudge.
+fn full_model(matrix: &[f64], xy: &[f64], names: &[String]) -> Result<Vec<f64>> {
+    let factor = nudged(matrix, xy.len()).map_err(|error| Error::NotFinite {
         what: "Cholesky factor of the Gram matrix".into(),
-        column: problem.names.first().cloned().unwrap_or_default(),
+        column: names[error.pivot].clone(),
         remedy: "the statistics are not those of any data: a Gram matrix is positive semidefinite"
             .into(),
-    })
+    })?;
+    let mut center = xy.to_vec();
+    factor.solve(&mut center);
+    // One step of refinement; with a nudge it also removes most of it.
+    let mut rest: Vec<f64> = multiply(matrix, &center)
+        .iter()
+        .zip(xy)
+        .map(|(p, xy)| xy - p)
+        .collect();
+    factor.solve(&mut rest);
+    center
+        .iter_mut()
+        .zip(&rest)
+        .for_each(|(x, step)| *x += step);
+    Ok(center)
 }
 
 /// `A x`.

@@ -238,13 +238,18 @@ pub fn assemble(
     } else {
         scale_of_residual(yy / n.max(f64::MIN_POSITIVE))
     };
+    let learned = settings.scaled_variance == Auto::Auto;
     let slab = columns
         .references(&mean_square)
         .iter()
         .enumerate()
-        .map(|(k, reference)| match columns.prior_sd[k] {
-            Some(sd) if settings.scaled_variance == Auto::Auto => sd * sd / noise,
-            _ => plug_in.scaled_variance[columns.family_of(k)] / reference,
+        .map(|(k, reference)| {
+            let slab = match columns.prior_sd[k] {
+                Some(sd) if learned => sd * sd / noise,
+                _ => plug_in.scaled_variance[columns.family_of(k)] / reference,
+            };
+            let widest = WIDEST_SLAB / gram[k * count + k];
+            if learned { slab.min(widest) } else { slab }
         })
         .collect();
     let (shape, scale) = match settings.noise {
@@ -274,6 +279,11 @@ pub fn assemble(
         names: columns.names.clone(),
     })
 }
+
+/// Largest variance of an automatic slab, in squares of the standard error that the column has alone. A slab that is wider
+/// tells nothing more of the coefficient, and columns that depend on each other lose their last digits against it: on a
+/// log without noise a prior of 1 kg would be 1e10 standard errors wide.
+const WIDEST_SLAB: f64 = 1e12;
 
 /// a0 of the automatic noise prior; b0 = a0 · mean(y²).
 pub const AUTO_SHAPE: f64 = 1e-3;

@@ -393,3 +393,27 @@ fn an_error_of_the_visitor_ends_the_visit() {
     );
     assert_eq!(blocks, 1);
 }
+
+#[test]
+fn spread_pieces_are_all_of_a_short_log_and_evenly_spread_over_a_long_one() {
+    let pipeline = pipeline(20.0);
+    let rows = |slices: &[Slice]| -> usize { slices.iter().map(|slice| slice.rows.len()).sum() };
+    for samples in [1_000, MOST_RAW] {
+        let all = spread_raw(&pipeline, &trajectory(samples, 1e-3), f64::NEG_INFINITY);
+        assert_eq!(rows(&all), samples);
+    }
+    for samples in [MOST_RAW + 1, 3 * MOST_RAW / 2, 10 * MOST_RAW + 77] {
+        let long = trajectory(samples, 1e-3);
+        let some = spread_raw(&pipeline, &long, f64::NEG_INFINITY);
+        assert!(rows(&some).abs_diff(MOST_RAW) <= 2 * RAW_PIECE, "{samples}");
+        assert!(some.iter().all(|slice| slice.rows.len() <= RAW_PIECE));
+        // No piece twice, no stretch without one.
+        let starts: Vec<usize> = some.iter().map(|slice| slice.rows.start).collect();
+        let apart = samples as f64 / some.len() as f64;
+        assert!(starts.windows(2).all(|w| {
+            let gap = (w[1] - w[0]) as f64;
+            w[1] > w[0] && (gap - apart).abs() <= 1.01 * RAW_PIECE as f64
+        }));
+        assert!(starts[0] == 0 && samples - starts[starts.len() - 1] < 2 * apart as usize);
+    }
+}

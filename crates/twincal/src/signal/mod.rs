@@ -7,6 +7,7 @@ mod clock;
 pub(crate) mod convolve;
 pub(crate) mod decimate;
 mod fourier;
+mod jumps;
 mod correct;
 mod cutoff;
 mod describe;

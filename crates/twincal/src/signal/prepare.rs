@@ -1,6 +1,7 @@
 //! One log on even clocks: cut, unfolded, resampled where the clock is uneven; nothing filtered yet.
 
 use super::clock::{Run, even_interval, read_clock, report_jitter};
+use super::jumps::cut_jumps;
 use super::spline::resample;
 use super::units::refuse_degrees;
 use super::unwrap::unwrap_angle;
@@ -106,6 +107,7 @@ pub(crate) fn prepare(
     let clock = read_clock(log, &names, minimum, every_row, findings)?;
     refuse_degrees(joints, log)?;
     let unfolded = unfold(joints, log, &clock.runs, every_row, findings);
+    let runs = cut_jumps(joints, log, &unfolded, &clock, every_row, findings);
     let channels = |joint: usize, run: &Run| Channels {
         q: unfolded[joint].as_ref().map_or_else(
             || {
@@ -120,10 +122,10 @@ pub(crate) fn prepare(
         qdd: pick(&log.joints[joint].qdd, run),
         tau: pick(&log.joints[joint].tau, run),
     };
-    let mut pieces = Vec::with_capacity(clock.runs.len());
+    let mut pieces = Vec::with_capacity(runs.len());
     let (mut short, mut short_rows, mut resampled) = (0_u64, 0_u64, 0_u64);
     let moves = corrections.moves(joints);
-    for run in &clock.runs {
+    for run in &runs {
         if run.rows.len() < MINIMUM_RUN && !every_row {
             short += 1;
             short_rows += run.rows.len() as u64;
@@ -164,7 +166,7 @@ pub(crate) fn prepare(
         }
         pieces.push(piece);
     }
-    report_jitter(log, &clock.runs, clock.interval, resampled, findings);
+    report_jitter(log, &runs, clock.interval, resampled, findings);
     report_short(log, short, short_rows, findings);
     Ok(Prepared {
         pieces,

@@ -6,7 +6,7 @@ use super::component::{Component, Meaning, Parameter};
 use super::expression::{Graph, Id, Slot, Tape, Variable, bounded_values};
 use super::model_column::{ModelColumn, ModelColumns};
 use super::overlaps;
-use super::parts::{Parts, Torque};
+use super::parts::{self, Parts, Torque};
 use super::propose::{About, last_link, proposals};
 use super::sentence::{Estimate, sentence};
 use super::verdicts::statuses;
@@ -382,13 +382,15 @@ impl Library {
 
     /// [`Library::evaluate`] with working memory that is kept between calls: for many short batches.
     pub fn evaluate_with(&self, motion: Motion<'_>, out: &mut [Vec<f64>], scratch: &mut Scratch) {
-        for (columns, out) in self.by_joint.iter().zip(out.iter_mut()) {
-            out.resize(columns.len() * motion.len, 0.0);
-        }
-        self.tape.evaluate(motion, out, &mut scratch.tape);
-        if let Some(model) = &self.model {
-            model.evaluate(motion, out, scratch);
-        }
+        let counts = self.by_joint.iter().map(Vec::len);
+        parts::evaluate(
+            counts,
+            &self.tape,
+            self.model.as_deref(),
+            motion,
+            out,
+            scratch,
+        );
     }
 
     /// How many signals the columns of a joint are combinations of, see [`Library::evaluate_parts`].

@@ -137,13 +137,15 @@ impl Parts {
 
     /// Writes every part: `out[joint][part * len + sample]`.
     pub(super) fn evaluate(&self, motion: Motion<'_>, out: &mut [Vec<f64>], scratch: &mut Scratch) {
-        for (count, out) in self.counts.iter().zip(out.iter_mut()) {
-            out.resize(count * motion.len, 0.0);
-        }
-        self.tape.evaluate(motion, out, &mut scratch.tape);
-        if let Some(model) = &self.model {
-            model.evaluate(motion, out, scratch);
-        }
+        let counts = self.counts.iter().copied();
+        evaluate(
+            counts,
+            &self.tape,
+            self.model.as_ref(),
+            motion,
+            out,
+            scratch,
+        );
     }
 
     /// Columns of a joint from its filtered parts: `parts[part * stride + row]` to `out[column * rows + row]`.
@@ -173,5 +175,23 @@ impl Parts {
                 }
             }
         }
+    }
+}
+
+/// Writes what a tape and a model make of a motion, `counts` signals on each joint: `out[joint][signal * len + sample]`.
+pub(super) fn evaluate(
+    counts: impl Iterator<Item = usize>,
+    tape: &Tape,
+    model: Option<&ModelColumns>,
+    motion: Motion<'_>,
+    out: &mut [Vec<f64>],
+    scratch: &mut Scratch,
+) {
+    for (count, out) in counts.zip(out.iter_mut()) {
+        out.resize(count * motion.len, 0.0);
+    }
+    tape.evaluate(motion, out, &mut scratch.tape);
+    if let Some(model) = model {
+        model.evaluate(motion, out, scratch);
     }
 }

@@ -20,7 +20,7 @@ pub(super) struct Mend {
 }
 
 /// Findings in the order in which they matter, with what mends them.
-const ORDER: [(&str, &str); 24] = [
+const ORDER: [(&str, &str); 26] = [
     (
         "joint_order",
         "map the columns in [columns.q], [columns.qd], [columns.tau] of twincal.toml",
@@ -99,6 +99,14 @@ const ORDER: [(&str, &str); 24] = [
     (
         "joint_stands_still",
         "record a log in which that joint moves",
+    ),
+    (
+        "motion_spike",
+        "look at the encoder's cable and driver; the samples are left out",
+    ),
+    (
+        "position_step",
+        "keep the side whose zero is right and cut the other off",
     ),
     (
         "wrapped_angle",

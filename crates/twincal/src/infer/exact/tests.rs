@@ -211,6 +211,57 @@ fn case_87_a_zero_residual_has_nothing_to_correct() {
     }
 }
 
+/// Columns that agree to the last digit, on a log without noise and with a slab that is no help: any split between them
+/// is as good, their sum is told.
+#[test]
+fn equal_columns_share_their_coefficient() {
+    for (slab, noise) in [(10.0, 1e-2), (2e9, 1e-9), (2e9, 0.0)] {
+        let mut problem = problem(8, 6, 400, 0.3, Inclusion::Probability(0.25));
+        problem.prior.slab.fill(slab);
+        // Column 4 is column 1; the torque is 0.5 of it.
+        for k in 0..6 {
+            let value = problem.gram[k * 6 + 1];
+            problem.gram[k * 6 + 4] = value;
+        }
+        for k in 0..6 {
+            let value = problem.gram[6 + k];
+            problem.gram[4 * 6 + k] = value;
+        }
+        problem.xy = (0..6).map(|k| 0.5 * problem.gram[k * 6 + 1]).collect();
+        problem.yy = 0.25 * problem.gram[7] + 400.0 * noise * noise;
+        problem.prior.scale = 1e-6;
+        let sampled = crate::infer::testing::sampled(&problem);
+        for posterior in [enumerate(&problem).unwrap(), sampled] {
+            let all = posterior.mean.iter().chain(&posterior.sd);
+            assert!(all.chain(&posterior.inclusion).all(|x| x.is_finite()));
+            assert!((posterior.mean[1] + posterior.mean[4] - 0.5).abs() < 1e-3);
+            let either = posterior.inclusion[1].max(posterior.inclusion[4]);
+            assert!(either > 0.4, "{:?}", posterior.inclusion);
+        }
+    }
+}
+
+/// Columns that depend on each other under a slab 1e30 standard errors wide have no digit left: an error, not a NaN.
+#[test]
+fn a_slab_without_end_is_refused_by_name() {
+    let mut problem = problem(8, 24, 10, 0.99, Inclusion::Probability(0.5));
+    problem.prior.slab.fill(1e60);
+    let settings = crate::infer::InferenceSettings {
+        method: crate::infer::Choice::Exact,
+        chains: 4,
+        draws: 100,
+        seed: 1,
+        allow_disagreement: true,
+    };
+    let error = crate::infer::infer(&problem, &settings)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("posterior mean") && error.contains("`x"),
+        "{error}"
+    );
+}
+
 #[test]
 fn case_88_more_columns_than_rows() {
     agree(&problem(9, 8, 4, 0.0, Inclusion::ExpectedTerms(2.0)), 1e-9);
