@@ -320,7 +320,7 @@ fn a_log_of_the_models_own_torque_lacks_nothing() {
     let nominal = [column("shoulder.tau_nom"), column("elbow.tau_nom")];
     for error in [0.0, 1e-9] {
         let own = csv(400, &|number, mut row| {
-            let sign = if number * 7919 % 13 < 6 {
+            let sign = if number * 7919 % 14 < 7 {
                 error
             } else {
                 -error
@@ -343,5 +343,20 @@ fn a_log_of_the_models_own_torque_lacks_nothing() {
                 assert!(term["pip"].is_null() || term["mean"].is_f64(), "{term}");
             }
         }
+    }
+}
+
+/// One variance for all joints is one σ for all joints, whatever the likelihood.
+#[test]
+fn joints_that_share_a_variance_show_the_same_sigma() {
+    let folder = folder();
+    for model in ["iid", "tempered", "ar1"] {
+        let config = format!("{QUICK}[noise]\nmodel = \"{model}\"\nper_joint = false\n");
+        fs::write(folder.path().join("quick.toml"), config).unwrap();
+        fit(folder.path(), &["-o", "out", "--force"]).expect(0);
+        let noise = &result(folder.path())["noise"];
+        assert!(noise[0]["sigma"].as_f64().unwrap() > 0.0);
+        assert_eq!(noise[0]["sigma"], noise[1]["sigma"], "{model}");
+        assert_eq!(noise[0]["rho"], noise[1]["rho"], "{model}");
     }
 }

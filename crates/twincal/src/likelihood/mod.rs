@@ -50,7 +50,7 @@ pub struct NoiseInterval {
 pub struct NoiseSettings {
     /// Likelihood.
     pub model: NoiseModel,
-    /// One variance per joint; false: all w_j = 1.
+    /// One variance per joint; false: all w_j = 1 and, plugged in, one ρ.
     pub per_joint: bool,
     /// Outliers count less: Student-t weights of rows; with [`NoiseModel::Tempered`] only.
     pub robust: bool,

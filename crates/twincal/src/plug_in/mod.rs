@@ -158,7 +158,8 @@ pub fn total(parts: &[Part<'_>]) -> Gram {
     sum
 }
 
-/// Weights and autoregression that the residual at the model average asks for.
+/// Weights and autoregression that the residual at the model average asks for; one ρ for all joints where they share one
+/// variance, so that they share σ too.
 fn move_noise(
     plug_in: &mut PlugIn,
     training: &[Part<'_>],
@@ -166,17 +167,27 @@ fn move_noise(
     noise: NoiseSettings,
     posterior: &Posterior,
 ) {
-    let variance: Vec<f64> = (0..gram.joints.len())
-        .map(|joint| {
-            let runs = residual_runs(training, joint, &posterior.mean);
-            let runs: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
-            if noise.model == NoiseModel::Ar1 {
-                plug_in.rho[joint] = autoregression::coefficient(&runs);
-            }
-            autoregression::innovation_variance(&runs, plug_in.rho[joint])
-        })
+    let residual: Vec<Vec<Vec<f64>>> = (0..gram.joints.len())
+        .map(|joint| residual_runs(training, joint, &posterior.mean))
         .collect();
+    fn slices(runs: &[Vec<f64>]) -> Vec<&[f64]> {
+        runs.iter().map(Vec::as_slice).collect()
+    }
+    if noise.model == NoiseModel::Ar1 {
+        plug_in.rho = if noise.per_joint {
+            let of_joint = |runs: &Vec<Vec<f64>>| autoregression::coefficient(&slices(runs));
+            residual.iter().map(of_joint).collect()
+        } else {
+            let all = residual.concat();
+            vec![autoregression::coefficient(&slices(&all)); residual.len()]
+        };
+    }
     if noise.per_joint {
+        let variance: Vec<f64> = residual
+            .iter()
+            .zip(&plug_in.rho)
+            .map(|(runs, rho)| autoregression::innovation_variance(&slices(runs), *rho))
+            .collect();
         plug_in.weight = weights(gram, &variance);
     }
 }
