@@ -55,12 +55,8 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     let validation = score(twin, &logs, &mut found).map_err(|error| logs.as_given(error))?;
     drop(progress);
     require_strict(settings.log.strict, &found)?;
-    // Gates of the config where there is one, else those the twin was fitted with.
-    let gates = if flags.log.config.is_some() {
-        settings.gates
-    } else {
-        stored.gates
-    };
+    // A gate that the config does not give stays as the twin was fitted with.
+    let gates = config.gates_over(stored.gates)?;
     let gates = judge(
         &validation.filtered,
         &stored.calibration.validation.filtered,
@@ -201,6 +197,19 @@ mod tests {
                 .map(|gate| gate.passed)
                 .collect()
         };
+        let words = |rmse| {
+            judge(&scores(rmse, 0.95), &scores(0.1, 0.95), &gates)
+                .swap_remove(0)
+                .words
+        };
+        assert_eq!(
+            words(0.1199),
+            "joint `elbow`: RMSE 0.1199 is within the gate 0.1200 (1.2 × 0.1000 of the twin)"
+        );
+        assert_eq!(
+            words(0.1201),
+            "joint `elbow`: RMSE 0.1201 is above the gate 0.1200 (1.2 × 0.1000 of the twin)"
+        );
         assert_eq!(passed(0.1199, 0.95), [true, true]);
         assert_eq!(passed(0.1201, 0.95), [false, true]);
         assert_eq!(passed(0.1, 0.90), [true, true]);

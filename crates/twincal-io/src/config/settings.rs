@@ -89,6 +89,15 @@ pub struct Gates {
     pub coverage: [f64; 2],
 }
 
+impl Default for Gates {
+    fn default() -> Self {
+        Self {
+            rmse_ratio: 1.2,
+            coverage: [0.90, 0.99],
+        }
+    }
+}
+
 /// Everything a run can be told, complete and in range.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
@@ -121,7 +130,11 @@ impl Config {
     /// [`crate::Error::Content`] at the key's place in the file, or a setting error where a flag set it.
     pub fn settings(&self) -> Result<Settings> {
         let file = &self.file;
-        let (model, log, check) = (self.model()?, self.log()?, self.gates()?);
+        let (model, log, check) = (
+            self.model()?,
+            self.log()?,
+            self.gates_over(Gates::default())?,
+        );
         let threads = self.count("inference.threads", file.inference.threads, 1, 4096)?;
         Ok(Settings {
             model_file: file.model.file.clone(),
@@ -237,16 +250,20 @@ impl Config {
         Ok(entries)
     }
 
-    fn gates(&self) -> Result<Gates> {
+    /// The gates of `[check]`; a key that is not given keeps its gate in `kept`, which may be those of a stored twin.
+    ///
+    /// # Errors
+    /// [`crate::Error::Content`] at the place of a gate that is out of range.
+    pub fn gates_over(&self, kept: Gates) -> Result<Gates> {
         let table = &self.file.check;
-        let rmse_ratio = table.rmse_ratio.unwrap_or(1.2);
+        let rmse_ratio = table.rmse_ratio.unwrap_or(kept.rmse_ratio);
         self.number(
             "check.rmse_ratio",
             rmse_ratio,
             |ratio| ratio > 0.0,
             "a positive number",
         )?;
-        let coverage = table.coverage.unwrap_or([0.90, 0.99]);
+        let coverage = table.coverage.unwrap_or(kept.coverage);
         let [low, high] = coverage;
         if !(0.0 <= low && low <= high && high <= 1.0) {
             let problem = format!("[{low}, {high}] is not an interval inside [0, 1]");
