@@ -67,3 +67,59 @@ fn a_gate_that_the_config_does_not_give_stays_as_the_twin_has_it() {
     let coverage = "[check]\ncoverage = [0.9, 0.99]\n";
     assert_eq!(check(coverage, 1), gates(true, false));
 }
+
+#[test]
+fn rows_without_measured_torque_are_predicted_all_the_same() {
+    let (folder, done) = fitted_with(&csv(1000, &|_, row| row), FILTERED);
+    done.expect(0);
+    let holes = csv(1000, &|number, mut row| {
+        match number {
+            300..340 => row[8] = "nan".into(),
+            500 => row[8] = "inf".into(),
+            600 => row[7] = String::new(),
+            _ => {}
+        }
+        row
+    });
+    fs::write(folder.path().join("holes.csv"), holes).unwrap();
+    let predict = |log: &str| run(folder.path(), ["predict", log, "--twin", "out"]).expect(0);
+    let (whole, holed) = (predict("run.csv"), predict("holes.csv"));
+    let rows = |done: &Run| -> Vec<Vec<String>> {
+        let lines = done.out.lines();
+        lines
+            .map(|line| line.split(',').map(str::to_owned).collect())
+            .collect()
+    };
+    let (whole, mut rest) = (rows(&whole), rows(&holed));
+    assert_eq!(rest.len(), whole.len());
+    let mut empty = 0;
+    for (row, given) in rest.iter_mut().zip(&whole) {
+        for column in [1, 6] {
+            if row[column].is_empty() {
+                empty += 1;
+                row[column].clone_from(&given[column]);
+            }
+        }
+        assert_eq!(row, given);
+    }
+    assert_eq!(empty, 42);
+    holed.says(&["holes.csv", "joint `shoulder`: 1, joint `elbow`: 41"]);
+}
+
+#[test]
+fn rows_without_motion_are_cuts_of_a_prediction() {
+    let (folder, done) = fitted_with(&csv(1000, &|_, row| row), FILTERED);
+    done.expect(0);
+    let holed = csv(1000, &|number, mut row| {
+        if number == 500 {
+            row[2] = "nan".into();
+        }
+        row
+    });
+    fs::write(folder.path().join("holed.csv"), holed).unwrap();
+    let predict = |log: &str| run(folder.path(), ["predict", log, "--twin", "out"]).expect(0);
+    let (whole, holed) = (predict("run.csv"), predict("holed.csv"));
+    let lost = whole.out.lines().count() - holed.out.lines().count();
+    assert!(lost > 2, "{lost} rows lost");
+    holed.says(&["1 of 1000 rows", "position of joint `elbow`: 1"]);
+}

@@ -10,7 +10,7 @@ use crate::terminal::Terminal;
 use serde::Serialize;
 use std::io::{self, BufWriter, Write};
 use twincal::rows::{RowSignal, visit_rows};
-use twincal::signal::Recording;
+use twincal::signal::{Recording, missing_torque};
 use twincal::term::Library;
 use twincal::twin::{Predictor, TorqueSignal, Twin};
 use twincal::{Finding, Result, Severity};
@@ -61,6 +61,13 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
         findings: std::mem::take(&mut logs.findings),
         ..Prediction::default()
     };
+    let missing = logs.recordings.iter();
+    let missing = missing.filter_map(|recording| missing_torque(&twin.robot, recording));
+    prediction.findings.extend(missing);
+    // A prediction needs motion alone: measured torque stands beside it, row by row.
+    prediction.measured = (logs.recordings.iter_mut())
+        .map(Recording::take_torque)
+        .collect();
     match output {
         Some((format, mut output)) => {
             let written = match output.file() {
@@ -81,6 +88,7 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
         rows,
         extrapolating,
         findings,
+        ..
     } = prediction;
     let input_rows = logs
         .recordings
@@ -135,6 +143,8 @@ struct Prediction {
     rows: usize,
     extrapolating: usize,
     findings: Vec<Finding>,
+    /// Measured torque by log and joint, at the rows of the log.
+    measured: Vec<Vec<Option<Vec<f64>>>>,
 }
 
 impl Prediction {
@@ -152,8 +162,10 @@ impl Prediction {
             Ok(table) => table,
             Err(e) => return Ok(Err(e)),
         };
-        for recording in &logs.recordings {
-            let written = self.write_log(twin, &library, &predictor, recording, &mut table);
+        let all_measured = std::mem::take(&mut self.measured);
+        for (recording, measured) in logs.recordings.iter().zip(&all_measured) {
+            let log = (recording, measured.as_slice());
+            let written = self.write_log(twin, &library, &predictor, log, &mut table);
             if let Err(e) = written.map_err(|error| logs.as_given(error))? {
                 return Ok(Err(e));
             }
@@ -166,7 +178,7 @@ impl Prediction {
         twin: &Twin,
         library: &Library,
         predictor: &Predictor,
-        recording: &Recording,
+        (recording, logged): (&Recording, &[Option<Vec<f64>>]),
         table: &mut TableWriter<W>,
     ) -> Result<io::Result<()>> {
         let (trajectory, more) = twin.align(recording)?;
@@ -191,13 +203,11 @@ impl Prediction {
                         .collect::<Vec<_>>()
                 };
                 let time = of_rows(&recording.time);
-                let missing = vec![f64::NAN; block.len];
-                let measured: Vec<_> = (recording.joints.iter())
-                    .map(|channels| {
-                        channels
-                            .tau
-                            .as_deref()
-                            .map_or_else(|| missing.clone(), of_rows)
+                let finite = |value: f64| if value.is_finite() { value } else { f64::NAN };
+                let measured: Vec<Vec<f64>> = (logged.iter())
+                    .map(|tau| match tau {
+                        Some(tau) => of_rows(tau).into_iter().map(finite).collect(),
+                        None => vec![f64::NAN; block.len],
                     })
                     .collect();
                 let outside: Vec<bool> = (0..block.len)

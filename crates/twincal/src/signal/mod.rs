@@ -20,6 +20,7 @@ mod spectrum;
 pub(crate) mod spline;
 mod standstill;
 mod steps;
+mod torque;
 mod units;
 mod unwrap;
 
@@ -27,6 +28,7 @@ pub use agreement::{Agreement, velocity_agreement};
 pub use correct::{Corrections, Lag};
 pub use describe::{JointOverview, LogOverview, describe, hardly_driven};
 pub use steps::{Steps, steps};
+pub use torque::missing_torque;
 
 use crate::error::{Error, Finding, Result};
 use crate::robot::Robot;

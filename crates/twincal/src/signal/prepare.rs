@@ -124,7 +124,8 @@ pub(crate) fn prepare(
     };
     let mut pieces = Vec::with_capacity(runs.len());
     let (mut short, mut short_rows, mut resampled) = (0_u64, 0_u64, 0_u64);
-    let moves = corrections.moves(joints);
+    // Without torque nothing has to move, and the grid keeps its ends.
+    let moves = corrections.moves(joints) && log.joints.iter().any(|c| c.tau.is_some());
     for run in &runs {
         if run.rows.len() < MINIMUM_RUN && !every_row {
             short += 1;
