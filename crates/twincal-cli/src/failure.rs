@@ -7,7 +7,7 @@ use twincal_io::Error;
 pub(crate) const GATE: u8 = 1;
 /// Wrong usage, config or input.
 pub(crate) const INPUT: u8 = 2;
-/// Done, but data was lost or degraded beyond the stated limit.
+/// Done, but data was lost or degraded beyond the stated limit, or could not be printed.
 pub(crate) const DEGRADED: u8 = 3;
 /// The data cannot answer the question.
 pub(crate) const REFUSED: u8 = 4;
@@ -19,6 +19,13 @@ pub(crate) const BUG: u8 = 70;
 pub(crate) enum Failure {
     /// A file, a setting or the mathematics refused.
     Error(Error),
+    /// The result is complete in its place, what was to be printed of it is lost.
+    Unprinted {
+        /// What is wrong.
+        problem: String,
+        /// Where the result is.
+        remedy: String,
+    },
     /// The arguments do not fit together.
     Usage {
         /// What is wrong.
@@ -43,6 +50,8 @@ impl Failure {
         match self {
             Self::Error(Error::Core(twincal::Error::Refused { .. })) => REFUSED,
             Self::Error(Error::Internal { .. }) => BUG,
+            // Code 2 says that nothing was written.
+            Self::Unprinted { .. } => DEGRADED,
             Self::Error(_) | Self::Usage { .. } => INPUT,
         }
     }
@@ -50,7 +59,9 @@ impl Failure {
     /// What is wrong, and how to mend it.
     pub(crate) fn words(&self) -> (String, Option<String>) {
         match self {
-            Self::Usage { problem, remedy } => (problem.clone(), Some(remedy.clone())),
+            Self::Usage { problem, remedy } | Self::Unprinted { problem, remedy } => {
+                (problem.clone(), Some(remedy.clone()))
+            }
             Self::Error(error) => {
                 let message = error.to_string();
                 match remedy_of(error).and_then(|remedy| {

@@ -1,7 +1,7 @@
 //! The program `twincal`: words for people, JSON for programs, exit codes for both.
 //!
 //! Exit codes: 0 done · 1 a gate of `check` said no · 2 wrong usage or input · 3 done, but data was lost or degraded
-//! beyond the stated limit · 4 the data cannot answer the question · 70 our bug · 130 interrupted.
+//! beyond the stated limit, or the summary could not be printed · 4 the data cannot answer the question · 70 our bug · 130 interrupted.
 
 mod args;
 mod clock;

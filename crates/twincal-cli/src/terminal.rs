@@ -4,6 +4,7 @@
 use crate::failure::{Failure, Outcome};
 use anstream::AutoStream;
 use std::io::{self, IsTerminal as _, Write};
+use std::path::Path;
 
 const BOLD: &str = "\x1b[1m";
 const RED: &str = "\x1b[1;31m";
@@ -15,6 +16,8 @@ pub(crate) struct Terminal {
     out: AutoStream<io::Stdout>,
     err: AutoStream<io::Stderr>,
     broken: Option<io::Error>,
+    /// Where a result lies that is complete whatever becomes of standard output.
+    complete: Option<String>,
 }
 
 impl Terminal {
@@ -23,6 +26,7 @@ impl Terminal {
             out: anstream::stdout(),
             err: anstream::stderr(),
             broken: None,
+            complete: None,
         }
     }
 
@@ -61,6 +65,11 @@ impl Terminal {
         self.broken = self.broken.take().or(outcome.err());
     }
 
+    /// The result is in its place: what is said from here on only repeats it.
+    pub(crate) fn complete(&mut self, place: &Path) {
+        self.complete = Some(place.to_string_lossy().into_owned());
+    }
+
     /// A line that is not part of the result.
     pub(crate) fn note(&mut self, line: &str) {
         // Nobody is left to be told when standard error is closed.
@@ -80,10 +89,18 @@ impl Terminal {
     pub(crate) fn finish(&mut self) -> Outcome<()> {
         let flushed = self.out.flush();
         match self.broken.take().map_or(flushed, Err) {
-            Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(Failure::usage(
-                format!("cannot write to standard output: {e}"),
-                "free space or write elsewhere",
-            )),
+            Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(match self.complete.take() {
+                Some(place) => Failure::Unprinted {
+                    problem: format!("cannot write the summary to standard output: {e}"),
+                    remedy: format!(
+                        "the result in {place} is complete: nothing has to be run again"
+                    ),
+                },
+                None => Failure::usage(
+                    format!("cannot write to standard output: {e}"),
+                    "free space or write elsewhere",
+                ),
+            }),
             _ => Ok(()),
         }
     }

@@ -123,3 +123,22 @@ fn rows_without_motion_are_cuts_of_a_prediction() {
     assert!(lost > 2, "{lost} rows lost");
     holed.says(&["1 of 1000 rows", "position of joint `elbow`: 1"]);
 }
+
+#[test]
+fn a_result_that_cannot_be_printed_is_complete_and_says_where() {
+    if !Path::new("/dev/full").exists() {
+        println!("skipped: there is no /dev/full");
+        return;
+    }
+    for json in ["--json", ""] {
+        let folder = folder();
+        let line = format!(
+            "\"$TWINCAL\" fit run.csv --model arm.urdf --config quick.toml -o out {json} > /dev/full"
+        );
+        shell(folder.path(), &line).expect(3).says(&[
+            "cannot write the summary to standard output",
+            "the result in out is complete",
+        ]);
+        run(folder.path(), ["check", "run.csv", "--twin", "out"]).expect(0);
+    }
+}

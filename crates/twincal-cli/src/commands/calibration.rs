@@ -24,6 +24,8 @@ pub(super) struct Job<'a> {
     pub(super) robot: RobotInput,
     pub(super) logs: LogInput,
     pub(super) heldout: LogInput,
+    /// Folder of the result.
+    pub(super) output: &'a Path,
     pub(super) watch: Stopwatch,
 }
 
@@ -48,6 +50,7 @@ impl Job<'_> {
         let run_log = self.run_log(&stored);
         inputs.push(self.robot.source);
         stored.write(claim, self.maker, run_log, inputs)?;
+        terminal.complete(self.output);
         drop(progress);
         if self.settings.json {
             terminal.data(&stored.result_json()?);

@@ -78,6 +78,7 @@ pub(super) fn run(flags: &Demo, terminal: &mut Terminal) -> Outcome<u8> {
         robot,
         logs,
         heldout,
+        output,
         watch,
     };
     // The inputs lie beside the result, so that the command in the report can be repeated there.

@@ -133,14 +133,20 @@ fn open(flags: &Export) -> Outcome<Option<OutputFile>> {
 }
 
 /// Writes to the file, or to standard output; true if it was a file.
-fn write(output: Option<OutputFile>, bytes: &[u8], terminal: &mut Terminal) -> Outcome<bool> {
-    let Some(mut output) = output else {
+fn write(
+    flags: &Export,
+    output: Option<OutputFile>,
+    bytes: &[u8],
+    terminal: &mut Terminal,
+) -> Outcome<bool> {
+    let (Some(mut output), Some(place)) = (output, &flags.output) else {
         let written = terminal.rows().write_all(bytes);
         terminal.wrote(written);
         return Ok(false);
     };
     let written = output.file().map_or(Ok(()), |file| file.write_all(bytes));
     output.commit(written)?;
+    terminal.complete(place);
     Ok(true)
 }
 
@@ -193,7 +199,7 @@ fn code(flags: &Export, language: Language, terminal: &mut Terminal) -> Outcome<
         }
     };
     let text = source(&evaluator, language, &about)?;
-    if !write(output, text.as_bytes(), terminal)? {
+    if !write(flags, output, text.as_bytes(), terminal)? {
         return Ok(0);
     }
     if flags.json {
@@ -227,7 +233,7 @@ fn one(flags: &Export, kind: Kind, terminal: &mut Terminal) -> Outcome<u8> {
     let (stored, model) = read(flags, kind)?;
     let change = Writer::new(&stored.calibration, kind.holds)?.mean()?;
     let bytes = write_model(&model, &change)?;
-    if !write(output, &bytes, terminal)? {
+    if !write(flags, output, &bytes, terminal)? {
         return Ok(0);
     }
     if flags.json {
@@ -288,6 +294,7 @@ fn draws(
         .iter()
         .map(|(name, bytes)| (name.as_str(), bytes.clone()));
     claim.commit(Maker::Export, files.collect())?;
+    terminal.complete(folder);
     drop(progress);
     let output = folder.to_string_lossy().into_owned();
     if flags.json {

@@ -62,6 +62,7 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
         robot,
         logs,
         heldout,
+        output: &settings.output,
         watch,
     };
     let code = job.run(claim, Vec::new(), progress, terminal)?;

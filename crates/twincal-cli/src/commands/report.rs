@@ -14,6 +14,7 @@ pub(super) fn run(flags: &Report, terminal: &mut Terminal) -> Outcome<u8> {
     let stored = StoredTwin::read(&artifact, rewrite)?;
     let claim = Claim::new(&flags.twin, Replace::Artifact)?;
     stored.rewrite_report(&artifact, claim)?;
+    terminal.complete(&flags.twin);
     if flags.json {
         say_where_in_json(&flags.twin, terminal)?;
     } else {

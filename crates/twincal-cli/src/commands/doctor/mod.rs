@@ -140,6 +140,7 @@ pub(super) fn init(flags: &args::Init, terminal: &mut Terminal) -> Outcome<u8> {
         None => Ok(()),
     };
     output.commit(written)?;
+    terminal.complete(&target);
     let shown = target.to_string_lossy();
     if asked.settings.json {
         #[derive(Serialize)]
