@@ -142,3 +142,28 @@ fn a_result_that_cannot_be_printed_is_complete_and_says_where() {
         run(folder.path(), ["check", "run.csv", "--twin", "out"]).expect(0);
     }
 }
+
+#[test]
+fn result_says_the_rate_of_the_rows_that_were_kept() {
+    let config = FILTERED.replace("[library]", "rate_hz = 17.5\n[library]");
+    let (folder, done) = fitted_with(&csv(1000, &|_, row| row), &config);
+    done.expect(0);
+    let one = result(folder.path());
+    // Every third sample of 50 Hz.
+    for rate in [&one["signal"]["rate_hz"], &one["logs"][0]["kept_rate_hz"]] {
+        assert!((rate.as_f64().unwrap() - 50.0 / 3.0).abs() < 1e-9, "{rate}");
+    }
+    let text = csv(1000, &|_, row| row);
+    let lines: Vec<&str> = text.lines().collect();
+    let half: Vec<&str> = [lines[0]]
+        .into_iter()
+        .chain(lines[1..].iter().copied().step_by(2))
+        .collect();
+    fs::write(folder.path().join("half.csv"), half.join("\n")).unwrap();
+    let more = ["half.csv", "-o", "out", "--force"];
+    fit(folder.path(), &more).expect(0);
+    let two = result(folder.path());
+    assert_eq!(two["signal"]["rate_hz"], 17.5);
+    let kept = &two["logs"][1]["kept_rate_hz"];
+    assert!((kept.as_f64().unwrap() - 25.0).abs() < 1e-9, "{kept}");
+}

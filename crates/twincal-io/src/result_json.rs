@@ -119,7 +119,7 @@ struct NoisePriorRow {
 #[derive(Serialize)]
 struct SignalRow<'a> {
     #[serde(flatten)]
-    pipeline: &'a Pipeline,
+    pipeline: Pipeline,
     cutoff_sweep: &'a [SweepPoint],
 }
 
@@ -211,7 +211,11 @@ impl<'a> ResultFile<'a> {
             prior: PriorRow::of(calibration),
             likelihood: &calibration.likelihood,
             signal: SignalRow {
-                pipeline: &calibration.twin.pipeline,
+                // What was used: kept rows stand whole samples apart.
+                pipeline: Pipeline {
+                    rate_hz: calibration.kept_rate_hz(),
+                    ..calibration.twin.pipeline.clone()
+                },
                 cutoff_sweep: &calibration.sweep,
             },
             inference: InferenceRow::of(&calibration.twin.posterior.method, seed),

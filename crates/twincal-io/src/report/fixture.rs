@@ -276,6 +276,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
                 samples: 60_000,
                 duration: 60.0,
                 rate_hz: 1000.0,
+                kept_rate_hz: RATE,
                 segments: 1 + log as u64,
                 rows: (0..names.len()).map(|j| 1500 - 140 * j as u64).collect(),
                 standstill: (0..names.len()).map(|j| 140 * j as u64).collect(),

@@ -317,7 +317,10 @@ pub(super) fn pipeline(calibration: &Calibration) -> Vec<String> {
             with_unit(pipeline.motion_cutoff_hz, "Hz"),
             with_unit(pipeline.cutoff_hz, "Hz")
         ),
-        format!("Rows are kept at {}.", with_unit(pipeline.rate_hz, "Hz")),
+        format!(
+            "Rows are kept at {}.",
+            with_unit(calibration.kept_rate_hz(), "Hz")
+        ),
         format!(
             "A joint stands still below {} (rad/s or m/s); such rows are left out of its fit.",
             match pipeline.standstill_velocity.as_slice() {

@@ -53,7 +53,7 @@ impl Data {
                     leave_out(pipeline, &mut trajectory, &happened);
                     findings.extend(incident_findings(&recording.name, &happened));
                     let observations = observe(robot, library, pipeline, &trajectory)?;
-                    let summary = summary(robot, recording, role, &trajectory, &observations);
+                    let summary = summary(recording, role, pipeline, &trajectory, &observations);
                     Ok(Log {
                         trajectory,
                         observations,
@@ -301,9 +301,9 @@ fn add_squares(sum: &mut (f64, f64), values: &[f64], standstill: &[bool]) {
 }
 
 fn summary(
-    robot: &Robot,
     recording: &Recording,
     role: &str,
+    pipeline: &Pipeline,
     trajectory: &Trajectory,
     observations: &Observations,
 ) -> LogSummary {
@@ -329,16 +329,18 @@ fn summary(
             .filter(|s| **s)
             .count() as u64
     };
+    let longest = trajectory.segments.iter().max_by_key(|s| s.time.len());
     LogSummary {
         name: recording.name.clone(),
         role: role.into(),
         samples: recording.time.len() as u64,
         duration: ends.1 - ends.0,
         rate_hz: 1.0 / median,
+        kept_rate_hz: longest.map_or(0.0, |segment| pipeline.kept_rate(segment.interval)),
         segments: trajectory.segments.len() as u64,
-        rows: (0..robot.dof())
+        rows: (0..trajectory.dof)
             .map(|joint| observations.len() as u64 - still(joint))
             .collect(),
-        standstill: (0..robot.dof()).map(still).collect(),
+        standstill: (0..trajectory.dof).map(still).collect(),
     }
 }

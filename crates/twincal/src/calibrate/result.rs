@@ -260,6 +260,9 @@ pub struct LogSummary {
     pub duration: f64,
     /// Median rate, Hz.
     pub rate_hz: f64,
+    /// Rate of the kept rows, Hz: a whole fraction of the log's own; 0 in results that do not say it yet.
+    #[serde(default)]
+    pub kept_rate_hz: f64,
     /// Segments after cutting.
     pub segments: u64,
     /// Rows used per joint (standstill and saturated torque excluded).
@@ -347,4 +350,16 @@ pub struct Calibration {
     pub logs: Vec<LogSummary>,
     /// Everything that must be said.
     pub findings: Vec<Finding>,
+}
+
+impl Calibration {
+    /// Rate of the rows that were fitted, Hz; where logs differ, the rate that was asked for.
+    #[must_use]
+    pub fn kept_rate_hz(&self) -> f64 {
+        let fitted = self.logs.iter().filter(|log| log.role == "fit");
+        let kept = fitted.map(|log| log.kept_rate_hz);
+        self.twin
+            .pipeline
+            .common_rate(kept.filter(|rate| *rate > 0.0))
+    }
 }

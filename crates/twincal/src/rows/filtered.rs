@@ -29,9 +29,7 @@ pub(super) struct Plan {
 impl Plan {
     pub(super) fn new(pipeline: &Pipeline, segment: &Segment) -> Self {
         let kernel = column_kernel(pipeline.cutoff_hz, segment.interval);
-        let step = (1.0 / (segment.interval * pipeline.rate_hz))
-            .round()
-            .max(1.0) as usize;
+        let step = pipeline.step(segment.interval);
         let rows = match segment.time.len().checked_sub(kernel.len()) {
             Some(rest) => rest / step + 1,
             None => 0,

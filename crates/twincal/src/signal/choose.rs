@@ -271,16 +271,18 @@ fn on(
         pipeline.standstill_velocity.push(threshold);
     }
     findings.extend(unexcited(joints, &still, &pipeline.standstill_velocity)?);
+    let kept = pipeline.common_rate(prepared.iter().map(|p| pipeline.kept_rate(p.interval)));
     let taps = column_kernel(cutoff, 1.0 / lowest_rate);
     findings.push(Finding::new(
         Severity::Note,
         "pipeline",
         "",
         format!(
-            "columns and torque: symmetric FIR at {cutoff} Hz, {:.3} s to either side, white-noise gain {:.3}; motion: FIR at {motion_cutoff:.3} Hz, {:.3} s; rows at {rate} Hz",
+            "columns and torque: symmetric FIR at {cutoff} Hz, {:.3} s to either side, white-noise gain {:.3}; motion: FIR at {motion_cutoff:.3} Hz, {:.3} s; rows at {} Hz",
             column_half_seconds(cutoff),
             noise_gain(&taps),
-            motion_half_seconds(motion_cutoff)
+            motion_half_seconds(motion_cutoff),
+            (1e6 * kept).round() / 1e6
         ),
         0,
     ));

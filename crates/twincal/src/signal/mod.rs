@@ -34,6 +34,9 @@ use crate::error::{Error, Finding, Result};
 use crate::robot::Robot;
 use serde::{Deserialize, Serialize};
 
+/// Rates that differ by less than this share are one: clocks are known no better.
+const SAME_RATE: f64 = 1e-6;
+
 /// A number, or "auto": chosen from the data and stated in the result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Auto {
@@ -135,7 +138,7 @@ pub struct Pipeline {
     pub cutoff_hz: f64,
     /// f_q = 4 f_c of the motion filter, Hz.
     pub motion_cutoff_hz: f64,
-    /// Rate of kept rows, Hz.
+    /// Rate of kept rows as asked for, Hz; see [`Pipeline::kept_rate`] for that of a log.
     pub rate_hz: f64,
     /// v_s, rad/s or m/s.
     pub coulomb_velocity: f64,
@@ -214,6 +217,37 @@ impl Pipeline {
     /// True with cut-off 0.
     pub fn is_off(&self) -> bool {
         self.cutoff_hz == 0.0
+    }
+
+    /// Samples between kept rows of a log with this interval, s.
+    pub(crate) fn step(&self, interval: f64) -> usize {
+        if self.is_off() {
+            1
+        } else {
+            (1.0 / (interval * self.rate_hz)).round().max(1.0) as usize
+        }
+    }
+
+    /// Rate of the kept rows of a log with this interval (s), Hz: they stand whole samples apart, so that it is only near
+    /// `rate_hz`.
+    pub fn kept_rate(&self, interval: f64) -> f64 {
+        1.0 / (interval * self.step(interval) as f64)
+    }
+
+    /// The one rate of the kept rows of several logs, from that of each; `rate_hz` where they differ.
+    pub fn common_rate(&self, kept: impl IntoIterator<Item = f64>) -> f64 {
+        let alike = |a: f64, b: f64| (a - b).abs() <= SAME_RATE * b;
+        let kept: Vec<f64> = kept.into_iter().collect();
+        match kept.first() {
+            Some(&first) if kept.iter().all(|rate| alike(*rate, first)) => {
+                if alike(first, self.rate_hz) {
+                    self.rate_hz
+                } else {
+                    first
+                }
+            }
+            _ => self.rate_hz,
+        }
     }
 
     /// Half length of the column filter F, s; 0 when off. A row at t uses torque and columns from t − half to t + half.

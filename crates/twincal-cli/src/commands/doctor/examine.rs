@@ -267,8 +267,15 @@ impl Examination {
             }
             Err(error) => self.refusals.push(Failure::from(error).into()),
         }
+        let segments = checkup.trajectories.iter().flat_map(|t| &t.segments);
+        let kept: Vec<f64> = segments
+            .map(|segment| pipeline.kept_rate(segment.interval))
+            .collect();
         self.checkup = checkup;
-        self.pipeline = Some(pipeline);
+        self.pipeline = Some(Pipeline {
+            rate_hz: pipeline.common_rate(kept),
+            ..pipeline
+        });
     }
 }
 
