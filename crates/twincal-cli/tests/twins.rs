@@ -167,3 +167,45 @@ fn result_says_the_rate_of_the_rows_that_were_kept() {
     let kept = &two["logs"][1]["kept_rate_hz"];
     assert!((kept.as_f64().unwrap() - 25.0).abs() < 1e-9, "{kept}");
 }
+
+#[test]
+fn a_joint_that_stands_still_throughout_is_not_asked_for_rows() {
+    let still = csv(1000, &|number, mut row| {
+        for column in [2, 4, 6, 8] {
+            row[column] = "0".into();
+        }
+        // The arm stretched out: one body about the shoulder, viscous friction and a little noise.
+        let noise = ((number * 7919) % 1000) as f64 / 1000.0 - 0.5;
+        let (v1, a1): (f64, f64) = (row[3].parse().unwrap(), row[5].parse().unwrap());
+        row[7] = ((0.3025 + 0.12) * a1 + 0.4 * v1 + 0.05 * noise).to_string();
+        row
+    });
+    let (folder, done) = fitted_with(&still, FILTERED);
+    done.expect(0);
+    let noise = &result(folder.path())["noise"];
+    assert_eq!(noise[1]["n"], 0.0);
+    assert!(noise[0]["n_eff"].as_f64().unwrap() > 10.0);
+}
+
+#[test]
+fn a_joint_whose_rows_are_all_alike_is_named_beside_joints_that_answer() {
+    // Without torque of its own, what is left of the elbow is the motion itself.
+    let silent = csv(400, &|_, mut row| {
+        row[8] = "0".into();
+        row
+    });
+    let (folder, done) = fitted_with(&silent, common::QUICK);
+    done.expect(3);
+    let result = result(folder.path());
+    let findings = result["findings"].as_array().unwrap().iter();
+    let few: Vec<&Value> = findings
+        .filter(|f| f["code"] == "few_effective_rows")
+        .collect();
+    assert_eq!((few.len(), &few[0]["subject"]), (1, &"elbow".into()));
+    let words = few[0]["message"].as_str().unwrap();
+    assert!(
+        words.starts_with("the 400 rows of joint `elbow` count as "),
+        "{words}"
+    );
+    assert!(result["noise"][0]["n_eff"].as_f64().unwrap() >= 10.0);
+}
