@@ -209,3 +209,37 @@ fn a_joint_whose_rows_are_all_alike_is_named_beside_joints_that_answer() {
     );
     assert!(result["noise"][0]["n_eff"].as_f64().unwrap() >= 10.0);
 }
+
+#[test]
+fn a_log_whose_torque_never_changes_is_refused() {
+    let silent = |columns: &'static [usize]| {
+        csv(400, &move |_, mut row| {
+            columns.iter().for_each(|column| row[*column] = "0".into());
+            row
+        })
+    };
+    let (folder, done) = fitted_with(&silent(&[7, 8]), common::QUICK);
+    done.expect(4).says(&[
+        "run.csv: torque never changes while the joints move",
+        "`shoulder` is 0, `elbow` is 0",
+        "[columns] tau",
+    ]);
+    assert!(!folder.path().join("out").exists());
+    let line = ["doctor", "run.csv", "--model", "arm.urdf"];
+    let doctor = run(folder.path(), line).expect(4);
+    assert!(
+        doctor.out.contains("torque never changes"),
+        "{}",
+        doctor.out
+    );
+    // One joint may be a passive one.
+    fs::write(folder.path().join("run.csv"), silent(&[8])).unwrap();
+    let line = "doctor run.csv --model arm.urdf --config quick.toml --json";
+    let done = run(folder.path(), line.split(' ')).expect(0);
+    let findings = serde_json::from_str::<Value>(&done.out).unwrap()["findings"].clone();
+    let told: Vec<&Value> = findings.as_array().unwrap().iter().collect();
+    let told = told.iter().filter(|f| f["code"] == "constant_torque");
+    let words: Vec<&str> = told.map(|f| f["message"].as_str().unwrap()).collect();
+    assert_eq!(words.len(), 1);
+    assert!(words[0].contains("`elbow` is 0 throughout"), "{}", words[0]);
+}

@@ -45,7 +45,9 @@ use crate::posterior::Method;
 use crate::prior::PriorSettings;
 use crate::robot::Robot;
 use crate::self_check::self_check;
-use crate::signal::{Auto, Corrections, Recording, SignalSettings, choose_pipeline, hardly_driven};
+use crate::signal::{
+    Auto, Corrections, Recording, SignalSettings, choose_pipeline, constant_torque, hardly_driven,
+};
 use crate::term::{Family, Library, LibrarySettings};
 use crate::twin::Twin;
 use data::Data;
@@ -140,6 +142,7 @@ pub fn calibrate(
         log.require_torque(&robot.joint_names())?;
     }
     let (pipeline, mut findings) = choose_pipeline(robot, logs, &settings.signal)?;
+    findings.extend(constant_torque(robot, logs.iter().chain(heldout))?);
     findings.extend(hardly_driven(robot, logs.iter().chain(heldout)));
     let library_settings = LibrarySettings {
         coulomb_velocity: pipeline.coulomb_velocity,

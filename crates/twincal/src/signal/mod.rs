@@ -28,7 +28,7 @@ pub use agreement::{Agreement, velocity_agreement};
 pub use correct::{Corrections, Lag};
 pub use describe::{JointOverview, LogOverview, describe, hardly_driven};
 pub use steps::{Steps, steps};
-pub use torque::missing_torque;
+pub use torque::{constant_torque, missing_torque};
 
 use crate::error::{Error, Finding, Result};
 use crate::robot::Robot;

@@ -1,9 +1,11 @@
-//! What measured torque lacks: samples of it.
+//! What measured torque lacks: samples of it, or any change in it.
 
 use super::Recording;
-use crate::error::{Finding, Severity};
+use crate::error::{Error, Finding, Result, Severity};
 use crate::robot::Robot;
 
+/// A joint that travels less in a log stands still there, rad or m.
+const TRAVEL: f64 = 0.01;
 /// Names at most in one message.
 const NAMED: usize = 4;
 
@@ -41,4 +43,63 @@ pub fn missing_torque(robot: &Robot, log: &Recording) -> Option<Finding> {
         ),
         most as u64,
     ))
+}
+
+/// Torque that never changes while its joint moves: drives off, or a column that was not recorded. A joint like that is
+/// told, for it may be a passive one; a log in which every moving joint is like that teaches nothing of the robot.
+///
+/// # Errors
+/// [`Error::Refused`] for a log in which no moving joint has a torque that changes.
+pub fn constant_torque<'a>(
+    robot: &Robot,
+    logs: impl IntoIterator<Item = &'a Recording>,
+) -> Result<Vec<Finding>> {
+    let names = robot.joint_names();
+    let mut findings = Vec::new();
+    for log in logs {
+        let moving: Vec<(&str, &[f64])> = (names.iter().zip(&log.joints))
+            .filter(|(_, channels)| range(&channels.q) > TRAVEL)
+            .filter_map(|(name, channels)| Some((*name, channels.tau.as_deref()?)))
+            .collect();
+        let constant: Vec<String> = (moving.iter())
+            .filter(|(_, tau)| range(tau) <= 0.0)
+            .map(|(name, tau)| {
+                let value = tau.iter().find(|v| v.is_finite()).unwrap_or(&f64::NAN);
+                format!("`{name}` is {value}")
+            })
+            .collect();
+        if constant.is_empty() {
+            continue;
+        }
+        let shown = constant[..constant.len().min(NAMED)].join(", ");
+        let cause = "the drives were off, or the column was not recorded";
+        if constant.len() == moving.len() {
+            return Err(Error::Refused {
+                problem: format!(
+                    "{}: torque never changes while the joints move (joint {shown} throughout): {cause}",
+                    log.name
+                ),
+                remedy: "map the measured torque in [columns] tau, or leave this log out".into(),
+            });
+        }
+        findings.push(Finding::new(
+            Severity::Warning,
+            "constant_torque",
+            &log.name,
+            format!(
+                "torque never changes while the joint moves (joint {shown} throughout): {cause}; what is found on it is wrong \
+                 unless it swung freely"
+            ),
+            constant.len() as u64,
+        ));
+    }
+    Ok(findings)
+}
+
+/// Largest less smallest finite value; −∞ without any.
+fn range(values: &[f64]) -> f64 {
+    let finite = values.iter().filter(|v| v.is_finite());
+    let ends = |(low, high): (f64, f64), v: &f64| (low.min(*v), high.max(*v));
+    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+    high - low
 }

@@ -11,7 +11,8 @@ use twincal::Finding;
 use twincal::calibrate::{Outlook, outlook};
 use twincal::robot::{JointKind, Robot};
 use twincal::signal::{
-    LogOverview, Pipeline, Recording, Steps, choose_pipeline, describe, hardly_driven, steps,
+    LogOverview, Pipeline, Recording, Steps, choose_pipeline, constant_torque, describe,
+    hardly_driven, steps,
 };
 use twincal_io::config::Settings;
 use twincal_io::log::{
@@ -248,6 +249,10 @@ impl Examination {
             }
         }
         self.findings.extend(hardly_driven(robot, &logs.recordings));
+        match constant_torque(robot, &logs.recordings) {
+            Ok(more) => self.findings.extend(more),
+            Err(error) => self.refusals.push(Failure::from(error).into()),
+        }
         let (pipeline, more, mut checkup) = match together {
             Ok(filtered) => filtered,
             Err(error) => {
