@@ -3,6 +3,7 @@
 //! Exit codes: 0 done · 1 a gate of `check` said no · 2 wrong usage or input · 3 done, but data was lost or degraded
 //! beyond the stated limit, or the summary could not be printed · 4 the data cannot answer the question · 70 our bug · 130 interrupted.
 
+mod address_space;
 mod args;
 mod clock;
 mod commands;
@@ -19,6 +20,7 @@ use std::sync::atomic::AtomicBool;
 use terminal::Terminal;
 
 fn main() -> ExitCode {
+    address_space::prepare();
     std::panic::set_hook(Box::new(failure::report_panic));
     listen_to_signals();
     let outcome = catch_unwind(AssertUnwindSafe(|| {

@@ -243,3 +243,21 @@ fn a_log_whose_torque_never_changes_is_refused() {
     assert_eq!(words.len(), 1);
     assert!(words[0].contains("`elbow` is 0 throughout"), "{}", words[0]);
 }
+
+#[test]
+fn case_105_no_limit_of_the_address_space_ends_in_an_abort() {
+    let folder = folder();
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies/planar_arm/assets");
+    for kb in [30_000, 60_000, 80_000, 100_000, 120_000, 200_000] {
+        let line = format!(
+            "ulimit -c 0; ulimit -v {kb}; \"$TWINCAL\" fit {0}/train1.parquet --model {0}/arm.urdf -o out --force --threads 2",
+            assets.display()
+        );
+        let done = shell(folder.path(), &line);
+        match done.code {
+            Some(0) => {}
+            Some(2) => assert!(done.err.contains("memory"), "{kb}: {}", done.err),
+            code => panic!("{kb} kB: {code:?}\n{}", done.err),
+        }
+    }
+}

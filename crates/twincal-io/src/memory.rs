@@ -3,7 +3,7 @@
 use crate::error::{Error, Place, Result};
 use rustix::process::{Resource, getrlimit};
 
-/// Address space that threads and the allocator take besides what is counted, bytes.
+/// What inference, threads and the allocator take besides what is counted, bytes.
 const RESERVE: u64 = 16 << 20;
 
 /// What limits the memory of this process.
@@ -18,7 +18,7 @@ pub struct Available {
 /// The tightest of the address-space limit, the control group's limit and the machine's free memory; `None` where
 /// none of them can be read.
 pub fn available() -> Option<Available> {
-    let address_space = getrlimit(Resource::As).current.map(|limit| Available {
+    let address_space = address_space_limit().map(|limit| Available {
         bytes: limit.saturating_sub(statm_field(0).unwrap_or(0)),
         limit: "the address-space limit (ulimit -v)",
     });
@@ -36,13 +36,19 @@ pub fn available() -> Option<Available> {
         .min_by_key(|available| available.bytes)
 }
 
+/// The address-space limit (`ulimit -v`), bytes; `None` where there is none.
+pub fn address_space_limit() -> Option<u64> {
+    getrlimit(Resource::As).current
+}
+
 /// Refuses work that needs more memory than there is.
 ///
 /// # Errors
 /// [`Error::Content`] about `subject` with both numbers.
 pub fn require(subject: &str, bytes: u64, remedy: &str) -> Result<()> {
+    let bytes = bytes.saturating_add(RESERVE);
     match available() {
-        Some(available) if bytes.saturating_add(RESERVE) > available.bytes => Err(Error::content(
+        Some(available) if bytes > available.bytes => Err(Error::content(
             Place::file(subject),
             format!(
                 "needs about {} MB of memory, {} leaves {} MB",
@@ -145,7 +151,7 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(
-            error.starts_with("x.csv: needs about 2305843009214 MB of memory, "),
+            error.starts_with("x.csv: needs about 2305843009231 MB of memory, "),
             "{error}"
         );
     }
