@@ -261,3 +261,17 @@ fn case_105_no_limit_of_the_address_space_ends_in_an_abort() {
         }
     }
 }
+
+#[test]
+fn predictions_never_replace_what_they_are_made_from() {
+    let folder = common::fitted_copy();
+    fs::write(folder.path().join("c.csv"), "").unwrap();
+    let before = fs::read(folder.path().join("run.csv")).unwrap();
+    for output in ["run.csv", "./run.csv", "twin/twin.json", "c.csv"] {
+        let line = format!("predict run.csv --twin twin --config c.csv --force -o {output}");
+        let done = run(folder.path(), line.split(' ')).expect(2);
+        done.says(&["is read by this command", "-o"]);
+    }
+    assert_eq!(fs::read(folder.path().join("run.csv")).unwrap(), before);
+    run(folder.path(), ["check", "run.csv", "--twin", "twin"]).expect(0);
+}

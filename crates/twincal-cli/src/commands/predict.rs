@@ -1,6 +1,6 @@
 //! `twincal predict`: torque with intervals, one row per input row.
 
-use super::inputs::LogInput;
+use super::inputs::{LogInput, refuse_input_as_output};
 use super::summary::{Notes, paragraph};
 use super::{code_of, print_json, require_strict, settings, start_threads};
 use crate::args::Predict;
@@ -43,10 +43,15 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
         ));
     }
     let output = match &flags.output {
-        Some(path) => Some((
-            TableFormat::of_path(path)?,
-            OutputFile::create(path, flags.force)?,
-        )),
+        Some(path) => {
+            let mut inputs = vec![&flags.twin];
+            inputs.extend(&flags.logs);
+            inputs.extend(&flags.log.config);
+            inputs.extend(&settings.model_file);
+            refuse_input_as_output(path, &inputs)?;
+            let format = TableFormat::of_path(path)?;
+            Some((format, path, OutputFile::create(path, flags.force)?))
+        }
         None => None,
     };
     start_threads(settings.threads)?;
@@ -69,13 +74,14 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
         .map(Recording::take_torque)
         .collect();
     match output {
-        Some((format, mut output)) => {
+        Some((format, place, mut output)) => {
             let written = match output.file() {
                 Some(file) => prediction.write(twin, &logs, format, BufWriter::new(file))?,
                 None => Ok(()),
             };
             require_strict(settings.log.strict, &prediction.findings)?;
             output.commit(written)?;
+            terminal.complete(place);
         }
         None => {
             let written = prediction.write(twin, &logs, TableFormat::Csv, terminal.rows())?;
