@@ -51,6 +51,10 @@ pub struct ParameterChange {
     pub sd: f64,
     /// Its central 95 % interval.
     pub interval95: [f64; 2],
+    /// Its median: what the words tell.
+    pub median: f64,
+    /// Its central 68.3 % interval; half its width stands behind ± in the words.
+    pub interval68: [f64; 2],
     /// The larger of P(difference > 0) and P(difference < 0).
     pub certainty: f64,
 }
@@ -206,16 +210,19 @@ fn parameter_change(
         difference: centre,
         sd: (square / (count - 1.0)).sqrt(),
         interval95: [quantile(0.025), quantile(0.975)],
+        median: quantile(0.5),
+        interval68: [quantile(0.158_655), quantile(0.841_345)],
         certainty: share(|d| d > 0.0).max(share(|d| d < 0.0)),
     }
 }
 
 /// The surest changes of a component in one sentence.
 fn words(story: &str, parameters: &[ParameterChange]) -> String {
-    let clearness = |p: &ParameterChange| p.difference.abs() / p.sd.max(f64::MIN_POSITIVE);
+    let spread = |p: &ParameterChange| 0.5 * (p.interval68[1] - p.interval68[0]);
+    let clearness = |p: &ParameterChange| p.median.abs() / spread(p).max(f64::MIN_POSITIVE);
     let mut order: Vec<&ParameterChange> = parameters
         .iter()
-        .filter(|p| p.difference.is_finite())
+        .filter(|p| p.median.is_finite() && (p.median != 0.0 || spread(p) != 0.0))
         .collect();
     order.sort_by(|a, b| clearness(b).total_cmp(&clearness(a)));
     order.truncate(2);
@@ -230,11 +237,35 @@ fn words(story: &str, parameters: &[ParameterChange]) -> String {
             let difference = Estimate {
                 name: p.name.clone(),
                 unit: p.unit.clone(),
-                mean: p.difference,
-                sd: p.sd,
+                value: p.median,
+                spread: spread(p),
             };
             format!("{name}{difference}")
         })
         .collect();
+    if told.is_empty() {
+        return format!("{story}: no difference");
+    }
     format!("{story}: {}", told.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A thousand draws between 1 and 2 and one far off: the sd is that one's doing, the words are not.
+    #[test]
+    fn one_draw_far_off_moves_the_sd_and_not_the_words() {
+        let mut after: Vec<f64> = (0..1001).map(|i| 1.0 + 0.001 * f64::from(i)).collect();
+        after[1000] = 1e4;
+        let change = parameter_change("mass".into(), "kg".into(), vec![0.0; 1001], after);
+        assert!(change.sd > 300.0, "{change:?}");
+        // The uniform distribution on 1 … 2: median 1.5, central 68.3 % ± 0.3415.
+        let unseen = parameter_change("com_x".into(), "m".into(), vec![0.0; 9], vec![0.0; 9]);
+        assert_eq!(
+            words("payload", &[unseen.clone(), change]),
+            "payload: mass +1.50 ± 0.34 kg"
+        );
+        assert_eq!(words("payload", &[unseen]), "payload: no difference");
+    }
 }

@@ -11,6 +11,8 @@ const DRAWS: usize = 4000;
 const ENOUGH: usize = 500;
 /// Levels one standard deviation below and above the middle of a normal distribution.
 const ONE_SD: [f64; 2] = [0.158_655, 0.841_345];
+/// What is said instead of a number that is the prior's alone.
+pub(super) const NOT_SEEN: &str = "not seen by these data";
 /// Random stream of those draws.
 const STREAM: u64 = (1 << 32) + 1;
 
@@ -65,11 +67,15 @@ fn summary(
         .map(|p| Estimate {
             name: p.name.clone(),
             unit: p.unit.clone(),
-            mean: p.mean,
-            sd: p.sd,
+            value: p.told().0,
+            spread: p.told().1,
         })
         .collect();
-    summary.words = library.component_words(index, &estimates);
+    summary.words = if summary.verdict == Some(Verdict::NotSeen) {
+        format!("{}: {NOT_SEEN}", component.story)
+    } else {
+        library.component_words(index, &estimates)
+    };
     summary
 }
 
@@ -133,19 +139,36 @@ fn parameters(
                 column.get(place).copied().unwrap_or(f64::NAN)
             };
             // A coefficient has exact moments. A ratio of coefficients has none where its denominator can be near zero.
-            let exact = own.get(p).filter(|_| library.is_coefficient(index, p));
-            let exact = exact.and_then(|term| term.conditional_mean.zip(term.conditional_sd));
-            let middle = (
-                quantile(0.5),
-                0.5 * (quantile(ONE_SD[1]) - quantile(ONE_SD[0])),
-            );
-            let (mean, sd) = exact.unwrap_or(middle);
+            // A parameter stands at the place of its term. Where that is no column, its value is not 0 but unknown.
+            let term = own.get(p).copied();
+            if term.is_some_and(|term| term.pip.is_none()) {
+                return ParameterSummary {
+                    name: parameter.name,
+                    unit: parameter.unit,
+                    mean: f64::NAN,
+                    sd: f64::NAN,
+                    interval95: [f64::NAN; 2],
+                    median: f64::NAN,
+                    interval68: [f64::NAN; 2],
+                    seen: false,
+                };
+            }
+            let exact = term.filter(|_| library.is_coefficient(index, p));
+            let moments = exact.and_then(|term| term.conditional_mean.zip(term.conditional_sd));
+            let quantiles =
+                exact.and_then(|term| term.conditional_median.zip(term.conditional_interval68));
+            let (median, interval68) =
+                quantiles.unwrap_or_else(|| (quantile(0.5), ONE_SD.map(quantile)));
+            let (mean, sd) = moments.unwrap_or((median, 0.5 * (interval68[1] - interval68[0])));
             ParameterSummary {
                 name: parameter.name,
                 unit: parameter.unit,
                 mean,
                 sd,
                 interval95: [quantile(0.025), quantile(0.975)],
+                median,
+                interval68,
+                seen: term.is_none_or(|term| term.verdict != Some(Verdict::NotSeen)),
             }
         })
         .collect()

@@ -27,6 +27,12 @@ pub struct TermSummary {
     pub conditional_mean: Option<f64>,
     /// sd of β | y, included.
     pub conditional_sd: Option<f64>,
+    /// Median of β | y, included: what words and tables tell.
+    #[serde(default)]
+    pub conditional_median: Option<f64>,
+    /// Central 68.3 % interval of β | y, included; half its width stands behind ± in words and tables.
+    #[serde(default)]
+    pub conditional_interval68: Option<[f64; 2]>,
     /// PIP ≥ 0.5 and seen by the data.
     pub selected: bool,
     /// What the data say about the term; `None` for dropped terms.
@@ -77,7 +83,7 @@ pub struct ParameterSummary {
     /// SI unit.
     pub unit: String,
     /// Mean, or median where the parameter is a ratio of coefficients (a centre of mass, a rest angle); NaN here and `null`
-    /// in JSON where it does not exist (the centre of no mass).
+    /// in JSON where it does not exist (the centre of no mass) or no joint shows it.
     #[serde(deserialize_with = "nan_if_null")]
     pub mean: f64,
     /// Standard deviation; of a ratio half the width of its central 68.3 % interval.
@@ -86,6 +92,42 @@ pub struct ParameterSummary {
     /// Central 95 % interval.
     #[serde(deserialize_with = "nans_if_null")]
     pub interval95: [f64; 2],
+    /// Median: what words and tables tell.
+    #[serde(default = "nan", deserialize_with = "nan_if_null")]
+    pub median: f64,
+    /// Central 68.3 % interval; half its width stands behind ± in words and tables.
+    #[serde(default = "nans", deserialize_with = "nans_if_null")]
+    pub interval68: [f64; 2],
+    /// False if no joint or no motion in these logs shows it: its column was dropped, or the data leave it as wide as the
+    /// prior.
+    #[serde(default = "yes")]
+    pub seen: bool,
+}
+
+impl ParameterSummary {
+    /// What people are told: the median and half the width of the central 68.3 % interval. A few models far off move
+    /// mean and sd, not these; of a normal distribution they are mean and sd.
+    #[must_use]
+    pub fn told(&self) -> (f64, f64) {
+        let [low, high] = self.interval68;
+        if self.median.is_finite() {
+            (self.median, 0.5 * (high - low))
+        } else {
+            (self.mean, self.sd) // written by a version without quantiles
+        }
+    }
+}
+
+fn nan() -> f64 {
+    f64::NAN
+}
+
+fn nans() -> [f64; 2] {
+    [f64::NAN; 2]
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// What the data say about a candidate.
@@ -274,7 +316,7 @@ pub struct LogSummary {
 /// Kept coefficients' joint posterior draws, for the pair plot (paper fig. 3).
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Draws {
-    /// Names of the selected terms (at most 8, by |mean|/sd).
+    /// Names of the selected terms: at most 8, those with the largest |median| against half the central 68.3 %.
     pub terms: Vec<String>,
     /// `values[term][draw]`.
     pub values: Vec<Vec<f64>>,

@@ -1,6 +1,6 @@
 //! From posterior to what people read: terms, verdicts, groups, sensitivity, autocorrelation.
 
-use super::components::components;
+use super::components::{NOT_SEEN, components};
 use super::data::Data;
 use super::groups::groups;
 use super::result::{
@@ -15,7 +15,7 @@ use crate::likelihood::{Columns, JointNoise, mean_squares};
 use crate::observations::Part;
 use crate::plug_in::{residual_runs, total};
 use crate::posterior::draws::draw;
-use crate::posterior::summary::summarise as summarise_columns;
+use crate::posterior::summary::{ColumnSummary, summarise as summarise_columns};
 use crate::posterior::{Posterior, Problem};
 use crate::prior::Inclusion;
 use crate::signal::Auto;
@@ -144,7 +144,7 @@ pub(super) fn summarise(
         &fit.problem,
         data,
     ));
-    let selected = pair_plot_columns(&fit.posterior);
+    let selected = pair_plot_columns(library, &terms);
     let draws = draw(
         &fit.posterior,
         PAIR_PLOT.1,
@@ -289,19 +289,33 @@ fn terms(
                 interval95: Some(s.interval95),
                 conditional_mean: s.conditional_mean,
                 conditional_sd: s.conditional_sd,
+                conditional_median: s.conditional_median,
+                conditional_interval68: s.conditional_interval68,
                 selected: s.pip >= 0.5 && verdict != Verdict::NotSeen,
                 verdict: Some(verdict),
                 column_rms: Some(rms[k]),
                 pip_sensitivity: sensitivity[k].clone(),
                 sandwich_sd: None,
-                words: library.words(
-                    index,
-                    s.conditional_mean.unwrap_or(0.0),
-                    s.conditional_sd.unwrap_or(0.0),
-                ),
+                words: if verdict == Verdict::NotSeen {
+                    format!("{}: {NOT_SEEN}", library.story(index))
+                } else {
+                    let (value, spread) = told(s);
+                    library.words(index, value, spread)
+                },
             }
         })
         .collect()
+}
+
+/// Median and half the central 68.3 %; NaN where no model holds the column.
+fn told(summary: &ColumnSummary) -> (f64, f64) {
+    match (summary.conditional_median, summary.conditional_interval68) {
+        (Some(median), Some([low, high])) => (median, 0.5 * (high - low)),
+        _ => (
+            summary.conditional_mean.unwrap_or(f64::NAN),
+            summary.conditional_sd.unwrap_or(f64::NAN),
+        ),
+    }
 }
 
 fn dropped(term: &crate::term::Term) -> TermSummary {
@@ -314,6 +328,8 @@ fn dropped(term: &crate::term::Term) -> TermSummary {
         interval95: None,
         conditional_mean: None,
         conditional_sd: None,
+        conditional_median: None,
+        conditional_interval68: None,
         selected: false,
         verdict: None,
         column_rms: None,
@@ -390,12 +406,18 @@ fn findings_of_posterior(
     findings
 }
 
-/// Columns of the pair plot: the selected ones, by |mean|/sd.
-fn pair_plot_columns(posterior: &Posterior) -> Vec<usize> {
-    let mut selected: Vec<usize> = (0..posterior.inclusion.len())
-        .filter(|&k| posterior.inclusion[k] >= 0.5)
+/// Columns of the pair plot: of the selected ones those with the largest value against its spread.
+fn pair_plot_columns(library: &Library, terms: &[TermSummary]) -> Vec<usize> {
+    let of = |k: usize| &terms[library.columns()[k]];
+    let mut selected: Vec<usize> = (0..library.columns().len())
+        .filter(|&k| of(k).selected)
         .collect();
-    let strength = |k: usize| posterior.mean[k].abs() / posterior.sd[k].max(f64::MIN_POSITIVE);
+    let strength = |k: usize| match (of(k).conditional_median, of(k).conditional_interval68) {
+        (Some(median), Some([low, high])) => {
+            median.abs() / (0.5 * (high - low)).max(f64::MIN_POSITIVE)
+        }
+        _ => 0.0,
+    };
     selected.sort_by(|&a, &b| strength(b).total_cmp(&strength(a)).then(a.cmp(&b)));
     selected.truncate(PAIR_PLOT.0);
     selected.sort_unstable();

@@ -5,6 +5,9 @@ use super::student::StudentT;
 use super::{Method, Model, Posterior};
 use crate::linear_algebra::Cholesky;
 
+/// Probability within one sd of the mean of a normal distribution.
+const ONE_SD: f64 = 0.682_689_492_137_086;
+
 /// What is known about the coefficient β_k of one column, in its own unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColumnSummary {
@@ -22,6 +25,11 @@ pub struct ColumnSummary {
     pub conditional_mean: Option<f64>,
     /// sd of β_k | y, z_k = 1; `None` if pip is 0.
     pub conditional_sd: Option<f64>,
+    /// Median of β_k | y, z_k = 1; `None` if no stored model holds the column.
+    pub conditional_median: Option<f64>,
+    /// Central 68.3 % interval of β_k | y, z_k = 1: one sd to either side where it is normal, and not wider because a few
+    /// light models lie far off.
+    pub conditional_interval68: Option<[f64; 2]>,
     /// pip ≥ 0.5: a member of the median-probability model (Barbieri & Berger 2004).
     pub selected: bool,
 }
@@ -50,6 +58,7 @@ impl ColumnSummary {
             let variance = sd * (sd / pip) - (1.0 - pip) * conditional_mean * conditional_mean;
             (conditional_mean, variance.max(0.0).sqrt())
         });
+        let quantiles = components.quantiles(student);
         Self {
             pip,
             pip_mcse: posterior.inclusion_mcse[column],
@@ -58,6 +67,8 @@ impl ColumnSummary {
             interval95: components.interval95(student, 1.0 - pip),
             conditional_mean: conditional.map(|pair| pair.0),
             conditional_sd: conditional.map(|pair| pair.1),
+            conditional_median: quantiles.map(|[_, median, _]| median),
+            conditional_interval68: quantiles.map(|[low, _, high]| [low, high]),
             selected: pip >= 0.5,
         }
     }
@@ -140,10 +151,27 @@ impl Components {
     }
 
     fn interval95(&self, student: &StudentT, spike: f64) -> [f64; 2] {
+        // Only models too light to be stored hold the column: the spike has more than 95 %.
+        self.at(student, spike, Level::central(student, 0.95))
+            .unwrap_or_default()
+    }
+
+    /// Lower end of the central 68.3 %, median and upper end, given that the column is in.
+    fn quantiles(&self, student: &StudentT) -> Option<[f64; 3]> {
+        let [low, high] = Level::central(student, ONE_SD);
+        self.at(student, 0.0, [low, Level::new(student, 0.5), high])
+    }
+
+    /// The mixture's quantiles; `None` without models that hold the column.
+    fn at<const N: usize>(
+        &self,
+        student: &StudentT,
+        spike: f64,
+        levels: [Level; N],
+    ) -> Option<[f64; N]> {
         let mass: f64 = self.weights.iter().sum();
         if mass <= 0.0 {
-            // Only models too light to be stored hold the column: the spike has more than 95 %.
-            return [0.0; 2];
+            return None;
         }
         let weights: Vec<f64> = self.weights.iter().map(|w| w / mass).collect();
         let mixture = Mixture {
@@ -152,7 +180,7 @@ impl Components {
             scales: &self.scales,
             spike,
         };
-        Level::central(student, 0.95).map(|level| mixture.quantile(student, level).max(self.lower))
+        Some(levels.map(|level| mixture.quantile(student, level).max(self.lower)))
     }
 }
 
@@ -252,6 +280,32 @@ mod tests {
         assert_eq!(rows[1].interval95[1], 0.0);
     }
 
+    /// Three models agree and a light one lies far off: the sd is the light one's doing, what is told is not.
+    #[test]
+    fn a_light_model_far_off_moves_the_sd_and_neither_median_nor_interval() {
+        let mut posterior = posterior(1.0);
+        posterior.models[1].mean[0] = 40.0;
+        posterior.models[1].weight = 0.006;
+        posterior.models[0].weight = 0.794;
+        let share = 0.006 / 0.8;
+        let scale = (3.0_f64 / 11.0 / 4.0).sqrt();
+        let variance = scale * scale * 22.0 / 20.0;
+        let mean = 2.0 + share * 38.0;
+        posterior.mean[0] = 0.8 * mean;
+        let second = variance + (1.0 - share) * 4.0 + share * 1600.0;
+        posterior.sd[0] = (0.8 * second - posterior.mean[0].powi(2)).sqrt();
+        let row = summarise(&posterior)[0];
+        assert!(row.conditional_sd.unwrap() > 3.0, "{row:?}");
+        // The median of the heavy models' t and the light ones far above: its quantile at 0.5/(1 − share), and so the ends.
+        let student = StudentT::new(22.0);
+        let at = |level: f64| 2.0 + scale * student.quantile(level / (1.0 - share));
+        assert!((row.conditional_median.unwrap() - at(0.5)).abs() < 1e-9);
+        let [low, high] = row.conditional_interval68.unwrap();
+        assert!((low - at(0.5 - 0.5 * ONE_SD)).abs() < 1e-9, "{row:?}");
+        assert!((high - at(0.5 + 0.5 * ONE_SD)).abs() < 1e-9, "{row:?}");
+        assert!(0.5 * (high - low) < 0.28);
+    }
+
     #[test]
     fn scaling_a_column_scales_its_coefficient_and_nothing_else() {
         let (one, other) = (summarise(&posterior(1.0)), summarise(&posterior(1e6)));
@@ -277,6 +331,10 @@ mod tests {
         assert_eq!(
             (row.conditional_mean, row.conditional_sd, row.interval95),
             (None, None, [0.0; 2])
+        );
+        assert_eq!(
+            (row.conditional_median, row.conditional_interval68),
+            (None, None)
         );
         assert!(!row.selected);
     }

@@ -435,23 +435,32 @@ impl Library {
         Some(values[phi.0 as usize].value)
     }
 
+    /// What a term (index into [`Library::terms`]) is, in words: "viscous friction on elbow".
+    pub fn story(&self, term: usize) -> &str {
+        &self.stories[term]
+    }
+
     /// A term (index into [`Library::terms`]) with its coefficient in one sentence, e.g.
-    /// "viscous friction on elbow: +0.120 ± 0.010 N·m·s/rad".
-    pub fn words(&self, term: usize, mean: f64, sd: f64) -> String {
+    /// "viscous friction on elbow: +0.120 ± 0.010 N·m·s/rad"; `spread` is half the width of the central 68.3 % interval.
+    /// NaN: no model holds it.
+    pub fn words(&self, term: usize, value: f64, spread: f64) -> String {
+        let story = &self.stories[term];
+        if !value.is_finite() {
+            return format!("{story}: {}", super::words::NO_MODEL);
+        }
         // What no motor or brake can do on its own is said of the model.
         let hint = match self.terms[term].family {
-            Family::MotorInertia if mean < 0.0 => {
+            Family::MotorInertia if value < 0.0 => {
                 " (negative: the model has too much inertia there)"
             }
-            Family::Viscous | Family::Coulomb if mean < 0.0 => {
+            Family::Viscous | Family::Coulomb if value < 0.0 => {
                 " (negative: the model has too much friction there)"
             }
             _ => "",
         };
         format!(
-            "{}: {} {}{hint}",
-            self.stories[term],
-            super::words::estimate(mean, sd),
+            "{story}: {} {}{hint}",
+            super::words::estimate(value, spread),
             self.terms[term].unit
         )
     }

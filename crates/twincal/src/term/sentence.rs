@@ -4,39 +4,42 @@ use super::component::Component;
 use super::words::estimate;
 use super::{Family, words};
 
-/// A parameter's value with its sd, as it goes into a sentence.
+/// A parameter's value with its spread, as it goes into a sentence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     /// `mass`, `com_x`, `stiffness`, …
     pub name: String,
     /// SI unit.
     pub unit: String,
-    /// Mean.
-    pub mean: f64,
-    /// Standard deviation.
-    pub sd: f64,
+    /// Median; NaN where no joint shows it or no model holds it.
+    pub value: f64,
+    /// Half the width of the central 68.3 % interval.
+    pub spread: f64,
 }
 
 impl std::fmt::Display for Estimate {
     /// "+1.740 ± 0.004 kg".
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let unit = if self.unit == "1" { "" } else { &self.unit };
-        write!(f, "{} {unit}", estimate(self.mean, self.sd))
+        write!(f, "{} {unit}", estimate(self.value, self.spread))
     }
 }
 
 /// Parameters of a component that are told at most; the rest stands in the tables.
 const TOLD: usize = 3;
-/// A parameter further from 0 than this many sds is worth telling.
+/// A parameter further from 0 than this many spreads is worth telling.
 const CLEAR: f64 = 2.0;
 
 /// "payload at tool0: +1.200 ± 0.030 kg, centre of mass (0, 2, 61) ± 4 mm".
 pub(super) fn sentence(component: &Component, parameters: &[Estimate]) -> String {
+    if !parameters.iter().any(|p| p.value.is_finite()) {
+        return format!("{}: {}", component.story, words::NO_MODEL);
+    }
     let text = match component.family {
         Family::Payload => payload(parameters),
         Family::Gain | Family::LoadFriction | Family::MassScale => parameters
             .first()
-            .map(|p| format!("{} %", words::estimate(100.0 * p.mean, 100.0 * p.sd)))
+            .map(|p| format!("{} %", words::estimate(100.0 * p.value, 100.0 * p.spread)))
             .unwrap_or_default(),
         Family::EncoderZero => parameters.first().map(angle).unwrap_or_default(),
         Family::Tilt => tilt(parameters),
@@ -48,13 +51,13 @@ pub(super) fn sentence(component: &Component, parameters: &[Estimate]) -> String
 }
 
 fn one(p: &Estimate) -> String {
-    format!("{} {}", estimate(p.mean, p.sd), p.unit)
+    format!("{} {}", estimate(p.value, p.spread), p.unit)
 }
 
 /// The clearest parameters by name.
 fn several(parameters: &[Estimate]) -> String {
-    let clearness = |p: &Estimate| p.mean.abs() / p.sd.max(f64::MIN_POSITIVE);
-    let mut order: Vec<&Estimate> = parameters.iter().filter(|p| p.mean.is_finite()).collect();
+    let clearness = |p: &Estimate| p.value.abs() / p.spread.max(f64::MIN_POSITIVE);
+    let mut order: Vec<&Estimate> = parameters.iter().filter(|p| p.value.is_finite()).collect();
     order.sort_by(|a, b| clearness(b).total_cmp(&clearness(a)));
     let clear = order.iter().filter(|p| clearness(p) > CLEAR).count();
     order.truncate(clear.clamp(1, TOLD));
@@ -72,11 +75,15 @@ fn payload(parameters: &[Estimate]) -> String {
     let com = &rest[..3.min(rest.len())];
     let mass_text = one(mass);
     // Without a clear mass there is no centre of it.
-    if mass.mean.abs() < CLEAR * mass.sd || com.iter().any(|c| !c.mean.is_finite()) {
+    if mass.value.abs() < CLEAR * mass.spread || !com.iter().any(|c| c.value.is_finite()) {
         return mass_text;
     }
-    let millimetres: Vec<String> = com.iter().map(|c| format!("{:.0}", 1e3 * c.mean)).collect();
-    let worst = com.iter().map(|c| 1e3 * c.sd).fold(0.0, f64::max);
+    let millimetre = |c: &Estimate| match c.value {
+        value if value.is_finite() => format!("{:.0}", 1e3 * value),
+        _ => "–".into(), // no joint shows it
+    };
+    let millimetres: Vec<String> = com.iter().map(millimetre).collect();
+    let worst = com.iter().map(|c| 1e3 * c.spread).fold(0.0, f64::max);
     format!(
         "{mass_text}, centre of mass ({}) ± {:.*} mm",
         millimetres.join(", "),
@@ -87,26 +94,26 @@ fn payload(parameters: &[Estimate]) -> String {
 
 fn angle(p: &Estimate) -> String {
     if p.unit == "m" {
-        return format!("{} mm", estimate(1e3 * p.mean, 1e3 * p.sd));
+        return format!("{} mm", estimate(1e3 * p.value, 1e3 * p.spread));
     }
     format!(
         "{}°",
-        estimate(p.mean.to_degrees(), p.sd.to_degrees()).replace(" ± ", "° ± ")
+        estimate(p.value.to_degrees(), p.spread.to_degrees()).replace(" ± ", "° ± ")
     )
 }
 
 fn tilt(parameters: &[Estimate]) -> String {
     let values: Vec<String> = parameters
         .iter()
-        .filter(|p| p.mean != 0.0 || p.sd != 0.0) // an axis that no joint shows
-        .map(|p| format!("{} {}", p.name, estimate(p.mean, p.sd)))
+        .filter(|p| p.value.is_finite()) // the others no joint shows
+        .map(|p| format!("{} {}", p.name, estimate(p.value, p.spread)))
         .collect();
     format!("{} m/s²", values.join(", "))
 }
 
 /// What no motor or brake can do on its own is said of the model.
 fn hint(family: Family, parameters: &[Estimate]) -> &'static str {
-    let negative = parameters.first().is_some_and(|p| p.mean < 0.0);
+    let negative = parameters.first().is_some_and(|p| p.value < 0.0);
     match family {
         Family::MotorInertia if negative => " (negative: the model has too much inertia there)",
         Family::Viscous | Family::Coulomb if negative => {
@@ -133,11 +140,11 @@ mod tests {
     }
 
     fn estimates(values: &[(&str, &str, f64, f64)]) -> Vec<Estimate> {
-        let one = |&(name, unit, mean, sd): &(&str, &str, f64, f64)| Estimate {
+        let one = |&(name, unit, value, spread): &(&str, &str, f64, f64)| Estimate {
             name: name.into(),
             unit: unit.into(),
-            mean,
-            sd,
+            value,
+            spread,
         };
         values.iter().map(one).collect()
     }
@@ -153,6 +160,34 @@ mod tests {
         assert_eq!(
             sentence(&component(Family::Payload, "payload at tool0"), &parameters),
             "payload at tool0: +1.200 ± 0.030 kg, centre of mass (0, 2, 61) ± 4 mm"
+        );
+    }
+
+    #[test]
+    fn what_no_joint_shows_has_no_number() {
+        let parameters = estimates(&[
+            ("mass", "kg", 1.2, 0.03),
+            ("com_x", "m", 0.002, 0.002),
+            ("com_y", "m", f64::NAN, f64::NAN),
+            ("com_z", "m", 0.061, 0.004),
+        ]);
+        let payload = component(Family::Payload, "payload at tool0");
+        assert_eq!(
+            sentence(&payload, &parameters),
+            "payload at tool0: +1.200 ± 0.030 kg, centre of mass (2, –, 61) ± 4 mm"
+        );
+        let tilt = estimates(&[
+            ("x", "m/s²", 0.2, 0.01),
+            ("y", "m/s²", f64::NAN, f64::NAN),
+        ]);
+        assert_eq!(
+            sentence(&component(Family::Tilt, "gravity"), &tilt),
+            "gravity: x +0.200 ± 0.010 m/s²"
+        );
+        let nothing = estimates(&[("value", "N·m", f64::NAN, f64::NAN)]);
+        assert_eq!(
+            sentence(&component(Family::Offset, "offset on a"), &nothing),
+            "offset on a: in no model"
         );
     }
 

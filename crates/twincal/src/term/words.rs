@@ -1,26 +1,32 @@
 //! Estimates as people write them.
 
-/// "+0.120 ± 0.010": the sd with two digits, the mean to the same place; one power of ten where they are tiny or huge.
-pub(super) fn estimate(mean: f64, sd: f64) -> String {
-    let size = mean.abs().max(sd.abs());
-    if !(mean.is_finite() && sd.is_finite()) {
-        return format!("{mean:+} ± {sd}");
+/// What is said of a parameter that no model holds.
+pub(super) const NO_MODEL: &str = "in no model";
+
+/// "+0.120 ± 0.010": the spread with two digits, the value to the same place; one power of ten where they are tiny or huge.
+///
+/// The value is the posterior's median, the spread half the width of its central 68.3 % interval: one sd where it is normal,
+/// and not blown up by a few models far off.
+pub(super) fn estimate(value: f64, spread: f64) -> String {
+    let size = value.abs().max(spread.abs());
+    if !(value.is_finite() && spread.is_finite()) {
+        return format!("{value:+} ± {spread}");
     }
     if size != 0.0 && !(1e-3..1e6).contains(&size) {
         let power = size.log10().floor() as i32;
         let unit = 10.0_f64.powi(power);
-        return format!("({})·10^{power}", plain(mean / unit, sd / unit));
+        return format!("({})·10^{power}", plain(value / unit, spread / unit));
     }
-    plain(mean, sd)
+    plain(value, spread)
 }
 
-fn plain(mean: f64, sd: f64) -> String {
-    let decimals = if sd > 0.0 {
-        (1.0 - sd.log10().floor()).clamp(0.0, 6.0) as usize
+fn plain(value: f64, spread: f64) -> String {
+    let decimals = if spread > 0.0 {
+        (1.0 - spread.log10().floor()).clamp(0.0, 6.0) as usize
     } else {
         4
     };
-    format!("{mean:+.decimals$} ± {sd:.decimals$}")
+    format!("{value:+.decimals$} ± {spread:.decimals$}")
 }
 
 #[cfg(test)]
@@ -28,8 +34,8 @@ mod tests {
     use super::estimate;
 
     #[test]
-    fn two_digits_of_the_sd_and_the_mean_to_the_same_place() {
-        for (mean, sd, expected) in [
+    fn two_digits_of_the_spread_and_the_value_to_the_same_place() {
+        for (value, spread, expected) in [
             (0.12, 0.01, "+0.120 ± 0.010"),
             (-12.345, 0.99, "-12.35 ± 0.99"),
             (1234.5, 120.0, "+1234 ± 120"),
@@ -39,7 +45,7 @@ mod tests {
             (0.31, 0.0, "+0.3100 ± 0.0000"),
             (1.0, 1e-12, "+1.000000 ± 0.000000"),
         ] {
-            assert_eq!(estimate(mean, sd), expected);
+            assert_eq!(estimate(value, spread), expected);
         }
     }
 }

@@ -376,7 +376,7 @@ fn reason(family: Family, format: &str) -> String {
         Family::Spring => "springs",
         Family::Potential => "potentials of a joint",
         Family::Asymmetry => "friction that depends on direction",
-        Family::Stribeck => "friction that falls with speed",
+        Family::Stribeck => "friction that changes with speed",
         Family::LoadFriction => "friction that grows with the load",
         Family::CoupledFriction => "friction of coupled motors",
         Family::Gain => "torque gains",

@@ -3,6 +3,14 @@
 use super::projection::{Block, project};
 use super::pseudo_inertia::{factor, inverse, pseudo_inertia, times};
 
+#[test]
+fn a_reason_says_nothing_that_the_sign_of_the_effect_could_contradict() {
+    assert_eq!(
+        super::reason(crate::term::Family::Stribeck, "URDF"),
+        "a URDF cannot hold friction that changes with speed"
+    );
+}
+
 /// Ten parameters of point masses: Σ m (1, x, |x|² E − x xᵀ).
 fn points(masses: &[(f64, [f64; 3])]) -> [f64; 10] {
     let mut p = [0.0; 10];
