@@ -3,7 +3,8 @@
 use self::library::{BaseRow, ComponentRow, base_row, component_rows};
 use super::checkup::checkup;
 use super::inputs::{LogInput, RobotInput};
-use super::summary::{Notes, findings, paragraph, print_table, significant, table};
+use super::summary::{Notes, findings, paragraph, significant};
+use super::table::{print_table, table};
 use super::{code_of, print_json, require_strict, settings, start_threads};
 use crate::args::Inspect;
 use crate::failure::Outcome;

@@ -14,6 +14,7 @@ mod predict;
 mod report;
 mod settings;
 mod summary;
+mod table;
 
 use crate::args::Command;
 use crate::failure::{DEGRADED, Failure, Outcome};

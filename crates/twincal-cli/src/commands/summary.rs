@@ -1,18 +1,17 @@
 //! What a person reads after a fit: physical sentences, terms, held-out scores, findings.
 
+use super::table::{print_table, table};
 use crate::terminal::{Terminal, clean};
-use comfy_table::presets::NOTHING;
-use comfy_table::{CellAlignment, ContentArrangement, Table};
 use twincal::calibrate::{Calibration, ComponentSummary, TermSummary, Verdict};
 use twincal::term::Status;
 use twincal::validate::{Scores, Split};
 use twincal::{Finding, Severity};
 use twincal_io::result_json::status_word;
 
-/// Width of the terminal that everything fits.
-const WIDTH: u16 = 80;
 /// Dropped columns up to this number are named.
 const FEW: usize = 4;
+/// What the table of components holds.
+const VALUE: &str = "value: median, given that it is in; ±: half of the central 68 % interval";
 /// Terms below this probability are only counted.
 const MENTIONED: f64 = 0.05;
 
@@ -72,7 +71,7 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
 
 /// Every component worth mentioning; one of several columns has its numbers in the report and in result.json.
 fn components(calibration: &Calibration, terminal: &mut Terminal) {
-    let mut table = table(&["component", "PIP", "mean", "± sd", "unit"]);
+    let mut table = table(&["component", "PIP", "value", "±", "unit"]);
     let (mut rare, mut dropped) = (0, Vec::new());
     for component in &calibration.components {
         match component.pip {
@@ -84,6 +83,9 @@ fn components(calibration: &Calibration, terminal: &mut Terminal) {
         }
     }
     print_table(&table, terminal);
+    if !table.is_empty() {
+        paragraph(VALUE, terminal);
+    }
     if rare > 0 {
         terminal.say(&format!("  {rare} more below PIP {MENTIONED}"));
     }
@@ -121,13 +123,20 @@ fn row(component: &ComponentSummary, terms: &[TermSummary]) -> [String; 5] {
     let own: Vec<&TermSummary> = terms_of(component, terms).collect();
     match own[..] {
         [term] => {
-            let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
-            let (mean, sd) = with_sd(number(term.mean), number(term.sd));
-            [name, p, mean, sd, clean(&term.term.unit)]
+            let (value, spread) = match component.parameters.first() {
+                Some(parameter) if parameter.seen => {
+                    let (value, spread) = parameter.told();
+                    with_sd(value, spread)
+                }
+                _ => ("not seen".into(), String::new()),
+            };
+            [name, p, value, spread, clean(&term.term.unit)]
         }
         _ => {
-            let live = own.iter().filter(|term| term.pip.is_some()).count();
-            let size = format!("{live} numbers");
+            let size = match component.parameters.iter().filter(|p| p.seen).count() {
+                1 => "1 number".into(),
+                seen => format!("{seen} numbers"),
+            };
             [name, p, size, String::new(), String::new()]
         }
     }
@@ -355,26 +364,6 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// A table without lines; numbers stand right.
-pub(super) fn table(header: &[&str]) -> Table {
-    let mut table = Table::new();
-    table
-        .load_style(NOTHING)
-        .set_content_arrangement(ContentArrangement::Dynamic)
-        .set_width(WIDTH);
-    table.set_header(header);
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
-}
-
-pub(super) fn print_table(table: &Table, terminal: &mut Terminal) {
-    for line in table.lines() {
-        terminal.say(&format!(" {}", line.trim_end()));
-    }
-}
-
 /// A probability; never rounded to certainty.
 pub(super) fn pip(pip: Option<f64>) -> String {
     match pip {
@@ -393,7 +382,7 @@ pub(super) fn percent(share: f64) -> String {
     }
 }
 
-/// Mean and sd with the sd's two leading digits.
+/// A value and what stands behind ±, which gives two digits.
 fn with_sd(mean: f64, sd: f64) -> (String, String) {
     let size = sd.abs().max(mean.abs());
     if !(sd > 0.0 && (1e-4..1e6).contains(&size)) {

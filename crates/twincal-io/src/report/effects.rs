@@ -31,8 +31,10 @@ pub(super) struct Effect {
     pub(super) name: String,
     pub(super) family: &'static str,
     pub(super) pip: String,
-    /// What it is known by, given that it is there.
+    /// What it is known by, given that it is there; only what the data see.
     pub(super) parameters: Vec<Parameter>,
+    /// Names of the others.
+    pub(super) unseen: Vec<String>,
     /// The sampler cannot tell on which side of 0.5 it lies.
     pub(super) undecided: bool,
     /// The data say nothing about it.
@@ -65,7 +67,10 @@ pub(super) fn sort(calibration: &Calibration) -> Effects {
         .filter_map(|c| Some((c, c.pip?)))
         .collect();
     let strength = |c: &ComponentSummary| {
-        let clear = |p: &ParameterSummary| (p.mean / p.sd).abs();
+        let clear = |p: &ParameterSummary| {
+            let (value, spread) = p.told();
+            (value / spread).abs()
+        };
         let all = c.parameters.iter().map(clear).filter(|x| x.is_finite());
         all.fold(0.0, f64::max)
     };
@@ -98,7 +103,8 @@ fn effect(component: &ComponentSummary, pip: f64) -> Effect {
         name: component.name.clone(),
         family: family_name(component.family),
         pip: probability(pip),
-        parameters: component.parameters.iter().map(parameter).collect(),
+        parameters: seen(component, true).map(parameter).collect(),
+        unseen: seen(component, false).map(name).collect(),
         undecided: component
             .pip_mcse
             .is_some_and(|e| e > 0.0 && (pip - 0.5).abs() < 3.0 * e),
@@ -107,17 +113,31 @@ fn effect(component: &ComponentSummary, pip: f64) -> Effect {
     }
 }
 
+/// The parameters that these data see, or those that they do not.
+fn seen(component: &ComponentSummary, wanted: bool) -> impl Iterator<Item = &ParameterSummary> {
+    component
+        .parameters
+        .iter()
+        .filter(move |p| p.seen == wanted)
+}
+
+/// A parameter's name; empty where there is only one.
+fn name(parameter: &ParameterSummary) -> String {
+    match parameter.name.as_str() {
+        "value" => String::new(),
+        name => name.replace('_', " "),
+    }
+}
+
 fn parameter(parameter: &ParameterSummary) -> Parameter {
+    let (value, spread) = parameter.told();
     let unit = match parameter.unit.as_str() {
         "1" => "",
         unit => unit,
     };
     Parameter {
-        name: match parameter.name.as_str() {
-            "value" => String::new(),
-            name => name.replace('_', " "),
-        },
-        value: plus_minus(parameter.mean, parameter.sd),
+        name: name(parameter),
+        value: plus_minus(value, spread),
         unit: unit.into(),
         interval: interval(parameter.interval95),
     }
@@ -176,6 +196,38 @@ mod tests {
                 .iter()
                 .any(|d| d.reason.contains("total time derivative"))
         );
+    }
+
+    #[test]
+    fn a_parameter_that_the_data_do_not_see_has_no_number() {
+        let mut calibration = fixture::two_joints();
+        let component = &mut calibration.components[0];
+        let parameter = |name: &str, value: f64, seen| ParameterSummary {
+            name: name.into(),
+            unit: "kg·m²".into(),
+            mean: value + 0.3,
+            sd: 0.58,
+            interval95: [0.32, 0.63],
+            median: value,
+            interval68: [value - 0.08, value + 0.08],
+            seen,
+        };
+        component.parameters = vec![
+            parameter("ixx", 0.47, true),
+            parameter("com_y", f64::NAN, false),
+            parameter("izz", 0.0, false),
+        ];
+        let name = component.name.clone();
+        let effects = sort(&calibration);
+        let all = effects.found.iter().chain(&effects.possible);
+        let effect = all.chain(&effects.absent).find(|e| e.name == name).unwrap();
+        assert_eq!(effect.parameters.len(), 1);
+        assert_eq!(effect.parameters[0].value, "0.470 ± 0.080");
+        assert_eq!(effect.unseen, ["com y", "izz"]);
+        let html = crate::report::render(&calibration, &crate::report::ReportContext::default());
+        let html = html.unwrap();
+        assert!(html.contains("not seen by these data: com y, izz"));
+        assert!(!html.contains("0 ± 0<"));
     }
 
     #[test]

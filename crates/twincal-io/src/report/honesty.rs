@@ -60,7 +60,8 @@ pub(super) fn guarantee(validation: &Validation) -> String {
         .map(|joint| format!("{} {}", joint.joint, number(joint.factor, 3)))
         .collect();
     format!(
-        "Without believing the model: stretched by {}, the 95 % intervals of all joints hold {} of the rows of the next log          like these with probability {}/{} = {} {}. Joint by joint: {}.",
+        "Without believing the model: stretched by {}, the 95 % intervals of all joints hold {} of the rows of the next log \
+         like these with probability {}/{} = {} {}. Joint by joint: {}.",
         number(conformal.factor, 3),
         percent(conformal.rows),
         conformal.trajectories,

@@ -28,6 +28,8 @@ struct Page<'a> {
     effects: Effects,
     inclusion: Option<Figure>,
     pairs: Option<Figure>,
+    /// Which coefficients the figure of pairs shows, where it does not show all; may be empty.
+    pairs_shown: String,
     curves: Option<Figure>,
     torque: Vec<Figure>,
     other_torque: Vec<Figure>,
@@ -79,6 +81,10 @@ pub(super) fn fill(
         }
         _ => escape_formatter(out, state, value),
     });
+    // Names may break after `_` and `.`; what comes out is escaped already.
+    environment.add_filter("breaks", |text: String| {
+        Value::from_safe_string(text::breakable(&text))
+    });
     environment.add_template("report.html", include_str!("report.html"))?;
     environment.add_template("report.css", include_str!("report.css"))?;
     let joints = view::joints(calibration);
@@ -113,6 +119,7 @@ fn gather<'a>(
         effects: effects::sort(calibration),
         inclusion: figures::inclusion::figure(&calibration.components),
         pairs: figures::pairs::figure(&calibration.draws, terms),
+        pairs_shown: figures::pairs::shown(&calibration.draws, terms),
         curves: figures::curves::figure(&calibration.curves, joints),
         torque: joints.iter().filter_map(figures::torque::figure).collect(),
         other_torque: joints

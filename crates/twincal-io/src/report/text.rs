@@ -64,6 +64,29 @@ pub(super) fn escape(text: &str) -> String {
     out
 }
 
+/// [`escape`]d text with places for line breaks after `_` and after `.` before a letter: names break there or nowhere.
+pub(super) fn breakable(text: &str) -> String {
+    let text = clean(text);
+    let mut out = String::with_capacity(text.len());
+    let mut rest = 0;
+    let mut letters = text.char_indices().peekable();
+    while let Some((at, letter)) = letters.next() {
+        let next = letters.peek().map(|(_, next)| *next);
+        let breaks = match letter {
+            '_' => next.is_some_and(|next| !next.is_whitespace()),
+            '.' => next.is_some_and(char::is_alphabetic),
+            _ => false,
+        };
+        if breaks {
+            out.push_str(&escape(&text[rest..=at]));
+            out.push_str("<wbr/>");
+            rest = at + 1;
+        }
+    }
+    out.push_str(&escape(&text[rest..]));
+    out
+}
+
 /// `text` cut to about `width` pixels at `size` pixels per em, with an ellipsis in the middle (names differ at their ends).
 pub(super) fn shorten(text: &str, width: f64, size: f64) -> String {
     let text = clean(text).replace(['\n', '\t'], " ");
@@ -254,6 +277,15 @@ mod tests {
             escape(r#"<a b="c" d='e'>&"#),
             "&lt;a b=&quot;c&quot; d=&#39;e&#39;&gt;&amp;"
         );
+    }
+
+    #[test]
+    fn names_break_after_an_underscore_or_a_dot_before_a_letter() {
+        assert_eq!(
+            breakable("shoulder_pan.<b> 0.25 q_1.viscous: end."),
+            "shoulder_<wbr/>pan.&lt;b&gt; 0.25 q_<wbr/>1.<wbr/>viscous: end."
+        );
+        assert_eq!(breakable("é_ü_"), "é_<wbr/>ü_");
     }
 
     #[test]

@@ -176,10 +176,7 @@ mod tests {
             sentence(&payload, &parameters),
             "payload at tool0: +1.200 ± 0.030 kg, centre of mass (2, –, 61) ± 4 mm"
         );
-        let tilt = estimates(&[
-            ("x", "m/s²", 0.2, 0.01),
-            ("y", "m/s²", f64::NAN, f64::NAN),
-        ]);
+        let tilt = estimates(&[("x", "m/s²", 0.2, 0.01), ("y", "m/s²", f64::NAN, f64::NAN)]);
         assert_eq!(
             sentence(&component(Family::Tilt, "gravity"), &tilt),
             "gravity: x +0.200 ± 0.010 m/s²"

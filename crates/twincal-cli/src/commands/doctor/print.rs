@@ -2,7 +2,8 @@
 
 use super::super::inspect::library::{directions, families};
 use super::super::inspect::log_heading;
-use super::super::summary::{indented, paragraph, percent, print_table, significant, table};
+use super::super::summary::{indented, paragraph, percent, significant};
+use super::super::table::{print_table, table};
 use super::examine::Mapping;
 use super::{Diagnosis, LogRow};
 use crate::terminal::{Terminal, clean};

@@ -1,6 +1,7 @@
 //! What `fit` would look for, and what the logs cannot show of it.
 
-use super::super::summary::{paragraph, print_table, table};
+use super::super::summary::paragraph;
+use super::super::table::{print_table, table};
 use super::Inspection;
 use crate::terminal::Terminal;
 use serde::Serialize;

@@ -3,7 +3,7 @@
 use crate::report::figure::{Figure, Image};
 use crate::report::scale::Scale;
 use crate::report::svg::{Anchor, Path, Svg};
-use crate::report::text::{fixed, shorten, text_width};
+use crate::report::text::{count, fixed, list, shorten, text_width};
 use std::collections::BTreeMap;
 use twincal::calibrate::{Draws, TermSummary};
 
@@ -12,23 +12,14 @@ const HEX: f64 = 3.6;
 /// Shades of the hexagons, light to dark.
 const SHADES: [&str; 5] = ["h1", "h2", "h3", "h4", "h5"];
 const BARS: usize = 18;
+/// Space between cells, px.
+const GAP: f64 = 8.0;
+/// Size of a label, px.
+const LABEL: f64 = 11.0;
 
 /// The figure; `None` without kept coefficients or draws.
 pub(in crate::report) fn figure(draws: &Draws, terms: &[TermSummary]) -> Option<Figure> {
-    let variables: Vec<Variable<'_>> = draws
-        .terms
-        .iter()
-        .zip(&draws.values)
-        .filter(|(_, values)| values.iter().filter(|v| v.is_finite()).count() > 1)
-        .map(|(name, values)| Variable {
-            name,
-            values,
-            unit: terms
-                .iter()
-                .find(|t| t.term.name == *name)
-                .map_or("", |t| &t.term.unit),
-        })
-        .collect();
+    let variables = variables(draws, terms);
     if variables.is_empty() {
         return None;
     }
@@ -48,6 +39,72 @@ pub(in crate::report) fn figure(draws: &Draws, terms: &[TermSummary]) -> Option<
     })
 }
 
+/// Which coefficients are drawn and why, where it is not all, and what the numbers stand for that replace long names; empty
+/// where the figure says everything.
+pub(in crate::report) fn shown(draws: &Draws, terms: &[TermSummary]) -> String {
+    let kept = terms.iter().filter(|term| term.selected).count();
+    let names: Vec<&str> = variables(draws, terms).iter().map(|v| v.name).collect();
+    let drawn = names.len();
+    let mut out = String::new();
+    let numbered = numbered(&names);
+    if drawn > 0 && drawn < kept {
+        out = format!(
+            "Shown are the {} of {} kept coefficients that are largest against their ±",
+            count(drawn as u64),
+            count(kept as u64)
+        );
+        if !numbered {
+            out.push_str(&format!(": {}", list(&names)));
+        }
+        out.push_str(". All of them stand in the table of effects and in result.json. ");
+    }
+    if numbered {
+        let each: Vec<String> = (1..)
+            .zip(&names)
+            .map(|(n, name)| format!("{n} {name}"))
+            .collect();
+        out.push_str(&format!("In the figure: {}.", list(&each)));
+    }
+    out.trim_end().to_owned()
+}
+
+/// True where names do not fit beside their cells: cut short they could not be told from each other.
+fn numbered(names: &[&str]) -> bool {
+    let cell = cell(names.len());
+    names
+        .iter()
+        .any(|name| text_width(name, LABEL) > cell + GAP)
+}
+
+/// The coefficients that have draws.
+fn variables<'a>(draws: &'a Draws, terms: &'a [TermSummary]) -> Vec<Variable<'a>> {
+    draws
+        .terms
+        .iter()
+        .zip(&draws.values)
+        .filter(|(_, values)| values.iter().filter(|v| v.is_finite()).count() > 1)
+        .map(|(name, values)| Variable {
+            name,
+            values,
+            unit: terms
+                .iter()
+                .find(|t| t.term.name == *name)
+                .map_or("", |t| &t.term.unit),
+        })
+        .collect()
+}
+
+/// Width of a cell where `k` coefficients are drawn, px.
+fn cell(k: usize) -> f64 {
+    match k {
+        0 | 1 => 240.0,
+        2 => 190.0,
+        3..=4 => 150.0,
+        5..=6 => 120.0,
+        _ => 94.0,
+    }
+}
+
 struct Variable<'a> {
     name: &'a str,
     unit: &'a str,
@@ -56,16 +113,19 @@ struct Variable<'a> {
 
 fn draw(variables: &[Variable<'_>], label: &str) -> String {
     let k = variables.len();
-    let cell = match k {
-        1 => 240.0,
-        2 => 190.0,
-        3..=4 => 150.0,
-        5..=6 => 120.0,
-        _ => 94.0,
+    let cell = cell(k);
+    let names: Vec<&str> = variables.iter().map(|v| v.name).collect();
+    let numbered = numbered(&names);
+    let label_of = |index: usize| {
+        if numbered {
+            (index + 1).to_string()
+        } else {
+            shorten(names[index], cell + GAP, LABEL)
+        }
     };
-    let (left, top, gap) = (64.0, 26.0, 8.0);
-    let at = |i: usize| i as f64 * (cell + gap);
-    let size = at(k) - gap;
+    let (left, top) = (64.0, 26.0);
+    let at = |i: usize| i as f64 * (cell + GAP);
+    let size = at(k) - GAP;
     let mut svg = Svg::new(left + size + 12.0, top + size + 52.0);
     let scales: Vec<Scale> = variables
         .iter()
@@ -124,13 +184,13 @@ fn draw(variables: &[Variable<'_>], label: &str) -> String {
                 top + at(row) - if row == 0 { 9.0 } else { 2.0 },
             ),
             Anchor::Middle,
-            &shorten(y.name, cell + 12.0, 11.5),
+            &label_of(row),
         );
         svg.text(
             "l",
             (left + middle, top + size + 32.0),
             Anchor::Middle,
-            &shorten(y.name, cell + 4.0, 11.0),
+            &label_of(row),
         );
         if !y.unit.is_empty() {
             svg.text(
@@ -141,12 +201,7 @@ fn draw(variables: &[Variable<'_>], label: &str) -> String {
             );
         }
         if row > 0 {
-            svg.text_up(
-                "l",
-                (12.0, top + middle),
-                Anchor::Middle,
-                &shorten(y.name, cell + 4.0, 11.0),
-            );
+            svg.text_up("l", (12.0, top + middle), Anchor::Middle, &label_of(row));
         }
     }
     svg.finish(label)
@@ -352,6 +407,36 @@ mod tests {
         assert_eq!(bulk(&values)[0], 0.0);
         assert!(bulk(&[f64::NAN])[0].is_nan());
         assert_eq!(bulk(&[2.0]), [2.0; 2]);
+    }
+
+    #[test]
+    fn coefficients_that_are_not_drawn_are_counted() {
+        let mut calibration = crate::report::fixture::two_joints();
+        assert_eq!(shown(&calibration.draws, &calibration.terms), "");
+        calibration.draws.terms.truncate(2);
+        calibration.draws.values.truncate(2);
+        let text = shown(&calibration.draws, &calibration.terms);
+        assert!(!text.contains("In the figure"), "{text}");
+        let drawn = calibration.draws.terms.join(" and ");
+        assert!(
+            text.starts_with("Shown are the 2 of 7 kept coefficients")
+                && text.contains(&format!(": {drawn}. ")),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn names_that_do_not_fit_are_numbered_not_cut() {
+        let mut calibration = crate::report::fixture::two_joints();
+        let long = "shoulder_pan_joint_of_the_left_arm.viscous";
+        calibration.draws.terms[0] = long.into();
+        let text = shown(&calibration.draws, &calibration.terms);
+        assert!(
+            text.starts_with(&format!("In the figure: 1 {long}, 2 ")),
+            "{text}"
+        );
+        let figure = figure(&calibration.draws, &calibration.terms).unwrap();
+        assert!(figure.images[0].wide.contains(">7<") && !figure.images[0].wide.contains('…'));
     }
 
     #[test]
