@@ -124,10 +124,10 @@ fn row(component: &ComponentSummary, terms: &[TermSummary]) -> [String; 5] {
     match own[..] {
         [term] => {
             let (value, spread) = match component.parameters.first() {
-                Some(parameter) if parameter.seen => {
-                    let (value, spread) = parameter.told();
-                    with_sd(value, spread)
-                }
+                Some(parameter) if parameter.seen => match parameter.told() {
+                    (value, spread) if value.is_finite() => with_sd(value, spread),
+                    _ => ("–".into(), String::new()),
+                },
                 _ => ("not seen".into(), String::new()),
             };
             [name, p, value, spread, clean(&term.term.unit)]

@@ -55,8 +55,12 @@ pub(super) fn sentences(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<
 /// Sentences on what another motion would show, at most.
 const MOTIONS: usize = 4;
 
-/// A message as a sentence of its own.
+/// A message as a sentence of its own; a name at its beginning stays as it is.
 fn sentence(message: &str) -> String {
+    let first = message.split([' ', ',']).next().unwrap_or("");
+    if first.contains(|c: char| !c.is_alphabetic()) {
+        return format!("{message}.");
+    }
     let mut letters = message.chars();
     match letters.next() {
         Some(first) => format!("{}{}.", first.to_uppercase(), letters.as_str()),
@@ -113,7 +117,7 @@ mod tests {
         });
         let open = either_or(&calibration);
         assert!(
-            open.len() == 1 && open[0].contains("elbow.potential") && open[0].contains("0.98"),
+            open == ["elbow.spring or elbow.potential, with probability 0.98."],
             "{open:?}"
         );
     }

@@ -137,9 +137,18 @@ fn parameter(parameter: &ParameterSummary) -> Parameter {
     };
     Parameter {
         name: name(parameter),
-        value: plus_minus(value, spread),
+        // Only models too light to be listed hold it.
+        value: if value.is_finite() {
+            plus_minus(value, spread)
+        } else {
+            "–".into()
+        },
         unit: unit.into(),
-        interval: interval(parameter.interval95),
+        interval: if value.is_finite() {
+            interval(parameter.interval95)
+        } else {
+            "–".into()
+        },
     }
 }
 
@@ -214,6 +223,11 @@ mod tests {
         };
         component.parameters = vec![
             parameter("ixx", 0.47, true),
+            ParameterSummary {
+                sd: 0.0, // a difference of rounded sums
+                interval95: [f64::NAN; 2],
+                ..parameter("iyy", f64::NAN, true)
+            },
             parameter("com_y", f64::NAN, false),
             parameter("izz", 0.0, false),
         ];
@@ -221,8 +235,8 @@ mod tests {
         let effects = sort(&calibration);
         let all = effects.found.iter().chain(&effects.possible);
         let effect = all.chain(&effects.absent).find(|e| e.name == name).unwrap();
-        assert_eq!(effect.parameters.len(), 1);
-        assert_eq!(effect.parameters[0].value, "0.470 ± 0.080");
+        let values: Vec<&str> = effect.parameters.iter().map(|p| p.value.as_str()).collect();
+        assert_eq!(values, ["0.470 ± 0.080", "–"]);
         assert_eq!(effect.unseen, ["com y", "izz"]);
         let html = crate::report::render(&calibration, &crate::report::ReportContext::default());
         let html = html.unwrap();

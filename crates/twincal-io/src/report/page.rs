@@ -44,7 +44,7 @@ struct Page<'a> {
     halves: &'static str,
     compact: Vec<String>,
     sensitivity: Option<Figure>,
-    /// Terms whose selection depends on the prior, in one phrase; may be empty.
+    /// Effects whose selection depends on the prior, in one phrase; may be empty.
     sensitive: String,
     scores: Table,
     moving: Table,
@@ -108,10 +108,10 @@ fn gather<'a>(
         .flat_map(|t| t.pit.iter().copied())
         .collect();
     let others = OTHER_TRACES / joints.len().max(1);
-    let sensitive = terms
-        .iter()
+    let components = &calibration.components;
+    let sensitive = figures::sensitivity::one_each(terms)
         .filter(|t| figures::sensitivity::depends_on_prior(t))
-        .map(|t| t.term.name.as_str());
+        .map(|t| figures::sensitivity::name(t, components));
     Page {
         run,
         joints: joints.iter().map(|j| j.name).collect(),
@@ -137,7 +137,7 @@ fn gather<'a>(
         repeats: honesty::repeats(calibration),
         halves: honesty::halves(calibration),
         compact: honesty::compact(calibration, joints),
-        sensitivity: figures::sensitivity::figure(terms),
+        sensitivity: figures::sensitivity::figure(terms, components),
         sensitive: text::list(&sensitive.collect::<Vec<_>>()),
         scores: tables::scores(&validation.filtered, joints),
         moving: tables::scores(&validation.moving, joints),

@@ -106,15 +106,15 @@ pub struct ParameterSummary {
 
 impl ParameterSummary {
     /// What people are told: the median and half the width of the central 68.3 % interval. A few models far off move
-    /// mean and sd, not these; of a normal distribution they are mean and sd.
+    /// mean and sd, not these; of a normal distribution they are mean and sd. NaN where these logs do not show it, or where
+    /// only models too light to be listed hold it: their moments are differences of rounded sums.
     #[must_use]
     pub fn told(&self) -> (f64, f64) {
         let [low, high] = self.interval68;
-        if self.median.is_finite() {
-            (self.median, 0.5 * (high - low))
-        } else {
-            (self.mean, self.sd) // written by a version without quantiles
+        if self.median.is_nan() && self.interval95[0].is_finite() {
+            return (self.mean, self.sd); // written by a version without quantiles
         }
+        (self.median, 0.5 * (high - low))
     }
 }
 

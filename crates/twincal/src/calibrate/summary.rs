@@ -307,14 +307,11 @@ fn terms(
         .collect()
 }
 
-/// Median and half the central 68.3 %; NaN where no model holds the column.
+/// Median and half the central 68.3 %; NaN where no listed model holds the column.
 fn told(summary: &ColumnSummary) -> (f64, f64) {
     match (summary.conditional_median, summary.conditional_interval68) {
         (Some(median), Some([low, high])) => (median, 0.5 * (high - low)),
-        _ => (
-            summary.conditional_mean.unwrap_or(f64::NAN),
-            summary.conditional_sd.unwrap_or(f64::NAN),
-        ),
+        _ => (f64::NAN, f64::NAN),
     }
 }
 

@@ -442,7 +442,7 @@ impl Library {
 
     /// A term (index into [`Library::terms`]) with its coefficient in one sentence, e.g.
     /// "viscous friction on elbow: +0.120 ± 0.010 N·m·s/rad"; `spread` is half the width of the central 68.3 % interval.
-    /// NaN: no model holds it.
+    /// NaN: no model that counts holds it.
     pub fn words(&self, term: usize, value: f64, spread: f64) -> String {
         let story = &self.stories[term];
         if !value.is_finite() {

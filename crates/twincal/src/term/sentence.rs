@@ -184,7 +184,7 @@ mod tests {
         let nothing = estimates(&[("value", "N·m", f64::NAN, f64::NAN)]);
         assert_eq!(
             sentence(&component(Family::Offset, "offset on a"), &nothing),
-            "offset on a: in no model"
+            "offset on a: in no model that counts"
         );
     }
 

@@ -1,7 +1,7 @@
 //! Estimates as people write them.
 
-/// What is said of a parameter that no model holds.
-pub(super) const NO_MODEL: &str = "in no model";
+/// What is said of a parameter that only models too light to be listed hold.
+pub(super) const NO_MODEL: &str = "in no model that counts";
 
 /// "+0.120 ± 0.010": the spread with two digits, the value to the same place; one power of ten where they are tiny or huge.
 ///

@@ -3,7 +3,7 @@
 use crate::report::figure::{Figure, Image, Legend};
 use crate::report::scale::Scale;
 use crate::report::svg::{Anchor, Svg};
-use crate::report::text::{count, probability, shorten};
+use crate::report::text::{count, probability, shorten, text_width};
 use twincal::calibrate::ComponentSummary;
 use twincal::term::Family;
 
@@ -12,6 +12,10 @@ const MOST: usize = 60;
 /// "Stands out" means at least this inclusion probability.
 const LEAST: f64 = 0.05;
 const ROW: f64 = 18.0;
+/// Space for names beside the bars: on a desk screen, on a phone.
+pub(super) const NAMES: (f64, f64) = (250.0, 138.0);
+/// More height of a row whose name stands above its bar.
+pub(super) const ABOVE: f64 = 13.0;
 
 enum Row<'a> {
     Family(&'static str),
@@ -74,19 +78,38 @@ fn rows<'a>(components: &'a [ComponentSummary], live: usize) -> Vec<Row<'a>> {
     rows
 }
 
+/// Where bars begin, and true if names stand above them: on a phone where a name would be cut, so that two could look alike.
+pub(super) fn left<'a>(width: f64, mut names: impl Iterator<Item = &'a str>) -> (f64, bool) {
+    match width {
+        _ if width > 600.0 => (NAMES.0, false),
+        _ if names.any(|name| text_width(name, 12.0) > NAMES.1 - 14.0) => (6.0, true),
+        _ => (NAMES.1, false),
+    }
+}
+
 fn draw(rows: &[Row<'_>], width: f64, label: &str) -> String {
-    let left = if width > 600.0 { 250.0 } else { 138.0 };
+    let names = rows.iter().filter_map(|row| match row {
+        Row::Term(term, _) => Some(term.name.as_str()),
+        _ => None,
+    });
+    let (left, stacked) = left(width, names);
+    let height = |row: &Row<'_>| match row {
+        Row::Term(..) if stacked => ROW + ABOVE,
+        _ => ROW,
+    };
     let (right, top) = (width - 52.0, 6.0);
-    let bottom = top + ROW * rows.len() as f64 + 4.0;
+    let bottom = top + rows.iter().map(height).sum::<f64>() + 4.0;
     let mut svg = Svg::new(width, bottom + 38.0);
     let x = Scale::new((0.0, 1.0), (left, right));
     for (value, text) in x.ticks(if width > 600.0 { 10 } else { 5 }) {
         svg.line("g", (x.at(value), top), (x.at(value), bottom));
         svg.text("t", (x.at(value), bottom + 15.0), Anchor::Middle, &text);
     }
-    for (i, row) in rows.iter().enumerate() {
-        let y = top + ROW * i as f64;
-        let base = y + 13.5;
+    let mut next = top;
+    for row in rows {
+        let mut y = next;
+        next += height(row);
+        let mut base = y + 13.5;
         match row {
             Row::Family(name) => {
                 svg.rect("strip", (0.0, y + 2.0), (width, ROW - 2.0), None);
@@ -94,7 +117,7 @@ fn draw(rows: &[Row<'_>], width: f64, label: &str) -> String {
                     "l strong",
                     (4.0, base),
                     Anchor::Start,
-                    &shorten(name, left, 11.0),
+                    &shorten(name, width - 8.0, 11.0),
                 );
             }
             Row::Rest(n) => {
@@ -104,12 +127,14 @@ fn draw(rows: &[Row<'_>], width: f64, label: &str) -> String {
             Row::Term(term, pip) => {
                 let class = if term.selected { "kept" } else { "left" };
                 let hint = format!("{}: {}", term.name, probability(*pip));
-                svg.text(
-                    "name",
-                    (left - 6.0, base),
-                    Anchor::End,
-                    &shorten(&term.name, left - 12.0, 12.0),
-                );
+                if stacked {
+                    let name = shorten(&term.name, width - left, 12.0);
+                    svg.text("name", (left, base), Anchor::Start, &name);
+                    (y, base) = (y + ABOVE, base + ABOVE);
+                } else {
+                    let name = shorten(&term.name, left - 12.0, 12.0);
+                    svg.text("name", (left - 6.0, base), Anchor::End, &name);
+                }
                 // A bar of one pixel shows that there is a candidate.
                 svg.rect(
                     class,
@@ -181,6 +206,18 @@ mod tests {
             svg.contains(&format!(r#"width="{}""#, 0.25 * (880.0 - 52.0 - 250.0))),
             "{svg}"
         );
+    }
+
+    #[test]
+    fn a_long_name_stands_above_its_bar_on_a_phone() {
+        let mut term = fixture::two_joints().components[0].clone();
+        term.name = "shoulder_lift_joint.viscous".into();
+        for width in [350.0, 880.0] {
+            let svg = draw(&[Row::Term(&term, 0.25)], width, "");
+            assert!(svg.contains(&format!(">{}<", term.name)), "{svg}");
+        }
+        assert_eq!(left(350.0, ["elbow.viscous"].into_iter()), (138.0, false));
+        assert_eq!(left(350.0, [term.name.as_str()].into_iter()), (6.0, true));
     }
 
     #[test]
