@@ -14,6 +14,7 @@ mod fixture;
 mod page;
 mod plot;
 mod scale;
+mod shape;
 mod svg;
 mod tables;
 #[cfg(test)]

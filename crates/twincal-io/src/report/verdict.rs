@@ -1,12 +1,13 @@
 //! Can this twin be used, and where not: the first thing the report says, derived from held-out data alone.
 
+use super::shape;
 use super::text::{list, number, percent, with_sd};
 use super::view::{Joint, independent_rows, pooled_unit, standard_deviation};
 use serde::Serialize;
 use twincal::Severity;
 use twincal::calibrate::Calibration;
 use twincal::posterior::Method;
-use twincal::validate::{JointScore, Pit, Reliability, Split};
+use twincal::validate::{JointScore, Split};
 
 /// A 95 % interval is honest if it holds this share of the held-out rows (the range that `check` accepts).
 const COVERAGE: (f64, f64) = (0.90, 0.99);
@@ -18,10 +19,6 @@ const WORSE: f64 = 1.02;
 const FEW: f64 = 20.0;
 /// Share of the torque's standard deviation from which the remaining error is called large.
 const LARGE: f64 = 0.5;
-
-/// Distance of the PIT from uniform beyond which, if chance does not explain it, intervals are more than a little off: the
-/// 50 % interval then holds less than 40 % or more than 60 %.
-const OFF: f64 = 0.05;
 
 /// How the answer is coloured; the words carry the meaning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -68,7 +65,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
             .filter(|j| j.rmse_calibrated > WORSE * j.rmse_nominal),
     );
     let honest = (COVERAGE.0..=COVERAGE.1).contains(&scores.coverage95);
-    let off = shape_off(calibration);
+    let off = shape::off(calibration);
     let limits = limits(calibration, joints, &worse);
     let serious = calibration
         .findings
@@ -121,131 +118,6 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         grounds: grounds(calibration, joints, found),
         limits,
     }
-}
-
-/// How a predicted distribution is wrong.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Shape {
-    Wide,
-    Narrow,
-    /// The measured torque lies above the middle of the prediction too often.
-    Above,
-    Below,
-}
-
-impl Shape {
-    const ALL: [Self; 4] = [Self::Wide, Self::Narrow, Self::Above, Self::Below];
-
-    /// `None` where the distance from uniform is what chance allows.
-    fn of(pit: &Pit) -> Option<Self> {
-        // Not a comparison with NaN: without rows there is nothing to judge.
-        if pit.histogram.is_empty() || !(pit.distance > pit.chance) {
-            return None;
-        }
-        let bins = pit.histogram.len();
-        let mut share = 0.0;
-        let edges = (1..=bins).zip(&pit.histogram).map(|(edge, bin)| {
-            share += bin;
-            share - edge as f64 / bins as f64
-        });
-        // Share of the rows below each edge, less what it should be: of one sign where the prediction is off to one side.
-        let gaps: Vec<f64> = edges.collect();
-        let high = gaps.iter().copied().fold(0.0, f64::max);
-        let low = -gaps.iter().copied().fold(0.0, f64::min);
-        Some(if high < low / 3.0 {
-            Self::Above
-        } else if low < high / 3.0 {
-            Self::Below
-        } else if gaps[..bins / 2].iter().sum::<f64>() < 0.0 {
-            Self::Wide
-        } else {
-            Self::Narrow
-        })
-    }
-
-    fn headline(self) -> &'static str {
-        match self {
-            Self::Wide => "The torque yes; its intervals are wider than they need to be.",
-            Self::Narrow => "The torque yes, its intervals not: they are too narrow.",
-            Self::Above | Self::Below => {
-                "The torque yes, its intervals not: they lie off to one side."
-            }
-        }
-    }
-
-    /// What is said of joints, and of one; `slightly` where intervals are still of use.
-    fn words(self, slightly: bool) -> &'static str {
-        match (self, slightly) {
-            (Self::Wide, false) => "intervals are wider than they need to be",
-            (Self::Wide, true) => "intervals are a little wider than they need to be",
-            (Self::Narrow, false) => "intervals are too narrow",
-            (Self::Narrow, true) => "intervals are a little too narrow",
-            (Self::Above, false) => "intervals lie too low",
-            (Self::Above, true) => "intervals lie a little too low",
-            (Self::Below, false) => "intervals lie too high",
-            (Self::Below, true) => "intervals lie a little too high",
-        }
-    }
-}
-
-/// Where the shape of the predictions is off by more than [`OFF`] and by more than chance.
-struct ShapeOff {
-    /// Over all joints.
-    all: Option<Shape>,
-    /// On a single joint.
-    single: bool,
-}
-
-fn shape_off(calibration: &Calibration) -> ShapeOff {
-    let validation = &calibration.validation;
-    let far = |pit: &Pit| Shape::of(pit).filter(|_| pit.distance > OFF);
-    ShapeOff {
-        all: far(&validation.pit),
-        single: validation.reliability.iter().any(|j| far(&j.pit).is_some()),
-    }
-}
-
-/// Every joint whose predictions are off by more than chance allows, in words and with the number behind them.
-fn shapes(calibration: &Calibration) -> Vec<String> {
-    let validation = &calibration.validation;
-    let mut out = Vec::new();
-    let numbers = |pit: &Pit| {
-        format!(
-            "PIT off uniform by {}, by chance below {}",
-            number(pit.distance, 2),
-            number(pit.chance, 2)
-        )
-    };
-    for (shape, slightly) in Shape::ALL.into_iter().flat_map(|s| [(s, false), (s, true)]) {
-        let own: Vec<&Reliability> = (validation.reliability.iter())
-            .filter(|j| Shape::of(&j.pit) == Some(shape) && (j.pit.distance <= OFF) == slightly)
-            .collect();
-        let Some(worst) = (own.iter()).max_by(|a, b| a.pit.distance.total_cmp(&b.pit.distance))
-        else {
-            continue;
-        };
-        let names: Vec<&str> = own.iter().map(|j| j.joint.as_str()).collect();
-        out.push(match names[..] {
-            [one] => format!(
-                "Joint {one}: its {} ({}).",
-                shape.words(slightly),
-                numbers(&worst.pit)
-            ),
-            _ => format!(
-                "Joints {}: their {} (on {} {}).",
-                list(&names),
-                shape.words(slightly),
-                worst.joint,
-                numbers(&worst.pit)
-            ),
-        });
-    }
-    if let (true, Some(shape)) = (out.is_empty(), Shape::of(&validation.pit)) {
-        let pit = &validation.pit;
-        let words = shape.words(pit.distance <= OFF);
-        out.push(format!("All joints together: {words} ({}).", numbers(pit)));
-    }
-    out
 }
 
 fn grounds(calibration: &Calibration, joints: &[Joint<'_>], found: usize) -> Vec<String> {
@@ -316,7 +188,7 @@ fn limits(calibration: &Calibration, joints: &[Joint<'_>], worse: &[String]) -> 
         "its intervals are wider than they need to be",
         "their intervals are wider than they need to be",
     );
-    let mut out_of_shape = shapes(calibration);
+    let mut out_of_shape = shape::sentences(calibration);
     let large: Vec<String> = joints
         .iter()
         .filter(|joint| {
@@ -395,7 +267,9 @@ pub(super) fn plus_minus(mean: f64, sd: f64) -> String {
 mod tests {
     use super::*;
     use crate::report::fixture;
+    use crate::report::shape::tests::pit;
     use crate::report::view;
+    use twincal::validate::Pit;
 
     fn judged(change: impl Fn(&mut Calibration)) -> Verdict {
         let mut calibration = fixture::two_joints();
@@ -479,44 +353,6 @@ mod tests {
             assert_eq!(verdict.grade, grade, "{verdict:?}");
             assert!(verdict.headline.contains(words), "{verdict:?}");
         }
-    }
-
-    /// PIT with this many of 20 bins' share inside the middle ten, and a slope.
-    fn pit(middle: f64, slope: f64) -> Pit {
-        let bin = |i: usize| {
-            let share = if (5..15).contains(&i) {
-                middle
-            } else {
-                1.0 - middle
-            };
-            share / 10.0 + slope * (i as f64 - 9.5) / 1000.0
-        };
-        Pit {
-            histogram: (0..20).map(bin).collect(),
-            distance: 0.12,
-            chance: 0.05,
-        }
-    }
-
-    #[test]
-    fn the_shape_of_the_predictions_is_that_of_the_histogram() {
-        for (middle, slope, shape) in [
-            (0.75, 0.0, Shape::Wide),
-            (0.25, 0.0, Shape::Narrow),
-            (0.5, 4.0, Shape::Above),
-            (0.5, -4.0, Shape::Below),
-            (0.75, 0.5, Shape::Wide),
-        ] {
-            assert_eq!(
-                Shape::of(&pit(middle, slope)),
-                Some(shape),
-                "{middle} {slope}"
-            );
-        }
-        let mut chance = pit(0.75, 0.0);
-        chance.chance = 0.13;
-        assert_eq!(Shape::of(&chance), None);
-        assert_eq!(Shape::of(&Pit::default()), None);
     }
 
     #[test]

@@ -1,0 +1,177 @@
+//! Have the predicted distributions the right shape: what the PIT of held-out rows says, joint by joint, in words.
+
+use super::text::{list, number};
+use twincal::calibrate::Calibration;
+use twincal::validate::{Pit, Reliability};
+
+/// Distance of the PIT from uniform beyond which, if chance does not explain it, intervals are more than a little off: the
+/// 50 % interval then holds less than 40 % or more than 60 %.
+const OFF: f64 = 0.05;
+
+/// How a predicted distribution is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Shape {
+    Wide,
+    Narrow,
+    /// The measured torque lies above the middle of the prediction too often.
+    Above,
+    Below,
+}
+
+impl Shape {
+    const ALL: [Self; 4] = [Self::Wide, Self::Narrow, Self::Above, Self::Below];
+
+    /// `None` where the distance from uniform is what chance allows.
+    fn of(pit: &Pit) -> Option<Self> {
+        let beyond = pit.distance > pit.chance;
+        if pit.histogram.is_empty() || !beyond {
+            return None;
+        }
+        let bins = pit.histogram.len();
+        let mut share = 0.0;
+        let edges = (1..=bins).zip(&pit.histogram).map(|(edge, bin)| {
+            share += bin;
+            share - edge as f64 / bins as f64
+        });
+        // Share of the rows below each edge, less what it should be: of one sign where the prediction is off to one side.
+        let gaps: Vec<f64> = edges.collect();
+        let high = gaps.iter().copied().fold(0.0, f64::max);
+        let low = -gaps.iter().copied().fold(0.0, f64::min);
+        Some(if high < low / 3.0 {
+            Self::Above
+        } else if low < high / 3.0 {
+            Self::Below
+        } else if gaps[..bins / 2].iter().sum::<f64>() < 0.0 {
+            Self::Wide
+        } else {
+            Self::Narrow
+        })
+    }
+
+    pub(super) fn headline(self) -> &'static str {
+        match self {
+            Self::Wide => "The torque yes; its intervals are wider than they need to be.",
+            Self::Narrow => "The torque yes, its intervals not: they are too narrow.",
+            Self::Above | Self::Below => {
+                "The torque yes, its intervals not: they lie off to one side."
+            }
+        }
+    }
+
+    /// What is said of joints, and of one; `slightly` where intervals are still of use.
+    fn words(self, slightly: bool) -> &'static str {
+        match (self, slightly) {
+            (Self::Wide, false) => "intervals are wider than they need to be",
+            (Self::Wide, true) => "intervals are a little wider than they need to be",
+            (Self::Narrow, false) => "intervals are too narrow",
+            (Self::Narrow, true) => "intervals are a little too narrow",
+            (Self::Above, false) => "intervals lie too low",
+            (Self::Above, true) => "intervals lie a little too low",
+            (Self::Below, false) => "intervals lie too high",
+            (Self::Below, true) => "intervals lie a little too high",
+        }
+    }
+}
+
+/// Where the shape of the predictions is off by more than [`OFF`] and by more than chance.
+pub(super) struct Off {
+    /// Over all joints.
+    pub(super) all: Option<Shape>,
+    /// On a single joint.
+    pub(super) single: bool,
+}
+
+pub(super) fn off(calibration: &Calibration) -> Off {
+    let validation = &calibration.validation;
+    let far = |pit: &Pit| Shape::of(pit).filter(|_| pit.distance > OFF);
+    Off {
+        all: far(&validation.pit),
+        single: validation.reliability.iter().any(|j| far(&j.pit).is_some()),
+    }
+}
+
+/// Every joint whose predictions are off by more than chance allows, in words and with the number behind them.
+pub(super) fn sentences(calibration: &Calibration) -> Vec<String> {
+    let validation = &calibration.validation;
+    let mut out = Vec::new();
+    let numbers = |pit: &Pit| {
+        format!(
+            "PIT off uniform by {}, by chance below {}",
+            number(pit.distance, 2),
+            number(pit.chance, 2)
+        )
+    };
+    for (shape, slightly) in Shape::ALL.into_iter().flat_map(|s| [(s, false), (s, true)]) {
+        let own: Vec<&Reliability> = (validation.reliability.iter())
+            .filter(|j| Shape::of(&j.pit) == Some(shape) && (j.pit.distance <= OFF) == slightly)
+            .collect();
+        let Some(worst) = (own.iter()).max_by(|a, b| a.pit.distance.total_cmp(&b.pit.distance))
+        else {
+            continue;
+        };
+        let names: Vec<&str> = own.iter().map(|j| j.joint.as_str()).collect();
+        out.push(match names[..] {
+            [one] => format!(
+                "Joint {one}: its {} ({}).",
+                shape.words(slightly),
+                numbers(&worst.pit)
+            ),
+            _ => format!(
+                "Joints {}: their {} (on {} {}).",
+                list(&names),
+                shape.words(slightly),
+                worst.joint,
+                numbers(&worst.pit)
+            ),
+        });
+    }
+    if let (true, Some(shape)) = (out.is_empty(), Shape::of(&validation.pit)) {
+        let pit = &validation.pit;
+        let words = shape.words(pit.distance <= OFF);
+        out.push(format!("All joints together: {words} ({}).", numbers(pit)));
+    }
+    out
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// PIT with this many of 20 bins' share inside the middle ten, and a slope.
+    pub(in crate::report) fn pit(middle: f64, slope: f64) -> Pit {
+        let bin = |i: usize| {
+            let share = if (5..15).contains(&i) {
+                middle
+            } else {
+                1.0 - middle
+            };
+            share / 10.0 + slope * (i as f64 - 9.5) / 1000.0
+        };
+        Pit {
+            histogram: (0..20).map(bin).collect(),
+            distance: 0.12,
+            chance: 0.05,
+        }
+    }
+
+    #[test]
+    fn the_shape_of_the_predictions_is_that_of_the_histogram() {
+        for (middle, slope, shape) in [
+            (0.75, 0.0, Shape::Wide),
+            (0.25, 0.0, Shape::Narrow),
+            (0.5, 4.0, Shape::Above),
+            (0.5, -4.0, Shape::Below),
+            (0.75, 0.5, Shape::Wide),
+        ] {
+            assert_eq!(
+                Shape::of(&pit(middle, slope)),
+                Some(shape),
+                "{middle} {slope}"
+            );
+        }
+        let mut chance = pit(0.75, 0.0);
+        chance.chance = 0.13;
+        assert_eq!(Shape::of(&chance), None);
+        assert_eq!(Shape::of(&Pit::default()), None);
+    }
+}
