@@ -19,6 +19,9 @@ use twincal::calibrate::Calibration;
 /// Traces drawn beyond the first of each joint, over all joints: the page stays below two megabytes.
 const OTHER_TRACES: usize = 16;
 
+/// Letters of a word in a sentence that are kept on one line.
+const LONG: usize = 24;
+
 /// The names that the template knows.
 #[derive(Debug, Serialize)]
 struct Page<'a> {
@@ -81,9 +84,12 @@ pub(super) fn fill(
         }
         _ => escape_formatter(out, state, value),
     });
-    // Names may break after `_` and `.`; what comes out is escaped already.
+    // Names may break after `_` and `.`, in sentences only long ones; what comes out is escaped already.
     environment.add_filter("breaks", |text: String| {
-        Value::from_safe_string(text::breakable(&text))
+        Value::from_safe_string(text::breakable(&text, 0))
+    });
+    environment.add_filter("prose", |text: String| {
+        Value::from_safe_string(text::breakable(&text, LONG))
     });
     environment.add_template("report.html", include_str!("report.html"))?;
     environment.add_template("report.css", include_str!("report.css"))?;

@@ -64,26 +64,33 @@ pub(super) fn escape(text: &str) -> String {
     out
 }
 
-/// [`escape`]d text with places for line breaks after `_` and after `.` before a letter: names break there or nowhere.
-pub(super) fn breakable(text: &str) -> String {
+/// [`escape`]d text with places for line breaks after `_` and after `.` before a letter: names break there or nowhere, and
+/// only words of more than `whole` letters.
+pub(super) fn breakable(text: &str, whole: usize) -> String {
     let text = clean(text);
     let mut out = String::with_capacity(text.len());
-    let mut rest = 0;
-    let mut letters = text.char_indices().peekable();
-    while let Some((at, letter)) = letters.next() {
-        let next = letters.peek().map(|(_, next)| *next);
-        let breaks = match letter {
-            '_' => next.is_some_and(|next| !next.is_whitespace()),
-            '.' => next.is_some_and(char::is_alphabetic),
-            _ => false,
-        };
-        if breaks {
-            out.push_str(&escape(&text[rest..=at]));
-            out.push_str("<wbr/>");
-            rest = at + 1;
+    for word in text.split_inclusive(char::is_whitespace) {
+        if word.trim_end().chars().count() <= whole {
+            out.push_str(&escape(word));
+            continue;
         }
+        let mut rest = 0;
+        let mut letters = word.char_indices().peekable();
+        while let Some((at, letter)) = letters.next() {
+            let next = letters.peek().map(|(_, next)| *next);
+            let breaks = match letter {
+                '_' => next.is_some_and(|next| !next.is_whitespace()),
+                '.' => next.is_some_and(char::is_alphabetic),
+                _ => false,
+            };
+            if breaks {
+                out.push_str(&escape(&word[rest..=at]));
+                out.push_str("<wbr/>");
+                rest = at + 1;
+            }
+        }
+        out.push_str(&escape(&word[rest..]));
     }
-    out.push_str(&escape(&text[rest..]));
     out
 }
 
@@ -282,10 +289,14 @@ mod tests {
     #[test]
     fn names_break_after_an_underscore_or_a_dot_before_a_letter() {
         assert_eq!(
-            breakable("shoulder_pan.<b> 0.25 q_1.viscous: end."),
+            breakable("shoulder_pan.<b> 0.25 q_1.viscous: end.", 0),
             "shoulder_<wbr/>pan.&lt;b&gt; 0.25 q_<wbr/>1.<wbr/>viscous: end."
         );
-        assert_eq!(breakable("é_ü_"), "é_<wbr/>ü_");
+        assert_eq!(breakable("é_ü_", 0), "é_<wbr/>ü_");
+        assert_eq!(
+            breakable("of elbow_joint and left_elbow_joint", 11),
+            "of elbow_joint and left_<wbr/>elbow_<wbr/>joint"
+        );
     }
 
     #[test]
