@@ -70,7 +70,8 @@ pub(crate) fn shell(folder: &Path, line: &str) -> Run {
     finish(command.stdin(Stdio::null()))
 }
 
-fn finish(command: &mut Command) -> Run {
+/// Runs a command to its end.
+pub(crate) fn finish(command: &mut Command) -> Run {
     let output = command.output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
     Run {
