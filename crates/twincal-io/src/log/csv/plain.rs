@@ -1,0 +1,72 @@
+//! Rows of plain numbers, the most of every log: cut and read in one pass.
+
+use super::dialect::Dialect;
+use super::number;
+
+/// Reads the wanted fields of a line that has `fields` of them; false where anything but plain numbers stands in its way (a
+/// quotation mark, blanks around a field, too many fields): then the line has to be looked at field by field.
+///
+/// `order` holds, in file order, the field and the place in `row` of every wanted column.
+pub(super) fn read(
+    line: &[u8],
+    dialect: Dialect,
+    fields: usize,
+    order: &[(usize, usize)],
+    row: &mut [f64],
+) -> bool {
+    let Dialect {
+        delimiter,
+        decimal_comma,
+    } = dialect;
+    let point = if decimal_comma { b',' } else { b'.' };
+    let mut wanted = order.iter().peekable();
+    let mut at = 0;
+    for field in 0..fields {
+        if field > 0 {
+            if line.get(at) != Some(&delimiter) {
+                return false;
+            }
+            at += 1;
+        }
+        let rest = &line[at..];
+        if wanted.peek().is_none_or(|(from, _)| *from != field) {
+            let Some(length) = length(rest, delimiter) else {
+                return false;
+            };
+            at += length;
+            continue;
+        }
+        let value = match number::leading(rest, point) {
+            Some((value, length)) => {
+                at += length;
+                value
+            }
+            // No value, or a number of another form.
+            None => {
+                let Some(length) = length(rest, delimiter) else {
+                    return false;
+                };
+                at += length;
+                let Some(value) = number::parse(&rest[..length], decimal_comma) else {
+                    return false;
+                };
+                value
+            }
+        };
+        while let Some((_, to)) = wanted.next_if(|(from, _)| *from == field) {
+            row[*to] = value;
+        }
+    }
+    // A delimiter at the end is no field.
+    at == line.len() || delimiter != b' ' && line[at..] == [delimiter]
+}
+
+/// Bytes up to the next delimiter or the end; none if a quotation mark, a blank or the end of a line comes before. Between spaces
+/// there are no empty fields.
+fn length(rest: &[u8], delimiter: u8) -> Option<usize> {
+    let stops =
+        |byte: &u8| *byte == delimiter || matches!(byte, b'"' | b' ' | b'\t' | b'\r' | b'\n');
+    let at = rest.iter().position(stops).unwrap_or(rest.len());
+    let is_whole = rest.get(at).is_none_or(|byte| *byte == delimiter);
+    (is_whole && (at > 0 || delimiter != b' ')).then_some(at)
+}
