@@ -157,7 +157,7 @@ impl<'a> Header<'a> {
 /// Decides which column of `header` is which channel; see the table at the top of this file.
 ///
 /// # Errors
-/// [`Error::Content`] for duplicate or too many columns, a mapped column that is not there, a joint in the log that the model
+/// [`Error::Content`] for duplicate or too many columns, a mapped column that is not there or that two joints share, a joint in the log that the model
 /// lacks, a moving joint of the model that the log lacks, numbering from 0, no time column without `--rate`.
 pub fn match_columns(
     file: &str,
@@ -203,6 +203,7 @@ pub fn match_columns(
         }
         matched.push(channels);
     }
+    refuse_shared_columns(file, &joints, &matched)?;
     refuse_foreign_joints(&header, robot, &matched)?;
     refuse_missing_joints(&header, &joints, &matched)?;
     refuse_model_torque(file, &joints, &matched, options)?;
@@ -320,6 +321,36 @@ fn numbered_position(name: &str) -> Option<usize> {
 fn dotted_joint(name: &str) -> Option<&str> {
     let (joint, word) = name.rsplit_once(['.', '/'])?;
     (WORDS[0].contains(&word.to_lowercase().as_str()) && !joint.is_empty()).then_some(joint)
+}
+
+/// One column cannot be measured at two joints.
+fn refuse_shared_columns(
+    file: &str,
+    joints: &[&str],
+    matched: &[[Option<Channel>; 4]],
+) -> Result<()> {
+    let mut taken: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
+    for (joint, channels) in matched.iter().enumerate() {
+        for (quantity, channel) in channels.iter().enumerate() {
+            let Some(channel) = channel else { continue };
+            let Some((other, same)) = taken.insert(channel.index, (joint, quantity)) else {
+                continue;
+            };
+            return Err(Error::content(
+                Place::file(file),
+                format!(
+                    "column `{}` is taken as {} of joint `{}` and as {} of joint `{}`",
+                    channel.name,
+                    QUANTITIES[same],
+                    joints[other],
+                    QUANTITIES[quantity],
+                    joints[joint]
+                ),
+                "give every joint columns of its own in [columns]",
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// A position column of a joint that the model does not have (faults.md case 71).
