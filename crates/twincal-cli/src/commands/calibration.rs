@@ -70,7 +70,7 @@ impl Job<'_> {
             &self.settings.calibration,
             &step,
         )
-        .map_err(|error| heldout.as_given(logs.as_given(error)))?;
+        .map_err(|error| self.config.locate(heldout.as_given(logs.as_given(error))))?;
         let read = [&self.robot.findings, &logs.findings, &heldout.findings];
         let mut findings: Vec<_> = read.into_iter().flatten().cloned().collect();
         findings.append(&mut calibration.findings);

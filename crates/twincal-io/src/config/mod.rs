@@ -155,6 +155,36 @@ impl Config {
         ))
     }
 
+    /// The error with the place of its term or setting in the config, where it stands there.
+    #[must_use]
+    pub fn locate(&self, error: twincal::Error) -> Error {
+        let (key, problem, remedy) = match &error {
+            twincal::Error::Term {
+                term,
+                column,
+                problem,
+                remedy,
+            } => {
+                let mut terms = self.file.library.terms.iter();
+                let Some(index) = terms.position(|own| own == term) else {
+                    return error.into();
+                };
+                let problem = format!("term `{term}`, column {column}: {problem}");
+                (format!("library.terms.{index}"), problem, remedy)
+            }
+            twincal::Error::Setting {
+                key,
+                problem,
+                remedy,
+            } => (key.clone(), format!("key `{key}`: {problem}"), remedy),
+            _ => return error.into(),
+        };
+        match self.place(&key) {
+            Some(place) => Error::content(place, problem, remedy),
+            None => error.into(),
+        }
+    }
+
     /// The error for a value that is out of its range.
     fn out_of_range(&self, key: &str, problem: String, remedy: &str) -> Error {
         match self.place(key) {
