@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{ARM, Run, csv, fit, folder, run};
+use common::{ARM, QUICK, Run, csv, fit, folder, run};
 use serde_json::Value;
 use std::fs;
 use tempfile::TempDir;
@@ -344,4 +344,40 @@ fn entries_of_the_config_are_the_logs_where_none_is_given() {
     run(folder.path(), ["fit", "--model", "arm.urdf"])
         .expect(2)
         .says(&["no log", "[[log]]"]);
+}
+
+#[test]
+fn one_column_for_two_joints_is_refused_with_both_names() {
+    let folder = folder();
+    let config = format!("{QUICK}[columns]\ntau = {{ elbow = \"tau1\" }}\n");
+    fs::write(folder.path().join("quick.toml"), config).unwrap();
+    fit(folder.path(), &["-o", "out"]).expect(2).says(&[
+        "run.csv: column `tau1` is taken as torque of joint `shoulder` and as torque of joint `elbow`",
+        "[columns]",
+    ]);
+}
+
+#[test]
+fn an_error_in_a_term_says_where_it_stands_in_the_config() {
+    let folder = folder();
+    let config = QUICK.replace("[\"sin(q2)\"]", "[\"sin(q2)\",\n  \"sin(q2\"]");
+    fs::write(folder.path().join("quick.toml"), config).unwrap();
+    let done = fit(folder.path(), &["-o", "out"]).expect(2);
+    done.says(&["quick.toml:5:3: term `sin(q2`, column "]);
+}
+
+#[test]
+fn a_rate_without_a_filter_is_said_to_have_no_effect() {
+    let folder = folder();
+    let config = QUICK.replace("[library]", "rate_hz = 10\n[library]");
+    fs::write(folder.path().join("quick.toml"), config).unwrap();
+    fit(folder.path(), &["-o", "out"]).expect(0);
+    let result = json(&folder, "out/result.json");
+    let told = found(&result, &["rate_ignored"]);
+    assert_eq!(told.len(), 1);
+    assert!(
+        told[0].3.contains("signal.rate_hz = 10 has no effect"),
+        "{}",
+        told[0].3
+    );
 }

@@ -148,7 +148,18 @@ fn off(
             *still &= q.iter().all(|v| !v.is_finite() || *v == q[0]);
         }
     }
-    let findings = unexcited(joints, &still, &[])?;
+    let mut findings = unexcited(joints, &still, &[])?;
+    if let Auto::Value(rate) = settings.rate_hz {
+        findings.push(Finding::new(
+            Severity::Warning,
+            "rate_ignored",
+            "",
+            format!(
+                "signal.rate_hz = {rate} has no effect: with signal.cutoff_hz = 0 every input row is one row; leave one of them out"
+            ),
+            0,
+        ));
+    }
     let intervals: Vec<f64> = logs
         .iter()
         .filter_map(|log| even_interval(&log.time))
