@@ -503,10 +503,10 @@ pub struct InferenceTable {
     /// Default "auto": exact where every model can be summed, else Gibbs.
     pub method: Option<MethodWord>,
     /// Gibbs chains; default 4.
-    #[schemars(extend("minimum" = 2))]
+    #[schemars(extend("minimum" = twincal::infer::LEAST_CHAINS))]
     pub chains: Option<u64>,
     /// Draws per chain after warm-up; default 5000.
-    #[schemars(extend("minimum" = 4))]
+    #[schemars(extend("minimum" = twincal::infer::LEAST_DRAWS))]
     pub draws: Option<u64>,
     /// Seed of all random numbers; default 1 (flag `--seed`).
     pub seed: Option<u64>,

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use twincal::calibrate::CalibrationSettings;
-use twincal::infer::{Choice, InferenceSettings};
+use twincal::infer::{Choice, InferenceSettings, LEAST_CHAINS, LEAST_DRAWS};
 use twincal::likelihood::{NoiseModel, NoiseSettings, NoiseUncertainty};
 use twincal::prior::{Inclusion, PriorSettings};
 use twincal::signal::{Auto, Corrections, Lag, Payload, SignalSettings};
@@ -525,10 +525,15 @@ impl Config {
                 Some(MethodWord::Gibbs) => Choice::Gibbs,
             },
             chains: self
-                .count("inference.chains", table.chains, 2, 1024)?
+                .count("inference.chains", table.chains, LEAST_CHAINS as u64, 1024)?
                 .unwrap_or(4),
             draws: self
-                .count("inference.draws", table.draws, 4, 10_000_000)?
+                .count(
+                    "inference.draws",
+                    table.draws,
+                    LEAST_DRAWS as u64,
+                    10_000_000,
+                )?
                 .unwrap_or(5000),
             seed: table.seed.unwrap_or(1),
             allow_disagreement: self.allows(Allow::DisagreeingChains),

@@ -190,6 +190,11 @@ fn wrong_types_and_ranges_name_key_and_place() {
             "key `inference.chains`: 1 is out of range",
         ),
         (
+            "[inference]\ndraws = 99",
+            "twincal.toml:2:9",
+            "key `inference.draws`: 99 is out of range; give a whole number from 100 to",
+        ),
+        (
             "[inference]\nmethod = \"exakt\"",
             "twincal.toml:2:10",
             "`exact`",

@@ -19,7 +19,7 @@ mod walker;
 #[cfg(test)]
 mod testing;
 
-pub use gibbs::R_HAT_LIMIT;
+pub use gibbs::{LEAST_CHAINS, LEAST_DRAWS, R_HAT_LIMIT};
 pub use sampled::{Given, Sampled, sample, sampled_likelihood};
 
 use crate::error::{Error, Result};

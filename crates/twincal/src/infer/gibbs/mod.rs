@@ -31,8 +31,10 @@ const SCANS_PER_DRAW: [usize; 6] = [1, 4, 4, 16, 64, 256];
 const MIXED: (f64, f64) = (0.25, 0.004);
 /// Multiplications after which no longer run is tried (about a minute).
 pub(super) const WORK_LIMIT: f64 = 1e11;
-/// Fewest draws per chain that can be judged.
-const LEAST_DRAWS: usize = 100;
+/// Fewest chains that can disagree, and fewest draws per chain that can be judged.
+pub const LEAST_CHAINS: usize = 2;
+/// See [`LEAST_CHAINS`].
+pub const LEAST_DRAWS: usize = 100;
 
 /// How far the chains agree.
 struct Agreement {
@@ -71,7 +73,7 @@ pub(super) fn sample(problem: &Problem, settings: &InferenceSettings) -> Result<
 /// [`Error::Setting`] naming `inference.chains` or `inference.draws`.
 pub(super) fn require_draws(settings: &InferenceSettings) -> Result<()> {
     let key = match (settings.chains, settings.draws) {
-        (0, _) => "inference.chains",
+        (chains, _) if chains < LEAST_CHAINS => "inference.chains",
         (_, draws) if draws < LEAST_DRAWS => "inference.draws",
         _ => return Ok(()),
     };
@@ -81,7 +83,9 @@ pub(super) fn require_draws(settings: &InferenceSettings) -> Result<()> {
             "{} chains of {} draws cannot be judged",
             settings.chains, settings.draws
         ),
-        remedy: format!("use at least 1 chain (better 4) and {LEAST_DRAWS} draws (better 5000)"),
+        remedy: format!(
+            "use at least {LEAST_CHAINS} chains (better 4) and {LEAST_DRAWS} draws (better 5000)"
+        ),
     })
 }
 

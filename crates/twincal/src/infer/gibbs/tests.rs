@@ -198,7 +198,7 @@ fn case_90_and_91_stuck_chains_are_refused() {
 #[test]
 fn impossible_settings_name_their_key() {
     let problem = problem(1, 3, 20, 0.0, Inclusion::Probability(0.5));
-    for (chains, draws, key) in [(0, 500, "inference.chains"), (4, 5, "inference.draws")] {
+    for (chains, draws, key) in [(1, 500, "inference.chains"), (4, 99, "inference.draws")] {
         let bad = InferenceSettings {
             chains,
             draws,
