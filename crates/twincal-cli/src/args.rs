@@ -135,6 +135,13 @@ pub(crate) enum Allow {
     DisagreeingChains,
 }
 
+/// The same where nothing is fitted: a model only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum AllowModel {
+    /// Inertia tensors that no rigid body can have.
+    UnphysicalInertia,
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct Demo {
     /// Seed of all random numbers [default: 1].
@@ -159,7 +166,7 @@ pub(crate) struct Inspect {
     pub(crate) model: Option<PathBuf>,
     /// Accept with a warning what would be refused.
     #[arg(long, value_name = "WHAT", value_enum)]
-    pub(crate) allow: Vec<Allow>,
+    pub(crate) allow: Vec<AllowModel>,
     #[command(flatten)]
     pub(crate) log: LogFlags,
 }
@@ -179,7 +186,7 @@ pub(crate) struct Doctor {
     pub(crate) model: Option<PathBuf>,
     /// Accept with a warning what would be refused.
     #[arg(long, value_name = "WHAT", value_enum)]
-    pub(crate) allow: Vec<Allow>,
+    pub(crate) allow: Vec<AllowModel>,
     #[command(flatten)]
     pub(crate) log: LogFlags,
 }

@@ -1,6 +1,6 @@
 //! Flags over config: every flag has a key and overrides it.
 
-use crate::args::{Allow, Fit, LogFlags};
+use crate::args::{Allow, AllowModel, Fit, LogFlags};
 use crate::failure::Outcome;
 use crate::terminal::Terminal;
 use std::path::Path;
@@ -50,13 +50,16 @@ pub(super) fn of_fit(flags: &Fit, terminal: &mut Terminal) -> Outcome<Config> {
 /// The config of a command that looks at logs beside a model.
 pub(super) fn of_look(
     model: &Option<PathBuf>,
-    allow: &[Allow],
+    allow: &[AllowModel],
     flags: &LogFlags,
     terminal: &mut Terminal,
 ) -> Outcome<Config> {
     let mut config = of_logs(flags, terminal)?;
     over(&mut config.file.model.file, model.clone());
-    over(&mut config.file.model.allow, allowed(allow));
+    let allow: Vec<Allow> = (allow.iter())
+        .map(|AllowModel::UnphysicalInertia| Allow::UnphysicalInertia)
+        .collect();
+    over(&mut config.file.model.allow, allowed(&allow));
     Ok(config)
 }
 
