@@ -41,3 +41,25 @@ fn demo_ends_with_its_report_and_replaces_only_its_own_output() {
         .expect(2)
         .says(&["twincal-demo"]);
 }
+
+/// It has no such flag.
+#[test]
+fn no_error_of_demo_asks_for_another_output_with_a_flag() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path().join("twincal-demo");
+    let refused = || {
+        let done = run(folder.path(), ["demo"])
+            .expect(2)
+            .says(&["in another folder"]);
+        assert!(!done.err.contains("-o"), "{}", done.err);
+    };
+    fs::write(&place, "mine").unwrap();
+    refused();
+    fs::remove_file(&place).unwrap();
+    std::os::unix::fs::symlink("elsewhere", &place).unwrap();
+    refused();
+    fs::remove_file(&place).unwrap();
+    fs::create_dir(&place).unwrap();
+    fs::write(place.join("notes.txt"), "mine").unwrap();
+    refused();
+}

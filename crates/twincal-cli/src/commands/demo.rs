@@ -5,10 +5,11 @@ use super::inputs::{LogInput, RobotInput};
 use super::start_threads;
 use crate::args::Demo;
 use crate::clock::Stopwatch;
-use crate::failure::Outcome;
+use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::path::{Path, PathBuf};
+use twincal_io::Error;
 use twincal_io::artifact::{Claim, Maker, Replace};
 use twincal_io::config::Config;
 use twincal_io::model::parse_model;
@@ -51,7 +52,7 @@ pub(super) fn run(flags: &Demo, terminal: &mut Terminal) -> Outcome<u8> {
     config.file.output.json = flags.json.then_some(true);
     let settings = config.settings()?;
     let output = Path::new(FOLDER);
-    let claim = Claim::new(output, Replace::MadeBy(Maker::Demo))?;
+    let claim = Claim::new(output, Replace::MadeBy(Maker::Demo)).map_err(elsewhere)?;
     start_threads(settings.threads)?;
     terminal
         .note("A simulated two-joint arm (MuJoCo) whose model lacks a payload, friction and more:");
@@ -86,7 +87,27 @@ pub(super) fn run(flags: &Demo, terminal: &mut Terminal) -> Outcome<u8> {
     let inputs = carried
         .map(|(name, bytes)| (*name, bytes.to_vec()))
         .collect();
-    let code = job.run(claim, inputs, progress, terminal)?;
+    let code = (job.run(claim, inputs, progress, terminal)).map_err(|failure| match failure {
+        Failure::Error(error) => elsewhere(error).into(),
+        other => other,
+    })?;
     say_where(output, settings.json, terminal);
     Ok(code)
+}
+
+/// The error in words for a command without -o: its folder lies where it runs.
+fn elsewhere(mut error: Error) -> Error {
+    if let Error::Content { remedy, .. } | Error::System { remedy, .. } = &mut error {
+        for (given, instead) in [
+            ("give another output with -o", "run in another folder"),
+            ("give the folder itself with -o", "run in another folder"),
+            (
+                "give an output that you may write with -o",
+                "run in a folder that you may write",
+            ),
+        ] {
+            *remedy = remedy.replace(given, instead);
+        }
+    }
+    error
 }
