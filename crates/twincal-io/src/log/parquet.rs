@@ -4,7 +4,7 @@ use super::pages::check_chunk;
 use super::{Cells, LogOptions, assemble, match_columns};
 use crate::error::{Error, Place, Result};
 use crate::memory;
-use parquet::basic::{LogicalType, Repetition, TimeUnit, Type};
+use parquet::basic::{Compression, LogicalType, Repetition, TimeUnit, Type};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{AsBytes, DataType};
 use parquet::errors::ParquetError;
@@ -155,6 +155,7 @@ fn check(
                     index + 1
                 )));
             };
+            readable(name, &chunk.column_path().string(), chunk.compression())?;
             let values = chunk.num_values();
             if values != claimed {
                 return Err(refuse(format!(
@@ -183,6 +184,20 @@ fn check(
         }
     }
     Ok(rows)
+}
+
+/// Refuses the codecs that this program does not carry.
+fn readable(name: &str, column: &str, codec: Compression) -> Result<()> {
+    let codec = match codec {
+        Compression::BROTLI(_) => "Brotli",
+        Compression::LZO => "LZO",
+        _ => return Ok(()),
+    };
+    Err(Error::content(
+        Place::file(name),
+        format!("column `{column}` is compressed with {codec}, which is not read"),
+        "write the file with zstd, snappy, gzip, lz4 or no compression",
+    ))
 }
 
 /// Appends one column chunk, nulls as NaN.
@@ -229,5 +244,25 @@ where
             };
             values.push(value.map_or(f64::NAN, &convert));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use parquet::basic::BrotliLevel;
+
+    #[test]
+    fn a_codec_that_is_not_read_is_named_with_those_that_are() {
+        let brotli = Compression::BROTLI(BrotliLevel::default());
+        let error = readable("run.parquet", "q1", brotli)
+            .unwrap_err()
+            .to_string();
+        assert_eq!(
+            error,
+            "run.parquet: column `q1` is compressed with Brotli, which is not read; write the file with zstd, snappy, gzip, lz4 \
+             or no compression"
+        );
+        assert!(readable("run.parquet", "q1", Compression::SNAPPY).is_ok());
     }
 }
