@@ -134,6 +134,7 @@ fn row(component: &ComponentSummary, terms: &[TermSummary]) -> [String; 5] {
         }
         _ => {
             let size = match component.parameters.iter().filter(|p| p.seen).count() {
+                0 => "not seen".into(),
                 1 => "1 number".into(),
                 seen => format!("{seen} numbers"),
             };
