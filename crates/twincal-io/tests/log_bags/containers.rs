@@ -97,6 +97,27 @@ fn case_54_a_chunk_that_claims_eight_gibibytes_is_refused() {
 }
 
 #[test]
+fn texts_that_claim_more_than_their_record_are_refused_before_they_are_allocated() {
+    const HEADER: u8 = 0x01;
+    let claim = |at: usize| {
+        let mut bytes = bag(&both());
+        bytes[at..at + 4].copy_from_slice(&0xFFFF_FFF0_u32.to_le_bytes());
+        bytes
+    };
+    let bytes = bag(&both());
+    contains(
+        &refused(read_bytes(&claim(records(&bytes, HEADER)[0].start))),
+        &["a text in it is longer than the record"],
+    );
+    let (_, name) = chunk_fields(&bytes);
+    let (_, findings) = read_bytes(&claim(name - 4)).unwrap();
+    contains(
+        &says(&findings, "damaged_chunks").message,
+        &["its header is broken"],
+    );
+}
+
+#[test]
 fn case_55_an_unknown_compression_is_refused() {
     let mut bytes = bag(&both());
     let (_, compression) = chunk_fields(&bytes);

@@ -253,7 +253,7 @@ impl Reader<'_, '_> {
         let Ok(Record::Chunk {
             header,
             data: Cow::Borrowed(data),
-        }) = mcap::parse_record(op::CHUNK, body)
+        }) = parse(op::CHUNK, body)
         else {
             return Err(Damage::Chunk("its header is broken".into()));
         };
@@ -324,7 +324,7 @@ impl Reader<'_, '_> {
         if opcode == op::MESSAGE {
             return self.message(body);
         }
-        match mcap::parse_record(opcode, body) {
+        match parse(opcode, body) {
             Ok(Record::Schema { header, .. }) => {
                 self.schemas.insert(header.id, header.name);
             }
@@ -336,7 +336,7 @@ impl Reader<'_, '_> {
                 self.channels.insert(channel.id, topic);
             }
             Ok(_) => {}
-            Err(e) => return Err(Damage::Chunk(format!("a record is broken: {e}"))),
+            Err(problem) => return Err(Damage::Chunk(format!("a record is broken: {problem}"))),
         }
         Ok(())
     }
@@ -369,4 +369,36 @@ impl Reader<'_, '_> {
 fn record_head(head: &[u8]) -> Option<(u8, u64)> {
     let (&opcode, length) = head.split_first()?;
     Some((opcode, u64::from_le_bytes(length.try_into().ok()?)))
+}
+
+/// A record by the `mcap` crate, once its texts are known to lie within it: that crate allocates what they claim before it reads them.
+fn parse(opcode: u8, body: &[u8]) -> std::result::Result<Record<'_>, String> {
+    check_texts(opcode, body).ok_or("a text in it is longer than the record")?;
+    mcap::parse_record(opcode, body).map_err(|e| e.to_string())
+}
+
+/// Walks the texts of a record (4 bytes of length, then content); none if one ends beyond it.
+fn check_texts(opcode: u8, body: &[u8]) -> Option<()> {
+    let behind = |bytes: &[u8]| -> Option<usize> {
+        let length = u32::from_le_bytes(*bytes.first_chunk()?);
+        usize::try_from(length).ok()?.checked_add(4)
+    };
+    let (mut rest, texts) = match opcode {
+        op::HEADER => (body, 2),
+        op::SCHEMA => (body.get(2..)?, 3),
+        op::CHANNEL => (body.get(4..)?, 2),
+        op::CHUNK => (body.get(28..)?, 1),
+        _ => return Some(()),
+    };
+    for _ in 0..texts {
+        rest = rest.get(behind(rest)?..)?;
+    }
+    if opcode == op::CHANNEL {
+        // Keys and values, one after the other.
+        let mut map = rest.get(4..behind(rest)?)?;
+        while !map.is_empty() {
+            map = map.get(behind(map)?..)?;
+        }
+    }
+    Some(())
 }
