@@ -157,8 +157,8 @@ pub(crate) struct Demo {
 
 #[derive(Debug, Args)]
 pub(crate) struct Inspect {
-    /// Logs (CSV, Parquet, NPZ, MCAP, rosbag2); without --model the first path is
-    /// the model.
+    /// Logs (CSV, Parquet, Arrow, NPZ, MCAP, rosbag2); without --model the first
+    /// path is the model.
     #[arg(value_name = "PATH", required_unless_present = "model")]
     pub(crate) paths: Vec<PathBuf>,
     /// Robot model (URDF, MJCF).
@@ -178,7 +178,7 @@ pub(crate) struct Inspect {
     reason = "[[log]] is a table of twincal.toml, and this text is printed as help"
 )]
 pub(crate) struct Doctor {
-    /// Logs to look at (CSV, Parquet, NPZ, MCAP, rosbag2) [default: those of [[log]] in the config].
+    /// Logs to look at (CSV, Parquet, Arrow, NPZ, MCAP, rosbag2) [default: those of [[log]] in the config].
     #[arg(value_name = "LOG")]
     pub(crate) logs: Vec<PathBuf>,
     /// Robot model (URDF, MJCF).
@@ -222,8 +222,8 @@ pub(crate) struct Diff {
     reason = "[[log]] is a table of twincal.toml, and this text is printed as help"
 )]
 pub(crate) struct Fit {
-    /// Logs to fit (CSV, Parquet, NPZ, MCAP, rosbag2); each is a trajectory of
-    /// its own [default: those of [[log]] in the config].
+    /// Logs to fit (CSV, Parquet, Arrow, NPZ, MCAP, rosbag2); each is a trajectory
+    /// of its own [default: those of [[log]] in the config].
     #[arg(value_name = "LOG")]
     pub(crate) logs: Vec<PathBuf>,
     /// Robot model (URDF, MJCF).

@@ -1,13 +1,13 @@
 //! The names of a table's columns, without its rows.
 
-use super::{Kind, csv};
+use super::{Kind, arrow, csv};
 use crate::error::{Error, Result};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
-/// Column names of a CSV or Parquet file; `None` for what cannot be read twice (a pipe) or holds them otherwise.
+/// Column names of a CSV, Parquet or Arrow file; `None` for what cannot be read twice (a pipe) or holds them otherwise.
 ///
 /// # Errors
 /// [`Error::System`] if the file cannot be read, [`Error::Content`] if it has no header.
@@ -36,6 +36,8 @@ pub fn read_header(path: &Path) -> Result<Option<Vec<String>>> {
             let names = schema.columns().iter().map(|c| c.path().string());
             return Ok(Some(names.collect()));
         }
+        // What is wrong with the file is said when it is read.
+        Kind::Arrow => return Ok(arrow::header(file, &name).ok()),
         Kind::Text => {}
         _ => return Ok(None),
     }

@@ -1,4 +1,4 @@
-//! Logs in: tables (CSV, Parquet, NPZ) and bags of ROS (MCAP, rosbag2) become a [`Recording`] in the robot's joint order.
+//! Logs in: tables (CSV, Parquet, Arrow, NPZ) and bags of ROS (MCAP, rosbag2) become a [`Recording`] in the robot's joint order.
 //!
 //! | step | file |
 //! |---|---|
@@ -6,10 +6,12 @@
 //! | names of well-known recorders | `preset.rs` |
 //! | text tables | `csv/` |
 //! | Parquet | `parquet.rs`, checked first by `pages.rs` |
+//! | Arrow IPC | `arrow/` |
 //! | NPZ | `npz.rs` |
 //! | MCAP, rosbag2 | `bag/` |
 //! | what the logged torque is | `torque.rs` |
 
+mod arrow;
 mod bag;
 mod columns;
 mod csv;
@@ -69,8 +71,8 @@ pub(crate) struct Cells {
     pub(crate) first_dropped: Option<String>,
 }
 
-/// Reads one log: CSV with any delimiter, Parquet, NPZ, MCAP, a SQLite bag (told by their first bytes, not by their names) or the folder of a
-/// rosbag2.
+/// Reads one log: CSV with any delimiter, Parquet, Arrow, NPZ, MCAP, a SQLite bag (told by their first bytes, not by their names) or the folder
+/// of a rosbag2.
 ///
 /// Values are taken as they are, NaN included, and torque as `[log] torque` says; joints come out in the robot's order.
 ///
@@ -110,8 +112,10 @@ pub fn read_log(
             let pages = file.try_clone().map_err(|e| system(&e))?;
             parquet::read(file, pages, &name, robot, options)?
         }
+        Kind::Arrow => arrow::read(file, &name, robot, options)?,
         Kind::Npz => npz::read(BufReader::new(file), &name, robot, options)?,
         Kind::Mcap | Kind::Sqlite | Kind::Zstd => bag::read(path, robot, options)?,
+        Kind::FirstFeather => return Err(first_feather(&name)),
         Kind::LfsPointer => return Err(lfs_pointer(&name)),
         // The bytes already taken go first.
         Kind::Text => {
@@ -138,6 +142,7 @@ fn refuse_false_name(path: &Path, name: &str, head: &[u8], kind: Kind) -> Result
         Some("db3") => (Kind::Sqlite, "a SQLite bag"),
         Some("npz") => (Kind::Npz, "an NPZ file"),
         Some("parquet") => (Kind::Parquet, "a Parquet file"),
+        Some("arrow" | "arrows" | "feather") => (Kind::Arrow, "an Arrow file"),
         _ => return Ok(()),
     };
     if kind != Kind::Text || kind == claimed || head.is_empty() {
@@ -159,7 +164,16 @@ fn lfs_pointer(name: &str) -> Error {
     )
 }
 
-/// Reads a log from memory: CSV, Parquet, NPZ or MCAP; `name` is what messages call it.
+/// Feather's first version, a format of its own that nothing writes any more.
+fn first_feather(name: &str) -> Error {
+    Error::content(
+        Place::file(name),
+        "is a Feather file of version 1",
+        "write it again as version 2: pyarrow.feather.write_feather(pyarrow.feather.read_table(FILE), FILE)",
+    )
+}
+
+/// Reads a log from memory: CSV, Parquet, Arrow, NPZ or MCAP; `name` is what messages call it.
 ///
 /// # Errors
 /// Like [`read_log`].
@@ -176,7 +190,9 @@ pub fn parse_log(
             parquet::read(bytes, pages, name, robot, options)?
         }
         Kind::Mcap => bag::read_mcap(&mut std::io::Cursor::new(bytes), name, robot, options)?,
+        Kind::Arrow => arrow::read(std::io::Cursor::new(bytes), name, robot, options)?,
         Kind::Npz => npz::read(std::io::Cursor::new(bytes), name, robot, options)?,
+        Kind::FirstFeather => return Err(first_feather(name)),
         Kind::LfsPointer => return Err(lfs_pointer(name)),
         Kind::Text | Kind::Sqlite | Kind::Zstd => {
             csv_table(bytes, bytes.len() as u64, name, robot, options)?
@@ -190,6 +206,8 @@ pub fn parse_log(
 enum Kind {
     Text,
     Parquet,
+    Arrow,
+    FirstFeather,
     Npz,
     Mcap,
     Sqlite,
@@ -202,8 +220,11 @@ impl Kind {
     const HEAD: usize = 32;
 
     fn of(head: &[u8]) -> Self {
-        let kinds: [(&[u8], Self); 7] = [
+        let kinds: [(&[u8], Self); 10] = [
             (b"PAR1", Self::Parquet),
+            (arrow::FILE_MAGIC, Self::Arrow),
+            (&arrow::MARKER, Self::Arrow),
+            (b"FEA1", Self::FirstFeather),
             (b"PK\x03\x04", Self::Npz),
             (b"PK\x05\x06", Self::Npz),
             (b"\x89MCAP", Self::Mcap),

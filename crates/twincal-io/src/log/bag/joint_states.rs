@@ -524,7 +524,7 @@ impl<'a> JointStates<'a> {
     }
 }
 
-const CONVERT: &str = "record or convert it to sensor_msgs/msg/JointState in CDR, or export the joint states to CSV, Parquet or NPZ";
+const CONVERT: &str = "record or convert it to sensor_msgs/msg/JointState in CDR, or export the joint states to CSV, Parquet, Arrow or NPZ";
 
 impl Topic {
     fn words(&self) -> String {

@@ -128,7 +128,7 @@ impl Reader<'_, '_> {
         if magic != mcap::MAGIC {
             return Err(self.refuse(
                 "does not begin as an MCAP file does".into(),
-                "give an MCAP file, a rosbag2 folder, CSV, Parquet or NPZ",
+                "give an MCAP file, a rosbag2 folder, CSV, Parquet, Arrow or NPZ",
             ));
         }
         let mut position = magic.len() as u64;
