@@ -218,7 +218,10 @@ impl Reader<'_, '_> {
             let Ok(length) = i64::try_from(length) else {
                 break;
             };
-            source.seek(SeekFrom::Current(length))?;
+            // A length beyond all files is damage too.
+            if source.seek(SeekFrom::Current(length)).is_err() {
+                break;
+            }
         }
         source.seek(SeekFrom::Start(start))?;
         Ok(())
