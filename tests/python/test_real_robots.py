@@ -22,10 +22,7 @@ def test_held_out_torque_and_known_effects(split, tmp_path):
     folder = SHARED / split.folder
     arguments = ["--heldout", *[folder / name for name in split.heldout]] if split.heldout else []
     config = f"[signal]\ncutoff_hz = {split.cutoff_hz}\n"
-    # rows of a slow robot at 5 Hz: some joints have fewer than ten independent ones, which is degraded
-    expect = 3 if split.folder == "kuka_kr300" else 0
-    logs = [folder / name for name in split.fit]
-    result = fit(tmp_path, logs, config, *arguments, model=folder / split.model, expect=expect)
+    result = fit(tmp_path, [folder / name for name in split.fit], config, *arguments, model=folder / split.model)
     for joint, ((rmse, nominal, sd, _), limit) in enumerate(zip(real.scores(result, split.rows), split.limits), 1):
         limit = REACHED.get((split.name, joint), limit)
         assert rmse / sd <= (limit if math.isfinite(limit) else nominal / sd), f"joint {joint}"

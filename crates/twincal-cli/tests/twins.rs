@@ -195,7 +195,7 @@ fn a_joint_whose_rows_are_all_alike_is_named_beside_joints_that_answer() {
         row
     });
     let (folder, done) = fitted_with(&silent, common::QUICK);
-    done.expect(3);
+    done.expect(0);
     let result = result(folder.path());
     let findings = result["findings"].as_array().unwrap().iter();
     let few: Vec<&Value> = findings
@@ -208,6 +208,21 @@ fn a_joint_whose_rows_are_all_alike_is_named_beside_joints_that_answer() {
         "{words}"
     );
     assert!(result["noise"][0]["n_eff"].as_f64().unwrap() >= 10.0);
+}
+
+#[test]
+fn case_07_a_joint_without_candidates_does_not_hide_rows_that_are_all_alike() {
+    // What is left of the shoulder is white, and nothing is asked of it.
+    let silent = csv(400, &|_, mut row| {
+        row[7] = (number(&row[7]) - 0.4 * number(&row[3])).to_string();
+        row[8] = "0".into();
+        row
+    });
+    let config = "[signal]\ncutoff_hz = 0\n[library]\nterms = [\"sin(q2)\"]\ngeneric = false\nfamilies = []\n";
+    let (folder, done) = fitted_with(&silent, config);
+    done.expect(4)
+        .says(&["the 400 rows of joint `elbow` count as ", "10 are needed"]);
+    assert!(!folder.path().join("out").exists());
 }
 
 #[test]

@@ -72,7 +72,7 @@ fn effective_rows(noise: &[JointNoise], data: &Data) -> Result<Vec<Finding>> {
     }
     let said = |noise: &JointNoise| {
         Finding::new(
-            Severity::Degraded,
+            Severity::Warning,
             "few_effective_rows",
             noise.joint.clone(),
             format!(

@@ -4,9 +4,9 @@ use super::CalibrationSettings;
 use super::data::Data;
 use super::result::SweepPoint;
 use crate::error::{Finding, Result, Severity};
+use crate::gram::Gram;
 use crate::infer::approximate;
 use crate::likelihood::{Columns, assemble};
-use crate::observations::Part;
 use crate::plug_in::{Fit, total};
 use crate::posterior::Posterior;
 use crate::robot::Robot;
@@ -37,35 +37,35 @@ pub(super) fn cutoff(
         cutoff_hz: pipeline.cutoff_hz,
         mean: fit.posterior.mean.clone(),
     }];
-    let moved: Vec<Option<SweepPoint>> = FACTORS
+    // One after the other: of a long log one more trajectory fits in memory, two do not. Each uses all cores.
+    let mut moved: Vec<(f64, Gram)> = Vec::with_capacity(FACTORS.len());
+    for factor in FACTORS {
+        let scaled = Pipeline {
+            cutoff_hz: factor * pipeline.cutoff_hz,
+            motion_cutoff_hz: factor * pipeline.motion_cutoff_hz,
+            rate_hz: factor * pipeline.rate_hz,
+            ..pipeline.clone()
+        };
+        let Ok(data) = Data::read(robot, library, &scaled, logs, &[]) else {
+            continue;
+        };
+        let parts = data.training();
+        if parts.iter().any(|part| !part.rows.is_empty()) {
+            moved.push((scaled.cutoff_hz, total(&parts)));
+        }
+    }
+    let moved: Vec<SweepPoint> = moved
         .into_par_iter()
-        .map(|factor| {
-            let scaled = Pipeline {
-                cutoff_hz: factor * pipeline.cutoff_hz,
-                motion_cutoff_hz: factor * pipeline.motion_cutoff_hz,
-                rate_hz: factor * pipeline.rate_hz,
-                ..pipeline.clone()
-            };
-            let Ok(data) = Data::read(robot, library, &scaled, logs, &[]) else {
-                return Ok(None);
-            };
-            let parts: Vec<Part<'_>> = data
-                .fit
-                .iter()
-                .map(|log| log.observations.whole())
-                .collect();
-            if parts.iter().all(|part| part.rows.is_empty()) {
-                return Ok(None);
-            }
-            let problem = assemble(&total(&parts), columns, &fit.plug_in, &settings.prior)?;
+        .map(|(cutoff_hz, gram)| {
+            let problem = assemble(&gram, columns, &fit.plug_in, &settings.prior)?;
             let posterior = approximate(&problem, Some(&fit.posterior))?;
-            Ok(Some(SweepPoint {
-                cutoff_hz: scaled.cutoff_hz,
+            Ok(SweepPoint {
+                cutoff_hz,
                 mean: posterior.mean,
-            }))
+            })
         })
         .collect::<Result<_>>()?;
-    points.extend(moved.into_iter().flatten());
+    points.extend(moved);
     points.sort_by(|a, b| a.cutoff_hz.total_cmp(&b.cutoff_hz));
     Ok(points)
 }
