@@ -225,38 +225,32 @@ fn case_07_a_joint_without_candidates_does_not_hide_rows_that_are_all_alike() {
     assert!(!folder.path().join("out").exists());
 }
 
+/// Constant torque is told with its joints: a warning for one, which may be a passive one, degraded for all.
 #[test]
-fn a_log_whose_torque_never_changes_is_refused() {
-    let silent = |columns: &'static [usize]| {
-        csv(400, &move |_, mut row| {
+fn torque_that_never_changes_is_named() {
+    let folder = folder();
+    let told = |columns: &'static [usize]| {
+        let silent = csv(400, &move |_, mut row| {
             columns.iter().for_each(|column| row[*column] = "0".into());
             row
-        })
+        });
+        fs::write(folder.path().join("run.csv"), silent).unwrap();
+        let line = "doctor run.csv --model arm.urdf --config quick.toml --json";
+        let done = run(folder.path(), line.split(' '));
+        let findings = serde_json::from_str::<Value>(&done.out).unwrap()["findings"].clone();
+        let mut all = findings.as_array().unwrap().clone();
+        all.retain(|f| f["code"] == "constant_torque");
+        assert_eq!(all.len(), 1, "{findings}");
+        let text = |key: &str| all[0][key].as_str().unwrap().to_owned();
+        (done.code, text("severity"), text("message"))
     };
-    let (folder, done) = fitted_with(&silent(&[7, 8]), common::QUICK);
-    done.expect(4).says(&[
-        "run.csv: torque never changes while the joints move",
-        "`shoulder` is 0, `elbow` is 0",
-        "[columns] tau",
-    ]);
-    assert!(!folder.path().join("out").exists());
-    let line = ["doctor", "run.csv", "--model", "arm.urdf"];
-    let doctor = run(folder.path(), line).expect(4);
-    assert!(
-        doctor.out.contains("torque never changes"),
-        "{}",
-        doctor.out
-    );
-    // One joint may be a passive one.
-    fs::write(folder.path().join("run.csv"), silent(&[8])).unwrap();
-    let line = "doctor run.csv --model arm.urdf --config quick.toml --json";
-    let done = run(folder.path(), line.split(' ')).expect(0);
-    let findings = serde_json::from_str::<Value>(&done.out).unwrap()["findings"].clone();
-    let told: Vec<&Value> = findings.as_array().unwrap().iter().collect();
-    let told = told.iter().filter(|f| f["code"] == "constant_torque");
-    let words: Vec<&str> = told.map(|f| f["message"].as_str().unwrap()).collect();
-    assert_eq!(words.len(), 1);
-    assert!(words[0].contains("`elbow` is 0 throughout"), "{}", words[0]);
+    let (code, severity, words) = told(&[8]);
+    assert_eq!((code, severity.as_str()), (Some(0), "warning"));
+    assert!(words.contains("`elbow` is 0 throughout"), "{words}");
+    let (code, severity, words) = told(&[7, 8]);
+    assert_eq!((code, severity.as_str()), (Some(3), "degraded"));
+    assert!(words.contains("`shoulder` is 0, `elbow` is 0"), "{words}");
+    assert!(words.contains("[columns] tau"), "{words}");
 }
 
 #[test]

@@ -143,7 +143,10 @@ fn a_position_that_is_wrong_in_one_sample_is_named_and_left_out() {
     let (trajectory, findings) = run(&log.csv()).unwrap();
     let said = says(&findings, "motion_spike");
     assert_eq!(said.count, 1);
-    contains(&said.message, &["position", "+5.0", "7.515 s", "once"]);
+    contains(
+        &said.message,
+        &["position", "+0.500 rad", "7.515 s", "once"],
+    );
     assert_eq!(trajectory.segments.len(), 2);
     // What is left of motion and of its noise is as if it had not been there.
     let still = |trajectory: &Trajectory| -> usize {

@@ -42,10 +42,11 @@ pub(super) fn findings(
             "heavy_tails",
             name,
             format!(
-                "joint `{name}`: {count} of {} residuals ({:.1} %) are beyond {FAR} robust sd ({sd:.3e}), normal noise has 0.006 %: \
+                "joint `{name}`: {count} of {} residuals ({:.1} %) are beyond {FAR} robust sd ({}), normal noise has 0.006 %: \
                  contacts, dropped samples or missing physics; {advice}",
                 residual.len(),
-                100.0 * count as f64 / residual.len() as f64
+                100.0 * count as f64 / residual.len() as f64,
+                if sd < 1e-2 { format!("{sd:.2e}") } else { format!("{sd:.3}") }
             ),
             count as u64,
         ));

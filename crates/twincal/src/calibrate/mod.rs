@@ -142,7 +142,7 @@ pub fn calibrate(
         log.require_torque(&robot.joint_names())?;
     }
     let (pipeline, mut findings) = choose_pipeline(robot, logs, &settings.signal)?;
-    findings.extend(constant_torque(robot, logs.iter().chain(heldout))?);
+    findings.extend(constant_torque(robot, logs.iter().chain(heldout)));
     findings.extend(hardly_driven(robot, logs.iter().chain(heldout)));
     let library_settings = LibrarySettings {
         coulomb_velocity: pipeline.coulomb_velocity,

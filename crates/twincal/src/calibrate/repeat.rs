@@ -9,7 +9,7 @@ use crate::observations::{Observations, Part};
 use crate::plug_in::{Fit, total};
 use crate::posterior::{Posterior, Problem};
 use crate::prior::PriorSettings;
-use crate::term::Library;
+use crate::term::{Library, estimate};
 
 /// Sd between two halves from which a number is said not to repeat: 3 in 1000 of honest ones.
 const APART: f64 = 3.0;
@@ -122,14 +122,11 @@ pub(super) fn findings(repeats: &[Repeat], kind: Halves) -> Vec<Finding> {
             "does_not_repeat",
             worst.component.clone(),
             format!(
-                "`{}` is {:.4} ± {:.2e} {} from {one} and {:.4} ± {:.2e} from {other}, {:.1} sd apart: trust it no closer \
-                 than that",
+                "`{}` is {} {} from {one} and {} from {other}, {:.1} sd apart: trust it no closer than that",
                 worst.term,
-                worst.first,
-                worst.first_sd,
+                estimate(worst.first, worst.first_sd),
                 worst.unit,
-                worst.second,
-                worst.second_sd,
+                estimate(worst.second, worst.second_sd),
                 size(worst)
             ),
             group.iter().filter(|repeat| size(repeat) >= APART).count() as u64,

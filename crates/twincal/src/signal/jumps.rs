@@ -217,9 +217,13 @@ fn tell(joints: &[JointFacts], log: &Recording, found: &Found, every_row: bool) 
         } else {
             done
         };
+        let size = match largest.1 {
+            small if small.abs() < 1e-2 => format!("{small:+.2e}"),
+            size => format!("{size:+.3}"),
+        };
         let message = format!(
-            "joint `{}`: {channel} {what}, {times}, most by {:+.3e} {unit}{per} at {:.3} s, as no joint moves; {done}",
-            facts.name, largest.1, log.time[largest.0]
+            "joint `{}`: {channel} {what}, {times}, most by {size} {unit}{per} at {:.3} s, as no joint moves; {done}",
+            facts.name, log.time[largest.0]
         );
         let count = jumps.len() as u64;
         Some(Finding::new(

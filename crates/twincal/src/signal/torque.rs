@@ -1,7 +1,7 @@
 //! What measured torque lacks: samples of it, or any change in it.
 
 use super::Recording;
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Finding, Severity};
 use crate::robot::Robot;
 
 /// A joint that travels less in a log stands still there, rad or m.
@@ -45,15 +45,12 @@ pub fn missing_torque(robot: &Robot, log: &Recording) -> Option<Finding> {
     ))
 }
 
-/// Torque that never changes while its joint moves: drives off, or a column that was not recorded. A joint like that is
-/// told, for it may be a passive one; a log in which every moving joint is like that teaches nothing of the robot.
-///
-/// # Errors
-/// [`Error::Refused`] for a log in which no moving joint has a torque that changes.
+/// Torque that never changes while its joint moves: drives off, or a column that was not recorded. One joint like that may be
+/// a passive one; a log in which every moving joint is like that is degraded, unless the robot swung freely.
 pub fn constant_torque<'a>(
     robot: &Robot,
     logs: impl IntoIterator<Item = &'a Recording>,
-) -> Result<Vec<Finding>> {
+) -> Vec<Finding> {
     let names = robot.joint_names();
     let mut findings = Vec::new();
     for log in logs {
@@ -73,27 +70,23 @@ pub fn constant_torque<'a>(
         }
         let shown = constant[..constant.len().min(NAMED)].join(", ");
         let cause = "the drives were off, or the column was not recorded";
-        if constant.len() == moving.len() {
-            return Err(Error::Refused {
-                problem: format!(
-                    "{}: torque never changes while the joints move (joint {shown} throughout): {cause}",
-                    log.name
-                ),
-                remedy: "map the measured torque in [columns] tau, or leave this log out".into(),
-            });
-        }
+        let severity = if constant.len() == moving.len() {
+            Severity::Degraded
+        } else {
+            Severity::Warning
+        };
         findings.push(Finding::new(
-            Severity::Warning,
+            severity,
             "constant_torque",
             &log.name,
             format!(
-                "torque never changes while the joint moves (joint {shown} throughout): {cause}; what is found on it is wrong \
-                 unless it swung freely"
+                "torque never changes while the joint moves (joint {shown} throughout): {cause}; what is found there is wrong \
+                 unless it swung freely; map the measured torque in [columns] tau, or leave this log out"
             ),
             constant.len() as u64,
         ));
     }
-    Ok(findings)
+    findings
 }
 
 /// Largest less smallest finite value; −∞ without any.

@@ -53,6 +53,7 @@ pub use library::{Library, Scratch};
 pub(crate) use model_column::ModelColumn;
 pub use sentence::Estimate;
 pub use status::Status;
+pub(crate) use words::estimate;
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

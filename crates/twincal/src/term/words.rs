@@ -7,7 +7,7 @@ pub(super) const NO_MODEL: &str = "in no model that counts";
 ///
 /// The value is the posterior's median, the spread half the width of its central 68.3 % interval: one sd where it is normal,
 /// and not blown up by a few models far off.
-pub(super) fn estimate(value: f64, spread: f64) -> String {
+pub(crate) fn estimate(value: f64, spread: f64) -> String {
     let size = value.abs().max(spread.abs());
     if !(value.is_finite() && spread.is_finite()) {
         return format!("{value:+} ± {spread}");

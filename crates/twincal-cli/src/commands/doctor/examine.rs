@@ -249,10 +249,8 @@ impl Examination {
             }
         }
         self.findings.extend(hardly_driven(robot, &logs.recordings));
-        match constant_torque(robot, &logs.recordings) {
-            Ok(more) => self.findings.extend(more),
-            Err(error) => self.refusals.push(Failure::from(error).into()),
-        }
+        self.findings
+            .extend(constant_torque(robot, &logs.recordings));
         let (pipeline, more, mut checkup) = match together {
             Ok(filtered) => filtered,
             Err(error) => {
