@@ -29,6 +29,7 @@ pub use torque::{TorqueOptions, TorqueSource};
 
 use crate::config::ColumnsTable;
 use crate::error::{Error, Place, Result};
+use crate::memory;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -69,6 +70,24 @@ pub(crate) struct Cells {
     pub(crate) dropped: u64,
     /// First of them, in words.
     pub(crate) first_dropped: Option<String>,
+}
+
+impl Cells {
+    /// Room for `rows` numbers in each of `columns` columns, if there is that much memory.
+    ///
+    /// # Errors
+    /// [`Error::Content`] about the file `name` with both sizes.
+    pub(crate) fn reserve(name: &str, rows: usize, columns: usize) -> Result<Self> {
+        memory::require(
+            name,
+            (rows as u64).saturating_mul(columns as u64 * 8),
+            "read a shorter log, or one with fewer columns",
+        )?;
+        Ok(Self {
+            columns: (0..columns).map(|_| Vec::with_capacity(rows)).collect(),
+            ..Self::default()
+        })
+    }
 }
 
 /// Reads one log: CSV with any delimiter, Parquet, Arrow, NPZ, MCAP, a SQLite bag (told by their first bytes, not by their names) or the folder

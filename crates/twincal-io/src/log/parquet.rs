@@ -3,7 +3,6 @@
 use super::pages::check_chunk;
 use super::{Cells, LogOptions, assemble, match_columns};
 use crate::error::{Error, Place, Result};
-use crate::memory;
 use parquet::basic::{Compression, LogicalType, Repetition, TimeUnit, Type};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{AsBytes, DataType};
@@ -48,15 +47,7 @@ pub(super) fn read(
         scales.push(scale(name, &columns[index], &mut findings)?);
     }
     let rows = check(&mut pages, name, metadata, &wanted)?;
-    memory::require(
-        name,
-        (rows as u64).saturating_mul(wanted.len() as u64 * 8),
-        "read a shorter log, or one with fewer columns",
-    )?;
-    let mut cells = Cells {
-        columns: wanted.iter().map(|_| Vec::with_capacity(rows)).collect(),
-        ..Cells::default()
-    };
+    let mut cells = Cells::reserve(name, rows, wanted.len())?;
     for group in 0..reader.num_row_groups() {
         let group = reader.get_row_group(group).map_err(|e| broken(name, &e))?;
         for (values, &index) in cells.columns.iter_mut().zip(&wanted) {

@@ -7,7 +7,6 @@ mod layout;
 
 use super::{Cells, LogOptions, MAX_COLUMNS, assemble, match_columns};
 use crate::error::{Error, Place, Result};
-use crate::memory;
 use arrow_ipc::{
     CompressionType, Endianness, MessageHeader, MetadataVersion, RecordBatch, Schema,
     root_as_footer, root_as_message,
@@ -48,15 +47,7 @@ pub(super) fn read(
             .checked_add(batch.rows)
             .ok_or_else(|| log.refuse("declares more rows than can be counted".into()))?;
     }
-    memory::require(
-        name,
-        (rows as u64).saturating_mul(wanted.len() as u64 * 8),
-        "read a shorter log, or one with fewer columns",
-    )?;
-    let mut cells = Cells {
-        columns: wanted.iter().map(|_| Vec::with_capacity(rows)).collect(),
-        ..Cells::default()
-    };
+    let mut cells = Cells::reserve(name, rows, wanted.len())?;
     for at in log.batches.clone() {
         let batch = log.batch(at, &columns)?;
         for ((values, column), chunk) in cells.columns.iter_mut().zip(&columns).zip(&batch.chunks) {
