@@ -95,6 +95,7 @@ fn main() {
         rate_hz: Auto::Auto,
         coulomb_velocity: None,
         corrections: twincal::signal::Corrections::default(),
+        every_sample: false,
     };
     let (seconds, pipeline) =
         shortest(|| choose_pipeline(&robot, &logs, &settings).expect("moves").0);

@@ -23,6 +23,7 @@ const AUTO: SignalSettings = SignalSettings {
         lag: twincal::signal::Lag::Unsaid,
         velocity_from_position: false,
     },
+    every_sample: false,
 };
 
 /// Model and logs of a robot; `None` (and said) where the data are absent.

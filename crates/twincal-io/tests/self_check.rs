@@ -49,6 +49,7 @@ fn check(robot: &Robot, logs: &[Recording], cutoff: Auto) -> Result<Vec<Finding>
         rate_hz: Auto::Auto,
         coulomb_velocity: None,
         corrections: twincal::signal::Corrections::default(),
+        every_sample: false,
     };
     let (pipeline, _) = choose_pipeline(robot, logs, &settings)?;
     let mut trajectories = Vec::new();

@@ -60,6 +60,8 @@ pub struct Part<'a> {
 
 /// Rows that one thread takes at a time; a few, or the samples that every slice evaluates for its first row add up.
 const SLICE: usize = 1024;
+/// Slices that are evaluated before they are put in place: rows are held twice for these alone.
+const BATCH: usize = 8;
 
 /// Filters and decimates one trajectory into rows.
 ///
@@ -73,113 +75,123 @@ pub fn observe(
 ) -> Result<Observations> {
     let signal = RowSignal::Filtered;
     let slices = slices(pipeline, trajectory, signal, f64::NEG_INFINITY, SLICE);
-    let pieces: Vec<Piece> = slices
-        .into_par_iter()
-        .map(|slice| {
-            let mut piece = Piece::new(library, trajectory);
-            let mut add = |block: &RowBlock<'_>| {
-                piece.add(block);
-                Ok(())
-            };
-            let slice = [slice];
-            visit_slices(
-                robot, library, pipeline, trajectory, signal, &slice, &mut add,
-            )?;
-            Ok(piece)
-        })
-        .collect::<Result<_>>()?;
-    let mut out = Piece::new(library, trajectory);
-    pieces.into_iter().for_each(|piece| out.append(piece));
-    Ok(out.finish(library))
+    let len = slices.iter().map(|slice| slice.rows.len()).sum();
+    let mut out = Observations::empty(library, trajectory, len);
+    for batch in slices.chunks(BATCH) {
+        let blocks: Vec<Vec<Block>> = batch
+            .par_iter()
+            .map(|slice| {
+                let mut blocks = Vec::new();
+                let mut keep = |block: &RowBlock<'_>| {
+                    blocks.push(Block::of(block));
+                    Ok(())
+                };
+                let slice = std::slice::from_ref(slice);
+                visit_slices(
+                    robot, library, pipeline, trajectory, signal, slice, &mut keep,
+                )?;
+                Ok(blocks)
+            })
+            .collect::<Result<_>>()?;
+        blocks.iter().flatten().for_each(|block| out.add(block));
+    }
+    Ok(out)
 }
 
-/// Rows while they are being collected: every column on its own.
-struct Piece {
-    rows: Observations,
-    /// `columns[joint][i]`.
-    columns: Vec<Vec<Vec<f64>>>,
+/// A [`RowBlock`] that is kept until those before it are in place.
+struct Block {
+    first: bool,
+    time: Vec<f64>,
+    /// q, q̇, q̈: `joint * len + row`.
+    motion: [Vec<f64>; 3],
+    joints: Vec<BlockJoint>,
 }
 
-impl Piece {
-    fn new(library: &Library, trajectory: &Trajectory) -> Self {
-        let dof = trajectory.dof;
-        Self {
-            rows: Observations {
-                log: trajectory.name.clone(),
-                q: vec![Vec::new(); dof],
-                qd: vec![Vec::new(); dof],
-                qdd: vec![Vec::new(); dof],
-                joints: vec![JointObservations::default(); dof],
-                ..Observations::default()
-            },
-            columns: (0..dof)
-                .map(|joint| vec![Vec::new(); library.columns_of_joint(joint).len()])
+/// Its rows of one joint.
+struct BlockJoint {
+    /// `i * len + row`.
+    x: Vec<f64>,
+    measured: Vec<f64>,
+    nominal: Vec<f64>,
+    standstill: Vec<bool>,
+}
+
+impl Block {
+    fn of(block: &RowBlock<'_>) -> Self {
+        let joints = block.joints.iter().map(|rows| BlockJoint {
+            x: (0..rows.columns.len())
+                .flat_map(|i| &rows.x[i * rows.stride..i * rows.stride + block.len])
+                .copied()
                 .collect(),
+            measured: rows.measured.to_vec(),
+            nominal: rows.nominal.to_vec(),
+            standstill: rows.standstill.to_vec(),
+        });
+        Self {
+            first: block.first,
+            time: block.time.to_vec(),
+            motion: [block.q, block.qd, block.qdd].map(<[f64]>::to_vec),
+            joints: joints.collect(),
         }
-    }
-
-    fn add(&mut self, block: &RowBlock<'_>) {
-        let (len, out) = (block.len, &mut self.rows);
-        if block.first {
-            out.starts.push(out.time.len());
-        }
-        out.time.extend_from_slice(block.time);
-        for (joint, rows) in block.joints.iter().enumerate() {
-            let own = joint * len..(joint + 1) * len;
-            out.q[joint].extend_from_slice(&block.q[own.clone()]);
-            out.qd[joint].extend_from_slice(&block.qd[own.clone()]);
-            out.qdd[joint].extend_from_slice(&block.qdd[own]);
-            for (i, column) in self.columns[joint].iter_mut().enumerate() {
-                column.extend_from_slice(&rows.x[i * rows.stride..i * rows.stride + len]);
-            }
-            let kept = &mut out.joints[joint];
-            kept.measured.extend_from_slice(rows.measured);
-            kept.nominal.extend_from_slice(rows.nominal);
-            kept.y
-                .extend(rows.measured.iter().zip(rows.nominal).map(|(m, n)| m - n));
-            kept.standstill.extend_from_slice(rows.standstill);
-        }
-    }
-
-    /// Puts what follows behind.
-    fn append(&mut self, next: Self) {
-        let len = self.rows.time.len();
-        let rows = &mut self.rows;
-        rows.starts
-            .extend(next.rows.starts.iter().map(|start| len + start));
-        rows.time.extend(next.rows.time);
-        for (to, from) in [
-            (&mut rows.q, next.rows.q),
-            (&mut rows.qd, next.rows.qd),
-            (&mut rows.qdd, next.rows.qdd),
-        ] {
-            to.iter_mut()
-                .zip(from)
-                .for_each(|(to, from)| to.extend(from));
-        }
-        for (to, from) in rows.joints.iter_mut().zip(next.rows.joints) {
-            to.measured.extend(from.measured);
-            to.nominal.extend(from.nominal);
-            to.y.extend(from.y);
-            to.standstill.extend(from.standstill);
-        }
-        for (to, from) in self.columns.iter_mut().zip(next.columns) {
-            to.iter_mut()
-                .zip(from)
-                .for_each(|(to, from)| to.extend(from));
-        }
-    }
-
-    fn finish(mut self, library: &Library) -> Observations {
-        for (joint, values) in self.columns.into_iter().enumerate() {
-            self.rows.joints[joint].columns = library.columns_of_joint(joint).to_vec();
-            self.rows.joints[joint].x = values.concat();
-        }
-        self.rows
     }
 }
 
 impl Observations {
+    /// Without rows yet, but with room for `len`.
+    fn empty(library: &Library, trajectory: &Trajectory, len: usize) -> Self {
+        let dof = trajectory.dof;
+        let room = || (0..dof).map(|_| Vec::with_capacity(len)).collect();
+        let joint = |joint: usize| {
+            let columns = library.columns_of_joint(joint).to_vec();
+            JointObservations {
+                x: vec![0.0; columns.len() * len],
+                columns,
+                measured: Vec::with_capacity(len),
+                nominal: Vec::with_capacity(len),
+                y: Vec::with_capacity(len),
+                standstill: Vec::with_capacity(len),
+                ..JointObservations::default()
+            }
+        };
+        Self {
+            log: trajectory.name.clone(),
+            time: Vec::with_capacity(len),
+            starts: Vec::new(),
+            q: room(),
+            qd: room(),
+            qdd: room(),
+            joints: (0..dof).map(joint).collect(),
+        }
+    }
+
+    /// Puts the next rows behind those there are.
+    fn add(&mut self, block: &Block) {
+        let (from, len) = (self.time.len(), block.time.len());
+        if block.first {
+            self.starts.push(from);
+        }
+        self.time.extend_from_slice(&block.time);
+        for (to, values) in [&mut self.q, &mut self.qd, &mut self.qdd]
+            .into_iter()
+            .zip(&block.motion)
+        {
+            for (to, joint) in to.iter_mut().zip(values.chunks_exact(len.max(1))) {
+                to.extend_from_slice(joint);
+            }
+        }
+        for (kept, rows) in self.joints.iter_mut().zip(&block.joints) {
+            let total = kept.x.len() / kept.columns.len().max(1);
+            for (i, column) in rows.x.chunks_exact(len.max(1)).enumerate() {
+                kept.x[i * total + from..][..len].copy_from_slice(column);
+            }
+            kept.measured.extend_from_slice(&rows.measured);
+            kept.nominal.extend_from_slice(&rows.nominal);
+            let residual = rows.measured.iter().zip(&rows.nominal);
+            kept.y.extend(residual.map(|(m, n)| m - n));
+            kept.standstill.extend_from_slice(&rows.standstill);
+        }
+    }
+
     /// Rows.
     pub fn len(&self) -> usize {
         self.time.len()

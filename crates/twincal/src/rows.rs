@@ -81,7 +81,7 @@ pub struct Slice {
 
 /// The rows at or after time `since` (s; −∞: all of them) of a trajectory, in order, in slices of about `most` rows.
 ///
-/// How rows are cut into slices does not change them. Raw rows of an uneven clock stay together: their spline is one.
+/// How rows are cut into slices does not change them.
 pub fn slices(
     pipeline: &Pipeline,
     trajectory: &Trajectory,
@@ -92,8 +92,6 @@ pub fn slices(
     let mut slices = Vec::new();
     for (segment, samples) in trajectory.segments.iter().enumerate() {
         let rows = rows_since(pipeline, samples, signal, since);
-        let is_one = signal == RowSignal::Raw && samples.logged.is_some();
-        let most = if is_one { usize::MAX } else { most };
         let count = rows.len().div_ceil(most.max(1));
         let cut = |i: usize| rows.start + i * rows.len() / count;
         slices.extend((0..count).map(|i| Slice {
@@ -104,20 +102,21 @@ pub fn slices(
     slices
 }
 
-/// Raw rows of a log that a standard deviation or a coverage is measured on: beyond that more rows say nothing new.
-const MOST_RAW: usize = 1 << 16;
-/// In pieces of how many.
-const RAW_PIECE: usize = 1 << 10;
+/// Longest log whose raw rows are all scored.
+const ALL_RAW: usize = 1 << 16;
+/// Of a longer one so many are, in pieces: neighbours at a log's rate say nearly the same.
+const SPREAD_RAW: usize = 1 << 14;
+const RAW_PIECE: usize = 1 << 8;
 
 /// Raw rows at or after time `since` (s): all of a log of at most 65 536 rows, evenly spread pieces of a longer one, of
-/// 1024 rows at most and about 65 536 together.
+/// 256 rows at most and about 16 384 together.
 pub fn spread_raw(pipeline: &Pipeline, trajectory: &Trajectory, since: f64) -> Vec<Slice> {
     let all = slices(pipeline, trajectory, RowSignal::Raw, since, RAW_PIECE);
     let rows: usize = all.iter().map(|slice| slice.rows.len()).sum();
-    if rows <= MOST_RAW {
+    if rows <= ALL_RAW {
         return all;
     }
-    let kept = (all.len() * MOST_RAW).div_ceil(rows);
+    let kept = (all.len() * SPREAD_RAW).div_ceil(rows);
     (0..kept)
         .map(|i| all[i * all.len() / kept].clone())
         .collect()

@@ -311,6 +311,8 @@ impl Config {
                 lag: self.lag()?,
                 velocity_from_position: table.velocity == Some(VelocityWord::Position),
             },
+            every_sample: !self.file.library.terms.is_empty()
+                || !self.file.library.ripple.is_empty(),
         })
     }
 

@@ -227,6 +227,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
                 cutoff_hz: 10.0,
                 motion_cutoff_hz: 40.0,
                 rate_hz: RATE,
+                motion_interval: 0.0,
                 coulomb_velocity: 0.02,
                 standstill_velocity: vec![0.02; names.len()],
                 derived_from: vec![twincal::signal::DerivedFrom::Position; names.len()],

@@ -27,6 +27,7 @@ const AUTO: SignalSettings = SignalSettings {
         lag: twincal::signal::Lag::Unsaid,
         velocity_from_position: false,
     },
+    every_sample: false,
 };
 
 fn options() -> LogOptions {

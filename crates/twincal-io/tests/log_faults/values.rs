@@ -101,6 +101,7 @@ fn case_23_a_wrapped_angle_is_unfolded_and_counted_a_slider_never() {
         cutoff_hz: 5.0,
         motion_cutoff_hz: 20.0,
         rate_hz: 12.5,
+        motion_interval: 0.0,
         coulomb_velocity: 0.02,
         standstill_velocity: vec![0.02; 2],
         derived_from: vec![DerivedFrom::Position; 2],

@@ -8,7 +8,7 @@ use crate::likelihood::Columns;
 use crate::observations::{Observations, Part, observe};
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, Slice, count_rows, spread_raw, visit_slices};
-use crate::signal::{Payload, Pipeline, Recording, Trajectory, align};
+use crate::signal::{Payload, Pipeline, PreparedLog, Raw, Recording, Trajectory};
 use crate::term::Library;
 use rayon::prelude::*;
 
@@ -38,20 +38,18 @@ impl Data {
         robot: &Robot,
         library: &Library,
         pipeline: &Pipeline,
-        logs: &[Recording],
-        heldout: &[Recording],
+        logs: &[PreparedLog<'_>],
+        heldout: &[PreparedLog<'_>],
     ) -> Result<Self> {
         let mut findings = Vec::new();
-        let unknown = carry_something(logs.iter().chain(heldout));
-        let mut read = |logs: &[Recording], role: &str| -> Result<Vec<Log>> {
+        let unknown = carry_something(logs.iter().chain(heldout).map(PreparedLog::recording));
+        let mut read = |logs: &[PreparedLog<'_>], role: &str| -> Result<Vec<Log>> {
             logs.iter()
-                .map(|recording| {
-                    let (mut trajectory, mut more) = align(robot, recording, pipeline)?;
-                    trajectory.payload_acts = !unknown || recording.payload == Payload::Unknown;
+                .map(|log| {
+                    let recording = log.recording();
+                    let (trajectory, mut more) =
+                        usable(robot, pipeline, log, unknown, Raw::Spread)?;
                     findings.append(&mut more);
-                    let happened = incidents(robot, pipeline, &trajectory);
-                    leave_out(pipeline, &mut trajectory, &happened);
-                    findings.extend(incident_findings(&recording.name, &happened));
                     let observations = observe(robot, library, pipeline, &trajectory)?;
                     let summary = summary(recording, role, pipeline, &trajectory, &observations);
                     Ok(Log {
@@ -218,6 +216,39 @@ impl Data {
             })
             .collect()
     }
+}
+
+/// A log as a trajectory without contacts and protective stops; `unknown`: see [`carry_something`], `raw`: see [`PreparedLog::align`].
+fn usable(
+    robot: &Robot,
+    pipeline: &Pipeline,
+    log: &PreparedLog<'_>,
+    unknown: bool,
+    raw: Raw,
+) -> Result<(Trajectory, Vec<Finding>)> {
+    let (mut trajectory, mut findings) = log.align(pipeline, raw)?;
+    let recording = log.recording();
+    trajectory.payload_acts = !unknown || recording.payload == Payload::Unknown;
+    let happened = incidents(robot, pipeline, &trajectory);
+    leave_out(pipeline, &mut trajectory, &happened);
+    findings.extend(incident_findings(&recording.name, &happened));
+    Ok((trajectory, findings))
+}
+
+/// The rows of some logs alone.
+pub(super) fn rows(
+    robot: &Robot,
+    library: &Library,
+    pipeline: &Pipeline,
+    logs: &[PreparedLog<'_>],
+) -> Result<Vec<Observations>> {
+    let unknown = carry_something(logs.iter().map(PreparedLog::recording));
+    logs.iter()
+        .map(|log| {
+            let (trajectory, _) = usable(robot, pipeline, log, unknown, Raw::None)?;
+            observe(robot, library, pipeline, &trajectory)
+        })
+        .collect()
 }
 
 /// True if some log says that the robot carried something unknown: then the payload component acts in those logs only.

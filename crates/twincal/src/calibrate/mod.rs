@@ -46,7 +46,8 @@ use crate::prior::PriorSettings;
 use crate::robot::Robot;
 use crate::self_check::self_check;
 use crate::signal::{
-    Auto, Corrections, Recording, SignalSettings, choose_pipeline, constant_torque, hardly_driven,
+    Auto, Corrections, PreparedLog, Recording, SignalSettings, choose_and_prepare, constant_torque,
+    hardly_driven, prepare,
 };
 use crate::term::{Family, Library, LibrarySettings};
 use crate::twin::Twin;
@@ -81,6 +82,7 @@ impl Default for CalibrationSettings {
                 rate_hz: Auto::Auto,
                 coulomb_velocity: None,
                 corrections: Corrections::default(),
+                every_sample: false,
             },
             prior: PriorSettings {
                 scaled_variance: Auto::Auto,
@@ -141,7 +143,7 @@ pub fn calibrate(
     for log in logs.iter().chain(heldout) {
         log.require_torque(&robot.joint_names())?;
     }
-    let (pipeline, mut findings) = choose_pipeline(robot, logs, &settings.signal)?;
+    let (pipeline, mut findings, prepared) = choose_and_prepare(robot, logs, &settings.signal)?;
     findings.extend(constant_torque(robot, logs.iter().chain(heldout)));
     findings.extend(hardly_driven(robot, logs.iter().chain(heldout)));
     let library_settings = LibrarySettings {
@@ -152,7 +154,9 @@ pub fn calibrate(
     findings.extend(more);
 
     // eq. (1)–(4): residual torque and Euler–Lagrange columns, filtered alike
-    let mut data = Data::read(robot, &library, &pipeline, logs, heldout)?;
+    let ready = heldout.iter().map(|log| prepare(robot, log, &pipeline));
+    let others: Vec<PreparedLog<'_>> = ready.collect::<Result<_>>()?;
+    let mut data = Data::read(robot, &library, &pipeline, &prepared, &others)?;
     findings.extend(self_check(robot, &pipeline, data.trajectories())?);
     let lags: Vec<LogLag> = data
         .trajectories()
@@ -216,7 +220,7 @@ pub fn calibrate(
         robot,
         &library,
         &skeleton.pipeline,
-        logs,
+        &prepared,
         &columns,
         settings,
         &fitted.fit,

@@ -1,16 +1,17 @@
 //! Does an estimate depend on the cut-off? The same fit at 0.7 and 1.4 times f_c (method section 1).
 
 use super::CalibrationSettings;
-use super::data::Data;
+use super::data::rows;
 use super::result::SweepPoint;
 use crate::error::{Finding, Result, Severity};
 use crate::gram::Gram;
 use crate::infer::approximate;
 use crate::likelihood::{Columns, assemble};
+use crate::observations::{Observations, Part};
 use crate::plug_in::{Fit, total};
 use crate::posterior::Posterior;
 use crate::robot::Robot;
-use crate::signal::{Pipeline, Recording};
+use crate::signal::{Pipeline, PreparedLog};
 use crate::term::Library;
 use rayon::prelude::*;
 
@@ -25,7 +26,7 @@ pub(super) fn cutoff(
     robot: &Robot,
     library: &Library,
     pipeline: &Pipeline,
-    logs: &[Recording],
+    logs: &[PreparedLog<'_>],
     columns: &Columns,
     settings: &CalibrationSettings,
     fit: &Fit,
@@ -46,10 +47,10 @@ pub(super) fn cutoff(
             rate_hz: factor * pipeline.rate_hz,
             ..pipeline.clone()
         };
-        let Ok(data) = Data::read(robot, library, &scaled, logs, &[]) else {
+        let Ok(observations) = rows(robot, library, &scaled, logs) else {
             continue;
         };
-        let parts = data.training();
+        let parts: Vec<Part<'_>> = observations.iter().map(Observations::whole).collect();
         if parts.iter().any(|part| !part.rows.is_empty()) {
             moved.push((scaled.cutoff_hz, total(&parts)));
         }

@@ -41,7 +41,8 @@ pub(super) fn spikes(
     stopped: &[[f64; 2]],
 ) -> Vec<Incident> {
     let names = robot.joint_names();
-    let interval = trajectory.segments.first().map_or(1.0, |s| s.interval);
+    let first = trajectory.segments.first();
+    let (interval, logged) = first.map_or((1.0, 1.0), |s| (s.interval, s.logged_interval));
     let (width, joined) = if pipeline.is_off() {
         (1, JOINED_SAMPLES * interval)
     } else {
@@ -70,7 +71,7 @@ pub(super) fn spikes(
                     (*most, *last) = (times, incident);
                 }
                 last.span = span;
-                last.samples = ((span[1] - span[0]) / interval).round() as u64 + 1;
+                last.samples = ((span[1] - span[0]) / logged).round() as u64 + 1;
             }
             _ => merged.push((times, incident)),
         }
@@ -134,7 +135,7 @@ impl Bins {
             .collect();
         Self {
             spans,
-            width: width as u64,
+            width: (width * segment.thinning()) as u64,
             qd,
             qdd,
             tau,

@@ -79,7 +79,7 @@ pub(super) fn stops(robot: &Robot, pipeline: &Pipeline, trajectory: &Trajectory)
                             joint: names[joint].to_owned(),
                             span: [segment.time[from], segment.time[i - 1]],
                             torque,
-                            samples: (i - from) as u64,
+                            samples: ((i - from) * segment.thinning()) as u64,
                         });
                     }
                 }

@@ -123,7 +123,7 @@ pub fn estimate_lag(robot: &Robot, pipeline: &Pipeline, trajectory: &Trajectory)
     let common = common(&joints, interval);
     Some(LogLag {
         log: trajectory.name.clone(),
-        interval,
+        interval: first.logged_interval,
         joints,
         common,
     })

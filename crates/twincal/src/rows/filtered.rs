@@ -223,8 +223,11 @@ impl Rows {
 
 /// Row of the recording that is nearest in time to grid sample `i`.
 fn input_row(segment: &Segment, i: usize) -> usize {
+    if let Some(row) = segment.input_rows.get(i) {
+        return *row;
+    }
     let Some(logged) = &segment.logged else {
-        return segment.input_rows[i];
+        return i;
     };
     let t = segment.time[i];
     let after = logged

@@ -90,6 +90,7 @@ fn pipeline(cutoff_hz: f64) -> Pipeline {
         cutoff_hz,
         motion_cutoff_hz: 4.0 * cutoff_hz,
         rate_hz: 2.5 * cutoff_hz,
+        motion_interval: 0.0,
         coulomb_velocity: 0.02,
         standstill_velocity: vec![0.02; 2],
         derived_from: vec![DerivedFrom::Position; 2],
@@ -130,6 +131,7 @@ fn trajectory(samples: usize, interval: f64) -> Trajectory {
         tau,
         standstill,
         interval,
+        logged_interval: interval,
     };
     Trajectory {
         name: "stand-in".into(),
@@ -398,14 +400,17 @@ fn an_error_of_the_visitor_ends_the_visit() {
 fn spread_pieces_are_all_of_a_short_log_and_evenly_spread_over_a_long_one() {
     let pipeline = pipeline(20.0);
     let rows = |slices: &[Slice]| -> usize { slices.iter().map(|slice| slice.rows.len()).sum() };
-    for samples in [1_000, MOST_RAW] {
+    for samples in [1_000, ALL_RAW] {
         let all = spread_raw(&pipeline, &trajectory(samples, 1e-3), f64::NEG_INFINITY);
         assert_eq!(rows(&all), samples);
     }
-    for samples in [MOST_RAW + 1, 3 * MOST_RAW / 2, 10 * MOST_RAW + 77] {
+    for samples in [ALL_RAW + 1, 3 * ALL_RAW / 2, 10 * ALL_RAW + 77] {
         let long = trajectory(samples, 1e-3);
         let some = spread_raw(&pipeline, &long, f64::NEG_INFINITY);
-        assert!(rows(&some).abs_diff(MOST_RAW) <= 2 * RAW_PIECE, "{samples}");
+        assert!(
+            rows(&some).abs_diff(SPREAD_RAW) <= 2 * RAW_PIECE,
+            "{samples}"
+        );
         assert!(some.iter().all(|slice| slice.rows.len() <= RAW_PIECE));
         // No piece twice, no stretch without one.
         let starts: Vec<usize> = some.iter().map(|slice| slice.rows.start).collect();
@@ -416,4 +421,116 @@ fn spread_pieces_are_all_of_a_short_log_and_evenly_spread_over_a_long_one() {
         }));
         assert!(starts[0] == 0 && samples - starts[starts.len() - 1] < 2 * apart as usize);
     }
+}
+
+/// An arm that is 15 % heavier than its model, with friction, logged at 1 kHz: thinned or not, every row is explained by the
+/// true coefficients, and so is every sample as logged.
+#[test]
+fn a_coarser_clock_changes_no_row() {
+    use crate::robot::nominal_torque;
+    use crate::self_check::testing::arm;
+    use crate::signal::{Channels, Raw, Recording, prepare};
+    use crate::term::{Family, Library, LibrarySettings};
+    let (dof, len) = (4, 30_000);
+    let time: Vec<f64> = (0..len).map(|i| 1e-3 * i as f64).collect();
+    let wave = |order: i32| -> Vec<f64> {
+        let all = (0..dof).flat_map(|joint| {
+            let (w, v) = (0.9 + 0.37 * joint as f64, 2.3 - 0.41 * joint as f64);
+            time.iter().map(move |t| {
+                let quarter = f64::from(order) * std::f64::consts::FRAC_PI_2;
+                let sine = |size: f64, w: f64, phase: f64| {
+                    size * w.powi(order) * (w * t + phase + quarter).sin()
+                };
+                sine(0.9, w, joint as f64) + sine(0.4, v, 2.0 * joint as f64)
+            })
+        });
+        all.collect()
+    };
+    let [q, qd, qdd] = [wave(0), wave(1), wave(2)];
+    let mut tau = vec![0.0; dof * len];
+    let motion = Motion {
+        len,
+        q: &q,
+        qd: &qd,
+        qdd: &qdd,
+    };
+    nominal_torque(&arm(1.15), motion, &mut tau);
+    for (tau, qd) in tau.iter_mut().zip(&qd) {
+        *tau += 1.5 * qd + 2.0 * (qd / 0.02).tanh();
+    }
+    let of_joint = |values: &[f64], joint: usize| values[joint * len..(joint + 1) * len].to_vec();
+    let recording = Recording {
+        name: "run".into(),
+        joints: (0..dof)
+            .map(|joint| Channels {
+                q: of_joint(&q, joint),
+                qd: Some(of_joint(&qd, joint)),
+                qdd: None,
+                tau: Some(of_joint(&tau, joint)),
+            })
+            .collect(),
+        time,
+        payload: Payload::None,
+    };
+    let (robot, settings) = (
+        arm(1.0),
+        LibrarySettings {
+            families: vec![Family::MassScale, Family::Viscous, Family::Coulomb],
+            coulomb_velocity: 0.02,
+            ..LibrarySettings::default()
+        },
+    );
+    let library = Library::propose(&robot, &settings).unwrap().0;
+    let truth: Vec<f64> = library
+        .columns()
+        .iter()
+        .map(|&term| match library.terms()[term].family {
+            Family::MassScale => 0.15,
+            Family::Viscous => 1.5,
+            _ => 2.0,
+        })
+        .collect();
+    let mut times = Vec::new();
+    for motion_interval in [0.0, 0.007] {
+        let pipeline = Pipeline {
+            motion_interval,
+            standstill_velocity: vec![0.02; dof],
+            derived_from: vec![DerivedFrom::Velocity; dof],
+            ..pipeline(5.0)
+        };
+        let (trajectory, _) = prepare(&robot, &recording, &pipeline)
+            .unwrap()
+            .align(&pipeline, Raw::All)
+            .unwrap();
+        let interval = trajectory.segments[0].interval;
+        let expected = if motion_interval > 0.0 { 5e-3 } else { 1e-3 };
+        assert!((interval - expected).abs() < 1e-12, "{interval}");
+        for (signal, limit) in [(RowSignal::Filtered, 2e-4), (RowSignal::Raw, 5e-4)] {
+            let (mut worst, mut rows, mut first) = (0.0_f64, 0, f64::NAN);
+            let mut check = |block: &RowBlock<'_>| {
+                first = if rows == 0 { block.time[0] } else { first };
+                rows += block.len;
+                for joint in &block.joints {
+                    for r in 0..block.len {
+                        let columns = joint.columns.iter().enumerate();
+                        let explained: f64 = columns
+                            .map(|(i, &k)| truth[k] * joint.x[i * joint.stride + r])
+                            .sum();
+                        let left = joint.measured[r] - joint.nominal[r] - explained;
+                        worst = worst.max(left.abs());
+                    }
+                }
+                Ok(())
+            };
+            visit_rows(&robot, &library, &pipeline, &trajectory, signal, &mut check).unwrap();
+            assert!(
+                worst < limit,
+                "{signal:?}, {motion_interval}: {worst:e} N·m"
+            );
+            times.push((first, rows));
+        }
+    }
+    // The same rows but for the borders; samples as logged all the same.
+    assert!(times[2].1.abs_diff(times[0].1) <= 2, "{times:?}");
+    assert!(times[3].1 > 29_000 && times[3].1 < times[1].1, "{times:?}");
 }

@@ -4,51 +4,46 @@ use super::evaluate::{Source, Stretch};
 use super::{JointRows, MAX_BLOCK, RowBlock, Slice};
 use crate::error::Result;
 use crate::signal::Segment;
-use crate::signal::spline::resample;
+use crate::signal::interpolate::Place;
 
-/// The samples of a segment at the stamps of the log.
+/// Motion at the stamps of a log whose segment has another clock: the filtered motion, interpolated. The filter leaves nothing
+/// above f_q, so the error is far below that of the filter.
 struct AtStamps {
-    motion: [Vec<f64>; 3],
-    standstill: Vec<bool>,
+    places: Vec<Place>,
+    /// Nearest sample of the segment.
+    nearest: Vec<usize>,
 }
 
-/// An uneven log's motion at its own stamps: the filtered motion on the even grid, interpolated. The filter leaves
-/// nothing above f_q, so the spline's error is far below that of the filter.
-fn at_stamps(segment: &Segment, stamps: &[f64], dof: usize) -> AtStamps {
-    let len = segment.time.len();
-    let interpolate = |values: &[f64]| -> Vec<f64> {
-        if len < 4 {
-            // Too few for a spline: the nearest sample.
-            return values
-                .chunks_exact(len)
-                .flat_map(|joint| stamps.iter().map(|&t| joint[nearest(segment, t)]))
-                .collect();
-        }
-        values
-            .chunks_exact(len)
-            .flat_map(|joint| resample(&segment.time, joint, stamps))
-            .collect()
-    };
-    AtStamps {
-        motion: [
-            interpolate(&segment.q),
-            interpolate(&segment.qd),
-            interpolate(&segment.qdd),
-        ],
-        standstill: (0..dof)
-            .flat_map(|joint| {
-                stamps
-                    .iter()
-                    .map(move |&t| segment.standstill[joint * len + nearest(segment, t)])
-            })
+impl AtStamps {
+    fn new(segment: &Segment, stamps: &[f64]) -> Self {
+        let (start, len) = (segment.time[0], segment.time.len());
+        let nearest = |t: &f64| {
+            let steps = ((t - start) / segment.interval).round();
+            (steps.max(0.0) as usize).min(len - 1)
+        };
+        Self {
+            places: (stamps
+                .iter()
+                .map(|&t| Place::new(t, start, segment.interval, len)))
             .collect(),
+            nearest: stamps.iter().map(nearest).collect(),
+        }
     }
-}
 
-/// Grid sample nearest to time `t`.
-fn nearest(segment: &Segment, t: f64) -> usize {
-    let steps = ((t - segment.time[0]) / segment.interval).round();
-    (steps.max(0.0) as usize).min(segment.time.len() - 1)
+    /// `joint * stamps + stamp`.
+    fn of(&self, values: &[f64], len: usize, out: &mut Vec<f64>) {
+        out.clear();
+        for joint in values.chunks_exact(len) {
+            out.extend(self.places.iter().map(|place| place.of(joint)));
+        }
+    }
+
+    fn standstill(&self, still: &[bool], len: usize) -> Vec<bool> {
+        let joints = still.chunks_exact(len);
+        joints
+            .flat_map(|joint| self.nearest.iter().map(|&i| joint[i]))
+            .collect()
+    }
 }
 
 /// Visits logged samples of a segment.
@@ -59,40 +54,46 @@ pub(super) fn visit(
     dof: usize,
     visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
 ) -> Result<()> {
-    let stamped = segment
-        .logged
-        .as_ref()
-        .map(|logged| at_stamps(segment, &logged.time, dof));
     let (time, input_rows, tau) = match &segment.logged {
         Some(logged) => (&logged.time, &logged.input_rows, &logged.tau),
         None => (&segment.time, &segment.input_rows, &segment.tau),
     };
-    let (motion, still) = match &stamped {
-        Some(s) => ([&s.motion[0], &s.motion[1], &s.motion[2]], &s.standstill),
-        None => ([&segment.q, &segment.qd, &segment.qdd], &segment.standstill),
-    };
-    let total = time.len();
+    let (total, samples) = (time.len(), segment.time.len());
     let mut stretch = Stretch::new(dof);
     let mut from = slice.rows.start;
     while from < slice.rows.end {
         let len = MAX_BLOCK.min(slice.rows.end - from);
-        stretch.load(from, len, total, motion.map(Vec::as_slice));
+        let own = from..from + len;
+        let motion = [&segment.q, &segment.qd, &segment.qdd];
+        let still: Vec<bool> = if segment.logged.is_some() {
+            let at = AtStamps::new(segment, &time[own.clone()]);
+            stretch.len = len;
+            let own = [&mut stretch.q, &mut stretch.qd, &mut stretch.qdd];
+            for (to, values) in own.into_iter().zip(motion) {
+                at.of(values, samples, to);
+            }
+            at.standstill(&segment.standstill, samples)
+        } else {
+            stretch.load(from, len, total, motion.map(Vec::as_slice));
+            let joints = segment.standstill.chunks_exact(total);
+            joints
+                .flat_map(|joint| &joint[own.clone()])
+                .copied()
+                .collect()
+        };
         stretch.evaluate(source);
         let joints = (0..dof)
-            .map(|joint| {
-                let rows = joint * total + from..joint * total + from + len;
-                JointRows {
-                    columns: source.columns(joint),
-                    stride: len,
-                    x: &stretch.values[joint],
-                    measured: if tau.is_empty() {
-                        &[]
-                    } else {
-                        &tau[rows.clone()]
-                    },
-                    nominal: &stretch.nominal[joint * len..(joint + 1) * len],
-                    standstill: &still[rows],
-                }
+            .map(|joint| JointRows {
+                columns: source.columns(joint),
+                stride: len,
+                x: &stretch.values[joint],
+                measured: if tau.is_empty() {
+                    &[]
+                } else {
+                    &tau[joint * total + from..][..len]
+                },
+                nominal: &stretch.nominal[joint * len..(joint + 1) * len],
+                standstill: &still[joint * len..(joint + 1) * len],
             })
             .collect();
         visit(&RowBlock {

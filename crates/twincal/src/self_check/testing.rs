@@ -99,6 +99,7 @@ pub(crate) fn log(seed: f64) -> Trajectory {
         tau,
         standstill: vec![false; dof * LEN],
         interval: INTERVAL,
+        logged_interval: INTERVAL,
     };
     Trajectory {
         name: "run".into(),

@@ -83,6 +83,7 @@ mod tests {
             tau: Vec::new(),
             standstill: vec![false; time.len()],
             interval: 0.002,
+            logged_interval: 0.002,
             time,
         };
         let trajectory = Trajectory {

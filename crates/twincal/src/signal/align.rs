@@ -5,11 +5,14 @@ use super::choose::{COLUMN_LIMIT, MOTION_LIMIT, require_derivatives};
 use super::convolve::{correlate, correlate_two};
 use super::fir::{MotionKernels, column_half_seconds, motion_half_samples, motion_half_seconds};
 use super::mask::Saturated;
-use super::prepare::{JointFacts, Piece, prepare, report_short};
+use super::prepare::{JointFacts, Piece, Prepared, Values, pick, prepare, report_short};
 use super::standstill::standstill;
-use super::{Channels, DerivedFrom, LoggedSamples, Pipeline, Recording, Segment, Trajectory};
+use super::thin::thin;
+use super::{DerivedFrom, LoggedSamples, Pipeline, Recording, Segment, Trajectory};
 use crate::error::{Error, Finding, Result, Severity};
 use rayon::prelude::*;
+use std::borrow::Cow;
+use std::ops::Range;
 
 /// Standstill has to last for this many periods of the cut-off.
 const STANDSTILL_PERIODS: f64 = 3.0;
@@ -17,18 +20,104 @@ const STANDSTILL_PERIODS: f64 = 3.0;
 /// Share of standstill from which a joint counts as not moving in a log.
 const HARDLY_MOVES: f64 = 0.95;
 
-/// See [`super::align`].
-pub(crate) fn align(
-    joints: &[JointFacts],
-    log: &Recording,
-    pipeline: &Pipeline,
-) -> Result<(Trajectory, Vec<Finding>)> {
-    let mut findings = Vec::new();
-    let every_row = pipeline.is_off();
-    if every_row {
-        require_derivatives(joints, log)?;
+/// Samples as logged that are kept of a long log whose clock is thinned, about, and how many in a row.
+const SPREAD: usize = 1 << 16;
+const STRETCH: usize = 1 << 8;
+
+/// What a segment keeps of samples as logged where its motion has a coarser clock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Raw {
+    /// None: for filtered rows alone.
+    None,
+    /// Evenly spread stretches, about 65 536 samples of a log: enough for a standard deviation or a coverage.
+    Spread,
+    /// All.
+    All,
+}
+
+/// A log cut, unfolded and on even clocks, ready for any cut-off up to 1.4 times that of the pipeline it was made for.
+#[derive(Debug)]
+pub struct PreparedLog<'a> {
+    log: &'a Recording,
+    joints: Vec<JointFacts>,
+    pieces: Prepared<'a>,
+    saturated: Saturated,
+    findings: Vec<Finding>,
+}
+
+impl<'a> PreparedLog<'a> {
+    /// Step 1 of method section 1.
+    pub(crate) fn new(
+        joints: Vec<JointFacts>,
+        log: &'a Recording,
+        pipeline: &Pipeline,
+    ) -> Result<Self> {
+        let mut findings = Vec::new();
+        let every_row = pipeline.is_off();
+        if every_row {
+            require_derivatives(&joints, log)?;
+        }
+        let pieces = prepare(
+            &joints,
+            log,
+            every_row,
+            &pipeline.corrections,
+            &mut findings,
+        )?;
+        Ok(Self::of(joints, log, pieces, findings, pipeline))
     }
-    let prepared = prepare(joints, log, every_row, &pipeline.corrections, &mut findings)?;
+
+    /// The same from pieces that are there already, with what was found in them.
+    pub(crate) fn of(
+        joints: Vec<JointFacts>,
+        log: &'a Recording,
+        mut pieces: Prepared<'a>,
+        mut findings: Vec<Finding>,
+        pipeline: &Pipeline,
+    ) -> Self {
+        if !pipeline.is_off() {
+            let (short, rows) = thin(&mut pieces, pipeline);
+            report_short(log, short, rows, &mut findings);
+        }
+        Self {
+            saturated: Saturated::find(&joints, log, pipeline),
+            log,
+            joints,
+            pieces,
+            findings,
+        }
+    }
+
+    /// The log itself.
+    pub fn recording(&self) -> &'a Recording {
+        self.log
+    }
+
+    /// Step 2: smooth motion, with what was found on the way; `raw`: what stays of the samples as logged.
+    ///
+    /// # Errors
+    /// As [`super::align`].
+    pub fn align(&self, pipeline: &Pipeline, raw: Raw) -> Result<(Trajectory, Vec<Finding>)> {
+        let mut findings = self.findings.clone();
+        let trajectory = align(self, pipeline, raw, &mut findings)?;
+        Ok((trajectory, findings))
+    }
+}
+
+/// See [`PreparedLog::align`].
+fn align(
+    ready: &PreparedLog<'_>,
+    pipeline: &Pipeline,
+    raw: Raw,
+    findings: &mut Vec<Finding>,
+) -> Result<Trajectory> {
+    let PreparedLog {
+        log,
+        joints,
+        pieces: prepared,
+        saturated,
+        ..
+    } = ready;
     let with_tau = log.joints.iter().all(|c| c.tau.is_some());
     let mut trajectory = Trajectory {
         name: log.name.clone(),
@@ -37,14 +126,11 @@ pub(crate) fn align(
         payload: log.payload,
         payload_acts: true,
     };
-    if every_row {
-        trajectory.segments = prepared
-            .pieces
-            .iter()
-            .map(|piece| as_logged(piece, with_tau))
-            .collect();
-        Saturated::find(joints, log, pipeline).mask(log, &mut trajectory, &mut findings);
-        return Ok((trajectory, findings));
+    if pipeline.is_off() {
+        let logged = prepared.pieces.iter();
+        trajectory.segments = logged.map(|piece| as_logged(piece, with_tau)).collect();
+        saturated.mask(log, pipeline, &mut trajectory, findings);
+        return Ok(trajectory);
     }
     let rate = 1.0 / prepared.interval;
     if pipeline.cutoff_hz > COLUMN_LIMIT * rate {
@@ -75,8 +161,9 @@ pub(crate) fn align(
     }
     let (mut short, mut short_rows, mut total, mut used) = (0, 0, 0.0, 0.0);
     for piece in &prepared.pieces {
-        total += piece.time.len() as f64 * piece.interval;
-        match smoothed(joints, piece, pipeline, cutoff, log, with_tau) {
+        total += piece.rows.len() as f64 * prepared.interval;
+        let kept = Kept { with_tau, raw };
+        match smoothed(ready, piece, pipeline, cutoff, kept) {
             Some(segment) => {
                 let border = 2.0 * column_half_seconds(pipeline.cutoff_hz);
                 used += (segment.time.len() as f64 * piece.interval - border).max(0.0);
@@ -88,7 +175,7 @@ pub(crate) fn align(
             }
         }
     }
-    report_short(log, short, short_rows, &mut findings);
+    report_short(log, short, short_rows, findings);
     if trajectory.segments.is_empty() {
         return Err(Error::Log {
             log: log.name.clone(),
@@ -105,36 +192,52 @@ pub(crate) fn align(
         &log.name,
         format!(
             "the filters need {:.3} s at either end of each segment: {used:.3} of {total:.3} s become rows",
-            column_half_seconds(pipeline.cutoff_hz) + motion_half_seconds(cutoff)
+            column_half_seconds(pipeline.cutoff_hz) + pipeline.motion_half_length()
         ),
         0,
     ));
     let names: Vec<&str> = joints.iter().map(|facts| facts.name.as_str()).collect();
     let agreement = velocity_agreement(&trajectory, &pipeline.standstill_velocity);
     findings.extend(agreement::findings(&names, &log.name, &agreement));
-    report_standstill(joints, log, &trajectory, &mut findings);
-    Saturated::find(joints, log, pipeline).mask(log, &mut trajectory, &mut findings);
-    Ok((trajectory, findings))
+    report_standstill(joints, log, &trajectory, findings);
+    saturated.mask(log, pipeline, &mut trajectory, findings);
+    Ok(trajectory)
 }
 
 /// Channels one after the other: `joint * len + sample`.
 fn stacked<'a>(
-    joints: &'a [Channels],
-    channel: impl Fn(&'a Channels) -> Option<&'a Vec<f64>>,
+    joints: &'a [Values<'a>],
+    channel: impl Fn(&'a Values<'a>) -> Option<&'a Cow<'a, [f64]>>,
 ) -> Vec<f64> {
-    joints
-        .iter()
-        .filter_map(channel)
-        .flatten()
-        .copied()
+    let channels = joints.iter().filter_map(channel);
+    channels.flat_map(|values| values.iter().copied()).collect()
+}
+
+/// Evenly spread stretches of some samples of a log of `all`.
+fn spread(range: Range<usize>, all: usize) -> Vec<Range<usize>> {
+    let every = all.div_ceil(SPREAD).max(1);
+    let starts = (range.start..range.end).step_by(every * STRETCH);
+    if every == 1 {
+        return vec![range];
+    }
+    starts
+        .map(|start| start..range.end.min(start + STRETCH))
         .collect()
 }
 
+/// What of a piece goes into its segment beside motion.
+#[derive(Debug, Clone, Copy)]
+struct Kept {
+    with_tau: bool,
+    raw: Raw,
+}
+
 /// Pipeline off: the rows as they are.
-fn as_logged(piece: &Piece, with_tau: bool) -> Segment {
+fn as_logged(piece: &Piece<'_>, with_tau: bool) -> Segment {
     Segment {
         time: piece.time.clone(),
         input_rows: piece.rows.clone(),
+        logged_interval: piece.interval,
         logged: None,
         q: stacked(&piece.joints, |c| Some(&c.q)),
         qd: stacked(&piece.joints, |c| c.qd.as_ref()),
@@ -151,12 +254,11 @@ fn as_logged(piece: &Piece, with_tau: bool) -> Segment {
 
 /// Step 2 of method section 1; `None` if the piece does not hold the kernel and a few samples more.
 fn smoothed(
-    joints: &[JointFacts],
-    piece: &Piece,
+    ready: &PreparedLog<'_>,
+    piece: &Piece<'_>,
     pipeline: &Pipeline,
     cutoff: f64,
-    log: &Recording,
-    with_tau: bool,
+    kept: Kept,
 ) -> Option<Segment> {
     let half = motion_half_samples(cutoff, piece.interval);
     let len = piece
@@ -190,22 +292,19 @@ fn smoothed(
                 piece.interval,
             ));
         });
-    let logged_torque = piece.joints.iter().filter_map(|c| c.tau.as_ref());
-    let tau = logged_torque
-        .filter(|_| with_tau)
+    let torque = piece.joints.iter().filter_map(|c| c.tau.as_ref());
+    let tau = torque
+        .filter(|_| kept.with_tau)
         .flat_map(|tau| tau[inner.clone()].iter().copied())
         .collect();
     let time = piece.time[inner.clone()].to_vec();
-    let (input_rows, logged) = if piece.resampled {
-        (
-            Vec::new(),
-            Some(logged_samples(
-                joints, &time, piece, log, pipeline, with_tau,
-            )),
-        )
+    let input_rows = if piece.resampled() {
+        Vec::new()
     } else {
-        (piece.rows[inner].to_vec(), None)
+        piece.grid_rows[inner].to_vec()
     };
+    let logged = (piece.resampled() || piece.every > 1 && kept.raw != Raw::None)
+        .then(|| logged_samples(ready, &time, piece, pipeline, kept));
     Some(Segment {
         time,
         input_rows,
@@ -216,13 +315,14 @@ fn smoothed(
         tau,
         standstill: still,
         interval: piece.interval,
+        logged_interval: piece.interval / piece.every as f64,
     })
 }
 
 /// Smooth position, velocity and acceleration of one joint; the derivative of its position, where that is not the velocity.
 fn derivatives(
     kernels: &MotionKernels,
-    channels: &Channels,
+    channels: &Values<'_>,
     derived: DerivedFrom,
     [q, qd, qdd]: [&mut [f64]; 3],
 ) -> Option<Vec<f64>> {
@@ -255,26 +355,25 @@ fn derivatives(
     Some(travel)
 }
 
-/// The rows as logged that lie within the borders of a resampled segment; torque moved back by its lag.
+/// The rows as logged that lie within the borders of a segment; torque moved back by its lag.
 fn logged_samples(
-    joints: &[JointFacts],
+    ready: &PreparedLog<'_>,
     time: &[f64],
-    piece: &Piece,
-    log: &Recording,
+    piece: &Piece<'_>,
     pipeline: &Pipeline,
-    with_tau: bool,
+    kept: Kept,
 ) -> LoggedSamples {
-    let of_rows =
-        |values: &[f64]| -> Vec<f64> { piece.rows.iter().map(|&row| values[row]).collect() };
-    let stamps = of_rows(&log.time);
-    let logged: Vec<Channels> = log
+    let PreparedLog { log, joints, .. } = ready;
+    let stamps = pick(&log.time, &piece.rows);
+    let logged: Vec<Values<'_>> = log
         .joints
         .iter()
-        .map(|channels| Channels {
-            q: Vec::new(),
+        .map(|channels| Values {
+            q: Cow::Borrowed(&[]),
             qd: None,
             qdd: None,
-            tau: channels.tau.as_deref().filter(|_| with_tau).map(of_rows),
+            tau: (channels.tau.as_deref().filter(|_| kept.with_tau))
+                .map(|tau| pick(tau, &piece.rows)),
         })
         .collect();
     let mut moved = logged.clone();
@@ -285,14 +384,26 @@ fn logged_samples(
     let (first, last) = (time[0], time[time.len() - 1]);
     let from = stamps.partition_point(|t| *t < first);
     let to = stamps.partition_point(|t| *t <= last);
-    LoggedSamples {
-        time: stamps[from..to].to_vec(),
-        tau: moved
+    let stretches = match kept.raw {
+        Raw::Spread if piece.every > 1 => spread(from..to, log.time.len()),
+        _ => vec![from..to],
+    };
+    let kept = |values: &[f64]| -> Vec<f64> {
+        stretches
             .iter()
-            .filter_map(|channels| channels.tau.as_deref())
-            .flat_map(|tau| tau[from..to].iter().copied())
+            .flat_map(|stretch| &values[stretch.clone()])
+            .copied()
+            .collect()
+    };
+    let rows = stretches
+        .iter()
+        .flat_map(|stretch| &piece.rows[stretch.clone()]);
+    LoggedSamples {
+        time: kept(&stamps),
+        tau: (moved.iter().filter_map(|channels| channels.tau.as_deref()))
+            .flat_map(&kept)
             .collect(),
-        input_rows: piece.rows[from..to].to_vec(),
+        input_rows: rows.copied().collect(),
     }
 }
 
@@ -306,11 +417,9 @@ fn report_standstill(
         let (mut still, mut all) = (0_usize, 0_usize);
         for segment in &trajectory.segments {
             let len = segment.time.len();
-            all += len;
-            still += segment.standstill[joint * len..(joint + 1) * len]
-                .iter()
-                .filter(|s| **s)
-                .count();
+            let own = &segment.standstill[joint * len..(joint + 1) * len];
+            all += len * segment.thinning();
+            still += own.iter().filter(|s| **s).count() * segment.thinning();
         }
         if still == 0 {
             continue;

@@ -1,10 +1,14 @@
 //! Replaces every "auto" of the signal settings by a number that the training logs justify.
 
+use super::align::PreparedLog;
 use super::clock::even_interval;
-use super::cutoff::{JointSpectra, automatic, derived_from, motion_band, spectra};
+use super::cutoff::{
+    JointSpectra, automatic, derived_from, motion_band, rms_acceleration, spectra,
+};
 use super::encoder::velocity_resolution;
 use super::fir::{column_half_seconds, column_kernel, motion_half_seconds, noise_gain};
 use super::prepare::{JointFacts, Prepared, prepare};
+use super::thin::{coarsest, factor};
 use super::{Auto, DerivedFrom, Pipeline, Recording, SignalSettings};
 use crate::error::{Error, Finding, Result, Severity};
 
@@ -25,12 +29,12 @@ fn setting(key: &str, problem: String, remedy: &str) -> Error {
     }
 }
 
-/// See [`super::choose_pipeline`].
-pub(crate) fn choose(
+/// See [`super::choose_and_prepare`].
+pub(crate) fn choose<'a>(
     joints: &[JointFacts],
-    logs: &[Recording],
+    logs: &'a [Recording],
     settings: &SignalSettings,
-) -> Result<(Pipeline, Vec<Finding>)> {
+) -> Result<(Pipeline, Vec<Finding>, Vec<PreparedLog<'a>>)> {
     check_settings(settings)?;
     if logs.is_empty() {
         return Err(Error::Refused {
@@ -43,19 +47,25 @@ pub(crate) fn choose(
         settings.cutoff_hz == Auto::Value(0.0),
     );
     corrections.check(joints, is_off)?;
-    // What is wrong with single logs is said when they are aligned.
-    let mut unsaid = Vec::new();
-    if is_off {
-        for log in logs {
-            prepare(joints, log, true, corrections, &mut unsaid)?;
-        }
-        return off(joints, logs, settings);
-    }
     let mut prepared = Vec::with_capacity(logs.len());
+    // What is wrong with single logs is said when they are aligned.
+    let mut unsaid = Vec::with_capacity(logs.len());
     for log in logs {
-        prepared.push(prepare(joints, log, false, corrections, &mut unsaid)?);
+        let mut findings = Vec::new();
+        prepared.push(prepare(joints, log, is_off, corrections, &mut findings)?);
+        unsaid.push(findings);
     }
-    on(joints, logs, &prepared, settings)
+    let (pipeline, findings) = if is_off {
+        off(joints, logs, settings)?
+    } else {
+        on(joints, logs, &prepared, settings)?
+    };
+    let ready = logs.iter().zip(prepared).zip(unsaid);
+    let ready = ready.map(|((log, pieces), findings)| {
+        PreparedLog::of(joints.to_vec(), log, pieces, findings, &pipeline)
+    });
+    let ready = ready.collect();
+    Ok((pipeline, findings, ready))
 }
 
 fn check_settings(settings: &SignalSettings) -> Result<()> {
@@ -169,6 +179,7 @@ fn off(
         cutoff_hz: 0.0,
         motion_cutoff_hz: 0.0,
         rate_hz: if rate.is_finite() { 1.0 / rate } else { 0.0 },
+        motion_interval: 0.0,
         coulomb_velocity: settings.coulomb_velocity.unwrap_or(0.0),
         standstill_velocity: vec![0.0; joints.len()],
         derived_from: vec![DerivedFrom::Position; joints.len()],
@@ -203,7 +214,7 @@ pub(crate) fn require_derivatives(joints: &[JointFacts], log: &Recording) -> Res
 fn on(
     joints: &[JointFacts],
     logs: &[Recording],
-    prepared: &[Prepared],
+    prepared: &[Prepared<'_>],
     settings: &SignalSettings,
 ) -> Result<(Pipeline, Vec<Finding>)> {
     let coulomb_velocity = settings.coulomb_velocity.unwrap_or(COULOMB_VELOCITY);
@@ -211,7 +222,7 @@ fn on(
         .iter()
         .map(|p| 1.0 / p.interval)
         .fold(f64::INFINITY, f64::min);
-    let seconds = |p: &Prepared| {
+    let seconds = |p: &Prepared<'_>| {
         p.pieces
             .iter()
             .map(|piece| piece.time.len() as f64 * piece.interval)
@@ -256,10 +267,17 @@ fn on(
             0,
         ));
     }
+    let acceleration = moving.iter().map(|logs| rms_acceleration(logs));
+    let acceleration = acceleration.fold(0.0, f64::max);
     let mut pipeline = Pipeline {
         cutoff_hz: cutoff,
         motion_cutoff_hz: motion_cutoff,
         rate_hz: rate,
+        motion_interval: if settings.every_sample {
+            0.0
+        } else {
+            coarsest(motion_cutoff, coulomb_velocity, acceleration)
+        },
         coulomb_velocity,
         standstill_velocity: Vec::with_capacity(joints.len()),
         derived_from: (0..joints.len())
@@ -267,6 +285,9 @@ fn on(
             .collect(),
         corrections: settings.corrections.clone(),
     };
+    if prepared.iter().all(|p| factor(&pipeline, p.interval) == 1) {
+        pipeline.motion_interval = 0.0;
+    }
     let mut still = Vec::with_capacity(joints.len());
     for (joint, facts) in joints.iter().enumerate() {
         let resolved = velocity_resolution(
@@ -301,7 +322,7 @@ fn on(
 }
 
 /// Whether a joint is anywhere displaced by more than `threshold` times half a period of the cut-off in that time.
-fn moves(joint: usize, prepared: &[Prepared], threshold: f64, cutoff: f64) -> bool {
+fn moves(joint: usize, prepared: &[Prepared<'_>], threshold: f64, cutoff: f64) -> bool {
     prepared.iter().flat_map(|p| &p.pieces).any(|piece| {
         let lag = ((0.5 / cutoff / piece.interval).round() as usize).max(1);
         let least = threshold * lag as f64 * piece.interval;

@@ -2,6 +2,7 @@
 
 use super::Recording;
 use crate::error::{Error, Finding, Result, Severity};
+use rayon::prelude::*;
 
 /// A step longer than this many median intervals is a gap: the log is cut there.
 const GAP: f64 = 5.0;
@@ -115,6 +116,10 @@ fn finite_rows(
     findings: &mut Vec<Finding>,
 ) -> (Vec<usize>, Vec<bool>) {
     let samples = log.time.len();
+    let is_finite = |(_, values): &(String, &[f64])| values.iter().all(|v| v.is_finite());
+    if channels.par_iter().all(is_finite) {
+        return ((0..samples).collect(), vec![false; samples]);
+    }
     let (mut kept, mut cut_before) = (Vec::with_capacity(samples), Vec::with_capacity(samples));
     let mut per_channel = vec![0_usize; channels.len()];
     let mut cut = false;

@@ -1,7 +1,6 @@
 //! What a user says of a log's channels: torque that comes later than the motion, a velocity that is not to be used.
 
-use super::Channels;
-use super::prepare::JointFacts;
+use super::prepare::{JointFacts, Values};
 use super::spline::resample;
 use crate::error::{Error, Result};
 use crate::robot::did_you_mean;
@@ -124,9 +123,9 @@ impl Corrections {
         &self,
         joints: &[JointFacts],
         stamps: &[f64],
-        logged: &[Channels],
+        logged: &[Values<'_>],
         grid: &[f64],
-        moved: &mut [Channels],
+        moved: &mut [Values<'_>],
     ) -> Range<usize> {
         let lags: Vec<f64> = joints.iter().map(|j| self.lag_of(&j.name)).collect();
         let (least, most) = lags
@@ -141,7 +140,7 @@ impl Corrections {
             };
             if *lag != 0.0 {
                 let at: Vec<f64> = grid[from..to].iter().map(|t| t + lag).collect();
-                tau[from..to].copy_from_slice(&resample(stamps, values, &at));
+                tau.to_mut()[from..to].copy_from_slice(&resample(stamps, values, &at));
             }
         }
         from..to
@@ -164,8 +163,8 @@ mod tests {
         let stamps: Vec<f64> = (0..100).map(|i| 0.01 * f64::from(i)).collect();
         // a cubic passes through the spline exactly
         let cubic = |t: f64| 3.0 - t + 2.0 * t * t * t;
-        let channels = |lag: f64| Channels {
-            q: vec![0.0; 100],
+        let channels = |lag: f64| Values {
+            q: vec![0.0; 100].into(),
             qd: None,
             qdd: None,
             tau: Some(stamps.iter().map(|t| cubic(t - lag)).collect()),

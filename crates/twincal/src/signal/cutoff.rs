@@ -52,7 +52,7 @@ impl JointSpectra {
 }
 
 /// Spectra of every joint of a log; `None` if the log is too short.
-pub(crate) fn spectra(prepared: &Prepared) -> Option<Vec<JointSpectra>> {
+pub(crate) fn spectra(prepared: &Prepared<'_>) -> Option<Vec<JointSpectra>> {
     let pieces = &prepared.pieces;
     let interval = prepared.interval;
     let dof = pieces.first()?.joints.len();
@@ -61,7 +61,7 @@ pub(crate) fn spectra(prepared: &Prepared) -> Option<Vec<JointSpectra>> {
         .into_par_iter()
         .map(|joint| {
             let channels = || pieces.iter().map(move |p| &p.joints[joint]);
-            let position = Spectrum::welch(channels().map(|c| c.q.as_slice()), interval)?;
+            let position = Spectrum::welch(channels().map(|c| &*c.q), interval)?;
             let qd = Spectrum::welch(channels().filter_map(|c| c.qd.as_deref()), interval);
             let qdd = Spectrum::welch(channels().filter_map(|c| c.qdd.as_deref()), interval);
             Some(JointSpectra {
@@ -119,13 +119,26 @@ pub(crate) fn motion_band(logs: &[&JointSpectra]) -> (f64, f64) {
     (band.map_or(0.0, |b| b.0), total.sqrt())
 }
 
-/// Noise power of q̈ below `cutoff` over its signal power, pooled over logs; the signal is what lies below 3 f_m.
+/// Noise power of q̈ below `cutoff` over its signal power, pooled over logs.
 fn noise_ratio(logs: &[&JointSpectra], cutoff: f64, band: f64) -> f64 {
     let derived = derived_from(logs, cutoff);
-    let (mut noise, mut signal) = (0.0, 0.0);
-    for log in logs {
+    let noise = logs.iter().map(|log| {
         let (source, more) = log.source(derived);
-        noise += log.duration * source.power(more, cutoff);
+        log.duration * source.power(more, cutoff)
+    });
+    noise.sum::<f64>() / acceleration_energy(logs, band)
+}
+
+/// Root mean square of the acceleration of one joint over all logs, rad/s² or m/s².
+pub(crate) fn rms_acceleration(logs: &[&JointSpectra]) -> f64 {
+    let time: f64 = logs.iter().map(|log| log.duration).sum();
+    (acceleration_energy(logs, motion_band(logs).0) / time).sqrt()
+}
+
+/// ∫ q̈² over all logs, from what of position lies below 3 f_m and above its noise.
+fn acceleration_energy(logs: &[&JointSpectra], band: f64) -> f64 {
+    let mut signal = 0.0;
+    for log in logs {
         let spectrum = &log.position;
         let below = spectrum
             .density
@@ -138,7 +151,7 @@ fn noise_ratio(logs: &[&JointSpectra], cutoff: f64, band: f64) -> f64 {
             .sum::<f64>();
         signal += log.duration * below * spectrum.width;
     }
-    noise / signal
+    signal
 }
 
 /// The rule at the top of this file. `moving[j]` lists the spectra of a joint that moves; the longest segment is in s.

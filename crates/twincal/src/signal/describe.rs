@@ -1,6 +1,6 @@
 //! What a log holds, before anything is fitted: rates, cuts, motion and torque per joint.
 
-use super::prepare::{joint_facts, prepare};
+use super::prepare::{Piece, Values, joint_facts, prepare};
 use super::{Corrections, Recording};
 use crate::error::{Finding, Result, Severity};
 use crate::robot::Robot;
@@ -61,16 +61,16 @@ pub fn describe(robot: &Robot, log: &Recording) -> Result<(LogOverview, Vec<Find
         .iter()
         .enumerate()
         .map(|(joint, facts)| {
-            let gather = |pick: &dyn Fn(&super::Channels) -> Vec<f64>| -> Vec<f64> {
+            let gather = |pick: &dyn Fn(&Values<'_>) -> Vec<f64>| -> Vec<f64> {
                 prepared
                     .pieces
                     .iter()
                     .flat_map(|p| pick(&p.joints[joint]))
                     .collect()
             };
-            let q = gather(&|c| c.q.clone());
+            let q = gather(&|c| c.q.to_vec());
             let qd = gather(&|c| match &c.qd {
-                Some(qd) => qd.clone(),
+                Some(qd) => qd.to_vec(),
                 None => {
                     c.q.windows(6)
                         .map(|w| (w[5] - w[0]) / (5.0 * prepared.interval))
@@ -81,7 +81,7 @@ pub fn describe(robot: &Robot, log: &Recording) -> Result<(LogOverview, Vec<Find
             let tau = channels
                 .tau
                 .as_ref()
-                .map(|_| gather(&|c| c.tau.clone().unwrap_or_default()));
+                .map(|_| gather(&|c| c.tau.as_deref().unwrap_or_default().to_vec()));
             JointOverview {
                 joint: facts.name.clone(),
                 q_range: q
@@ -108,7 +108,7 @@ pub fn describe(robot: &Robot, log: &Recording) -> Result<(LogOverview, Vec<Find
             .sum(),
         rate_hz: 1.0 / prepared.interval,
         segments: prepared.pieces.len() as u64,
-        resampled: prepared.pieces.iter().any(|p| p.resampled),
+        resampled: prepared.pieces.iter().any(Piece::resampled),
         joints,
     };
     Ok((overview, findings))

@@ -123,6 +123,34 @@ impl MotionKernels {
     }
 }
 
+/// Stop band of the filter before a coarser clock, dB.
+const THINNING_ATTENUATION: f64 = 120.0;
+/// What a coarse clock has to keep, relative to the motion filter's cut-off: its stop band at the widest cut-off of a sweep.
+pub(crate) const WIDEST: f64 = 1.4;
+
+/// Half length of the filter before a coarser clock of `interval` s, s; motion is filtered at `cutoff_hz` afterwards.
+pub(crate) fn thinning_half_seconds(cutoff_hz: f64, interval: f64) -> f64 {
+    let pass = (1.0 + TRANSITION) * WIDEST * cutoff_hz;
+    let transition = 1.0 / interval - 2.0 * pass;
+    0.5 * (THINNING_ATTENUATION - 7.95) / (2.285 * 2.0 * PI * transition)
+}
+
+/// The filter before a coarser clock: flat up to `1.3 · 1.4 cutoff_hz`, stopped from as far below the coarse clock's rate.
+///
+/// Exact on polynomials up to degree 9: what lies far below the cut-off passes to rounding. `coarse` and `interval` in s.
+pub(crate) fn thinning_kernel(cutoff_hz: f64, coarse: f64, interval: f64) -> Vec<f64> {
+    let half = thinning_half_seconds(cutoff_hz, coarse) / interval;
+    let half = half.round().max(5.0) as usize;
+    let window = Window::new(THINNING_ATTENUATION, half, interval);
+    let middle = 0.5 / coarse;
+    let mut taps = sampled(half, interval, |t| {
+        window.derivatives(t)[0] * sinc(middle, t)[0] * interval
+    });
+    let exact = [1.0, 0.0, 0.0, 0.0, 0.0];
+    correct_moments(&mut taps, &window, interval, 0, &exact);
+    taps
+}
+
 /// √Σ h²: standard deviation of filtered white noise of sd 1.
 pub(crate) fn noise_gain(taps: &[f64]) -> f64 {
     taps.iter().map(|h| h * h).sum::<f64>().sqrt()
@@ -355,6 +383,35 @@ mod tests {
                     50.0 / (span * span),
                     "curvature",
                 );
+            }
+        }
+    }
+
+    #[test]
+    fn a_coarser_clock_sees_the_motion_as_it_is_and_nothing_folds() {
+        // cut-off 20 Hz, from 1 kHz to 200 and to 142 Hz
+        for coarse in [0.005, 0.007] {
+            let taps = thinning_kernel(20.0, coarse, 0.001);
+            let gain = |frequency: f64| {
+                let (gain, phase) = response(&taps, frequency, 0.001);
+                assert!(phase.abs() < 1e-13);
+                gain
+            };
+            for i in 0..=364 {
+                let frequency = 0.1 * f64::from(i);
+                // Beyond f_c a tenth of the motion filter's own ripple.
+                let limit = if frequency <= 5.0 { 1e-9 } else { 1e-4 };
+                let off = (gain(frequency) - 1.0).abs();
+                assert!(off < limit, "{frequency} Hz: off by {off:e}");
+            }
+            // What folds below the motion filter's stop band.
+            let first = 1.0 / coarse - 36.4;
+            for i in 0..1000 {
+                let frequency = first + 0.3 * f64::from(i);
+                if frequency < 500.0 {
+                    let left = gain(frequency).abs();
+                    assert!(left < 1e-5, "{frequency} Hz: {left:e}");
+                }
             }
         }
     }

@@ -2,21 +2,23 @@
 
 use super::prepare::JointFacts;
 use super::saturation::flat_runs;
-use super::{Pipeline, Recording, Trajectory};
+use super::{Channels, Pipeline, Recording, Trajectory};
 use crate::error::{Finding, Severity};
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// Time on either side of a flat run that is left out with it, in periods of the cut-off: main lobe and first side lobe
 /// of the filter.
 const MARGIN: f64 = 1.0;
 
 /// Where torque is flat, by joint.
+#[derive(Debug)]
 pub(crate) struct Saturated {
     joints: Vec<Flat>,
-    /// s.
-    margin: f64,
 }
 
 /// Flat runs of one joint.
+#[derive(Debug)]
 struct Flat {
     joint: usize,
     name: String,
@@ -30,11 +32,8 @@ struct Flat {
 impl Saturated {
     /// Flat runs of every joint of a log.
     pub(crate) fn find(joints: &[JointFacts], log: &Recording, pipeline: &Pipeline) -> Self {
-        let mut found = Vec::new();
-        for (joint, (facts, channels)) in joints.iter().zip(&log.joints).enumerate() {
-            let Some(tau) = &channels.tau else {
-                continue;
-            };
+        let one = |(joint, (facts, channels)): (usize, (&JointFacts, &Channels))| {
+            let tau = channels.tau.as_ref()?;
             let (time, q) = (&log.time, &channels.q);
             let runs = flat_runs(tau, facts.effort, |run| {
                 let seconds = time[run.end - 1] - time[run.start];
@@ -45,30 +44,24 @@ impl Saturated {
                     });
                 high - low > pipeline.standstill_velocity[joint] * seconds
             });
-            if runs.is_empty() {
-                continue;
-            }
-            found.push(Flat {
+            let span = |run: &Range<usize>| [time[run.start], time[run.end - 1]];
+            let level = |level: f64, run: &Range<usize>| level.max(tau[run.start].abs());
+            (!runs.is_empty()).then(|| Flat {
                 joint,
                 name: facts.name.clone(),
-                spans: runs
-                    .iter()
-                    .map(|run| [time[run.start], time[run.end - 1]])
-                    .collect(),
+                spans: runs.iter().map(span).collect(),
                 samples: runs.iter().map(|run| run.len() as u64).sum(),
-                level: runs
-                    .iter()
-                    .fold(0.0, |level: f64, run| level.max(tau[run.start].abs())),
-            });
-        }
-        let margin = if pipeline.is_off() {
-            0.0
-        } else {
-            MARGIN / pipeline.cutoff_hz
+                level: runs.iter().fold(0.0, level),
+            })
         };
+        let joints: Vec<Option<Flat>> = joints
+            .par_iter()
+            .zip(&log.joints)
+            .enumerate()
+            .map(one)
+            .collect();
         Self {
-            joints: found,
-            margin,
+            joints: joints.into_iter().flatten().collect(),
         }
     }
 
@@ -76,17 +69,23 @@ impl Saturated {
     pub(crate) fn mask(
         &self,
         log: &Recording,
+        pipeline: &Pipeline,
         trajectory: &mut Trajectory,
         findings: &mut Vec<Finding>,
     ) {
+        let margin = if pipeline.is_off() {
+            0.0
+        } else {
+            MARGIN / pipeline.cutoff_hz
+        };
         for flat in &self.joints {
             let (mut masked, mut all) = (0_usize, 0_usize);
             for segment in &mut trajectory.segments {
                 let len = segment.time.len();
                 let mask = &mut segment.standstill[flat.joint * len..(flat.joint + 1) * len];
                 for [first, last] in &flat.spans {
-                    let from = segment.time.partition_point(|t| *t < first - self.margin);
-                    let to = segment.time.partition_point(|t| *t <= last + self.margin);
+                    let from = segment.time.partition_point(|t| *t < first - margin);
+                    let to = segment.time.partition_point(|t| *t <= last + margin);
                     mask[from..to.max(from)].fill(true);
                 }
                 masked += mask.iter().filter(|m| **m).count();

@@ -6,13 +6,14 @@ mod choose;
 mod clock;
 pub(crate) mod convolve;
 pub(crate) mod decimate;
+mod correct;
 mod fourier;
 mod jumps;
-mod correct;
 mod cutoff;
 mod describe;
 mod encoder;
 pub(crate) mod fir;
+pub(crate) mod interpolate;
 mod mask;
 mod prepare;
 mod saturation;
@@ -20,11 +21,13 @@ mod spectrum;
 pub(crate) mod spline;
 mod standstill;
 mod steps;
+mod thin;
 mod torque;
 mod units;
 mod unwrap;
 
 pub use agreement::{Agreement, velocity_agreement};
+pub use align::{PreparedLog, Raw};
 pub use correct::{Corrections, Lag};
 pub use describe::{JointOverview, LogOverview, describe, hardly_driven};
 pub use steps::{Steps, steps};
@@ -36,6 +39,10 @@ use serde::{Deserialize, Serialize};
 
 /// Rates that differ by less than this share are one: clocks are known no better.
 const SAME_RATE: f64 = 1e-6;
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
 
 /// A number, or "auto": chosen from the data and stated in the result.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +64,8 @@ pub struct SignalSettings {
     pub coulomb_velocity: Option<f64>,
     /// What is put right in every log first.
     pub corrections: Corrections,
+    /// Columns may change faster than the motion does (expressions of the user, gear ripple): evaluate them at every sample.
+    pub every_sample: bool,
 }
 
 /// One joint's channels as logged, SI units, all of the recording's length.
@@ -140,6 +149,10 @@ pub struct Pipeline {
     pub motion_cutoff_hz: f64,
     /// Rate of kept rows as asked for, Hz; see [`Pipeline::kept_rate`] for that of a log.
     pub rate_hz: f64,
+    /// Longest sampling interval at which motion is held and columns are evaluated, s: a finer clock is thinned behind a filter
+    /// of its own (`signal/thin.rs`). 0: every sample of the log.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub motion_interval: f64,
     /// v_s, rad/s or m/s.
     pub coulomb_velocity: f64,
     /// Standstill threshold per joint: max(v_s, what the encoder resolves), rad/s or m/s.
@@ -154,27 +167,37 @@ pub struct Pipeline {
 /// A run of samples on one clock without a cut: finite, time increasing. Arrays are `joint * len + sample`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Segment {
-    /// Time stamps, s; uniform to rounding unless the pipeline is off.
+    /// Time stamps, s; uniform to rounding unless the pipeline is off. Those of every d-th sample of a fine clock
+    /// ([`Pipeline::motion_interval`]).
     pub time: Vec<f64>,
     /// Index of each sample's input row in the recording when the clock was uniform already; otherwise empty.
     pub input_rows: Vec<usize>,
-    /// The samples as logged within the segment, when the clock was uneven; `None` when `time` are the stamps.
+    /// The samples as logged within the segment, when the clock was uneven or too fine; `None` when `time` are the stamps.
     pub logged: Option<LoggedSamples>,
-    /// Filtered motion (f_q) at the log's rate; as logged with the pipeline off.
+    /// Filtered motion (f_q); as logged with the pipeline off.
     pub q: Vec<f64>,
     /// Velocity.
     pub qd: Vec<f64>,
     /// Acceleration.
     pub qdd: Vec<f64>,
-    /// Torque as logged (resampled if needed), unfiltered; empty if the log has none.
+    /// Torque as logged (resampled if needed), not filtered but for a coarser clock; empty if the log has none.
     pub tau: Vec<f64>,
     /// Per joint and sample: the joint stands still or its torque is saturated, so that the torque says nothing.
     pub standstill: Vec<bool>,
     /// Sampling interval, s.
     pub interval: f64,
+    /// Sampling interval of the log, s.
+    pub logged_interval: f64,
 }
 
-/// Rows of an uneven log that lie within a resampled segment, untouched.
+impl Segment {
+    /// How many samples of the log one sample stands for.
+    pub(crate) fn thinning(&self) -> usize {
+        (self.interval / self.logged_interval).round().max(1.0) as usize
+    }
+}
+
+/// Rows of a log that lie within a segment with a clock of its own, untouched.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoggedSamples {
     /// Stamps, s.
@@ -207,6 +230,7 @@ impl Pipeline {
             cutoff_hz: 0.0,
             motion_cutoff_hz: 0.0,
             rate_hz: 0.0,
+            motion_interval: 0.0,
             coulomb_velocity: 0.0,
             standstill_velocity: vec![0.0; dof],
             derived_from: vec![DerivedFrom::Position; dof],
@@ -259,13 +283,17 @@ impl Pipeline {
         }
     }
 
-    /// Half length of the motion filter, s; 0 when off.
+    /// Half length of the motion filter with what thins a fine clock before it, s; 0 when off.
     pub fn motion_half_length(&self) -> f64 {
         if self.is_off() {
-            0.0
-        } else {
-            fir::motion_half_seconds(self.motion_cutoff_hz)
+            return 0.0;
         }
+        let thinning = if self.motion_interval > 0.0 {
+            fir::thinning_half_seconds(self.motion_cutoff_hz, self.motion_interval)
+        } else {
+            0.0
+        };
+        fir::motion_half_seconds(self.motion_cutoff_hz) + thinning
     }
 
     /// Whole length of what one row sees, s: two rows further apart share no sample. 0 when off.
@@ -300,6 +328,19 @@ pub fn choose_pipeline(
     logs: &[Recording],
     settings: &SignalSettings,
 ) -> Result<(Pipeline, Vec<Finding>)> {
+    let (pipeline, findings, _) = choose_and_prepare(robot, logs, settings)?;
+    Ok((pipeline, findings))
+}
+
+/// [`choose_pipeline`] and [`prepare`] in one: logs are cut and unfolded once.
+///
+/// # Errors
+/// Those of both.
+pub fn choose_and_prepare<'a>(
+    robot: &Robot,
+    logs: &'a [Recording],
+    settings: &SignalSettings,
+) -> Result<(Pipeline, Vec<Finding>, Vec<PreparedLog<'a>>)> {
     choose::choose(&prepare::joint_facts(robot), logs, settings)
 }
 
@@ -316,7 +357,19 @@ pub fn align(
     log: &Recording,
     pipeline: &Pipeline,
 ) -> Result<(Trajectory, Vec<Finding>)> {
-    align::align(&prepare::joint_facts(robot), log, pipeline)
+    prepare(robot, log, pipeline)?.align(pipeline, Raw::All)
+}
+
+/// Step 1 alone, for [`PreparedLog::align`] at several cut-offs up to 1.4 times that of `pipeline`.
+///
+/// # Errors
+/// As [`align`].
+pub fn prepare<'a>(
+    robot: &Robot,
+    log: &'a Recording,
+    pipeline: &Pipeline,
+) -> Result<PreparedLog<'a>> {
+    PreparedLog::new(prepare::joint_facts(robot), log, pipeline)
 }
 
 #[cfg(test)]

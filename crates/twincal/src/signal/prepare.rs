@@ -5,9 +5,11 @@ use super::jumps::cut_jumps;
 use super::spline::resample;
 use super::units::refuse_degrees;
 use super::unwrap::unwrap_angle;
-use super::{Channels, Corrections, Recording};
+use super::{Corrections, Recording};
 use crate::error::{Error, Finding, Result, Severity};
 use crate::robot::{JointKind, Robot};
+use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Fewest samples of a log with the filter on: anything shorter cannot hold a kernel.
 pub(crate) const MINIMUM_SAMPLES: usize = 10;
@@ -43,54 +45,95 @@ pub(crate) fn joint_facts(robot: &Robot) -> Vec<JointFacts> {
         .collect()
 }
 
+/// One joint's values on the grid of a piece: the recording's own where nothing had to change.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Values<'a> {
+    /// rad or m.
+    pub(crate) q: Cow<'a, [f64]>,
+    /// rad/s or m/s, if logged.
+    pub(crate) qd: Option<Cow<'a, [f64]>>,
+    /// rad/s² or m/s², if logged.
+    pub(crate) qdd: Option<Cow<'a, [f64]>>,
+    /// N·m or N, if logged.
+    pub(crate) tau: Option<Cow<'a, [f64]>>,
+}
+
+impl<'a> Values<'a> {
+    /// The channels there are: q, q̇, q̈, τ.
+    pub(crate) fn channels(&self) -> impl Iterator<Item = &[f64]> {
+        let others = [&self.qd, &self.qdd, &self.tau].into_iter().flatten();
+        std::iter::once(&self.q)
+            .chain(others)
+            .map(|channel| &**channel)
+    }
+
+    /// Changes them, in that order.
+    pub(crate) fn for_each(&mut self, change: impl FnMut(&mut Cow<'a, [f64]>)) {
+        let others = [&mut self.qd, &mut self.qdd, &mut self.tau]
+            .into_iter()
+            .flatten();
+        std::iter::once(&mut self.q).chain(others).for_each(change);
+    }
+}
+
 /// A run of samples on one even clock.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Piece {
+pub(crate) struct Piece<'a> {
     /// Grid, s: the stamps themselves when they are even.
     pub(crate) time: Vec<f64>,
     /// Interval, s.
     pub(crate) interval: f64,
-    /// Rows of the recording; one per grid sample unless `resampled`.
+    /// How many samples of the log became one.
+    pub(crate) every: usize,
+    /// Rows of the recording; one per stamp of the run.
     pub(crate) rows: Vec<usize>,
-    /// The stamps were uneven.
-    pub(crate) resampled: bool,
+    /// Row of the recording of every grid sample; empty where the stamps were uneven.
+    pub(crate) grid_rows: Vec<usize>,
     /// Values on the grid.
-    pub(crate) joints: Vec<Channels>,
+    pub(crate) joints: Vec<Values<'a>>,
 }
 
-impl Piece {
+impl Piece<'_> {
+    /// The stamps were uneven.
+    pub(crate) fn resampled(&self) -> bool {
+        self.grid_rows.is_empty()
+    }
+
     /// Keeps these samples of the grid.
     fn keep(&mut self, range: std::ops::Range<usize>) {
-        let cut = |values: &mut Vec<f64>| *values = values[range.clone()].to_vec();
-        cut(&mut self.time);
-        if !self.resampled {
+        self.time = self.time[range.clone()].to_vec();
+        if !self.resampled() {
             self.rows = self.rows[range.clone()].to_vec();
+            self.grid_rows = self.grid_rows[range.clone()].to_vec();
         }
-        for channels in &mut self.joints {
-            cut(&mut channels.q);
-            let others = [&mut channels.qd, &mut channels.qdd, &mut channels.tau];
-            others.into_iter().flatten().for_each(cut);
+        for values in &mut self.joints {
+            values.for_each(|channel| {
+                *channel = match channel {
+                    Cow::Borrowed(all) => Cow::Borrowed(&all[range.clone()]),
+                    Cow::Owned(all) => Cow::Owned(all[range.clone()].to_vec()),
+                };
+            });
         }
     }
 }
 
 /// A log as pieces.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Prepared {
+pub(crate) struct Prepared<'a> {
     /// In the log's order.
-    pub(crate) pieces: Vec<Piece>,
+    pub(crate) pieces: Vec<Piece<'a>>,
     /// Median step of the log, s.
     pub(crate) interval: f64,
 }
 
 /// Step 1 of method section 1. With `every_row` (pipeline off) values stay as they are and only cuts are found.
-pub(crate) fn prepare(
+pub(crate) fn prepare<'a>(
     joints: &[JointFacts],
-    log: &Recording,
+    log: &'a Recording,
     every_row: bool,
     corrections: &Corrections,
     findings: &mut Vec<Finding>,
-) -> Result<Prepared> {
+) -> Result<Prepared<'a>> {
     if log.joints.len() != joints.len() {
         return Err(Error::Log {
             log: log.name.clone(),
@@ -108,19 +151,18 @@ pub(crate) fn prepare(
     refuse_degrees(joints, log)?;
     let unfolded = unfold(joints, log, &clock.runs, every_row, findings);
     let runs = cut_jumps(joints, log, &unfolded, &clock, every_row, findings);
-    let channels = |joint: usize, run: &Run| Channels {
-        q: unfolded[joint].as_ref().map_or_else(
-            || {
-                run.rows
-                    .iter()
-                    .map(|&row| log.joints[joint].q[row])
-                    .collect()
+    let values = |joint: usize, run: &Run| {
+        let own = &log.joints[joint];
+        let channel = |values: &'a Option<Vec<f64>>| Some(pick(values.as_deref()?, &run.rows));
+        Values {
+            q: match &unfolded[joint] {
+                None => pick(&own.q, &run.rows),
+                Some(q) => run.rows.iter().map(|&row| q[row]).collect(),
             },
-            |q| run.rows.iter().map(|&row| q[row]).collect(),
-        ),
-        qd: pick(&log.joints[joint].qd, run).filter(|_| !corrections.velocity_from_position),
-        qdd: pick(&log.joints[joint].qdd, run),
-        tau: pick(&log.joints[joint].tau, run),
+            qd: channel(&own.qd).filter(|_| !corrections.velocity_from_position),
+            qdd: channel(&own.qdd),
+            tau: channel(&own.tau),
+        }
     };
     let mut pieces = Vec::with_capacity(runs.len());
     let (mut short, mut short_rows, mut resampled) = (0_u64, 0_u64, 0_u64);
@@ -133,9 +175,7 @@ pub(crate) fn prepare(
             continue;
         }
         let stamps: Vec<f64> = run.rows.iter().map(|&row| log.time[row]).collect();
-        let values: Vec<Channels> = (0..joints.len())
-            .map(|joint| channels(joint, run))
-            .collect();
+        let values: Vec<Values<'a>> = (0..joints.len()).map(|joint| values(joint, run)).collect();
         let even = if every_row {
             Some(clock.interval)
         } else {
@@ -146,8 +186,9 @@ pub(crate) fn prepare(
             Some(interval) => Piece {
                 time: stamps,
                 interval,
+                every: 1,
                 rows: run.rows.clone(),
-                resampled: false,
+                grid_rows: run.rows.clone(),
                 joints: values,
             },
             None => {
@@ -188,33 +229,33 @@ pub(crate) fn report_short(log: &Recording, short: u64, rows: u64, findings: &mu
     }
 }
 
-fn pick(channel: &Option<Vec<f64>>, run: &Run) -> Option<Vec<f64>> {
-    channel
-        .as_ref()
-        .map(|values| run.rows.iter().map(|&row| values[row]).collect())
+/// Values of some rows, which ascend: a stretch of the channel where none is missing.
+pub(crate) fn pick<'a>(values: &'a [f64], rows: &[usize]) -> Cow<'a, [f64]> {
+    match (rows.first(), rows.last()) {
+        (Some(&first), Some(&last)) if last - first + 1 == rows.len() => {
+            Cow::Borrowed(&values[first..=last])
+        }
+        _ => rows.iter().map(|&row| values[row]).collect(),
+    }
 }
 
 /// A run on the log's median step by cubic splines.
-fn on_grid(stamps: &[f64], run: &Run, values: &[Channels], interval: f64) -> Piece {
+fn on_grid<'a>(stamps: &[f64], run: &Run, values: &[Values<'a>], interval: f64) -> Piece<'a> {
     let span = stamps[stamps.len() - 1] - stamps[0];
     let steps = (span / interval * (1.0 + 1e-12)).floor() as usize;
     let grid: Vec<f64> = (0..=steps)
         .map(|i| stamps[0] + i as f64 * interval)
         .collect();
-    let spline = |values: &Vec<f64>| resample(stamps, values, &grid);
+    let mut joints = values.to_vec();
+    joints.par_iter_mut().for_each(|values| {
+        values.for_each(|channel| *channel = Cow::Owned(resample(stamps, channel, &grid)));
+    });
     Piece {
         interval,
+        every: 1,
         rows: run.rows.clone(),
-        resampled: true,
-        joints: values
-            .iter()
-            .map(|c| Channels {
-                q: spline(&c.q),
-                qd: c.qd.as_ref().map(spline),
-                qdd: c.qdd.as_ref().map(spline),
-                tau: c.tau.as_ref().map(spline),
-            })
-            .collect(),
+        grid_rows: Vec::new(),
+        joints,
         time: grid,
     }
 }
@@ -233,49 +274,53 @@ fn unfold(
         cuts.push(rows);
         rows += run.rows.len();
     }
-    joints
-        .iter()
-        .enumerate()
-        .map(|(joint, facts)| {
-            if !matches!(facts.kind, JointKind::Revolute | JointKind::Continuous) {
-                return None;
-            }
-            let mut q: Vec<f64> = runs
-                .iter()
-                .flat_map(|run| run.rows.iter().map(|&row| log.joints[joint].q[row]))
-                .collect();
-            let jumps = unwrap_angle(&mut q, &cuts);
-            if jumps == 0 {
-                return None;
-            }
-            let done = if every_row {
-                "left as logged because the filter is off: unfold them if the library has springs"
-            } else {
-                "unfolded"
-            };
-            let severity = if every_row {
-                Severity::Warning
-            } else {
-                Severity::Note
-            };
-            findings.push(Finding::new(
-                severity,
-                "wrapped_angle",
-                &log.name,
-                format!(
-                    "joint `{}`: {jumps} jumps by a full turn, {done}",
-                    facts.name
-                ),
-                jumps,
-            ));
-            if every_row {
-                return None;
-            }
-            let mut all = log.joints[joint].q.clone();
-            for (row, value) in runs.iter().flat_map(|run| run.rows.iter()).zip(q) {
-                all[*row] = value;
-            }
-            Some(all)
+    let one = |(joint, facts): (usize, &JointFacts)| {
+        if !matches!(facts.kind, JointKind::Revolute | JointKind::Continuous) {
+            return None;
+        }
+        let mut q: Vec<f64> = runs
+            .iter()
+            .flat_map(|run| run.rows.iter().map(|&row| log.joints[joint].q[row]))
+            .collect();
+        let jumps = unwrap_angle(&mut q, &cuts);
+        if jumps == 0 {
+            return None;
+        }
+        let (done, severity) = if every_row {
+            (
+                "left as logged because the filter is off: unfold them if the library has springs",
+                Severity::Warning,
+            )
+        } else {
+            ("unfolded", Severity::Note)
+        };
+        let finding = Finding::new(
+            severity,
+            "wrapped_angle",
+            &log.name,
+            format!(
+                "joint `{}`: {jumps} jumps by a full turn, {done}",
+                facts.name
+            ),
+            jumps,
+        );
+        if every_row {
+            return Some((finding, None));
+        }
+        let mut all = log.joints[joint].q.clone();
+        for (row, value) in runs.iter().flat_map(|run| run.rows.iter()).zip(q) {
+            all[*row] = value;
+        }
+        Some((finding, Some(all)))
+    };
+    let found: Vec<Option<(Finding, Option<Vec<f64>>)>> =
+        joints.par_iter().enumerate().map(one).collect();
+    found
+        .into_iter()
+        .map(|found| {
+            let (finding, unfolded) = found?;
+            findings.push(finding);
+            unfolded
         })
         .collect()
 }

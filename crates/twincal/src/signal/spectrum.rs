@@ -3,6 +3,15 @@
 use super::fourier::Fourier;
 use std::f64::consts::PI;
 
+/// Pieces that a spectrum is averaged over at most, evenly spread: its relative sd is 18 % per bin, 1 % in a floor's median.
+const MOST_PIECES: usize = 32;
+
+/// Evenly spread ones of many pieces.
+fn spread<'a>(pieces: &[&'a [f64]]) -> Vec<&'a [f64]> {
+    let kept = pieces.len().min(MOST_PIECES);
+    (0..kept).map(|i| pieces[i * pieces.len() / kept]).collect()
+}
+
 /// One-sided power density of a channel, corrected for the differencing that keeps slow motion from leaking.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Spectrum {
@@ -53,7 +62,7 @@ impl Spectrum {
     }
 
     /// Welch's average over 20 s pieces (or the whole run) of all `runs` that have at least 32 samples, Hann window, half
-    /// overlap. The first difference is transformed, its gain `2 sin(π f dt)` divided out. The floor is the median over
+    /// overlap, at most 32 of them. The first difference is transformed, its gain `2 sin(π f dt)` divided out. The floor is the median over
     /// a quarter to 0.42 of the rate. `None` if every run is too short.
     pub(crate) fn welch<'a>(
         runs: impl Iterator<Item = &'a [f64]> + Clone,
@@ -80,6 +89,7 @@ impl Spectrum {
                     .map(|start| &run[start..=start + piece])
             })
             .collect();
+        let starts = spread(&starts);
         let pieces = starts.len() as f64;
         let fourier = Fourier::new(size);
         let (mut re, mut im) = (vec![0.0; size], vec![0.0; size]);

@@ -79,7 +79,12 @@ fn settings(cutoff_hz: Auto) -> SignalSettings {
         rate_hz: Auto::Auto,
         coulomb_velocity: None,
         corrections: Corrections::default(),
+        every_sample: false,
     }
+}
+
+fn aligned(log: &Recording, pipeline: &Pipeline) -> Result<(Trajectory, Vec<Finding>)> {
+    PreparedLog::new(joints(), log, pipeline)?.align(pipeline, Raw::All)
 }
 
 fn pipeline(log: &Recording) -> Pipeline {
@@ -90,7 +95,7 @@ fn pipeline(log: &Recording) -> Pipeline {
 
 /// Root mean square error of q̇ and q̈ over both joints.
 fn errors(log: &Recording, pipeline: &Pipeline, fundamental: f64) -> [f64; 2] {
-    let (trajectory, _) = align::align(&joints(), log, pipeline).unwrap();
+    let (trajectory, _) = aligned(log, pipeline).unwrap();
     let (mut wrong, mut samples) = ([0.0; 2], 0.0);
     for segment in &trajectory.segments {
         let len = segment.time.len();
@@ -160,7 +165,7 @@ fn torque_stays_with_its_own_motion() {
         channels.tau = channels.qdd.clone();
     }
     for log in [even, uneven] {
-        let (trajectory, _) = align::align(&joints(), &log, &pipeline(&log)).unwrap();
+        let (trajectory, _) = aligned(&log, &pipeline(&log)).unwrap();
         let segment = &trajectory.segments[0];
         let worst = segment
             .tau
@@ -192,7 +197,7 @@ fn logged_derivatives_pass_the_same_kernel() {
 fn without_filter_every_row_is_taken_as_it_is() {
     let mut log = recording(100.0, 3.0, 0.2, 0.0, true);
     log.joints[1].q[17] = f64::NAN;
-    let (off, _) = choose::choose(
+    let (off, _, _) = choose::choose(
         &joints(),
         std::slice::from_ref(&log),
         &settings(Auto::Value(0.0)),
@@ -200,7 +205,7 @@ fn without_filter_every_row_is_taken_as_it_is() {
     .unwrap();
     assert!(off.is_off() && off.coulomb_velocity == 0.0);
     assert_eq!(off.kernel_length(), 0.0);
-    let (trajectory, findings) = align::align(&joints(), &log, &off).unwrap();
+    let (trajectory, findings) = aligned(&log, &off).unwrap();
     assert_eq!(findings.len(), 1);
     assert_eq!(
         (findings[0].code.as_str(), findings[0].count),
@@ -245,9 +250,9 @@ fn unfit_settings_are_refused_with_the_key() {
         let message = choose(cutoff, rate).unwrap_err().to_string();
         assert!(message.contains(part), "{message}");
     }
-    let (_, findings) = choose(5.0, Auto::Value(6.0)).unwrap();
+    let (_, findings, _) = choose(5.0, Auto::Value(6.0)).unwrap();
     assert!(findings.iter().any(|f| f.code == "rows_alias"));
-    let (pipeline, findings) = choose(20.0, Auto::Auto).unwrap();
+    let (pipeline, findings, _) = choose(20.0, Auto::Auto).unwrap();
     assert!((pipeline.motion_cutoff_hz - 45.0).abs() < 1e-9);
     assert!(findings.iter().any(|f| f.code == "motion_filter_capped"));
 }

@@ -4,6 +4,7 @@ use super::prepare::JointFacts;
 use super::{Channels, Recording};
 use crate::error::{Error, Result};
 use crate::robot::JointKind;
+use rayon::prelude::*;
 
 /// Degrees per radian.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
@@ -24,6 +25,13 @@ const BEYOND: f64 = 3.0;
 /// # Errors
 /// [`Error::Log`] with the joint, the numbers and the remedy.
 pub(crate) fn refuse_degrees(joints: &[JointFacts], log: &Recording) -> Result<()> {
+    let check = |(facts, channels)| refuse_joint(facts, channels, log);
+    let checked: Vec<Result<()>> = joints.par_iter().zip(&log.joints).map(check).collect();
+    checked.into_iter().collect()
+}
+
+/// The same for one joint.
+fn refuse_joint(facts: &JointFacts, channels: &Channels, log: &Recording) -> Result<()> {
     let error = |problem: String, remedy: &str| {
         Err(Error::Log {
             log: log.name.clone(),
@@ -31,48 +39,44 @@ pub(crate) fn refuse_degrees(joints: &[JointFacts], log: &Recording) -> Result<(
             remedy: format!("{remedy} (× π/180)"),
         })
     };
-    for (facts, channels) in joints.iter().zip(&log.joints) {
-        if facts.kind == JointKind::Prismatic {
-            continue;
-        }
-        if let Some(ratio) = velocity_ratio(&log.time, channels) {
-            let near = |expected: f64| (ratio / expected - 1.0).abs() < NEAR;
-            if near(DEGREES) {
-                return error(
-                    format!(
-                        "the velocity of joint `{}` is {ratio:.1} times the change of its position: it is in degrees/s",
-                        facts.name
-                    ),
-                    "export velocities in rad/s",
-                );
-            }
-            if near(1.0 / DEGREES) {
-                return error(
-                    format!(
-                        "the position of joint `{}` changes {:.1} times faster than its velocity says: it is in degrees",
-                        facts.name,
-                        1.0 / ratio
-                    ),
-                    "export positions in rad",
-                );
-            }
-        }
-        let (Some(range), [low, high]) = (facts.range, extremes(&channels.q)) else {
-            continue;
-        };
-        let travel = high - low;
-        if travel > std::f64::consts::TAU
-            && travel > BEYOND * range
-            && travel / DEGREES <= 1.05 * range
-        {
+    if facts.kind == JointKind::Prismatic {
+        return Ok(());
+    }
+    if let Some(ratio) = velocity_ratio(&log.time, channels) {
+        let near = |expected: f64| (ratio / expected - 1.0).abs() < NEAR;
+        if near(DEGREES) {
             return error(
                 format!(
-                    "joint `{}` moves from {low:.1} to {high:.1}, its range in the model is {range:.2} rad: these are degrees",
+                    "the velocity of joint `{}` is {ratio:.1} times the change of its position: it is in degrees/s",
                     facts.name
                 ),
-                "export positions, velocities and accelerations in radians",
+                "export velocities in rad/s",
             );
         }
+        if near(1.0 / DEGREES) {
+            return error(
+                format!(
+                    "the position of joint `{}` changes {:.1} times faster than its velocity says: it is in degrees",
+                    facts.name,
+                    1.0 / ratio
+                ),
+                "export positions in rad",
+            );
+        }
+    }
+    let (Some(range), [low, high]) = (facts.range, extremes(&channels.q)) else {
+        return Ok(());
+    };
+    let travel = high - low;
+    if travel > std::f64::consts::TAU && travel > BEYOND * range && travel / DEGREES <= 1.05 * range
+    {
+        return error(
+            format!(
+                "joint `{}` moves from {low:.1} to {high:.1}, its range in the model is {range:.2} rad: these are degrees",
+                facts.name
+            ),
+            "export positions, velocities and accelerations in radians",
+        );
     }
     Ok(())
 }
