@@ -3,7 +3,7 @@
 use super::refuse;
 use super::result::LogSummary;
 use crate::error::{Finding, Result, Severity};
-use crate::incidents::{incident_findings, incidents, leave_out};
+use crate::incidents::{Incident, incident_findings, incidents, leave_out};
 use crate::likelihood::Columns;
 use crate::observations::{Observations, Part, observe};
 use crate::robot::Robot;
@@ -21,6 +21,8 @@ const ROWS_PER_COLUMN: usize = 3;
 /// One log, ready.
 pub(super) struct Log {
     pub(super) trajectory: Trajectory,
+    /// Contacts and protective stops, which are left out.
+    incidents: Vec<Incident>,
     pub(super) observations: Observations,
     pub(super) summary: LogSummary,
 }
@@ -47,13 +49,17 @@ impl Data {
             logs.iter()
                 .map(|log| {
                     let recording = log.recording();
-                    let (trajectory, mut more) =
-                        usable(robot, pipeline, log, unknown, Raw::Spread)?;
+                    let (mut trajectory, mut more) =
+                        trajectory(pipeline, log, unknown, Raw::Spread)?;
                     findings.append(&mut more);
+                    let incidents = incidents(robot, pipeline, &trajectory);
+                    leave_out(pipeline, &mut trajectory, &incidents);
+                    findings.extend(incident_findings(&recording.name, &incidents));
                     let observations = observe(robot, library, pipeline, &trajectory)?;
                     let summary = summary(recording, role, pipeline, &trajectory, &observations);
                     Ok(Log {
                         trajectory,
+                        incidents,
                         observations,
                         summary,
                     })
@@ -218,34 +224,33 @@ impl Data {
     }
 }
 
-/// A log as a trajectory without contacts and protective stops; `unknown`: see [`carry_something`], `raw`: see [`PreparedLog::align`].
-fn usable(
-    robot: &Robot,
+/// A log as a trajectory; `unknown`: see [`carry_something`].
+fn trajectory(
     pipeline: &Pipeline,
     log: &PreparedLog<'_>,
     unknown: bool,
     raw: Raw,
 ) -> Result<(Trajectory, Vec<Finding>)> {
-    let (mut trajectory, mut findings) = log.align(pipeline, raw)?;
-    let recording = log.recording();
-    trajectory.payload_acts = !unknown || recording.payload == Payload::Unknown;
-    let happened = incidents(robot, pipeline, &trajectory);
-    leave_out(pipeline, &mut trajectory, &happened);
-    findings.extend(incident_findings(&recording.name, &happened));
+    let (mut trajectory, findings) = log.align(pipeline, raw)?;
+    trajectory.payload_acts = !unknown || log.recording().payload == Payload::Unknown;
     Ok((trajectory, findings))
 }
 
-/// The rows of some logs alone.
+/// The rows of the fit logs at another cut-off; what is left out stays left out.
 pub(super) fn rows(
     robot: &Robot,
     library: &Library,
     pipeline: &Pipeline,
-    logs: &[PreparedLog<'_>],
+    prepared: &[PreparedLog<'_>],
+    data: &Data,
 ) -> Result<Vec<Observations>> {
-    let unknown = carry_something(logs.iter().map(PreparedLog::recording));
-    logs.iter()
-        .map(|log| {
-            let (trajectory, _) = usable(robot, pipeline, log, unknown, Raw::None)?;
+    let unknown = carry_something(prepared.iter().map(PreparedLog::recording));
+    prepared
+        .iter()
+        .zip(&data.fit)
+        .map(|(log, own)| {
+            let (mut trajectory, _) = trajectory(pipeline, log, unknown, Raw::None)?;
+            leave_out(pipeline, &mut trajectory, &own.incidents);
             observe(robot, library, pipeline, &trajectory)
         })
         .collect()

@@ -221,6 +221,7 @@ pub fn calibrate(
         &library,
         &skeleton.pipeline,
         &prepared,
+        &data,
         &columns,
         settings,
         &fitted.fit,

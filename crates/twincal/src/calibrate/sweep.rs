@@ -1,7 +1,7 @@
 //! Does an estimate depend on the cut-off? The same fit at 0.7 and 1.4 times f_c (method section 1).
 
 use super::CalibrationSettings;
-use super::data::rows;
+use super::data::{Data, rows};
 use super::result::SweepPoint;
 use crate::error::{Finding, Result, Severity};
 use crate::gram::Gram;
@@ -27,6 +27,7 @@ pub(super) fn cutoff(
     library: &Library,
     pipeline: &Pipeline,
     logs: &[PreparedLog<'_>],
+    data: &Data,
     columns: &Columns,
     settings: &CalibrationSettings,
     fit: &Fit,
@@ -47,7 +48,7 @@ pub(super) fn cutoff(
             rate_hz: factor * pipeline.rate_hz,
             ..pipeline.clone()
         };
-        let Ok(observations) = rows(robot, library, &scaled, logs) else {
+        let Ok(observations) = rows(robot, library, &scaled, logs, data) else {
             continue;
         };
         let parts: Vec<Part<'_>> = observations.iter().map(Observations::whole).collect();
