@@ -59,7 +59,7 @@ def main():
         (folder / "main.c").write_text(f"#define N {n}\n#define ROWS {len(states)}\n" + HARNESS)
         subprocess.run(["cc", "-O2", "-D_POSIX_C_SOURCE=199309L", "-std=c99", folder / "twin.c", folder / "main.c", "-o", folder / "main", "-lm"], check=True)  # fmt: skip
         done = subprocess.run([folder / "main", folder / "states.bin"], capture_output=True, text=True, check=True)
-        print(f"{given.robot}: {n} joints, {told['kept']} kept columns, {told['steps']} steps: {done.stdout.split()[0]} ns per call; "
+        print(f"{given.robot}: {n} joints, {told['kept']} parameters in the interval, {told['steps']} steps: {done.stdout.split()[0]} ns per call; "
               f"interval within {100 * told['interval_error']:.2f} % of its width")  # fmt: skip
 
 

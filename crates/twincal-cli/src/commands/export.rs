@@ -215,7 +215,7 @@ fn code(flags: &Export, language: Language, terminal: &mut Terminal) -> Outcome<
     } else {
         let text = format!(
             "{} joints, {} steps; the ends of the interval are within {} % of its width of those of `twincal predict` \
-             (one distribution for the mixture, from {} columns)",
+             (one distribution for the mixture, from {} parameters)",
             evaluator.joints.len(),
             evaluator.steps.len(),
             short(100.0 * evaluator.interval_error),

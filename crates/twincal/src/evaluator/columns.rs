@@ -1,6 +1,7 @@
 //! Columns of a library as steps.
 
-use super::dynamics::{self, Moving, Screw};
+use super::dynamics::{self, Load, Moving, Screw};
+use super::regrouped::regrouped;
 use super::trace::{Id, Step, Trace};
 use crate::robot::Robot;
 use crate::term::{Function, Graph, GraphId, Library, ModelColumn, Node, Variable};
@@ -53,13 +54,7 @@ impl<'a> Columns<'a> {
                     .map(|(joint, id)| (joint, self.expression(t, id)))
                     .collect()
             }
-            Some(ModelColumn::Inertia { body, weights }) => {
-                let (robot, moving) = (self.robot, &self.moving);
-                let screws = self
-                    .screws
-                    .get_or_insert_with(|| dynamics::screws(t, robot, moving));
-                dynamics::column(t, &self.moving[*body], &screws[*body], weights)
-            }
+            Some(ModelColumn::Inertia { body, weights }) => self.inertia(t, *body, weights),
             Some(ModelColumn::Gravity { axis }) => {
                 let mut gravity = [0.0; 3];
                 gravity[*axis] = 1.0;
@@ -81,19 +76,39 @@ impl<'a> Columns<'a> {
         }
     }
 
+    /// Torque of a body with these parameters on every joint that moves it.
+    pub(super) fn inertia(
+        &mut self,
+        t: &mut Trace,
+        body: usize,
+        parameters: &[f64; 10],
+    ) -> Vec<(usize, Id)> {
+        let (robot, moving) = (self.robot, &self.moving);
+        let screws = self
+            .screws
+            .get_or_insert_with(|| dynamics::screws(t, robot, moving));
+        dynamics::column(t, &self.moving[body], &screws[body], parameters)
+    }
+
     /// Torque of this change of gravity on the nominal robot.
-    pub(super) fn gravity(&self, t: &mut Trace, gravity: [f64; 3]) -> Vec<(usize, Id)> {
-        let still = dynamics::motion(t, self.robot, gravity, false);
-        let parameters = nominal_parameters(self.robot);
-        let torque = dynamics::torque(t, self.robot, &still, &parameters);
+    fn gravity(&self, t: &mut Trace, gravity: [f64; 3]) -> Vec<(usize, Id)> {
+        let loads = self.gravity_loads(t, gravity);
+        let torque = dynamics::torque(t, self.robot, &self.moving, loads);
         torque.into_iter().enumerate().collect()
+    }
+
+    /// What the bodies of the nominal robot need against this change of gravity.
+    pub(super) fn gravity_loads(&self, t: &mut Trace, gravity: [f64; 3]) -> Vec<Load> {
+        let still = dynamics::motion(t, self.robot, gravity, false);
+        dynamics::loads(t, &still, &nominal_parameters(self.robot))
     }
 
     /// Nominal torque per joint.
     pub(super) fn nominal(&mut self, t: &mut Trace) -> Vec<Id> {
         let (robot, moving) = (self.robot, &self.moving);
         let nominal = self.nominal.get_or_insert_with(|| {
-            let rigid = dynamics::torque(t, robot, moving, &nominal_parameters(robot));
+            let loads = dynamics::loads(t, moving, &nominal_parameters(robot));
+            let rigid = dynamics::torque(t, robot, moving, loads);
             let passive = dynamics::passive(t, robot, moving);
             let both = rigid.into_iter().zip(passive);
             both.map(|(a, b)| t.add(a, b)).collect()
@@ -150,11 +165,16 @@ impl<'a> Columns<'a> {
     }
 }
 
-/// Parameters of every body.
-pub(super) fn nominal_parameters(robot: &Robot) -> Vec<[f64; 10]> {
+/// Parameters of every body as the model file has them.
+pub(super) fn parameters(robot: &Robot) -> Vec<[f64; 10]> {
     (0..robot.layout().len())
         .map(|body| robot.parameters_of_body(body))
         .collect()
+}
+
+/// The same torque from fewer of them.
+pub(super) fn nominal_parameters(robot: &Robot) -> Vec<[f64; 10]> {
+    regrouped(robot, parameters(robot))
 }
 
 /// tanh(rate/v_s), or the sign for v_s = 0.

@@ -19,12 +19,17 @@ pub(super) struct Moving {
     wd: Vector,
     a: Vector,
     b: [Vector; 3],
+    /// ω_x ω_y, ω_x ω_z, ω_y ω_z.
+    products: Vector,
+    /// ω_y² − ω_z², ω_z² − ω_x², ω_x² − ω_y².
+    differences: Vector,
 }
 
 /// Half a turn leaves 6e-17 where 0 is meant.
 const ROUNDING: f64 = 3e-16;
 
-fn clean(matrix: &Matrix) -> Matrix {
+/// A rotation without the rounding of its zeros.
+pub(super) fn clean(matrix: &Matrix) -> Matrix {
     matrix.map(|row| row.map(|v| if v.abs() < ROUNDING { 0.0 } else { v }))
 }
 
@@ -114,6 +119,8 @@ pub(super) fn motion(t: &mut Trace, robot: &Robot, gravity: [f64; 3], moves: boo
             wd: [zero; 3],
             a: [zero; 3],
             b: [[zero; 3]; 3],
+            products: [zero; 3],
+            differences: [zero; 3],
         };
         let (mut w, mut wd, mut a) = match body.parent {
             Some(parent) => {
@@ -175,40 +182,69 @@ pub(super) fn motion(t: &mut Trace, robot: &Robot, gravity: [f64; 3], moves: boo
             [t.add(xy, wd[2]), diagonal[1], t.subtract(yz, wd[0])],
             [t.subtract(xz, wd[1]), t.add(yz, wd[0]), diagonal[2]],
         ];
+        own.products = [xy, xz, yz];
+        own.differences = [t.subtract(yy, zz), t.subtract(zz, xx), t.subtract(xx, yy)];
         (own.w, own.wd, own.a) = (w, wd, a);
         all.push(own);
     }
     all
 }
 
+/// Force and moment about its origin.
+pub(super) type Load = [Vector; 2];
+
 /// Force and moment about the origin that a body of these ten parameters needs.
-fn load(t: &mut Trace, m: &Moving, parameters: &[f64; 10]) -> [Vector; 2] {
+fn load(t: &mut Trace, m: &Moving, parameters: &[f64; 10]) -> Load {
     let p = parameters.map(|x| t.number(x));
     let (mass, mc) = (p[0], [p[1], p[2], p[3]]);
-    let tensor = [[p[4], p[5], p[6]], [p[5], p[7], p[8]], [p[6], p[8], p[9]]];
+    let [xx, xy, xz, yy, yz, zz] = [p[4], p[5], p[6], p[7], p[8], p[9]];
     // f = m a + B mc
     let weight = m.a.map(|a| t.multiply(mass, a));
     let spin = m.b.map(|row| t.dot(&row, &mc));
     let force = plus(t, weight, spin);
-    // n = I ω̇ + ω × I ω + mc × a
-    let iw = tensor.map(|row| t.dot(&row, &m.w));
-    let iwd = tensor.map(|row| t.dot(&row, &m.wd));
-    let gyro = cross(t, m.w, iw);
+    // n = I ω̇ + ω × I ω + mc × a, entry by entry of I: what each is multiplied with stands in B already, or is a difference.
+    let [gap_x, gap_y, gap_z] =
+        [(9, 7), (4, 9), (7, 4)].map(|(i, k)| t.number(parameters[i] - parameters[k]));
+    let [b20, b01, b12] = [(2, 0), (0, 1), (1, 2)].map(|(i, k)| t.negate(m.b[i][k]));
+    let moment = [
+        t.dot(
+            &[xx, gap_x, xy, xz, yz],
+            &[m.wd[0], m.products[2], b20, m.b[1][0], m.differences[0]],
+        ),
+        t.dot(
+            &[yy, gap_y, yz, xy, xz],
+            &[m.wd[1], m.products[1], b01, m.b[2][1], m.differences[1]],
+        ),
+        t.dot(
+            &[zz, gap_z, xz, yz, xy],
+            &[m.wd[2], m.products[0], b12, m.b[0][2], m.differences[2]],
+        ),
+    ];
     let lever = cross(t, mc, m.a);
-    let moment = plus(t, iwd, gyro);
     [force, plus(t, moment, lever)]
 }
 
-/// Rigid-body torque per coordinate, of bodies with these parameters.
+/// What every body needs.
+pub(super) fn loads(t: &mut Trace, moving: &[Moving], parameters: &[[f64; 10]]) -> Vec<Load> {
+    (moving.iter().zip(parameters))
+        .map(|(m, p)| load(t, m, p))
+        .collect()
+}
+
+/// The sum, body by body.
+pub(super) fn together(t: &mut Trace, a: &[Load], b: &[Load]) -> Vec<Load> {
+    (a.iter().zip(b))
+        .map(|(a, b)| [plus(t, a[0], b[0]), plus(t, a[1], b[1])])
+        .collect()
+}
+
+/// Torque per coordinate that gives every body its load.
 pub(super) fn torque(
     t: &mut Trace,
     robot: &Robot,
     moving: &[Moving],
-    parameters: &[[f64; 10]],
+    mut loads: Vec<Load>,
 ) -> Vec<Id> {
-    let mut loads: Vec<[Vector; 2]> = (moving.iter().zip(parameters))
-        .map(|(m, p)| load(t, m, p))
-        .collect();
     let zero = t.number(0.0);
     let mut tau = vec![zero; robot.dof()];
     for (index, body) in robot.layout().iter().enumerate().rev() {

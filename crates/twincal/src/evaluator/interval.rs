@@ -1,4 +1,4 @@
-//! The interval of a program: one t distribution with the mixture's mean and variance, from the columns that count.
+//! The interval of a program: one t distribution with the mixture's mean and variance, from what counts for it.
 //!
 //! ```text
 //! scale² = (a−1)/a (xᵀ Cov[β | y] x + E[φ] f²/(w_j (1−ρ_j²))) + s_out²,     half width = t_{2a}⁻¹(0.975) · scale
@@ -6,6 +6,7 @@
 //! Exact where the posterior holds one model; how far it is from the mixture over models is measured.
 
 use super::columns::Columns;
+use super::coordinates::{Acting, Coordinates};
 use super::states::{STATES, States};
 use super::trace::{Id, Trace};
 use crate::error::Result;
@@ -17,16 +18,16 @@ use crate::twin::{JointInput, TorqueSignal, Twin};
 /// Share of the variance (that of the noise included) by which a joint's approximation may be off in the training range:
 /// 4.9 % of the interval's width in its worst corner.
 const LEFT_OUT: f64 = 0.1;
+/// The same at the corners of the range, where no data are but the flag for extrapolation still has to speak.
+const LEFT_OUT_AT_CORNERS: f64 = 0.5;
 
 /// Everything about the interval.
 pub(super) struct Interval {
-    /// Columns that count on each joint, ascending.
+    /// Coordinates that count on each joint, ascending.
     kept: Vec<Vec<usize>>,
     /// Mean variance of the others on each joint, (N·m)².
     rest: Vec<f64>,
-    /// Cov[β | y], K × K.
-    covariance: Vec<f64>,
-    columns: usize,
+    coordinates: Coordinates,
     /// See [`super::EvaluatorJoint::noise`].
     pub(super) noise: Vec<f64>,
     /// See [`super::EvaluatorJoint::base`].
@@ -51,8 +52,7 @@ impl Interval {
         let mut interval = Self {
             kept: Vec::new(),
             rest: Vec::new(),
-            covariance: posterior.covariance(),
-            columns: library.columns().len(),
+            coordinates: Coordinates::new(&twin.robot, library, &posterior.covariance()),
             noise: own.iter().zip(&out).map(|(a, b)| a + b).collect(),
             base: own.iter().zip(&out).map(|(a, b)| ratio * a + b).collect(),
             quantile: Level::new(&student, 0.975).standard,
@@ -60,8 +60,10 @@ impl Interval {
             error: 0.0,
         };
         let mut variances = Vec::new();
-        for joint in 0..own.len() {
-            let (kept, rest, variance) = interval.columns_that_count(states, joint);
+        let corners = States::corners(twin, library);
+        let acting = (interval.coordinates).on_states(&twin.robot, library, &[states, &corners]);
+        for (joint, acting) in acting.iter().enumerate() {
+            let (kept, rest, variance) = interval.what_counts(acting, joint);
             interval.kept.push(kept);
             interval.rest.push(rest);
             variances.push(variance);
@@ -70,50 +72,55 @@ impl Interval {
         Ok(interval)
     }
 
-    /// How many columns count on some joint.
+    /// How many coordinates count on some joint.
     pub(super) fn count(&self) -> usize {
         let all: std::collections::BTreeSet<usize> = self.kept.iter().flatten().copied().collect();
         all.len()
     }
 
-    /// Columns are left out one by one, always the one that is missed least, while the others and a constant stay within
+    /// Coordinates are left out one by one, always the one that is missed least, while the others and a constant stay within
     /// [`LEFT_OUT`] of the variance everywhere: what stays, the constant, and the variance that they give per state.
-    fn columns_that_count(&self, states: &States, joint: usize) -> (Vec<usize>, f64, Vec<f64>) {
-        let (columns, x) = states.columns(joint);
-        let x: Vec<&[f64]> = x.chunks_exact(STATES).collect();
-        let c = |i: usize, k: usize| self.covariance[columns[i] * self.columns + columns[k]];
-        // (C x)_i per state, over the columns that are still there.
+    fn what_counts(&self, acting: &Acting, joint: usize) -> (Vec<usize>, f64, Vec<f64>) {
+        let (columns, x) = (&acting.which, &acting.torque);
+        let c = |i: usize, k: usize| self.coordinates.covariance(columns[i], columns[k]);
+        // (C x)_i per state, over the coordinates that are still there.
         let mut along: Vec<Vec<f64>> = (0..columns.len())
             .map(|i| {
-                let mut row = vec![0.0; STATES];
+                let mut row = vec![0.0; 2 * STATES];
                 for (k, x) in x.iter().enumerate() {
-                    row.iter_mut()
-                        .zip(*x)
-                        .for_each(|(sum, x)| *sum += c(i, k) * x);
+                    let factor = c(i, k);
+                    for (sum, x) in row.iter_mut().zip(x) {
+                        *sum += factor * x;
+                    }
                 }
                 row
             })
             .collect();
-        let mut full = vec![0.0; STATES];
+        let mut full = vec![0.0; 2 * STATES];
         for (x, along) in x.iter().zip(&along) {
-            let products = x.iter().zip(along);
-            full.iter_mut()
-                .zip(products)
-                .for_each(|(sum, (x, a))| *sum += x * a);
+            for (sum, (x, a)) in full.iter_mut().zip(x.iter().zip(along)) {
+                *sum += x * a;
+            }
         }
-        let allowed: Vec<f64> = full
-            .iter()
-            .map(|full| LEFT_OUT * (self.noise[joint] + full))
+        let allowed: Vec<f64> = (full.iter().enumerate())
+            .map(|(state, full)| {
+                let share = if state < STATES {
+                    LEFT_OUT
+                } else {
+                    LEFT_OUT_AT_CORNERS
+                };
+                share * (self.noise[joint] + full)
+            })
             .collect();
         let mut kept: Vec<usize> = (0..columns.len()).collect();
-        let mut missing = vec![0.0; STATES];
+        let mut missing = vec![0.0; 2 * STATES];
         let mut rest = 0.0;
         while !kept.is_empty() {
             let mut best: Option<(f64, f64, usize)> = None;
             for (at, &i) in kept.iter().enumerate() {
                 let own = |s: usize| missing[s] + x[i][s] * (2.0 * along[i][s] - c(i, i) * x[i][s]);
                 let mean = (0..STATES).map(own).sum::<f64>() / STATES as f64;
-                let worst = (0..STATES)
+                let worst = (0..2 * STATES)
                     .map(|s| (own(s) - mean).abs() / allowed[s])
                     .fold(0.0, f64::max);
                 if best.is_none_or(|(least, ..)| worst < least) {
@@ -126,21 +133,22 @@ impl Interval {
             debug_assert!(worst.is_finite());
             let i = kept.remove(at);
             rest = mean;
-            for s in 0..STATES {
+            for s in 0..2 * STATES {
                 missing[s] += x[i][s] * (2.0 * along[i][s] - c(i, i) * x[i][s]);
             }
             for &k in &kept {
                 let factor = c(k, i);
                 along[k]
                     .iter_mut()
-                    .zip(x[i])
+                    .zip(&x[i])
                     .for_each(|(sum, x)| *sum -= factor * x);
             }
         }
         let variance = full
             .iter()
             .zip(&missing)
-            .map(|(full, missing)| full - missing + rest);
+            .map(|(full, missing)| full - missing + rest)
+            .take(STATES);
         (
             kept.iter().map(|&i| columns[i]).collect(),
             rest,
@@ -184,13 +192,13 @@ impl Interval {
         Ok(worst)
     }
 
-    /// xᵀ C x over the columns that count and the constant, as steps.
+    /// xᵀ C x over what counts and the constant, as steps.
     pub(super) fn variance(&self, t: &mut Trace, columns: &mut Columns<'_>) -> Vec<Id> {
         let mut variance = Vec::with_capacity(self.kept.len());
         for (joint, kept) in self.kept.iter().enumerate() {
             let mut own: Vec<(usize, Id)> = Vec::new();
             for &column in kept {
-                let all = columns.column(t, column);
+                let all = self.coordinates.torque(t, columns, column);
                 own.extend(
                     all.into_iter()
                         .filter(|(j, _)| *j == joint)
@@ -202,7 +210,7 @@ impl Interval {
                 let mut along = t.number(0.0);
                 for (k, &(b, other)) in own.iter().enumerate().skip(i) {
                     let twice = if k == i { 1.0 } else { 2.0 };
-                    let part = t.scale(twice * self.covariance[a * self.columns + b], other);
+                    let part = t.scale(twice * self.coordinates.covariance(a, b), other);
                     along = t.add(along, part);
                 }
                 let part = t.multiply(x, along);

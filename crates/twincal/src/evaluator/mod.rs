@@ -5,8 +5,10 @@
 //! inertial corrections; structure that is known beforehand (zeros, right angles) is folded away.
 
 mod columns;
+mod coordinates;
 mod dynamics;
 mod interval;
+mod regrouped;
 mod states;
 mod trace;
 #[cfg(test)]
@@ -19,8 +21,9 @@ use crate::error::{Error, Result};
 use crate::robot::Robot;
 use crate::term::{Library, ModelColumn};
 use crate::twin::Twin;
-use columns::{Columns, direction, nominal_parameters};
+use columns::{Columns, direction, nominal_parameters, parameters};
 use interval::Interval;
+use regrouped::regrouped;
 use trace::{Id, Trace};
 
 /// Coefficients whose torque stays below this in every state of the training range are left out, N·m.
@@ -56,7 +59,7 @@ pub struct Evaluator {
     pub quantile: f64,
     /// From the variance over noise levels to the square of the t scale: (a − 1)/a.
     pub ratio: f64,
-    /// Columns that the interval is made of; the others enter as a constant.
+    /// Inertial parameters and columns that the interval is made of; the others enter as a constant.
     pub kept: usize,
     /// Largest error of an end of the interval over 512 states within the training range, as a share of its width.
     pub interval_error: f64,
@@ -127,24 +130,7 @@ impl Evaluator {
     /// If a slice is shorter than the number of joints.
     #[must_use]
     pub fn evaluate(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let mut values: Vec<f64> = Vec::with_capacity(self.steps.len());
-        for step in &self.steps {
-            let at = |id: &u32| values[*id as usize];
-            values.push(match step {
-                Step::Constant(value) => *value,
-                Step::Position(joint) => q[*joint],
-                Step::Velocity(joint) => qd[*joint],
-                Step::Acceleration(joint) => qdd[*joint],
-                Step::Add(a, b) => at(a) + at(b),
-                Step::Subtract(a, b) => at(a) - at(b),
-                Step::Multiply(a, b) => at(a) * at(b),
-                Step::Divide(a, b) => at(a) / at(b),
-                Step::Negate(a) => -at(a),
-                Step::Absolute(a) => at(a).abs(),
-                Step::Power(a, exponent) => at(a).powf(*exponent),
-                Step::Apply(function, a) => function.value(at(a)),
-            });
-        }
+        let values = trace::values(&self.steps, q, qd, qdd);
         let pick = |ids: &[u32]| ids.iter().map(|&id| values[id as usize]).collect();
         (pick(&self.torque), pick(&self.variance))
     }
@@ -153,7 +139,7 @@ impl Evaluator {
 /// τ_nom + Φ E[β | y] per joint.
 fn mean_torque(t: &mut Trace, columns: &mut Columns<'_>, twin: &Twin, states: &States) -> Vec<Id> {
     let (robot, library): (&Robot, &Library) = (columns.robot, columns.library);
-    let mut parameters = nominal_parameters(robot);
+    let mut parameters = parameters(robot);
     let mut gravity = [0.0; 3];
     let mut others = Vec::new();
     for (column, &beta) in twin.posterior.mean.iter().enumerate() {
@@ -168,19 +154,16 @@ fn mean_torque(t: &mut Trace, columns: &mut Columns<'_>, twin: &Twin, states: &S
             _ => {}
         }
     }
-    let rigid = dynamics::torque(t, robot, &columns.moving, &parameters);
+    let mut loads = dynamics::loads(t, &columns.moving, &regrouped(robot, parameters));
+    if gravity != [0.0; 3] {
+        let tilt = columns.gravity_loads(t, gravity);
+        loads = dynamics::together(t, &loads, &tilt);
+    }
+    let rigid = dynamics::torque(t, robot, &columns.moving, loads);
     let passive = dynamics::passive(t, robot, &columns.moving);
     let mut torque: Vec<Id> = (rigid.into_iter().zip(passive))
         .map(|(a, b)| t.add(a, b))
         .collect();
-    let tilt = if gravity == [0.0; 3] {
-        Vec::new()
-    } else {
-        columns.gravity(t, gravity)
-    };
-    for (joint, part) in tilt {
-        torque[joint] = t.add(torque[joint], part);
-    }
     for (column, beta) in others {
         for (joint, x) in columns.column(t, column) {
             let part = t.scale(beta, x);
@@ -194,7 +177,8 @@ fn mean_torque(t: &mut Trace, columns: &mut Columns<'_>, twin: &Twin, states: &S
 fn written_torque(t: &mut Trace, twin: &Twin, beyond: Beyond<'_>) -> Vec<Id> {
     let robot = beyond.robot;
     let moving = dynamics::motion(t, robot, robot.description().gravity, true);
-    let rigid = dynamics::torque(t, robot, &moving, &nominal_parameters(robot));
+    let loads = dynamics::loads(t, &moving, &nominal_parameters(robot));
+    let rigid = dynamics::torque(t, robot, &moving, loads);
     let passive = dynamics::passive(t, robot, &moving);
     let mut torque = Vec::with_capacity(rigid.len());
     for (joint, (rigid, passive)) in rigid.into_iter().zip(passive).enumerate() {

@@ -20,13 +20,22 @@ pub(crate) struct States {
 
 impl States {
     pub(crate) fn new(twin: &Twin, library: &Library) -> Self {
+        Self::at(twin, library, |fraction| fraction)
+    }
+
+    /// Corners of the box: every position, velocity and acceleration at an end of its range, by chance.
+    pub(crate) fn corners(twin: &Twin, library: &Library) -> Self {
+        Self::at(twin, library, f64::round)
+    }
+
+    fn at(twin: &Twin, library: &Library, place: impl Fn(f64) -> f64) -> Self {
         let joints = twin.robot.dof();
         let channel = |which: usize| -> Vec<f64> {
             let value = |joint: usize, state: usize| {
                 let [low, high] = [twin.hull[joint][2 * which], twin.hull[joint][2 * which + 1]];
                 // Kronecker sequence with square roots of primes: even in every projection.
                 let step = (PRIMES[(3 * joint + which) % PRIMES.len()] as f64).sqrt();
-                low + (high - low) * ((state as f64 + 0.5) * step).fract()
+                low + (high - low) * place(((state as f64 + 0.5) * step).fract())
             };
             (0..joints)
                 .flat_map(|joint| (0..STATES).map(move |state| value(joint, state)))
@@ -55,6 +64,12 @@ impl States {
             qd: &self.qd,
             qdd: &self.qdd,
         }
+    }
+
+    /// Positions, velocities and accelerations of one state.
+    pub(crate) fn state(&self, state: usize) -> [Vec<f64>; 3] {
+        let of = |all: &[f64]| all.iter().skip(state).step_by(STATES).copied().collect();
+        [of(&self.q), of(&self.qd), of(&self.qdd)]
     }
 
     /// Σ β x per joint and state, `joint * STATES + state`.
@@ -94,6 +109,12 @@ impl States {
         let mut torque = vec![0.0; self.q.len()];
         nominal_torque(robot, self.motion(), &mut torque);
         torque
+    }
+
+    /// Torque of a column on a joint at all states, where it acts there.
+    pub(crate) fn column(&self, joint: usize, column: usize) -> Option<&[f64]> {
+        let i = self.by_joint[joint].binary_search(&column).ok()?;
+        Some(&self.columns[joint][i * STATES..(i + 1) * STATES])
     }
 
     /// Columns of a joint and their values, `[i * STATES + state]`.

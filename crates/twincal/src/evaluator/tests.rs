@@ -1,7 +1,16 @@
 //! The program computes what the recursion and the library compute.
 
-use super::trace::{Step, Trace};
-use crate::term::Function;
+use super::columns::{Columns, parameters};
+use super::coordinates::{Coordinate, Coordinates};
+use super::dynamics;
+use super::regrouped::regrouped;
+use super::trace::{Step, Trace, values};
+use crate::robot::{
+    Inertia, JointDescription, JointKind, LinkDescription, Mimic, Motion, Robot, RobotDescription,
+    nominal_torque,
+};
+use crate::term::{Family, Function, Library, LibrarySettings};
+use std::collections::BTreeMap;
 
 fn value(t: &Trace, id: u32, q: &[f64]) -> f64 {
     let at = |id: u32| value(t, id, q);
@@ -51,5 +60,175 @@ fn double_angles_and_derivatives_are_those_of_closed_forms() {
         assert!((value(&t, f, &q) - wanted).abs() < 1e-14);
         let wanted = 2.0 * (2.0 * a).cos() * b + 2.0 * (2.0 * a).sin();
         assert!((value(&t, change[0], &q) - wanted).abs() < 1e-14);
+    }
+}
+
+/// A tree: two arms on one turning body, sliders in both, one joint that mimics another, every link lopsided and every axis skew.
+fn tree() -> Robot {
+    use JointKind::{Prismatic, Revolute};
+    let parents = [0, 1, 2, 1, 4, 5, 5];
+    let kinds = [
+        Revolute, Revolute, Prismatic, Prismatic, Revolute, Revolute, Revolute,
+    ];
+    let links = (0..=parents.len()).map(|i| {
+        let x = i as f64;
+        LinkDescription {
+            name: format!("link{i}"),
+            inertia: (i > 0).then_some(Inertia {
+                mass: 1.0 + 0.3 * x,
+                com: [0.2, -0.1 * x, 0.15],
+                tensor: [
+                    [0.04, 0.005, -0.003],
+                    [0.005, 0.05, 0.004],
+                    [-0.003, 0.004, 0.03 + 0.001 * x],
+                ],
+            }),
+        }
+    });
+    let joints = parents
+        .iter()
+        .zip(kinds)
+        .enumerate()
+        .map(|(i, (parent, kind))| {
+            let name = |k: usize| format!("link{k}");
+            let mut joint =
+                JointDescription::new(&format!("joint{i}"), kind, &name(*parent), &name(i + 1));
+            joint.axis = [[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 2.0, 0.5]][i % 3];
+            joint.placement.translation = [0.3, 0.1 * i as f64, -0.2];
+            if i == 5 {
+                joint.mimic = Some(Mimic {
+                    joint: "joint1".into(),
+                    multiplier: -0.7,
+                    offset: 0.2,
+                });
+            }
+            joint
+        });
+    let description = RobotDescription {
+        name: "tree".to_owned(),
+        gravity: [3.0, -2.0, -9.0],
+        joints: joints.collect(),
+        links: links.collect(),
+        allow_unphysical: false,
+    };
+    Robot::new(description, &BTreeMap::new()).unwrap().0
+}
+
+/// A state without round numbers.
+fn state(joints: usize, which: usize) -> [Vec<f64>; 3] {
+    [1.7, 2.3, 4.1].map(|scale: f64| {
+        (0..joints)
+            .map(|j| scale * (0.3 + 1.9 * j as f64 + 5.7 * scale + 0.77 * which as f64).sin())
+            .collect()
+    })
+}
+
+/// Regrouped parameters give the torque of the batch recursion, which knows nothing of them, and fewer of them are not zero.
+#[test]
+fn regrouped_parameters_give_the_same_torque() {
+    let robot = tree();
+    let mut t = Trace::default();
+    let moving = dynamics::motion(&mut t, &robot, robot.description().gravity, true);
+    let fewer = regrouped(&robot, parameters(&robot));
+    let count = |all: &[[f64; 10]]| all.iter().flatten().filter(|x| **x != 0.0).count();
+    assert_eq!(count(&parameters(&robot)), 70);
+    // Seven of a body that turns, four of one that slides; its tensor goes to its parent.
+    assert_eq!(count(&fewer), 5 * 7 + 2 * 4);
+    let loads = dynamics::loads(&mut t, &moving, &fewer);
+    let torque = dynamics::torque(&mut t, &robot, &moving, loads);
+    for which in 0..20 {
+        let [q, qd, qdd] = state(robot.dof(), which);
+        let mut expected = vec![0.0; robot.dof()];
+        let motion = Motion {
+            len: 1,
+            q: &q,
+            qd: &qd,
+            qdd: &qdd,
+        };
+        nominal_torque(&robot, motion, &mut expected);
+        let all = values(&t.steps, &q, &qd, &qdd);
+        for (joint, expected) in expected.iter().enumerate() {
+            let torque = all[torque[joint] as usize];
+            assert!(
+                (torque - expected).abs() < 1e-10,
+                "joint {joint}: {torque} {expected}"
+            );
+        }
+    }
+}
+
+/// zᵀ Cov[z] z of the coordinates is βᵀ-side x ᵀ Cov[β] x of the library's columns: a covariance in which every column is tied to
+/// every other.
+#[test]
+fn the_variance_in_coordinates_is_that_in_columns() {
+    let robot = tree();
+    let settings = LibrarySettings {
+        families: vec![
+            Family::Payload,
+            Family::MassMoments,
+            Family::Tensor,
+            Family::Viscous,
+        ],
+        generic: Some(false),
+        ..LibrarySettings::default()
+    };
+    let (library, _) = Library::propose(&robot, &settings).unwrap();
+    let count = library.columns().len();
+    let covariance: Vec<f64> = (0..count * count)
+        .map(|k| {
+            let (a, b) = (k / count, k % count);
+            let tied: f64 = (0..3)
+                .map(|f| (((a + 1) * (f + 2)) as f64).sin() * (((b + 1) * (f + 2)) as f64).sin())
+                .sum();
+            tied + if a == b { 0.1 } else { 0.0 }
+        })
+        .collect();
+    let coordinates = Coordinates::new(&robot, &library, &covariance);
+    let inertial = coordinates
+        .all
+        .iter()
+        .filter(|c| matches!(c, Coordinate::Parameter(..)));
+    assert!(inertial.count() <= 5 * 7 + 2 * 4);
+    let mut t = Trace::default();
+    let mut columns = Columns::new(&mut t, &robot, &library);
+    let steps: Vec<Vec<(usize, u32)>> = (0..coordinates.all.len())
+        .map(|which| coordinates.torque(&mut t, &mut columns, which))
+        .collect();
+    for which in 0..5 {
+        let [q, qd, qdd] = state(robot.dof(), which);
+        let motion = Motion {
+            len: 1,
+            q: &q,
+            qd: &qd,
+            qdd: &qdd,
+        };
+        let mut out = vec![Vec::new(); robot.dof()];
+        library.evaluate(motion, &mut out);
+        let all = values(&t.steps, &q, &qd, &qdd);
+        for joint in 0..robot.dof() {
+            let own = library.columns_of_joint(joint);
+            let mut expected = 0.0;
+            for (i, a) in own.iter().enumerate() {
+                for (k, b) in own.iter().enumerate() {
+                    expected += out[joint][i] * covariance[a * count + b] * out[joint][k];
+                }
+            }
+            let z: Vec<f64> = (steps.iter())
+                .map(|steps| {
+                    let step = steps.iter().find(|(j, _)| *j == joint);
+                    step.map_or(0.0, |(_, x)| all[*x as usize])
+                })
+                .collect();
+            let mut variance = 0.0;
+            for (a, x) in z.iter().enumerate() {
+                for (b, y) in z.iter().enumerate() {
+                    variance += x * coordinates.covariance(a, b) * y;
+                }
+            }
+            assert!(
+                (variance - expected).abs() < 1e-9 * expected,
+                "joint {joint}: {variance} {expected}"
+            );
+        }
     }
 }

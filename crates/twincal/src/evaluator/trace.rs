@@ -71,6 +71,29 @@ impl Step {
     }
 }
 
+/// What every step is at one state.
+pub(super) fn values(steps: &[Step], q: &[f64], qd: &[f64], qdd: &[f64]) -> Vec<f64> {
+    let mut values: Vec<f64> = Vec::with_capacity(steps.len());
+    for step in steps {
+        let at = |id: &u32| values[*id as usize];
+        values.push(match step {
+            Step::Constant(value) => *value,
+            Step::Position(joint) => q[*joint],
+            Step::Velocity(joint) => qd[*joint],
+            Step::Acceleration(joint) => qdd[*joint],
+            Step::Add(a, b) => at(a) + at(b),
+            Step::Subtract(a, b) => at(a) - at(b),
+            Step::Multiply(a, b) => at(a) * at(b),
+            Step::Divide(a, b) => at(a) / at(b),
+            Step::Negate(a) => -at(a),
+            Step::Absolute(a) => at(a).abs(),
+            Step::Power(a, exponent) => at(a).powf(*exponent),
+            Step::Apply(function, a) => function.value(at(a)),
+        });
+    }
+    values
+}
+
 /// Steps in the order in which they are computed.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Trace {
@@ -95,7 +118,8 @@ impl Trace {
         self.step(Step::Constant(value + 0.0))
     }
 
-    fn value(&self, id: Id) -> Option<f64> {
+    /// What is known of a step beforehand.
+    pub(super) fn value(&self, id: Id) -> Option<f64> {
         match self.steps[id as usize] {
             Step::Constant(value) => Some(value),
             _ => None,
@@ -158,6 +182,15 @@ impl Trace {
             (_, Some(1.0)) => a,
             (Some(-1.0), _) => self.negate(b),
             (_, Some(-1.0)) => self.negate(a),
+            // Equal but for the sign is equal.
+            (Some(x), _) if x < 0.0 => {
+                let product = self.scale(-x, b);
+                self.negate(product)
+            }
+            (_, Some(y)) if y < 0.0 => {
+                let product = self.scale(-y, a);
+                self.negate(product)
+            }
             _ => match (self.negated(a), self.negated(b)) {
                 (Some(a), Some(b)) => self.multiply(a, b),
                 // The sign goes outside, where sums take it up.
