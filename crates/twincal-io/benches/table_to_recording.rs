@@ -1,5 +1,6 @@
 //! From a table to a recording, one core: `cargo bench -p twincal-io --bench table_to_recording`. Peers: the `csv` crate with the standard
-//! library's numbers, and pyarrow on one thread (`peers/tables.py`; TWINCAL_CHECK_PYTHON or .venv, skipped without pyarrow).
+//! library's numbers, and pyarrow on one thread (`peers/tables.py`; TWINCAL_CHECK_PYTHON or .venv, skipped without pyarrow). Then Parquet on
+//! two threads by the clock, and the peak memory of a process that reads one file and nothing else (`… -- --peak FILE`).
 
 #![allow(
     clippy::print_stdout,
@@ -14,7 +15,7 @@ mod logs;
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
-use twincal::robot::JointKind;
+use twincal::robot::{JointKind, Robot};
 use twincal_io::log::{LogOptions, read_log};
 use twincal_io::table::{ColumnKind, TableFormat, TableWriter, Values};
 
@@ -47,13 +48,34 @@ fn say(what: &str, who: &str, seconds: f64, bytes: u64) {
     );
 }
 
+/// What reading takes at its highest, MB, of which the file's numbers are so many.
+fn peak(path: &Path, robot: &Robot) {
+    let (recording, _) = read_log(path, robot, &LogOptions::default()).expect("readable");
+    let status = std::fs::read_to_string("/proc/self/status").expect("Linux");
+    let line = status.lines().find(|line| line.starts_with("VmHWM"));
+    let words = line.expect("a peak").split_ascii_whitespace();
+    let kilobytes: f64 = words.rev().nth(1).and_then(|w| w.parse().ok()).expect("kB");
+    let numbers = recording.time.len() as f64 * 22.0 * 8.0;
+    println!("{:.1} MB of {:.1}", kilobytes / 1e3, numbers / 1e6);
+}
+
 fn main() {
+    // Columns are decoded here and not on other threads, whose time would not be seen.
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1);
+    one.use_current_thread()
+        .build_global()
+        .expect("no pool yet");
     let names: Vec<String> = (1..=7).map(|i| format!("joint{i}")).collect();
     let joints: Vec<(&str, JointKind)> = names
         .iter()
         .map(|name| (name.as_str(), JointKind::Revolute))
         .collect();
     let robot = logs::robot(&joints);
+    let arguments: Vec<String> = std::env::args().collect();
+    if let Some(at) = arguments.iter().position(|word| word == "--peak") {
+        peak(Path::new(&arguments[at + 1]), &robot);
+        return;
+    }
     let mut columns = vec!["t".to_owned()];
     for word in ["q", "qd", "tau"] {
         columns.extend((1..=7).map(|joint| format!("{word}{joint}")));
@@ -112,6 +134,28 @@ fn main() {
             recording.time.len()
         });
         say(&word(path), "twincal", seconds, size(path));
+    }
+    let two = rayon::ThreadPoolBuilder::new().num_threads(2);
+    let two = two.build().expect("threads");
+    let by_the_clock = (0..5).map(|_| {
+        let start = std::time::Instant::now();
+        let read = two.install(|| read_log(&files[2], &robot, &LogOptions::default()));
+        assert_eq!(read.expect("readable").0.time.len(), ROWS);
+        start.elapsed().as_secs_f64()
+    });
+    let seconds = by_the_clock.fold(f64::INFINITY, f64::min);
+    say(
+        "plain.parquet",
+        "twincal, two threads",
+        seconds,
+        size(&files[2]),
+    );
+    for path in &files {
+        let program = std::env::current_exe().expect("this bench");
+        let output = Command::new(program).arg("--peak").arg(path).output();
+        let output = output.expect("runs again").stdout;
+        let text = String::from_utf8_lossy(&output);
+        println!("{:<34} {:<24} peak {}", word(path), "twincal", text.trim());
     }
     for path in &files[..2] {
         let seconds = shortest(|| {

@@ -5,7 +5,7 @@
 //! | which column is which channel | `columns.rs` |
 //! | names of well-known recorders | `preset.rs` |
 //! | text tables | `csv/` |
-//! | Parquet | `parquet.rs`, checked first by `pages.rs` |
+//! | Parquet | `parquet.rs`, checked first by `pages.rs`; `shared_file.rs` for several threads |
 //! | Arrow IPC | `arrow/` |
 //! | NPZ | `npz.rs` |
 //! | MCAP, rosbag2 | `bag/` |
@@ -20,6 +20,7 @@ mod npz;
 mod pages;
 mod parquet;
 mod preset;
+mod shared_file;
 mod torque;
 
 pub use columns::{Channel, Selection, joints_without_column, match_columns};
@@ -129,7 +130,8 @@ pub fn read_log(
     let read = match kind {
         Kind::Parquet => {
             let pages = file.try_clone().map_err(|e| system(&e))?;
-            parquet::read(file, pages, &name, robot, options)?
+            let chunks = shared_file::SharedFile::new(file).map_err(|e| system(&e))?;
+            parquet::read(chunks, pages, &name, robot, options)?
         }
         Kind::Arrow => arrow::read(file, &name, robot, options)?,
         Kind::Npz => npz::read(BufReader::new(file), &name, robot, options)?,

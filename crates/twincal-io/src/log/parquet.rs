@@ -1,4 +1,4 @@
-//! Parquet logs: column by column into doubles, after the file's claims about itself have been checked.
+//! Parquet logs: columns side by side into doubles, after the file's claims about itself have been checked.
 
 use super::pages::check_chunk;
 use super::{Cells, LogOptions, assemble, match_columns};
@@ -10,6 +10,7 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
+use rayon::prelude::*;
 use std::io::{Read, Seek};
 use twincal::Finding;
 use twincal::Severity;
@@ -18,6 +19,8 @@ use twincal::signal::Recording;
 
 /// Values read at a time.
 const BATCH: usize = 8192;
+/// Largest page, packed and unpacked, bytes, of files whose columns are decoded side by side: writers make pages of 1 MiB.
+const SIDE_BY_SIDE: u64 = 1 << 24;
 
 fn broken(name: &str, error: &ParquetError) -> Error {
     Error::content(
@@ -46,15 +49,23 @@ pub(super) fn read(
     for &index in &wanted {
         scales.push(scale(name, &columns[index], &mut findings)?);
     }
-    let rows = check(&mut pages, name, metadata, &wanted)?;
+    let (rows, largest) = check(&mut pages, name, metadata, &wanted)?;
+    let side_by_side = if largest <= SIDE_BY_SIDE {
+        1
+    } else {
+        wanted.len()
+    };
     let mut cells = Cells::reserve(name, rows, wanted.len())?;
     for group in 0..reader.num_row_groups() {
         let group = reader.get_row_group(group).map_err(|e| broken(name, &e))?;
-        for (values, &index) in cells.columns.iter_mut().zip(&wanted) {
-            let column = group
-                .get_column_reader(index)
-                .map_err(|e| broken(name, &e))?;
-            append(column, values).map_err(|e| broken(name, &e))?;
+        // A thread holds the page that it is at, packed and unpacked.
+        let read: Vec<_> = (cells.columns.par_iter_mut().zip(&wanted))
+            .with_min_len(side_by_side)
+            .map(|(values, &index)| append(group.get_column_reader(index)?, values))
+            .collect();
+        // The first column with a mistake, whichever thread was first.
+        for read in read {
+            read.map_err(|e| broken(name, &e))?;
         }
     }
     if let Some(short) = cells.columns.iter().position(|c| c.len() != rows) {
@@ -123,16 +134,16 @@ fn scale(name: &str, column: &ColumnDescriptor, findings: &mut Vec<Finding>) -> 
     Ok(ticks)
 }
 
-/// Compares the footer's claims with each other and with the pages'; the number of rows.
+/// Compares the footer's claims with each other and with the pages'; the number of rows, and the bytes of the largest page.
 fn check(
     pages: &mut (impl Read + Seek),
     name: &str,
     metadata: &ParquetMetaData,
     wanted: &[usize],
-) -> Result<usize> {
+) -> Result<(usize, u64)> {
     let refuse =
         |problem: String| Error::content(Place::file(name), problem, "copy or export it again");
-    let mut rows = 0_usize;
+    let (mut rows, mut largest) = (0_usize, 0);
     for (number, group) in metadata.row_groups().iter().enumerate() {
         let claimed = group.num_rows();
         rows = usize::try_from(claimed)
@@ -166,15 +177,16 @@ fn check(
                     chunk.column_path().string()
                 )));
             };
-            check_chunk(pages, start, length, values).map_err(|problem| {
+            let page = check_chunk(pages, start, length, values).map_err(|problem| {
                 refuse(format!(
                     "column `{}`: {problem}",
                     chunk.column_path().string()
                 ))
             })?;
+            largest = largest.max(page);
         }
     }
-    Ok(rows)
+    Ok((rows, largest))
 }
 
 /// Refuses the codecs that this program does not carry.

@@ -1,7 +1,7 @@
 //! Lines of a text file with a limit on their length: memory stays flat whatever the file holds.
 
 use crate::error::{Error, Place, Result};
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, ErrorKind, Read};
 
 /// Longest line, bytes.
 pub(super) const MAX_LINE: usize = 1 << 20;
@@ -95,6 +95,26 @@ impl<R: Read> Lines<R> {
         Ok(None)
     }
 
+    /// Hands `read` the bytes that are there already, which begin with a line, before that line is copied: it gives the bytes that the
+    /// line takes with its end, or `None` where it cannot read it. Those bytes, or 0 if the line is still to come; blank lines and
+    /// comments are not shown.
+    pub(super) fn in_place(&mut self, read: impl FnOnce(&[u8]) -> Option<usize>) -> Result<usize> {
+        if self.comment.is_some() {
+            return Ok(0);
+        }
+        let bytes = match self.reader.fill_buf() {
+            Ok(bytes) => bytes,
+            Err(e) if e.kind() == ErrorKind::Interrupted => return Ok(0),
+            Err(e) => return Err(unreadable(&self.name, &e)),
+        };
+        let is_data = (bytes.first()).is_some_and(|b| *b != b'#' && !b.is_ascii_whitespace());
+        let taken = if is_data { read(bytes).unwrap_or(0) } else { 0 };
+        self.reader.consume(taken);
+        self.bytes += taken as u64;
+        self.number += u64::from(taken > 0);
+        Ok(taken)
+    }
+
     /// The next line; a line with an open quotation mark goes on with the one below.
     fn next_line(&mut self) -> Result<Option<Line>> {
         let mut text = std::mem::take(&mut self.spare);
@@ -108,14 +128,7 @@ impl<R: Read> Lines<R> {
             let read = (&mut self.reader)
                 .take(room)
                 .read_until(b'\n', &mut text)
-                .map_err(|e| {
-                    Error::system(
-                        &self.name,
-                        "read",
-                        &e,
-                        "check the disk or the program that writes it",
-                    )
-                })?;
+                .map_err(|e| unreadable(&self.name, &e))?;
             if read == 0 {
                 break;
             }
@@ -198,6 +211,11 @@ impl<R: Read> Lines<R> {
         }
         Ok(())
     }
+}
+
+fn unreadable(name: &str, error: &std::io::Error) -> Error {
+    let remedy = "check the disk or the program that writes it";
+    Error::system(name, "read", error, remedy)
 }
 
 /// Whether the number of quotation marks is odd.

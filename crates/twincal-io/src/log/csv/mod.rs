@@ -89,11 +89,26 @@ impl<R: Read> Table<R> {
         let mut row = vec![0.0; wanted.len()];
         let mut next = self.first.take();
         let (mut rows, mut text) = (0_u64, 0_u64);
-        while let Some(line) = match next.take() {
-            Some(line) => Some(line),
-            None => self.lines.data()?,
-        } {
-            match self.parse(&line, &order, &mut row) {
+        let (dialect, fields) = (self.dialect, self.header.len());
+        loop {
+            let mut taken = 0;
+            if next.is_none() {
+                taken = (self.lines)
+                    .in_place(|text| plain::read(text, false, dialect, fields, &order, &mut row))?;
+            }
+            let mut read = Ok(());
+            if taken == 0 {
+                let Some(line) = (match next.take() {
+                    Some(line) => Some(line),
+                    None => self.lines.data()?,
+                }) else {
+                    break;
+                };
+                read = self.parse(&line, &order, &mut row);
+                taken = line.text.len() + 1;
+                self.lines.give_back(line);
+            }
+            match read {
                 Ok(()) => {
                     for (column, value) in cells.columns.iter_mut().zip(&row) {
                         column.push(*value);
@@ -106,7 +121,7 @@ impl<R: Read> Table<R> {
                 Err(error) => return Err(error),
             }
             rows += 1;
-            text += line.text.len() as u64 + 1;
+            text += taken as u64;
             if rows == 1000 {
                 let expected = self.bytes as f64 * rows as f64 / text as f64;
                 self.check_memory(expected, wanted.len())?;
@@ -115,7 +130,6 @@ impl<R: Read> Table<R> {
                     column.reserve((1.01 * expected) as usize);
                 }
             }
-            self.lines.give_back(line);
         }
         Ok(cells)
     }
@@ -154,7 +168,8 @@ impl<R: Read> Table<R> {
 
     /// One line to numbers, in the order of the wanted columns.
     fn parse(&self, line: &lines::Line, order: &[(usize, usize)], row: &mut [f64]) -> Result<()> {
-        if plain::read(&line.text, self.dialect, self.header.len(), order, row) {
+        let fields = self.header.len();
+        if plain::read(&line.text, true, self.dialect, fields, order, row).is_some() {
             return Ok(());
         }
         self.parse_any(line, order, row)
@@ -257,12 +272,74 @@ mod tests {
                 let line = lines::Line { number: 2, text: text.clone().into_bytes() };
                 for order in [&[(0, 1), (2, 0), (2, 2)][..], &[(0, 0), (1, 1), (2, 2), (3, 3)]] {
                     let (mut short, mut long) = ([7.0; 4], [7.0; 4]);
-                    if plain::read(&line.text, table.dialect, 4, order, &mut short) {
+                    if plain::read(&line.text, true, table.dialect, 4, order, &mut short).is_some() {
                         prop_assert!(table.parse_any(&line, order, &mut long).is_ok(), "{text:?}");
                         prop_assert_eq!(short.map(f64::to_bits), long.map(f64::to_bits), "{:?}", text);
+                    }
+                    // The same where more follows, or the rest of the line is still to come.
+                    for (after, read) in [("\n", true), ("\r\n7,8", true), ("\n\n", true), ("", false), ("\r", false), ("\r7", false)] {
+                        let mut line = text.clone().into_bytes();
+                        while matches!(line.last(), Some(b'\r' | b'\n')) {
+                            line.pop();
+                        }
+                        let mut there = [7.0; 4];
+                        let alone = plain::read(&line, true, table.dialect, 4, order, &mut short);
+                        let length = line.len() + after.trim_end_matches(|c: char| c.is_ascii_digit() || c == ',').len().min(if after.starts_with('\r') { 2 } else { 1 });
+                        line.extend(after.bytes());
+                        let taken = plain::read(&line, false, table.dialect, 4, order, &mut there);
+                        prop_assert_eq!(taken, alone.filter(|_| read).map(|_| length), "{:?}{:?}", text, after);
+                        prop_assert!(taken.is_none() || short.map(f64::to_bits) == there.map(f64::to_bits), "{:?}", text);
                     }
                 }
             }
         }
+    }
+
+    /// Lines that are read in place, lines that are not and lines that end in another buffer (256 KiB): numbers are the standard
+    /// library's, and a mistake is told with its line.
+    #[test]
+    fn rows_of_every_kind_are_those_of_a_naive_reader() {
+        let mut text = String::from("t,a,b,c\n");
+        let (mut expected, mut line) = (vec![Vec::new(); 2], 1_u64);
+        for row in 0..60_000_u64 {
+            let noise = row.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+            let [a, c] = [noise as i64 as f64 * 1e-17, (noise >> 20) as f64 * 1e-9];
+            let c = match row % 19 {
+                0 => String::new(),
+                1 => format!("{c:e}"),
+                2 => format!("{c:.0}"),
+                _ => format!("{c:.9}"),
+            };
+            let b = match row % 7 {
+                0 => "\"quoted, with\na line\"",
+                1 => "word",
+                2 => "",
+                _ => "12.5",
+            };
+            if row % 11 == 0 {
+                text.push_str(["\n", "  \n", "# a comment\n", "\t# too\n"][(row % 4) as usize]);
+                line += 1;
+            }
+            text.push_str(&format!("{row}.5,{a},{b},{c}"));
+            text.push_str(["\n", "\r\n", ",\n", "\n"][(row % 4) as usize]);
+            line += 1 + u64::from(row % 7 == 0);
+            let number = |text: &str| text.parse::<f64>().unwrap_or(f64::NAN).to_bits();
+            expected[0].push(number(&c));
+            expected[1].push(number(&a.to_string()));
+        }
+        let read = |text: &str| {
+            let mut table = Table::open(text.as_bytes(), text.len() as u64, "run.csv").unwrap();
+            table.read(&[3, 1], false)
+        };
+        let cells = read(&text).unwrap();
+        for (found, expected) in cells.columns.iter().zip(&expected) {
+            let found: Vec<u64> = found.iter().map(|value| value.to_bits()).collect();
+            assert!(found == *expected);
+        }
+        // Without the end of its last line, and with a mistake in one more.
+        assert_eq!(read(text.trim_end()).unwrap().columns[1].len(), 60_000);
+        let error = read(&(text + "1,2,3,x\n")).unwrap_err().to_string();
+        let place = format!("run.csv:{}:7: ", line + 1);
+        assert!(error.starts_with(&place), "{error}, not {place}");
     }
 }
