@@ -10,9 +10,10 @@ mod autocorrelation;
 mod ranks;
 
 pub use autocorrelation::integrated_autocorrelation_time;
+pub use ranks::NormalScores;
 
 use autocorrelation::effective_samples;
-use ranks::{mean_and_variance, median, normal_scores, quantile};
+use ranks::{cut, folded, mean_and_variance, median, median_of, normal_scores, quantile, sorted};
 
 /// Fewest draws per chain.
 const LEAST_DRAWS: usize = 4;
@@ -51,6 +52,23 @@ pub fn r_hat<C: AsRef<[f64]>>(chains: &[C]) -> f64 {
         plain_r_hat(&normal_scores(&folded)),
     );
     if bulk.is_nan() { bulk } else { bulk.max(tail) }
+}
+
+/// ([`r_hat`], [`ess_bulk`]) to the last bit, from one sort of the draws and one table of scores.
+pub fn convergence<C: AsRef<[f64]>>(chains: &[C], scores: &NormalScores) -> (f64, f64) {
+    let Some(halves) = halves(chains) else {
+        return (f64::NAN, f64::NAN);
+    };
+    let pooled = sorted(&halves);
+    let bulk = cut(&scores.of(&pooled), &halves);
+    let ess = effective_samples(&bulk);
+    let bulk = plain_r_hat(&bulk);
+    if chains.len() < 2 || bulk.is_nan() {
+        return (f64::NAN, ess);
+    }
+    let distances = folded(&pooled, median_of(&pooled));
+    let tail = plain_r_hat(&cut(&scores.of(&distances), &halves));
+    (bulk.max(tail), ess)
 }
 
 /// `√((B/W + n − 1)/n)`.

@@ -47,6 +47,17 @@ fn every_diagnostic_equals_arviz() {
             &case["ess_bulk"],
             &format!("{name}: ess_bulk"),
         );
+        let pooled: usize = chains.iter().map(|chain| chain.len() / 2 * 2).sum();
+        // A table of another size is not used, and changes nothing.
+        for size in [pooled, 7] {
+            let (r, ess) = convergence(&chains, &NormalScores::new(size));
+            close(r, &case["r_hat"], &format!("{name}: r_hat by table"));
+            close(
+                ess,
+                &case["ess_bulk"],
+                &format!("{name}: ess_bulk by table"),
+            );
+        }
         close(
             ess_tail(&chains),
             &case["ess_tail"],
