@@ -39,7 +39,8 @@ use crate::likelihood::{
 };
 use crate::observations::Part;
 use crate::plug_in::{
-    Fit, FitSettings, LeftOut, Moving, fit, fit_tempered, residual_correlation_time, start,
+    Fit, FitSettings, LeftOut, Moving, fit, fit_tempered, moving_rows, residual_correlation_time,
+    start,
 };
 use crate::posterior::Method;
 use crate::prior::PriorSettings;
@@ -256,7 +257,13 @@ pub fn calibrate(
         repeats,
         halves,
     };
-    let excitation = unseen::excitation(robot, &every_candidate, &skeleton.zero_columns, &data);
+    let excitation = unseen::excitation(
+        robot,
+        &every_candidate,
+        &skeleton.zero_columns,
+        &fitted.fit.gram,
+        &data,
+    );
     let mut calibration = summary::summarise(
         skeleton, &library, &data, &columns, settings, fitted, validation, sweep, opinion, findings,
     )?;
@@ -313,7 +320,7 @@ fn estimate(
             let mut noise = Vec::new();
             if draws_noise {
                 let given = Given {
-                    grams: &crate::plug_in::total(training),
+                    grams: &fit.gram,
                     columns,
                     plug_in: &fit.plug_in,
                     problem: &fit.problem,
@@ -398,13 +405,12 @@ fn noise_of(
     profiles: &[Option<SpeedProfile>],
 ) -> Vec<JointNoise> {
     let (plug_in, posterior) = (&fitted.fit.plug_in, &fitted.fit.posterior);
-    let gram = crate::plug_in::total(training);
     robot
         .joint_names()
         .into_iter()
         .enumerate()
         .map(|(j, name)| {
-            let (n, rho) = (gram.joints[j].n, plug_in.rho[j]);
+            let (n, rho) = (moving_rows(training, j), plug_in.rho[j]);
             JointNoise {
                 joint: name.to_owned(),
                 sigma: (posterior.noise / (plug_in.weight[j] * (1.0 - rho * rho))).sqrt(),

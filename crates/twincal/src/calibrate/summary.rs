@@ -13,7 +13,7 @@ use crate::error::{Finding, Result, Severity};
 use crate::infer::approximate;
 use crate::likelihood::{Columns, JointNoise, mean_squares};
 use crate::observations::Part;
-use crate::plug_in::{residual_runs, total};
+use crate::plug_in::residual_runs;
 use crate::posterior::draws::draw;
 use crate::posterior::summary::{ColumnSummary, summarise as summarise_columns};
 use crate::posterior::{Posterior, Problem};
@@ -110,8 +110,7 @@ pub(super) fn summarise(
         .iter()
         .map(|log| log.observations.whole())
         .collect();
-    let gram = total(&training);
-    let rms: Vec<f64> = mean_squares(&gram, columns.names.len(), &fit.plug_in.weight)
+    let rms: Vec<f64> = mean_squares(&fit.gram, columns.names.len(), &fit.plug_in.weight)
         .into_iter()
         .map(f64::sqrt)
         .collect();

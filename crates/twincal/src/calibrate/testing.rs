@@ -90,10 +90,12 @@ impl Regression {
     pub(super) fn fitted(&self, logs: &[Part<'_>]) -> (Fit, Posterior) {
         let (columns, prior) = (Self::columns(), Self::prior());
         let plug_in = start(logs, &columns, &prior);
-        let problem = assemble(&total(logs), &columns, &plug_in, &prior).unwrap();
+        let gram = total(logs);
+        let problem = assemble(&gram, &columns, &plug_in, &prior).unwrap();
         let posterior = crate::infer::approximate(&problem, None).unwrap();
         let compact = refit(&problem, &[true, true], &posterior).unwrap();
         let fit = Fit {
+            gram,
             plug_in,
             problem,
             posterior,

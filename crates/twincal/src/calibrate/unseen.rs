@@ -5,8 +5,6 @@ use super::result::{Calibration, Verdict};
 use crate::error::{Finding, Severity};
 use crate::excitation::{Excitation, STATES, Seen, States, excitation as compare, sentence};
 use crate::gram::Gram;
-use crate::observations::Part;
-use crate::plug_in::total;
 use crate::robot::Robot;
 use crate::term::{Library, Status};
 
@@ -15,23 +13,19 @@ const TOLD: usize = 5;
 /// Names that a sentence holds at most.
 const NAMES: usize = 4;
 
-/// What the fit logs show of all candidates, those included whose columns (`dropped`) are zero on all rows.
+/// What the fit logs, whose statistics are `gram`, show of all candidates, those included whose columns (`dropped`) are zero on all rows.
 pub(super) fn excitation(
     robot: &Robot,
     library: &Library,
     dropped: &[usize],
+    gram: &Gram,
     data: &Data,
 ) -> Excitation {
-    let parts: Vec<Part<'_>> = data
-        .fit
-        .iter()
-        .map(|log| log.observations.whole())
-        .collect();
     let kept: Vec<u32> = (0..library.columns().len())
         .filter(|column| !dropped.contains(column))
         .map(|column| column as u32)
         .collect();
-    let Gram { mut joints } = total(&parts);
+    let mut joints = gram.joints.clone();
     for joint in &mut joints {
         let columns = joint.columns.iter_mut();
         columns.for_each(|column| *column = kept[*column as usize]);

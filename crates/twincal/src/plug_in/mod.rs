@@ -50,6 +50,8 @@ pub struct FitSettings<'a> {
 /// A posterior with the plug-ins that it was computed from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
+    /// Statistics of the training parts.
+    pub gram: Gram,
     /// The plug-ins in force.
     pub plug_in: PlugIn,
     /// The regression and prior that they make.
@@ -98,7 +100,27 @@ pub fn fit(
     moving: Moving,
     known: Option<&Posterior>,
 ) -> Result<Fit> {
-    let gram = total(training);
+    fit_gram(
+        training,
+        &total(training),
+        columns,
+        settings,
+        start,
+        moving,
+        known,
+    )
+}
+
+/// [`fit`] with the statistics of `training` at hand.
+fn fit_gram(
+    training: &[Part<'_>],
+    gram: &Gram,
+    columns: &Columns,
+    settings: FitSettings<'_>,
+    start: &PlugIn,
+    moving: Moving,
+    known: Option<&Posterior>,
+) -> Result<Fit> {
     let mut plug_in = start.clone();
     let mut known = known.cloned();
     let components = columns.family.len();
@@ -110,14 +132,14 @@ pub fn fit(
     let mut rounds = 0;
     loop {
         rounds += 1;
-        let problem = assemble(&gram, columns, &plug_in, settings.prior)?;
+        let problem = assemble(gram, columns, &plug_in, settings.prior)?;
         let posterior = approximate(&problem, known.as_ref())?;
         let mut next = plug_in.clone();
         if moving == Moving::All {
-            move_noise(&mut next, training, &gram, settings.noise, &posterior);
+            move_noise(&mut next, training, gram, settings.noise, &posterior);
         }
         if settings.prior.scaled_variance == Auto::Auto {
-            next.scaled_variance = slab_scales(&gram, columns, &plug_in, &problem, &posterior);
+            next.scaled_variance = slab_scales(gram, columns, &plug_in, &problem, &posterior);
             if posterior.noise.is_finite() {
                 next.noise = posterior.noise;
             }
@@ -125,6 +147,7 @@ pub fn fit(
         let converged = largest_change(&plug_in, &next) < tolerance;
         if converged || rounds == moving.rounds(components) {
             return Ok(Fit {
+                gram: gram.clone(),
                 plug_in,
                 problem,
                 posterior,
@@ -156,6 +179,15 @@ pub fn total(parts: &[Part<'_>]) -> Gram {
         sum += &part.gram();
     }
     sum
+}
+
+/// Moving rows of a joint over several parts: n of [`total`].
+pub fn moving_rows(parts: &[Part<'_>], joint: usize) -> f64 {
+    let moving = |part: &Part<'_>| {
+        let standstill = &part.observations.joints[joint].standstill[part.rows.clone()];
+        standstill.iter().filter(|still| !**still).count() as f64
+    };
+    parts.iter().map(moving).sum()
 }
 
 /// Weights and autoregression that the residual at the model average asks for; one ρ for all joints where they share one

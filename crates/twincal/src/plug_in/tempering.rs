@@ -3,8 +3,9 @@
 //! The residual of a real robot is mostly model error: slow, repeatable on one trajectory, different on the next. An
 //! in-sample noise level cannot see that; predicting parts that were left out can.
 
-use super::{Fit, FitSettings, Moving, fit, residual_correlation_time, start, total};
+use super::{Fit, FitSettings, Moving, fit_gram, residual_correlation_time, start, total};
 use crate::error::Result;
+use crate::gram::Gram;
 use crate::infer::approximate;
 use crate::likelihood::{Columns, PlugIn, assemble};
 use crate::observations::{Observations, Part};
@@ -64,8 +65,10 @@ pub fn fit_tempered(
     columns: &Columns,
     settings: FitSettings<'_>,
 ) -> Result<(Fit, LeftOut)> {
-    let white = fit(
+    let gram = total(training);
+    let white = fit_gram(
         training,
+        &gram,
         columns,
         settings,
         &start(training, columns, settings.prior),
@@ -88,8 +91,9 @@ pub fn fit_tempered(
             tempering: c,
             ..correlated.clone()
         };
-        let fitted = fit(
+        let fitted = fit_gram(
             training,
+            &gram,
             columns,
             settings,
             &plug_in,
@@ -121,8 +125,9 @@ pub fn fit_tempered(
         .position(|s| s.1 >= best - MARGIN)
         .unwrap_or(0);
     let (rough, predicted, _) = candidates.swap_remove(chosen);
-    let fitted = fit(
+    let fitted = fit_gram(
         training,
+        &gram,
         columns,
         settings,
         &rough.plug_in,
@@ -176,8 +181,16 @@ fn weighing(training: &[Part<'_>], joint: usize, robust: bool) -> f64 {
     if cost.is_finite() { cost.max(1.0) } else { 1.0 }
 }
 
-/// `(training, left out)` pairs: whole logs when there are three or more, otherwise equal parts of each log.
-fn folds<'a>(training: &[Part<'a>]) -> Vec<(Vec<Part<'a>>, Vec<Part<'a>>)> {
+/// What one fold knows, and what it predicts.
+struct LeaveOut<'a> {
+    /// Statistics of the kept pieces, added up in their order: no subtraction, no rounding but that of a sum.
+    kept: Gram,
+    out: Vec<Part<'a>>,
+}
+
+/// Whole logs are left out when there are three or more, otherwise equal parts of each log. Every piece is gone through
+/// once, however often its statistics count.
+fn folds<'a>(training: &[Part<'a>]) -> Vec<LeaveOut<'a>> {
     let pieces: Vec<Part<'a>> = if training.len() >= 3 {
         training.to_vec()
     } else {
@@ -188,17 +201,21 @@ fn folds<'a>(training: &[Part<'a>]) -> Vec<(Vec<Part<'a>>, Vec<Part<'a>>)> {
             .collect()
     };
     let count = pieces.len().min(MOST_FOLDS);
+    let grams: Vec<Gram> = pieces.par_iter().map(Part::gram).collect();
     (0..count)
         .map(|fold| {
-            let (out, kept): (Vec<_>, Vec<_>) = pieces
-                .iter()
-                .cloned()
-                .enumerate()
-                .partition(|(i, _)| i % count == fold);
-            (
-                kept.into_iter().map(|p| p.1).collect(),
-                out.into_iter().map(|p| p.1).collect(),
-            )
+            let mut own = LeaveOut {
+                kept: Gram::default(),
+                out: Vec::new(),
+            };
+            for (i, (piece, gram)) in pieces.iter().zip(&grams).enumerate() {
+                if i % count == fold {
+                    own.out.push(piece.clone());
+                } else {
+                    own.kept += gram;
+                }
+            }
+            own
         })
         .collect()
 }
@@ -215,7 +232,7 @@ fn pieces_of<'a>(part: &Part<'a>, count: usize) -> Vec<Part<'a>> {
 }
 
 fn predict_left_out(
-    folds: &[(Vec<Part<'_>>, Vec<Part<'_>>)],
+    folds: &[LeaveOut<'_>],
     columns: &Columns,
     settings: FitSettings<'_>,
     whole: &Fit,
@@ -223,8 +240,8 @@ fn predict_left_out(
     let plug_in = &whole.plug_in;
     folds
         .par_iter()
-        .map(|(kept, out)| {
-            let problem = assemble(&total(kept), columns, plug_in, settings.prior)?;
+        .map(|LeaveOut { kept, out }| {
+            let problem = assemble(kept, columns, plug_in, settings.prior)?;
             let posterior = approximate(&problem, Some(&whole.posterior))?;
             let covariance = posterior.covariance();
             let joints = plug_in.weight.len();
