@@ -5,7 +5,7 @@
 use super::EXACT_LIMIT;
 use super::answer::{Averages, Listed, posterior};
 use super::search::{self, Care, Found, Start};
-use super::standard::Standard;
+use super::standard::{Reduced, Standard};
 use super::{bounds, certain};
 use crate::error::Result;
 use crate::posterior::{Method, Model, Posterior, Problem};
@@ -29,9 +29,11 @@ pub(super) fn approximate(problem: &Problem, warm: Option<&Posterior>) -> Result
     } else {
         Care::Full
     };
-    let found = search(&standard, problem, warm, budget, care);
+    let certain = certain::components(&standard, &problem.prior);
+    let reduced = Reduced::new(&standard, &certain);
+    let found = search(&reduced, problem, warm, budget, care);
     let total = found.sums.total() / (1.0 - found.missing);
-    let heaviest = shares(&standard, &found, total, LISTED_MODELS);
+    let heaviest = shares(&reduced, &found, total, LISTED_MODELS);
     let all = total.ln() + found.sums.reference;
     let log_weights: BTreeMap<Vec<u32>, f64> = (heaviest.iter().zip(&found.models))
         .map(|((_, members, _), (log_weight, _))| (members.clone(), log_weight - all))
@@ -42,7 +44,7 @@ pub(super) fn approximate(problem: &Problem, warm: Option<&Posterior>) -> Result
         LISTED_MASS
     };
     let listed = Listed::new(&standard, heaviest, mass, LISTED_MODELS)?;
-    let mut averages = averages(&standard, &found);
+    let mut averages = averages(&reduced, &found);
     let method = Method::Search {
         models: found.models.len() as u64,
         missing: found.missing,
@@ -66,15 +68,14 @@ pub(super) fn approximate(problem: &Problem, warm: Option<&Posterior>) -> Result
 
 /// Runs the search on a problem; `warm` gives starts.
 pub(super) fn search(
-    standard: &Standard,
+    reduced: &Reduced<'_>,
     problem: &Problem,
     warm: Option<&Posterior>,
     budget: usize,
     care: Care,
 ) -> Found {
-    let sure = certain::components(standard, &problem.prior);
-    let (certain, active): (Vec<usize>, Vec<usize>) =
-        (0..standard.blocks.len()).partition(|&b| sure[standard.blocks[b].component]);
+    let standard = &reduced.open;
+    let active = &reduced.active;
     let starts: Vec<Vec<usize>> = warm
         .filter(|warm| warm.component == standard.component)
         .map(|warm| {
@@ -83,7 +84,7 @@ pub(super) fn search(
                 .iter()
                 .take(2)
                 .map(|model| {
-                    let mut holds = vec![false; standard.blocks.len()];
+                    let mut holds = vec![false; problem.prior.components()];
                     model
                         .members
                         .iter()
@@ -100,11 +101,9 @@ pub(super) fn search(
         })
         .unwrap_or_default();
     search::run(
-        standard,
+        reduced,
         &problem.prior,
         &Start {
-            certain: &certain,
-            active: &active,
             warm: &starts,
             budget,
             care,
@@ -114,7 +113,7 @@ pub(super) fn search(
 
 /// (share of `total`, columns, positions) of the heaviest models found.
 pub(super) fn shares(
-    standard: &Standard,
+    reduced: &Reduced<'_>,
     found: &Found,
     total: f64,
     most: usize,
@@ -124,25 +123,26 @@ pub(super) fn shares(
         .iter()
         .take(most)
         .map(|(log_weight, set)| {
-            let (members, positions) = standard.members(set);
+            let (members, positions) = reduced.members(set);
             (found.sums.weight(*log_weight) / total, members, positions)
         })
         .collect()
 }
 
 /// Averages over all models found.
-pub(super) fn averages(standard: &Standard, found: &Found) -> Averages {
-    let (sums, total) = (&found.sums, found.sums.total());
+pub(super) fn averages(reduced: &Reduced<'_>, found: &Found) -> Averages {
+    let (sums, total, open) = (&found.sums, found.sums.total(), &reduced.open);
     let share = |values: &[f64]| -> Vec<f64> { values.iter().map(|x| x / total).collect() };
-    Averages {
-        inclusion: standard
+    let averages = Averages {
+        inclusion: open
             .block_of()
             .iter()
             .map(|&b| sums.inclusion[b] / total)
             .collect(),
-        mcse: vec![0.0; standard.size()],
+        mcse: vec![0.0; open.size()],
         shift: share(&sums.shift),
         moment: share(&sums.moment),
         misfit: sums.misfit / total,
-    }
+    };
+    reduced.widen(averages, &share(&sums.products))
 }

@@ -18,7 +18,7 @@ mod propagation;
 use super::answer::{Averages, Listed};
 use super::approximate;
 use super::search::Care;
-use super::standard::{Standard, nudged, slab_mass};
+use super::standard::{Reduced, Standard, nudged, slab_mass};
 use crate::error::Result;
 use crate::linear_algebra::Cholesky;
 use crate::posterior::{Model, Problem, Site};
@@ -134,14 +134,15 @@ pub(super) fn apply(
 /// [`apply`] for a method that does not know the bounds: where they act, its list is joined by what a search finds.
 pub(super) fn settle(
     problem: &Problem,
-    standard: &Standard,
+    reduced: &Reduced<'_>,
     averages: &mut Averages,
     mut listed: Listed,
 ) -> Result<(Listed, f64)> {
+    let standard = reduced.full;
     if !standard.bounded {
         return Ok((listed, 0.0));
     }
-    let found = approximate::search(standard, problem, None, BUDGET, Care::Full);
+    let found = approximate::search(reduced, problem, None, BUDGET, Care::Full);
     let known: BTreeSet<Vec<u32>> = listed
         .models
         .iter()
@@ -153,7 +154,7 @@ pub(super) fn settle(
     };
     let reference = log_weight(problem, standard, heaviest) - heaviest.weight.ln();
     let mut log_weights: Vec<f64> = listed.models.iter().map(|m| m.weight.ln()).collect();
-    for (_, members, positions) in approximate::shares(standard, &found, found.sums.total(), JOINED)
+    for (_, members, positions) in approximate::shares(reduced, &found, found.sums.total(), JOINED)
     {
         if known.contains(&members) {
             continue;

@@ -9,56 +9,153 @@
 //! ```
 //!
 //! Where that is below e^−40 of a single model that does hold B, all of them together are below rounding.
+//!
+//! The same bound says how far coefficients can move: models with `c > c_max`, `Π factor (1 + c_max)^−a_n` being that
+//! little, do not count, and in the others
+//!
+//! ```text
+//! |δ_d| ≤ √(c_max (A⁻¹)_dd),    Var β_d ≤ φ_max (A⁻¹)_dd,    φ_max = (1 + c_max)/(2 a_n)
+//! ```
+//!
+//! A bound that is [`FAR`] sd away even so acts in no model that counts.
 
-use super::moments::present;
+use super::moments::{Moments, present};
 use super::search::climb;
-use super::standard::Standard;
+use super::standard::{Block, Reduced, Standard, nudged};
 use super::walker::Walker;
+use crate::linear_algebra::Cholesky;
 use crate::prior::Prior;
 use pulp::{Simd, WithSimd};
 
 /// ln of the share of the mass below which models are not visited: 4e-18, far below one ulp of the sum.
 const NEGLIGIBLE: f64 = -40.0;
 
-/// Components (by their own number) that every model with weight holds.
-pub(super) fn components(standard: &Standard, prior: &Prior) -> Vec<bool> {
-    pulp::Arch::new().dispatch(Certain { standard, prior })
+/// sd from the mean beyond which a bound takes no mass: ln Φ(9) = −1e-19.
+const FAR: f64 = 9.0;
+
+/// What is certain, by the components' own numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Certain {
+    /// Every model with weight holds it.
+    pub(super) sure: Vec<bool>,
+    /// Its bounds, if it has any, act in no model with weight that holds it.
+    pub(super) settled: Vec<bool>,
 }
 
-struct Certain<'a> {
+/// The components that every model with weight holds.
+///
+/// Any model makes a valid bound, a good one a sharp one: what the full model settles is integrated out before a better
+/// one is looked for among the rest.
+pub(super) fn components(standard: &Standard, prior: &Prior) -> Certain {
+    let Ok(factor) = nudged(&standard.matrix, standard.size()) else {
+        return none(prior);
+    };
+    let inverse = factor.inverse();
+    let size = standard.size();
+    let cost = |block: &Block| -> f64 {
+        let square: Vec<f64> = block
+            .range()
+            .flat_map(|i| inverse[i * size..][block.range()].iter().copied())
+            .collect();
+        let mut half = standard.center[block.range()].to_vec();
+        match Cholesky::new(&square, block.len) {
+            Ok(factor) => factor.solve_lower(&mut half),
+            Err(_) => return 0.0,
+        }
+        half.iter().map(|x| x * x).sum()
+    };
+    let bounds = Bounds {
+        standard,
+        prior,
+        costs: standard.blocks.iter().map(cost).collect(),
+        spread: (0..size).map(|d| inverse[d * size + d]).collect(),
+        factors: standard.blocks.iter().map(|b| b.factor.ln()).sum(),
+    };
+    let full = Moments {
+        delta: vec![0.0; size],
+        variance: bounds.spread.clone(),
+        excess: 0.0,
+        holds: Vec::new(),
+        inside: Vec::new(),
+        covariance: Vec::new(),
+    };
+    let slabs: f64 = standard.precision.iter().map(|p| p.ln()).sum();
+    let reference = prior.log_model(&prior.family_sizes()) + bounds.factors + 0.5 * slabs
+        - 0.5 * factor.log_determinant();
+    let first = bounds.judge(reference + full.log_mass(standard));
+    let reduced = Reduced::new(standard, &first);
+    let climbed = pulp::Arch::new().dispatch(Climb {
+        standard: &reduced.open,
+        prior,
+    });
+    bounds.judge(climbed)
+}
+
+/// What the bounds of the module's text are made of.
+struct Bounds<'a> {
     standard: &'a Standard,
     prior: &'a Prior,
+    /// c of the full model without each component, and `(A⁻¹)_dd`.
+    costs: Vec<f64>,
+    spread: Vec<f64>,
+    /// `Σ ln factor`.
+    factors: f64,
 }
 
-impl WithSimd for Certain<'_> {
-    type Output = Vec<bool>;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Vec<bool> {
-        let Self { standard, prior } = self;
-        let count = standard.blocks.len();
-        let all: Vec<usize> = (0..count).collect();
-        let mut walker = Walker::new(standard, prior);
-        all.iter().for_each(|&block| walker.flip(simd, block));
-        walker.tableau.refine();
-        let bounds: f64 = standard.blocks.iter().map(|b| b.factor.ln()).sum();
-        let costs: Vec<f64> = all.iter().map(|&b| walker.tableau.block(b).1).collect();
-        // Any model makes a valid bound; a good one a sharp one.
-        climb(simd, &mut walker, &all, &[]);
-        let reference = walker.log_weight() + present(&walker).log_mass(standard);
-        let mut certain = vec![false; count];
-        for (block, cost) in standard.blocks.iter().zip(costs) {
-            let (_, outside) = prior.next(block.family, 0, 0);
-            let bound = bounds + outside.ln() - standard.shape * cost.ln_1p();
-            certain[block.component] = bound < reference + NEGLIGIBLE;
+impl Bounds<'_> {
+    /// `reference`: ln of the weight of any model.
+    fn judge(&self, reference: f64) -> Certain {
+        let standard = self.standard;
+        let least = reference + NEGLIGIBLE;
+        let most = ((self.factors - least).max(0.0) / standard.shape).exp_m1();
+        let phi = 0.5 * (1.0 + most) / standard.shape;
+        let far = |d: usize| {
+            let reach = most.sqrt() + FAR * phi.sqrt();
+            standard.lower[d] == f64::NEG_INFINITY
+                || standard.center[d] - standard.lower[d] > reach * self.spread[d].sqrt()
+        };
+        let mut certain = none(self.prior);
+        for (block, cost) in standard.blocks.iter().zip(&self.costs) {
+            let (_, outside) = self.prior.next(block.family, 0, 0);
+            let bound = self.factors + outside.ln() - standard.shape * cost.ln_1p();
+            certain.sure[block.component] = bound < least;
+            certain.settled[block.component] = block.range().all(far);
         }
         certain
     }
 }
 
+/// ln of the weight of a good model, its bounds counted as the search's guide does: the full one and a climb.
+struct Climb<'a> {
+    standard: &'a Standard,
+    prior: &'a Prior,
+}
+
+impl WithSimd for Climb<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> f64 {
+        let mut walker = Walker::new(self.standard, self.prior);
+        let all: Vec<usize> = (0..self.standard.blocks.len()).collect();
+        all.iter().for_each(|&block| walker.flip(simd, block));
+        walker.tableau.refine();
+        climb(simd, &mut walker, &all, &[]);
+        walker.log_weight() + present(&walker, false).log_mass(self.standard)
+    }
+}
+
+/// Nothing is certain.
+pub(super) fn none(prior: &Prior) -> Certain {
+    Certain {
+        sure: vec![false; prior.components()],
+        settled: vec![false; prior.components()],
+    }
+}
+
 /// Order of the components for the tree: certain ones, then the largest first; how many are certain.
-pub(super) fn order(prior: &Prior, certain: &[bool]) -> (Vec<usize>, usize) {
-    let columns = prior.columns();
+pub(super) fn order(prior: &Prior, certain: &Certain) -> (Vec<usize>, usize) {
+    let (columns, certain) = (prior.columns(), &certain.sure);
     let mut order: Vec<usize> = (0..certain.len()).collect();
     order.sort_by_key(|&c| {
         (

@@ -16,9 +16,26 @@ pub(super) struct Moments {
     pub(super) excess: f64,
     /// By place in `standard.blocks`.
     pub(super) holds: Vec<bool>,
+    /// Included positions, and their `(A_zz⁻¹)_kl`, row by row; both empty unless asked for.
+    pub(super) inside: Vec<usize>,
+    pub(super) covariance: Vec<f64>,
 }
 
 impl Moments {
+    /// Covariances by place in `inside` and position, `entry(a, b, i, j)`; variances as they stand.
+    fn fill(&mut self, entry: impl Fn(usize, usize, usize, usize) -> f64) {
+        let count = self.inside.len();
+        self.covariance = vec![0.0; count * count];
+        for (a, &i) in self.inside.iter().enumerate() {
+            for (b, &j) in self.inside.iter().enumerate().take(a) {
+                let value = entry(a, b, i, j);
+                self.covariance[a * count + b] = value;
+                self.covariance[b * count + a] = value;
+            }
+            self.covariance[a * count + a] = self.variance[i];
+        }
+    }
+
     /// ln of the mass within the bounds if the coefficients were independent: guides the search, is no part of a result.
     pub(super) fn log_mass(&self, standard: &Standard) -> f64 {
         if !standard.bounded {
@@ -46,8 +63,8 @@ pub(super) fn log_normal_mass(t: f64) -> f64 {
         + (-s * (1.0 - 3.0 * s * (1.0 - 5.0 * s))).ln_1p()
 }
 
-/// Moments of the present model.
-pub(super) fn present(walker: &Walker<'_>) -> Moments {
+/// Moments of the present model; `joint`: with the covariances.
+pub(super) fn present(walker: &Walker<'_>, joint: bool) -> Moments {
     let (standard, tableau) = (walker.standard, &walker.tableau);
     let size = standard.size();
     let mut delta: Vec<f64> = standard.center.iter().map(|x| -x).collect();
@@ -56,6 +73,15 @@ pub(super) fn present(walker: &Walker<'_>) -> Moments {
         delta[k] += tableau.gradient[k];
         variance[k] = tableau.diagonal[k];
     }
+    let (mut inside, mut covariance) = (Vec::new(), Vec::new());
+    if joint {
+        inside.clone_from(&tableau.members);
+        covariance.reserve(inside.len() * inside.len());
+        for &i in &inside {
+            let row = tableau.row(i);
+            covariance.extend(inside.iter().map(|&k| row[k]));
+        }
+    }
     Moments {
         delta,
         variance,
@@ -63,17 +89,20 @@ pub(super) fn present(walker: &Walker<'_>) -> Moments {
         holds: (0..standard.blocks.len())
             .map(|b| tableau.holds(b))
             .collect(),
+        inside,
+        covariance,
     }
 }
 
 /// Moments after moving one component; `excess` is c then.
 ///
 /// ```text
-/// out: β_i −= C_iB C_BB⁻¹ β_B,  C_ii −= C_iB C_BB⁻¹ C_Bi      in: β_i −= t_iB b,  C_ii += t_iB S⁻¹ t_iBᵀ,  b = S⁻¹ u_B
+/// out: β_i −= C_iB C_BB⁻¹ β_B,  C_ij −= C_iB C_BB⁻¹ C_Bj      in: β_i −= t_iB b,  C_ij += t_iB S⁻¹ t_jBᵀ,  b = S⁻¹ u_B
+///                                                                C_iB = −t_iB S⁻¹,  C_BB = S⁻¹
 /// ```
-pub(super) fn after_flip(walker: &Walker<'_>, block: usize, excess: f64) -> Moments {
+pub(super) fn after_flip(walker: &Walker<'_>, block: usize, excess: f64, joint: bool) -> Moments {
     let (standard, tableau) = (walker.standard, &walker.tableau);
-    let mut moments = present(walker);
+    let mut moments = present(walker, false);
     moments.excess = excess;
     let own = standard.blocks[block];
     let inside = tableau.holds(block);
@@ -85,36 +114,71 @@ pub(super) fn after_flip(walker: &Walker<'_>, block: usize, excess: f64) -> Mome
         tableau.square(block).to_vec()
     };
     let Ok(factor) = Cholesky::new(&square, own.len) else {
-        return moments;
+        return present(walker, joint);
     };
     let mut step = tableau.gradient[own.range()].to_vec();
     factor.solve(&mut step);
     let sign = if inside { -1.0 } else { 1.0 };
-    let mut cross = vec![0.0; own.len];
-    for &i in tableau.members.iter().filter(|i| !own.range().contains(i)) {
+    let stays: Vec<usize> = (tableau.members.iter().copied())
+        .filter(|i| !own.range().contains(i))
+        .collect();
+    // L⁻¹ of the block's part of every row that stays.
+    let mut halves = vec![0.0; stays.len() * own.len];
+    for (&i, cross) in stays.iter().zip(halves.chunks_exact_mut(own.len)) {
         cross.copy_from_slice(&tableau.row(i)[own.range()]);
         let shift: f64 = cross.iter().zip(&step).map(|(t, b)| t * b).sum();
         moments.delta[i] -= shift;
-        factor.solve_lower(&mut cross);
+        factor.solve_lower(cross);
         let spread: f64 = cross.iter().map(|x| x * x).sum();
         moments.variance[i] = (moments.variance[i] + sign * spread).max(1.0);
     }
+    // L⁻¹ of the block's unit vectors.
+    let mut units = vec![0.0; own.len * own.len];
     if inside {
         for k in own.range() {
             moments.delta[k] = -standard.center[k];
             moments.variance[k] = 0.0;
         }
     } else {
-        let mut unit = vec![0.0; own.len];
-        for (a, k) in own.range().enumerate() {
-            unit.fill(0.0);
+        for (a, unit) in units.chunks_exact_mut(own.len).enumerate() {
+            let k = own.start + a;
             unit[a] = 1.0;
-            factor.solve_lower(&mut unit);
+            factor.solve_lower(unit);
             moments.delta[k] = step[a] - standard.center[k];
             moments.variance[k] = unit.iter().map(|x| x * x).sum();
         }
     }
+    if joint {
+        let entering = if inside { 0..0 } else { own.range() };
+        let old = |i: usize, j: usize| tableau.row(i)[j];
+        let change = |a: usize, b: usize| {
+            let half = |a: usize| halves_or(&halves, &units, stays.len(), own.len, a);
+            let (x, y) = (half(a), half(b));
+            x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>()
+        };
+        moments.inside = stays.iter().copied().chain(entering).collect();
+        let staying = stays.len();
+        moments.fill(|a, b, i, j| match (a < staying, b < staying) {
+            (true, true) => old(i, j) + sign * change(a, b),
+            (false, false) => change(a, b),
+            _ => -change(a, b),
+        });
+    }
     moments
+}
+
+/// Row `a` of `first`, which has `count` rows of `len`, with `second` below it.
+fn halves_or<'a>(
+    first: &'a [f64],
+    second: &'a [f64],
+    count: usize,
+    len: usize,
+    a: usize,
+) -> &'a [f64] {
+    match a.checked_sub(count) {
+        None => &first[a * len..(a + 1) * len],
+        Some(a) => &second[a * len..(a + 1) * len],
+    }
 }
 
 /// Moments after an exchange; `excess` is c then. See [`Pivot`] for the formulas.
@@ -123,18 +187,25 @@ pub(super) fn after_exchange(
     step: &Step,
     pivot: &Pivot,
     excess: f64,
+    joint: bool,
 ) -> Moments {
     let (standard, tableau) = (walker.standard, &walker.tableau);
-    let mut moments = present(walker);
+    let mut moments = present(walker, false);
     moments.excess = excess;
     let (leaving, entering) = pivot.positions.split_at(pivot.leaving);
-    let mut v = vec![0.0; pivot.positions.len()];
-    for &i in &tableau.members {
+    let all = pivot.positions.len();
+    let stays: Vec<usize> = (tableau.members.iter().copied())
+        .filter(|i| !leaving.contains(i))
+        .collect();
+    // L⁻¹ v of every row that stays, then of the entering unit vectors.
+    let mut halves = vec![0.0; (stays.len() + entering.len()) * all];
+    let (rows, units) = halves.split_at_mut(stays.len() * all);
+    for (&i, v) in stays.iter().zip(rows.chunks_exact_mut(all)) {
         let row = tableau.row(i);
         v.iter_mut()
             .zip(&pivot.positions)
             .for_each(|(v, &k)| *v = row[k]);
-        let (shift, spread) = pivot.forms(&mut v);
+        let (shift, spread) = pivot.forms(v);
         moments.delta[i] -= shift;
         moments.variance[i] = (moments.variance[i] - spread).max(1.0);
     }
@@ -142,15 +213,27 @@ pub(super) fn after_exchange(
         moments.delta[k] = -standard.center[k];
         moments.variance[k] = 0.0;
     }
-    for (a, &k) in entering.iter().enumerate() {
-        v.fill(0.0);
+    for ((a, &k), v) in entering.iter().enumerate().zip(units.chunks_exact_mut(all)) {
         v[pivot.leaving + a] = 1.0;
-        let (mean, variance) = pivot.forms(&mut v);
+        let (mean, variance) = pivot.forms(v);
         moments.delta[k] = mean - standard.center[k];
         moments.variance[k] = (-variance).max(1.0);
     }
     for &block in step.leaving.iter().chain(&step.entering) {
         moments.holds[block] ^= true;
+    }
+    if joint {
+        let staying = stays.len();
+        let half = |a: usize| &halves[a * all..(a + 1) * all];
+        moments.inside = stays.iter().chain(entering).copied().collect();
+        moments.fill(|a, b, i, j| {
+            let form = pivot.form(half(a), half(b));
+            match (a < staying, b < staying) {
+                (true, true) => tableau.row(i)[j] - form,
+                (false, false) => -form,
+                _ => form,
+            }
+        });
     }
     moments
 }
@@ -169,13 +252,17 @@ pub(super) struct Sums {
     /// Σ w E[δ], Σ w E[δ²] by position.
     pub(super) shift: Vec<f64>,
     pub(super) moment: Vec<f64>,
+    /// Σ w E[δ δᵀ], row-major; empty unless columns were integrated out.
+    pub(super) products: Vec<f64>,
     /// Σ w (1 + c).
     pub(super) misfit: f64,
 }
 
 impl Sums {
-    pub(super) fn new(standard: &Standard) -> Self {
+    /// `joint`: with products.
+    pub(super) fn new(standard: &Standard, joint: bool) -> Self {
         let factor = standard.noise_factor();
+        let products = if joint { standard.size() } else { 0 };
         Self {
             reference: 0.0,
             factor: if factor.is_finite() { factor } else { 0.0 },
@@ -183,6 +270,7 @@ impl Sums {
             inclusion: vec![0.0; standard.blocks.len()],
             shift: vec![0.0; standard.size()],
             moment: vec![0.0; standard.size()],
+            products: vec![0.0; products * products],
             misfit: 0.0,
         }
     }
@@ -206,7 +294,12 @@ impl Sums {
         self.reference = log_weight;
         self.total *= factor;
         self.misfit *= factor;
-        let sums = [&mut self.inclusion, &mut self.shift, &mut self.moment];
+        let sums = [
+            &mut self.inclusion,
+            &mut self.shift,
+            &mut self.moment,
+            &mut self.products,
+        ];
         sums.into_iter().flatten().for_each(|sum| *sum *= factor);
     }
 
@@ -227,6 +320,24 @@ impl Sums {
         {
             *shift += weight * delta;
             *moment += weight * (delta * delta + phi * variance);
+        }
+        if self.products.is_empty() {
+            return;
+        }
+        let size = moments.delta.len();
+        for (row, own) in self.products.chunks_exact_mut(size).zip(&moments.delta) {
+            let scaled = weight * own;
+            for (sum, other) in row.iter_mut().zip(&moments.delta) {
+                *sum += scaled * other;
+            }
+        }
+        let scaled = weight * phi;
+        let rows = moments.covariance.chunks_exact(moments.inside.len().max(1));
+        for (&i, covariances) in moments.inside.iter().zip(rows) {
+            let row = &mut self.products[i * size..(i + 1) * size];
+            for (&j, covariance) in moments.inside.iter().zip(covariances) {
+                row[j] += scaled * covariance;
+            }
         }
     }
 }

@@ -130,6 +130,12 @@ impl Pivot {
         }
         (with_gradient, with_itself)
     }
+
+    /// `v M⁻¹ wᵀ` of two rows that [`Pivot::forms`] has made `L⁻¹ v` and `L⁻¹ w`.
+    pub(super) fn form(&self, v: &[f64], w: &[f64]) -> f64 {
+        let pairs = v.iter().zip(w).zip(&self.pivots);
+        pairs.map(|((v, w), pivot)| v * w / pivot).sum()
+    }
 }
 
 #[cfg(test)]

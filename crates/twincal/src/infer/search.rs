@@ -8,7 +8,7 @@
 use super::bounds::{Weights, truncate};
 use super::exchanges::{Exchange, exchanges};
 use super::moments::{Moments, Sums, after_exchange, after_flip, present};
-use super::standard::Standard;
+use super::standard::Reduced;
 use super::walker::Walker;
 use crate::prior::Prior;
 use pulp::{Simd, WithSimd};
@@ -37,7 +37,7 @@ const LEAST_EXPANDED: usize = 4;
 /// A set of components, one bit each.
 pub(super) type Set = Vec<u64>;
 
-/// What a search found.
+/// What a search found, by component and position of [`Reduced::open`].
 pub(super) struct Found {
     /// Sums over all weighed models.
     pub(super) sums: Sums,
@@ -51,10 +51,6 @@ pub(super) struct Found {
 
 /// What a search is told.
 pub(super) struct Start<'a> {
-    /// Components (by place in `standard.blocks`) that every model holds.
-    pub(super) certain: &'a [usize],
-    /// The others.
-    pub(super) active: &'a [usize],
     /// Components of models to start from, beside the two of its own.
     pub(super) warm: &'a [Vec<usize>],
     /// Models that are expanded at most.
@@ -89,16 +85,16 @@ impl Care {
 }
 
 /// Runs a search.
-pub(super) fn run(standard: &Standard, prior: &Prior, start: &Start<'_>) -> Found {
+pub(super) fn run(reduced: &Reduced<'_>, prior: &Prior, start: &Start<'_>) -> Found {
     pulp::Arch::new().dispatch(Run {
-        standard,
+        reduced,
         prior,
         start,
     })
 }
 
 struct Run<'a> {
-    standard: &'a Standard,
+    reduced: &'a Reduced<'a>,
     prior: &'a Prior,
     start: &'a Start<'a>,
 }
@@ -109,23 +105,25 @@ impl WithSimd for Run<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Found {
         let Self {
-            standard,
+            reduced,
             prior,
             start,
         } = self;
-        let exchanges = exchanges(standard, start.active, true);
+        let standard = &reduced.open;
+        let exchanges = exchanges(standard, &reduced.active, true);
         let mut walker = Walker::new(standard, prior);
-        for &block in start.certain {
+        for &block in &reduced.certain {
             walker.flip(simd, block);
         }
         let mut search = Search {
             known: BTreeMap::new(),
             queue: BinaryHeap::new(),
-            sums: Sums::new(standard),
+            sums: Sums::new(standard, reduced.shrinks()),
             best: f64::NEG_INFINITY,
             overrated: false,
             walker,
-            active: start.active,
+            reduced,
+            active: &reduced.active,
             exchanges: &exchanges,
             care: start.care,
         };
@@ -190,6 +188,7 @@ impl Ord for Candidate {
 
 struct Search<'a> {
     walker: Walker<'a>,
+    reduced: &'a Reduced<'a>,
     active: &'a [usize],
     exchanges: &'a [Exchange],
     /// ln weight of every model that was weighed and is not negligible.
@@ -254,7 +253,7 @@ impl Search<'_> {
     fn add_present(&mut self) {
         let set = self.set();
         if !self.known.contains_key(&set) {
-            let moments = present(&self.walker);
+            let moments = present(&self.walker, self.reduced.shrinks());
             let bounds = -moments.log_mass(self.walker.standard);
             let log_weight = self.walker.log_weight() - bounds;
             self.sums.add(log_weight, &moments);
@@ -288,7 +287,7 @@ impl Search<'_> {
             if self.known.contains_key(&other) {
                 continue;
             }
-            let moments = after_flip(&self.walker, block, excess);
+            let moments = after_flip(&self.walker, block, excess, self.reduced.shrinks());
             self.add(other, now + gain, &moments);
         }
     }
@@ -310,8 +309,8 @@ impl Search<'_> {
         }
         let mut own = log_weight;
         if bounds > ACTING {
-            let standard = self.walker.standard;
-            let (_, mut positions) = standard.members(set);
+            let standard = self.reduced.full;
+            let (_, mut positions) = self.reduced.members(set);
             positions.sort_unstable_by_key(|&d| standard.order[d]);
             let truncated = standard
                 .model(&positions, 1.0)
@@ -339,7 +338,8 @@ impl Search<'_> {
             }
             let (gain, excess, pivot) = self.walker.exchange_gain(&step);
             if now + gain >= self.best + self.care.negligible() {
-                let moments = after_exchange(&self.walker, &step, &pivot, excess);
+                let moments =
+                    after_exchange(&self.walker, &step, &pivot, excess, self.reduced.shrinks());
                 self.add(other, now + gain, &moments);
             }
         }

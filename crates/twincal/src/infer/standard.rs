@@ -9,6 +9,10 @@
 //!
 //! so that neither `yy − rᵀA⁻¹r` nor `E[β²] − E[β]²` is ever a difference of large numbers.
 
+mod reduced;
+
+pub(super) use reduced::{Reduced, Response};
+
 use super::check::check;
 use crate::error::{Error, Result};
 use crate::linear_algebra::{Cholesky, NotPositiveDefinite};
@@ -49,6 +53,10 @@ pub(super) struct Standard {
     pub(super) component: Vec<usize>,
     /// Components in the order of their positions.
     pub(super) blocks: Vec<Block>,
+    /// Components of each family that are in every model without a position here, see [`Reduced`].
+    pub(super) held: Vec<usize>,
+    /// Their `Σ ln factor − ½ ln |A| Π v`.
+    pub(super) log_held: f64,
     /// `√(G_kk + 1/v_k)` of each position: `β = β_natural · unit / scale`.
     scale: Vec<f64>,
     /// `√(2 b̂)`, N·m.
@@ -188,6 +196,8 @@ impl Standard {
             names,
             component: prior.component.clone(),
             blocks,
+            held: vec![0; prior.families()],
+            log_held: 0.0,
             bounded: lower.iter().any(|&l| l > f64::NEG_INFINITY),
             lower,
             scale,

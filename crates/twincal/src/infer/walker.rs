@@ -3,6 +3,8 @@
 //! ```text
 //! ln weight(z) = ln p(z) + Σ ln factor − ½ ln |A_zz| Π v − a_n ln(1 + c_z)
 //! ```
+//!
+//! What [`super::standard::Reduced`] took out of the tableau counts in every term.
 
 use super::pivot::Pivot;
 use super::standard::Standard;
@@ -36,9 +38,9 @@ impl<'a> Walker<'a> {
             standard,
             tableau: Tableau::new(standard),
             prior,
-            members: vec![0; prior.families()],
+            members: standard.held.clone(),
             sizes: prior.family_sizes(),
-            log_slab: 0.0,
+            log_slab: standard.log_held,
         }
     }
 
@@ -67,7 +69,7 @@ impl<'a> Walker<'a> {
                 .filter(held)
                 .map(|b| self.standard.blocks[b].factor.ln())
                 .sum();
-            self.log_slab = factors - 0.5 * log_determinant;
+            self.log_slab = self.standard.log_held + factors - 0.5 * log_determinant;
         }
     }
 

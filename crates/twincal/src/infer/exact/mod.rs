@@ -15,8 +15,9 @@ mod sums;
 mod tree;
 
 use super::answer::{Averages, LISTED_MASS, LISTED_MODELS, Listed, posterior};
-use super::standard::Standard;
-use super::{bounds, certain};
+use super::bounds;
+use super::certain::{self, Certain};
+use super::standard::{Reduced, Standard};
 use crate::error::{Error, Result};
 use crate::posterior::{Method, Posterior, Problem};
 use sums::Layout;
@@ -35,8 +36,8 @@ pub(super) fn enumerate(problem: &Problem) -> Result<Posterior> {
 ///
 /// # Errors
 /// Those of [`super::infer`].
-pub(super) fn sum(problem: &Problem, certain: &[bool]) -> Result<Posterior> {
-    let (order, certain) = certain::order(&problem.prior, certain);
+pub(super) fn sum(problem: &Problem, sure: &Certain) -> Result<Posterior> {
+    let (order, certain) = certain::order(&problem.prior, sure);
     if order.len() - certain > BRANCHES {
         return Err(Error::Setting {
             key: "inference.method".into(),
@@ -71,7 +72,12 @@ pub(super) fn sum(problem: &Problem, certain: &[bool]) -> Result<Posterior> {
         })
         .collect();
     let listed = Listed::new(&standard, found, LISTED_MASS, LISTED_MODELS)?;
-    let (listed, log_growth) = bounds::settle(problem, &standard, &mut averages, listed)?;
+    let (listed, log_growth) = bounds::settle(
+        problem,
+        &Reduced::new(&standard, sure),
+        &mut averages,
+        listed,
+    )?;
     let log_evidence = standard.log_evidence(weight.ln() - tree::LOG_REFERENCE);
     let models = 1u64.checked_shl(order.len() as u32).unwrap_or(u64::MAX);
     Ok(posterior(

@@ -414,10 +414,10 @@ fn certain_columns_change_nothing() {
             let problem = problem(size as u64 * 10 + seed, size, 3000, 0.5, inclusion);
             let standard = Standard::new(&problem).unwrap();
             let certain = certain::components(&standard, &problem.prior);
-            let count = certain.iter().filter(|c| **c).count();
+            let count = certain.sure.iter().filter(|c| **c).count();
             assert!(count >= 1 && count < size, "{count} of {size} are certain");
             let (mut order, first) = certain::order(&problem.prior, &certain);
-            assert!(first == count && order[..count].iter().all(|&c| certain[c]));
+            assert!(first == count && order[..count].iter().all(|&c| certain.sure[c]));
             order.sort_unstable();
             assert!(order.into_iter().eq(0..size));
             agree(&problem, 1e-9);
@@ -476,7 +476,7 @@ fn certain_components_change_nothing() {
     let standard = Standard::new(&data.problem).unwrap();
     let certain = certain::components(&standard, &data.problem.prior);
     assert!(
-        certain.contains(&true) && certain.contains(&false),
+        certain.sure.contains(&true) && certain.sure.contains(&false),
         "{certain:?}"
     );
     let (got, truth) = (enumerate(&data.problem).unwrap(), Densities::new(&data));

@@ -4,13 +4,13 @@
 //! with β and φ integrated out (a metropolised Gibbs step; the factor keeps it aperiodic). As long as nothing flips, all
 //! f stay what they are: eight are computed at a time and kept, and ONE uniform number, compared with the running
 //! product Π(1 − f), says where the next flip is. A scan without flips is C/8 multiplications.
-//! Components that every model with weight holds ([`crate::infer::certain`]) are in from the start and stay.
+//! Columns that every model with weight holds are integrated out ([`Reduced`]) or, where a bound may act, in from the start.
 
 use super::jumps::Jumps;
 use super::random::Source;
 use super::swaps::Swaps;
 use crate::infer::exchanges::Exchange;
-use crate::infer::standard::Standard;
+use crate::infer::standard::{Reduced, Response};
 use crate::infer::walker::Walker;
 use crate::lanes::{LANES, Lane, exp, ln};
 use crate::prior::Prior;
@@ -35,17 +35,16 @@ pub(super) struct Length {
 /// What chains are about.
 #[derive(Clone, Copy)]
 pub(super) struct Target<'a> {
-    pub(super) standard: &'a Standard,
+    pub(super) reduced: &'a Reduced<'a>,
     pub(super) prior: &'a Prior,
-    /// By place in `standard.blocks`: in every model.
-    pub(super) certain: &'a [bool],
     /// Exchanges in which a component of several columns takes part.
     pub(super) exchanges: &'a [Exchange],
     /// Models to jump between.
     pub(super) jumps: &'a Jumps,
 }
 
-/// What a chain found. Arrays `[component * draws + draw]` (`beta`: position), natural units.
+/// What a chain found, natural units. `conditional`, `inclusion` and `visits` are about the components of
+/// [`Reduced::open`], `beta`, `shift` and `moment` about all positions. Arrays are `[row * draws + draw]`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Trace {
     /// P(z = 1 | all other z), mean over a draw's scans.
@@ -112,7 +111,7 @@ impl Run<'_> {
             chain,
             length,
         } = self;
-        let (size, count) = (target.standard.size(), target.standard.blocks.len());
+        let (size, count) = (target.reduced.full.size(), target.reduced.open.blocks.len());
         let mut state = Chain::new(simd, target, Source::new(seed, chain as u64));
         state.start(simd, chain);
         let mut trace = Trace {
@@ -153,8 +152,10 @@ struct Chain<'a> {
     source: Source,
     /// Components that may flip, by place in `standard.blocks`: wide ones first.
     active: Vec<usize>,
-    /// The others, in every model.
-    certain: Vec<usize>,
+    reduced: &'a Reduced<'a>,
+    /// Columns integrated out, and the version of the state that it belongs to.
+    response: Response,
+    responded: u64,
     /// Prior ratio of flipping each of them, slab's mass within the bounds included.
     odds: Vec<f64>,
     chunks: Vec<Chunk>,
@@ -170,10 +171,9 @@ struct Chain<'a> {
 impl<'a> Chain<'a> {
     #[inline(always)]
     fn new<S: Simd>(simd: S, target: Target<'a>, mut source: Source) -> Self {
-        let standard = target.standard;
+        let standard = &target.reduced.open;
         let mut walker = Walker::new(standard, target.prior);
-        let (certain, active): (Vec<usize>, Vec<usize>) =
-            (0..standard.blocks.len()).partition(|&b| target.certain[b]);
+        let (certain, active) = (&target.reduced.certain, target.reduced.active.clone());
         certain.iter().for_each(|&block| walker.flip(simd, block));
         let chunks = active.len().div_ceil(LANES);
         let uniform = source.uniform();
@@ -197,7 +197,9 @@ impl<'a> Chain<'a> {
             moves: 0,
             walker,
             active,
-            certain,
+            reduced: target.reduced,
+            response: Response::default(),
+            responded: 0,
         };
         (0..target.prior.families()).for_each(|family| chain.update_odds(family));
         chain
@@ -404,8 +406,10 @@ impl<'a> Chain<'a> {
     }
 
     /// φ | z, then each β_k | z, φ; sums that need no draw use the conditional expectations.
+    #[inline(always)]
     fn record(&mut self, trace: &mut Trace, draw: usize, length: Length) {
-        let (standard, tableau) = (self.walker.standard, &self.walker.tableau);
+        let reduced = self.reduced;
+        let (standard, tableau) = (&reduced.open, &self.walker.tableau);
         let misfit = 1.0 + tableau.excess;
         let factor = standard.noise_factor();
         let phi = if factor.is_finite() {
@@ -414,7 +418,7 @@ impl<'a> Chain<'a> {
             0.0
         };
         let set = self.set();
-        for &block in &self.certain {
+        for &block in &reduced.certain {
             trace.conditional[block * length.draws + draw] = 1.0;
             trace.inclusion[block] += 1.0;
         }
@@ -423,25 +427,43 @@ impl<'a> Chain<'a> {
             trace.conditional[block * length.draws + draw] = conditional as f32;
             trace.inclusion[block] += conditional;
         }
-        for k in 0..standard.size() {
-            let center = standard.center[k];
-            let (delta, variance) = if tableau.includes(k) {
-                (tableau.gradient[k] - center, phi * tableau.diagonal[k])
+        let delta = |k: usize| {
+            let inside = if tableau.includes(k) {
+                tableau.gradient[k]
             } else {
-                (-center, 0.0)
+                0.0
             };
-            trace.shift[k] += delta;
-            trace.moment[k] += delta * delta + variance;
+            inside - standard.center[k]
+        };
+        if reduced.shrinks() && self.responded != self.version {
+            let delta: Vec<f64> = (0..standard.size()).map(delta).collect();
+            let row = |k: usize| tableau.row(k);
+            reduced.respond(&delta, &tableau.members, row, &mut self.response);
+            self.responded = self.version;
         }
-        trace.misfit += misfit;
-
         // φ | z ~ InvGamma(a_n, (1 + c)/2), β_k | z, φ ~ N(β_k, φ (A_zz⁻¹)_kk)
         let sampled = 0.5 * misfit / self.source.gamma(standard.shape);
-        for &k in &tableau.members {
-            let sd = (sampled * tableau.diagonal[k]).sqrt();
-            trace.beta[k * length.draws + draw] =
-                (tableau.gradient[k] + sd * self.source.normal()) as f32;
+        let root = sampled.sqrt();
+        let center = &reduced.full.center;
+        for (k, (d, stretch)) in reduced.left().enumerate() {
+            let (inside, delta) = (tableau.includes(k), delta(k) / stretch);
+            trace.shift[d] += delta;
+            trace.moment[d] += delta * delta;
+            if inside {
+                let variance = tableau.diagonal[k] / (stretch * stretch);
+                trace.moment[d] += phi * variance;
+                let noise = root * variance.sqrt() * self.source.normal();
+                trace.beta[d * length.draws + draw] = (center[d] + delta + noise) as f32;
+            }
         }
+        let response = self.response.delta.iter().zip(&self.response.variance);
+        for (&d, (&delta, &variance)) in reduced.gone().iter().zip(response) {
+            trace.shift[d] += delta;
+            trace.moment[d] += delta * delta + phi * variance;
+            let noise = root * variance.sqrt() * self.source.normal();
+            trace.beta[d * length.draws + draw] = (center[d] + delta + noise) as f32;
+        }
+        trace.misfit += misfit;
         *trace.visits.entry(set).or_default() += 1;
     }
 }

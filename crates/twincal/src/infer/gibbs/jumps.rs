@@ -7,7 +7,7 @@
 
 use crate::infer::approximate;
 use crate::infer::search::{Care, Set};
-use crate::infer::standard::Standard;
+use crate::infer::standard::{Reduced, Standard};
 use crate::infer::walker::Walker;
 use crate::posterior::Problem;
 use pulp::{Simd, WithSimd};
@@ -41,22 +41,22 @@ impl Jumps {
     }
 
     /// What a search finds.
-    pub(super) fn of(standard: &Standard, problem: &Problem) -> Self {
-        let found = approximate::search(standard, problem, None, BUDGET, Care::Loop);
+    pub(super) fn of(reduced: &Reduced<'_>, problem: &Problem) -> Self {
+        let found = approximate::search(reduced, problem, None, BUDGET, Care::Loop);
         let models = found.models.into_iter().map(|(_, set)| set);
-        Self::heaviest(models.take(MODELS).collect(), standard, problem)
+        Self::heaviest(models.take(MODELS).collect(), &reduced.open, problem)
     }
 
     /// The heaviest of these and of some more models.
     pub(super) fn joined(
         self,
         more: BTreeSet<Set>,
-        standard: &Standard,
+        reduced: &Reduced<'_>,
         problem: &Problem,
     ) -> Self {
         let mut all = more;
         all.extend(self.models);
-        Self::heaviest(all.into_iter().collect(), standard, problem)
+        Self::heaviest(all.into_iter().collect(), &reduced.open, problem)
     }
 
     /// The list of the heaviest of these models, weighed as the chain weighs them.

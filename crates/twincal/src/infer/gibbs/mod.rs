@@ -10,9 +10,9 @@ mod swaps;
 
 use super::answer::{Averages, LISTED_MASS, LISTED_MODELS, Listed, posterior};
 use super::exchanges::exchanges;
-use super::standard::Standard;
+use super::standard::{Reduced, Standard};
 use super::{InferenceSettings, bounds, certain};
-use crate::diagnostics::{ess_bulk, mcse_mean, r_hat};
+use crate::diagnostics::{NormalScores, convergence, mcse_mean};
 use crate::error::{Error, Result};
 use crate::posterior::{Method, Posterior, Problem};
 use chain::{Length, Target, Trace};
@@ -41,7 +41,7 @@ struct Agreement {
     /// Of β, per position.
     r_hat: Vec<f64>,
     ess: Vec<f64>,
-    /// Of the PIP, per place in `standard.blocks`.
+    /// Of the PIP, per component of [`Reduced::open`]; the others have none.
     mcse: Vec<f64>,
     /// Largest difference of the PIP between two chains, likewise.
     spread: Vec<f64>,
@@ -63,8 +63,10 @@ impl Agreement {
 pub(super) fn sample(problem: &Problem, settings: &InferenceSettings) -> Result<Posterior> {
     require_draws(settings)?;
     let standard = Standard::new(problem)?;
-    let jumps = Jumps::of(&standard, problem);
-    chains(problem, settings, &standard, jumps, true)
+    let certain = certain::components(&standard, &problem.prior);
+    let reduced = Reduced::new(&standard, &certain);
+    let jumps = Jumps::of(&reduced, problem);
+    chains(problem, settings, &reduced, jumps, true)
 }
 
 /// Refuses chains that nobody could judge.
@@ -94,14 +96,12 @@ pub(super) fn require_draws(settings: &InferenceSettings) -> Result<()> {
 fn chains(
     problem: &Problem,
     settings: &InferenceSettings,
-    standard: &Standard,
+    reduced: &Reduced<'_>,
     mut jumps: Jumps,
     share: bool,
 ) -> Result<Posterior> {
-    let sure = certain::components(standard, &problem.prior);
-    let certain: Vec<bool> = standard.blocks.iter().map(|b| sure[b.component]).collect();
-    let active: Vec<usize> = (0..certain.len()).filter(|&b| !certain[b]).collect();
-    let exchanges = exchanges(standard, &active, false);
+    let standard = &reduced.open;
+    let exchanges = exchanges(standard, &reduced.active, false);
     let mut best: Option<(Vec<Trace>, Agreement)> = None;
     for scans_per_draw in SCANS_PER_DRAW {
         let length = Length {
@@ -115,9 +115,8 @@ fn chains(
             break;
         }
         let target = Target {
-            standard,
+            reduced,
             prior: &problem.prior,
-            certain: &certain,
             exchanges: &exchanges,
             jumps: &jumps,
         };
@@ -125,14 +124,14 @@ fn chains(
             .into_par_iter()
             .map(|chain| chain::run(target, settings.seed, chain, length))
             .collect();
-        let agreement = judge(standard, &traces, settings.draws);
-        let mut agree = disagreement(standard, &agreement).is_none();
+        let agreement = judge(reduced, &traces, settings.draws);
+        let mut agree = disagreement(reduced, &agreement).is_none();
         if scans_per_draw == SCANS_PER_DRAW[0] {
             agree &= agreement.mixed((settings.chains * settings.draws) as f64);
         }
         if share && !agree {
             let visited = traces.iter().flat_map(|trace| trace.visits.keys().cloned());
-            jumps = jumps.joined(visited.collect(), standard, problem);
+            jumps = jumps.joined(visited.collect(), reduced, problem);
         }
         best = Some((traces, agreement));
         if agree {
@@ -147,30 +146,28 @@ fn chains(
         });
     };
     if let Some((d, why)) =
-        disagreement(standard, &agreement).filter(|_| !settings.allow_disagreement)
+        disagreement(reduced, &agreement).filter(|_| !settings.allow_disagreement)
     {
         return Err(Error::Refused {
             problem: format!(
                 "{} chains of {} draws disagree, most about `{}`: {why}",
-                settings.chains, settings.draws, problem.names[standard.order[d]]
+                settings.chains, settings.draws, problem.names[reduced.full.order[d]]
             ),
             remedy: "raise inference.draws, or remove columns that the data cannot tell apart, or allow disagreement"
                 .into(),
         });
     }
-    summarise(problem, standard, &traces, &agreement, settings)
+    summarise(problem, reduced, &traces, &agreement, settings)
 }
 
 /// See [`super::scan`].
 pub(super) fn scan(problem: &Problem, scans: usize, seed: u64) -> Result<u64> {
     let standard = Standard::new(problem)?;
-    let certain = vec![false; standard.blocks.len()];
-    let active: Vec<usize> = (0..certain.len()).collect();
+    let reduced = Reduced::whole(&standard, &certain::none(&problem.prior));
     let target = Target {
-        standard: &standard,
+        reduced: &reduced,
         prior: &problem.prior,
-        certain: &certain,
-        exchanges: &exchanges(&standard, &active, false),
+        exchanges: &exchanges(&standard, &reduced.active, false),
         jumps: &Jumps::none(),
     };
     let length = Length {
@@ -192,26 +189,33 @@ fn rows(traces: &[Trace], draws: usize, row: usize, values: fn(&Trace) -> &[f32]
     traces.iter().map(of).collect()
 }
 
-fn judge(standard: &Standard, traces: &[Trace], draws: usize) -> Agreement {
-    let (r_hat, ess) = (0..standard.size())
+fn judge(reduced: &Reduced<'_>, traces: &[Trace], draws: usize) -> Agreement {
+    // One chain is compared with itself: its halves.
+    let halved = traces.len() < 2;
+    let (chains, each) = if halved {
+        (2 * traces.len(), draws / 2)
+    } else {
+        (traces.len(), draws)
+    };
+    let scores = NormalScores::new(chains * (each / 2) * 2);
+    let (r_hat, ess) = (0..reduced.full.size())
         .into_par_iter()
         .map(|d| {
             let beta = rows(traces, draws, d, |t| &t.beta);
-            // One chain is compared with itself: its halves.
             let halves: Vec<&[f64]> = beta
                 .iter()
                 .flat_map(|c| [&c[..draws / 2], &c[draws - draws / 2..]])
                 .collect();
-            let r_hat = if traces.len() > 1 {
-                r_hat(&beta)
+            let (r_hat, ess) = if halved {
+                convergence(&halves, &scores)
             } else {
-                r_hat(&halves)
+                convergence(&beta, &scores)
             };
             // Draws that are all equal (never included) agree.
-            (if r_hat.is_nan() { 1.0 } else { r_hat }, ess_bulk(&beta))
+            (if r_hat.is_nan() { 1.0 } else { r_hat }, ess)
         })
         .unzip();
-    let (mcse, spread) = (0..standard.blocks.len())
+    let (mcse, spread) = (0..reduced.open.blocks.len())
         .into_par_iter()
         .map(|b| {
             let conditional = rows(traces, draws, b, |t| &t.conditional);
@@ -242,11 +246,11 @@ fn standard_error(values: impl Iterator<Item = f64> + Clone) -> f64 {
 }
 
 /// The position that the chains disagree about most, and in which words.
-fn disagreement(standard: &Standard, agreement: &Agreement) -> Option<(usize, String)> {
+fn disagreement(reduced: &Reduced<'_>, agreement: &Agreement) -> Option<(usize, String)> {
     let worst = |values: &[f64]| (0..values.len()).max_by(|&a, &b| values[a].total_cmp(&values[b]));
     if let Some(d) = worst(&agreement.spread).filter(|&b| agreement.spread[b] > SPREAD_LIMIT) {
         return Some((
-            standard.blocks[d].start,
+            reduced.first_position(d),
             format!(
                 "its inclusion probability differs by {:.2} between chains",
                 agreement.spread[d]
@@ -265,23 +269,28 @@ fn disagreement(standard: &Standard, agreement: &Agreement) -> Option<(usize, St
 
 fn summarise(
     problem: &Problem,
-    standard: &Standard,
+    reduced: &Reduced<'_>,
     traces: &[Trace],
     agreement: &Agreement,
     settings: &InferenceSettings,
 ) -> Result<Posterior> {
+    let standard = reduced.full;
     let draws = (settings.chains * settings.draws) as f64;
     let mean_of = |sums: fn(&Trace) -> &[f64], d: usize| {
         traces.iter().map(|t| sums(t)[d]).sum::<f64>() / draws
     };
     let block = standard.block_of();
     let positions = 0..standard.size();
+    let inclusion: Vec<f64> = (0..reduced.open.blocks.len())
+        .map(|b| mean_of(|t| &t.inclusion, b).clamp(0.0, 1.0))
+        .collect();
+    let (inclusion, mcse) = (
+        reduced.by_block(&inclusion, 1.0),
+        reduced.by_block(&agreement.mcse, 0.0),
+    );
     let mut averages = Averages {
-        inclusion: positions
-            .clone()
-            .map(|d| mean_of(|t| &t.inclusion, block[d]).clamp(0.0, 1.0))
-            .collect(),
-        mcse: block.iter().map(|&b| agreement.mcse[b]).collect(),
+        inclusion: block.iter().map(|&b| inclusion[b]).collect(),
+        mcse: block.iter().map(|&b| mcse[b]).collect(),
         shift: positions
             .clone()
             .map(|d| mean_of(|t| &t.shift, d))
@@ -291,11 +300,11 @@ fn summarise(
     };
     let listed = Listed::new(
         standard,
-        visited(standard, traces, draws),
+        visited(reduced, traces, draws),
         LISTED_MASS,
         LISTED_MODELS,
     )?;
-    let (listed, _) = bounds::settle(problem, standard, &mut averages, listed)?;
+    let (listed, _) = bounds::settle(problem, reduced, &mut averages, listed)?;
     let method = Method::Gibbs {
         chains: settings.chains,
         draws: settings.draws,
@@ -306,7 +315,11 @@ fn summarise(
 }
 
 /// Visited models: share of the draws, columns, positions.
-fn visited(standard: &Standard, traces: &[Trace], draws: f64) -> Vec<(f64, Vec<u32>, Vec<usize>)> {
+fn visited(
+    reduced: &Reduced<'_>,
+    traces: &[Trace],
+    draws: f64,
+) -> Vec<(f64, Vec<u32>, Vec<usize>)> {
     let mut visits: BTreeMap<&[u64], u64> = BTreeMap::new();
     for (set, count) in traces.iter().flat_map(|t| &t.visits) {
         *visits.entry(set).or_default() += count;
@@ -314,7 +327,7 @@ fn visited(standard: &Standard, traces: &[Trace], draws: f64) -> Vec<(f64, Vec<u
     visits
         .into_iter()
         .map(|(set, count)| {
-            let (members, positions) = standard.members(set);
+            let (members, positions) = reduced.members(set);
             (count as f64 / draws, members, positions)
         })
         .collect()

@@ -169,7 +169,9 @@ fn case_90_and_91_stuck_chains_are_refused() {
         ..settings(200, 1)
     };
     let standard = Standard::new(&stuck).unwrap();
-    let blind = |settings| chains(&stuck, settings, &standard, Jumps::none(), false);
+    let certain = certain::components(&standard, &stuck.prior);
+    let reduced = Reduced::new(&standard, &certain);
+    let blind = |settings| chains(&stuck, settings, &reduced, Jumps::none(), false);
     match blind(&twelve) {
         Err(Error::Refused { problem, .. }) => assert!(problem.contains("chains"), "{problem}"),
         other => panic!("not refused: {other:?}"),

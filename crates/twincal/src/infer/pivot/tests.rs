@@ -1,11 +1,11 @@
 //! Moments after an exchange against those of a tableau that walked there.
 
-use crate::infer::moments::{Moments, after_exchange, present};
+use crate::infer::moments::{Moments, after_exchange, after_flip, present};
 use crate::infer::standard::Standard;
 use crate::infer::testing::grouped;
 use crate::infer::walker::{Step, Walker};
 
-/// Every exchange that a random walk passes, of one component for one or two.
+/// Every flip of a random walk, and every exchange that it passes, of one component for one or two.
 #[test]
 fn the_moments_are_those_of_the_model_after_the_walk() {
     let problem = grouped(2, &[3, 1, 2, 10, 1, 4], 60, true).problem;
@@ -17,7 +17,11 @@ fn the_moments_are_those_of_the_model_after_the_walk() {
         state = state
             .wrapping_mul(6364136223846793005)
             .wrapping_add(1442695040888963407);
-        walker.flip(pulp::Scalar::new(), (state >> 33) as usize % blocks);
+        let block = (state >> 33) as usize % blocks;
+        let (_, excess) = walker.flip_gain(block);
+        let got = after_flip(&walker, block, excess, true);
+        walker.flip(pulp::Scalar::new(), block);
+        alike(&got, &present(&walker, true), &Step::default());
         let (inside, outside): (Vec<usize>, Vec<usize>) =
             (0..blocks).partition(|&b| walker.tableau.holds(b));
         for &leaves in &inside {
@@ -37,9 +41,9 @@ fn the_moments_are_those_of_the_model_after_the_walk() {
 fn compare(walker: &mut Walker<'_>, step: &Step) {
     let before = walker.log_weight();
     let (gain, excess, pivot) = walker.exchange_gain(step);
-    let got = after_exchange(walker, step, &pivot, excess);
+    let got = after_exchange(walker, step, &pivot, excess, true);
     walker.take(pulp::Scalar::new(), step);
-    let (then, truth) = (walker.log_weight(), present(walker));
+    let (then, truth) = (walker.log_weight(), present(walker, true));
     let back = Step {
         leaving: step.entering.clone(),
         entering: step.leaving.clone(),
@@ -65,5 +69,17 @@ fn alike(got: &Moments, truth: &Moments, step: &Step) {
             got.variance[k],
             truth.variance[k]
         );
+    }
+    let covariance = |moments: &Moments, i: usize, j: usize| {
+        let place = |k: usize| moments.inside.iter().position(|&own| own == k);
+        let (a, b) = (place(i).unwrap(), place(j).unwrap());
+        moments.covariance[a * moments.inside.len() + b]
+    };
+    assert_eq!(got.inside.len(), truth.inside.len(), "{step:?}");
+    for &i in &truth.inside {
+        for &j in &truth.inside {
+            let (a, b) = (covariance(got, i, j), covariance(truth, i, j));
+            assert!(close(a, b), "{step:?}: covariance of {i} and {j}, {a} {b}");
+        }
     }
 }
