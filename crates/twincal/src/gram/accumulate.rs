@@ -1,7 +1,8 @@
 //! From rows to statistics: samples are gathered into small column-contiguous buffers and multiplied there.
 
-use super::products::{BLOCK, Products, STRIDE};
+use super::products::{BLOCK, LANES, Products, STRIDE};
 use super::{JointGram, Symmetric};
+use pulp::{Simd, WithSimd};
 
 /// What a part of a log must know of the part before it: the last row of a run that is still open.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -99,13 +100,14 @@ impl JointAccumulator {
                 &y[row..row + count]
             };
             let at = i * STRIDE + self.waiting;
-            self.rows[at..at + count].copy_from_slice(column);
-            let steps = &mut self.steps[at..at + count];
             // The first row of a run has no predecessor: its difference is none, not its distance from zero.
-            steps[0] = if starts { 0.0 } else { column[0] - last[i] };
-            for (step, pair) in steps[1..].iter_mut().zip(column.windows(2)) {
-                *step = pair[1] - pair[0];
-            }
+            let before = if starts { column[0] } else { last[i] };
+            self.arch.dispatch(Differences {
+                column,
+                before,
+                rows: &mut self.rows[at..at + count],
+                steps: &mut self.steps[at..at + count],
+            });
             if starts {
                 last[i] = column[0];
             }
@@ -132,14 +134,15 @@ impl JointAccumulator {
         if self.waiting == 0 {
             return;
         }
-        if self.waiting < BLOCK {
-            for i in 0..=self.gram.columns.len() {
-                self.rows[i * STRIDE + self.waiting..i * STRIDE + BLOCK].fill(0.0);
-                self.steps[i * STRIDE + self.waiting..i * STRIDE + BLOCK].fill(0.0);
-            }
+        // Whole vectors: what is missing of the last one counts as zero.
+        let samples = self.waiting.next_multiple_of(LANES);
+        for i in 0..=self.gram.columns.len() {
+            let unused = i * STRIDE + self.waiting..i * STRIDE + samples;
+            self.rows[unused.clone()].fill(0.0);
+            self.steps[unused].fill(0.0);
         }
-        self.s0.add(self.arch, &self.rows);
-        self.d.add(self.arch, &self.steps);
+        self.s0.add(self.arch, &self.rows, samples);
+        self.d.add(self.arch, &self.steps, samples);
         self.waiting = 0;
     }
 
@@ -169,5 +172,35 @@ impl JointAccumulator {
             values: self.d.matrix(size),
         };
         (self.gram, self.run)
+    }
+}
+
+/// Copies a column and writes its first differences beside it.
+struct Differences<'a> {
+    column: &'a [f64],
+    /// What stands before the first value.
+    before: f64,
+    rows: &'a mut [f64],
+    steps: &'a mut [f64],
+}
+
+impl WithSimd for Differences<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self {
+            column,
+            before,
+            rows,
+            steps,
+        } = self;
+        rows[0] = column[0];
+        steps[0] = column[0] - before;
+        let places = rows[1..].iter_mut().zip(&mut steps[1..]);
+        for ((row, step), pair) in places.zip(column.windows(2)) {
+            *row = pair[1];
+            *step = pair[1] - pair[0];
+        }
     }
 }

@@ -1,17 +1,22 @@
-//! Inner products of all pairs of columns: 4 × 4 register tiles on the CPU's widest vectors.
+//! Inner products of all pairs of columns: 3 × 3 register tiles on the CPU's widest vectors.
 
 use pulp::{Simd, WithSimd};
 
 /// Samples per buffer: small enough that the columns stay in the cache.
-pub(super) const BLOCK: usize = 64;
+pub(super) const BLOCK: usize = 128;
 /// Distance of two columns in a buffer; not a power of two, or the columns fall into the same cache set.
 pub(super) const STRIDE: usize = BLOCK + 8;
-/// Columns per side of a tile.
-const TILE: usize = 4;
-/// Numbers that one tile keeps: 16 sums in up to 8 lanes.
-const TILE_SUMS: usize = TILE * TILE * 8;
+/// Numbers in the widest vector.
+pub(super) const LANES: usize = 8;
+/// Columns per side of a tile: nine sums and six factors fit into the sixteen registers of AVX2, and nine independent sums
+/// hide the latency of a multiply-add on two units.
+const TILE: usize = 3;
+/// Numbers that one tile keeps.
+const TILE_SUMS: usize = TILE * TILE;
+/// Rows of tiles that share what was loaded of a column of tiles: their columns stay in the first-level cache.
+const GROUP: usize = 4;
 
-/// Running sums of `Σ_t x_i(t) x_j(t)` over all pairs of columns, lanes not yet added up.
+/// Running sums of `Σ_t x_i(t) x_j(t)` over all pairs of columns.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Products {
     tiles: usize,
@@ -33,42 +38,42 @@ impl Products {
         width.div_ceil(TILE) * TILE * STRIDE
     }
 
-    /// Adds the products of one buffer; sample s of column i is `buffer[i * STRIDE + s]`, unused samples are zero.
-    pub(super) fn add(&mut self, arch: pulp::Arch, buffer: &[f64]) {
+    /// Adds the products of the first `samples` of a buffer, a multiple of [`LANES`]; sample s of column i is
+    /// `buffer[i * STRIDE + s]`.
+    pub(super) fn add(&mut self, arch: pulp::Arch, buffer: &[f64], samples: usize) {
         arch.dispatch(Kernel {
             tiles: self.tiles,
             sums: &mut self.sums,
             buffer,
+            samples,
         });
     }
 
     /// The full symmetric matrix, row-major.
     pub(super) fn matrix(&self, width: usize) -> Vec<f64> {
         let mut out = vec![0.0; width * width];
-        let mut tiles = self.sums.chunks_exact(TILE_SUMS);
-        for row in 0..self.tiles {
-            for column in 0..=row {
-                let Some(tile) = tiles.next() else { return out };
-                for entry in 0..TILE * TILE {
-                    let (i, j) = (row * TILE + entry / TILE, column * TILE + entry % TILE);
-                    if j <= i && i < width {
-                        let lanes = &tile[entry * 8..entry * 8 + 8];
-                        let sum = ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6]))
-                            + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]));
-                        out[i * width + j] = sum;
-                        out[j * width + i] = sum;
-                    }
-                }
+        for i in 0..width {
+            for j in 0..=i {
+                let tile = place(i / TILE, j / TILE);
+                let sum = self.sums[tile + i % TILE * TILE + j % TILE];
+                out[i * width + j] = sum;
+                out[j * width + i] = sum;
             }
         }
         out
     }
 }
 
+/// First sum of a tile on or below the diagonal.
+fn place(row: usize, column: usize) -> usize {
+    (row * (row + 1) / 2 + column) * TILE_SUMS
+}
+
 struct Kernel<'a> {
     tiles: usize,
     sums: &'a mut [f64],
     buffer: &'a [f64],
+    samples: usize,
 }
 
 impl WithSimd for Kernel<'_> {
@@ -76,45 +81,75 @@ impl WithSimd for Kernel<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let mut tiles = self.sums.chunks_exact_mut(TILE_SUMS);
-        for row in 0..self.tiles {
-            for column in 0..=row {
-                let Some(tile) = tiles.next() else { return };
-                let left = &self.buffer[row * TILE * STRIDE..(row + 1) * TILE * STRIDE];
-                let right = &self.buffer[column * TILE * STRIDE..(column + 1) * TILE * STRIDE];
-                add_tile(simd, tile, left, right);
+        let columns =
+            |tile: usize| columns::<S>(&self.buffer[tile * TILE * STRIDE..], self.samples);
+        for first in (0..self.tiles).step_by(GROUP) {
+            let last = self.tiles.min(first + GROUP);
+            for column in 0..last {
+                let right = columns(column);
+                for row in first.max(column)..last {
+                    let at = place(row, column);
+                    let sums = &mut self.sums[at..at + TILE_SUMS];
+                    if row == column {
+                        add_diagonal(simd, sums, right);
+                    } else {
+                        add_tile(simd, sums, columns(row), right);
+                    }
+                }
             }
         }
     }
 }
 
+/// All nine products of two times three columns.
 #[inline(always)]
-fn add_tile<S: Simd>(simd: S, tile: &mut [f64], left: &[f64], right: &[f64]) {
-    let l = columns::<S>(left);
-    let r = columns::<S>(right);
+fn add_tile<S: Simd>(
+    simd: S,
+    sums: &mut [f64],
+    left: [&[S::f64s]; TILE],
+    right: [&[S::f64s]; TILE],
+) {
     let mut sum = [[simd.splat_f64s(0.0); TILE]; TILE];
-    for s in 0..BLOCK / S::F64_LANES {
-        let a = [l[0][s], l[1][s], l[2][s], l[3][s]];
-        let b = [r[0][s], r[1][s], r[2][s], r[3][s]];
+    // Said once more, so that no index is checked in the loop.
+    let samples = right[0].len();
+    let (left, right) = (left.map(|c| &c[..samples]), right.map(|c| &c[..samples]));
+    for s in 0..samples {
+        let a = left.map(|column| column[s]);
+        let b = right.map(|column| column[s]);
         for i in 0..TILE {
             for j in 0..TILE {
                 sum[i][j] = simd.mul_add_e_f64s(a[i], b[j], sum[i][j]);
             }
         }
     }
-    for (lanes, value) in tile.chunks_exact_mut(8).zip(sum.iter().flatten()) {
-        let (vectors, _) = S::as_mut_simd_f64s(lanes);
-        vectors[0] = simd.add_f64s(vectors[0], *value);
+    for (total, lanes) in sums.iter_mut().zip(sum.iter().flatten()) {
+        *total += simd.reduce_sum_f64s(*lanes);
     }
 }
 
-/// The four columns of one tile as vectors.
+/// The six products of three columns among themselves; what stands above the diagonal stays zero.
 #[inline(always)]
-fn columns<S: Simd>(buffer: &[f64]) -> [&[S::f64s]; TILE] {
-    [
-        S::as_simd_f64s(&buffer[..BLOCK]).0,
-        S::as_simd_f64s(&buffer[STRIDE..STRIDE + BLOCK]).0,
-        S::as_simd_f64s(&buffer[2 * STRIDE..2 * STRIDE + BLOCK]).0,
-        S::as_simd_f64s(&buffer[3 * STRIDE..3 * STRIDE + BLOCK]).0,
-    ]
+fn add_diagonal<S: Simd>(simd: S, sums: &mut [f64], columns: [&[S::f64s]; TILE]) {
+    let mut sum = [[simd.splat_f64s(0.0); TILE]; TILE];
+    let samples = columns[0].len();
+    let columns = columns.map(|c| &c[..samples]);
+    for s in 0..samples {
+        let a = columns.map(|column| column[s]);
+        for i in 0..TILE {
+            for j in 0..=i {
+                sum[i][j] = simd.mul_add_e_f64s(a[i], a[j], sum[i][j]);
+            }
+        }
+    }
+    for i in 0..TILE {
+        for j in 0..=i {
+            sums[i * TILE + j] += simd.reduce_sum_f64s(sum[i][j]);
+        }
+    }
+}
+
+/// The columns of one tile as vectors.
+#[inline(always)]
+fn columns<S: Simd>(buffer: &[f64], samples: usize) -> [&[S::f64s]; TILE] {
+    std::array::from_fn(|i| S::as_simd_f64s(&buffer[i * STRIDE..i * STRIDE + samples]).0)
 }
