@@ -225,6 +225,29 @@ fn case_07_a_joint_without_candidates_does_not_hide_rows_that_are_all_alike() {
     assert!(!folder.path().join("out").exists());
 }
 
+/// An encoder that is reset in the middle: what follows from it stands before the refusal, so that nobody looks for
+/// longer logs where the encoder is at fault.
+#[test]
+fn a_refusal_says_what_was_found_before_it() {
+    let reset = csv(400, &|number, mut row| {
+        if number >= 200 {
+            row[2] = (self::number(&row[2]) + 1.5).to_string();
+        }
+        // No noise and nothing to explain it: rows that are all alike.
+        row[7] = "0".into();
+        row[8] = "0".into();
+        row
+    });
+    let config = "[signal]\ncutoff_hz = 0\n[library]\nterms = [\"sin(q2)\"]\ngeneric = false\nfamilies = []\n";
+    let (folder, done) = fitted_with(&reset, config);
+    let done = done.expect(4).says(&["count as ", "10 are needed"]);
+    let step = done.err.find("position steps from one sample");
+    let refusal = done.err.find("error: ");
+    assert!(step.is_some() && step < refusal, "{}", done.err);
+    assert_eq!(done.out, "");
+    assert!(!folder.path().join("out").exists());
+}
+
 /// Constant torque is told with its joints: a warning for one, which may be a passive one, degraded for all.
 #[test]
 fn torque_that_never_changes_is_named() {

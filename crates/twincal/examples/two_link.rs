@@ -70,7 +70,8 @@ pub(crate) fn study() -> twincal::Result<Calibration> {
     settings.library.terms = vec!["sin(q1 - q2)".into()];
     settings.library.families = vec![Family::Payload, Family::Viscous, Family::MotorInertia];
     settings.signal.cutoff_hz = Auto::Value(0.0); // exact motion: nothing to filter
-    calibrate(&nominal, &[training], &[heldout], &settings, &|_| {})
+    let result = calibrate(&nominal, &[training], &[heldout], &settings, &|_| {})?;
+    Ok(result)
 }
 
 fn main() -> twincal::Result<()> {

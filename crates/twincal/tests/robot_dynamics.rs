@@ -79,6 +79,81 @@ fn torque_and_energy_are_pinocchios() {
     }
 }
 
+/// The same link with a point mass at `com`, by hand: masses add, the centre is their mean, and either part's inertia is
+/// moved to the common centre by Steiner's theorem.
+fn merged(link: Option<Inertia>, mass: f64, com: [f64; 3]) -> Inertia {
+    let link = link.unwrap_or(Inertia {
+        mass: 0.0,
+        com: [0.0; 3],
+        tensor: [[0.0; 3]; 3],
+    });
+    let total = link.mass + mass;
+    let centre = [0, 1, 2].map(|k| (link.mass * link.com[k] + mass * com[k]) / total);
+    let mut tensor = link.tensor;
+    for (mass, at) in [(link.mass, link.com), (mass, com)] {
+        let d = [0, 1, 2].map(|k| at[k] - centre[k]);
+        let square: f64 = d.iter().map(|x| x * x).sum();
+        for i in 0..3 {
+            for j in 0..3 {
+                let own = if i == j { square } else { 0.0 };
+                tensor[i][j] += mass * (own - d[i] * d[j]);
+            }
+        }
+    }
+    Inertia {
+        mass: total,
+        com: centre,
+        tensor,
+    }
+}
+
+/// At every link of every golden robot, also the fixed ones, which move with another: torque is that of the model in which
+/// the load was merged into the link by hand.
+#[test]
+fn a_known_load_is_the_link_with_the_load_merged_in() {
+    let (mass, com) = (1.3, [0.11, -0.07, 0.23]);
+    let mut moved = 0;
+    for (case, robot) in golden().iter().zip(golden_robots()) {
+        let description: RobotDescription =
+            serde_json::from_value(case["description"].clone()).unwrap();
+        for link in 0..description.links.len() {
+            let mut by_hand = description.clone();
+            let name = by_hand.links[link].name.clone();
+            by_hand.links[link].inertia = Some(merged(by_hand.links[link].inertia, mass, com));
+            let (loaded, by_hand) = (robot.carrying(&name, mass, com).unwrap(), build(by_hand));
+            for sample in case["samples"].as_array().unwrap() {
+                let [q, qd, qdd] = ["q", "qd", "qdd"].map(|k| floats(&sample[k]));
+                let (a, b) = (
+                    torque(&loaded, &q, &qd, &qdd),
+                    torque(&by_hand, &q, &qd, &qdd),
+                );
+                let largest = b.iter().fold(0f64, |m, v| m.max(v.abs()));
+                for (a, b) in a.iter().zip(&b) {
+                    let close = (a - b).abs() <= 1e-12 * largest;
+                    assert!(close, "{} at {name}: {a} {b}", case["name"]);
+                }
+                let bare = torque(&robot, &q, &qd, &qdd);
+                moved += usize::from(a.iter().zip(&bare).any(|(a, b)| (a - b).abs() > 1e-3));
+            }
+        }
+    }
+    assert!(moved > 100, "only {moved} samples feel the load");
+}
+
+#[test]
+fn a_load_that_is_none_is_refused() {
+    let robot = build(pendulum());
+    for (link, mass, com, word) in [
+        ("rod", 0.0, [0.0; 3], "mass is 0 kg"),
+        ("rod", f64::NAN, [0.0; 3], "mass is NaN kg"),
+        ("rod", 1.0, [0.0, f64::INFINITY, 0.0], "centre of mass is"),
+        ("hand", 1.0, [0.0; 3], "no such link"),
+    ] {
+        let error = robot.carrying(link, mass, com).unwrap_err().to_string();
+        assert!(error.contains(word) && error.contains(link), "{error}");
+    }
+}
+
 /// A rod of length l on a hinge about y, hanging at q = 0, with every passive term.
 fn pendulum() -> RobotDescription {
     let mut hinge = JointDescription::new("hinge", JointKind::Continuous, "base", "rod");

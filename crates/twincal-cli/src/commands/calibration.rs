@@ -9,7 +9,7 @@ use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use twincal::calibrate::{Calibration, Stage, calibrate};
+use twincal::calibrate::{Calibration, Stage, Stopped, calibrate};
 use twincal_io::artifact::{Claim, Maker, REPORT};
 use twincal_io::config::{Config, Settings};
 use twincal_io::report::ReportContext;
@@ -38,7 +38,15 @@ impl Job<'_> {
         progress: Progress,
         terminal: &mut Terminal,
     ) -> Outcome<u8> {
-        let calibration = self.calibrate(&progress)?;
+        let calibration = match self.calibrate(&progress) {
+            Ok(calibration) => calibration,
+            Err(stopped) => {
+                drop(progress);
+                summary::before_the_error(&stopped.findings, terminal);
+                let as_given = self.logs.as_given(stopped.error);
+                return Err(self.config.locate(self.heldout.as_given(as_given)).into());
+            }
+        };
         require_strict(self.settings.log.strict, &calibration.findings)?;
         let code = code_of(&calibration.findings);
         let stored = StoredTwin {
@@ -60,7 +68,8 @@ impl Job<'_> {
         Ok(code)
     }
 
-    fn calibrate(&self, progress: &Progress) -> Outcome<Calibration> {
+    /// With what reading the inputs found before everything else.
+    fn calibrate(&self, progress: &Progress) -> Result<Calibration, Stopped> {
         let (logs, heldout) = (&self.logs, &self.heldout);
         let step = |stage| progress.step(&stage_words(stage));
         let mut calibration = calibrate(
@@ -69,13 +78,14 @@ impl Job<'_> {
             &heldout.recordings,
             &self.settings.calibration,
             &step,
-        )
-        .map_err(|error| self.config.locate(heldout.as_given(logs.as_given(error))))?;
+        );
         let read = [&self.robot.findings, &logs.findings, &heldout.findings];
-        let mut findings: Vec<_> = read.into_iter().flatten().cloned().collect();
-        findings.append(&mut calibration.findings);
-        calibration.findings = findings;
-        Ok(calibration)
+        let findings = match &mut calibration {
+            Ok(calibration) => &mut calibration.findings,
+            Err(stopped) => &mut stopped.findings,
+        };
+        findings.splice(0..0, read.into_iter().flatten().cloned());
+        calibration
     }
 
     fn context(&self) -> ReportContext {

@@ -271,18 +271,20 @@ pub(super) enum Notes {
     In(&'static str),
 }
 
+/// The serious ones first, each with its word.
+const ORDER: [(Severity, &str); 3] = [
+    (Severity::Degraded, "degraded"),
+    (Severity::Warning, "warning"),
+    (Severity::Note, "note"),
+];
+
 /// Everything that must be said, the most serious first; what is said of several logs is said once.
 pub(super) fn findings(findings: &[Finding], notes: Notes, terminal: &mut Terminal) {
     if findings.is_empty() {
         return;
     }
     terminal.heading("Findings");
-    let order = [
-        (Severity::Degraded, "degraded"),
-        (Severity::Warning, "warning"),
-        (Severity::Note, "note"),
-    ];
-    for (severity, word) in order {
+    for (severity, word) in ORDER {
         if let (Severity::Note, Notes::In(place)) = (severity, notes) {
             let count = findings
                 .iter()
@@ -293,38 +295,57 @@ pub(super) fn findings(findings: &[Finding], notes: Notes, terminal: &mut Termin
             }
             continue;
         }
-        let of_severity: Vec<_> = findings
-            .iter()
-            .filter(|finding| finding.severity == severity)
-            .collect();
-        for (number, finding) in of_severity.iter().enumerate() {
-            let same = |other: &&&Finding| {
-                (&other.code, &other.message) == (&finding.code, &finding.message)
-            };
-            if of_severity[..number].iter().any(|other| same(&other)) {
-                continue;
-            }
-            let subjects: Vec<_> = of_severity
-                .iter()
-                .filter(same)
-                .map(|finding| finding.subject.as_str())
-                .collect();
-            let text = format!(
-                "{word}: {}{}",
-                about(&subjects, &finding.message),
-                finding.message
-            );
-            for (line, text) in wrapped(&text, 76).iter().enumerate() {
-                let line = format!("{}{text}", if line == 0 { "  " } else { "    " });
-                if severity == Severity::Note {
-                    terminal.say(&line)
-                } else {
-                    terminal.warning(&line)
-                }
+        for line in lines(findings, severity, word) {
+            if severity == Severity::Note {
+                terminal.say(&line);
+            } else {
+                terminal.warning(&line);
             }
         }
     }
     terminal.say("");
+}
+
+/// What was found before an error ended the work, on standard error, where the error follows: warnings explain it, notes
+/// would bury it.
+pub(super) fn before_the_error(findings: &[Finding], terminal: &mut Terminal) {
+    for (severity, word) in ORDER {
+        if severity > Severity::Note {
+            for line in lines(findings, severity, word) {
+                terminal.note(line.strip_prefix("  ").unwrap_or(&line));
+            }
+        }
+    }
+}
+
+/// The findings of one severity as indented lines of at most 80 columns.
+fn lines(findings: &[Finding], severity: Severity, word: &str) -> Vec<String> {
+    let of_severity: Vec<_> = findings
+        .iter()
+        .filter(|finding| finding.severity == severity)
+        .collect();
+    let mut lines = Vec::new();
+    for (number, finding) in of_severity.iter().enumerate() {
+        let same =
+            |other: &&&Finding| (&other.code, &other.message) == (&finding.code, &finding.message);
+        if of_severity[..number].iter().any(|other| same(&other)) {
+            continue;
+        }
+        let subjects: Vec<_> = of_severity
+            .iter()
+            .filter(same)
+            .map(|finding| finding.subject.as_str())
+            .collect();
+        let text = format!(
+            "{word}: {}{}",
+            about(&subjects, &finding.message),
+            finding.message
+        );
+        for (line, text) in wrapped(&text, 76).iter().enumerate() {
+            lines.push(format!("{}{text}", if line == 0 { "  " } else { "    " }));
+        }
+    }
+    lines
 }
 
 /// What a message is about, unless it says so itself.

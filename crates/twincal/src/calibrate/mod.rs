@@ -14,6 +14,7 @@ mod repeat;
 mod result;
 mod sandwich;
 mod speed;
+mod stopped;
 mod summary;
 mod sweep;
 mod unphysical;
@@ -28,6 +29,7 @@ pub use result::{
     LikelihoodUsed, LogSummary, ParameterSummary, PriorUsed, Repeat, SweepPoint, TermSummary,
     Verdict,
 };
+pub use stopped::Stopped;
 
 use crate::error::{Error, Finding, Result, Severity};
 use crate::infer::{
@@ -129,7 +131,8 @@ pub enum Stage {
 /// the last 30 % of each log. The coefficients always come from all of `logs`.
 ///
 /// # Errors
-/// [`Error::Log`] and [`Error::Setting`] for unusable input, [`Error::Refused`] where the data cannot answer.
+/// [`Error::Log`] and [`Error::Setting`] for unusable input, [`Error::Refused`] where the data cannot answer; each with
+/// what was found before.
 /// # Source
 /// paper eq. (1)–(5); method sections 1–8.
 pub fn calibrate(
@@ -138,13 +141,28 @@ pub fn calibrate(
     heldout: &[Recording],
     settings: &CalibrationSettings,
     progress: &dyn Fn(Stage),
+) -> std::result::Result<Calibration, Stopped> {
+    let mut findings = Vec::new();
+    let calibration = whole_road(robot, logs, heldout, settings, progress, &mut findings);
+    calibration.map_err(|error| Stopped { error, findings })
+}
+
+/// [`calibrate`]; `findings` holds what was found where it ends early.
+fn whole_road(
+    robot: &Robot,
+    logs: &[Recording],
+    heldout: &[Recording],
+    settings: &CalibrationSettings,
+    progress: &dyn Fn(Stage),
+    findings: &mut Vec<Finding>,
 ) -> Result<Calibration> {
     // the same filters for every log, and candidates for this robot
     progress(Stage::Rows);
     for log in logs.iter().chain(heldout) {
         log.require_torque(&robot.joint_names())?;
     }
-    let (pipeline, mut findings, prepared) = choose_and_prepare(robot, logs, &settings.signal)?;
+    let (pipeline, more, prepared) = choose_and_prepare(robot, logs, &settings.signal)?;
+    findings.extend(more);
     findings.extend(constant_torque(robot, logs.iter().chain(heldout)));
     findings.extend(hardly_driven(robot, logs.iter().chain(heldout)));
     let library_settings = LibrarySettings {
@@ -167,12 +185,12 @@ pub fn calibrate(
     let every_candidate = library.clone();
     let (library, zero_columns) = data.drop_zero_columns(library);
     let columns = columns_of(robot, &library, settings)?;
-    data.require_enough(robot, &columns)?;
     findings.append(&mut data.findings);
+    data.require_enough(robot, &columns)?;
 
     // eq. (5): sparse regression with everything that is plugged in at its fixed point
     progress(Stage::Inference);
-    let profiles = weigh::weigh(robot, &mut data, &columns, settings, &mut findings)?;
+    let profiles = weigh::weigh(robot, &mut data, &columns, settings, findings)?;
     let training = data.training();
     let plan = held_out::plan(&data, &pipeline);
     let (fitted, fits_of_folds) = rayon::join(

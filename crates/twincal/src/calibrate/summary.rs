@@ -101,7 +101,7 @@ pub(super) fn summarise(
     validation: Validation,
     sweep: Vec<SweepPoint>,
     opinion: SecondOpinion,
-    mut findings: Vec<Finding>,
+    findings: &mut Vec<Finding>,
 ) -> Result<Calibration> {
     let Fitted { fit, left_out, .. } = fitted;
     findings.extend(effective_rows(&twin.noise, data)?);
@@ -204,7 +204,7 @@ pub(super) fn summarise(
             .chain(&data.heldout)
             .map(|log| log.summary.clone())
             .collect(),
-        findings,
+        findings: std::mem::take(findings),
     })
 }
 
