@@ -236,9 +236,8 @@ fn whole_road(
 
     progress(Stage::Sensitivity);
     let sweep = sweep::cutoff(
-        robot,
+        &skeleton,
         &library,
-        &skeleton.pipeline,
         &prepared,
         &data,
         &columns,

@@ -10,9 +10,9 @@ use crate::likelihood::{Columns, assemble};
 use crate::observations::{Observations, Part};
 use crate::plug_in::{Fit, total};
 use crate::posterior::Posterior;
-use crate::robot::Robot;
 use crate::signal::{Pipeline, PreparedLog};
 use crate::term::Library;
+use crate::twin::Twin;
 use rayon::prelude::*;
 
 /// Factors on the cut-off.
@@ -23,15 +23,15 @@ const FACTORS: [f64; 2] = [0.7, 1.4];
 ///
 /// A cut-off at which the logs cannot be used (too short for the kernel) is left out.
 pub(super) fn cutoff(
-    robot: &Robot,
+    twin: &Twin,
     library: &Library,
-    pipeline: &Pipeline,
     logs: &[PreparedLog<'_>],
     data: &Data,
     columns: &Columns,
     settings: &CalibrationSettings,
     fit: &Fit,
 ) -> Result<Vec<SweepPoint>> {
+    let (robot, pipeline) = (&twin.robot, &twin.pipeline);
     if pipeline.cutoff_hz == 0.0 || settings.noise.robust || settings.noise.varies_with_speed {
         return Ok(Vec::new());
     }

@@ -218,7 +218,7 @@ fn spread(range: Range<usize>, all: usize) -> Vec<Range<usize>> {
     let every = all.div_ceil(SPREAD).max(1);
     let starts = (range.start..range.end).step_by(every * STRETCH);
     if every == 1 {
-        return vec![range];
+        return std::iter::once(range).collect();
     }
     starts
         .map(|start| start..range.end.min(start + STRETCH))
@@ -386,7 +386,7 @@ fn logged_samples(
     let to = stamps.partition_point(|t| *t <= last);
     let stretches = match kept.raw {
         Raw::Spread if piece.every > 1 => spread(from..to, log.time.len()),
-        _ => vec![from..to],
+        _ => std::iter::once(from..to).collect(),
     };
     let kept = |values: &[f64]| -> Vec<f64> {
         stretches

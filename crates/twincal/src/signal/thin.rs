@@ -38,7 +38,10 @@ pub(crate) fn coarsest(motion_cutoff: f64, coulomb_velocity: f64, acceleration: 
 pub(crate) fn factor(pipeline: &Pipeline, interval: f64) -> usize {
     let most = (pipeline.motion_interval / interval * (1.0 + 1e-9)) as usize;
     let step = pipeline.step(interval);
-    (1..=most.max(1)).rev().find(|d| step % d == 0).unwrap_or(1)
+    (1..=most.max(1))
+        .rev()
+        .find(|d| step.is_multiple_of(*d))
+        .unwrap_or(1)
 }
 
 /// Every d-th sample of every piece; pieces that are shorter than the filter are dropped and counted (pieces, rows).
