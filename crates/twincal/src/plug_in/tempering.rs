@@ -59,7 +59,7 @@ struct Prediction {
 /// nothing is left.
 ///
 /// # Errors
-/// Those of [`fit`].
+/// Those of [`super::fit`].
 pub fn fit_tempered(
     training: &[Part<'_>],
     columns: &Columns,
