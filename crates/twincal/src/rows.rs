@@ -103,13 +103,13 @@ pub fn slices(
 }
 
 /// Longest log whose raw rows are all scored.
-const ALL_RAW: usize = 1 << 16;
+const ALL_RAW: usize = 1 << 15;
 /// Of a longer one so many are, in pieces: neighbours at a log's rate say nearly the same.
-const SPREAD_RAW: usize = 1 << 14;
+const SPREAD_RAW: usize = 1 << 13;
 const RAW_PIECE: usize = 1 << 8;
 
-/// Raw rows at or after time `since` (s): all of a log of at most 65 536 rows, evenly spread pieces of a longer one, of
-/// 256 rows at most and about 16 384 together.
+/// Raw rows at or after time `since` (s): all of a log of at most 32 768 rows, evenly spread pieces of a longer one, of
+/// 256 rows at most and about 8192 together.
 pub fn spread_raw(pipeline: &Pipeline, trajectory: &Trajectory, since: f64) -> Vec<Slice> {
     let all = slices(pipeline, trajectory, RowSignal::Raw, since, RAW_PIECE);
     let rows: usize = all.iter().map(|slice| slice.rows.len()).sum();

@@ -32,7 +32,7 @@ pub(super) struct Job<'a> {
 impl Job<'_> {
     /// Calibrates, writes and prints; returns the exit code.
     pub(super) fn run(
-        self,
+        mut self,
         claim: Claim,
         mut inputs: Vec<(&str, Vec<u8>)>,
         progress: Progress,
@@ -69,13 +69,13 @@ impl Job<'_> {
     }
 
     /// With what reading the inputs found before everything else.
-    fn calibrate(&self, progress: &Progress) -> Result<Calibration, Stopped> {
-        let (logs, heldout) = (&self.logs, &self.heldout);
+    fn calibrate(&mut self, progress: &Progress) -> Result<Calibration, Stopped> {
+        let (logs, heldout) = (&mut self.logs, &mut self.heldout);
         let step = |stage| progress.step(&stage_words(stage));
         let mut calibration = calibrate(
             &self.robot.robot,
-            &logs.recordings,
-            &heldout.recordings,
+            std::mem::take(&mut logs.recordings),
+            std::mem::take(&mut heldout.recordings),
             &self.settings.calibration,
             &step,
         );

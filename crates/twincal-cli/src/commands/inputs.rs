@@ -76,7 +76,11 @@ impl LogInput {
         };
         for (path, name) in paths.iter().zip(display_names(paths)) {
             progress.step(&format!("reading {}", path.to_string_lossy()));
-            let (recording, findings) = read_log(path, robot, &settings.options(path))?;
+            let (log, checksum) = rayon::join(
+                || read_log(path, robot, &settings.options(path)),
+                || sha256_of_log(path),
+            );
+            let (recording, findings) = log?;
             rows += recording.time.len() as u64;
             let bytes = rows.saturating_mul(robot.dof() as u64 * 8 * (DOUBLES_PER_SAMPLE + terms));
             memory::require(
@@ -87,7 +91,7 @@ impl LogInput {
             input.push(recording, findings, &name);
             input.files.push(FileHash {
                 name,
-                sha256: sha256_of_log(path)?,
+                sha256: checksum?,
             });
         }
         Ok(input)
@@ -133,10 +137,7 @@ impl LogInput {
                 problem,
                 remedy,
             } => {
-                let at = self
-                    .recordings
-                    .iter()
-                    .position(|recording| recording.name == log);
+                let at = self.files.iter().position(|file| file.name == log);
                 let log = at.map_or(log, |at| self.given[at].to_string_lossy().into_owned());
                 twincal::Error::Log {
                     log,

@@ -1,9 +1,10 @@
 //! From the posterior over columns to physical stories: one line per component, with parameters that people know.
 
 use super::result::{ComponentSummary, ParameterSummary, TermSummary, Verdict};
-use crate::posterior::draws::{CoefficientDraws, draw};
+use crate::posterior::draws::{CoefficientDraws, Drawer};
 use crate::posterior::{Model, Posterior};
 use crate::term::{Component, Estimate, Library};
+use rayon::prelude::*;
 
 /// Draws that the parameters are worked out from.
 const DRAWS: usize = 4000;
@@ -23,19 +24,56 @@ pub(super) fn components(
     terms: &[TermSummary],
     seed: u64,
 ) -> Vec<ComponentSummary> {
-    let all = draw(posterior, DRAWS, seed, STREAM);
+    let drawer = Drawer::new(posterior);
+    let drawn = Drawn {
+        posterior,
+        all: drawer.draw(DRAWS, seed, STREAM),
+        drawer,
+        seed,
+    };
     (0..library.components().len())
-        .map(|index| summary(library, index, posterior, terms, &all, seed))
+        .into_par_iter()
+        .map(|index| summary(library, index, terms, &drawn))
         .collect()
+}
+
+/// What the parameters are worked out from.
+struct Drawn<'a> {
+    posterior: &'a Posterior,
+    drawer: Drawer<'a>,
+    all: CoefficientDraws,
+    seed: u64,
+}
+
+impl Drawn<'_> {
+    /// Draws of `columns` (0 for `None`) from the models that hold `member`: those among all draws, or draws given such models
+    /// if they are few.
+    fn given(&self, member: u32, columns: &[Option<usize>]) -> Vec<Vec<f64>> {
+        let holds = |model: &Model| model.members.contains(&member);
+        let of = |draws: &CoefficientDraws| -> Vec<Vec<f64>> {
+            let rows = draws.models.iter().enumerate();
+            rows.filter(|(_, model)| holds(&self.posterior.models[**model as usize]))
+                .map(|(row, _)| {
+                    let value = |column: &Option<usize>| {
+                        column.map_or(0.0, |k| draws.beta[row * draws.columns + k])
+                    };
+                    columns.iter().map(value).collect()
+                })
+                .collect()
+        };
+        let values = of(&self.all);
+        if values.len() >= ENOUGH {
+            return values;
+        }
+        of(&self.drawer.draw_given(holds, ENOUGH, self.seed, STREAM))
+    }
 }
 
 fn summary(
     library: &Library,
     index: usize,
-    posterior: &Posterior,
     terms: &[TermSummary],
-    all: &CoefficientDraws,
-    seed: u64,
+    drawn: &Drawn<'_>,
 ) -> ComponentSummary {
     let component = &library.components()[index];
     let own: Vec<&TermSummary> = component.terms.iter().map(|&t| &terms[t]).collect();
@@ -60,7 +98,7 @@ fn summary(
     summary.verdict = verdict(&live);
     summary.selected =
         first.pip.is_some_and(|pip| pip >= 0.5) && summary.verdict != Some(Verdict::NotSeen);
-    summary.parameters = parameters(library, component, index, &own, posterior, all, seed);
+    summary.parameters = parameters(library, component, index, &own, drawn);
     let estimates: Vec<Estimate> = summary
         .parameters
         .iter()
@@ -93,9 +131,7 @@ fn parameters(
     component: &Component,
     index: usize,
     own: &[&TermSummary],
-    posterior: &Posterior,
-    all: &CoefficientDraws,
-    seed: u64,
+    drawn: &Drawn<'_>,
 ) -> Vec<ParameterSummary> {
     let columns: Vec<Option<usize>> = component
         .terms
@@ -105,27 +141,10 @@ fn parameters(
     let Some(member) = columns.iter().flatten().next().copied() else {
         return Vec::new();
     };
-    let holds = |model: &Model| model.members.contains(&(member as u32));
-    let with = |draws: &CoefficientDraws, posterior: &Posterior| -> Vec<Vec<f64>> {
-        draws
-            .models
-            .iter()
-            .enumerate()
-            .filter(|(_, model)| holds(&posterior.models[**model as usize]))
-            .map(|(row, _)| {
-                let value = |column: &Option<usize>| {
-                    column.map_or(0.0, |k| draws.beta[row * draws.columns + k])
-                };
-                let beta: Vec<f64> = columns.iter().map(value).collect();
-                library.parameter_values(index, &beta)
-            })
-            .collect()
-    };
-    let mut values = with(all, posterior);
-    if values.len() < ENOUGH {
-        let given = given(posterior, &holds);
-        values = with(&draw(&given, ENOUGH, seed, STREAM), &given);
-    }
+    let given = drawn.given(member as u32, &columns).into_iter();
+    let values: Vec<Vec<f64>> = given
+        .map(|beta| library.parameter_values(index, &beta))
+        .collect();
     library
         .parameters(index)
         .into_iter()
@@ -172,23 +191,4 @@ fn parameters(
             }
         })
         .collect()
-}
-
-/// The posterior given that a component is in.
-fn given(posterior: &Posterior, holds: &dyn Fn(&Model) -> bool) -> Posterior {
-    let mut given = Posterior {
-        models: posterior
-            .models
-            .iter()
-            .filter(|m| holds(m))
-            .cloned()
-            .collect(),
-        ..posterior.clone()
-    };
-    let total: f64 = given.models.iter().map(|model| model.weight).sum();
-    given
-        .models
-        .iter_mut()
-        .for_each(|model| model.weight /= total);
-    given
 }

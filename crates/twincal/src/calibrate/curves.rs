@@ -3,9 +3,8 @@
 //!
 //! Single coefficients of such a law are hard to read and often cannot be told apart; their sum at a position can.
 
-use super::result::{Along, ComponentSummary, Curve};
-use crate::posterior::Posterior;
-use crate::posterior::draws::{CoefficientDraws, draw};
+use super::result::{Along, Calibration, Curve};
+use crate::posterior::draws::{CoefficientDraws, Drawer};
 use crate::robot::{JointKind, Motion, Robot};
 use crate::term::Library;
 
@@ -25,20 +24,20 @@ const NAMED: f64 = 0.1;
 /// A column belongs to the curve of joint j over position (velocity) if it acts on joint j alone and its torque changes with
 /// nothing but that. A constant torque counts as one over position: it has a potential.
 ///
-/// `hull` holds `[q_min, q_max, q̇_min, q̇_max, …]` of each joint in the logs.
+/// They span the range of each joint in the logs.
 pub(super) fn curves(
     robot: &Robot,
     library: &Library,
-    components: &[ComponentSummary],
-    posterior: &Posterior,
-    hull: &[[f64; 6]],
+    calibration: &Calibration,
+    drawer: &Drawer<'_>,
     seed: u64,
 ) -> Vec<Curve> {
     let mut curves = Vec::new();
-    if posterior.models.is_empty() {
+    let (components, hull) = (&calibration.components, &calibration.twin.hull);
+    let draws = drawer.draw(DRAWS, seed, STREAM);
+    if draws.models.is_empty() {
         return curves; // nothing to draw from
     }
-    let draws = draw(posterior, DRAWS, seed, STREAM);
     for joint in 0..robot.dof() {
         for along in [Along::Position, Along::Velocity] {
             let Some(x) = grid(&hull[joint], along, robot.joint_kind(joint)) else {

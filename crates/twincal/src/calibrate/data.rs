@@ -20,11 +20,23 @@ const ROWS_PER_COLUMN: usize = 3;
 
 /// One log, ready.
 pub(super) struct Log {
-    pub(super) trajectory: Trajectory,
     /// Contacts and protective stops, which are left out.
     incidents: Vec<Incident>,
     pub(super) observations: Observations,
     pub(super) summary: LogSummary,
+}
+
+/// The logs' motion, apart from their rows: it is dropped first.
+pub(super) struct Trajectories {
+    pub(super) fit: Vec<Trajectory>,
+    pub(super) heldout: Vec<Trajectory>,
+}
+
+impl Trajectories {
+    /// Those of all logs.
+    pub(super) fn all(&self) -> impl Iterator<Item = &Trajectory> {
+        self.fit.iter().chain(&self.heldout)
+    }
 }
 
 /// All logs of a calibration.
@@ -42,10 +54,10 @@ impl Data {
         pipeline: &Pipeline,
         logs: &[PreparedLog<'_>],
         heldout: &[PreparedLog<'_>],
-    ) -> Result<Self> {
+    ) -> Result<(Self, Trajectories)> {
         let mut findings = Vec::new();
         let unknown = carry_something(logs.iter().chain(heldout).map(PreparedLog::recording));
-        let mut read = |logs: &[PreparedLog<'_>], role: &str| -> Result<Vec<Log>> {
+        let mut read = |logs: &[PreparedLog<'_>], role: &str| -> Result<(Vec<Log>, Vec<_>)> {
             logs.iter()
                 .map(|log| {
                     let recording = log.recording();
@@ -57,36 +69,33 @@ impl Data {
                     findings.extend(incident_findings(&recording.name, &incidents));
                     let observations = observe(robot, library, pipeline, &trajectory)?;
                     let summary = summary(recording, role, pipeline, &trajectory, &observations);
-                    Ok(Log {
-                        trajectory,
+                    let log = Log {
                         incidents,
                         observations,
                         summary,
-                    })
+                    };
+                    Ok((log, trajectory))
                 })
                 .collect()
         };
-        let fit = read(logs, "fit")?;
-        let heldout = read(heldout, "heldout")?;
-        Ok(Self {
+        let (fit, of_fit) = read(logs, "fit")?;
+        let (heldout, of_heldout) = read(heldout, "heldout")?;
+        let data = Self {
             fit,
             heldout,
             findings,
-        })
+        };
+        let trajectories = Trajectories {
+            fit: of_fit,
+            heldout: of_heldout,
+        };
+        Ok((data, trajectories))
     }
 
     /// All rows of the fit logs.
     pub(super) fn training(&self) -> Vec<Part<'_>> {
         let logs = self.fit.iter();
         logs.map(|log| log.observations.whole()).collect()
-    }
-
-    /// Trajectories of all logs.
-    pub(super) fn trajectories(&self) -> impl Iterator<Item = &Trajectory> {
-        self.fit
-            .iter()
-            .chain(&self.heldout)
-            .map(|log| &log.trajectory)
     }
 
     /// Drops the columns that are zero on all fit logs, e.g. of joints that never move; returns their indices.
@@ -167,6 +176,7 @@ impl Data {
         robot: &Robot,
         library: &Library,
         pipeline: &Pipeline,
+        trajectories: &Trajectories,
         beta: &[f64],
     ) -> Result<Vec<f64>> {
         let dof = robot.dof();
@@ -174,11 +184,11 @@ impl Data {
             return Ok(vec![0.0; dof]);
         }
         let (mut raw, mut in_band) = (vec![(0.0, 0.0); dof], vec![(0.0, 0.0); dof]);
-        for log in &self.fit {
-            let (slices, times) = spread(pipeline, &log.trajectory);
+        for (log, trajectory) in self.fit.iter().zip(&trajectories.fit) {
+            let (slices, times) = spread(pipeline, trajectory);
             let sums: Vec<Vec<(f64, f64)>> = slices
                 .into_par_iter()
-                .map(|slice| raw_squares(robot, library, pipeline, log, slice, beta))
+                .map(|slice| raw_squares(robot, library, pipeline, trajectory, slice, beta))
                 .collect::<Result<_>>()?;
             for slice in sums {
                 for (sum, more) in raw.iter_mut().zip(slice) {
@@ -293,7 +303,7 @@ fn raw_squares(
     robot: &Robot,
     library: &Library,
     pipeline: &Pipeline,
-    log: &Log,
+    trajectory: &Trajectory,
     slice: Slice,
     beta: &[f64],
 ) -> Result<Vec<(f64, f64)>> {
@@ -313,7 +323,6 @@ fn raw_squares(
         }
         Ok(())
     };
-    let trajectory = &log.trajectory;
     visit_slices(
         robot,
         library,

@@ -1,12 +1,13 @@
 //! Held-out truth: what to leave out, fit without it, predict it, score it.
 
-use super::data::{Data, Log};
+use super::data::{Data, Trajectories};
+use super::summary::LEAST_EFFECTIVE_ROWS;
 use super::{CalibrationSettings, Fitted, Stage, compact, estimate, noise_of};
-use crate::error::Result;
-use crate::likelihood::Columns;
+use crate::error::{Finding, Result, Severity};
+use crate::likelihood::{Columns, JointNoise};
 use crate::observations::Part;
 use crate::posterior::Posterior;
-use crate::signal::Pipeline;
+use crate::signal::{Pipeline, Trajectory};
 use crate::term::Library;
 use crate::twin::Twin;
 use crate::validate::{HeldOut, Predictors, Split, Validation};
@@ -26,8 +27,8 @@ pub(super) struct Plan<'a> {
 /// One fit and what it has to predict.
 struct Fold<'a> {
     training: Vec<Part<'a>>,
-    /// Logs and the time in s from which on they are held out.
-    held_out: Vec<(&'a Log, f64)>,
+    /// Motion of logs and the time in s from which on they are held out.
+    held_out: Vec<(&'a Trajectory, f64)>,
 }
 
 /// The twin that was fitted to all logs, and the posterior of its compact form.
@@ -56,15 +57,17 @@ impl Plan<'_> {
     }
 }
 
-/// Scores the twin and its compact form on data that it has not seen; `fits` are those of [`Plan::fits`].
+/// Scores the twin and its compact form on data that it has not seen; `fits` are those of [`Plan::fits`]. A fold whose fit has
+/// fewer than ten independent rows on every joint predicts nothing worth a score, and is told instead.
 pub(super) fn validate(
     own: Own<'_>,
     library: &Library,
     plan: Plan<'_>,
     fits: Vec<Fitted>,
     progress: &dyn Fn(Stage),
-) -> Result<Validation> {
+) -> Result<(Validation, Vec<Finding>)> {
     let twin = own.twin;
+    let mut findings = Vec::new();
     let mut held_out = HeldOut::new(twin.robot.joint_names());
     let mut fits = fits.into_iter();
     for (done, fold) in plan.folds.iter().enumerate() {
@@ -73,6 +76,10 @@ pub(super) fn validate(
             None => (twin.clone(), own.compact.clone()),
             Some(fitted) => refitted(twin, &fold.training, fitted)?,
         };
+        if !fold.training.is_empty() && !says_something(&average.noise) {
+            findings.push(not_scored(&fold.held_out, &average.noise));
+            continue;
+        }
         let predictor = average.predictor(library)?;
         let compact = Twin {
             posterior: compact,
@@ -83,8 +90,7 @@ pub(super) fn validate(
             twin: &predictor,
             compact: Some(&compact),
         };
-        for (log, from) in &fold.held_out {
-            let trajectory = &log.trajectory;
+        for (trajectory, from) in &fold.held_out {
             held_out.score(
                 &twin.robot,
                 library,
@@ -95,7 +101,31 @@ pub(super) fn validate(
             )?;
         }
     }
-    Ok(held_out.finish(plan.split))
+    Ok((held_out.finish(plan.split), findings))
+}
+
+/// Whether some joint has as many independent rows as a result needs.
+fn says_something(noise: &[JointNoise]) -> bool {
+    noise
+        .iter()
+        .any(|joint| joint.n_eff >= LEAST_EFFECTIVE_ROWS)
+}
+
+/// A fold that is left out of the scores.
+fn not_scored(held_out: &[(&Trajectory, f64)], noise: &[JointNoise]) -> Finding {
+    let names: Vec<&str> = held_out.iter().map(|(log, _)| log.name.as_str()).collect();
+    let names = names.join(", ");
+    let most = noise.iter().map(|joint| joint.n_eff).fold(0.0, f64::max);
+    Finding::new(
+        Severity::Warning,
+        "heldout_not_scored",
+        names.clone(),
+        format!(
+            "what is left out of {names} is not predicted: the rows that remain for the fit count as {most:.1} independent \
+             rows at most, fewer than {LEAST_EFFECTIVE_ROWS}; record longer, or give another log with --heldout"
+        ),
+        held_out.len() as u64,
+    )
 }
 
 /// `twin` with the posterior and noise of a fit to `training`, and the posterior of its compact form.
@@ -115,9 +145,14 @@ fn refitted(twin: &Twin, training: &[Part<'_>], fitted: Fitted) -> Result<(Twin,
 }
 
 /// Which rows train and which are held out.
-pub(super) fn plan<'a>(data: &'a Data, pipeline: &Pipeline) -> Plan<'a> {
+pub(super) fn plan<'a>(
+    data: &'a Data,
+    trajectories: &'a Trajectories,
+    pipeline: &Pipeline,
+) -> Plan<'a> {
+    let whole = |trajectory: &'a Trajectory| (trajectory, f64::NEG_INFINITY);
     if !data.heldout.is_empty() {
-        let held_out = data.heldout.iter().map(|log| (log, f64::NEG_INFINITY));
+        let held_out = trajectories.heldout.iter().map(whole);
         let fold = Fold {
             training: Vec::new(),
             held_out: held_out.collect(),
@@ -133,7 +168,7 @@ pub(super) fn plan<'a>(data: &'a Data, pipeline: &Pipeline) -> Plan<'a> {
                 .filter(|&log| log != out)
                 .map(|log| data.fit[log].observations.whole())
                 .collect(),
-            held_out: vec![(&data.fit[out], f64::NEG_INFINITY)],
+            held_out: vec![whole(&trajectories.fit[out])],
         });
         return Plan {
             split: Split::LeaveOneLogOut,
@@ -145,13 +180,13 @@ pub(super) fn plan<'a>(data: &'a Data, pipeline: &Pipeline) -> Plan<'a> {
         training: Vec::new(),
         held_out: Vec::new(),
     };
-    for log in &data.fit {
+    for (log, trajectory) in data.fit.iter().zip(&trajectories.fit) {
         let (end, from) = last_thirty(&log.observations.time, gap);
         fold.training.push(Part {
             observations: &log.observations,
             rows: 0..end,
         });
-        fold.held_out.push((log, from));
+        fold.held_out.push((trajectory, from));
     }
     Plan {
         split: Split::LastThirty,

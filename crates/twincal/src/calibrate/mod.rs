@@ -45,6 +45,7 @@ use crate::plug_in::{
     start,
 };
 use crate::posterior::Method;
+use crate::posterior::draws::Drawer;
 use crate::prior::PriorSettings;
 use crate::robot::Robot;
 use crate::self_check::self_check;
@@ -55,6 +56,7 @@ use crate::signal::{
 use crate::term::{Family, Library, LibrarySettings};
 use crate::twin::Twin;
 use data::Data;
+use std::borrow::Cow;
 
 /// Everything a calibration can be told; each field is a table of `twincal.toml`.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,34 +130,36 @@ pub enum Stage {
 /// Finds what the nominal robot misses in `logs` and says how well the calibrated twin predicts.
 ///
 /// With `heldout` recordings these are predicted; without, three or more logs are left out one by one, and otherwise
-/// the last 30 % of each log. The coefficients always come from all of `logs`.
+/// the last 30 % of each log. The coefficients always come from all of `logs`. Recordings that are given away (as `Vec`) are
+/// dropped as soon as nobody needs them, which is what the largest of them cost in memory at the end.
 ///
 /// # Errors
 /// [`Error::Log`] and [`Error::Setting`] for unusable input, [`Error::Refused`] where the data cannot answer; each with
 /// what was found before.
 /// # Source
 /// paper eq. (1)–(5); method sections 1–8.
-pub fn calibrate(
+pub fn calibrate<'a>(
     robot: &Robot,
-    logs: &[Recording],
-    heldout: &[Recording],
+    logs: impl Into<Cow<'a, [Recording]>>,
+    heldout: impl Into<Cow<'a, [Recording]>>,
     settings: &CalibrationSettings,
     progress: &dyn Fn(Stage),
 ) -> std::result::Result<Calibration, Stopped> {
     let mut findings = Vec::new();
-    let calibration = whole_road(robot, logs, heldout, settings, progress, &mut findings);
+    let recordings = (logs.into(), heldout.into());
+    let calibration = whole_road(robot, recordings, settings, progress, &mut findings);
     calibration.map_err(|error| Stopped { error, findings })
 }
 
 /// [`calibrate`]; `findings` holds what was found where it ends early.
 fn whole_road(
     robot: &Robot,
-    logs: &[Recording],
-    heldout: &[Recording],
+    recordings: (Cow<'_, [Recording]>, Cow<'_, [Recording]>),
     settings: &CalibrationSettings,
     progress: &dyn Fn(Stage),
     findings: &mut Vec<Finding>,
 ) -> Result<Calibration> {
+    let (logs, heldout) = (&*recordings.0, &*recordings.1);
     // the same filters for every log, and candidates for this robot
     progress(Stage::Rows);
     for log in logs.iter().chain(heldout) {
@@ -175,10 +179,10 @@ fn whole_road(
     // eq. (1)–(4): residual torque and Euler–Lagrange columns, filtered alike
     let ready = heldout.iter().map(|log| prepare(robot, log, &pipeline));
     let others: Vec<PreparedLog<'_>> = ready.collect::<Result<_>>()?;
-    let mut data = Data::read(robot, &library, &pipeline, &prepared, &others)?;
-    findings.extend(self_check(robot, &pipeline, data.trajectories())?);
-    let lags: Vec<LogLag> = data
-        .trajectories()
+    let (mut data, trajectories) = Data::read(robot, &library, &pipeline, &prepared, &others)?;
+    findings.extend(self_check(robot, &pipeline, trajectories.all())?);
+    let lags: Vec<LogLag> = trajectories
+        .all()
         .filter_map(|trajectory| estimate_lag(robot, &pipeline, trajectory))
         .collect();
     findings.extend(lag_findings(&pipeline, &lags));
@@ -192,7 +196,7 @@ fn whole_road(
     progress(Stage::Inference);
     let profiles = weigh::weigh(robot, &mut data, &columns, settings, findings)?;
     let training = data.training();
-    let plan = held_out::plan(&data, &pipeline);
+    let plan = held_out::plan(&data, &trajectories, &pipeline);
     let (fitted, fits_of_folds) = rayon::join(
         || estimate(&training, &columns, settings),
         || plan.fits(&columns, settings),
@@ -217,7 +221,13 @@ fn whole_road(
     let compact = compact::refit(&fitted.fit.problem, &inside, &fitted.fit.posterior)?;
 
     // τ_calib = τ_nom + Φβ̂ with intervals, and held-out truth
-    let out_of_band = data.out_of_band(robot, &library, &pipeline, &fitted.fit.posterior.mean)?;
+    let out_of_band = data.out_of_band(
+        robot,
+        &library,
+        &pipeline,
+        &trajectories,
+        &fitted.fit.posterior.mean,
+    )?;
     let skeleton = Twin {
         robot: robot.clone(),
         library: library_settings,
@@ -232,23 +242,20 @@ fn whole_road(
         twin: &skeleton,
         compact: &compact,
     };
-    let validation = held_out::validate(own, &library, plan, fits_of_folds, progress)?;
+    let (validation, more) = held_out::validate(own, &library, plan, fits_of_folds, progress)?;
+    findings.extend(more);
+
+    // What follows reads the smoothed logs at other cut-offs and nothing of the recordings.
+    drop((trajectories, others));
+    let prepared: Vec<PreparedLog<'static>> =
+        prepared.into_iter().map(PreparedLog::detached).collect();
+    drop(recordings);
 
     progress(Stage::Sensitivity);
-    let sweep = sweep::cutoff(
-        &skeleton,
-        &library,
-        &prepared,
-        &data,
-        &columns,
-        settings,
-        &fitted.fit,
-    )?;
-    findings.extend(sweep::findings(&sweep, &library, &fitted.fit.posterior));
     let gap = (skeleton.pipeline.kernel_length() * skeleton.pipeline.rate_hz).ceil() as usize;
     let halves = repeat::cut(&training, gap);
-    let repeats = match &halves {
-        None => Vec::new(),
+    let again = || match &halves {
+        None => Ok(Vec::new()),
         Some(cut) => repeat::repeat(
             cut,
             &library,
@@ -256,46 +263,59 @@ fn whole_road(
             &settings.prior,
             &fitted.fit,
             &inside,
-        )?,
+        ),
     };
+    let elsewhere = || {
+        sweep::cutoff(
+            &skeleton,
+            &library,
+            &prepared,
+            &data,
+            &columns,
+            settings,
+            &fitted.fit,
+        )
+    };
+    let (problem, posterior) = (&fitted.fit.problem, &fitted.fit.posterior);
+    let beside = || {
+        let repeats = again();
+        let sandwich = sandwich::sds(&fitted.fit, &compact, &training);
+        let compact = compact::summary(&library, problem, posterior, &compact, &training);
+        let excitation = unseen::excitation(
+            robot,
+            &every_candidate,
+            &skeleton.zero_columns,
+            &fitted.fit.gram,
+            &data,
+        );
+        (repeats, sandwich, compact, excitation)
+    };
+    let (sweep, (repeats, sandwich, compact, excitation)) = rayon::join(elsewhere, beside);
+    let (sweep, repeats) = (sweep?, repeats?);
+    drop(prepared);
+    findings.extend(sweep::findings(&sweep, &library, posterior));
     let halves = halves.map(|cut| cut.kind).filter(|_| !repeats.is_empty());
     if let Some(kind) = halves {
         findings.extend(repeat::findings(&repeats, kind));
     }
     let opinion = summary::SecondOpinion {
-        sandwich: sandwich::sds(&fitted.fit, &compact, &training),
-        compact: compact::summary(
-            &library,
-            &fitted.fit.problem,
-            &fitted.fit.posterior,
-            &compact,
-            &training,
-        ),
+        sandwich,
+        compact,
         repeats,
         halves,
     };
-    let excitation = unseen::excitation(
-        robot,
-        &every_candidate,
-        &skeleton.zero_columns,
-        &fitted.fit.gram,
-        &data,
-    );
     let mut calibration = summary::summarise(
         skeleton, &library, &data, &columns, settings, fitted, validation, sweep, opinion, findings,
     )?;
     unseen::tell(&mut calibration, &excitation);
     let seed = settings.inference.seed;
     let twin = &calibration.twin;
-    calibration.curves = curves::curves(
-        robot,
-        &library,
-        &calibration.components,
-        &twin.posterior,
-        &twin.hull,
-        seed,
+    let drawer = Drawer::new(&twin.posterior);
+    let (curves, unphysical) = rayon::join(
+        || curves::curves(robot, &library, &calibration, &drawer, seed),
+        || unphysical::findings(robot, &library, &calibration, &drawer, seed),
     );
-    let unphysical = unphysical::findings(robot, &library, &calibration, seed);
+    calibration.curves = curves;
     calibration.findings.extend(unphysical);
     Ok(calibration)
 }

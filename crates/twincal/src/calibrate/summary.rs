@@ -22,9 +22,10 @@ use crate::signal::Auto;
 use crate::term::Library;
 use crate::twin::Twin;
 use crate::validate::Validation;
+use rayon::prelude::*;
 
 /// Effective rows below which nothing is concluded (case 7).
-const LEAST_EFFECTIVE_ROWS: f64 = 10.0;
+pub(super) const LEAST_EFFECTIVE_ROWS: f64 = 10.0;
 /// Lags of the residual autocorrelation, rows.
 const LAGS: usize = 20;
 /// Terms in the pair plot at most, and draws of each.
@@ -234,7 +235,7 @@ fn sensitivity(problem: &Problem, posterior: &Posterior) -> Result<Vec<Vec<f64>>
         variants.push(variant);
     }
     let pips: Vec<Vec<f64>> = variants
-        .iter()
+        .par_iter()
         .map(|variant| approximate(variant, Some(posterior)).map(|posterior| posterior.inclusion))
         .collect::<Result<_>>()?;
     Ok((0..problem.names.len())
@@ -426,27 +427,17 @@ fn autocorrelation(training: &[Part<'_>], beta: &[f64]) -> Vec<Vec<f64>> {
         .first()
         .map_or(0, |part| part.observations.joints.len());
     let nothing = vec![0.0; beta.len()];
-    let mut all = Vec::new();
-    for joint in 0..joints {
-        for coefficients in [&nothing[..], beta] {
-            let runs = residual_runs(training, joint, coefficients);
-            let sum = |lag: usize| {
-                runs.iter()
-                    .map(|r| {
-                        r.iter()
-                            .zip(r.iter().skip(lag))
-                            .map(|(a, b)| a * b)
-                            .sum::<f64>()
-                    })
-                    .sum::<f64>()
-            };
-            let zero = sum(0);
-            all.push(
-                (0..=LAGS)
-                    .map(|lag| if zero > 0.0 { sum(lag) / zero } else { 0.0 })
-                    .collect(),
-            );
-        }
-    }
-    all
+    let of = |(joint, coefficients): (usize, &[f64])| {
+        let runs = residual_runs(training, joint, coefficients);
+        let along = |run: &Vec<f64>, lag: usize| {
+            let pairs = run.iter().zip(run.iter().skip(lag));
+            pairs.map(|(a, b)| a * b).sum::<f64>()
+        };
+        let sum = |lag: usize| runs.iter().map(|run| along(run, lag)).sum::<f64>();
+        let zero = sum(0);
+        let normalised = |lag| if zero > 0.0 { sum(lag) / zero } else { 0.0 };
+        (0..=LAGS).map(normalised).collect()
+    };
+    let both = (0..joints).flat_map(|joint| [(joint, &nothing[..]), (joint, beta)]);
+    both.collect::<Vec<_>>().into_par_iter().map(of).collect()
 }

@@ -2,7 +2,7 @@
 
 use super::result::Calibration;
 use crate::error::{Finding, Severity};
-use crate::posterior::draws::draw;
+use crate::posterior::draws::Drawer;
 use crate::robot::{Robot, base_parameters, inertia_of, principal_axes};
 use crate::term::{Library, ModelColumn};
 
@@ -28,6 +28,7 @@ pub(super) fn findings(
     robot: &Robot,
     library: &Library,
     calibration: &Calibration,
+    drawer: &Drawer<'_>,
     seed: u64,
 ) -> Vec<Finding> {
     let found = |column: usize| {
@@ -46,7 +47,7 @@ pub(super) fn findings(
         return Vec::new();
     }
     let hidden = base_parameters(robot).unidentifiable;
-    let draws = draw(&calibration.twin.posterior, DRAWS, seed, STREAM);
+    let draws = drawer.draw(DRAWS, seed, STREAM);
     let count = draws.models.len();
     let mut findings = Vec::new();
     for (body, name) in robot.bodies().into_iter().enumerate() {

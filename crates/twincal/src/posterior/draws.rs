@@ -1,8 +1,9 @@
 //! Joint posterior draws of structure, noise and coefficients (paper fig. 3; method section 7).
 
-use super::Posterior;
 use super::bounded::Law;
 use super::random::Random;
+use super::{Model, Posterior};
+use std::sync::OnceLock;
 
 /// Independent draws from p(z, φ, β | y).
 #[derive(Debug, Clone, PartialEq)]
@@ -17,64 +18,100 @@ pub struct CoefficientDraws {
     pub columns: usize,
 }
 
-/// `count` independent draws: z by model weight, φ | z ~ InvGamma(a_n, b_n), then β_z = μ_z + √φ L⁻ᵀ ε with A_z = L Lᵀ.
-///
-/// Coefficients with bounds ([`super::Site`]) come from the normal distribution of the model cut off there.
-///
-/// Draw `i` depends only on `seed`, `stream` and the draws before it, never on threads. A posterior without models (it
-/// cannot come from inference) gives no draws.
+/// Draws from one posterior. What drawing from a model needs is worked out when the model first comes up, once for all draws.
+#[derive(Debug)]
+pub struct Drawer<'a> {
+    posterior: &'a Posterior,
+    laws: Vec<OnceLock<Law>>,
+}
+
+impl<'a> Drawer<'a> {
+    /// Ready to draw; nothing is worked out yet.
+    #[must_use]
+    pub fn new(posterior: &'a Posterior) -> Self {
+        Self {
+            posterior,
+            laws: posterior.models.iter().map(|_| OnceLock::new()).collect(),
+        }
+    }
+
+    /// `count` independent draws: z by model weight, φ | z ~ InvGamma(a_n, b_n), then β_z = μ_z + √φ L⁻ᵀ ε with A_z = L Lᵀ.
+    ///
+    /// Coefficients with bounds ([`super::Site`]) come from the normal distribution of the model cut off there.
+    ///
+    /// Draw `i` depends only on `seed`, `stream` and the draws before it, never on threads. A posterior without models (it
+    /// cannot come from inference) gives no draws.
+    #[must_use]
+    pub fn draw(&self, count: usize, seed: u64, stream: u64) -> CoefficientDraws {
+        self.draw_given(|_| true, count, seed, stream)
+    }
+
+    /// [`Self::draw`] given that z is one of the models that `holds` says yes to; no draws if there is none.
+    #[must_use]
+    pub fn draw_given(
+        &self,
+        holds: impl Fn(&Model) -> bool,
+        count: usize,
+        seed: u64,
+        stream: u64,
+    ) -> CoefficientDraws {
+        let posterior = self.posterior;
+        let columns = posterior.inclusion.len();
+        let mut random = Random::new(seed, stream);
+        let mut draws = CoefficientDraws {
+            models: Vec::new(),
+            noise: Vec::new(),
+            beta: Vec::new(),
+            columns,
+        };
+        let models = posterior.models.iter().enumerate();
+        let (among, cumulative): (Vec<usize>, Vec<f64>) = models
+            .filter(|(_, model)| holds(model))
+            .scan(0.0, |sum, (index, model)| {
+                *sum += model.weight;
+                Some((index, *sum))
+            })
+            .unzip();
+        let Some(last) = among.len().checked_sub(1) else {
+            return draws;
+        };
+        draws.beta = vec![0.0; count * columns];
+        let mut direction = Vec::new();
+        for row in 0..count {
+            let level = random.uniform() * cumulative[last];
+            let index = among[cumulative.partition_point(|&sum| sum < level).min(last)];
+            let model = &posterior.models[index];
+            let phi = random.inverse_gamma(posterior.shape, model.scale);
+            let size = model.members.len();
+            direction.clear();
+            direction.extend((0..size).map(|_| random.normal()));
+            let law = self.laws[index].get_or_init(|| Law::new(model));
+            law.factor.solve_upper(&mut direction);
+            for (x, mean) in direction.iter_mut().zip(&law.mean) {
+                *x = mean + phi.sqrt() * *x;
+            }
+            law.cut_off(&mut direction, phi, &mut random);
+            for (&column, x) in model.members.iter().zip(&direction) {
+                draws.beta[row * columns + column as usize] = *x;
+            }
+            draws.models.push(index as u32);
+            draws.noise.push(phi);
+        }
+        draws
+    }
+}
+
+/// [`Drawer::draw`] for those who draw once.
 #[must_use]
 pub fn draw(posterior: &Posterior, count: usize, seed: u64, stream: u64) -> CoefficientDraws {
-    let columns = posterior.inclusion.len();
-    let mut random = Random::new(seed, stream);
-    let mut draws = CoefficientDraws {
-        models: Vec::new(),
-        noise: Vec::new(),
-        beta: Vec::new(),
-        columns,
-    };
-    let Some(last) = posterior.models.len().checked_sub(1) else {
-        return draws;
-    };
-    let cumulative: Vec<f64> = posterior
-        .models
-        .iter()
-        .scan(0.0, |sum, model| {
-            *sum += model.weight;
-            Some(*sum)
-        })
-        .collect();
-    draws.beta = vec![0.0; count * columns];
-    let laws: Vec<Law> = posterior.models.iter().map(Law::new).collect();
-    let mut direction = Vec::new();
-    for row in 0..count {
-        let level = random.uniform() * cumulative[last];
-        let index = cumulative.partition_point(|&sum| sum < level).min(last);
-        let model = &posterior.models[index];
-        let phi = random.inverse_gamma(posterior.shape, model.scale);
-        let size = model.members.len();
-        direction.clear();
-        direction.extend((0..size).map(|_| random.normal()));
-        let law = &laws[index];
-        law.factor.solve_upper(&mut direction);
-        for (x, mean) in direction.iter_mut().zip(&law.mean) {
-            *x = mean + phi.sqrt() * *x;
-        }
-        law.cut_off(&mut direction, phi, &mut random);
-        for (&column, x) in model.members.iter().zip(&direction) {
-            draws.beta[row * columns + column as usize] = *x;
-        }
-        draws.models.push(index as u32);
-        draws.noise.push(phi);
-    }
-    draws
+    Drawer::new(posterior).draw(count, seed, stream)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::posterior::Method;
     use crate::posterior::student::StudentT;
-    use crate::posterior::{Method, Model};
 
     fn posterior() -> Posterior {
         // A = [[4, 2], [2, 10]] with L = [[2, 0], [1, 3]].
@@ -166,5 +203,21 @@ mod tests {
         assert_eq!(draws, draw(&posterior(), 200, 5, 1));
         assert_ne!(draws, draw(&posterior(), 200, 5, 2));
         assert_eq!(draw(&posterior(), 100, 5, 1).beta[..], draws.beta[..300]);
+    }
+
+    /// What is drawn given a condition has the law of a posterior in which only such models are.
+    #[test]
+    fn draws_given_a_condition_are_those_of_the_models_that_meet_it() {
+        let posterior = posterior();
+        let drawer = Drawer::new(&posterior);
+        let given = drawer.draw_given(|model| model.members.contains(&1), 300, 5, 1);
+        assert!(given.models.iter().all(|&model| model == 1));
+        let alone = Posterior {
+            models: posterior.models[1..].to_vec(),
+            ..posterior.clone()
+        };
+        assert_eq!(draw(&alone, 300, 5, 1).beta, given.beta);
+        assert_eq!(drawer.draw(300, 5, 1), draw(&posterior, 300, 5, 1));
+        assert!(drawer.draw_given(|_| false, 300, 5, 1).models.is_empty());
     }
 }

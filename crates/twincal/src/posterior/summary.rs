@@ -4,6 +4,7 @@ use super::mixture::{Level, Mixture};
 use super::student::StudentT;
 use super::{Method, Model, Posterior};
 use crate::linear_algebra::Cholesky;
+use rayon::prelude::*;
 
 /// Probability within one sd of the mean of a normal distribution.
 const ONE_SD: f64 = 0.682_689_492_137_086;
@@ -81,23 +82,26 @@ impl ColumnSummary {
 #[must_use]
 pub fn summarise(posterior: &Posterior) -> Vec<ColumnSummary> {
     let student = StudentT::new(2.0 * posterior.shape);
+    let diagonals: Vec<Vec<f64>> = (posterior.models.par_iter())
+        .map(|model| {
+            Cholesky::from_lower(model.factor.clone(), model.members.len()).inverse_diagonal()
+        })
+        .collect();
     let mut components = vec![Components::default(); posterior.inclusion.len()];
-    for model in &posterior.models {
-        let size = model.members.len();
-        let inverse = Cholesky::from_lower(model.factor.clone(), size).inverse();
+    for (model, diagonal) in posterior.models.iter().zip(&diagonals) {
         for (place, &column) in model.members.iter().enumerate() {
             let bound = model.sites.iter().find(|site| site.place as usize == place);
             components[column as usize].push(
                 bound.map_or(f64::NEG_INFINITY, |site| site.lower),
                 model,
                 model.mean[place],
-                inverse[place * size + place],
+                diagonal[place],
                 posterior.shape,
             );
         }
     }
-    (0..posterior.inclusion.len())
-        .map(|k| ColumnSummary::of(posterior, &student, k, &components[k]))
+    (components.par_iter().enumerate())
+        .map(|(k, components)| ColumnSummary::of(posterior, &student, k, components))
         .collect()
 }
 

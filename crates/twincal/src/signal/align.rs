@@ -8,7 +8,7 @@ use super::mask::Saturated;
 use super::prepare::{JointFacts, Piece, Prepared, Values, pick, prepare, report_short};
 use super::standstill::standstill;
 use super::thin::thin;
-use super::{DerivedFrom, LoggedSamples, Pipeline, Recording, Segment, Trajectory};
+use super::{Channels, DerivedFrom, LoggedSamples, Pipeline, Recording, Segment, Trajectory};
 use crate::error::{Error, Finding, Result, Severity};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -38,7 +38,7 @@ pub enum Raw {
 /// A log cut, unfolded and on even clocks, ready for any cut-off up to 1.4 times that of the pipeline it was made for.
 #[derive(Debug)]
 pub struct PreparedLog<'a> {
-    log: &'a Recording,
+    log: Cow<'a, Recording>,
     joints: Vec<JointFacts>,
     pieces: Prepared<'a>,
     saturated: Saturated,
@@ -81,7 +81,7 @@ impl<'a> PreparedLog<'a> {
         }
         Self {
             saturated: Saturated::find(&joints, log, pipeline),
-            log,
+            log: Cow::Borrowed(log),
             joints,
             pieces,
             findings,
@@ -89,8 +89,36 @@ impl<'a> PreparedLog<'a> {
     }
 
     /// The log itself.
-    pub fn recording(&self) -> &'a Recording {
-        self.log
+    pub fn recording(&self) -> &Recording {
+        &self.log
+    }
+
+    /// What [`Raw::None`] needs, without the recording: of that only its name and its load are left, and which channels it had.
+    #[must_use]
+    pub fn detached(self) -> PreparedLog<'static> {
+        let channels = self.log.joints.iter().map(|joint| Channels {
+            q: Vec::new(),
+            qd: joint.qd.as_ref().map(|_| Vec::new()),
+            qdd: joint.qdd.as_ref().map(|_| Vec::new()),
+            tau: joint.tau.as_ref().map(|_| Vec::new()),
+        });
+        PreparedLog {
+            log: Cow::Owned(Recording {
+                name: self.log.name.clone(),
+                time: Vec::new(),
+                joints: channels.collect(),
+                payload: self.log.payload,
+            }),
+            joints: self.joints,
+            pieces: Prepared {
+                interval: self.pieces.interval,
+                pieces: (self.pieces.pieces.into_iter())
+                    .map(Piece::into_owned)
+                    .collect(),
+            },
+            saturated: self.saturated,
+            findings: self.findings,
+        }
     }
 
     /// Step 2: smooth motion, with what was found on the way; `raw`: what stays of the samples as logged.

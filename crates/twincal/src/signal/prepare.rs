@@ -67,6 +67,17 @@ impl<'a> Values<'a> {
             .map(|channel| &**channel)
     }
 
+    /// The same without the recording.
+    fn into_owned(self) -> Values<'static> {
+        let own = |channel: Cow<'a, [f64]>| Cow::Owned(channel.into_owned());
+        Values {
+            q: own(self.q),
+            qd: self.qd.map(own),
+            qdd: self.qdd.map(own),
+            tau: self.tau.map(own),
+        }
+    }
+
     /// Changes them, in that order.
     pub(crate) fn for_each(&mut self, change: impl FnMut(&mut Cow<'a, [f64]>)) {
         let others = [&mut self.qd, &mut self.qdd, &mut self.tau]
@@ -94,6 +105,18 @@ pub(crate) struct Piece<'a> {
 }
 
 impl Piece<'_> {
+    /// The same without the recording.
+    pub(crate) fn into_owned(self) -> Piece<'static> {
+        Piece {
+            joints: self.joints.into_iter().map(Values::into_owned).collect(),
+            time: self.time,
+            interval: self.interval,
+            every: self.every,
+            rows: self.rows,
+            grid_rows: self.grid_rows,
+        }
+    }
+
     /// The stamps were uneven.
     pub(crate) fn resampled(&self) -> bool {
         self.grid_rows.is_empty()
