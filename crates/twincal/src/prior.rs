@@ -21,7 +21,7 @@ pub struct PriorSettings {
     pub scaled_variance: Auto,
     /// `None`: `ExpectedTerms(min(5, K/2))`.
     pub inclusion: Option<Inclusion>,
-    /// `(a0, b0)` of `φ ~ InvGamma`; b0 in (N·m)²; `None`: `(1e-3, 1e-3 · mean(y²))`.
+    /// `(a0, b0)` of `φ ~ InvGamma`; b0 in (N·m)²; `None`: a0 = 1e-3 and b0 of [`crate::likelihood::auto_scale`].
     pub noise: Option<(f64, f64)>,
     /// Expected number of components of single families, instead of what `inclusion` says of them.
     pub families: Vec<(Family, f64)>,

@@ -449,7 +449,7 @@ pub enum NoisePrior {
         #[schemars(extend("exclusiveMinimum" = 0))]
         scale: f64,
     },
-    /// (1e-3, 1e-3 · mean(y²)).
+    /// (1e-3, 1e-3 · the noise that the fit finds).
     Auto(AutoWord),
 }
 

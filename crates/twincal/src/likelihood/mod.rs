@@ -233,10 +233,11 @@ pub fn assemble(
         log_constant += 0.5 * temper * joint.starts * (-rho * rho).ln_1p();
     }
     let mean_square = mean_squares(grams, count, &plug_in.weight);
+    let unexplained = scale_of_residual(yy / n.max(f64::MIN_POSITIVE));
     let noise = if plug_in.noise > 0.0 {
         plug_in.noise
     } else {
-        scale_of_residual(yy / n.max(f64::MIN_POSITIVE))
+        unexplained
     };
     let learned = settings.scaled_variance == Auto::Auto;
     let slab = columns
@@ -254,10 +255,7 @@ pub fn assemble(
         .collect();
     let (shape, scale) = match settings.noise {
         Some(given) => given,
-        None => (
-            AUTO_SHAPE,
-            AUTO_SHAPE * scale_of_residual(yy / n.max(f64::MIN_POSITIVE)),
-        ),
+        None => (AUTO_SHAPE, auto_scale(noise, unexplained)),
     };
     let (families, odds, inclusion) = structure::structure(columns, settings)?;
     Ok(Problem {
@@ -285,8 +283,18 @@ pub fn assemble(
 /// log without noise a prior of 1 kg would be 1e10 standard errors wide.
 const WIDEST_SLAB: f64 = 1e12;
 
-/// a0 of the automatic noise prior; b0 = a0 · mean(y²).
+/// a0 of the automatic noise prior: it weighs as much as two thousandths of a row.
 pub const AUTO_SHAPE: f64 = 1e-3;
+
+/// Least noise that the automatic prior stands for, as a share of mean(y²).
+const LEAST_NOISE: f64 = 1e-4;
+
+/// `b0 = a0 max(E[φ], 1e-4 mean(y²))` of the automatic noise prior, (N·m)²: two thousandths of a row at the noise that the fixed point
+/// finds. mean(y²) in its place is no weak prior where candidates explain nearly all: 300 effective rows whose noise is
+/// 1/200 of the residual torque would get a variance 27 % too large.
+pub fn auto_scale(noise: f64, unexplained: f64) -> f64 {
+    AUTO_SHAPE * noise.max(LEAST_NOISE * unexplained)
+}
 
 /// Mean square of the residual torque, with a floor at rounding: an exactly perfect model must not make b0 zero.
 fn scale_of_residual(mean_square: f64) -> f64 {

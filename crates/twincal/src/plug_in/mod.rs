@@ -140,9 +140,9 @@ fn fit_gram(
         }
         if settings.prior.scaled_variance == Auto::Auto {
             next.scaled_variance = slab_scales(gram, columns, &plug_in, &problem, &posterior);
-            if posterior.noise.is_finite() {
-                next.noise = posterior.noise;
-            }
+        }
+        if posterior.noise.is_finite() {
+            next.noise = posterior.noise;
         }
         let converged = largest_change(&plug_in, &next) < tolerance;
         if converged || rounds == moving.rounds(components) {

@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::gram::Gram;
 use crate::infer::answer::{LISTED_MASS, LISTED_MODELS, Listed};
 use crate::likelihood::{
-    AUTO_SHAPE, Columns, NoiseInterval, NoiseModel, NoiseSettings, PlugIn, assemble,
+    AUTO_SHAPE, Columns, NoiseInterval, NoiseModel, NoiseSettings, PlugIn, assemble, auto_scale,
 };
 use crate::linear_algebra::Cholesky;
 use crate::posterior::random::Random;
@@ -176,7 +176,13 @@ fn groups(given: &Given<'_>) -> (Vec<usize>, Vec<(f64, f64)>) {
                     (rows + joint.n, squares + joint.s0.at(last, last))
                 });
                 let mean = if rows > 0.0 { squares / rows } else { 1.0 };
-                (AUTO_SHAPE, AUTO_SHAPE * mean.max(1e-24))
+                let mean = mean.max(1e-24);
+                let found = match given.plug_in.noise {
+                    phi if phi > 0.0 && given.noise.per_joint => phi / given.plug_in.weight[g],
+                    phi if phi > 0.0 => phi,
+                    _ => mean,
+                };
+                (AUTO_SHAPE, auto_scale(found, mean))
             })
         })
         .collect();
