@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use twincal::robot::{Robot, Workspace, inverse_dynamics};
 use twincal::term::{Library, LibrarySettings};
-use twincal_io::config::Config;
+use twincal_io::config::{ChannelNames, Config};
 use twincal_io::log::{LogOptions, read_csv, read_log};
 use twincal_io::model::{ModelSettings, parse_model};
 use twincal_io::twin_json::StoredTwin;
@@ -125,6 +125,25 @@ pub(crate) const TARGETS: &[Target] = &[
         run: |_, file| log(file),
     },
     Target {
+        name: "mapped",
+        words: &[
+            "float64",
+            "float64[] q\n",
+            "uint8[<=3]",
+            "[2]",
+            "[]",
+            "string",
+            "MSG: my_msgs/Joint\n",
+            "===\n",
+            "my_msgs/Joint",
+            "ros2msg",
+            "cdr",
+            "\u{ff}\u{ff}",
+        ],
+        corpus: mapped,
+        run: |_, file| answer(read_log(file, &arm(), &mapping())),
+    },
+    Target {
         name: "npz",
         words: &[
             "descr",
@@ -226,6 +245,40 @@ fn sqlite() -> Vec<Vec<u8>> {
         .iter()
         .flat_map(|bytes| zstd::stream::decode_all(&bytes[..]))
         .collect()
+}
+
+/// Bags of mapped topics, their checksums set to "none" so that damage reaches definitions and messages.
+fn mapped() -> Vec<Vec<u8>> {
+    let root = here("../crates/twincal-io/tests/fixtures/bags");
+    let paths = files(&root).into_iter().filter(|path| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with("mapped") && name.ends_with(".mcap")
+    });
+    let mut bags: Vec<Vec<u8>> = paths.flat_map(std::fs::read).collect();
+    for bytes in &mut bags {
+        let mut at = 8;
+        while let Some(&[opcode, a, b, c, d, e, f, g, h]) = bytes.get(at..at + 9) {
+            let length = u64::from_le_bytes([a, b, c, d, e, f, g, h]);
+            // A chunk's checksum stands behind two times and its size.
+            if opcode == 0x06
+                && let Some(checksum) = bytes.get_mut(at + 33..at + 37)
+            {
+                checksum.fill(0);
+            }
+            at = at.saturating_add(9).saturating_add(length as usize);
+        }
+    }
+    bags.extend(std::fs::read(root.join("mapped_db3/mapped_db3.db3")));
+    bags
+}
+
+/// Paths into those bags by order, by name and in lists of records.
+fn mapping() -> LogOptions {
+    let mut options = LogOptions::default();
+    options.columns.q = ChannelNames::All("/arm/state:q[*]".into());
+    options.columns.qd = ChannelNames::All("/arm/state:qd[*]".into());
+    options.columns.tau = ChannelNames::All("/arm/state:joints[*].effort".into());
+    options
 }
 
 /// Four columns of sixty rows, as twincal writes them.

@@ -79,7 +79,7 @@ fn files_streams_and_feather_hold_what_pyarrow_wrote() {
 #[test]
 fn other_forms_of_numbers_are_read() {
     let mut options = LogOptions::default();
-    options.columns.q.insert("shoulder".into(), "q1_32".into());
+    options.columns.q = [("shoulder".into(), "q1_32".into())].into_iter().collect();
     options.columns.time = Some("step".into());
     for name in &NAMES[1..] {
         let (recording, _) = read_log(&fixture(name), &arm(), &options).unwrap();
@@ -119,7 +119,7 @@ fn case_48_columns_that_hold_no_numbers_are_refused_by_name() {
         ("map", "is of type Map"),
     ] {
         let mut options = LogOptions::default();
-        options.columns.q.insert("elbow".into(), column.into());
+        options.columns.q = [("elbow".into(), column.into())].into_iter().collect();
         let message = refused(read(&bytes("plain.arrow"), &options));
         contains(
             &message,

@@ -150,7 +150,7 @@ fn case_48_a_column_of_text_is_refused_by_name() {
     // A null is NaN.
     let one = robot(&[("elbow", JointKind::Revolute)]);
     let mut options = LogOptions::default();
-    options.columns.q.insert("elbow".into(), "q2".into());
+    options.columns.q = [("elbow".into(), "q2".into())].into_iter().collect();
     let mut stored = tempfile::NamedTempFile::new().unwrap();
     stored.write_all(&bytes).unwrap();
     let (recording, _) = read_log(stored.path(), &one, &options).unwrap();

@@ -43,6 +43,13 @@ fn read_entries(entries: &[(&str, Vec<u8>)], method: CompressionMethod) -> Resul
     read_log(&path, &arm(), &LogOptions::default()).map(|(recording, _)| recording)
 }
 
+fn read_npz(bytes: Vec<u8>, options: &LogOptions) -> Result<(Recording, Vec<Finding>)> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    fs::write(&path, bytes).unwrap();
+    read_log(&path, &arm(), options)
+}
+
 fn zipped(entries: &[(&str, Vec<u8>)], method: CompressionMethod) -> Vec<u8> {
     let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
     for (name, content) in entries {
@@ -93,6 +100,119 @@ fn arrays_of_numpy_are_read_to_their_numbers() {
                 near(channels.tau.as_ref().unwrap()[i], qdd + 0.5 * qd);
             }
         }
+    }
+}
+
+/// Options of a `twincal.toml` with this text in `[columns]`.
+fn columns(text: &str) -> LogOptions {
+    let config = format!("[columns]\n{text}\n");
+    let config = twincal_io::config::Config::parse("twincal.toml", &config).unwrap();
+    let settings = config.settings().unwrap();
+    settings.log.options(std::path::Path::new("run.npz"))
+}
+
+#[test]
+fn arrays_and_their_columns_are_mapped_by_the_config() {
+    let table: Vec<f64> = (0..12).map(f64::from).collect();
+    let write = |names: &[(&str, Vec<u8>)]| {
+        let mut entries = vec![
+            ("time_ms", doubles("(4,)", &[0.0, 100.0, 200.0, 300.0])),
+            ("positions", doubles("(4, 3)", &table)),
+            ("torques", doubles("(4, 2)", &table[..8])),
+        ];
+        entries.extend(names.iter().cloned());
+        zipped(&entries, CompressionMethod::Stored)
+    };
+    let text = "time = \"time_ms\"\ntime_unit = \"ms\"\nq = { shoulder = \"positions[:,2]\", elbow = \"positions[:, 0]\" }\ntau = \"torques\"";
+    let (recording, findings) = read_npz(write(&[]), &columns(text)).unwrap();
+    assert_eq!(recording.time, [0.0, 0.1, 0.2, 0.3]);
+    assert_eq!(recording.joints[0].q, [2.0, 5.0, 8.0, 11.0]);
+    assert_eq!(recording.joints[1].q, [0.0, 3.0, 6.0, 9.0]);
+    assert_eq!(
+        recording.joints[0].tau.as_deref().unwrap(),
+        [0.0, 2.0, 4.0, 6.0]
+    );
+    let said = findings.iter().find(|f| f.code == "columns").unwrap();
+    contains(
+        &said.message,
+        &[
+            "shoulder = positions[:,2] torques[:,0]",
+            "elbow = positions[:,0] torques[:,1]",
+        ],
+    );
+    // names in the file say whose the columns of a whole array are
+    let names = array(
+        "{'descr': '<U8', 'fortran_order': False, 'shape': (2,), }",
+        &["elbow", "shoulder"]
+            .map(|name| {
+                let mut cell = [0; 32];
+                for (at, c) in name.chars().enumerate() {
+                    cell[4 * at..4 * at + 4].copy_from_slice(&u32::from(c).to_le_bytes());
+                }
+                cell
+            })
+            .concat(),
+    );
+    let (recording, _) = read_npz(write(&[("joints", names)]), &columns(text)).unwrap();
+    assert_eq!(
+        recording.joints[1].tau.as_deref().unwrap(),
+        [0.0, 2.0, 4.0, 6.0]
+    );
+    let start = "time = \"time_ms\"\n";
+    for (text, words) in [
+        (
+            "q = \"positions\"",
+            &[
+                "`positions` has 3 columns, the model has 2",
+                "positions[:,0]",
+            ][..],
+        ),
+        (
+            "q = \"position\"",
+            &["no array `position`", "did you mean `positions`?"],
+        ),
+        (
+            "q = { elbow = \"positions[:,3]\" }",
+            &["has 3 columns, none of number 3 (from 0)"],
+        ),
+        (
+            "q = { elbow = \"time_ms[:,0]\" }",
+            &["`time_ms` has shape [4]", "samples × joints"],
+        ),
+        (
+            "q = { elbow = \"positions[:,:]\" }",
+            &["gives joint `elbow` all of"],
+        ),
+    ] {
+        let options = columns(&format!("{start}{text}"));
+        contains(&refused(read_npz(write(&[]), &options)), words);
+    }
+}
+
+#[test]
+fn one_name_with_a_star_means_a_column_per_joint() {
+    let zero = "stamp_us,pos_0,pos_1,load 0 Nm,load 1 Nm\n0,1,2,3,4\n500000,5,6,7,8\n";
+    let one = zero
+        .replace("_1,", "_2,")
+        .replace("_0,", "_1,")
+        .replace("load 1", "load 2")
+        .replace("load 0", "load 1");
+    let text = "time = \"stamp_us\"\ntime_unit = \"us\"\nq = \"pos_*\"\ntau = \"load * Nm\"";
+    for csv in [zero, &one] {
+        let (recording, _) = table(csv, 2, &columns(text)).unwrap();
+        assert_eq!(recording.time, [0.0, 0.5]);
+        assert_eq!(recording.joints[1].q, [2.0, 6.0]);
+        assert_eq!(recording.joints[0].tau.as_deref().unwrap(), [3.0, 7.0]);
+    }
+    for (text, words) in [
+        (
+            "q = \"pos_0\"",
+            &["is one column for 2 moving joints", "write * where"][..],
+        ),
+        ("q = \"pos*\"", &["`pos1` is not there"]),
+    ] {
+        let text = format!("time = \"stamp_us\"\n{text}");
+        contains(&refused(table(zero, 2, &columns(&text))), words);
     }
 }
 

@@ -1,5 +1,6 @@
 //! The keys of `twincal.toml`, as written: the one source of their names, their documentation and the JSON Schema.
 
+use super::ColumnsTable;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -203,23 +204,6 @@ pub enum PayloadKey {
     },
     /// To be found in the log.
     Unknown(UnknownWord),
-}
-
-/// `[columns]`
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(default)]
-#[schemars(deny_unknown_fields)]
-pub struct ColumnsTable {
-    /// Column of the time stamps, s.
-    pub time: Option<String>,
-    /// Position column of each joint, by joint name; rad or m.
-    pub q: BTreeMap<String, String>,
-    /// Velocity column of each joint; rad/s or m/s.
-    pub qd: BTreeMap<String, String>,
-    /// Acceleration column of each joint; rad/s² or m/s².
-    pub qdd: BTreeMap<String, String>,
-    /// Torque column of each joint, joint side; N·m or N.
-    pub tau: BTreeMap<String, String>,
 }
 
 /// `[library]`

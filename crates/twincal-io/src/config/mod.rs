@@ -4,6 +4,7 @@
 //! file, [`Config::settings`] fills in defaults and checks ranges. Flags of the program are written into
 //! [`Config::file`] before that: a flag overrides its key.
 
+mod channel_names;
 mod file;
 mod log_form;
 mod log_forms;
@@ -11,12 +12,12 @@ mod proposal;
 mod settings;
 mod unknown_keys;
 
+pub use channel_names::{ChannelNames, ColumnsTable, TimeUnit};
 pub use file::{
-    Allow, AutoWord, BaseTable, CheckTable, ColumnsTable, ConfigFile, FamilyWord, Friction,
-    InclusionTable, InferenceTable, LagKey, LibraryTable, LogEntry, LogTable, MethodWord,
-    ModelTable, NoisePrior, NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey,
-    PresetWord, PriorTable, SignalTable, Slab, Topics, TorqueWord, UncertaintyWord, UnknownWord,
-    VelocityWord,
+    Allow, AutoWord, BaseTable, CheckTable, ConfigFile, FamilyWord, Friction, InclusionTable,
+    InferenceTable, LagKey, LibraryTable, LogEntry, LogTable, MethodWord, ModelTable, NoisePrior,
+    NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PresetWord, PriorTable,
+    SignalTable, Slab, Topics, TorqueWord, UncertaintyWord, UnknownWord, VelocityWord,
 };
 pub use log_form::LogForm;
 pub use proposal::Proposal;

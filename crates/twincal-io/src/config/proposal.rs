@@ -1,6 +1,6 @@
 //! A `twincal.toml` to begin with: only the keys that a model and its logs ask for, each with the numbers behind it.
 
-use super::{ColumnsTable, LogEntry};
+use super::{ChannelNames, ColumnsTable, LogEntry};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -96,10 +96,28 @@ impl Proposal {
             ("qdd", &self.columns.qdd),
             ("tau", &self.columns.tau),
         ];
+        let mut lines = Vec::new();
         if let Some(time) = &self.columns.time {
-            let _ = writeln!(text, "\n[columns]\ntime = {}", string(time));
+            lines.push(format!("time = {}", string(time)));
         }
-        for (name, table) in tables.into_iter().filter(|(_, table)| !table.is_empty()) {
+        if let Some(unit) = self.columns.time_unit {
+            lines.push(format!("time_unit = \"{}\"", unit.word()));
+        }
+        for (name, names) in tables {
+            if let ChannelNames::All(all) = names {
+                lines.push(format!("{name} = {}", string(all)));
+            }
+        }
+        if !lines.is_empty() {
+            let _ = writeln!(text, "\n[columns]\n{}", lines.join("\n"));
+        }
+        for (name, names) in tables {
+            let ChannelNames::ByJoint(table) = names else {
+                continue;
+            };
+            if table.is_empty() {
+                continue;
+            }
             let _ = writeln!(text, "\n[columns.{name}]");
             for (joint, column) in table {
                 let _ = writeln!(text, "{} = {}", key(joint), string(column));
@@ -161,7 +179,7 @@ fn key(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Config, LagKey, TorqueWord, VelocityWord};
+    use super::super::{Config, LagKey, TimeUnit, TorqueWord, VelocityWord};
     use super::*;
 
     #[test]
@@ -187,7 +205,9 @@ mod tests {
             ],
             columns: ColumnsTable {
                 time: Some("stamp".into()),
-                q: BTreeMap::from([(odd.into(), "angle\n1".into())]),
+                time_unit: Some(TimeUnit::Us),
+                q: ChannelNames::from_iter([(odd.into(), "angle\n1".into())]),
+                tau: ChannelNames::All("/arm \"1\":effort[*]".into()),
                 ..ColumnsTable::default()
             },
             cutoff_hz: None,

@@ -2,15 +2,19 @@
 //!
 //! | first wins | position | velocity | acceleration | torque |
 //! |---|---|---|---|---|
-//! | `[columns]` in the config | `q` | `qd` | `qdd` | `tau` |
+//! | `[columns]` in the config, by joint or one name with `*` for all | `q` | `qd` | `qdd` | `tau` |
 //! | joint name and word, joined by `.`, `/`, `_` or `:`, either first | `q`, `pos`, `position`, `angle`; the bare joint name | `qd`, `dq`, `vel`, `velocity`, `speed` | `qdd`, `ddq`, `acc`, `accel`, `acceleration` | `tau`, `torque`, `effort`, `force`, `tau_meas` |
 //! | word and number, with or without `_` or in `[]`, 1 = first moving joint | `q1` | `qd1` | `qdd1` | `tau1` |
 //!
 //! Time is `t`, `time`, `timestamp`, `stamp`, `sec`, `secs` or `seconds`, a unit may follow (`time_s`, `time [s]`, `t_ms`). Letter case is
 //! free where that leaves one column.
 
+mod configured;
+
 use super::{LogOptions, MAX_COLUMNS, preset};
 use crate::error::{Error, Place, Result};
+use configured::by_joint_name;
+pub(super) use configured::refuse_unknown_joints;
 use std::collections::BTreeMap;
 use twincal::robot::{Robot, did_you_mean};
 use twincal::{Finding, Severity};
@@ -169,25 +173,14 @@ pub fn match_columns(
     let options = &*preset::fill_in(&mut names, robot, options);
     let header = Header::new(file, &names)?;
     let joints = robot.joint_names();
+    refuse_unknown_joints(file, &joints, options)?;
+    let columns = &options.columns;
     let tables = [
-        &options.columns.q,
-        &options.columns.qd,
-        &options.columns.qdd,
-        &options.columns.tau,
+        by_joint_name(&header, "q", &columns.q, &joints)?,
+        by_joint_name(&header, "qd", &columns.qd, &joints)?,
+        by_joint_name(&header, "qdd", &columns.qdd, &joints)?,
+        by_joint_name(&header, "tau", &columns.tau, &joints)?,
     ];
-    for (table, key) in tables.iter().zip(["q", "qd", "qdd", "tau"]) {
-        for joint in table.keys() {
-            if !joints.contains(&joint.as_str()) {
-                return Err(Error::content(
-                    Place::file(file),
-                    format!(
-                        "[columns] {key} names joint `{joint}`, which does not move in the model"
-                    ),
-                    did_you_mean(joint, joints.iter().copied()),
-                ));
-            }
-        }
-    }
     let time = find_time(&header, options)?;
     let mut matched = Vec::with_capacity(joints.len());
     for (number, joint) in joints.iter().enumerate() {
@@ -228,7 +221,7 @@ pub fn joints_without_column(
     let joints = robot.joint_names().into_iter().enumerate();
     joints
         .filter(|(number, joint)| {
-            !options.columns.q.contains_key(*joint)
+            !options.columns.q.names(joint)
                 && by_joint(&header, joint, 0).is_none()
                 && by_number(&header, number + 1, 0).is_none()
         })
@@ -469,7 +462,7 @@ fn refuse_missing_joints(
 }
 
 /// Torque that is the controller's own model, not a measurement (faults.md case 31).
-fn refuse_model_torque(
+pub(super) fn refuse_model_torque(
     file: &str,
     joints: &[&str],
     matched: &[[Option<Channel>; 4]],
@@ -511,7 +504,7 @@ fn key(name: &str) -> String {
 }
 
 /// The whole assignment as one note.
-fn say(
+pub(super) fn say(
     file: &str,
     joints: &[&str],
     time: &Option<Channel>,

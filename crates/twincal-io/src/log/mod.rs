@@ -375,7 +375,14 @@ pub(crate) fn assemble(
         }
         None => {
             let mut time = take(positions.time).unwrap_or_default();
-            if let Some(preset) = options.preset.filter(|preset| preset.ticks() != 1.0) {
+            if let Some(unit) = options.columns.time_unit.filter(|unit| unit.ticks() != 1.0) {
+                time.iter_mut().for_each(|time| *time /= unit.ticks());
+                let message = format!(
+                    "time stamps were taken as {} as [columns] time_unit says",
+                    unit.word()
+                );
+                findings.push(Finding::new(Severity::Note, "time_unit", name, message, 0));
+            } else if let Some(preset) = options.preset.filter(|p| wants_ticks(*p, options)) {
                 time.iter_mut().for_each(|time| *time /= preset.ticks());
                 let message = format!(
                     "time stamps were divided by {} as the preset `{}` says",
@@ -405,6 +412,11 @@ pub(crate) fn assemble(
     };
     refuse_empty_columns(name, &recording, selection)?;
     Ok(recording)
+}
+
+/// Whether a preset's own clock counts: not where the config states the unit.
+fn wants_ticks(preset: Preset, options: &LogOptions) -> bool {
+    preset.ticks() != 1.0 && options.columns.time_unit.is_none()
 }
 
 /// A column without a single number is a mistake in the export, not a gap.

@@ -1,7 +1,10 @@
 //! NPZ logs (`numpy.savez`): numeric arrays only, no pickle, sizes checked before anything is allocated.
 //!
 //! An array with one dimension is a column under its key, as in CSV. An array `q` with two, samples × joints, makes columns `q1`, `q2` …, or
-//! `<joint>.q` where an array of names (`joints`, `joint_names` or `names`) says whose they are.
+//! `<joint>.q` where an array of names (`joints`, `joint_names` or `names`) says whose they are. `[columns]` may name an array, for all joints, or
+//! one of its columns, `positions[:,2]` (`npz/arrays.rs`).
+
+mod arrays;
 
 use super::{Cells, LogOptions, assemble, match_columns};
 use crate::error::{Error, Place, Result};
@@ -137,6 +140,7 @@ pub(super) fn read(
         }
         array.width = columns.len() - array.first;
     }
+    let options = &*arrays::name_columns(name, &arrays, &names, &mut columns, robot, options)?;
     let selection = match_columns(name, &columns, robot, options)?;
     let wanted = selection.file_columns();
     let uses = |array: &&Array| {

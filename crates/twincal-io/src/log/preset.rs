@@ -8,6 +8,7 @@
 //! Both count joints from 0. What `[columns]` says goes first.
 
 use super::LogOptions;
+use crate::config::ChannelNames;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use twincal::robot::Robot;
@@ -94,7 +95,7 @@ pub(super) fn fill_in<'a>(
                 .iter()
                 .map(|(before, behind)| format!("{before}{number}{behind}"))
                 .find(|name| has(name));
-            if let Some(name) = name {
+            if let (Some(name), ChannelNames::ByJoint(table)) = (name, &mut *table) {
                 table.entry(joint.to_owned()).or_insert(name);
             }
         }

@@ -11,6 +11,7 @@ mod refusals;
 mod logs;
 mod containers;
 mod folders;
+mod mapped;
 mod messages;
 mod mutations;
 mod write;

@@ -318,10 +318,9 @@ fn joints_that_are_missing_or_named_otherwise() {
         ],
     );
     let mut options = LogOptions::default();
-    options
-        .columns
-        .q
-        .insert("elbow".into(), "elbow_joint".into());
+    options.columns.q = [("elbow".into(), "elbow_joint".into())]
+        .into_iter()
+        .collect();
     is_the_motion(&read_bytes_with(&bytes, &options).unwrap().0, 200, 1.0);
 }
 

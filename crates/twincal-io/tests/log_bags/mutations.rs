@@ -1,6 +1,8 @@
 //! Bytes changed at random: any answer but a crash, and what is read stays small.
 
+use super::fixture;
 use super::logs::arm;
+use super::mapped::arm_state;
 use super::write::{Message, plain};
 use proptest::prelude::*;
 use twincal_io::log::{LogOptions, parse_log};
@@ -25,8 +27,38 @@ fn without_checksum(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
+/// Bags of mapped topics in CDR, in the form of ROS 1 and in JSON, with their definitions.
+fn mapped() -> Vec<Vec<u8>> {
+    [
+        "mapped_big_endian.mcap",
+        "mapped_ros1.mcap",
+        "mapped_json.mcap",
+    ]
+    .map(|name| without_checksum(std::fs::read(fixture(name)).unwrap()))
+    .to_vec()
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_bytes_in_a_mapped_bag_are_answered(
+        which in any::<prop::sample::Index>(),
+        changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+        within in 200_usize..2000,
+    ) {
+        let bags = mapped();
+        let mut bytes = bags[which.index(bags.len())].clone();
+        for (at, value) in changes {
+            // The definition and the first messages: what stands behind is read alike.
+            let at = at.index(within.min(bytes.len()));
+            bytes[at] = value;
+        }
+        let read = parse_log("run.mcap", bytes.leak(), &arm(), &arm_state());
+        if let Ok((recording, _)) = read {
+            prop_assert!(recording.time.len() <= 40);
+        }
+    }
 
     #[test]
     fn any_bytes_in_a_bag_are_answered(

@@ -214,16 +214,17 @@ fn columns_named_after_joints_win_over_numbers() {
     assert_eq!(read(&log.csv()).unwrap().0, numbered);
     // explicit mapping wins over everything
     let mut mapped = options();
-    for (joint, column) in [("shoulder", "elbow"), ("elbow", "pos_shoulder")] {
-        mapped.columns.q.insert(joint.into(), column.into());
-    }
+    let columns = |elbow: &str| {
+        [
+            ("shoulder".into(), "elbow".into()),
+            ("elbow".into(), elbow.into()),
+        ]
+    };
+    mapped.columns.q = columns("pos_shoulder").into_iter().collect();
     let (recording, _) = read_bytes(log.csv().as_bytes(), &mapped).unwrap();
     assert_eq!(recording.joints[0].q, numbered.joints[1].q);
     assert_eq!(recording.joints[1].q, numbered.joints[0].q);
-    mapped
-        .columns
-        .q
-        .insert("elbow".into(), "pos_shoulde".into());
+    mapped.columns.q = columns("pos_shoulde").into_iter().collect();
     contains(
         &refused(read_bytes(log.csv().as_bytes(), &mapped)),
         &["no column `pos_shoulde`", "pos_shoulder"],

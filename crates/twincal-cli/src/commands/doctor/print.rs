@@ -23,6 +23,8 @@ const OF_LOG: [&str; 5] = [
     "wrapped_angle",
     "time_replaced",
 ];
+/// Notes that say what was matched where there is no table of columns: on bags and NPZ files.
+const OF_BAG: [&str; 3] = ["columns", "time_source", "model_order"];
 /// Share of torque by which the model must explain more than friction for its factor to mean anything.
 const MEANS: f64 = 0.01;
 /// What stands where nothing is known.
@@ -44,7 +46,9 @@ pub(super) fn print(diagnosis: &Diagnosis, terminal: &mut Terminal) {
         print_log(log, terminal);
         for finding in &diagnosis.findings {
             let own = finding.subject == log.overview.name && finding.severity == Severity::Note;
-            if own && OF_LOG.contains(&finding.code.as_str()) {
+            let code = finding.code.as_str();
+            let matched = log.columns.is_none() && OF_BAG.contains(&code);
+            if own && (matched || OF_LOG.contains(&code)) {
                 paragraph(&finding.message, terminal);
             }
         }

@@ -80,29 +80,31 @@ impl NameBlock<'_> {
 
 /// The parts of a message that the encoding's header decides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Layout {
-    big_endian: bool,
+pub(super) struct Layout {
+    pub(super) big_endian: bool,
     /// Largest alignment, bytes; 1: none.
     alignment: usize,
     /// Strings end with a zero that counts.
     zero: bool,
 }
 
-struct Cursor<'a> {
-    bytes: &'a [u8],
-    at: usize,
-    layout: Layout,
+/// A place in a message.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cursor<'a> {
+    pub(super) bytes: &'a [u8],
+    pub(super) at: usize,
+    pub(super) layout: Layout,
 }
 
 impl<'a> Cursor<'a> {
     #[inline]
-    fn align(&mut self, size: usize) {
+    pub(super) fn align(&mut self, size: usize) {
         let size = size.min(self.layout.alignment);
         self.at = self.at.div_ceil(size) * size;
     }
 
     #[inline]
-    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+    pub(super) fn take(&mut self, count: usize) -> Option<&'a [u8]> {
         let end = self.at.checked_add(count)?;
         let taken = self.bytes.get(self.at..end)?;
         self.at = end;
@@ -110,7 +112,7 @@ impl<'a> Cursor<'a> {
     }
 
     #[inline]
-    fn u32(&mut self) -> Option<u32> {
+    pub(super) fn u32(&mut self) -> Option<u32> {
         self.align(4);
         let bytes = <[u8; 4]>::try_from(self.take(4)?).ok()?;
         Some(if self.layout.big_endian {
@@ -120,7 +122,7 @@ impl<'a> Cursor<'a> {
         })
     }
 
-    fn string(&mut self) -> Option<&'a [u8]> {
+    pub(super) fn string(&mut self) -> Option<&'a [u8]> {
         let length = self.u32()? as usize;
         let text = self.take(length)?;
         match text.split_last() {
@@ -153,22 +155,8 @@ pub(super) fn decode<'a>(
     message: &'a [u8],
     known: &[u8],
 ) -> Result<JointState<'a>, String> {
-    let (bytes, layout) = match encoding {
-        Encoding::Ros1 => (
-            message,
-            Layout {
-                big_endian: false,
-                alignment: 1,
-                zero: false,
-            },
-        ),
-        Encoding::Cdr => cdr_header(message)?,
-    };
-    let mut cursor = Cursor {
-        bytes,
-        at: 0,
-        layout,
-    };
+    let mut cursor = begin(encoding, message)?;
+    let (bytes, layout) = (cursor.bytes, cursor.layout);
     let end = |what: &str| format!("its {what} reaches past its end ({} bytes)", message.len());
     if encoding == Encoding::Ros1 {
         cursor.u32().ok_or_else(|| end("header"))?; // seq
@@ -218,6 +206,26 @@ impl<'a> NameBlock<'a> {
     pub(super) fn bytes(self) -> &'a [u8] {
         self.bytes
     }
+}
+
+/// The first byte behind what the encoding puts before a message.
+pub(super) fn begin(encoding: Encoding, message: &[u8]) -> Result<Cursor<'_>, String> {
+    let (bytes, layout) = match encoding {
+        Encoding::Ros1 => (
+            message,
+            Layout {
+                big_endian: false,
+                alignment: 1,
+                zero: false,
+            },
+        ),
+        Encoding::Cdr => cdr_header(message)?,
+    };
+    Ok(Cursor {
+        bytes,
+        at: 0,
+        layout,
+    })
 }
 
 /// Byte order and alignment from the first two bytes; the payload behind the first four.

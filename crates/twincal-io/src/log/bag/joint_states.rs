@@ -4,14 +4,21 @@
 //! stamp belongs, if that is at most half a second and 1024 messages back; what is further back is a step of the clock and stays.
 
 mod choose;
+mod mapped;
+mod topics;
 
 use super::joint_state::{Encoding, decode};
-use super::merge::{Part, merge};
+use super::mapping::{Mapping, Schema};
+use super::merge::{LISTS as PART_LISTS, Part, merge};
+use super::path::is_source;
 use crate::error::{Error, Place, Result};
+use crate::log::columns::{refuse_model_torque, say as say_columns};
 use crate::log::{Cells, Channel, LogOptions, Selection, TorqueSource, assemble};
 use crate::memory;
-use std::fmt::Write as _;
-use twincal::robot::{Robot, did_you_mean};
+use std::borrow::Cow;
+use std::rc::Rc;
+use topics::CONVERT;
+use twincal::robot::Robot;
 use twincal::signal::Recording;
 use twincal::{Finding, Severity};
 
@@ -32,7 +39,7 @@ const LOOK: usize = 1 << 16;
 const MAX_LAYOUTS: usize = 256;
 /// Words for the lists of a message.
 const LISTS: [&str; 3] = ["position[]", "velocity[]", "effort[]"];
-const CHANNELS: [&str; 3] = ["position", "velocity", "effort"];
+const CHANNELS: [&str; PART_LISTS] = ["position", "velocity", "effort", "acceleration"];
 
 /// A topic of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,8 +48,12 @@ pub(super) struct TopicId(usize);
 struct Topic {
     name: String,
     kind: Option<String>,
+    schema: Option<Rc<Schema>>,
     encoding: String,
+    /// How joint states on it are read.
     read_as: Option<Encoding>,
+    /// Which of the mapped topics it is.
+    mapped: Option<usize>,
     messages: u64,
     layouts: Vec<Layout>,
     last: usize,
@@ -64,12 +75,15 @@ pub(super) struct JointStates<'a> {
     options: &'a LogOptions,
     /// Name in messages of each moving joint.
     wanted: Vec<String>,
+    mapping: Option<Mapping>,
     topics: Vec<Topic>,
     parts: Vec<Part>,
     part_topics: Vec<usize>,
     foreign: Vec<String>,
     ambiguous: bool,
     rows: usize,
+    /// Of them those of joint states.
+    states: usize,
     dropped: u64,
     first_dropped: Option<String>,
     late: u64,
@@ -78,51 +92,57 @@ pub(super) struct JointStates<'a> {
 }
 
 impl<'a> JointStates<'a> {
-    pub(super) fn new(file: &'a str, robot: &'a Robot, options: &'a LogOptions) -> Self {
+    /// # Errors
+    /// [`Error::Content`] for a mapping that cannot be understood.
+    pub(super) fn new(file: &'a str, robot: &'a Robot, options: &'a LogOptions) -> Result<Self> {
         let wanted = robot
             .joint_names()
             .iter()
-            .map(|joint| match options.columns.q.get(*joint) {
-                Some(name) => name.clone(),
-                None => (*joint).to_owned(),
+            .map(|joint| match options.columns.q.of_joint(joint) {
+                Some(name) if !is_source(name) => name.to_owned(),
+                _ => (*joint).to_owned(),
             })
             .collect();
-        Self {
+        Ok(Self {
             file,
             robot,
             options,
             wanted,
+            mapping: Mapping::new(file, robot, options)?,
             topics: Vec::new(),
             parts: Vec::new(),
             part_topics: Vec::new(),
             foreign: Vec::new(),
             ambiguous: false,
             rows: 0,
+            states: 0,
             dropped: 0,
             first_dropped: None,
             late: 0,
             latest: 0,
             lag: 0.0,
-        }
+        })
     }
 
     fn refuse(&self, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
         Error::content(Place::file(self.file), problem, remedy)
     }
 
-    /// Makes a topic known; `kind` is the message type, `None` if its schema is missing.
+    /// Makes a topic known; `schema` says what its messages are, `None` if it is missing.
     ///
     /// # Errors
     /// [`Error::Content`] if the config asks for it and it cannot be read.
     pub(super) fn topic(
         &mut self,
         name: &str,
-        kind: Option<&str>,
+        schema: Option<Rc<Schema>>,
         encoding: &str,
     ) -> Result<TopicId> {
+        let kind = schema.as_ref().map(|schema| schema.kind.as_str());
         let clean = |text: &str| text.chars().filter(|c| !c.is_control()).collect::<String>();
         let name = clean(name);
         if let Some(known) = self.topics.iter().position(|topic| topic.name == name) {
+            self.same_kind(known, kind)?;
             return Ok(TopicId(known));
         }
         let asked = self.options.topics.contains(&name);
@@ -132,10 +152,18 @@ impl<'a> JointStates<'a> {
             "ros1" => Some(Encoding::Ros1),
             _ => None,
         };
+        let wanted = self
+            .mapping
+            .as_ref()
+            .is_none_or(|mapping| mapping.joint_states);
+        let wanted = wanted && (asked || self.options.topics.is_empty());
+        let mapped = self.declare_mapped(&name, encoding, schema.as_deref())?;
         let topic = Topic {
-            read_as: encoded.filter(|_| joint_state && (asked || self.options.topics.is_empty())),
+            read_as: encoded.filter(|_| joint_state && wanted),
+            mapped,
             name,
             kind: kind.map(clean),
+            schema: schema.clone(),
             encoding: clean(encoding),
             messages: 0,
             layouts: Vec::new(),
@@ -157,7 +185,8 @@ impl<'a> JointStates<'a> {
 
     /// Whether messages of a topic are read.
     pub(super) fn reads(&self, id: TopicId) -> bool {
-        self.topics[id.0].read_as.is_some()
+        let topic = &self.topics[id.0];
+        topic.read_as.is_some() || topic.mapped.is_some()
     }
 
     /// Takes one message.
@@ -167,6 +196,10 @@ impl<'a> JointStates<'a> {
     pub(super) fn message(&mut self, id: TopicId, log_time: u64, data: &[u8]) -> Result<()> {
         let topic = &mut self.topics[id.0];
         topic.messages += 1;
+        if let Some(mapped) = topic.mapped {
+            self.mapped_message(id, mapped, log_time, data)?;
+        }
+        let topic = &self.topics[id.0];
         let Some(encoding) = topic.read_as else {
             return Ok(());
         };
@@ -244,6 +277,12 @@ impl<'a> JointStates<'a> {
             self.latest = self.latest.max(lateness);
         }
         part.insert(late.at, stamp, &layout.entries, &state.values);
+        self.states += 1;
+        self.count_row()
+    }
+
+    /// A row more; now and then a look at the memory that is left.
+    fn count_row(&mut self) -> Result<()> {
         self.rows += 1;
         if self.rows.is_multiple_of(LOOK) {
             // Growing vectors hold up to three times their content while they move.
@@ -264,14 +303,18 @@ impl<'a> JointStates<'a> {
 
     /// A message whose lists do not fit: refused, or dropped when told to be lenient.
     fn unfit(&mut self, problem: String) -> Result<()> {
+        self.unfit_with(
+            problem,
+            "mend the publisher, or drop and count such messages with --lenient",
+        )
+    }
+
+    fn unfit_with(&mut self, problem: String, remedy: &str) -> Result<()> {
         if self.options.lenient {
             self.drop(|| problem);
             return Ok(());
         }
-        Err(self.refuse(
-            problem,
-            "mend the publisher, or drop and count such messages with --lenient",
-        ))
+        Err(self.refuse(problem, remedy))
     }
 
     /// Learns a new list of names; `None` if the message is left out.
@@ -317,8 +360,10 @@ impl<'a> JointStates<'a> {
                 self.foreign.push(name.clone());
             }
         }
-        let same =
-            |(part, of): (&Part, &usize)| *of == topic && part.joints == joints && part.has == has;
+        let same = |(part, of): (&Part, &usize)| {
+            let alike = part.joints == joints && part.has[..3] == has;
+            *of == topic && alike && !part.mapped
+        };
         let part = match self.parts.iter().zip(&self.part_topics).position(same) {
             Some(part) => part,
             None => {
@@ -347,7 +392,6 @@ impl<'a> JointStates<'a> {
         mut findings: Vec<Finding>,
     ) -> Result<(Recording, Vec<Finding>)> {
         self.check_topics()?;
-        let messages = self.rows as f64;
         if self.rows == 0 {
             let problem = match (&self.first_dropped, self.dropped) {
                 (Some(first), count) => {
@@ -358,7 +402,10 @@ impl<'a> JointStates<'a> {
             return Err(self.refuse(problem, "record it again, or copy it again"));
         }
         let parts = self.choose()?;
-        self.say(&mut findings, messages);
+        self.say(&mut findings);
+        if let Some(mapping) = &self.mapping {
+            mapping.say(self.file, &mut findings)?;
+        }
         let (time, columns) = merge(
             self.file,
             &mut self.parts,
@@ -383,14 +430,17 @@ impl<'a> JointStates<'a> {
         let joints: Vec<[Option<Channel>; 4]> = (columns.into_iter().zip(&parts).enumerate())
             .map(|(joint, (values, parts))| {
                 let named = |list: usize, part: Option<usize>| {
+                    if let Some(words) = self.mapping.as_ref().and_then(|m| m.words(joint, list)) {
+                        return words;
+                    }
                     let topic = part.map_or("", |part| &self.topics[self.part_topics[part]].name);
                     format!("{topic} {}[{}]", CHANNELS[list], self.wanted[joint])
                 };
-                let [q, qd, tau] = values;
+                let [q, qd, tau, qdd] = values;
                 [
                     q.map(|q| channel(named(0, parts[0]), q)),
                     qd.map(|qd| channel(named(1, parts[1]), qd)),
-                    None,
+                    qdd.map(|qdd| channel(named(3, parts[3]), qdd)),
                     tau.map(|tau| channel(named(2, parts[2]), tau)),
                 ]
             })
@@ -398,97 +448,53 @@ impl<'a> JointStates<'a> {
         let selection = Selection {
             time: Some(Channel {
                 index: 0,
-                name: "header.stamp".into(),
+                name: self.time_words(),
             }),
             joints,
             findings: Vec::new(),
         };
-        let rows = cells.columns[0].len();
-        let recording = assemble(
+        let names = self.robot.joint_names();
+        if self.mapping.is_some() {
+            refuse_model_torque(self.file, &names, &selection.joints, self.options)?;
+        }
+        findings.push(say_columns(
             self.file,
-            rows,
-            cells,
-            &selection,
-            self.options,
-            &mut findings,
-        )?;
+            &names,
+            &selection.time,
+            &selection.joints,
+        ));
+        // Time is in seconds already.
+        let mut options = Cow::Borrowed(self.options);
+        if self.options.columns.time_unit.is_some() {
+            options.to_mut().columns.time_unit = None;
+        }
+        let rows = cells.columns[0].len();
+        let recording = assemble(self.file, rows, cells, &selection, &options, &mut findings)?;
         Ok((recording, findings))
     }
 
-    fn check_topics(&self) -> Result<()> {
-        for asked in &self.options.topics {
-            if !self.topics.iter().any(|topic| topic.name == *asked) {
-                let names = self.topics.iter().map(|topic| topic.name.as_str());
-                return Err(self.refuse(
-                    format!(
-                        "has no topic `{asked}`, which [log] topic names; it has {}",
-                        self.list(|_| true)
-                    ),
-                    did_you_mean(asked, names),
-                ));
-            }
-        }
-        if self.ambiguous {
-            let list = self.list(|topic| topic.read_as.is_some() && topic.messages > 0);
-            return Err(self.refuse(
-                format!("has joint states on more than one topic: {list}"),
-                "say which with [log] topic = \"…\"; a list of topics takes each joint's channel from the first that has it",
-            ));
-        }
-        if !self.topics.iter().any(|topic| topic.read_as.is_some()) {
-            let list = self.list(|_| true);
-            let problem = if list.is_empty() {
-                "has no topic at all".to_owned()
-            } else {
-                format!("has no topic with {} in CDR; it has {list}", KINDS[0])
-            };
-            return Err(self.refuse(problem, CONVERT));
-        }
-        Ok(())
-    }
-
-    fn list(&self, which: impl Fn(&Topic) -> bool) -> String {
-        const SHOWN: usize = 12;
-        let chosen: Vec<&Topic> = self.topics.iter().filter(|topic| which(topic)).collect();
-        let mut text = String::new();
-        for topic in chosen.iter().take(SHOWN) {
-            let comma = if text.is_empty() { "" } else { ", " };
-            // Writing to a String cannot fail.
-            let _ = write!(text, "{comma}{}", topic.words());
-        }
-        if chosen.len() > SHOWN {
-            let _ = write!(text, " and {} more", chosen.len() - SHOWN);
-        }
-        text
-    }
-
-    fn read_topics(&self) -> String {
-        let names: Vec<String> = (self.topics.iter())
-            .filter(|topic| topic.read_as.is_some() && topic.messages > 0)
-            .map(|topic| format!("`{}`", topic.name))
-            .collect();
-        names.join(", ")
-    }
-
-    fn say(&self, findings: &mut Vec<Finding>, messages: f64) {
+    fn say(&self, findings: &mut Vec<Finding>) {
+        let messages = self.rows as f64;
         let mut say = |severity, code: &str, message: String, count| {
             findings.push(Finding::new(severity, code, self.file, message, count));
         };
-        say(
-            Severity::Note,
-            "time_source",
-            format!(
-                "time is header.stamp on topic {}, not the recorder's clock, which is later by {:.3} ms on average",
-                self.read_topics(),
-                self.lag / messages / 1e6
-            ),
-            0,
-        );
+        if self.states > 0 {
+            say(
+                Severity::Note,
+                "time_source",
+                format!(
+                    "time is header.stamp on topic {}, not the recorder's clock, which is later by {:.3} ms on average",
+                    self.read_topics(),
+                    self.lag / self.states as f64 / 1e6
+                ),
+                0,
+            );
+        }
         if self.options.torque_source() == TorqueSource::Joint {
             say(
                 Severity::Note,
                 "effort_is_joint_torque",
-                "effort[] counts as torque on the joint's side of the gear, N·m (N for sliders); if it is of the motor or a current, say so with [log] torque".into(),
+                "the logged torque (effort[], or what [columns] tau names) counts as torque on the joint's side of the gear, N·m (N for sliders); if it is of the motor or a current, say so with [log] torque".into(),
                 0,
             );
         }
@@ -502,7 +508,7 @@ impl<'a> JointStates<'a> {
                 severity,
                 "late_messages",
                 format!(
-                    "{} of {messages} messages came late, by at most {:.3} ms, and were put in the order of header.stamp",
+                    "{} of {messages} messages came late, by at most {:.3} ms, and were put in the order of their stamps",
                     self.late,
                     self.latest as f64 / 1e6
                 ),
@@ -521,17 +527,5 @@ impl<'a> JointStates<'a> {
                 self.foreign.len() as u64,
             );
         }
-    }
-}
-
-const CONVERT: &str = "record or convert it to sensor_msgs/msg/JointState in CDR, or export the joint states to CSV, Parquet, Arrow or NPZ";
-
-impl Topic {
-    fn words(&self) -> String {
-        let kind = self.kind.as_deref().unwrap_or("no schema");
-        format!(
-            "`{}` ({kind}, {}, {} messages)",
-            self.name, self.encoding, self.messages
-        )
     }
 }

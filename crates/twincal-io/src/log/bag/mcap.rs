@@ -2,16 +2,21 @@
 //!
 //! Format: <https://mcap.dev/spec>. A record is an opcode, a length of 8 bytes and the content.
 
+use super::definition::MAX_TEXT;
 use super::joint_states::{JointStates, TopicId};
+use super::mapping::Schema;
 use crate::error::{Error, Place, Result};
 use mcap::records::{Record, op};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, SeekFrom};
+use std::rc::Rc;
 use twincal::{Finding, Severity};
 
 /// Largest record, and largest chunk when unpacked, bytes.
 pub(in super::super) const MAX_RECORD: u64 = 256 << 20;
+/// Most bytes of all definitions that are kept.
+const MAX_DEFINITIONS: usize = 64 << 20;
 /// Bytes of a record before its content.
 const RECORD_HEAD: usize = 9;
 /// Bytes of a message before its data: channel, sequence, two times.
@@ -32,8 +37,9 @@ impl From<Error> for Damage {
 struct Reader<'a, 'b> {
     file: &'a str,
     sink: &'a mut JointStates<'b>,
-    /// Name of the message type by schema.
-    schemas: BTreeMap<u16, String>,
+    schemas: BTreeMap<u16, Rc<Schema>>,
+    /// Bytes of the definitions in `schemas`.
+    definitions: usize,
     channels: BTreeMap<u16, TopicId>,
     /// Channel of the last message and its topic: most messages come from the same.
     last: Option<(u16, TopicId)>,
@@ -43,7 +49,7 @@ struct Reader<'a, 'b> {
     first_damage: Option<String>,
 }
 
-/// Hands all messages of JointState topics in `source` to `sink`.
+/// Hands all messages of topics that are read in `source` to `sink`.
 ///
 /// # Errors
 /// [`Error::System`] if reading fails; [`Error::Content`] for what is no MCAP file, for records and chunks above 256 MiB and unknown
@@ -57,6 +63,7 @@ pub(super) fn read(
         file,
         sink,
         schemas: BTreeMap::new(),
+        definitions: 0,
         channels: BTreeMap::new(),
         last: None,
         unpacked: Vec::new(),
@@ -328,14 +335,24 @@ impl Reader<'_, '_> {
             return self.message(body);
         }
         match parse(opcode, body) {
-            Ok(Record::Schema { header, .. }) => {
-                self.schemas.insert(header.id, header.name);
+            Ok(Record::Schema { header, data }) => {
+                // A definition beyond all reason is like none.
+                let fits =
+                    data.len() <= MAX_TEXT && self.definitions + data.len() <= MAX_DEFINITIONS;
+                let text = if fits { &data[..] } else { &[] };
+                let schema = Schema {
+                    kind: header.name,
+                    language: header.encoding,
+                    text: String::from_utf8_lossy(text).into_owned(),
+                };
+                self.definitions += text.len();
+                let former = self.schemas.insert(header.id, Rc::new(schema));
+                self.definitions -=
+                    former.map_or(0, |former| former.text.len().min(self.definitions));
             }
             Ok(Record::Channel(channel)) if !self.channels.contains_key(&channel.id) => {
-                let kind = self.schemas.get(&channel.schema_id).map(String::as_str);
-                let topic = self
-                    .sink
-                    .topic(&channel.topic, kind, &channel.message_encoding)?;
+                let schema = self.schemas.get(&channel.schema_id).cloned();
+                let topic = (self.sink).topic(&channel.topic, schema, &channel.message_encoding)?;
                 self.channels.insert(channel.id, topic);
             }
             Ok(_) => {}

@@ -12,16 +12,21 @@ const GAP: f64 = 5.0;
 /// Least share of the slowest part's rows that the others have to cover.
 const COVERED: f64 = 0.5;
 
+/// Lists of a part: position, velocity, effort, acceleration (which only mapped topics have).
+pub(super) const LISTS: usize = 4;
+
 /// Messages of one topic that name the same joints.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Part {
     /// Moving joints of the model.
     pub(super) joints: Vec<usize>,
-    /// Whether position, velocity, effort are there.
-    pub(super) has: [bool; 3],
+    /// Whether position, velocity, effort, acceleration are there.
+    pub(super) has: [bool; LISTS],
+    /// Of a mapped topic: which joint has which list, `[columns]` says.
+    pub(super) mapped: bool,
     /// `header.stamp`, ns.
     pub(super) stamps: Vec<i64>,
-    /// Three per joint; empty where not there.
+    /// [`LISTS`] per joint; empty where not there.
     columns: Vec<Vec<f64>>,
     /// First row behind the last step back of the clock.
     floor: usize,
@@ -35,12 +40,22 @@ pub(super) struct Placed {
 }
 
 impl Part {
-    pub(super) fn new(joints: Vec<usize>, has: [bool; 3]) -> Self {
-        let columns = vec![Vec::new(); 3 * joints.len()];
+    pub(super) fn new(joints: Vec<usize>, [q, qd, tau]: [bool; 3]) -> Self {
         Self {
+            columns: vec![Vec::new(); LISTS * joints.len()],
+            joints,
+            has: [q, qd, tau, false],
+            ..Self::default()
+        }
+    }
+
+    /// Of a mapped topic, with these lists of one joint or another.
+    pub(super) fn mapped(joints: Vec<usize>, has: [bool; LISTS]) -> Self {
+        Self {
+            columns: vec![Vec::new(); LISTS * joints.len()],
             joints,
             has,
-            columns,
+            mapped: true,
             ..Self::default()
         }
     }
@@ -92,7 +107,7 @@ impl Part {
         } else {
             self.stamps.insert(at, stamp);
         }
-        for (columns, &entry) in self.columns.chunks_exact_mut(3).zip(entries) {
+        for (columns, &entry) in self.columns.chunks_exact_mut(LISTS).zip(entries) {
             for ((column, list), has) in columns.iter_mut().zip(values).zip(self.has) {
                 if !has {
                     continue;
@@ -107,9 +122,24 @@ impl Part {
         }
     }
 
-    fn column(&self, joint: usize, list: usize) -> Option<usize> {
+    /// Adds a row of a mapped topic: columns and their values.
+    #[inline]
+    pub(super) fn insert_mapped(
+        &mut self,
+        at: usize,
+        stamp: i64,
+        values: impl Iterator<Item = (usize, f64)>,
+    ) {
+        self.stamps.insert(at, stamp);
+        for (column, value) in values {
+            self.columns[column].insert(at, value);
+        }
+    }
+
+    /// Which of the columns a joint's list is.
+    pub(super) fn column(&self, joint: usize, list: usize) -> Option<usize> {
         let at = self.joints.iter().position(|j| *j == joint)?;
-        Some(3 * at + list)
+        Some(LISTS * at + list)
     }
 
     fn median_step(&self) -> f64 {
@@ -156,14 +186,14 @@ impl Part {
     }
 }
 
-/// Position, velocity and effort of each joint.
-type Columns = Vec<[Option<Vec<f64>>; 3]>;
+/// Position, velocity, effort and acceleration of each joint.
+type Columns = Vec<[Option<Vec<f64>>; LISTS]>;
 
 /// Time in seconds and the columns of each joint, all on the stamps of the slowest part that is used.
 pub(super) fn merge<'t>(
     file: &str,
     parts: &mut [Part],
-    chosen: &[[Option<usize>; 3]],
+    chosen: &[[Option<usize>; LISTS]],
     topic: impl Fn(usize) -> &'t str,
     robot: &Robot,
     findings: &mut Vec<Finding>,
@@ -179,7 +209,7 @@ pub(super) fn merge<'t>(
         let part = &mut parts[slowest];
         let columns = (chosen.iter().enumerate())
             .map(|(joint, lists)| {
-                [0, 1, 2].map(|list| {
+                std::array::from_fn(|list| {
                     let column = lists[list].and_then(|_| part.column(joint, list))?;
                     Some(std::mem::take(&mut part.columns[column]))
                 })
@@ -202,7 +232,7 @@ pub(super) fn merge<'t>(
         return Err(Error::content(
             Place::file(file),
             format!(
-                "header.stamp of {} steps back in time, so its joints cannot be brought together with the others",
+                "time of {} steps back, so its joints cannot be brought together with the others",
                 describe(back)
             ),
             "cut the log where the clock was set, or publish all joints in one message",
@@ -215,7 +245,7 @@ pub(super) fn merge<'t>(
     let columns: Columns = (chosen.iter().enumerate())
         .map(|(joint, lists)| {
             let is_angle = robot.joint_kind(joint) != JointKind::Prismatic;
-            [0, 1, 2].map(|list| {
+            std::array::from_fn(|list| {
                 let part = lists[list]?;
                 let column = parts[part].column(joint, list)?;
                 if part == slowest {
@@ -239,7 +269,7 @@ pub(super) fn merge<'t>(
         return Err(Error::content(
             Place::file(file),
             format!(
-                "joints come in messages of their own that hardly overlap in time: {lost} of {} stamps of {} have no values of {}",
+                "joints or channels come in messages of their own that hardly overlap in time: {lost} of {} stamps of {} have no values of {}",
                 stamps.len(),
                 describe(slowest),
                 list.join(" and ")
@@ -248,7 +278,7 @@ pub(super) fn merge<'t>(
         ));
     }
     let message = format!(
-        "joints come in messages of their own: {} brought to the stamps of {} by linear interpolation; {lost} of {} rows lie outside or in gaps and are NaN",
+        "joints or channels come in messages of their own: {} brought to the stamps of {} by linear interpolation; {lost} of {} rows lie outside or in gaps and are NaN",
         list.join(" and "),
         describe(slowest),
         stamps.len()

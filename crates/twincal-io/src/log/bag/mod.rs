@@ -1,4 +1,4 @@
-//! Logs of ROS: MCAP files, SQLite bags and rosbag2 folders with `sensor_msgs/JointState`.
+//! Logs of ROS: MCAP files, SQLite bags and rosbag2 folders with `sensor_msgs/JointState` and topics of any other type that are mapped.
 //!
 //! | step | file |
 //! |---|---|
@@ -7,14 +7,23 @@
 //! | one message | `joint_state.rs` |
 //! | topics, joints, order in time | `joint_states.rs` |
 //! | messages with some of the joints | `merge.rs` |
+//! | what `[columns]` says of topics | `path.rs`, `mapping.rs` |
+//! | messages of any type | `definition.rs`, `decode.rs`; `value.rs` finds what a path means |
+//! | what could be mapped | `suggest.rs` |
 
+mod decode;
+mod definition;
 mod folder;
 mod joint_state;
 mod joint_states;
+mod mapping;
 mod mcap;
 mod merge;
+mod path;
 mod sqlite;
+mod suggest;
 mod unpack;
+mod value;
 
 use super::{Kind, LogOptions};
 use crate::error::{Error, Place, Result};
@@ -36,7 +45,7 @@ pub(super) fn read_mcap(
     robot: &Robot,
     options: &LogOptions,
 ) -> Result<(Recording, Vec<Finding>)> {
-    let mut states = JointStates::new(file, robot, options);
+    let mut states = JointStates::new(file, robot, options)?;
     let findings = mcap::read(source, file, &mut states)?;
     states.finish(findings)
 }
@@ -48,7 +57,7 @@ pub(super) fn read(
     options: &LogOptions,
 ) -> Result<(Recording, Vec<Finding>)> {
     let name = path.display().to_string();
-    let mut states = JointStates::new(&name, robot, options);
+    let mut states = JointStates::new(&name, robot, options)?;
     let (files, mut findings) = files(path)?;
     for file in files {
         findings.extend(read_file(&file, &mut states)?);

@@ -1,6 +1,8 @@
 //! rosbag2's SQLite files (`.db3`): opened read-only and immutable, so that nothing beside the file is made or touched.
 
+use super::definition::MAX_TEXT;
 use super::joint_states::{JointStates, TopicId};
+use super::mapping::Schema;
 use super::mcap::MAX_RECORD;
 use crate::error::{Error, Place, Result};
 use rusqlite::limits::Limit;
@@ -8,13 +10,14 @@ use rusqlite::{Connection, OpenFlags};
 use std::collections::BTreeMap;
 use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
+use std::rc::Rc;
 
 /// First bytes of a Zstandard frame: rosbag2 can pack messages one by one.
 const ZSTD: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
 /// Largest message when unpacked, bytes.
 const MAX_MESSAGE: usize = 1 << 20;
 
-/// Hands all messages of JointState topics in the file at `path` to `sink`; `file` is what messages call it.
+/// Hands all messages of topics that are read in the file at `path` to `sink`; `file` is what messages call it.
 ///
 /// # Errors
 /// [`Error::Content`] for files that are still being written, damaged, or no bag.
@@ -56,7 +59,8 @@ pub(super) fn read(path: &Path, file: &str, sink: &mut JointStates<'_>) -> Resul
     while let Some(row) = rows.next().map_err(broken)? {
         let text = |column| row.get::<_, String>(column).map_err(broken);
         let (name, kind, encoding) = (text(1)?, text(2)?, text(3)?);
-        let topic = sink.topic(&name, Some(&kind), &encoding)?;
+        let schema = Rc::new(definition(&bag, kind).map_err(broken)?);
+        let topic = sink.topic(&name, Some(schema), &encoding)?;
         topics.insert(row.get(0).map_err(broken)?, topic);
     }
     let mut query = bag
@@ -86,6 +90,30 @@ pub(super) fn read(path: &Path, file: &str, sink: &mut JointStates<'_>) -> Resul
         }
     }
     Ok(())
+}
+
+/// What the bag says of a message type; bags before ROS 2 Iron have no definitions.
+fn definition(bag: &Connection, kind: String) -> rusqlite::Result<Schema> {
+    let query =
+        "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = 'message_definitions'";
+    let tables: i64 = bag.query_row(query, [], |row| row.get(0))?;
+    let mut schema = Schema {
+        kind,
+        ..Schema::default()
+    };
+    if tables == 0 {
+        return Ok(schema);
+    }
+    let query = "SELECT encoding, encoded_message_definition FROM message_definitions \
+                 WHERE topic_type = ?1 AND length(encoded_message_definition) <= ?2";
+    let mut query = bag.prepare(query)?;
+    let limit = i64::try_from(MAX_TEXT).unwrap_or(i64::MAX);
+    let mut rows = query.query(rusqlite::params![schema.kind, limit])?;
+    if let Some(row) = rows.next()? {
+        schema.language = row.get(0)?;
+        schema.text = row.get(1)?;
+    }
+    Ok(schema)
 }
 
 /// A log that is still being written has a file beside it that holds what is missing.

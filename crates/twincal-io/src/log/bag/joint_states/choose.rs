@@ -1,43 +1,48 @@
 //! Which part each channel of each joint comes from, and what is missing.
 
-use super::JointStates;
+use super::{JointStates, PART_LISTS};
 use crate::error::Result;
 use crate::log::TorqueSource;
 use twincal::robot::did_you_mean;
 
 impl JointStates<'_> {
-    /// Which part each joint's position, velocity and effort come from.
-    pub(super) fn choose(&self) -> Result<Vec<[Option<usize>; 3]>> {
+    /// Which part each joint's position, velocity, effort and acceleration come from: what is mapped first, then joint states.
+    pub(super) fn choose(&self) -> Result<Vec<[Option<usize>; PART_LISTS]>> {
         let order = |part: usize| {
             let topic = &self.topics[self.part_topics[part]].name;
             let place = self.options.topics.iter().position(|asked| asked == topic);
             (place, usize::MAX - self.parts[part].stamps.len(), part)
         };
         let mut by_preference: Vec<usize> = (0..self.parts.len())
-            .filter(|&part| !self.parts[part].stamps.is_empty())
+            .filter(|&part| !self.parts[part].stamps.is_empty() && !self.parts[part].mapped)
             .collect();
         by_preference.sort_by_key(|&part| order(part));
         let joints = self.wanted.len();
-        let chosen: Vec<[Option<usize>; 3]> = (0..joints)
+        let mapped = |joint: usize, list: usize| self.mapping.as_ref()?.part(joint, list);
+        let chosen: Vec<[Option<usize>; PART_LISTS]> = (0..joints)
             .map(|joint| {
                 let of = |list: usize, home: Option<usize>| {
+                    if let Some(part) = mapped(joint, list) {
+                        return Some(part);
+                    }
                     let has = |part: &usize| {
                         let part = &self.parts[*part];
-                        part.has[list] && part.joints.contains(&joint)
+                        part.has[list] && !part.mapped && part.joints.contains(&joint)
                     };
                     home.filter(has)
                         .or_else(|| by_preference.iter().copied().find(has))
                 };
                 let q = of(0, None);
-                [q, of(1, q), of(2, q)]
+                [q, of(1, q), of(2, q), of(3, q)]
             })
             .collect();
+        self.refuse_silent_topics()?;
         self.refuse_missing_joints(&chosen)?;
         self.refuse_missing_effort(&chosen)?;
         Ok(chosen)
     }
 
-    fn refuse_missing_joints(&self, chosen: &[[Option<usize>; 3]]) -> Result<()> {
+    fn refuse_missing_joints(&self, chosen: &[[Option<usize>; PART_LISTS]]) -> Result<()> {
         let Some(first) = chosen.iter().position(|parts| parts[0].is_none()) else {
             return Ok(());
         };
@@ -45,6 +50,15 @@ impl JointStates<'_> {
             .filter(|(parts, _)| parts[0].is_none())
             .map(|(_, name)| name.as_str())
             .collect();
+        if self.states == 0 {
+            return Err(self.refuse(
+                format!(
+                    "[columns] q maps no position of joint `{}`, and there are no joint states",
+                    missing.join("`, `")
+                ),
+                "map it too, or fix a joint that does not move with [model] locked",
+            ));
+        }
         let named = self.parts.iter().flat_map(|part| part.joints.iter());
         if named.clone().any(|joint| *joint == first) {
             return Err(self.refuse(
@@ -75,7 +89,7 @@ impl JointStates<'_> {
         ))
     }
 
-    fn refuse_missing_effort(&self, chosen: &[[Option<usize>; 3]]) -> Result<()> {
+    fn refuse_missing_effort(&self, chosen: &[[Option<usize>; PART_LISTS]]) -> Result<()> {
         if self.options.torque_source() == TorqueSource::None {
             return Ok(());
         }
@@ -91,6 +105,12 @@ impl JointStates<'_> {
         } else {
             format!(" of joint `{}`", missing.join("`, `"))
         };
+        if self.states == 0 {
+            return Err(self.refuse(
+                format!("[columns] maps no torque{whose}, and no joint states are read"),
+                "map it with [columns] tau, name a topic of joint states in [log] topic, or say [log] torque = \"none\" for a log that is only to be predicted",
+            ));
+        }
         Err(self.refuse(
             format!(
                 "topic {}: effort[]{whose} is empty in all messages",

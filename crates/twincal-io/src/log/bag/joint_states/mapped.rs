@@ -1,0 +1,163 @@
+//! Messages of mapped topics, and advice where a log has no joint states.
+
+use super::{JointStates, LATE_MESSAGES, LATE_NS, TopicId};
+use crate::error::Result;
+use crate::log::bag::definition::Definition;
+use crate::log::bag::joint_state::Encoding;
+use crate::log::bag::mapping::{Problem, Schema};
+use crate::log::bag::suggest::Lists;
+
+/// Most topics whose definitions are looked at for advice, and that are shown.
+const LOOKED_AT: usize = 64;
+const SHOWN: usize = 8;
+
+impl JointStates<'_> {
+    /// Makes a part for a topic that `[columns]` names.
+    pub(super) fn declare_mapped(
+        &mut self,
+        name: &str,
+        encoding: &str,
+        schema: Option<&Schema>,
+    ) -> Result<Option<usize>> {
+        let Some(mapping) = &mut self.mapping else {
+            return Ok(None);
+        };
+        let part = self.parts.len();
+        let Some((number, new)) = mapping.declare(self.file, name, encoding, schema, part)? else {
+            return Ok(None);
+        };
+        self.parts.push(new);
+        self.part_topics.push(self.topics.len());
+        Ok(Some(number))
+    }
+
+    /// A mapped topic whose messages are of several types cannot be read by one definition.
+    pub(super) fn same_kind(&self, known: usize, kind: Option<&str>) -> Result<()> {
+        let topic = &self.topics[known];
+        if topic.mapped.is_none() || topic.kind.as_deref() == kind {
+            return Ok(());
+        }
+        let words = |kind: Option<&str>| kind.unwrap_or("no schema").to_owned();
+        Err(self.refuse(
+            format!(
+                "topic `{}` is of type {} and of type {}",
+                topic.name,
+                words(topic.kind.as_deref()),
+                words(kind)
+            ),
+            "record every type on a topic of its own",
+        ))
+    }
+
+    /// Takes a message of a mapped topic.
+    pub(super) fn mapped_message(
+        &mut self,
+        id: TopicId,
+        mapped: usize,
+        log_time: u64,
+        data: &[u8],
+    ) -> Result<()> {
+        let Some(mapping) = &mut self.mapping else {
+            return Ok(());
+        };
+        let sample = match mapping.read(mapped, log_time, data) {
+            Ok(sample) => sample,
+            Err(problem) => {
+                let topic = &self.topics[id.0];
+                let message = format!("message {} on `{}`: ", topic.messages, topic.name);
+                return match problem {
+                    Problem::Broken(words) => {
+                        self.drop(|| message + &words);
+                        Ok(())
+                    }
+                    Problem::Unfit(words) => {
+                        let (problem, remedy) = words.rsplit_once("; ").unwrap_or((&words, ""));
+                        let remedy = format!("{remedy}; --lenient drops and counts such messages");
+                        self.unfit_with(message + problem, &remedy)
+                    }
+                };
+            }
+        };
+        let part = &mut self.parts[sample.part];
+        let late = part.place(sample.stamp, LATE_NS, LATE_MESSAGES);
+        part.insert_mapped(late.at, sample.stamp, mapping.values(mapped));
+        if let Some(lateness) = late.lateness {
+            self.late += 1;
+            self.latest = self.latest.max(lateness);
+        }
+        self.count_row()
+    }
+
+    /// The times that are used, in words.
+    pub(super) fn time_words(&self) -> String {
+        let mut words = Vec::new();
+        if self.states > 0 {
+            words.push("header.stamp".to_owned());
+        }
+        let mapping = self.mapping.iter();
+        words.extend(mapping.flat_map(|mapping| mapping.time_words()));
+        words.join(" and ")
+    }
+
+    /// Topics whose messages never came.
+    pub(super) fn refuse_silent_topics(&self) -> Result<()> {
+        for (part, topic) in self.parts.iter().zip(&self.part_topics) {
+            if part.mapped && part.stamps.is_empty() {
+                let why = match &self.first_dropped {
+                    Some(first) => format!("; dropped were {}, the first: {first}", self.dropped),
+                    None => String::new(),
+                };
+                return Err(self.refuse(
+                    format!(
+                        "topic {} is mapped and none of its messages could be taken{why}",
+                        self.topics[*topic].words()
+                    ),
+                    "map another topic in [columns], or record it again",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Lists of numbers that topics have, and the line that maps one.
+    pub(super) fn suggestions(&self) -> (String, String) {
+        let (mut shown, mut line) = (Vec::new(), None);
+        let joints = self.robot.dof();
+        for topic in self
+            .topics
+            .iter()
+            .filter(|topic| topic.messages > 0)
+            .take(LOOKED_AT)
+        {
+            let Some(schema) = &topic.schema else {
+                continue;
+            };
+            let (language, encoding) = match topic.encoding.as_str() {
+                "cdr" => ("ros2msg", Encoding::Cdr),
+                "ros1" => ("ros1msg", Encoding::Ros1),
+                _ => continue,
+            };
+            if schema.language != language && !schema.text.is_empty() {
+                continue;
+            }
+            let Ok(definition) = Definition::parse(&schema.kind, &schema.text, encoding) else {
+                continue;
+            };
+            let lists = Lists::of(&definition, joints);
+            if lists.is_empty() {
+                continue;
+            }
+            if shown.len() < SHOWN {
+                shown.push(format!("`{}` has {}", topic.name, lists.words()));
+            }
+            line = line.or_else(|| lists.line(&topic.name));
+        }
+        match line {
+            Some(line) => (
+                format!("; lists of numbers: {}", shown.join("; ")),
+                format!("if these are the joints, map them at the top of twincal.toml: {line}"),
+            ),
+            None => (String::new(), super::CONVERT.to_owned()),
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! Which topics there are, in words, and which of them cannot be told apart.
+
+use super::{JointStates, KINDS, Topic};
+use crate::error::Result;
+use std::fmt::Write as _;
+use twincal::robot::did_you_mean;
+
+/// What helps where a topic cannot be read.
+pub(super) const CONVERT: &str = "map other types with [columns] (docs/logs.md), record or convert it to sensor_msgs/msg/JointState in CDR, or export the joint states to CSV, Parquet, Arrow or NPZ";
+
+impl JointStates<'_> {
+    pub(super) fn check_topics(&self) -> Result<()> {
+        if let Some(mapping) = &self.mapping {
+            let names = self.topics.iter().map(|topic| topic.name.as_str());
+            mapping.check(self.file, names, &self.list(|_| true))?;
+            if !mapping.joint_states {
+                return Ok(());
+            }
+        }
+        for asked in &self.options.topics {
+            if !self.topics.iter().any(|topic| topic.name == *asked) {
+                let names = self.topics.iter().map(|topic| topic.name.as_str());
+                return Err(self.refuse(
+                    format!(
+                        "has no topic `{asked}`, which [log] topic names; it has {}",
+                        self.list(|_| true)
+                    ),
+                    did_you_mean(asked, names),
+                ));
+            }
+        }
+        if self.ambiguous {
+            let list = self.list(|topic| topic.read_as.is_some() && topic.messages > 0);
+            return Err(self.refuse(
+                format!("has joint states on more than one topic: {list}"),
+                "say which with [log] topic = \"…\"; a list of topics takes each joint's channel from the first that has it",
+            ));
+        }
+        if !self.topics.iter().any(|topic| topic.read_as.is_some()) {
+            let list = self.list(|_| true);
+            if list.is_empty() {
+                return Err(self.refuse("has no topic at all", CONVERT));
+            }
+            if self.mapping.is_some() {
+                return Ok(());
+            }
+            let (lists, remedy) = self.suggestions();
+            return Err(self.refuse(
+                format!(
+                    "has no topic with {} in CDR; it has {list}{lists}",
+                    KINDS[0]
+                ),
+                remedy,
+            ));
+        }
+        Ok(())
+    }
+
+    pub(super) fn list(&self, which: impl Fn(&Topic) -> bool) -> String {
+        const SHOWN: usize = 12;
+        let chosen: Vec<&Topic> = self.topics.iter().filter(|topic| which(topic)).collect();
+        let mut text = String::new();
+        for topic in chosen.iter().take(SHOWN) {
+            let comma = if text.is_empty() { "" } else { ", " };
+            // Writing to a String cannot fail.
+            let _ = write!(text, "{comma}{}", topic.words());
+        }
+        if chosen.len() > SHOWN {
+            let _ = write!(text, " and {} more", chosen.len() - SHOWN);
+        }
+        text
+    }
+
+    pub(super) fn read_topics(&self) -> String {
+        let names: Vec<String> = (self.topics.iter())
+            .filter(|topic| topic.read_as.is_some() && topic.messages > 0)
+            .map(|topic| format!("`{}`", topic.name))
+            .collect();
+        names.join(", ")
+    }
+}
+
+impl Topic {
+    pub(super) fn words(&self) -> String {
+        let kind = self.kind.as_deref().unwrap_or("no schema");
+        format!(
+            "`{}` ({kind}, {}, {} messages)",
+            self.name, self.encoding, self.messages
+        )
+    }
+}
