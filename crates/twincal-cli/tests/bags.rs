@@ -95,6 +95,47 @@ fn a_bag_gives_the_answer_of_its_csv() {
     }
 }
 
+#[test]
+fn torque_from_a_topic_of_another_type_gives_the_answer_of_joint_states() {
+    let folder = folder();
+    let folder = folder.path();
+    let messages = messages(2000);
+    fs::write(folder.join("run.mcap"), bag(&messages)).unwrap();
+    fit(folder, "run.mcap", &[]).expect(0);
+    let expected = result(folder);
+    let mut mapped = write::Bag::new(None);
+    mapped.topic("/torque", Some("std_msgs/msg/Float64MultiArray"), "cdr");
+    for message in &messages {
+        let mut states = message.clone();
+        let torque = std::mem::take(&mut states.lists[2]);
+        mapped.message("/joint_states", &states);
+        // no dimensions, no offset, two numbers
+        let mut data = vec![0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0];
+        torque.iter().for_each(|tau| data.extend(tau.to_le_bytes()));
+        mapped.raw("/torque", message.stamp, &data);
+    }
+    fs::write(folder.join("mapped.mcap"), mapped.finish()).unwrap();
+    let columns = "tau = { elbow = \"/torque:data[0]\", shoulder = \"/torque:data[1]\" }";
+    let settings = format!("{SETTINGS}[columns]\n{columns}\n");
+    fs::write(folder.join("mapped.toml"), settings).unwrap();
+    let base = ["--model", "arm.urdf", "--config", "mapped.toml"];
+    let fit = ["fit", "mapped.mcap", "-o", "out", "--force"];
+    run(folder, fit.iter().chain(&base)).expect(0);
+    assert_eq!(result(folder)["terms"], expected["terms"]);
+    for code in ["log_time", "parts_merged", "columns"] {
+        let codes = codes(folder);
+        assert!(
+            codes.iter().any(|found| found == code),
+            "{code} in {codes:?}"
+        );
+    }
+    let doctor = ["doctor", "mapped.mcap"];
+    let done = run(folder, doctor.iter().chain(&base));
+    let words: String = done.out.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("/torque:data[1]"), "{words}");
+    assert!(words.contains("elbow = \"/torque:data[0]\""), "{words}");
+}
+
 /// Fits a file of these bytes.
 fn fit_bytes(bytes: &[u8], more: &[&str]) -> (tempfile::TempDir, common::Run) {
     let folder = folder();

@@ -314,3 +314,6 @@ fn largest_change(a: &PlugIn, b: &PlugIn) -> f64 {
         .max(relative(&a.scaled_variance, &b.scaled_variance))
         .max((a.noise - b.noise).abs() / a.noise.max(b.noise).max(f64::MIN_POSITIVE))
 }
+
+#[cfg(test)]
+mod tests;

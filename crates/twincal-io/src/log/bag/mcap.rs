@@ -1,4 +1,4 @@
-//! The container MCAP: records one by one, chunks unpacked one at a time, limits before allocations, damaged chunks skipped and counted.
+//! The container MCAP: records one by one, a few chunks unpacked at a time, limits before allocations, damaged chunks skipped and counted.
 //!
 //! Format: <https://mcap.dev/spec>. A record is an opcode, a length of 8 bytes and the content.
 
@@ -7,9 +7,11 @@ use super::joint_states::{JointStates, TopicId};
 use super::mapping::Schema;
 use crate::error::{Error, Place, Result};
 use mcap::records::{Record, op};
+use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, SeekFrom};
+use std::ops::Range;
 use std::rc::Rc;
 use twincal::{Finding, Severity};
 
@@ -17,6 +19,12 @@ use twincal::{Finding, Severity};
 pub(in super::super) const MAX_RECORD: u64 = 256 << 20;
 /// Most bytes of all definitions that are kept.
 const MAX_DEFINITIONS: usize = 64 << 20;
+/// Most chunks that are unpacked side by side, and the unpacked bytes from which on no further one joins them.
+const SIDE_BY_SIDE: (usize, u64) = (4, 32 << 20);
+/// Where a chunk says how large it is when unpacked.
+const CLAIM: usize = 16;
+/// Where the records of a chunk begin that is not packed: behind two times, size, checksum, an empty text and a length.
+const PLAIN: usize = 40;
 /// Bytes of a record before its content.
 const RECORD_HEAD: usize = 9;
 /// Bytes of a message before its data: channel, sequence, two times.
@@ -34,6 +42,93 @@ impl From<Error> for Damage {
     }
 }
 
+/// A chunk as it lies in the file, and unpacked.
+#[derive(Default)]
+struct Chunk {
+    /// Of its record, bytes from the start of the file.
+    position: u64,
+    body: Vec<u8>,
+    unpacked: Vec<u8>,
+    /// Where its records are in `body`; `None`: in `unpacked`.
+    plain: Option<Range<usize>>,
+}
+
+impl Chunk {
+    /// Bytes that it claims to unpack to; they are compared with the limit before anything is unpacked.
+    fn claim(&self) -> u64 {
+        let claim = self.body.get(CLAIM..).and_then(<[u8]>::first_chunk);
+        claim.map_or(0, |bytes| u64::from_le_bytes(*bytes))
+    }
+
+    /// Its records, once it is unpacked.
+    fn records(&self) -> &[u8] {
+        match &self.plain {
+            Some(range) => &self.body[range.clone()],
+            None => &self.unpacked,
+        }
+    }
+
+    /// Unpacks what is packed and compares size and checksum.
+    fn unpack(&mut self, file: &str) -> std::result::Result<(), Damage> {
+        self.unpacked.clear();
+        let Ok(Record::Chunk {
+            header,
+            data: Cow::Borrowed(data),
+        }) = parse(op::CHUNK, &self.body)
+        else {
+            return Err(Damage::Chunk("its header is broken".into()));
+        };
+        let size = header.uncompressed_size;
+        let refuse = |problem, remedy| Damage::File(refusal(file, problem, remedy));
+        if size > MAX_RECORD {
+            return Err(refuse(
+                format!("a chunk claims {size} bytes when unpacked, the limit is {MAX_RECORD}"),
+                "record it again with smaller chunks",
+            ));
+        }
+        let damaged = |e: std::io::Error| Damage::Chunk(format!("cannot be unpacked: {e}"));
+        let plain = PLAIN..PLAIN + data.len();
+        self.plain = header.compression.is_empty().then_some(plain);
+        match header.compression.as_str() {
+            "" => {}
+            "zstd" => {
+                self.unpacked.reserve_exact(size as usize);
+                zstd::bulk::Decompressor::new()
+                    .and_then(|mut zstd| zstd.decompress_to_buffer(data, &mut self.unpacked))
+                    .map_err(damaged)?;
+            }
+            "lz4" => {
+                self.unpacked.reserve_exact(size as usize);
+                lz4_flex::frame::FrameDecoder::new(data)
+                    .take(size + 1)
+                    .read_to_end(&mut self.unpacked)
+                    .map_err(damaged)?;
+            }
+            other => {
+                return Err(refuse(
+                    format!("a chunk is compressed with `{other}`, known are zstd and lz4"),
+                    "`mcap compress` writes it anew",
+                ));
+            }
+        }
+        let records = self.records();
+        if records.len() as u64 != size {
+            return Err(Damage::Chunk(format!(
+                "it unpacks to {} bytes and claims {size}",
+                records.len()
+            )));
+        }
+        if header.uncompressed_crc != 0 && crc32fast::hash(records) != header.uncompressed_crc {
+            return Err(Damage::Chunk("its checksum is wrong".into()));
+        }
+        Ok(())
+    }
+}
+
+fn refusal(file: &str, problem: String, remedy: &str) -> Error {
+    Error::content(Place::file(file), problem, remedy)
+}
+
 struct Reader<'a, 'b> {
     file: &'a str,
     sink: &'a mut JointStates<'b>,
@@ -43,7 +138,10 @@ struct Reader<'a, 'b> {
     channels: BTreeMap<u16, TopicId>,
     /// Channel of the last message and its topic: most messages come from the same.
     last: Option<(u16, TopicId)>,
-    unpacked: Vec<u8>,
+    /// Chunks that are read and not yet looked at.
+    waiting: Vec<Chunk>,
+    /// Buffers of earlier ones.
+    spare: Vec<Chunk>,
     chunks: u64,
     damaged: u64,
     first_damage: Option<String>,
@@ -66,7 +164,8 @@ pub(super) fn read(
         definitions: 0,
         channels: BTreeMap::new(),
         last: None,
-        unpacked: Vec::new(),
+        waiting: Vec::new(),
+        spare: Vec::new(),
         chunks: 0,
         damaged: 0,
         first_damage: None,
@@ -115,7 +214,7 @@ enum End {
 
 impl Reader<'_, '_> {
     fn refuse(&self, problem: String, remedy: &str) -> Error {
-        Error::content(Place::file(self.file), problem, remedy)
+        refusal(self.file, problem, remedy)
     }
 
     fn records(&mut self, source: &mut (impl Read + Seek)) -> Result<End> {
@@ -142,6 +241,9 @@ impl Reader<'_, '_> {
         let (mut body, mut head) = (Vec::new(), Vec::with_capacity(RECORD_HEAD));
         let mut behind_data = false;
         loop {
+            if self.full() {
+                self.chunks(source, position)?;
+            }
             head.clear();
             (&mut *source)
                 .take(RECORD_HEAD as u64)
@@ -153,12 +255,17 @@ impl Reader<'_, '_> {
                 End::Cut(position)
             };
             let Some((opcode, length)) = record_head(&head) else {
+                self.chunks(source, position)?;
                 return Ok(ended);
             };
             let wanted = matches!(
                 opcode,
                 op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK | op::HEADER
             );
+            // What stands between chunks otherwise, their indexes, changes nothing.
+            if opcode != op::CHUNK && (wanted || matches!(opcode, op::DATA_END | op::FOOTER)) {
+                self.chunks(source, position)?;
+            }
             if wanted && length > MAX_RECORD {
                 return Err(self.refuse(
                     format!("the record at byte {position} (opcode {opcode:#04x}) claims {length} bytes, the limit is {MAX_RECORD}"),
@@ -176,17 +283,15 @@ impl Reader<'_, '_> {
             };
             let read = read.map_err(|e| Error::system(self.file, "read", &e, "check the disk"))?;
             if read < length {
+                self.chunks(source, position)?;
                 return Ok(ended);
             }
             match opcode {
                 op::CHUNK => {
-                    let damaged = self.damaged;
-                    self.chunk(&body, position)?;
-                    if damaged == 0 && self.damaged > 0 {
-                        // What it declared is declared once more behind the data.
-                        self.declared_later(source)
-                            .map_err(|e| Error::system(self.file, "read", &e, "check the disk"))?;
-                    }
+                    let mut chunk = self.spare.pop().unwrap_or_default();
+                    chunk.position = position;
+                    std::mem::swap(&mut chunk.body, &mut body);
+                    self.waiting.push(chunk);
                 }
                 op::DATA_END => behind_data = true,
                 op::FOOTER => return Ok(End::Whole),
@@ -206,9 +311,14 @@ impl Reader<'_, '_> {
         }
     }
 
-    /// Schemas and channels outside chunks from here to the end; the position stays.
-    fn declared_later(&mut self, source: &mut (impl Read + Seek)) -> std::io::Result<()> {
+    /// Schemas and channels outside chunks from byte `from` to the end; the position stays.
+    fn declared_later(
+        &mut self,
+        source: &mut (impl Read + Seek),
+        from: u64,
+    ) -> std::io::Result<()> {
         let start = source.stream_position()?;
+        source.seek(SeekFrom::Start(from))?;
         let mut body = Vec::new();
         let mut head = [0; RECORD_HEAD];
         while source.read_exact(&mut head).is_ok() {
@@ -234,85 +344,39 @@ impl Reader<'_, '_> {
         Ok(())
     }
 
-    /// A chunk; damage in it is counted.
-    fn chunk(&mut self, body: &[u8], position: u64) -> Result<()> {
-        self.chunks += 1;
-        let mut unpacked = std::mem::take(&mut self.unpacked);
-        let result = self
-            .unpack(body, &mut unpacked)
-            .and_then(|records| self.records_of_chunk(records));
-        self.unpacked = unpacked;
-        match result {
-            Ok(()) => Ok(()),
-            Err(Damage::File(error)) => Err(error),
-            Err(Damage::Chunk(problem)) => {
-                self.damaged += 1;
-                self.first_damage
-                    .get_or_insert_with(|| format!("at byte {position}, {problem}"));
-                Ok(())
-            }
-        }
+    /// Whether no further chunk should wait.
+    fn full(&self) -> bool {
+        let claims = self.waiting.iter().map(Chunk::claim);
+        self.waiting.len() >= SIDE_BY_SIDE.0
+            || claims.fold(0, u64::saturating_add) >= SIDE_BY_SIDE.1
     }
 
-    /// The records of a chunk, unpacked into `unpacked` where they are packed.
-    fn unpack<'c>(
-        &self,
-        body: &'c [u8],
-        unpacked: &'c mut Vec<u8>,
-    ) -> std::result::Result<&'c [u8], Damage> {
-        let Ok(Record::Chunk {
-            header,
-            data: Cow::Borrowed(data),
-        }) = parse(op::CHUNK, body)
-        else {
-            return Err(Damage::Chunk("its header is broken".into()));
-        };
-        let size = header.uncompressed_size;
-        if size > MAX_RECORD {
-            return Err(self
-                .refuse(
-                    format!("a chunk claims {size} bytes when unpacked, the limit is {MAX_RECORD}"),
-                    "record it again with smaller chunks",
-                )
-                .into());
-        }
-        let damaged = |e: std::io::Error| Damage::Chunk(format!("cannot be unpacked: {e}"));
-        let records: &'c [u8] = match header.compression.as_str() {
-            "" => data,
-            "zstd" | "lz4" => {
-                unpacked.clear();
-                unpacked.reserve_exact(size as usize);
-                if header.compression == "zstd" {
-                    zstd::bulk::Decompressor::new()
-                        .and_then(|mut zstd| zstd.decompress_to_buffer(data, unpacked))
-                        .map_err(damaged)?;
-                } else {
-                    lz4_flex::frame::FrameDecoder::new(data)
-                        .take(size + 1)
-                        .read_to_end(unpacked)
-                        .map_err(damaged)?;
+    /// The chunks that wait, unpacked on all cores, in their order; damage in them is counted. The next record begins at byte `next`.
+    fn chunks(&mut self, source: &mut (impl Read + Seek), next: u64) -> Result<()> {
+        let mut waiting = std::mem::take(&mut self.waiting);
+        let file = self.file;
+        let unpacked: Vec<std::result::Result<(), Damage>> =
+            waiting.par_iter_mut().map(|c| c.unpack(file)).collect();
+        for (chunk, unpacked) in waiting.iter().zip(unpacked) {
+            self.chunks += 1;
+            match unpacked.and_then(|()| self.records_of_chunk(chunk.records())) {
+                Ok(()) => {}
+                Err(Damage::File(error)) => return Err(error),
+                Err(Damage::Chunk(problem)) => {
+                    self.damaged += 1;
+                    let at = chunk.position;
+                    self.first_damage
+                        .get_or_insert_with(|| format!("at byte {at}, {problem}"));
+                    if self.damaged == 1 {
+                        // What it declared is declared once more behind the data.
+                        self.declared_later(source, next)
+                            .map_err(|e| Error::system(self.file, "read", &e, "check the disk"))?;
+                    }
                 }
-                &unpacked[..]
             }
-            other => {
-                return Err(self
-                    .refuse(
-                        format!("a chunk is compressed with `{other}`, known are zstd and lz4"),
-                        "`mcap compress` writes it anew",
-                    )
-                    .into());
-            }
-        };
-        if records.len() as u64 != size {
-            return Err(Damage::Chunk(format!(
-                "it unpacks to {} bytes and claims {size}",
-                records.len()
-            )));
         }
-        if header.uncompressed_crc != 0 && crc32fast::hash(records) != header.uncompressed_crc {
-            return Err(Damage::Chunk("its checksum is wrong".into()));
-        }
-        Ok(records)
+        self.spare.append(&mut waiting);
+        Ok(())
     }
 
     fn records_of_chunk(&mut self, mut rest: &[u8]) -> std::result::Result<(), Damage> {

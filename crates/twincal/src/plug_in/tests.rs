@@ -1,0 +1,85 @@
+//! The fixed point on a regression whose answer is known in closed form.
+
+use super::*;
+use crate::likelihood::{AUTO_SHAPE, NoiseUncertainty};
+use crate::observations::{JointObservations, Observations};
+use crate::posterior::random::Random;
+use crate::prior::Inclusion;
+use crate::term::Family;
+
+const ROWS: usize = 300;
+
+/// `y = 1000 x + ε`, x and ε standard normal.
+fn log() -> Observations {
+    let mut random = Random::new(7, 0);
+    let x: Vec<f64> = (0..ROWS).map(|_| random.normal()).collect();
+    let y: Vec<f64> = x.iter().map(|x| 1000.0 * x + random.normal()).collect();
+    Observations {
+        log: "log".into(),
+        time: (0..ROWS).map(|row| 0.01 * row as f64).collect(),
+        starts: vec![0],
+        q: vec![vec![0.0; ROWS]],
+        qd: vec![vec![1.0; ROWS]],
+        qdd: vec![vec![0.0; ROWS]],
+        joints: vec![JointObservations {
+            columns: vec![0],
+            x,
+            measured: y.clone(),
+            nominal: vec![0.0; ROWS],
+            y,
+            standstill: vec![false; ROWS],
+            weight: Vec::new(),
+            spread: Vec::new(),
+        }],
+    }
+}
+
+/// One column explains all but a millionth of the squares. What is left is noise, and E[φ] = (b0 + RSS/2)/(a0 + n/2 − 1) with b0 a
+/// thousandth of the noise must be RSS/(n − 2): no row more than there is.
+#[test]
+fn the_automatic_prior_adds_no_noise_where_nearly_all_is_explained() {
+    let log = log();
+    let joint = &log.joints[0];
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let beta = dot(&joint.x, &joint.y) / dot(&joint.x, &joint.x);
+    let left: f64 = (joint.x.iter().zip(&joint.y))
+        .map(|(x, y)| (y - beta * x) * (y - beta * x))
+        .sum();
+    let columns = Columns {
+        names: vec!["x".into()],
+        component: vec![0],
+        family: vec![0],
+        families: vec![Family::User],
+        prior_sd: vec![None],
+        lower: vec![f64::NEG_INFINITY],
+        forced: Vec::new(),
+    };
+    let prior = PriorSettings {
+        scaled_variance: Auto::Auto,
+        inclusion: Some(Inclusion::Probability(0.5)),
+        noise: None,
+        families: Vec::new(),
+        forced: Vec::new(),
+    };
+    let settings = FitSettings {
+        noise: NoiseSettings {
+            model: NoiseModel::Iid,
+            per_joint: true,
+            robust: false,
+            varies_with_speed: false,
+            uncertainty: NoiseUncertainty::PlugIn,
+        },
+        prior: &prior,
+    };
+    let parts = [log.whole()];
+    let first = start(&parts, &columns, &prior);
+    let fit = fit(&parts, &columns, settings, &first, Moving::All, None).unwrap();
+    // The slab adds β²/(2v) to b_n: less than one unit of noise at the scale that it learns.
+    let exact = left / (ROWS as f64 + 2.0 * AUTO_SHAPE - 2.0);
+    assert!(fit.converged && fit.posterior.inclusion[0] > 0.999);
+    assert!(
+        (fit.posterior.noise / exact - 1.0).abs() < 0.01,
+        "{} instead of {exact}",
+        fit.posterior.noise
+    );
+}
