@@ -76,11 +76,15 @@ impl LogInput {
         };
         for (path, name) in paths.iter().zip(display_names(paths)) {
             progress.step(&format!("reading {}", path.to_string_lossy()));
-            let (log, checksum) = rayon::join(
-                || read_log(path, robot, &settings.options(path)),
-                || sha256_of_log(path),
-            );
-            let (recording, findings) = log?;
+            let read = || read_log(path, robot, &settings.options(path));
+            let (log, checksum) = if path.is_file() || path.is_dir() {
+                let (log, checksum) = rayon::join(read, || sha256_of_log(path));
+                (log?, checksum)
+            } else {
+                // A pipe can be read once, and may have no end.
+                (read()?, sha256_of_log(path))
+            };
+            let (recording, findings) = log;
             rows += recording.time.len() as u64;
             let bytes = rows.saturating_mul(robot.dof() as u64 * 8 * (DOUBLES_PER_SAMPLE + terms));
             memory::require(

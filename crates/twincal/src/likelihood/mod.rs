@@ -293,10 +293,13 @@ const LEAST_NOISE: f64 = 1e-4;
 /// finds. mean(y²) in its place is no weak prior where candidates explain nearly all: 300 effective rows whose noise is
 /// 1/200 of the residual torque would get a variance 27 % too large.
 pub fn auto_scale(noise: f64, unexplained: f64) -> f64 {
-    AUTO_SHAPE * noise.max(LEAST_NOISE * unexplained)
+    AUTO_SHAPE * noise.max(LEAST_NOISE * unexplained).max(ROUNDING)
 }
+
+/// Mean square of rounding in torque, (N·m)²: below it there is nothing to explain.
+const ROUNDING: f64 = 1e-24;
 
 /// Mean square of the residual torque, with a floor at rounding: an exactly perfect model must not make b0 zero.
 fn scale_of_residual(mean_square: f64) -> f64 {
-    mean_square.max(1e-24)
+    mean_square.max(ROUNDING)
 }
