@@ -331,7 +331,7 @@ fn smoothed(
     } else {
         piece.grid_rows[inner].to_vec()
     };
-    let logged = (piece.resampled() || piece.every > 1 && kept.raw != Raw::None)
+    let logged = (kept.raw != Raw::None && (piece.resampled() || piece.every > 1))
         .then(|| logged_samples(ready, &time, piece, pipeline, kept));
     Some(Segment {
         time,

@@ -272,3 +272,36 @@ fn white_noise_gain_is_what_white_noise_shows() {
     let sd = (out.iter().map(|v| v * v).sum::<f64>() / out.len() as f64).sqrt();
     assert!((sd / pipeline.noise_gain(1000.0) - 1.0).abs() < 0.2, "{sd}");
 }
+
+/// A log that was let go gives the same motion: slow, held at a coarser clock, and with an uneven clock.
+#[test]
+fn without_its_recording_a_log_is_smoothed_to_the_same_bits() {
+    let even = recording(100.0, 20.0, 0.1, 1e-5, false);
+    let fast = recording(1000.0, 20.0, 0.05, 1e-5, true);
+    let mut uneven = even.clone();
+    for (i, t) in uneven.time.iter_mut().enumerate() {
+        *t += 0.002 * (7.3 * i as f64).sin();
+    }
+    for (log, thinned, resampled) in [
+        (even, false, false),
+        (fast, true, false),
+        (uneven, false, true),
+    ] {
+        let pipeline = pipeline(&log);
+        let wider = Pipeline {
+            cutoff_hz: 1.4 * pipeline.cutoff_hz,
+            motion_cutoff_hz: 1.4 * pipeline.motion_cutoff_hz,
+            ..pipeline.clone()
+        };
+        let ready = || PreparedLog::new(joints(), &log, &pipeline).unwrap();
+        let (kept, said) = ready().align(&wider, Raw::None).unwrap();
+        let (alone, also) = ready().detached().align(&wider, Raw::None).unwrap();
+        assert_eq!((&kept, &said), (&alone, &also));
+        let (whole, _) = ready().align(&wider, Raw::All).unwrap();
+        let (kept, whole) = (&kept.segments[0], &whole.segments[0]);
+        assert_eq!((&kept.qdd, &kept.tau), (&whole.qdd, &whole.tau));
+        assert_eq!(kept.thinning() > 1, thinned);
+        assert_eq!(whole.logged.is_some(), thinned || resampled);
+        assert!(kept.logged.is_none());
+    }
+}
