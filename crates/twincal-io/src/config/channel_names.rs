@@ -109,8 +109,8 @@ pub struct ColumnsTable {
     pub time: Option<String>,
     /// What one tick of time is; default "s", for whole numbers in messages of a bag "ns".
     pub time_unit: Option<TimeUnit>,
-    /// Position column of each joint, by joint name, or one name for all joints; rad or m. "positions[:,2]" is a column of an
-    /// array of an NPZ file, "/topic:field.list[2]" a number in the messages of a bag.
+    /// Position column of each joint, by joint name, or one name for all joints; rad or m. `positions[:,2]` is a column of an
+    /// array of an NPZ file, `/topic:field.list[2]` a number in the messages of a bag.
     pub q: ChannelNames,
     /// Velocity column of each joint; rad/s or m/s.
     pub qd: ChannelNames,
