@@ -21,6 +21,8 @@ from math import exp, sqrt
 from pathlib import Path
 
 import numpy as np
+import pyarrow
+import pyarrow.parquet
 from scipy.signal import lfilter
 
 from acceptance import FRICTION, FRICTIONLESS, PROGRAM
@@ -71,8 +73,8 @@ def noise(world, rng, rows):
         white = rng.standard_normal((rows, 2))
         if time > 0:
             rho = exp(-1.0 / (LOGS["rate_hz"] * time))
-            start = (rho * rng.standard_normal((1, 2)),)  # stationary from the first sample on
-            white, _ = lfilter([sqrt(1 - rho * rho)], [1, -rho], white, axis=0, zi=start[0])
+            start = rho * rng.standard_normal((1, 2))  # stationary from the first sample on
+            white, _ = lfilter([sqrt(1 - rho * rho)], [1, -rho], white, axis=0, zi=start)
         total += sd * white
     hit = rng.random((rows, 2)) < world.outliers
     return np.where(hit, 20 * SD * rng.standard_normal((rows, 2)), total) * world.joints
@@ -92,9 +94,6 @@ def measure(seed, index):
             columns = log.columns()
             if not log.encoder_only:
                 columns = {name: x for name, x in columns.items() if not name.startswith("qdd")}
-            import pyarrow
-            import pyarrow.parquet
-
             pyarrow.parquet.write_table(pyarrow.table(columns), folder / f"{log.role}.parquet")
         (folder / "twincal.toml").write_text((FRICTION if world.friction else PLAIN) + world.config)
         command = [PROGRAM, "fit", folder / "train.parquet", "--heldout", folder / "heldout.parquet", "--model",

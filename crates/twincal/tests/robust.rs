@@ -68,6 +68,47 @@ fn case_92_robust_fits_are_sharper_and_their_intervals_hold() {
     }
 }
 
+/// A log that is long enough, without its last 30 % not: what is left out is told and not scored. Intervals from a handful of rows would
+/// hold everything.
+#[test]
+fn a_fold_of_a_handful_of_rows_is_told_and_not_scored() {
+    let with_rows = |rows: usize| {
+        let mut log = log(0.3, 0.0, &mut Random::new(11, 0));
+        let step = log.time.len() / rows;
+        let few = |values: &mut Vec<f64>| {
+            *values = values.iter().step_by(step).take(rows).copied().collect()
+        };
+        few(&mut log.time);
+        for joint in &mut log.joints {
+            few(&mut joint.q);
+            let others = [&mut joint.qd, &mut joint.qdd, &mut joint.tau];
+            others.into_iter().flatten().for_each(few);
+        }
+        let mut settings = CalibrationSettings::default();
+        settings.library.terms = vec!["sin(q1 - q2)".into()];
+        settings.library.families = vec![Family::Payload];
+        settings.library.generic = Some(false);
+        settings.signal.cutoff_hz = Auto::Value(0.0);
+        let nominal = two_link::arm(2.0).expect("an arm");
+        let none: &[Recording] = &[];
+        calibrate(&nominal, vec![log], none, &settings, &|_| {}).expect("a calibration")
+    };
+    for (rows, scored) in [(13, false), (200, true)] {
+        let result = with_rows(rows);
+        let said = result
+            .findings
+            .iter()
+            .filter(|f| f.code == "heldout_not_scored");
+        assert_eq!(said.count(), usize::from(!scored), "{rows} rows");
+        let joint = &result.validation.filtered.joints[0];
+        assert_eq!(
+            joint.rows > 0 && joint.mean_width95 < 2.0,
+            scored,
+            "{joint:?}"
+        );
+    }
+}
+
 #[test]
 fn robust_needs_the_tempered_likelihood() {
     let mut settings = CalibrationSettings::default();

@@ -256,7 +256,7 @@ fn rows_of_one_smooth_motion_are_those_of_the_weak_form() {
                 "{sd:e} rad, motion up to {motion_cutoff_hz} Hz: errors {strong:.3e} and {weak:.3e} N m, {apart:.3e} apart"
             );
             // 0.28 N m per 1e-3 rad: the noise is seen, and not drowned in something else.
-            assert!((150.0..450.0).contains(&(strong / sd)), "{told}");
+            assert!((270.0..295.0).contains(&(strong / sd)), "{told}");
             assert!((weak / strong - 1.0).abs() < 1e-3, "{told}");
             assert!(apart < 1e-3 * strong, "{told}");
         }

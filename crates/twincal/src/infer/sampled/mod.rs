@@ -176,7 +176,6 @@ fn groups(given: &Given<'_>) -> (Vec<usize>, Vec<(f64, f64)>) {
                     (rows + joint.n, squares + joint.s0.at(last, last))
                 });
                 let mean = if rows > 0.0 { squares / rows } else { 1.0 };
-                let mean = mean.max(1e-24);
                 let found = match given.plug_in.noise {
                     phi if phi > 0.0 && given.noise.per_joint => phi / given.plug_in.weight[g],
                     phi if phi > 0.0 => phi,
