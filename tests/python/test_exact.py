@@ -5,6 +5,8 @@ coefficients, effective rows and slab scale are plug-ins of the fit: given those
 this one.
 """
 
+from itertools import product
+
 import arm
 import brute_force
 import candidates
@@ -91,6 +93,30 @@ def test_iid_one_variance(logs, tmp_path):
     phi, y = phi.reshape(-1, 12), y.ravel()
     slab = SLAB / np.mean(phi**2, axis=0)
     compare(result, *brute_force.posterior(phi, y, slab, brute_force.independent(0.2), A0, B0))
+
+
+def test_heredity(logs, tmp_path):
+    """Models with a child without its parent have no weight, the others share the prior: probabilities and evidence."""
+    pairs = {"cos(q1)": "q1^2", "qd1*qd2": "qd1^2", "qd1*qd2*cos(q2)": "qd1*qd2", "qd2^2": "cos(q2)"}
+    heredity = "heredity = { " + ", ".join(f'"{child}" = "{parent}"' for child, parent in pairs.items()) + " }\n"
+    result = fit(tmp_path, logs[1], HEAD + GIVEN + heredity + '[noise]\nmodel = "iid"\nper_joint = false\n')
+    assert result["prior"]["heredity"] == pairs
+    phi, y = columns_and_target(logs[0])
+    phi, y = phi.reshape(-1, 12), y.ravel()
+    slab = SLAB / np.mean(phi**2, axis=0)
+    index = [(TWELVE.index(child), TWELVE.index(parent)) for child, parent in pairs.items()]
+    urn = brute_force.independent(0.2)
+    alive = [np.array(z, bool) for z in product([0, 1], repeat=12) if all(z[p] or not z[c] for c, p in index)]
+    assert result["inference"]["models"] == len(alive) < 4096
+    share = np.logaddexp.reduce([urn(z) for z in alive])
+
+    def prior(z):
+        return urn(z) - share if all(z[p] or not z[c] for c, p in index) else -np.inf
+
+    pips, evidence, means = brute_force.posterior(phi, y, slab, prior, A0, B0)
+    free = brute_force.posterior(phi, y, slab, urn, A0, B0)[0]
+    assert np.abs(pips - free).max() > 0.01, "heredity changes nothing here"
+    compare(result, pips, evidence, means)
 
 
 def test_iid_given_weights(logs, tmp_path):

@@ -5,6 +5,7 @@
 
 use crate::error::{Error, Result};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use twincal::Finding;
 use twincal::calibrate::{
     Calibration, CompactTerm, ComponentSummary, Curve, Group, Halves, LikelihoodUsed, LogSummary,
@@ -88,6 +89,8 @@ struct PriorRow {
     inclusion: Inclusion,
     expected: Vec<ExpectedRow>,
     forced: Vec<String>,
+    /// Components that are in only where another is.
+    heredity: BTreeMap<String, String>,
     noise: NoisePriorRow,
 }
 
@@ -290,6 +293,7 @@ impl PriorRow {
                 .map(|&(family, components)| ExpectedRow { family, components })
                 .collect(),
             forced: prior.forced.clone(),
+            heredity: prior.heredity.iter().cloned().collect(),
             noise: NoisePriorRow {
                 shape: prior.shape,
                 scale: prior.scale,

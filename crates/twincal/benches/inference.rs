@@ -112,6 +112,7 @@ fn arm(size: usize) -> Problem {
         yy,
         names: base.names[..columns].to_vec(),
         prior: Prior {
+            parent: Vec::new(),
             slab: vec![10.0; columns],
             component: component[..columns].to_vec(),
             family: (0..size)

@@ -4,6 +4,8 @@ use crate::signal::Auto;
 use crate::term::Family;
 use serde::{Deserialize, Serialize};
 
+mod heredity;
+
 /// `[prior] inclusion`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -27,7 +29,14 @@ pub struct PriorSettings {
     pub families: Vec<(Family, f64)>,
     /// Names of components that are in, whatever the data say.
     pub forced: Vec<String>,
+    /// `(child, parent)`: the child is in only where its parent is. Components by name, or families by [`Family::word`], joint by
+    /// joint. `None`: [`HEREDITY`].
+    pub heredity: Option<Vec<(String, String)>>,
 }
+
+/// What is in only with what, unless the user says otherwise: the Stribeck effect and asymmetry are changes of Coulomb friction,
+/// which no nominal model here contains.
+pub const HEREDITY: [(&str, &str); 2] = [("asymmetry", "coulomb"), ("stribeck", "coulomb")];
 
 /// Factor on prior odds that settles a component: what the data say weighs nothing beside it (e^690).
 pub const SETTLED: f64 = 1e300;
@@ -35,7 +44,8 @@ pub const SETTLED: f64 = 1e300;
 /// The prior with every number filled in, for the K columns and C components of one problem.
 ///
 /// A component is in or out with all its columns: a payload (10 columns), a friction (1). Components are independent of
-/// each other but for the Beta–Binomial of their family.
+/// each other but for the Beta–Binomial of their family and for heredity: a model that holds a child without its parent has
+/// probability 0, and all others share what it would have had ([`Prior::log_admissible`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     /// v_k: `β_k | z_k=1, φ ~ N(0, φ v_k)` in the column's own units, K.
@@ -44,6 +54,8 @@ pub struct Prior {
     pub component: Vec<usize>,
     /// Family of each component (0..families), C.
     pub family: Vec<usize>,
+    /// Heredity: the component without which this one is never in, C; empty: none. No component is its own ancestor.
+    pub parent: Vec<Option<usize>>,
     /// r_f > 0: factor on the prior odds of the components of each family; 1 leaves them alone.
     pub odds: Vec<f64>,
     /// β_k ≥ lower_k (≤ 0, so that 0 is allowed); −∞: free, K. The slab is truncated there and normalised again.
@@ -71,6 +83,7 @@ impl Prior {
             odds: vec![1.0; families],
             slab,
             family,
+            parent: Vec::new(),
             inclusion,
             shape,
             scale,
@@ -82,6 +95,7 @@ impl Prior {
     pub fn settled(&self, inside: &[bool]) -> Self {
         Self {
             family: inside.iter().map(|&inside| usize::from(!inside)).collect(),
+            parent: Vec::new(),
             odds: vec![SETTLED, 1.0 / SETTLED],
             inclusion: Inclusion::Probability(0.5),
             ..self.clone()
@@ -146,21 +160,21 @@ impl Prior {
         }
     }
 
-    /// `ln p(z)` of a model by its number of components in each family.
+    /// `ln p(z)` of a model by its number of components in each family, [`Prior::log_admissible`] not taken off.
     pub fn log_model(&self, members: &[usize]) -> f64 {
-        let family = |f: usize, size: usize, included: usize| -> f64 {
-            let inside: f64 = (0..included).map(|i| self.next(f, i, i).0.ln()).sum();
-            inside
-                + (included..size)
-                    .map(|seen| self.next(f, included, seen).1.ln())
-                    .sum::<f64>()
-        };
         self.family_sizes()
             .iter()
             .zip(members)
             .enumerate()
-            .map(|(f, (&size, &included))| family(f, size, included))
+            .map(|(f, (&size, &included))| self.log_family(f, size, included))
             .sum()
+    }
+
+    /// `ln p` of one set of `included` of a family's `size` components.
+    pub(crate) fn log_family(&self, family: usize, size: usize, included: usize) -> f64 {
+        let inside: f64 = (0..included).map(|i| self.next(family, i, i).0.ln()).sum();
+        let outside = |seen| self.next(family, included, seen).1.ln();
+        inside + (included..size).map(outside).sum::<f64>()
     }
 }
 

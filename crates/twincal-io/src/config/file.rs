@@ -385,6 +385,9 @@ pub struct PriorTable {
     pub families: BTreeMap<String, f64>,
     /// Components that are in, whatever the data say, such as ["elbow.viscous"].
     pub forced: Option<Vec<String>>,
+    /// Heredity: what is in only where something else is, such as { stribeck = "coulomb", "sin(2*q2)" = "sin(q2)" }; families joint by
+    /// joint, or components by name. Default: { asymmetry = "coulomb", stribeck = "coulomb" }; {} binds nothing.
+    pub heredity: Option<BTreeMap<String, String>>,
 }
 
 /// The slab or "auto".

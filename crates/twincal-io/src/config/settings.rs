@@ -439,6 +439,10 @@ impl Config {
             noise,
             families: self.expected_families()?,
             forced: table.forced.clone().unwrap_or_default(),
+            heredity: table
+                .heredity
+                .clone()
+                .map(|pairs| pairs.into_iter().collect()),
         })
     }
 

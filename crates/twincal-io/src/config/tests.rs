@@ -110,6 +110,12 @@ fn prior_of_families_and_forced_components() {
     let prior = settings.calibration.prior;
     assert_eq!(prior.families, [(Family::Spring, 0.5), (Family::User, 2.0)]);
     assert_eq!(prior.forced, ["elbow.viscous"]);
+    assert_eq!(prior.heredity, None);
+    let text = "[prior]\nheredity = { stribeck = \"coulomb\", \"sin(2*q2)\" = \"sin(q2)\" }\n";
+    let settings = Config::parse("x", text).unwrap().settings().unwrap();
+    let pair = |child: &str, parent: &str| (child.to_owned(), parent.to_owned());
+    let both = vec![pair("sin(2*q2)", "sin(q2)"), pair("stribeck", "coulomb")];
+    assert_eq!(settings.calibration.prior.heredity, Some(both));
     let said = message("[prior]\nfamilies = { sprong = 0.5 }\n");
     assert!(
         said.contains("no family `sprong`") && said.contains("spring"),

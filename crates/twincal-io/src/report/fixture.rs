@@ -254,6 +254,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
             inclusion: Inclusion::ExpectedTerms(5.0),
             families: Vec::new(),
             forced: Vec::new(),
+            heredity: Vec::new(),
             shape: 1e-3,
             scale: 1e-4,
         },

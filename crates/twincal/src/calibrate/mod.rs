@@ -8,6 +8,7 @@ mod drift;
 mod groups;
 mod heavy_tails;
 mod held_out;
+mod heredity;
 mod outlook;
 mod prior_conflict;
 mod repeat;
@@ -56,6 +57,7 @@ use crate::signal::{
 use crate::term::{Family, Library, LibrarySettings};
 use crate::twin::Twin;
 use data::Data;
+use heredity::Named;
 use std::borrow::Cow;
 
 /// Everything a calibration can be told; each field is a table of `twincal.toml`.
@@ -95,6 +97,7 @@ impl Default for CalibrationSettings {
                 noise: None,
                 families: Vec::new(),
                 forced: Vec::new(),
+                heredity: None,
             },
             noise: NoiseSettings {
                 model: NoiseModel::Tempered,
@@ -386,7 +389,7 @@ fn estimate(
 /// The live columns with their components, families and bounds.
 ///
 /// # Errors
-/// [`Error::Setting`] if a component that is forced in has no column.
+/// [`Error::Setting`] if a component that is forced in has no column, or heredity makes no sense.
 fn columns_of(robot: &Robot, library: &Library, settings: &CalibrationSettings) -> Result<Columns> {
     let forced = &settings.prior.forced;
     let mut columns = Columns {
@@ -397,7 +400,9 @@ fn columns_of(robot: &Robot, library: &Library, settings: &CalibrationSettings) 
         prior_sd: library.prior_sds(),
         lower: Vec::new(),
         forced: Vec::new(),
+        parent: Vec::new(),
     };
+    let mut named = Vec::new();
     let mut unknown: Vec<&String> = forced.iter().collect();
     let mut last = None;
     for &index in library.columns() {
@@ -405,6 +410,10 @@ fn columns_of(robot: &Robot, library: &Library, settings: &CalibrationSettings) 
         if last != Some(term.component) {
             last = Some(term.component);
             let name = &library.components()[term.component].name;
+            named.push(Named {
+                name,
+                family: term.family,
+            });
             columns.forced.push(forced.contains(name));
             unknown.retain(|forced| *forced != name);
             let known = columns.families.iter().position(|f| *f == term.family);
@@ -421,6 +430,7 @@ fn columns_of(robot: &Robot, library: &Library, settings: &CalibrationSettings) 
             f64::NEG_INFINITY
         });
     }
+    columns.parent = heredity::parents(&named, settings.prior.heredity.as_deref())?;
     match unknown.first() {
         None => Ok(columns),
         Some(name) => Err(Error::Setting {

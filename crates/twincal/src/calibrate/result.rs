@@ -270,6 +270,9 @@ pub struct PriorUsed {
     /// Components that were forced in.
     #[serde(default)]
     pub forced: Vec<String>,
+    /// `(child, parent)` by name: components that are in only where another is.
+    #[serde(default)]
+    pub heredity: Vec<(String, String)>,
     /// a0.
     pub shape: f64,
     /// b0, (N·m)².

@@ -183,6 +183,7 @@ pub(super) fn summarise(
             inclusion: fit.problem.prior.inclusion,
             families: settings.prior.families.clone(),
             forced: settings.prior.forced.clone(),
+            heredity: heredity(library, columns, &fit.problem),
             shape: fit.problem.prior.shape,
             scale: fit.problem.prior.scale,
         },
@@ -207,6 +208,21 @@ pub(super) fn summarise(
             .collect(),
         findings: std::mem::take(findings),
     })
+}
+
+/// `(child, parent)` by name.
+fn heredity(library: &Library, columns: &Columns, problem: &Problem) -> Vec<(String, String)> {
+    let name = |component: usize| {
+        let column = columns.component.iter().position(|&c| c == component);
+        let term = column.map(|k| &library.terms()[library.columns()[k]]);
+        term.map_or_else(String::new, |t| {
+            library.components()[t.component].name.clone()
+        })
+    };
+    let parents = problem.prior.parent.iter().enumerate();
+    parents
+        .filter_map(|(child, parent)| parent.map(|parent| (name(child), name(parent))))
+        .collect()
 }
 
 /// A probability that is nobody's evidence.

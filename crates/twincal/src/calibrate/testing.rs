@@ -73,6 +73,7 @@ impl Regression {
             prior_sd: vec![None; 2],
             lower: vec![f64::NEG_INFINITY; 2],
             forced: Vec::new(),
+            parent: Vec::new(),
         }
     }
 
@@ -83,6 +84,7 @@ impl Regression {
             noise: None,
             families: Vec::new(),
             forced: Vec::new(),
+            heredity: None,
         }
     }
 

@@ -121,6 +121,14 @@ impl Bounds<'_> {
             certain.sure[block.component] = bound < least;
             certain.settled[block.component] = block.range().all(far);
         }
+        // What holds a child holds its parent.
+        for child in 0..certain.sure.len() {
+            let mut parent = self.prior.parent_of(child).filter(|_| certain.sure[child]);
+            while let Some(sure) = parent {
+                certain.sure[sure] = true;
+                parent = self.prior.parent_of(sure);
+            }
+        }
         certain
     }
 }
@@ -153,14 +161,18 @@ pub(super) fn none(prior: &Prior) -> Certain {
     }
 }
 
-/// Order of the components for the tree: certain ones, then the largest first; how many are certain.
+/// Order of the components for the tree: certain ones, then the largest first, those without kin last (the innermost loops ask
+/// nobody); how many are certain.
 pub(super) fn order(prior: &Prior, certain: &Certain) -> (Vec<usize>, usize) {
     let (columns, certain) = (prior.columns(), &certain.sure);
+    let children = prior.children();
+    let kin = |c: usize| prior.parent_of(c).is_some() || !children[c].is_empty();
     let mut order: Vec<usize> = (0..certain.len()).collect();
     order.sort_by_key(|&c| {
         (
             !certain[c],
             std::cmp::Reverse(columns[c].len()),
+            !kin(c),
             prior.family[c],
         )
     });

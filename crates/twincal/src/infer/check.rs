@@ -45,6 +45,24 @@ pub(super) fn check(problem: &Problem) -> Result<()> {
             remedy: "every column needs a component, every component a column and a family".into(),
         });
     }
+    let ancestors = |c: usize| {
+        std::iter::successors(prior.parent_of(c), |&p| prior.parent_of(p)).take(components + 1)
+    };
+    let known = prior.parent.is_empty() || prior.parent.len() == components;
+    if !known || prior.parent.iter().flatten().any(|&p| p >= components) {
+        return Err(Error::Setting {
+            key: "problem".into(),
+            problem: format!("{} parents for {components} components", prior.parent.len()),
+            remedy: "every component has one of the components for its parent, or none".into(),
+        });
+    }
+    if (0..components).any(|c| ancestors(c).any(|a| a == c)) {
+        return Err(Error::Setting {
+            key: "prior.heredity".into(),
+            problem: "a component is its own ancestor".into(),
+            remedy: "leave out one of the pairs that lead back to it".into(),
+        });
+    }
     if let Some(k) = (0..size).find(|&k| prior.lower[k].is_nan() || prior.lower[k] > 0.0) {
         return Err(Error::Setting {
             key: "prior.lower".into(),

@@ -9,6 +9,7 @@ mod check;
 mod exact;
 mod exchanges;
 mod gibbs;
+mod kin;
 mod moments;
 mod pivot;
 mod sampled;

@@ -159,6 +159,7 @@ impl Standard {
         let unit = (2.0 * full_scale).sqrt();
         let shape = prior.shape + 0.5 * problem.n;
         let log_constant = problem.log_constant
+            - prior.log_admissible()
             - 0.5 * problem.n * (2.0 * std::f64::consts::PI).ln()
             + prior.shape * b0.ln()
             - ln_gamma(prior.shape)

@@ -142,6 +142,7 @@ pub(super) fn acting(
         slab: (0..size).map(|k| 1.0 + 0.2 * k as f64).collect(),
         component,
         family: (0..sizes.len()).map(|c| [0, 1, 0, 2][c % 4]).collect(),
+        parent: Vec::new(),
         odds: vec![1.0, 0.3, 4.0],
         lower: vec![f64::NEG_INFINITY; size],
         inclusion: Inclusion::ExpectedTerms(0.3 * sizes.len() as f64),
@@ -160,7 +161,19 @@ pub(super) fn acting(
     Grouped { problem, x, y }
 }
 
+impl Grouped {
+    /// The same with heredity: (child, parent).
+    pub(super) fn with_parents(mut self, pairs: &[(usize, usize)]) -> Self {
+        let prior = &mut self.problem.prior;
+        prior.parent = vec![None; prior.components()];
+        pairs.iter().for_each(|&(c, p)| prior.parent[c] = Some(p));
+        self
+    }
+}
+
 /// Posterior of every set of components by multivariate t densities of the rows: no Gram matrix, no Schur complement.
+///
+/// Sets with a child without its parent have none, and the others share the prior.
 ///
 /// ```text
 /// y | z ~ t with 2 a0 degrees of freedom, location 0, scale (b0/a0)(1 + X_z V_z X_zᵀ)
@@ -181,8 +194,16 @@ impl Densities {
         let (problem, prior) = (&data.problem, &data.problem.prior);
         let (size, rows, count) = (problem.xy.len(), data.y.len(), prior.components());
         let shape = prior.shape + 0.5 * rows as f64;
-        let mut models = Vec::new();
+        let (mut models, mut share) = (Vec::new(), 0.0);
+        let orphan = |set: u32, c: usize| {
+            let parent = prior.parent.get(c).copied().flatten();
+            set >> c & 1 == 1 && parent.is_some_and(|p| set >> p & 1 == 0)
+        };
         for set in 0u32..1 << count {
+            if (0..count).any(|c| orphan(set, c)) {
+                models.push((f64::NEG_INFINITY, set, vec![0.0; size], vec![0.0; size]));
+                continue;
+            }
             let members: Vec<usize> = (0..size)
                 .filter(|&k| set >> prior.component[k] & 1 == 1)
                 .collect();
@@ -206,6 +227,7 @@ impl Densities {
             (0..count)
                 .filter(|&c| set >> c & 1 == 1)
                 .for_each(|c| families[prior.family[c]] += 1);
+            share += prior.log_model(&families).exp();
             let log = prior.log_model(&families) + problem.log_constant + ln_gamma(shape)
                 - ln_gamma(prior.shape)
                 - 0.5 * rows as f64 * (2.0 * std::f64::consts::PI * prior.scale).ln()
@@ -227,7 +249,7 @@ impl Densities {
         let top = models.iter().map(|m| m.0).fold(f64::NEG_INFINITY, f64::max);
         let total: f64 = models.iter().map(|m| (m.0 - top).exp()).sum();
         let mut out = Self {
-            log_evidence: top + total.ln(),
+            log_evidence: top + total.ln() - share.ln(),
             pip: vec![0.0; count],
             mean: vec![0.0; size],
             sd: vec![0.0; size],

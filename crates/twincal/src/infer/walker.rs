@@ -6,6 +6,7 @@
 //!
 //! What [`super::standard::Reduced`] took out of the tableau counts in every term.
 
+use super::kin::Kin;
 use super::pivot::Pivot;
 use super::standard::Standard;
 use super::tableau::Tableau;
@@ -17,6 +18,7 @@ pub(super) struct Walker<'a> {
     pub(super) standard: &'a Standard,
     pub(super) tableau: Tableau<'a>,
     prior: &'a Prior,
+    kin: Option<Kin>,
     /// Members and size of each family.
     members: Vec<usize>,
     sizes: Vec<usize>,
@@ -38,13 +40,24 @@ impl<'a> Walker<'a> {
             standard,
             tableau: Tableau::new(standard),
             prior,
+            kin: Kin::new(standard, prior),
             members: standard.held.clone(),
             sizes: prior.family_sizes(),
             log_slab: standard.log_held,
         }
     }
 
-    /// ln of the present model's weight.
+    /// Whether moving a component changes what others may do.
+    pub(super) fn has_kin(&self) -> bool {
+        self.kin.is_some()
+    }
+
+    /// Number of families.
+    pub(super) fn families(&self) -> usize {
+        self.members.len()
+    }
+
+    /// ln of the present model's weight; it must be one that heredity allows.
     pub(super) fn log_weight(&self) -> f64 {
         self.prior.log_model(&self.members) + self.log_slab
             - self.standard.shape * self.tableau.excess.ln_1p()
@@ -81,9 +94,21 @@ impl<'a> Walker<'a> {
         }
     }
 
-    /// A priori, how much likelier a component is where it is not; the slab's mass within the bounds included.
+    /// A priori, how much likelier a component is where it is not; the slab's mass within the bounds included. 0 where heredity
+    /// forbids the move.
     #[inline(always)]
     pub(super) fn flip_odds(&self, block: usize) -> f64 {
+        if let Some(kin) = &self.kin
+            && !kin.may_flip(&self.tableau, block)
+        {
+            return 0.0;
+        }
+        self.free_odds(block)
+    }
+
+    /// [`Walker::flip_odds`] without heredity.
+    #[inline(always)]
+    fn free_odds(&self, block: usize) -> f64 {
         let own = &self.standard.blocks[block];
         let inside = self.tableau.holds(block);
         let others = self.members[own.family] - usize::from(inside);
@@ -111,10 +136,15 @@ impl<'a> Walker<'a> {
             &self.standard.blocks[leaving],
             &self.standard.blocks[entering],
         );
+        if let Some(kin) = &self.kin
+            && !kin.may_exchange(&self.tableau, leaving, entering)
+        {
+            return 0.0;
+        }
         if out.family == into.family {
             into.factor / out.factor
         } else {
-            self.flip_odds(leaving) * self.flip_odds(entering)
+            self.free_odds(leaving) * self.free_odds(entering)
         }
     }
 
@@ -122,6 +152,11 @@ impl<'a> Walker<'a> {
     pub(super) fn exchange_gain(&self, step: &Step) -> (f64, f64, Pivot) {
         let pivot = Pivot::new(&self.tableau, &step.leaving, &step.entering);
         let (misfit, after) = self.misfits(pivot.change);
+        if let Some(kin) = &self.kin
+            && !kin.may_take(&self.tableau, step)
+        {
+            return (f64::NEG_INFINITY, after - 1.0, pivot);
+        }
         let mut members = self.members.clone();
         let mut log_factor = 0.0;
         for &block in &step.leaving {

@@ -131,9 +131,16 @@ pub struct Columns {
     pub lower: Vec<f64>,
     /// Components that are in, whatever the data say; empty: none, C.
     pub forced: Vec<bool>,
+    /// Component without which each is never in; empty: none, C.
+    pub parent: Vec<Option<usize>>,
 }
 
 impl Columns {
+    /// Component without which this one is never in.
+    pub fn parent_of(&self, component: usize) -> Option<usize> {
+        self.parent.get(component).copied().flatten()
+    }
+
     /// Index in `families` of a column's family.
     pub fn family_of(&self, column: usize) -> usize {
         self.family[self.component[column]]
@@ -268,6 +275,7 @@ pub fn assemble(
             slab,
             component: columns.component.clone(),
             family: families,
+            parent: columns.parent.clone(),
             odds,
             lower: columns.lower.clone(),
             inclusion,

@@ -53,6 +53,7 @@ fn the_automatic_prior_adds_no_noise_where_nearly_all_is_explained() {
         prior_sd: vec![None],
         lower: vec![f64::NEG_INFINITY],
         forced: Vec::new(),
+        parent: Vec::new(),
     };
     let prior = PriorSettings {
         scaled_variance: Auto::Auto,
@@ -60,6 +61,7 @@ fn the_automatic_prior_adds_no_noise_where_nearly_all_is_explained() {
         noise: None,
         families: Vec::new(),
         forced: Vec::new(),
+        heredity: None,
     };
     let settings = FitSettings {
         noise: NoiseSettings {

@@ -73,6 +73,7 @@ impl Data {
             prior_sd: vec![None; self.columns],
             lower: vec![f64::NEG_INFINITY; self.columns],
             forced: Vec::new(),
+            parent: Vec::new(),
         };
         let mut plug_in = PlugIn::start(2, 2, 30.0);
         plug_in.weight = weight.to_vec();
@@ -82,6 +83,7 @@ impl Data {
             noise: None,
             families: Vec::new(),
             forced: Vec::new(),
+            heredity: None,
         };
         assemble(gram, &columns, &plug_in, &settings).expect("a possible prior")
     }

@@ -79,7 +79,7 @@ pub(super) fn sum(problem: &Problem, sure: &Certain) -> Result<Posterior> {
         listed,
     )?;
     let log_evidence = standard.log_evidence(weight.ln() - tree::LOG_REFERENCE);
-    let models = 1u64.checked_shl(order.len() as u32).unwrap_or(u64::MAX);
+    let models = problem.prior.admissible_models();
     Ok(posterior(
         &standard,
         &averages,

@@ -38,6 +38,7 @@ pub(super) fn plan<S: Simd>(about: Root<'_>) -> Plan<S::f64s> {
     let lane_components = S::F64_LANES.ilog2() as usize;
     let free = standard.blocks.len() - certain;
     let counters = counters(about, lane_components);
+    let kin = Kin::new(about, lane_components);
     let mut levels = Vec::new();
     let mut top = Vec::new();
     for (index, block) in standard.blocks.iter().enumerate() {
@@ -71,13 +72,20 @@ pub(super) fn plan<S: Simd>(about: Root<'_>) -> Plan<S::f64s> {
                 .clone()
                 .map(|count| {
                     from_lanes(|lane| match first {
+                        true if !kin.may_enter(index, lane) => 0.0,
                         true => factor(lane, count).0 * block.factor * root,
                         false => root,
                     })
                 })
                 .collect();
             let exclude: Vec<S::f64s> = counts
-                .map(|count| from_lanes(|lane| if first { factor(lane, count).1 } else { 1.0 }))
+                .map(|count| {
+                    from_lanes(|lane| match first {
+                        true if !kin.may_stay_out(index, lane) => 0.0,
+                        true => factor(lane, count).1,
+                        false => 1.0,
+                    })
+                })
                 .collect();
             if in_lanes {
                 top.push(Top {
@@ -96,6 +104,8 @@ pub(super) fn plan<S: Simd>(about: Root<'_>) -> Plan<S::f64s> {
                 mask: if first { mask } else { 0 },
                 step: u32::from(first && !in_lanes) << shift,
                 bit: number.map_or(0, |number| 1 << number),
+                needs: kin.needs(index),
+                bound_by: kin.bound_by(index),
                 choice: match (number, first) {
                     (None, _) => Choice::Certain,
                     (_, true) => Choice::Free,
@@ -121,6 +131,8 @@ pub(super) fn plan<S: Simd>(about: Root<'_>) -> Plan<S::f64s> {
             mask: 0,
             step: 0,
             bit: 1 << filler,
+            needs: 0,
+            bound_by: 0,
             choice: Choice::Free,
             left: 0,
         });
@@ -130,7 +142,7 @@ pub(super) fn plan<S: Simd>(about: Root<'_>) -> Plan<S::f64s> {
     let written_out = levels
         .iter()
         .take(WRITTEN_OUT.min(padded - top.len()))
-        .take_while(|level| level.choice == Choice::Free)
+        .take_while(|level| level.choice == Choice::Free && level.needs == 0 && level.bound_by == 0)
         .count();
     let noise = Some(standard.noise_factor())
         .filter(|x| x.is_finite())
@@ -145,6 +157,70 @@ pub(super) fn plan<S: Simd>(about: Root<'_>) -> Plan<S::f64s> {
         },
         top,
         padded,
+    }
+}
+
+/// Heredity in the tree: of a parent and its child, the one that is decided later is bound by the other.
+struct Kin {
+    /// By place in `standard.blocks`, those decided earlier only.
+    parent: Vec<Option<usize>>,
+    children: Vec<Vec<usize>>,
+    certain: usize,
+    lane_components: usize,
+}
+
+impl Kin {
+    fn new(about: Root<'_>, lane_components: usize) -> Self {
+        let blocks = &about.standard.blocks;
+        let (mut parent, mut children) = (vec![None; blocks.len()], vec![Vec::new(); blocks.len()]);
+        for (child, block) in blocks.iter().enumerate() {
+            let above = about.prior.parent_of(block.component);
+            let place = above.and_then(|p| blocks.iter().position(|b| b.component == p));
+            match place {
+                Some(p) if p < child => parent[child] = Some(p),
+                Some(p) => children[p].push(child),
+                None => {}
+            }
+        }
+        Self {
+            parent,
+            children,
+            certain: about.certain,
+            lane_components,
+        }
+    }
+
+    /// Whether a lane holds a component; `None` if it is decided below the lanes.
+    fn in_lane(&self, index: usize, lane: usize) -> Option<bool> {
+        let Some(number) = index.checked_sub(self.certain) else {
+            return Some(true);
+        };
+        (number < self.lane_components).then_some(lane >> number & 1 == 1)
+    }
+
+    fn may_enter(&self, index: usize, lane: usize) -> bool {
+        self.parent[index].is_none_or(|p| self.in_lane(p, lane).unwrap_or(true))
+    }
+
+    fn may_stay_out(&self, index: usize, lane: usize) -> bool {
+        let held = |&child: &usize| self.in_lane(child, lane).unwrap_or(false);
+        !self.children[index].iter().any(held)
+    }
+
+    /// Bit of a component that is decided below the lanes.
+    fn bit(&self, index: usize) -> u32 {
+        match self.in_lane(index, 0) {
+            None => 1 << (index - self.certain),
+            Some(_) => 0,
+        }
+    }
+
+    fn needs(&self, index: usize) -> u32 {
+        self.parent[index].map_or(0, |p| self.bit(p))
+    }
+
+    fn bound_by(&self, index: usize) -> u32 {
+        self.children[index].iter().map(|&c| self.bit(c)).sum()
     }
 }
 

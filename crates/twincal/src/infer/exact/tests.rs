@@ -1,7 +1,7 @@
 //! The tree against a plain loop over all models by another route: one Cholesky factorisation each, uncentred.
 
 use super::*;
-use crate::infer::testing::{Densities, acting, grouped, problem};
+use crate::infer::testing::{Densities, Grouped, acting, grouped, problem};
 use crate::linear_algebra::Cholesky;
 use crate::prior::Inclusion;
 use statrs::function::gamma::ln_gamma;
@@ -440,30 +440,68 @@ fn components_equal_multivariate_t_densities() {
     for (seed, sizes) in cases.iter().enumerate() {
         for (rows, interleaved) in [(30, false), (45, true), (7, true)] {
             let data = grouped(seed as u64, sizes, rows, interleaved);
-            let (got, truth) = (enumerate(&data.problem).unwrap(), Densities::new(&data));
-            for k in 0..data.problem.xy.len() {
-                let pip = truth.pip[data.problem.prior.component[k]];
-                assert!(
-                    (got.inclusion[k] - pip).abs() < 1e-9,
-                    "{sizes:?} {rows}: PIP {k}"
-                );
-                let off = (got.mean[k] - truth.mean[k]).abs();
-                assert!(off < 1e-8 * truth.sd[k], "{sizes:?} {rows}: mean {k}");
-                let off = (got.sd[k] / truth.sd[k] - 1.0).abs();
-                assert!(off < 1e-6, "{sizes:?} {rows}: sd {k}");
-            }
-            let off = got.log_evidence.unwrap() - truth.log_evidence;
-            assert!(off.abs() < 1e-9 * truth.log_evidence.abs(), "{off}");
-            for model in &got.models {
-                let holds = |c: usize| {
-                    let k = data.problem.prior.component.iter().position(|&d| d == c);
-                    k.is_some_and(|k| model.members.contains(&(k as u32)))
-                };
-                let set: usize = (0..sizes.len()).filter(|&c| holds(c)).map(|c| 1 << c).sum();
-                let off = model.weight * got.models_mass - truth.weights[set];
-                assert!(off.abs() < 1e-9, "{sizes:?} {rows}: model {set:b}");
-            }
+            agrees_with_densities(&data, &format!("{sizes:?} {rows}"));
         }
+    }
+}
+
+/// Heredity: children before and after their parents, chains, several children, in lanes and below, of one column and of more.
+#[test]
+fn heredity_equals_multivariate_t_densities() {
+    type Case<'a> = (&'a [usize], &'a [(usize, usize)]);
+    let cases: [Case<'_>; 6] = [
+        (&[1, 2], &[(1, 0)]),
+        (&[1; 8], &[(0, 7), (6, 1), (2, 1), (5, 2)]),
+        (&[2, 2, 1, 4, 1], &[(0, 4), (4, 3), (1, 3)]),
+        (&[1; 10], &[(9, 0), (0, 5), (5, 2), (2, 8)]),
+        (&[1, 6, 1, 1, 1, 4, 1], &[(1, 0), (0, 2), (3, 5), (4, 5)]),
+        (&[1; 7], &[(0, 1), (2, 1), (3, 1), (4, 1), (5, 1)]),
+    ];
+    for (seed, (sizes, pairs)) in cases.into_iter().enumerate() {
+        let orphans = |set: u64| {
+            let orphan = |&&(c, p): &&(usize, usize)| set >> c & 1 == 1 && set >> p & 1 == 0;
+            pairs.iter().filter(orphan).count()
+        };
+        let models = (0..1 << sizes.len())
+            .filter(|&set| orphans(set) == 0)
+            .count() as u64;
+        for rows in [7, 40] {
+            let data = grouped(60 + seed as u64, sizes, rows, true).with_parents(pairs);
+            agrees_with_densities(&data, &format!("{sizes:?} {pairs:?} {rows}"));
+            let method = enumerate(&data.problem).unwrap().method;
+            assert_eq!(method, Method::Exact { models });
+        }
+    }
+    let sizes = [10, 6, 4, 4, 1, 6, 1, 4];
+    let data = acting(3, &sizes, 150, true, 2.0).with_parents(&[(0, 4), (3, 6), (7, 2), (5, 3)]);
+    agrees_with_densities(&data, "with certain components");
+}
+
+#[track_caller]
+fn agrees_with_densities(data: &Grouped, what: &str) {
+    let prior = &data.problem.prior;
+    let (got, truth) = (enumerate(&data.problem).unwrap(), Densities::new(data));
+    for k in 0..data.problem.xy.len() {
+        let pip = truth.pip[data.problem.prior.component[k]];
+        assert!((got.inclusion[k] - pip).abs() < 1e-9, "{what}: PIP {k}");
+        let off = (got.mean[k] - truth.mean[k]).abs();
+        assert!(off < 1e-8 * truth.sd[k], "{what}: mean {k}");
+        let off = (got.sd[k] / truth.sd[k] - 1.0).abs();
+        assert!(off < 1e-6, "{what}: sd {k}");
+    }
+    let off = got.log_evidence.unwrap() - truth.log_evidence;
+    assert!(off.abs() < 1e-9 * truth.log_evidence.abs(), "{off}");
+    for model in &got.models {
+        let holds = |c: usize| {
+            let k = data.problem.prior.component.iter().position(|&d| d == c);
+            k.is_some_and(|k| model.members.contains(&(k as u32)))
+        };
+        let set: usize = (0..prior.components())
+            .filter(|&c| holds(c))
+            .map(|c| 1 << c)
+            .sum();
+        let off = model.weight * got.models_mass - truth.weights[set];
+        assert!(off.abs() < 1e-9, "{what}: model {set:b}");
     }
 }
 

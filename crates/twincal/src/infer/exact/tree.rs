@@ -32,6 +32,9 @@ pub(super) struct Level<V> {
     pub(super) step: u32,
     /// Bit of this column's component in a set.
     pub(super) bit: u32,
+    /// Heredity: components that must be in `set` for the including branch to exist, and must not be for the excluding one.
+    pub(super) needs: u32,
+    pub(super) bound_by: u32,
     /// What is to be decided here.
     pub(super) choice: Choice,
     /// Components yet to decide, this one included.
@@ -61,7 +64,7 @@ impl<V: Copy> Level<V> {
     #[inline(always)]
     pub(super) fn branches(&self, set: u32) -> (bool, bool) {
         match self.choice {
-            Choice::Free => (true, true),
+            Choice::Free => (set & self.needs == self.needs, set & self.bound_by == 0),
             Choice::Follows => {
                 let inside = set & self.bit != 0;
                 (inside, !inside)
@@ -253,9 +256,13 @@ fn branch<S: Simd>(
             let (inside, heavy) = branch(simd, tree, m - 1, inside);
             (join(simd, level, m, &node, &inside, &nothing()), heavy)
         }
-        (false, _) => {
+        (false, true) => {
             let (outside, heavy) = branch(simd, tree, m - 1, outside);
             (join(simd, level, m, &node, &nothing(), &outside), heavy)
         }
+        (false, false) => (
+            vec![simd.splat_f64s(0.0); Layout::new(m).len()],
+            Heaviest::new(&tree.heavy),
+        ),
     }
 }

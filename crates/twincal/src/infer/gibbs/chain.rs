@@ -212,7 +212,8 @@ impl<'a> Chain<'a> {
         // More than 100 members at the start would only cost time: they leave within a scan.
         let share = [0.0, 0.9, 0.5, 0.1][chain % 4] * (100.0 / count as f64).min(1.0);
         for index in 0..count {
-            if self.source.uniform() < share {
+            // Odds of 0: a child whose parent is out.
+            if self.source.uniform() < share && self.odds[index] > 0.0 {
                 self.flip(simd, self.active[index]);
             }
         }
@@ -230,8 +231,11 @@ impl<'a> Chain<'a> {
     #[inline(always)]
     fn flip<S: Simd>(&mut self, simd: S, block: usize) {
         self.walker.flip(simd, block);
-        let family = self.walker.standard.blocks[block].family;
-        self.update_odds(family);
+        if self.walker.has_kin() {
+            (0..self.walker.families()).for_each(|family| self.update_odds(family));
+        } else {
+            self.update_odds(self.walker.standard.blocks[block].family);
+        }
         self.version += 1;
         self.moves += 1;
     }

@@ -102,6 +102,21 @@ fn chains_over_components_agree_with_the_sum_over_all_models() {
     }
 }
 
+/// Heredity: children of one column and of several, a chain of three.
+#[test]
+fn chains_keep_to_heredity() {
+    type Case<'a> = (u64, &'a [usize], &'a [(usize, usize)]);
+    let cases: [Case<'_>; 3] = [
+        (1, &[4, 4, 1, 2, 2, 1, 1, 1, 6], &[(0, 5), (5, 2), (3, 7)]),
+        (2, &[1; 11], &[(0, 1), (3, 4), (4, 5), (6, 5), (9, 8)]),
+        (3, &[2, 2, 2, 2, 2], &[(0, 1), (3, 2)]),
+    ];
+    for (seed, sizes, pairs) in cases {
+        let data = grouped(70 + seed, sizes, 60, true).with_parents(pairs);
+        agrees(&data.problem, seed);
+    }
+}
+
 /// More columns than rows, a column of zeros, nothing to explain.
 #[test]
 fn degenerate_problems_are_sampled_too() {

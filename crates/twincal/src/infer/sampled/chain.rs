@@ -171,15 +171,23 @@ impl<'a> Chain<'a> {
         )
     }
 
-    /// `P(z_c = 1)/P(z_c = 0)` given the others, a priori.
+    /// `P(z_c = 1)/P(z_c = 0)` given the others, a priori: 0 without the parent, infinite below a child.
     fn odds(&self, component: usize) -> f64 {
+        let prior = self.target.prior;
+        if prior.parent_of(component).is_some_and(|p| !self.holds[p]) {
+            return 0.0;
+        }
+        if self.target.children[component]
+            .iter()
+            .any(|&c| self.holds[c])
+        {
+            return f64::INFINITY;
+        }
         let family = self.target.prior.family[component];
         let own = usize::from(self.holds[component]);
         let others = self.members[family] - planted!(2, own, 0);
-        let (p, q) = self
-            .target
-            .prior
-            .next(family, others, self.sizes[family] - 1);
+        let decided = self.sizes[family] - planted!(2, 1, 0);
+        let (p, q) = prior.next(family, others, decided);
         p / q
     }
 

@@ -258,7 +258,8 @@ fn run(
     let turned = [0.0, 0.0, 0.2, 0.5][number % 4];
     for (component, inside) in holds.iter_mut().enumerate() {
         let bounded = target.prior.lower[target.columns[component][0]] > f64::NEG_INFINITY;
-        // A bounded component starts outside: inside it would need coefficients.
+        // A bounded component starts outside: inside it would need coefficients. A child in without its parent does not stay so for
+        // a step: whichever of them is visited first moves.
         *inside = !bounded && number % 4 != 1 && (*inside != (random.uniform() < turned));
     }
     let factor = STARTS[number % STARTS.len()];

@@ -32,6 +32,8 @@ pub(super) struct Target<'a> {
     pub(super) prior: &'a Prior,
     /// Columns of each component.
     pub(super) columns: Vec<Vec<usize>>,
+    /// Components that are never in without each.
+    pub(super) children: Vec<Vec<usize>>,
     /// Pairs of free components between which exchanges are proposed.
     pub(super) pairs: Vec<(usize, usize)>,
 }
@@ -55,6 +57,7 @@ impl<'a> Target<'a> {
             slab,
             prior,
             columns: prior.columns(),
+            children: prior.children(),
             pairs: Vec::new(),
         };
         let (matrix, _) = target.precision(at);

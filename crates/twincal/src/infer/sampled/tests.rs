@@ -17,6 +17,7 @@ const RUN: usize = 6;
 /// Six columns in four components: one free column, two free ones together, one bounded, two bounded together.
 fn prior() -> Prior {
     Prior {
+        parent: Vec::new(),
         slab: vec![1.0; COLUMNS],
         component: vec![0, 1, 1, 2, 3, 3],
         family: vec![0, 0, 1, 1],
@@ -78,20 +79,42 @@ struct Truth {
     noise: Noise,
 }
 
-/// A draw from the prior: urn, slabs, inverse gamma, uniform.
+/// [`prior`] with heredity: a free component needs a bounded one, that another bounded one, that a free one.
+fn bound() -> Prior {
+    Prior {
+        parent: vec![Some(2), None, Some(3), Some(1)],
+        ..prior()
+    }
+}
+
+/// [`alike`] with heredity: exchanges part children from their parents.
+fn alike_and_bound() -> Prior {
+    Prior {
+        parent: vec![None, None, Some(0), None, Some(1)],
+        ..alike()
+    }
+}
+
+/// A draw from the prior: urn (again until heredity allows the structure), slabs, inverse gamma, uniform.
 fn from_prior(prior: &Prior, slab: &[f64], random: &mut Random, autoregressive: bool) -> Truth {
-    let (mut seen, mut inside) = (vec![0; prior.families()], vec![0; prior.families()]);
-    let holds: Vec<bool> = prior
-        .family
-        .iter()
-        .map(|&family| {
+    let urn = |random: &mut Random| -> Vec<bool> {
+        let (mut seen, mut inside) = (vec![0; prior.families()], vec![0; prior.families()]);
+        let draw = |&family: &usize| {
             let (p, _) = prior.next(family, inside[family], seen[family]);
             let holds = random.uniform() < p;
             seen[family] += 1;
             inside[family] += usize::from(holds);
             holds
-        })
-        .collect();
+        };
+        prior.family.iter().map(draw).collect()
+    };
+    let holds = loop {
+        let holds = urn(random);
+        let orphan = |c: usize| holds[c] && prior.parent_of(c).is_some_and(|p| !holds[p]);
+        if !(0..holds.len()).any(orphan) {
+            break holds;
+        }
+    };
     let beta = (0..slab.len())
         .map(|k| {
             if !holds[prior.component[k]] {
@@ -246,6 +269,14 @@ fn geweke_with_autocorrelation_and_bounds() {
 fn geweke_with_exchanges() {
     let (z, what) = geweke(&alike(), true, 22, 100_000);
     assert!(z < 4.0, "{what}");
+}
+
+#[test]
+fn geweke_with_heredity() {
+    for (prior, seed) in [(bound(), 24), (alike_and_bound(), 25)] {
+        let (z, what) = geweke(&prior, true, seed, 100_000);
+        assert!(z < 4.0, "{what}");
+    }
 }
 
 #[test]

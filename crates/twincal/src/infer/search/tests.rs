@@ -13,8 +13,12 @@ fn the_search_agrees_with_the_sum_over_all_models() {
         &[4, 4, 1, 2, 2, 1, 1, 1, 6],
         &[1; 10],
     ];
-    for (seed, sizes) in sizes.iter().enumerate() {
-        let data = grouped(seed as u64, sizes, 60, true);
+    let heredity = [(3, 1), (1, 2), (4, 2), (0, 6)];
+    let cases = sizes
+        .iter()
+        .flat_map(|sizes| [(sizes, &heredity[..]), (sizes, &[])]);
+    for (seed, (sizes, pairs)) in cases.enumerate() {
+        let data = grouped(seed as u64 / 2, sizes, 60, true).with_parents(pairs);
         let (got, truth) = (
             approximate(&data.problem, None).unwrap(),
             Densities::new(&data),

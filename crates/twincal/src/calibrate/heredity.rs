@@ -1,0 +1,145 @@
+//! From the user's words to heredity: which component is in only where another is.
+
+use crate::error::{Error, Result};
+use crate::prior::HEREDITY;
+use crate::term::Family;
+
+/// A component as heredity sees it.
+pub(super) struct Named<'a> {
+    pub(super) name: &'a str,
+    pub(super) family: Family,
+}
+
+impl Named<'_> {
+    /// The name of what another family has on the same joint or link: `elbow.stribeck` → `elbow.coulomb`.
+    fn of_family(&self, word: &str) -> Option<String> {
+        let own = self.name.strip_suffix(self.family.word())?;
+        Some(format!("{own}{word}"))
+    }
+}
+
+/// Parent of each component. A pair of families binds the components of one joint or link to each other where both are candidates;
+/// what is said of a component by name goes before what is said of its family.
+///
+/// # Errors
+/// [`Error::Setting`] for a name that is neither a candidate's nor a family's, and for a component that would be its own
+/// ancestor.
+pub(super) fn parents(
+    components: &[Named<'_>],
+    given: Option<&[(String, String)]>,
+) -> Result<Vec<Option<usize>>> {
+    let pairs = match given {
+        Some(pairs) => pairs.to_vec(),
+        None => HEREDITY.map(|(a, b)| (a.into(), b.into())).to_vec(),
+    };
+    let place = |name: &str| components.iter().position(|c| c.name == name);
+    let is_family = |word: &str| {
+        let mut known = [Family::User, Family::Generic]
+            .into_iter()
+            .chain(Family::NAMED);
+        place(word).is_none() && known.any(|family| family.word() == word)
+    };
+    let mut parent = vec![None; components.len()];
+    for (child, above) in pairs.iter().filter(|(child, _)| is_family(child)) {
+        let named = place(above);
+        if named.is_none() && !is_family(above) {
+            return Err(unknown(child, above));
+        }
+        for (c, component) in components.iter().enumerate() {
+            if component.family.word() == child {
+                let same = || component.of_family(above).and_then(|name| place(&name));
+                parent[c] = named.or_else(same).filter(|&p| p != c);
+            }
+        }
+    }
+    for (child, above) in pairs.iter().filter(|(child, _)| !is_family(child)) {
+        let own = place(child).ok_or_else(|| unknown(child, child))?;
+        parent[own] = Some(place(above).ok_or_else(|| unknown(child, above))?);
+    }
+    for (c, component) in components.iter().enumerate() {
+        let up = std::iter::successors(parent[c], |&p| parent[p]).take(components.len());
+        if up.into_iter().any(|p| p == c) {
+            return Err(Error::Setting {
+                key: "prior.heredity".into(),
+                problem: format!("`{}` needs itself to be in", component.name),
+                remedy: "leave out one of the pairs that lead back to it".into(),
+            });
+        }
+    }
+    Ok(parent)
+}
+
+fn unknown(child: &str, name: &str) -> Error {
+    Error::Setting {
+        key: format!("prior.heredity.{child}"),
+        problem: format!("no candidate `{name}` with torque of its own in these logs"),
+        remedy: "give names of components as `twincal fit` prints them, or families such as stribeck = \"coulomb\"".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALL: [(&str, Family); 7] = [
+        ("elbow.stribeck", Family::Stribeck),
+        ("elbow.coulomb", Family::Coulomb),
+        ("wrist.asymmetry", Family::Asymmetry),
+        ("wrist.coulomb", Family::Coulomb),
+        ("hip.stribeck", Family::Stribeck),
+        ("sin(2*q1)", Family::User),
+        ("payload", Family::Payload),
+    ];
+
+    fn heredity(given: Option<&[(&str, &str)]>) -> Result<Vec<Option<usize>>> {
+        let components = ALL.map(|(name, family)| Named { name, family });
+        let given = given.map(|pairs| {
+            let own = pairs.iter().map(|&(a, b)| (a.into(), b.into()));
+            own.collect::<Vec<(String, String)>>()
+        });
+        parents(&components, given.as_deref())
+    }
+
+    #[test]
+    fn families_bind_joint_by_joint_and_names_go_before() {
+        let none = vec![None; 7];
+        let with = |pairs: &[(usize, usize)]| {
+            let mut parent = none.clone();
+            pairs.iter().for_each(|&(c, p)| parent[c] = Some(p));
+            parent
+        };
+        // The hip's Coulomb friction is no candidate: its Stribeck effect stands alone.
+        assert_eq!(heredity(None).unwrap(), with(&[(0, 1), (2, 3)]));
+        assert_eq!(heredity(Some(&[])).unwrap(), none);
+        let mine = [
+            ("sin(2*q1)", "payload"),
+            ("stribeck", "coulomb"),
+            ("elbow.stribeck", "wrist.coulomb"),
+        ];
+        assert_eq!(heredity(Some(&mine)).unwrap(), with(&[(5, 6), (0, 3)]));
+        let all = [("coulomb", "payload")];
+        assert_eq!(heredity(Some(&all)).unwrap(), with(&[(1, 6), (3, 6)]));
+    }
+
+    #[test]
+    fn impossible_pairs_are_named() {
+        let loops = [
+            ("sin(2*q1)", "payload"),
+            ("payload", "hip.stribeck"),
+            ("hip.stribeck", "sin(2*q1)"),
+        ];
+        let cases: [(&[(&str, &str)], &str); 4] = [
+            (&[("stribek", "coulomb")], "`stribek`"),
+            (&[("stribeck", "colomb")], "`colomb`"),
+            (&[("payload", "elbow.spring")], "`elbow.spring`"),
+            (&loops, "needs itself"),
+        ];
+        for (pairs, said) in cases {
+            let text = heredity(Some(pairs)).unwrap_err().to_string();
+            assert!(
+                text.contains(said) && text.contains("prior.heredity"),
+                "{text}"
+            );
+        }
+    }
+}
