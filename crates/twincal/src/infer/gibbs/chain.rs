@@ -49,14 +49,19 @@ pub(super) struct Target<'a> {
 pub(super) struct Trace {
     /// P(z = 1 | all other z), mean over a draw's scans.
     pub(super) conditional: Vec<f32>,
+    /// z before the jump, or of a listed model P(z = 1 | list): what jumping from there would give on average.
+    pub(super) jumped: Vec<f32>,
+    /// Draws whose model is listed.
+    pub(super) listed: u64,
     /// Draws of β_k given z, each from its own margin: their joint law is not needed to judge a chain.
     pub(super) beta: Vec<f32>,
     /// Σ over draws of E[δ | z].
     pub(super) shift: Vec<f64>,
     /// Σ over draws of E[δ² | z].
     pub(super) moment: Vec<f64>,
-    /// Σ over draws of P(z = 1 | all other z), by component.
+    /// Σ over draws of `conditional` and of `jumped`, by component.
     pub(super) inclusion: Vec<f64>,
+    pub(super) jumped_inclusion: Vec<f64>,
     /// Σ over draws of (1 + c).
     pub(super) misfit: f64,
     /// How often each model (a set of components) was the state of a draw.
@@ -116,10 +121,13 @@ impl Run<'_> {
         state.start(simd, chain);
         let mut trace = Trace {
             conditional: vec![0.0; count * length.draws],
+            jumped: vec![0.0; count * length.draws],
+            listed: 0,
             beta: vec![0.0; size * length.draws],
             shift: vec![0.0; size],
             moment: vec![0.0; size],
             inclusion: vec![0.0; count],
+            jumped_inclusion: vec![0.0; count],
             misfit: 0.0,
             visits: BTreeMap::new(),
             moves: 0,
@@ -136,8 +144,8 @@ impl Run<'_> {
             for _ in 0..length.scans_per_draw {
                 state.scan(simd);
             }
-            state.jump(simd, target.jumps);
-            state.record(&mut trace, draw, length);
+            let listed = state.jump(simd, target.jumps);
+            state.record(&mut trace, draw, length, listed);
         }
         trace.moves = state.moves;
         trace
@@ -319,16 +327,17 @@ impl<'a> Chain<'a> {
         set
     }
 
-    /// A Gibbs step over the listed models, see [`Jumps`].
+    /// A Gibbs step over the listed models, see [`Jumps`]; P(z = 1 | list) by component where the present one is among them.
     #[inline(always)]
-    fn jump<S: Simd>(&mut self, simd: S, jumps: &Jumps) {
+    fn jump<'j, S: Simd>(&mut self, simd: S, jumps: &'j Jumps) -> Option<&'j [f64]> {
         if jumps.is_empty() {
-            return;
+            return None;
         }
         let (now, uniform) = (self.set(), self.source.uniform());
-        let Some(goal) = jumps.from(&now, uniform) else {
-            return;
-        };
+        let (goal, inclusion) = jumps.from(&now, uniform)?;
+        if *goal == now {
+            return Some(inclusion);
+        }
         for block in 0..self.walker.standard.blocks.len() {
             if (now[block / 64] ^ goal[block / 64]) >> (block % 64) & 1 == 1 {
                 self.flip(simd, block);
@@ -337,6 +346,7 @@ impl<'a> Chain<'a> {
         }
         self.moves += 1;
         self.renew();
+        Some(inclusion)
     }
 
     /// A new uniform number for the next flip.
@@ -411,7 +421,7 @@ impl<'a> Chain<'a> {
 
     /// φ | z, then each β_k | z, φ; sums that need no draw use the conditional expectations.
     #[inline(always)]
-    fn record(&mut self, trace: &mut Trace, draw: usize, length: Length) {
+    fn record(&mut self, trace: &mut Trace, draw: usize, length: Length, listed: Option<&[f64]>) {
         let reduced = self.reduced;
         let (standard, tableau) = (&reduced.open, &self.walker.tableau);
         let misfit = 1.0 + tableau.excess;
@@ -424,13 +434,22 @@ impl<'a> Chain<'a> {
         let set = self.set();
         for &block in &reduced.certain {
             trace.conditional[block * length.draws + draw] = 1.0;
+            trace.jumped[block * length.draws + draw] = 1.0;
             trace.inclusion[block] += 1.0;
+            trace.jumped_inclusion[block] += 1.0;
         }
         for (sum, &block) in self.sums.iter().zip(&self.active) {
             let conditional = sum / length.scans_per_draw as f64;
             trace.conditional[block * length.draws + draw] = conditional as f32;
             trace.inclusion[block] += conditional;
+            let jumped = match listed {
+                Some(inclusion) => inclusion[block],
+                None => f64::from(u8::from(tableau.holds(block))),
+            };
+            trace.jumped[block * length.draws + draw] = jumped as f32;
+            trace.jumped_inclusion[block] += jumped;
         }
+        trace.listed += u64::from(listed.is_some());
         let delta = |k: usize| {
             let inside = if tableau.includes(k) {
                 tableau.gradient[k]

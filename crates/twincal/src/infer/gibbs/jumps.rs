@@ -12,7 +12,7 @@ use crate::infer::walker::Walker;
 use crate::posterior::Problem;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 /// Models in the list at most.
 const MODELS: usize = 1000;
@@ -22,21 +22,24 @@ const BUDGET: usize = 256;
 const PIECE: usize = 256;
 
 /// Models with their share of the list's mass.
+#[derive(Clone)]
 pub(super) struct Jumps {
-    /// Place in `models` of each set.
-    places: BTreeMap<Set, usize>,
+    places: BTreeSet<Set>,
     models: Vec<Set>,
     /// Running sum of the weights, the last one 1.
     cumulative: Vec<f64>,
+    /// P(z = 1 | list) by component.
+    inclusion: Vec<f64>,
 }
 
 impl Jumps {
     /// No list: the chain stays where flips and exchanges lead it.
     pub(super) fn none() -> Self {
         Self {
-            places: BTreeMap::new(),
+            places: BTreeSet::new(),
             models: Vec::new(),
             cumulative: Vec::new(),
+            inclusion: Vec::new(),
         }
     }
 
@@ -90,22 +93,50 @@ impl Jumps {
             .collect();
         cumulative.iter_mut().for_each(|value| *value /= sum);
         let models: Vec<Set> = weighed.into_iter().map(|(_, set)| set).collect();
-        Self {
-            places: models.iter().cloned().zip(0..).collect(),
+        let mut jumps = Self {
+            places: models.iter().cloned().collect(),
             models,
             cumulative,
-        }
+            inclusion: Vec::new(),
+        };
+        jumps.inclusion = jumps.means(standard.blocks.len());
+        jumps
     }
 
-    /// The model to go to from `now`, with a uniform number; `None` if `now` is not listed or nothing changes.
-    pub(super) fn from(&self, now: &[u64], uniform: f64) -> Option<&Set> {
-        let here = *self.places.get(now)?;
+    /// P(z = 1 | list) of every component.
+    fn means(&self, components: usize) -> Vec<f64> {
+        let mut means = vec![0.0; components];
+        for (set, weight) in self.weighted() {
+            let inside = (0..components).filter(|b| set[b / 64] >> (b % 64) & 1 == 1);
+            inside.for_each(|b| means[b] += weight);
+        }
+        means
+    }
+
+    /// Listed models with their shares of the list's mass.
+    pub(super) fn weighted(&self) -> impl Iterator<Item = (&Set, f64)> {
+        let before = std::iter::once(0.0).chain(self.cumulative.iter().copied());
+        let shares = self.cumulative.iter().zip(before);
+        let shares = shares.map(|(after, before)| after - before);
+        self.models.iter().zip(shares)
+    }
+
+    pub(super) fn lists(&self, set: &[u64]) -> bool {
+        self.places.contains(set)
+    }
+
+    /// The model to go to from `now`, with a uniform number, and P(z = 1 | list) of every component; `None` if `now` is not
+    /// listed.
+    pub(super) fn from(&self, now: &[u64], uniform: f64) -> Option<(&Set, &[f64])> {
+        if !self.lists(now) {
+            return None;
+        }
         let last = self.models.len() - 1;
         let there = self
             .cumulative
             .partition_point(|&sum| sum <= uniform)
             .min(last);
-        (there != here).then(|| &self.models[there])
+        Some((&self.models[there], &self.inclusion))
     }
 
     pub(super) fn is_empty(&self) -> bool {

@@ -43,6 +43,8 @@ struct Agreement {
     ess: Vec<f64>,
     /// Of the PIP, per component of [`Reduced::open`]; the others have none.
     mcse: Vec<f64>,
+    /// Whether the PIP is that of [`Trace::jumped`], likewise.
+    by_list: Vec<bool>,
     /// Largest difference of the PIP between two chains, likewise.
     spread: Vec<f64>,
 }
@@ -102,7 +104,7 @@ fn chains(
 ) -> Result<Posterior> {
     let standard = &reduced.open;
     let exchanges = exchanges(standard, &reduced.active, false);
-    let mut best: Option<(Vec<Trace>, Agreement)> = None;
+    let mut best: Option<(Vec<Trace>, Agreement, Jumps)> = None;
     for scans_per_draw in SCANS_PER_DRAW {
         let length = Length {
             warm_up: settings.draws / 4,
@@ -129,16 +131,17 @@ fn chains(
         if scans_per_draw == SCANS_PER_DRAW[0] {
             agree &= agreement.mixed((settings.chains * settings.draws) as f64);
         }
+        let known = jumps.clone();
         if share && !agree {
             let visited = traces.iter().flat_map(|trace| trace.visits.keys().cloned());
             jumps = jumps.joined(visited.collect(), reduced, problem);
         }
-        best = Some((traces, agreement));
+        best = Some((traces, agreement, known));
         if agree {
             break;
         }
     }
-    let Some((traces, agreement)) = best else {
+    let Some((traces, agreement, jumps)) = best else {
         return Err(Error::Setting {
             key: "inference.draws".into(),
             problem: "no run was tried".into(),
@@ -157,7 +160,7 @@ fn chains(
                 .into(),
         });
     }
-    summarise(problem, reduced, &traces, &agreement, settings)
+    summarise(problem, reduced, &traces, &jumps, &agreement, settings)
 }
 
 /// See [`super::scan`].
@@ -215,22 +218,33 @@ fn judge(reduced: &Reduced<'_>, traces: &[Trace], draws: usize) -> Agreement {
             (if r_hat.is_nan() { 1.0 } else { r_hat }, ess)
         })
         .unzip();
-    let (mcse, spread) = (0..reduced.open.blocks.len())
+    let unseen = 1.0 / (traces.len() * draws) as f64;
+    let judged: Vec<(f64, bool, f64)> = (0..reduced.open.blocks.len())
         .into_par_iter()
         .map(|b| {
-            let conditional = rows(traces, draws, b, |t| &t.conditional);
             let pips = traces.iter().map(|t| t.inclusion[b] / draws as f64);
+            let jumped = traces.iter().map(|t| t.jumped_inclusion[b] / draws as f64);
             let spread = pips.clone().fold(0.0, f64::max) - pips.clone().fold(1.0, f64::min);
             // What the memory of the chains says, or the scatter of their means: rare visits hide from the first.
-            let error = mcse_mean(&conditional).max(standard_error(pips));
-            (error, spread.max(0.0))
+            let scans =
+                mcse_mean(&rows(traces, draws, b, |t| &t.conditional)).max(standard_error(pips));
+            let list =
+                mcse_mean(&rows(traces, draws, b, |t| &t.jumped)).max(standard_error(jumped));
+            let error = if reduced.certain.contains(&b) {
+                0.0
+            } else {
+                // A model that N draws never met may have 1/N of the mass.
+                scans.min(list).hypot(unseen)
+            };
+            (error, list < scans, spread.max(0.0))
         })
-        .unzip();
+        .collect();
     Agreement {
         r_hat,
         ess,
-        mcse,
-        spread,
+        mcse: judged.iter().map(|j| j.0).collect(),
+        by_list: judged.iter().map(|j| j.1).collect(),
+        spread: judged.iter().map(|j| j.2).collect(),
     }
 }
 
@@ -271,6 +285,7 @@ fn summarise(
     problem: &Problem,
     reduced: &Reduced<'_>,
     traces: &[Trace],
+    jumps: &Jumps,
     agreement: &Agreement,
     settings: &InferenceSettings,
 ) -> Result<Posterior> {
@@ -282,7 +297,14 @@ fn summarise(
     let block = standard.block_of();
     let positions = 0..standard.size();
     let inclusion: Vec<f64> = (0..reduced.open.blocks.len())
-        .map(|b| mean_of(|t| &t.inclusion, b).clamp(0.0, 1.0))
+        .map(|b| {
+            let pip = if agreement.by_list[b] {
+                mean_of(|t| &t.jumped_inclusion, b)
+            } else {
+                mean_of(|t| &t.inclusion, b)
+            };
+            pip.clamp(0.0, 1.0)
+        })
         .collect();
     let (inclusion, mcse) = (
         reduced.by_block(&inclusion, 1.0),
@@ -300,7 +322,7 @@ fn summarise(
     };
     let listed = Listed::new(
         standard,
-        visited(reduced, traces, draws),
+        visited(reduced, traces, jumps, draws),
         LISTED_MASS,
         LISTED_MODELS,
     )?;
@@ -314,21 +336,28 @@ fn summarise(
     Ok(posterior(standard, &averages, listed, None, method))
 }
 
-/// Visited models: share of the draws, columns, positions.
+/// Visited models, with columns and positions: those listed share the draws in the list by their weights, others have theirs.
 fn visited(
     reduced: &Reduced<'_>,
     traces: &[Trace],
+    jumps: &Jumps,
     draws: f64,
 ) -> Vec<(f64, Vec<u32>, Vec<usize>)> {
-    let mut visits: BTreeMap<&[u64], u64> = BTreeMap::new();
-    for (set, count) in traces.iter().flat_map(|t| &t.visits) {
-        *visits.entry(set).or_default() += count;
+    let listed = traces.iter().map(|t| t.listed).sum::<u64>() as f64 / draws;
+    let mut shares: BTreeMap<&[u64], f64> = BTreeMap::new();
+    if listed > 0.0 {
+        let weighted = jumps.weighted();
+        shares.extend(weighted.map(|(set, share)| (set.as_slice(), listed * share)));
     }
-    visits
+    let visits = traces.iter().flat_map(|t| &t.visits);
+    for (set, &count) in visits.filter(|(set, _)| !jumps.lists(set)) {
+        *shares.entry(set).or_default() += count as f64 / draws;
+    }
+    shares
         .into_iter()
-        .map(|(set, count)| {
+        .map(|(set, share)| {
             let (members, positions) = reduced.members(set);
-            (count as f64 / draws, members, positions)
+            (share, members, positions)
         })
         .collect()
 }
