@@ -29,7 +29,7 @@ pub(super) fn approximate(problem: &Problem, warm: Option<&Posterior>) -> Result
     } else {
         Care::Full
     };
-    let certain = certain::components(&standard, &problem.prior);
+    let certain = certain::components(&standard, problem, warm);
     let reduced = Reduced::new(&standard, &certain);
     let found = search(&reduced, problem, warm, budget, care);
     let total = found.sums.total() / (1.0 - found.missing);

@@ -172,7 +172,7 @@ pub(super) fn settle(
 }
 
 /// ln of a model's weight but for what all models share, from its own factor.
-fn log_weight(problem: &Problem, standard: &Standard, model: &Model) -> f64 {
+pub(super) fn log_weight(problem: &Problem, standard: &Standard, model: &Model) -> f64 {
     let prior = &problem.prior;
     let mut holds = vec![false; prior.components()];
     model

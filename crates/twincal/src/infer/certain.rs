@@ -19,12 +19,14 @@
 //!
 //! A bound that is [`FAR`] sd away even so acts in no model that counts.
 
+use super::bounds::log_weight;
 use super::moments::{Moments, present};
 use super::search::climb;
 use super::standard::{Block, Reduced, Standard, nudged};
 use super::walker::Walker;
 use crate::linear_algebra::Cholesky;
-use crate::prior::Prior;
+use crate::posterior::{Posterior, Problem};
+use crate::prior::{Prior, SETTLED};
 use pulp::{Simd, WithSimd};
 
 /// ln of the share of the mass below which models are not visited: 4e-18, far below one ulp of the sum.
@@ -44,9 +46,14 @@ pub(super) struct Certain {
 
 /// The components that every model with weight holds.
 ///
-/// Any model makes a valid bound, a good one a sharp one: what the full model settles is integrated out before a better
-/// one is looked for among the rest.
-pub(super) fn components(standard: &Standard, prior: &Prior) -> Certain {
+/// Any model makes a valid bound, a good one a sharp one: the heaviest of a posterior that is known to be near, or, without one, what
+/// the full model settles is integrated out and a better one looked for among the rest.
+pub(super) fn components(
+    standard: &Standard,
+    problem: &Problem,
+    near: Option<&Posterior>,
+) -> Certain {
+    let prior = &problem.prior;
     let Ok(factor) = nudged(&standard.matrix, standard.size()) else {
         return none(prior);
     };
@@ -71,6 +78,9 @@ pub(super) fn components(standard: &Standard, prior: &Prior) -> Certain {
         spread: (0..size).map(|d| inverse[d * size + d]).collect(),
         factors: standard.blocks.iter().map(|b| b.factor.ln()).sum(),
     };
+    if let Some(reference) = near.and_then(|near| weight_of_heaviest(standard, problem, near)) {
+        return bounds.judge(reference);
+    }
     let full = Moments {
         delta: vec![0.0; size],
         variance: bounds.spread.clone(),
@@ -89,6 +99,47 @@ pub(super) fn components(standard: &Standard, prior: &Prior) -> Certain {
         prior,
     });
     bounds.judge(climbed)
+}
+
+/// ln of the weight that the heaviest model of another posterior has here, its bounds counted as the search's guide does;
+/// `None` where it is no model of this problem.
+pub(super) fn weight_of_heaviest(
+    standard: &Standard,
+    problem: &Problem,
+    near: &Posterior,
+) -> Option<f64> {
+    let prior = &problem.prior;
+    // A structure that is settled here is not the heaviest there.
+    if near.component != prior.component || prior.odds.iter().any(|&odds| odds >= SETTLED) {
+        return None;
+    }
+    let model = near.models.first()?;
+    let mut holds = vec![false; prior.components()];
+    let members = model.members.iter();
+    members.for_each(|&k| holds[prior.component[k as usize]] = true);
+    let orphan = |c: usize| holds[c] && prior.parent_of(c).is_some_and(|p| !holds[p]);
+    if (0..holds.len()).any(orphan) {
+        return None;
+    }
+    let blocks = standard.blocks.iter().filter(|b| holds[b.component]);
+    let mut positions: Vec<usize> = blocks.flat_map(Block::range).collect();
+    let model = standard.model(&positions, 1.0).ok()?;
+    positions.sort_unstable_by_key(|&d| standard.order[d]);
+    let count = positions.len();
+    let spread = Cholesky::from_lower(model.factor.clone(), count).inverse_diagonal();
+    let mut moments = Moments {
+        delta: standard.center.iter().map(|x| -x).collect(),
+        variance: vec![0.0; standard.size()],
+        excess: standard.misfit(model.scale) - 1.0,
+        holds: Vec::new(),
+        inside: Vec::new(),
+        covariance: Vec::new(),
+    };
+    for ((&d, mean), spread) in positions.iter().zip(&model.mean).zip(&spread) {
+        moments.delta[d] += mean * standard.natural(d);
+        moments.variance[d] = spread * standard.precision_unit(d);
+    }
+    Some(log_weight(problem, standard, &model) + moments.log_mass(standard))
 }
 
 /// What the bounds of the module's text are made of.

@@ -82,7 +82,7 @@ fn by_method(problem: &Problem, settings: &InferenceSettings) -> Result<Posterio
     if settings.method == Choice::Gibbs {
         return gibbs::sample(problem, settings);
     }
-    let certain = certain::components(&Standard::new(problem)?, &problem.prior);
+    let certain = certain::components(&Standard::new(problem)?, problem, None);
     let open = certain.sure.iter().filter(|c| !**c).count();
     match settings.method {
         _ if open <= EXACT_LIMIT => exact::sum(problem, &certain),

@@ -28,7 +28,7 @@ const BRANCHES: usize = 30;
 #[cfg(test)]
 pub(super) fn enumerate(problem: &Problem) -> Result<Posterior> {
     let standard = Standard::new(problem)?;
-    let certain = certain::components(&standard, &problem.prior);
+    let certain = certain::components(&standard, problem, None);
     sum(problem, &certain)
 }
 

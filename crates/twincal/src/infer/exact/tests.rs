@@ -413,7 +413,7 @@ fn certain_columns_change_nothing() {
         ] {
             let problem = problem(size as u64 * 10 + seed, size, 3000, 0.5, inclusion);
             let standard = Standard::new(&problem).unwrap();
-            let certain = certain::components(&standard, &problem.prior);
+            let certain = certain::components(&standard, &problem, None);
             let count = certain.sure.iter().filter(|c| **c).count();
             assert!(count >= 1 && count < size, "{count} of {size} are certain");
             let (mut order, first) = certain::order(&problem.prior, &certain);
@@ -421,8 +421,23 @@ fn certain_columns_change_nothing() {
             order.sort_unstable();
             assert!(order.into_iter().eq(0..size));
             agree(&problem, 1e-9);
+            same_with_what_is_near(&standard, &problem, &certain);
         }
     }
+}
+
+/// A known posterior gives the same answer, by the weight of its heaviest model.
+#[track_caller]
+fn same_with_what_is_near(standard: &Standard, problem: &Problem, certain: &certain::Certain) {
+    let near = enumerate(problem).unwrap();
+    assert_eq!(
+        &certain::components(standard, problem, Some(&near)),
+        certain
+    );
+    let weight = certain::weight_of_heaviest(standard, problem, &near).unwrap();
+    let truth = near.log_evidence.unwrap() + (near.models[0].weight * near.models_mass).ln();
+    let off = standard.log_evidence(weight) - truth;
+    assert!(off.abs() < 1e-9 * truth.abs().max(1.0), "{off}");
 }
 
 /// Components of several columns, in three families with odds, two of them nearly alike, columns lying apart.
@@ -512,11 +527,12 @@ fn certain_components_change_nothing() {
     let data = acting(3, &sizes, 150, true, 2.0);
     assert!(data.problem.xy.len() > 32);
     let standard = Standard::new(&data.problem).unwrap();
-    let certain = certain::components(&standard, &data.problem.prior);
+    let certain = certain::components(&standard, &data.problem, None);
     assert!(
         certain.sure.contains(&true) && certain.sure.contains(&false),
         "{certain:?}"
     );
+    same_with_what_is_near(&standard, &data.problem, &certain);
     let (got, truth) = (enumerate(&data.problem).unwrap(), Densities::new(&data));
     for k in 0..data.problem.xy.len() {
         let pip = truth.pip[data.problem.prior.component[k]];

@@ -8,6 +8,7 @@
 
 use super::jumps::Jumps;
 use super::random::Source;
+use super::state::State;
 use super::swaps::Swaps;
 use crate::infer::exchanges::Exchange;
 use crate::infer::standard::{Reduced, Response};
@@ -21,6 +22,9 @@ use std::collections::BTreeMap;
 pub(super) const LAZY: f64 = 0.95;
 /// Exchanges that a scan proposes; most are void.
 const EXCHANGES: usize = 8;
+/// Draws between two jumps: a walk to a model far away costs more than many scans. Draws from listed models are from the whole list
+/// all the same.
+const JUMP_EVERY: usize = 4;
 /// Ratios beyond this count as this.
 const RATIO_MAX: f64 = 1e300;
 
@@ -64,7 +68,7 @@ pub(super) struct Trace {
     pub(super) jumped_inclusion: Vec<f64>,
     /// Σ over draws of (1 + c).
     pub(super) misfit: f64,
-    /// How often each model (a set of components) was the state of a draw.
+    /// How often each model (a set of components) that is not listed was the state of a draw.
     pub(super) visits: BTreeMap<Vec<u64>, u64>,
     /// Accepted moves.
     pub(super) moves: u64,
@@ -134,7 +138,7 @@ impl Run<'_> {
         };
         for scan in 0..length.warm_up * length.scans_per_draw {
             state.scan(simd);
-            if scan % length.scans_per_draw == 0 {
+            if scan % (JUMP_EVERY * length.scans_per_draw) == 0 {
                 state.jump(simd, target.jumps);
             }
         }
@@ -144,8 +148,10 @@ impl Run<'_> {
             for _ in 0..length.scans_per_draw {
                 state.scan(simd);
             }
-            let listed = state.jump(simd, target.jumps);
-            state.record(&mut trace, draw, length, listed);
+            state.record(&mut trace, draw, length, target.jumps);
+            if draw % JUMP_EVERY == 0 {
+                state.jump(simd, target.jumps);
+            }
         }
         trace.moves = state.moves;
         trace
@@ -161,9 +167,12 @@ struct Chain<'a> {
     /// Components that may flip, by place in `standard.blocks`: wide ones first.
     active: Vec<usize>,
     reduced: &'a Reduced<'a>,
-    /// Columns integrated out, and the version of the state that it belongs to.
+    /// The present model's moments and whether it is listed, with the version of the chain that they belong to.
+    present: State,
+    read: u64,
+    listed: bool,
+    looked: u64,
     response: Response,
-    responded: u64,
     /// Prior ratio of flipping each of them, slab's mass within the bounds included.
     odds: Vec<f64>,
     chunks: Vec<Chunk>,
@@ -206,8 +215,11 @@ impl<'a> Chain<'a> {
             walker,
             active,
             reduced: target.reduced,
+            present: State::default(),
+            read: 0,
+            listed: false,
+            looked: 0,
             response: Response::default(),
-            responded: 0,
         };
         (0..target.prior.families()).for_each(|family| chain.update_odds(family));
         chain
@@ -327,26 +339,35 @@ impl<'a> Chain<'a> {
         set
     }
 
-    /// A Gibbs step over the listed models, see [`Jumps`]; P(z = 1 | list) by component where the present one is among them.
+    /// Whether the present model is listed.
+    fn is_listed(&mut self, jumps: &Jumps) -> bool {
+        if self.looked != self.version {
+            self.listed = !jumps.is_empty() && jumps.lists(&self.set());
+            self.looked = self.version;
+        }
+        self.listed
+    }
+
+    /// A Gibbs step over the listed models, see [`Jumps`].
     #[inline(always)]
-    fn jump<'j, S: Simd>(&mut self, simd: S, jumps: &'j Jumps) -> Option<&'j [f64]> {
-        if jumps.is_empty() {
-            return None;
+    fn jump<S: Simd>(&mut self, simd: S, jumps: &Jumps) {
+        if !self.is_listed(jumps) {
+            return;
         }
-        let (now, uniform) = (self.set(), self.source.uniform());
-        let (goal, inclusion) = jumps.from(&now, uniform)?;
-        if *goal == now {
-            return Some(inclusion);
-        }
+        let goal = jumps.draw(self.source.uniform());
+        let goal = jumps.set(goal);
+        let mut changes = 0;
         for block in 0..self.walker.standard.blocks.len() {
-            if (now[block / 64] ^ goal[block / 64]) >> (block % 64) & 1 == 1 {
+            let inside = goal[block / 64] >> (block % 64) & 1 == 1;
+            if self.walker.tableau.holds(block) != inside {
                 self.flip(simd, block);
-                self.moves -= 1;
+                changes += 1;
             }
         }
-        self.moves += 1;
-        self.renew();
-        Some(inclusion)
+        if changes > 0 {
+            self.moves -= changes - 1;
+            self.renew();
+        }
     }
 
     /// A new uniform number for the next flip.
@@ -419,19 +440,12 @@ impl<'a> Chain<'a> {
         chunk.version = self.version;
     }
 
-    /// φ | z, then each β_k | z, φ; sums that need no draw use the conditional expectations.
+    /// φ | z, then each β_k | z, φ; sums that need no draw use the conditional expectations. z is the present model, or where
+    /// that is listed one drawn from the list: the chain need not go there.
     #[inline(always)]
-    fn record(&mut self, trace: &mut Trace, draw: usize, length: Length, listed: Option<&[f64]>) {
+    fn record(&mut self, trace: &mut Trace, draw: usize, length: Length, jumps: &Jumps) {
         let reduced = self.reduced;
-        let (standard, tableau) = (&reduced.open, &self.walker.tableau);
-        let misfit = 1.0 + tableau.excess;
-        let factor = standard.noise_factor();
-        let phi = if factor.is_finite() {
-            misfit * factor
-        } else {
-            0.0
-        };
-        let set = self.set();
+        let listed = self.is_listed(jumps);
         for &block in &reduced.certain {
             trace.conditional[block * length.draws + draw] = 1.0;
             trace.jumped[block * length.draws + draw] = 1.0;
@@ -442,52 +456,45 @@ impl<'a> Chain<'a> {
             let conditional = sum / length.scans_per_draw as f64;
             trace.conditional[block * length.draws + draw] = conditional as f32;
             trace.inclusion[block] += conditional;
-            let jumped = match listed {
-                Some(inclusion) => inclusion[block],
-                None => f64::from(u8::from(tableau.holds(block))),
+            let jumped = if listed {
+                jumps.inclusion(block)
+            } else {
+                f64::from(u8::from(self.walker.tableau.holds(block)))
             };
             trace.jumped[block * length.draws + draw] = jumped as f32;
             trace.jumped_inclusion[block] += jumped;
         }
-        trace.listed += u64::from(listed.is_some());
-        let delta = |k: usize| {
-            let inside = if tableau.includes(k) {
-                tableau.gradient[k]
-            } else {
-                0.0
-            };
-            inside - standard.center[k]
+        let state = if listed {
+            trace.listed += 1;
+            jumps.state(jumps.draw(self.source.uniform()))
+        } else {
+            *trace.visits.entry(self.set()).or_default() += 1;
+            if self.read != self.version {
+                let tableau = &self.walker.tableau;
+                self.present.read(reduced, tableau, &mut self.response);
+                self.read = self.version;
+            }
+            &self.present
         };
-        if reduced.shrinks() && self.responded != self.version {
-            let delta: Vec<f64> = (0..standard.size()).map(delta).collect();
-            let row = |k: usize| tableau.row(k);
-            reduced.respond(&delta, &tableau.members, row, &mut self.response);
-            self.responded = self.version;
-        }
+        let standard = &reduced.open;
+        let factor = standard.noise_factor();
+        let phi = if factor.is_finite() {
+            state.misfit * factor
+        } else {
+            0.0
+        };
         // φ | z ~ InvGamma(a_n, (1 + c)/2), β_k | z, φ ~ N(β_k, φ (A_zz⁻¹)_kk)
-        let sampled = 0.5 * misfit / self.source.gamma(standard.shape);
-        let root = sampled.sqrt();
+        let root = (0.5 * state.misfit / self.source.gamma(standard.shape)).sqrt();
         let center = &reduced.full.center;
-        for (k, (d, stretch)) in reduced.left().enumerate() {
-            let (inside, delta) = (tableau.includes(k), delta(k) / stretch);
+        for (d, (&delta, &variance)) in state.delta.iter().zip(&state.variance).enumerate() {
             trace.shift[d] += delta;
-            trace.moment[d] += delta * delta;
-            if inside {
-                let variance = tableau.diagonal[k] / (stretch * stretch);
-                trace.moment[d] += phi * variance;
+            trace.moment[d] += delta * delta + phi * variance;
+            if variance > 0.0 {
                 let noise = root * variance.sqrt() * self.source.normal();
                 trace.beta[d * length.draws + draw] = (center[d] + delta + noise) as f32;
             }
         }
-        let response = self.response.delta.iter().zip(&self.response.variance);
-        for (&d, (&delta, &variance)) in reduced.gone().iter().zip(response) {
-            trace.shift[d] += delta;
-            trace.moment[d] += delta * delta + phi * variance;
-            let noise = root * variance.sqrt() * self.source.normal();
-            trace.beta[d * length.draws + draw] = (center[d] + delta + noise) as f32;
-        }
-        trace.misfit += misfit;
-        *trace.visits.entry(set).or_default() += 1;
+        trace.misfit += state.misfit;
     }
 }
 

@@ -5,9 +5,10 @@
 //! one is drawn anew in proportion to their weights: an update of the structure on that list, which keeps the posterior
 //! whatever the list is.
 
+use super::state::State;
 use crate::infer::approximate;
 use crate::infer::search::{Care, Set};
-use crate::infer::standard::{Reduced, Standard};
+use crate::infer::standard::{Reduced, Response};
 use crate::infer::walker::Walker;
 use crate::posterior::Problem;
 use pulp::{Simd, WithSimd};
@@ -30,6 +31,8 @@ pub(super) struct Jumps {
     cumulative: Vec<f64>,
     /// P(z = 1 | list) by component.
     inclusion: Vec<f64>,
+    /// Moments of each model.
+    states: Vec<State>,
 }
 
 impl Jumps {
@@ -40,6 +43,7 @@ impl Jumps {
             models: Vec::new(),
             cumulative: Vec::new(),
             inclusion: Vec::new(),
+            states: Vec::new(),
         }
     }
 
@@ -47,7 +51,7 @@ impl Jumps {
     pub(super) fn of(reduced: &Reduced<'_>, problem: &Problem) -> Self {
         let found = approximate::search(reduced, problem, None, BUDGET, Care::Loop);
         let models = found.models.into_iter().map(|(_, set)| set);
-        Self::heaviest(models.take(MODELS).collect(), &reduced.open, problem)
+        Self::heaviest(models.take(MODELS).collect(), reduced, problem)
     }
 
     /// The heaviest of these and of some more models.
@@ -59,47 +63,43 @@ impl Jumps {
     ) -> Self {
         let mut all = more;
         all.extend(self.models);
-        Self::heaviest(all.into_iter().collect(), &reduced.open, problem)
+        Self::heaviest(all.into_iter().collect(), reduced, problem)
     }
 
     /// The list of the heaviest of these models, weighed as the chain weighs them.
-    fn heaviest(mut models: Vec<Set>, standard: &Standard, problem: &Problem) -> Self {
-        // Neighbours in this order differ by few components; a piece has its own walk, whatever the threads.
-        models.sort_unstable();
-        let mut weighed: Vec<(f64, Set)> = models
-            .par_chunks(PIECE)
-            .flat_map_iter(|models| {
-                let weights = pulp::Arch::new().dispatch(Weights {
-                    standard,
-                    problem,
-                    models,
-                });
-                weights.into_iter().zip(models.iter().cloned())
-            })
+    fn heaviest(models: Vec<Set>, reduced: &Reduced<'_>, problem: &Problem) -> Self {
+        let mut weighed: Vec<(f64, Set)> = walked(models, reduced, problem, false)
+            .into_iter()
+            .map(|(set, weight, _)| (weight, set))
             .collect();
         weighed.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
         weighed.truncate(MODELS);
         if weighed.len() < 2 {
             return Self::none();
         }
-        let largest = weighed[0].0;
+        let kept = weighed.into_iter().map(|(_, set)| set).collect();
+        let mut kept = walked(kept, reduced, problem, true);
+        kept.sort_by(|a, b| b.1.total_cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+        let largest = kept[0].1;
         let mut sum = 0.0;
-        let mut cumulative: Vec<f64> = weighed
+        let mut cumulative: Vec<f64> = kept
             .iter()
-            .map(|(weight, _)| {
+            .map(|(_, weight, _)| {
                 sum += (weight - largest).exp();
                 sum
             })
             .collect();
         cumulative.iter_mut().for_each(|value| *value /= sum);
-        let models: Vec<Set> = weighed.into_iter().map(|(_, set)| set).collect();
+        let (models, states): (Vec<Set>, Vec<State>) =
+            kept.into_iter().map(|(set, _, state)| (set, state)).unzip();
         let mut jumps = Self {
             places: models.iter().cloned().collect(),
             models,
             cumulative,
             inclusion: Vec::new(),
+            states,
         };
-        jumps.inclusion = jumps.means(standard.blocks.len());
+        jumps.inclusion = jumps.means(reduced.open.blocks.len());
         jumps
     }
 
@@ -125,18 +125,23 @@ impl Jumps {
         self.places.contains(set)
     }
 
-    /// The model to go to from `now`, with a uniform number, and P(z = 1 | list) of every component; `None` if `now` is not
-    /// listed.
-    pub(super) fn from(&self, now: &[u64], uniform: f64) -> Option<(&Set, &[f64])> {
-        if !self.lists(now) {
-            return None;
-        }
-        let last = self.models.len() - 1;
-        let there = self
-            .cumulative
-            .partition_point(|&sum| sum <= uniform)
-            .min(last);
-        Some((&self.models[there], &self.inclusion))
+    /// A listed model, drawn by its weight with a uniform number.
+    pub(super) fn draw(&self, uniform: f64) -> usize {
+        let place = self.cumulative.partition_point(|&sum| sum <= uniform);
+        place.min(self.models.len() - 1)
+    }
+
+    pub(super) fn set(&self, model: usize) -> &[u64] {
+        &self.models[model]
+    }
+
+    pub(super) fn state(&self, model: usize) -> &State {
+        &self.states[model]
+    }
+
+    /// P(z = 1 | list).
+    pub(super) fn inclusion(&self, component: usize) -> f64 {
+        self.inclusion[component]
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -144,28 +149,57 @@ impl Jumps {
     }
 }
 
-/// ln weight of every model as the chain counts it.
-struct Weights<'a> {
-    standard: &'a Standard,
-    problem: &'a Problem,
-    models: &'a [Set],
+/// Models in another order, with ln weights as the chain counts them and, if asked for, their moments.
+fn walked(
+    mut models: Vec<Set>,
+    reduced: &Reduced<'_>,
+    problem: &Problem,
+    moments: bool,
+) -> Vec<(Set, f64, State)> {
+    // Neighbours in this order differ by few components; a piece has its own walk, whatever the threads.
+    models.sort_unstable();
+    models
+        .par_chunks(PIECE)
+        .flat_map_iter(|models| {
+            pulp::Arch::new().dispatch(Walk {
+                reduced,
+                problem,
+                models,
+                moments,
+            })
+        })
+        .collect()
 }
 
-impl WithSimd for Weights<'_> {
-    type Output = Vec<f64>;
+/// Goes from model to model.
+struct Walk<'a> {
+    reduced: &'a Reduced<'a>,
+    problem: &'a Problem,
+    models: &'a [Set],
+    moments: bool,
+}
+
+impl WithSimd for Walk<'_> {
+    type Output = Vec<(Set, f64, State)>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Vec<f64> {
-        let mut walker = Walker::new(self.standard, &self.problem.prior);
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let standard = &self.reduced.open;
+        let mut walker = Walker::new(standard, &self.problem.prior);
+        let mut response = Response::default();
         self.models
             .iter()
             .map(|set| {
-                for block in 0..self.standard.blocks.len() {
+                for block in 0..standard.blocks.len() {
                     if walker.tableau.holds(block) != (set[block / 64] >> (block % 64) & 1 == 1) {
                         walker.flip(simd, block);
                     }
                 }
-                walker.log_weight()
+                let mut state = State::default();
+                if self.moments {
+                    state.read(self.reduced, &walker.tableau, &mut response);
+                }
+                (set.clone(), walker.log_weight(), state)
             })
             .collect()
     }

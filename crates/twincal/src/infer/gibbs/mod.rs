@@ -6,6 +6,7 @@
 mod chain;
 mod jumps;
 mod random;
+mod state;
 mod swaps;
 
 use super::answer::{Averages, LISTED_MASS, LISTED_MODELS, Listed, posterior};
@@ -65,7 +66,7 @@ impl Agreement {
 pub(super) fn sample(problem: &Problem, settings: &InferenceSettings) -> Result<Posterior> {
     require_draws(settings)?;
     let standard = Standard::new(problem)?;
-    let certain = certain::components(&standard, &problem.prior);
+    let certain = certain::components(&standard, problem, None);
     let reduced = Reduced::new(&standard, &certain);
     let jumps = Jumps::of(&reduced, problem);
     chains(problem, settings, &reduced, jumps, true)

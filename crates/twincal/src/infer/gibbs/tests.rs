@@ -184,7 +184,7 @@ fn case_90_and_91_stuck_chains_are_refused() {
         ..settings(200, 1)
     };
     let standard = Standard::new(&stuck).unwrap();
-    let certain = certain::components(&standard, &stuck.prior);
+    let certain = certain::components(&standard, &stuck, None);
     let reduced = Reduced::new(&standard, &certain);
     let blind = |settings| chains(&stuck, settings, &reduced, Jumps::none(), false);
     match blind(&twelve) {

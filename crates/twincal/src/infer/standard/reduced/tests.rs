@@ -12,7 +12,7 @@ use crate::posterior::Problem;
 /// Averages and ln evidence of all models that hold what is certain, with or without its columns in the tableau.
 fn summed(problem: &Problem, shrink: bool) -> (Averages, f64, bool) {
     let standard = Standard::new(problem).unwrap();
-    let certain = components(&standard, &problem.prior);
+    let certain = components(&standard, &problem, None);
     let reduced = if shrink {
         Reduced::new(&standard, &certain)
     } else {
@@ -97,7 +97,7 @@ fn integrating_columns_out_changes_nothing() {
 fn what_is_gone_follows_what_is_left() {
     let data = acting(3, &[10, 6, 4, 4, 1, 6, 1, 4], 150, true, 2.0);
     let standard = Standard::new(&data.problem).unwrap();
-    let certain = components(&standard, &data.problem.prior);
+    let certain = components(&standard, &data.problem, None);
     let reduced = Reduced::new(&standard, &certain);
     assert!(reduced.shrinks());
     let mut walker = Walker::new(&reduced.open, &data.problem.prior);
