@@ -1,5 +1,6 @@
 //! Torque that is flat at a limit: the drive gave what it had, not what the motion needed (case 26).
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Fewest samples of a flat run at a limit that the model states.
@@ -84,12 +85,16 @@ fn runs(tau: &[f64], inside: impl Fn(f64) -> bool) -> Vec<Range<usize>> {
 
 /// Length of the run of equal values in which the median sample stands.
 fn usual_run(tau: &[f64]) -> usize {
-    let mut lengths: Vec<usize> = tau
-        .chunk_by(|a, b| a == b)
-        .flat_map(|run| std::iter::repeat_n(run.len(), run.len()))
-        .collect();
-    lengths.sort_unstable();
-    lengths[lengths.len() / 2]
+    let mut samples: BTreeMap<usize, usize> = BTreeMap::new();
+    for run in tau.chunk_by(|a, b| a == b) {
+        *samples.entry(run.len()).or_default() += run.len();
+    }
+    let mut seen = 0;
+    let median = samples.iter().find(|(_, count)| {
+        seen += **count;
+        seen > tau.len() / 2
+    });
+    median.map_or(0, |(length, _)| *length)
 }
 
 /// Smallest difference between neighbours that is not zero: the channel's resolution.

@@ -35,8 +35,8 @@ BUGS = [
     (
         "the log-determinant of weights and stationary starts forgotten",
         "infer/standard.rs",
-        "problem.log_constant\n            - 0.5 * problem.n",
-        "-0.5 * problem.n",
+        "problem.log_constant\n            - prior.log_admissible()",
+        "-prior.log_admissible()",
     ),
     (
         "one urn for all families",
@@ -71,8 +71,8 @@ BUGS = [
     (
         "prior odds of a family not updated after a flip",
         "infer/gibbs/chain.rs",
-        "        self.update_odds(family);\n        self.version",
-        "        self.version",
+        "            self.update_odds(self.walker.standard.blocks[block].family);\n",
+        "",
     ),
     (
         "a forgotten stationary factor: first rows count fully",
@@ -83,8 +83,8 @@ BUGS = [
     (
         "the difference over a cut lost",
         "gram/accumulate.rs",
-        "steps[0] = if starts { 0.0 } else { column[0] - last[i] };",
-        "steps[0] = 0.0;",
+        "let before = if starts { column[0] } else { last[i] };",
+        "let before = column[0];",
     ),
     (
         "a component leaves and its square does not follow",
@@ -101,8 +101,8 @@ BUGS = [
     (
         "an exchange without the determinant",
         "infer/walker.rs",
-        "prior + log_factor - 0.5 * d.ln()",
-        "prior + log_factor - 0.0 * d.ln()",
+        "- 0.5 * pivot.determinant.ln()",
+        "- 0.0 * pivot.determinant.ln()",
     ),
     (
         "a bounded slab that is not normalised",
@@ -149,8 +149,38 @@ BUGS = [
     (
         "ranks without ties",
         "diagnostics/ranks.rs",
-        "let rank = from as f64 + (tie.len() as f64 + 1.0) / 2.0;",
-        "let rank = from as f64 + 1.0;",
+        "pooled.chunk_by(|a, b| a.0 == b.0)",
+        "pooled.chunk_by(|_, _| false)",
+    ),
+    (
+        "heredity without its renormaliser",
+        "infer/standard.rs",
+        "            - prior.log_admissible()\n",
+        "",
+    ),
+    (
+        "a parent leaves its child behind",
+        "infer/kin.rs",
+        "!self.children[block].iter().any(|&c| tableau.holds(c))",
+        "true",
+    ),
+    (
+        "a child is decided before its parent, and nobody asks",
+        "infer/exact/plan.rs",
+        "bound_by: kin.bound_by(index),",
+        "bound_by: 0,",
+    ),
+    (
+        "every draw counts as listed",
+        "infer/gibbs/chain.rs",
+        "let jumped = if listed {",
+        "let jumped = if !jumps.is_empty() {",
+    ),
+    (
+        "the weight of what is near without its determinant",
+        "infer/certain.rs",
+        "Some(log_weight(problem, standard, &model) + moments",
+        "Some(log_weight(problem, standard, &model) - 1.0 + moments",
     ),
 ]
 
