@@ -12,7 +12,7 @@ use crate::posterior::Problem;
 /// Averages and ln evidence of all models that hold what is certain, with or without its columns in the tableau.
 fn summed(problem: &Problem, shrink: bool) -> (Averages, f64, bool) {
     let standard = Standard::new(problem).unwrap();
-    let certain = components(&standard, &problem, None);
+    let certain = components(&standard, problem, None);
     let reduced = if shrink {
         Reduced::new(&standard, &certain)
     } else {
