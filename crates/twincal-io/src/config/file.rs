@@ -380,7 +380,7 @@ pub struct PriorTable {
     /// { shape = a0, scale = b0 } of φ ~ InvGamma(a0, b0), scale in (N·m)²; default "auto".
     pub noise: Option<NoisePrior>,
     /// Expected number of components of single families, such as { spring = 0.5, potential = 0.2 }: more than 0 and fewer than
-    /// the family has candidates. The names are those of `terms[].family`.
+    /// the family has candidates, before heredity. The names are those of `terms[].family`.
     #[schemars(extend("additionalProperties" = { "type": "number", "exclusiveMinimum": 0 }))]
     pub families: BTreeMap<String, f64>,
     /// Components that are in, whatever the data say, such as ["elbow.viscous"].

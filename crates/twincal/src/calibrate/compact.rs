@@ -1,5 +1,6 @@
 //! The compact twin: the median-probability model (Barbieri & Berger 2004) refitted jointly, and what it costs.
 
+use super::heredity;
 use super::result::{Compact, CompactTerm};
 use crate::error::Result;
 use crate::infer::approximate;
@@ -16,6 +17,8 @@ pub(super) fn members(problem: &Problem, posterior: &Posterior) -> Vec<bool> {
     for (&component, &pip) in problem.prior.component.iter().zip(&posterior.inclusion) {
         inside[component] = pip >= MEDIAN;
     }
+    // Near the median, sampled probabilities of a child and its parent may lie on either side of it.
+    heredity::force_parents(&problem.prior.parent, &mut inside);
     inside
 }
 

@@ -45,11 +45,21 @@ pub(super) fn parents(
         if named.is_none() && !is_family(above) {
             return Err(unknown(child, above));
         }
-        for (c, component) in components.iter().enumerate() {
-            if component.family.word() == child {
-                let same = || component.of_family(above).and_then(|name| place(&name));
-                parent[c] = named.or_else(same).filter(|&p| p != c);
-            }
+        let own = components.iter().enumerate();
+        let own: Vec<_> = own.filter(|(_, c)| c.family.word() == child).collect();
+        let mut bound = 0;
+        for &(c, component) in &own {
+            let same = || component.of_family(above).and_then(|name| place(&name));
+            parent[c] = named.or_else(same);
+            bound += usize::from(parent[c].is_some());
+        }
+        let is_candidate = || components.iter().any(|c| c.family.word() == above);
+        if given.is_some() && bound == 0 && !own.is_empty() && is_candidate() {
+            return Err(Error::Setting {
+                key: format!("prior.heredity.{child}"),
+                problem: format!("no {child} stands on a joint or link that has a {above}"),
+                remedy: "bind components by name, such as \"elbow.stribeck\" = \"payload\"".into(),
+            });
         }
     }
     for (child, above) in pairs.iter().filter(|(child, _)| !is_family(child)) {
@@ -69,11 +79,24 @@ pub(super) fn parents(
     Ok(parent)
 }
 
+/// What is forced in brings what it needs.
+pub(super) fn force_parents(parent: &[Option<usize>], forced: &mut [bool]) {
+    for child in 0..forced.len() {
+        let of = |c: usize| parent.get(c).copied().flatten();
+        let mut above = of(child).filter(|_| forced[child]);
+        while let Some(own) = above.filter(|&p| !forced[p]) {
+            forced[own] = true;
+            above = of(own);
+        }
+    }
+}
+
 fn unknown(child: &str, name: &str) -> Error {
     Error::Setting {
         key: format!("prior.heredity.{child}"),
         problem: format!("no candidate `{name}` with torque of its own in these logs"),
-        remedy: "give names of components as `twincal fit` prints them, or families such as stribeck = \"coulomb\"".into(),
+        remedy: "pair components by name, as `twincal fit` prints them (\"elbow.stribeck\" = \"elbow.coulomb\"), or families (stribeck = \"coulomb\")"
+            .into(),
     }
 }
 
@@ -128,7 +151,10 @@ mod tests {
             ("payload", "hip.stribeck"),
             ("hip.stribeck", "sin(2*q1)"),
         ];
-        let cases: [(&[(&str, &str)], &str); 4] = [
+        let cases: [(&[(&str, &str)], &str); 7] = [
+            (&[("coulomb", "coulomb")], "needs itself"),
+            (&[("user", "coulomb")], "no user stands on"),
+            (&[("payload", "coulomb")], "`coulomb`"),
             (&[("stribek", "coulomb")], "`stribek`"),
             (&[("stribeck", "colomb")], "`colomb`"),
             (&[("payload", "elbow.spring")], "`elbow.spring`"),
@@ -141,5 +167,13 @@ mod tests {
                 "{text}"
             );
         }
+    }
+
+    #[test]
+    fn what_is_forced_brings_what_it_needs() {
+        let parent = [Some(1), Some(2), None, Some(2), None];
+        let mut forced = [true, false, false, false, false];
+        force_parents(&parent, &mut forced);
+        assert_eq!(forced, [true, true, true, false, false]);
     }
 }

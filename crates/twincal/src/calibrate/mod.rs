@@ -431,6 +431,7 @@ fn columns_of(robot: &Robot, library: &Library, settings: &CalibrationSettings) 
         });
     }
     columns.parent = heredity::parents(&named, settings.prior.heredity.as_deref())?;
+    heredity::force_parents(&columns.parent, &mut columns.forced);
     match unknown.first() {
         None => Ok(columns),
         Some(name) => Err(Error::Setting {

@@ -137,7 +137,13 @@ pub(super) fn summarise(
     ));
     let components = components(library, &fit.posterior, &terms, settings.inference.seed);
     let groups = groups(&fit.problem, &fit.posterior, library);
-    findings.extend(settings.prior.forced.iter().map(forced));
+    let names = names(library, columns);
+    let is_forced = |(_, forced): &(&String, &bool)| **forced;
+    let sure: Vec<String> = (names.iter().zip(&columns.forced))
+        .filter(is_forced)
+        .map(|(name, _)| name.clone())
+        .collect();
+    findings.extend(sure.iter().map(forced));
     findings.extend(findings_of_posterior(
         &components,
         &groups,
@@ -182,8 +188,10 @@ pub(super) fn summarise(
             learned: settings.prior.scaled_variance == Auto::Auto,
             inclusion: fit.problem.prior.inclusion,
             families: settings.prior.families.clone(),
-            forced: settings.prior.forced.clone(),
-            heredity: heredity(library, columns, &fit.problem),
+            forced: sure,
+            heredity: (columns.parent.iter().enumerate())
+                .filter_map(|(c, parent)| Some((names[c].clone(), names[(*parent)?].clone())))
+                .collect(),
             shape: fit.problem.prior.shape,
             scale: fit.problem.prior.scale,
         },
@@ -210,19 +218,14 @@ pub(super) fn summarise(
     })
 }
 
-/// `(child, parent)` by name.
-fn heredity(library: &Library, columns: &Columns, problem: &Problem) -> Vec<(String, String)> {
-    let name = |component: usize| {
-        let column = columns.component.iter().position(|&c| c == component);
-        let term = column.map(|k| &library.terms()[library.columns()[k]]);
-        term.map_or_else(String::new, |t| {
-            library.components()[t.component].name.clone()
-        })
-    };
-    let parents = problem.prior.parent.iter().enumerate();
-    parents
-        .filter_map(|(child, parent)| parent.map(|parent| (name(child), name(parent))))
-        .collect()
+/// Name of each component.
+fn names(library: &Library, columns: &Columns) -> Vec<String> {
+    let mut names = vec![String::new(); columns.family.len()];
+    for (&component, &index) in columns.component.iter().zip(library.columns()) {
+        let own = library.terms()[index].component;
+        names[component].clone_from(&library.components()[own].name);
+    }
+    names
 }
 
 /// A probability that is nobody's evidence.
@@ -231,7 +234,9 @@ fn forced(name: &String) -> Finding {
         Severity::Note,
         "forced",
         name.clone(),
-        format!("`{name}` is in because prior.forced says so: its probability of 1 is no evidence"),
+        format!(
+            "`{name}` is in because prior.forced says so, or names what needs it: its probability of 1 is no evidence"
+        ),
         0,
     )
 }

@@ -4,6 +4,9 @@ use crate::error::{Error, Result};
 use crate::posterior::Problem;
 use crate::prior::Inclusion;
 
+/// Most values of the sum behind heredity: it is done anew for every problem.
+const HEREDITY_VALUES: f64 = 1e5;
+
 /// Sizes that fit, numbers that are numbers, a prior that is one.
 ///
 /// # Errors
@@ -61,6 +64,18 @@ pub(super) fn check(problem: &Problem) -> Result<()> {
             key: "prior.heredity".into(),
             problem: "a component is its own ancestor".into(),
             remedy: "leave out one of the pairs that lead back to it".into(),
+        });
+    }
+    let values = prior.heredity_values();
+    if values > HEREDITY_VALUES {
+        return Err(Error::Setting {
+            key: "prior.heredity".into(),
+            problem: format!(
+                "pairs that hang together bind so many families that their prior takes {values:.0} numbers"
+            ),
+            remedy: format!(
+                "bind fewer families to each other: up to {HEREDITY_VALUES:.0} numbers are kept, Π (components + 1) over the families"
+            ),
         });
     }
     if let Some(k) = (0..size).find(|&k| prior.lower[k].is_nan() || prior.lower[k] > 0.0) {

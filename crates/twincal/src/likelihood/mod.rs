@@ -129,7 +129,7 @@ pub struct Columns {
     pub prior_sd: Vec<Option<f64>>,
     /// Least value of each coefficient; −∞ where any is allowed, K.
     pub lower: Vec<f64>,
-    /// Components that are in, whatever the data say; empty: none, C.
+    /// Components that are in, whatever the data say, with those that they need; empty: none, C.
     pub forced: Vec<bool>,
     /// Component without which each is never in; empty: none, C.
     pub parent: Vec<Option<usize>>,

@@ -17,7 +17,7 @@ const DEFAULT_EXPECTED: f64 = 5.0;
 /// b_f = C_f/m_f − 1          m_f expected of family f, where the user says so
 /// b_f = 1                    unasked, for what is as likely there as not (P(z = 1) = ½)
 /// ```
-/// Forced components, with those without which they are never in, are a family of their own, after the others, with odds that no data outweigh.
+/// Forced components are a family of their own, after the others, with odds that no data outweigh.
 ///
 /// # Errors
 /// [`Error::Setting`] for a probability outside (0, 1), and an expected number that is not between 0 and the number of
@@ -27,17 +27,7 @@ pub(super) fn structure(
     settings: &PriorSettings,
 ) -> Result<(Vec<usize>, Vec<f64>, Inclusion)> {
     let count = columns.family.len();
-    let mut forced: Vec<bool> = (0..count)
-        .map(|c| columns.forced.get(c).copied().unwrap_or(false))
-        .collect();
-    for child in 0..count {
-        let mut parent = columns.parent_of(child).filter(|_| forced[child]);
-        while let Some(own) = parent.filter(|&p| !forced[p]) {
-            forced[own] = true;
-            parent = columns.parent_of(own);
-        }
-    }
-    let forced = |c: usize| forced[c];
+    let forced = |c: usize| columns.forced.get(c).copied().unwrap_or(false);
     let free = (0..count).filter(|&c| !forced(c)).count();
     let inclusion = if free == 0 && count > 0 {
         Inclusion::Probability(0.5) // of nothing
@@ -219,19 +209,6 @@ mod tests {
         near(expected(&some, &settings(None, &mine)), [2.5, 0.3, 1.5]);
         let all = columns(&[0, 1, 2, 3, 4, 5, 6, 7, 8]);
         near(expected(&all, &settings(None, &[])), [4.0, 3.0, 2.0]);
-    }
-
-    /// A child that is forced in brings its ancestors.
-    #[test]
-    fn a_forced_child_needs_its_parents() {
-        let mut some = columns(&[6]);
-        some.parent = vec![None; 9];
-        (some.parent[6], some.parent[3]) = (Some(3), Some(0));
-        let (with, ..) = structure(&some, &settings(None, &[])).unwrap();
-        some.forced = (0..9).map(|c| [0, 3, 6].contains(&c)).collect();
-        let (without, ..) = structure(&some, &settings(None, &[])).unwrap();
-        assert_eq!(with, without);
-        assert_eq!(with.iter().filter(|&&f| f == 3).count(), 3);
     }
 
     #[test]

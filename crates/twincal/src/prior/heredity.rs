@@ -12,20 +12,32 @@ impl Prior {
     /// T_c(x) = 1 + x_f(c) Π_{children e} T_e(x),        Σ p(z) = Σ_m [x^m] Π_roots T · Π_f p_f(m_f)
     /// ```
     ///
-    /// and the product over all roots is kept as one number per vector m of members of the families that take part.
+    /// and the product over all roots is kept as one number per vector m of members, for every set of families that parents and children
+    /// connect.
     pub fn log_admissible(&self) -> f64 {
-        if self.parent.iter().all(Option::is_none) {
-            return 0.0;
-        }
-        let part: Vec<usize> = (0..self.families())
-            .filter(|&f| self.takes_part(f))
-            .collect();
+        let sets = self.connected_families();
+        sets.iter().map(|part| self.log_share(part)).sum()
+    }
+
+    /// Largest number of values that [`Prior::log_admissible`] keeps, Π (C_f + 1) over a connected set of families.
+    pub fn heredity_values(&self) -> f64 {
+        let sizes = self.family_sizes();
+        let sets = self.connected_families();
+        let values = sets.iter().map(|part| {
+            let sizes = part.iter().map(|&f| sizes[f] as f64 + 1.0);
+            sizes.product::<f64>()
+        });
+        values.fold(1.0, f64::max)
+    }
+
+    /// ln of what the models share that are admissible to one connected set of families.
+    fn log_share(&self, part: &[usize]) -> f64 {
         let sizes = self.family_sizes();
         let shape = Shape::new(part.iter().map(|&f| sizes[f]).collect());
         let mut all = shape.one();
-        for root in (0..self.components()).filter(|&c| self.parent[c].is_none()) {
+        for root in (0..self.components()).filter(|&c| self.parent_of(c).is_none()) {
             if part.contains(&self.family[root]) {
-                all = shape.product(&all, &self.tree(root, &part, &shape));
+                all = shape.product(&all, &self.tree(root, part, &shape));
             }
         }
         let logs: Vec<f64> = all
@@ -43,6 +55,27 @@ impl Prior {
             .collect();
         let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         top + logs.iter().map(|log| (log - top).exp()).sum::<f64>().ln()
+    }
+
+    /// Families that parents and children connect, set by set.
+    fn connected_families(&self) -> Vec<Vec<usize>> {
+        let mut label: Vec<usize> = (0..self.families()).collect();
+        let pairs = self.parent.iter().enumerate();
+        let pairs: Vec<(usize, usize)> = pairs
+            .filter_map(|(child, parent)| parent.map(|p| (self.family[child], self.family[p])))
+            .collect();
+        for &(a, b) in &pairs {
+            let (keep, drop) = (label[a].min(label[b]), label[a].max(label[b]));
+            let labels = label.iter_mut().filter(|own| **own == drop);
+            labels.for_each(|own| *own = keep);
+        }
+        let takes_part = |f: &usize| pairs.iter().any(|(a, b)| a == f || b == f);
+        let mut sets = vec![Vec::new(); self.families()];
+        (0..self.families())
+            .filter(takes_part)
+            .for_each(|f| sets[label[f]].push(f));
+        sets.retain(|set| !set.is_empty());
+        sets
     }
 
     /// Number of models with a prior probability; `u64::MAX` where it does not fit.
@@ -68,15 +101,6 @@ impl Prior {
             }
         }
         children
-    }
-
-    /// Whether a family has parents or children.
-    fn takes_part(&self, family: usize) -> bool {
-        let related = |(child, parent): (usize, &Option<usize>)| {
-            parent
-                .is_some_and(|parent| self.family[child] == family || self.family[parent] == family)
-        };
-        self.parent.iter().enumerate().any(related)
     }
 
     /// T of a component.
@@ -160,11 +184,11 @@ impl Shape {
 mod tests {
     use super::super::{Inclusion, Prior};
 
-    /// Ten components of three families; two trees, one of them a chain of three.
+    /// Ten components of four families, of which three are connected and one is with itself; a chain of three.
     fn prior(inclusion: Inclusion) -> Prior {
-        let family = vec![0, 1, 0, 2, 1, 0, 2, 2, 1, 0];
+        let family = vec![0, 1, 0, 2, 1, 3, 3, 2, 1, 0];
         let mut prior = Prior::single(vec![1.0; 10], family, inclusion, (1.0, 1.0));
-        prior.odds = vec![1.0, 0.4, 3.0];
+        prior.odds = vec![1.0, 0.4, 3.0, 0.7];
         prior.parent = vec![None; 10];
         for (child, parent) in [(1, 0), (3, 1), (4, 0), (6, 5)] {
             prior.parent[child] = Some(parent);
@@ -185,13 +209,14 @@ mod tests {
             let prior = prior(inclusion);
             let mut sum = 0.0;
             for model in (0..1024).filter(|&model| admissible(&prior, model)) {
-                let mut members = [0; 3];
+                let mut members = [0; 4];
                 (0..10)
                     .filter(|c| model >> c & 1 == 1)
                     .for_each(|c| members[prior.family[c]] += 1);
                 sum += prior.log_model(&members).exp();
             }
             assert!((prior.log_admissible() - sum.ln()).abs() < 1e-13, "{sum}");
+            assert_eq!(prior.heredity_values(), 4.0 * 4.0 * 3.0);
         }
     }
 

@@ -177,7 +177,7 @@ BUGS = [
         "let jumped = if !jumps.is_empty() {",
     ),
     (
-        "the weight of what is near without its determinant",
+        "the weight of what is near e times too small",
         "infer/certain.rs",
         "Some(log_weight(problem, standard, &model) + moments",
         "Some(log_weight(problem, standard, &model) - 1.0 + moments",

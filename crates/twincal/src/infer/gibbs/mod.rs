@@ -223,21 +223,22 @@ fn judge(reduced: &Reduced<'_>, traces: &[Trace], draws: usize) -> Agreement {
     let judged: Vec<(f64, bool, f64)> = (0..reduced.open.blocks.len())
         .into_par_iter()
         .map(|b| {
-            let pips = traces.iter().map(|t| t.inclusion[b] / draws as f64);
+            let scanned = traces.iter().map(|t| t.inclusion[b] / draws as f64);
             let jumped = traces.iter().map(|t| t.jumped_inclusion[b] / draws as f64);
-            let spread = pips.clone().fold(0.0, f64::max) - pips.clone().fold(1.0, f64::min);
             // What the memory of the chains says, or the scatter of their means: rare visits hide from the first.
-            let scans =
-                mcse_mean(&rows(traces, draws, b, |t| &t.conditional)).max(standard_error(pips));
-            let list =
-                mcse_mean(&rows(traces, draws, b, |t| &t.jumped)).max(standard_error(jumped));
-            let error = if reduced.certain.contains(&b) {
-                0.0
+            let scans = mcse_mean(&rows(traces, draws, b, |t| &t.conditional))
+                .max(standard_error(scanned.clone()));
+            let list = mcse_mean(&rows(traces, draws, b, |t| &t.jumped))
+                .max(standard_error(jumped.clone()));
+            let (error, spread) = if list < scans {
+                (list, range(jumped))
             } else {
-                // A model that N draws never met may have 1/N of the mass.
-                scans.min(list).hypot(unseen)
+                (scans, range(scanned))
             };
-            (error, list < scans, spread.max(0.0))
+            // A model that N draws never met may have about 1/N of the mass.
+            let known = reduced.certain.contains(&b);
+            let error = if known { 0.0 } else { error.hypot(unseen) };
+            (error, list < scans, spread)
         })
         .collect();
     Agreement {
@@ -247,6 +248,12 @@ fn judge(reduced: &Reduced<'_>, traces: &[Trace], draws: usize) -> Agreement {
         by_list: judged.iter().map(|j| j.1).collect(),
         spread: judged.iter().map(|j| j.2).collect(),
     }
+}
+
+/// Largest less smallest.
+fn range(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let largest = values.clone().fold(0.0, f64::max);
+    (largest - values.fold(1.0, f64::min)).max(0.0)
 }
 
 /// Standard error of the mean of independent values; 0 for one alone.
