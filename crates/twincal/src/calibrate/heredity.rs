@@ -22,8 +22,8 @@ impl Named<'_> {
 /// what is said of a component by name goes before what is said of its family.
 ///
 /// # Errors
-/// [`Error::Setting`] for a name that is neither a candidate's nor a family's, and for a component that would be its own
-/// ancestor.
+/// [`Error::Setting`] for a name that is neither a candidate's nor a family's, for a given pair of families that never share a joint
+/// or link, and for a component that would be its own ancestor.
 pub(super) fn parents(
     components: &[Named<'_>],
     given: Option<&[(String, String)]>,

@@ -136,11 +136,6 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// Component without which this one is never in.
-    pub fn parent_of(&self, component: usize) -> Option<usize> {
-        self.parent.get(component).copied().flatten()
-    }
-
     /// Index in `families` of a column's family.
     pub fn family_of(&self, column: usize) -> usize {
         self.family[self.component[column]]
