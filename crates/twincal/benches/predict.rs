@@ -62,7 +62,7 @@ fn main() {
         n_eff: 400.0,
         autocorrelation_time: 1.0,
         interval_factor: 1.0,
-        speed_profile: None,
+        spread: Default::default(),
         sampled: None,
         out_of_band: 0.0,
     };

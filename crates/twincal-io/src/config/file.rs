@@ -455,6 +455,8 @@ pub struct NoiseTable {
     /// The noise of a joint may change with its speed (learned from the residual, in intervals too); with "tempered" only;
     /// default false.
     pub varies_with_speed: Option<bool>,
+    /// The noise of a joint may change with the size of its nominal torque (likewise); with "tempered" only; default false.
+    pub varies_with_load: Option<bool>,
     /// "plug_in" (default): noise and autocorrelation at their estimates; "sampled": drawn together with structure and
     /// coefficients, with "ar1" and "iid" only.
     pub uncertainty: Option<UncertaintyWord>,

@@ -448,11 +448,7 @@ impl Config {
 
     /// `[prior] families`: words of families and expected numbers.
     fn expected_families(&self) -> Result<Vec<(Family, f64)>> {
-        let known = || {
-            [Family::User, Family::Generic]
-                .into_iter()
-                .chain(Family::NAMED)
-        };
+        let known = || Family::UNNAMED.into_iter().chain(Family::NAMED);
         let mut out = Vec::new();
         for (word, &expected) in &self.file.prior.families {
             let key = format!("prior.families.{word}");
@@ -515,6 +511,7 @@ impl Config {
             per_joint: table.per_joint.unwrap_or(true),
             robust: table.robust.unwrap_or(false),
             varies_with_speed: table.varies_with_speed.unwrap_or(false),
+            varies_with_load: table.varies_with_load.unwrap_or(false),
             uncertainty: match table.uncertainty {
                 None | Some(UncertaintyWord::PlugIn) => NoiseUncertainty::PlugIn,
                 Some(UncertaintyWord::Sampled) => NoiseUncertainty::Sampled,

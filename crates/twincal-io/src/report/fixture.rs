@@ -207,7 +207,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
             autocorrelation_time: 2.4,
             interval_factor: 1.08,
             out_of_band: 0.021,
-            speed_profile: None,
+            spread: Default::default(),
             sampled: None,
         })
         .collect();

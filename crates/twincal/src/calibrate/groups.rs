@@ -60,10 +60,17 @@ pub(super) fn groups(problem: &Problem, posterior: &Posterior, library: &Library
             }
         }
     }
+    // The parts of a payload are one story.
+    for inner in (1..count).filter(|&k| all.is_inner(k)) {
+        join(inner, inner - 1, true);
+    }
     let mut groups: Vec<Group> = (0..count)
         .filter_map(|first| {
             let members: Vec<usize> = (first..count).filter(|&k| label[k] == first).collect();
-            if members.len() < 2 {
+            if members
+                .iter()
+                .all(|&k| all.component[k] == all.component[members[0]])
+            {
                 return None;
             }
             all.group(&members, structural[first])
@@ -114,6 +121,11 @@ impl<'a> Candidates<'a> {
 
     fn name(&self, k: usize) -> &str {
         &self.library.components()[self.component[k]].name
+    }
+
+    /// A payload's tensor: in or out by itself, but part of the payload.
+    fn is_inner(&self, k: usize) -> bool {
+        k > 0 && self.component[k] == self.component[k - 1]
     }
 
     fn unsure(&self, k: usize) -> bool {
@@ -223,7 +235,7 @@ impl<'a> Candidates<'a> {
         if pip < WORTH_TELLING {
             return None;
         }
-        let settled = members.iter().all(|&k| !self.unsure(k));
+        let settled = (members.iter()).all(|&k| !self.unsure(k) || self.is_inner(k));
         let alike = if every_motion {
             Alike::EveryMotion
         } else {
@@ -231,7 +243,12 @@ impl<'a> Candidates<'a> {
         };
         let mut order = members.to_vec();
         order.sort_by(|&a, &b| self.pip[b].total_cmp(&self.pip[a]));
-        let told: Vec<&str> = order.iter().map(|&k| self.name(k)).collect();
+        let mut told: Vec<&str> = Vec::new();
+        for name in order.iter().map(|&k| self.name(k)) {
+            if !told.contains(&name) {
+                told.push(name);
+            }
+        }
         let words = words(&told, pip, alike, settled);
         let names = told.into_iter().map(str::to_owned).collect();
         Some(Group {

@@ -131,8 +131,8 @@ fn not_scored(held_out: &[(&Trajectory, f64)], noise: &[JointNoise]) -> Finding 
 /// `twin` with the posterior and noise of a fit to `training`, and the posterior of its compact form.
 fn refitted(twin: &Twin, training: &[Part<'_>], fitted: Fitted) -> Result<(Twin, Posterior)> {
     let out_of_band: Vec<f64> = twin.noise.iter().map(|noise| noise.out_of_band).collect();
-    let profiles: Vec<_> = twin.noise.iter().map(|n| n.speed_profile.clone()).collect();
-    let noise = noise_of(&twin.robot, &fitted, training, &out_of_band, &profiles);
+    let spreads: Vec<_> = twin.noise.iter().map(|n| n.spread.clone()).collect();
+    let noise = noise_of(&twin.robot, &fitted, training, &out_of_band, &spreads);
     let Fitted { fit, .. } = fitted;
     let inside = compact::members(&fit.problem, &fit.posterior);
     let compact = compact::refit(&fit.problem, &inside, &fit.posterior)?;

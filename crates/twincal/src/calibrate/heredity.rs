@@ -18,7 +18,7 @@ impl Named<'_> {
     }
 }
 
-/// Parent of each component. A pair of families binds the components of one joint or link to each other where both are candidates;
+/// Parent of each component; a component of two parts stands twice, one after the other. A pair of families binds the components of one joint or link to each other where both are candidates;
 /// what is said of a component by name goes before what is said of its family.
 ///
 /// # Errors
@@ -34,9 +34,7 @@ pub(super) fn parents(
     };
     let place = |name: &str| components.iter().position(|c| c.name == name);
     let is_family = |word: &str| {
-        let mut known = [Family::User, Family::Generic]
-            .into_iter()
-            .chain(Family::NAMED);
+        let mut known = Family::UNNAMED.into_iter().chain(Family::NAMED);
         place(word).is_none() && known.any(|family| family.word() == word)
     };
     let mut parent = vec![None; components.len()];
@@ -65,6 +63,12 @@ pub(super) fn parents(
     for (child, above) in pairs.iter().filter(|(child, _)| !is_family(child)) {
         let own = place(child).ok_or_else(|| unknown(child, child))?;
         parent[own] = Some(place(above).ok_or_else(|| unknown(child, above))?);
+    }
+    // What is in or out by itself within a component needs the rest of it.
+    for (c, pair) in components.windows(2).enumerate() {
+        if pair[0].name == pair[1].name {
+            parent[c + 1] = Some(c);
+        }
     }
     for (c, component) in components.iter().enumerate() {
         let up = std::iter::successors(parent[c], |&p| parent[p]).take(components.len());
@@ -166,6 +170,22 @@ mod tests {
                 text.contains(said) && text.contains("prior.heredity"),
                 "{text}"
             );
+        }
+    }
+
+    #[test]
+    fn a_part_of_a_component_needs_the_rest_of_it() {
+        let named = |name, family| Named { name, family };
+        let components = [
+            named("elbow.coulomb", Family::Coulomb),
+            named("payload", Family::Payload),
+            named("payload", Family::PayloadTensor),
+        ];
+        for given in [None, Some(("payload", "elbow.coulomb"))] {
+            let pairs = given.map(|(a, b)| vec![(a.to_owned(), b.to_owned())]);
+            let above = given.map(|_| 0);
+            let parents = parents(&components, pairs.as_deref()).unwrap();
+            assert_eq!(parents, [None, above, Some(1)]);
         }
     }
 

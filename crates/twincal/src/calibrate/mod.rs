@@ -14,11 +14,11 @@ mod prior_conflict;
 mod repeat;
 mod result;
 mod sandwich;
-mod speed;
 mod stopped;
 mod summary;
 mod sweep;
 mod unphysical;
+mod uneven_noise;
 mod unseen;
 mod weigh;
 #[cfg(test)]
@@ -38,7 +38,7 @@ use crate::infer::{
 };
 use crate::lag::{LogLag, estimate_lag, lag_findings};
 use crate::likelihood::{
-    Columns, JointNoise, NoiseInterval, NoiseModel, NoiseSettings, NoiseUncertainty, SpeedProfile,
+    Columns, JointNoise, NoiseInterval, NoiseModel, NoiseSettings, NoiseUncertainty, Spread,
 };
 use crate::observations::Part;
 use crate::plug_in::{
@@ -104,6 +104,7 @@ impl Default for CalibrationSettings {
                 per_joint: true,
                 robust: false,
                 varies_with_speed: false,
+                varies_with_load: false,
                 uncertainty: NoiseUncertainty::PlugIn,
             },
             inference: InferenceSettings {
@@ -191,13 +192,14 @@ fn whole_road(
     findings.extend(lag_findings(&pipeline, &lags));
     let every_candidate = library.clone();
     let (library, zero_columns) = data.drop_zero_columns(library);
-    let columns = columns_of(robot, &library, settings)?;
+    let payload_apart = data::carry_something(logs.iter().chain(heldout));
+    let columns = columns_of(robot, &library, settings, payload_apart)?;
     findings.append(&mut data.findings);
     data.require_enough(robot, &columns)?;
 
     // eq. (5): sparse regression with everything that is plugged in at its fixed point
     progress(Stage::Inference);
-    let profiles = weigh::weigh(robot, &mut data, &columns, settings, findings)?;
+    let spreads = weigh::weigh(robot, &mut data, &columns, settings, findings)?;
     let training = data.training();
     let plan = held_out::plan(&data, &trajectories, &pipeline);
     let (fitted, fits_of_folds) = rayon::join(
@@ -217,9 +219,12 @@ fn whole_road(
         settings.noise.robust,
     ));
     findings.extend(drift::findings(robot, &training, mean));
-    if !settings.noise.varies_with_speed {
-        findings.extend(speed::findings(robot, &fitted.fit, &training));
-    }
+    findings.extend(uneven_noise::findings(
+        robot,
+        &fitted.fit,
+        &training,
+        settings.noise,
+    ));
     let inside = compact::members(&fitted.fit.problem, &fitted.fit.posterior);
     let compact = compact::refit(&fitted.fit.problem, &inside, &fitted.fit.posterior)?;
 
@@ -237,9 +242,9 @@ fn whole_road(
         zero_columns,
         pipeline,
         posterior: fitted.fit.posterior.clone(),
-        noise: noise_of(robot, &fitted, &training, &out_of_band, &profiles),
+        noise: noise_of(robot, &fitted, &training, &out_of_band, &spreads),
         hull: data.hull(robot),
-        payload_where_unknown: data::carry_something(logs.iter().chain(heldout)),
+        payload_where_unknown: payload_apart,
     };
     let own = held_out::Own {
         twin: &skeleton,
@@ -386,11 +391,17 @@ fn estimate(
     }
 }
 
-/// The live columns with their components, families and bounds.
+/// The live columns with their components, families and bounds; `payload_apart`: the payload acts in some logs only, which tells
+/// it from the link that carries it.
 ///
 /// # Errors
 /// [`Error::Setting`] if a component that is forced in has no column, or heredity makes no sense.
-fn columns_of(robot: &Robot, library: &Library, settings: &CalibrationSettings) -> Result<Columns> {
+fn columns_of(
+    robot: &Robot,
+    library: &Library,
+    settings: &CalibrationSettings,
+    payload_apart: bool,
+) -> Result<Columns> {
     let forced = &settings.prior.forced;
     let mut columns = Columns {
         names: Vec::new(),
@@ -401,20 +412,26 @@ fn columns_of(robot: &Robot, library: &Library, settings: &CalibrationSettings) 
         lower: Vec::new(),
         forced: Vec::new(),
         parent: Vec::new(),
+        second_choice: Vec::new(),
     };
     let mut named = Vec::new();
     let mut unknown: Vec<&String> = forced.iter().collect();
     let mut last = None;
     for &index in library.columns() {
         let term = &library.terms()[index];
-        if last != Some(term.component) {
-            last = Some(term.component);
+        // A payload's tensor is in or out by itself.
+        if last != Some((term.component, term.family)) {
+            last = Some((term.component, term.family));
             let name = &library.components()[term.component].name;
             named.push(Named {
                 name,
                 family: term.family,
             });
             columns.forced.push(forced.contains(name));
+            let component = &library.components()[term.component];
+            columns
+                .second_choice
+                .push(!payload_apart && component.is_second_choice());
             unknown.retain(|forced| *forced != name);
             let known = columns.families.iter().position(|f| *f == term.family);
             columns.family.push(known.unwrap_or_else(|| {
@@ -450,7 +467,7 @@ fn noise_of(
     fitted: &Fitted,
     training: &[Part<'_>],
     out_of_band: &[f64],
-    profiles: &[Option<SpeedProfile>],
+    spreads: &[Spread],
 ) -> Vec<JointNoise> {
     let (plug_in, posterior) = (&fitted.fit.plug_in, &fitted.fit.posterior);
     robot
@@ -472,7 +489,7 @@ fn noise_of(
                     .as_ref()
                     .map_or(1.0, |l| l.interval_factor[j]),
                 out_of_band: out_of_band[j],
-                speed_profile: profiles[j].clone(),
+                spread: spreads[j].clone(),
                 sampled: fitted.sampled.get(j).copied(),
             }
         })

@@ -139,10 +139,11 @@ pub(super) fn summarise(
     let groups = groups(&fit.problem, &fit.posterior, library);
     let names = names(library, columns);
     let is_forced = |(_, forced): &(&String, &bool)| **forced;
-    let sure: Vec<String> = (names.iter().zip(&columns.forced))
+    let mut sure: Vec<String> = (names.iter().zip(&columns.forced))
         .filter(is_forced)
         .map(|(name, _)| name.clone())
         .collect();
+    sure.dedup();
     findings.extend(sure.iter().map(forced));
     findings.extend(findings_of_posterior(
         &components,
@@ -191,6 +192,7 @@ pub(super) fn summarise(
             forced: sure,
             heredity: (columns.parent.iter().enumerate())
                 .filter_map(|(c, parent)| Some((names[c].clone(), names[(*parent)?].clone())))
+                .filter(|(child, parent)| child != parent)
                 .collect(),
             shape: fit.problem.prior.shape,
             scale: fit.problem.prior.scale,

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 const FACTORS: [f64; 2] = [0.7, 1.4];
 
 /// Posterior means at 0.7, 1 and 1.4 f_c with the plug-ins of the fit; empty with the filter off, and where rows are weighed
-/// (`noise.robust`, `noise.varies_with_speed`): rows of another cut-off have no weights.
+/// (`noise.robust`, `noise.varies_with_speed`, `noise.varies_with_load`): rows of another cut-off have no weights.
 ///
 /// A cut-off at which the logs cannot be used (too short for the kernel) is left out.
 pub(super) fn cutoff(
@@ -32,7 +32,7 @@ pub(super) fn cutoff(
     fit: &Fit,
 ) -> Result<Vec<SweepPoint>> {
     let (robot, pipeline) = (&twin.robot, &twin.pipeline);
-    if pipeline.cutoff_hz == 0.0 || settings.noise.robust || settings.noise.varies_with_speed {
+    if pipeline.cutoff_hz == 0.0 || settings.noise.weighs_rows() {
         return Ok(Vec::new());
     }
     let mut points = vec![SweepPoint {

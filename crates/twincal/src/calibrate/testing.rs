@@ -74,6 +74,7 @@ impl Regression {
             lower: vec![f64::NEG_INFINITY; 2],
             forced: Vec::new(),
             parent: Vec::new(),
+            second_choice: Vec::new(),
         }
     }
 

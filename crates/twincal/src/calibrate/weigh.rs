@@ -1,5 +1,5 @@
 //! Rows that count less, by second passes over the kept rows: outliers, as a Student-t likelihood weighs them, and rows at
-//! speeds at which a joint is noisier.
+//! speeds and under loads at which a joint is noisier.
 //!
 //! A t distribution is a normal one of random scale. Given the residual r and the scale s of its joint, the expected precision
 //! of a row is (Lange, Little & Taylor 1989)
@@ -13,7 +13,7 @@
 use super::data::Data;
 use super::{CalibrationSettings, estimate};
 use crate::error::{Error, Finding, Result, Severity};
-use crate::likelihood::{Columns, NoiseModel, SpeedProfile};
+use crate::likelihood::{Columns, NoiseModel, NoiseSettings, Profile, Spread};
 use crate::observations::Part;
 use crate::robot::Robot;
 
@@ -26,7 +26,7 @@ const PASSES: usize = 2;
 /// Weight below which a row counts as turned down.
 const DOWN: f64 = 0.25;
 
-/// Weighs the rows of all fit logs, as the settings ask: robust, by speed, or both. Returns the speed profile of each joint.
+/// Weighs the rows of all fit logs, as the settings ask: robust, by speed, by load. Returns how the noise of each joint varies.
 ///
 /// # Errors
 /// [`Error::Setting`] with another likelihood than the tempered one, and those of the fit.
@@ -36,15 +36,18 @@ pub(super) fn weigh(
     columns: &Columns,
     settings: &CalibrationSettings,
     findings: &mut Vec<Finding>,
-) -> Result<Vec<Option<SpeedProfile>>> {
-    let mut profiles = vec![None; robot.dof()];
+) -> Result<Vec<Spread>> {
+    let mut spreads = vec![Spread::default(); robot.dof()];
     let noise = settings.noise;
-    let key = match (noise.robust, noise.varies_with_speed) {
-        (false, false) => return Ok(profiles),
-        (true, _) => "noise.robust",
-        (false, true) => "noise.varies_with_speed",
-    };
+    if !noise.weighs_rows() {
+        return Ok(spreads);
+    }
     if noise.model != NoiseModel::Tempered {
+        let key = match (noise.robust, noise.varies_with_speed) {
+            (true, _) => "noise.robust",
+            (false, true) => "noise.varies_with_speed",
+            (false, false) => "noise.varies_with_load",
+        };
         return Err(Error::Setting {
             key: key.into(),
             problem: "only noise.model = \"tempered\" can weigh rows one by one".into(),
@@ -55,13 +58,15 @@ pub(super) fn weigh(
     for _ in 0..PASSES {
         let fitted = estimate(&data.training(), columns, settings)?;
         let beta = &fitted.fit.posterior.mean;
-        for joint in 0..robot.dof() {
+        for (joint, spread) in spreads.iter_mut().enumerate() {
             let memory = fitted.fit.plug_in.autocorrelation_time[joint];
-            if noise.varies_with_speed {
-                profiles[joint] =
-                    SpeedProfile::of_rows(moving(&data.training(), joint, beta), memory);
-            }
-            down[joint] = set(data, joint, beta, profiles[joint].as_ref(), noise.robust);
+            learn(
+                spread,
+                &moving(&data.training(), joint, beta),
+                memory,
+                noise,
+            );
+            down[joint] = set(data, joint, beta, spread, noise.robust);
         }
     }
     for (name, (count, all)) in robot.joint_names().into_iter().zip(down) {
@@ -77,19 +82,63 @@ pub(super) fn weigh(
             ));
         }
     }
-    Ok(profiles)
+    Ok(spreads)
 }
 
-/// `(|q̇|, residual)` of the moving rows of a joint.
-pub(super) fn moving(training: &[Part<'_>], joint: usize, beta: &[f64]) -> Vec<(f64, f64)> {
+/// A moving row of a joint.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MovingRow {
+    /// |q̇|.
+    pub(super) speed: f64,
+    /// |τ_nom|.
+    pub(super) load: f64,
+    pub(super) residual: f64,
+}
+
+/// One round of backfitting: each factor from what the other leaves of the residual.
+fn learn(spread: &mut Spread, rows: &[MovingRow], memory: f64, noise: NoiseSettings) {
+    let profile = |x: fn(&MovingRow) -> f64, rest: &Spread| {
+        let pair = |row: &MovingRow| {
+            let left = rest.at(row.speed, row.load).sqrt();
+            (x(row), row.residual / left)
+        };
+        Profile::of_rows(rows.iter().map(pair).collect(), memory)
+    };
+    if noise.varies_with_speed {
+        spread.speed = None;
+        spread.speed = profile(|row| row.speed, spread);
+    }
+    if noise.varies_with_load {
+        spread.load = None;
+        spread.load = profile(|row| row.load, spread);
+    }
+    // Where speed and load go together the mean of the product is not the product of the means.
+    let all = rows.iter().map(|row| spread.at(row.speed, row.load));
+    let mean = all.sum::<f64>() / rows.len() as f64;
+    if let Spread {
+        speed: Some(_),
+        load: Some(load),
+    } = spread
+    {
+        load.divide(mean);
+    }
+}
+
+/// Speed, load and residual of the moving rows of a joint.
+pub(super) fn moving(training: &[Part<'_>], joint: usize, beta: &[f64]) -> Vec<MovingRow> {
     let mut rows = Vec::new();
     for part in training {
         let residual = part.residual(joint, beta, part.rows.clone());
-        let still = &part.observations.joints[joint].standstill;
+        let own = &part.observations.joints[joint];
+        let velocity = &part.observations.qd[joint];
         let all = part.rows.clone().zip(residual);
         rows.extend(
-            all.filter(|(row, _)| !still[*row])
-                .map(|(row, r)| (part.observations.qd[joint][row].abs(), r)),
+            all.filter(|(row, _)| !own.standstill[*row])
+                .map(|(row, residual)| MovingRow {
+                    speed: velocity[row].abs(),
+                    load: own.nominal[row].abs(),
+                    residual,
+                }),
         );
     }
     rows
@@ -100,19 +149,20 @@ fn set(
     data: &mut Data,
     joint: usize,
     beta: &[f64],
-    profile: Option<&SpeedProfile>,
+    spread: &Spread,
     robust: bool,
 ) -> (usize, usize) {
-    let spread = |velocity: f64| profile.map_or(1.0, |profile| profile.at(velocity));
     let rows = moving(&data.training(), joint, beta);
-    let scale = scale(rows.iter().map(|(v, r)| r / spread(*v).sqrt()).collect());
+    let even = |row: &MovingRow| row.residual / spread.at(row.speed, row.load).sqrt();
+    let scale = scale(rows.iter().map(even).collect());
     let (mut down, mut all) = (0, 0);
     for log in &mut data.fit {
         let own = &mut log.observations;
         let residual = own.whole().residual(joint, beta, 0..own.len());
         let velocity = &own.qd[joint];
         let kept = &mut own.joints[joint];
-        kept.spread = velocity.iter().map(|v| spread(*v)).collect();
+        let motion = velocity.iter().zip(&kept.nominal);
+        kept.spread = motion.map(|(v, load)| spread.at(*v, *load)).collect();
         kept.weight = residual
             .iter()
             .zip(&kept.spread)

@@ -1,9 +1,9 @@
 //! Which rows count how much: iid, tempered and AR(1) noise, plug-ins by fixed point (method section 5).
 
-mod speed_profile;
+mod spread;
 mod structure;
 
-pub use speed_profile::SpeedProfile;
+pub use spread::{Profile, Spread};
 
 use crate::error::Result;
 use crate::gram::Gram;
@@ -56,8 +56,17 @@ pub struct NoiseSettings {
     pub robust: bool,
     /// The noise of a joint may change with its speed; with [`NoiseModel::Tempered`] only.
     pub varies_with_speed: bool,
+    /// The noise of a joint may change with the size of its nominal torque; with [`NoiseModel::Tempered`] only.
+    pub varies_with_load: bool,
     /// Plug-in noise or sampled noise.
     pub uncertainty: NoiseUncertainty,
+}
+
+impl NoiseSettings {
+    /// True where a row's weight depends on the row.
+    pub fn weighs_rows(&self) -> bool {
+        self.robust || self.varies_with_speed || self.varies_with_load
+    }
 }
 
 /// Plug-in noise of one joint.
@@ -65,7 +74,7 @@ pub struct NoiseSettings {
 pub struct JointNoise {
     /// Joint name.
     pub joint: String,
-    /// √E[φ/(w_j(1−ρ_j²)) | y], N·m or N; the root mean square over the training rows where it changes with speed.
+    /// √E[φ/(w_j(1−ρ_j²)) | y], N·m or N; the root mean square over the training rows where it changes with speed or load.
     pub sigma: f64,
     /// AR(1) coefficient; 0 unless `ar1`.
     pub rho: f64,
@@ -81,9 +90,9 @@ pub struct JointNoise {
     pub interval_factor: f64,
     /// sd of the torque outside the filter's band, measured on the training residual, N·m; 0 with the filter off.
     pub out_of_band: f64,
-    /// How the noise in the band changes with the joint's speed; `None`: it does not.
+    /// How the noise in the band changes with the joint's speed and load.
     #[serde(default)]
-    pub speed_profile: Option<SpeedProfile>,
+    pub spread: Spread,
     /// What draws say of sigma and ρ; `None` where they are plug-ins.
     #[serde(default)]
     pub sampled: Option<NoiseInterval>,
@@ -133,6 +142,8 @@ pub struct Columns {
     pub forced: Vec<bool>,
     /// Component without which each is never in; empty: none, C.
     pub parent: Vec<Option<usize>>,
+    /// Components whose torque another one, more usual, has in every motion: rare before the data; empty: none, C.
+    pub second_choice: Vec<bool>,
 }
 
 impl Columns {

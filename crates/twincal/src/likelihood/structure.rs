@@ -7,6 +7,8 @@ use crate::term::Family;
 
 /// Components that are expected where nothing is said.
 const DEFAULT_EXPECTED: f64 = 5.0;
+/// Prior probability of a component that says what a more usual one says.
+const SECOND_CHOICE: f64 = 0.005;
 
 /// Family of every component, r_f of every family, and the inclusion prior, as [`crate::prior::Prior`] wants them.
 ///
@@ -16,8 +18,10 @@ const DEFAULT_EXPECTED: f64 = 5.0;
 /// b_f = C/m0 − 1             m0 components expected in total, families by their size
 /// b_f = C_f/m_f − 1          m_f expected of family f, where the user says so
 /// b_f = 1                    unasked, for what is as likely there as not (P(z = 1) = ½)
+/// b_f = 199                  second choices, which no motion tells from something more usual (P(z = 1) = 1/200)
 /// ```
-/// Forced components are a family of their own, after the others, with odds that no data outweigh.
+/// Second choices are a family of their own after the others unless the user says how many are expected of theirs, or how likely
+/// anything is; forced components are another one, with odds that no data outweigh.
 ///
 /// # Errors
 /// [`Error::Setting`] for a probability outside (0, 1), and an expected number that is not between 0 and the number of
@@ -29,6 +33,15 @@ pub(super) fn structure(
     let count = columns.family.len();
     let forced = |c: usize| columns.forced.get(c).copied().unwrap_or(false);
     let free = (0..count).filter(|&c| !forced(c)).count();
+    let given = |index: usize| {
+        let mut all = settings.families.iter();
+        all.find(|(f, _)| *f == columns.families[index])
+    };
+    let second_choice = |c: usize| {
+        let marked = columns.second_choice.get(c).copied().unwrap_or(false);
+        let free_to_say = settings.inclusion.is_none() && given(columns.family[c]).is_none();
+        marked && free_to_say && !forced(c)
+    };
     let inclusion = if free == 0 && count > 0 {
         Inclusion::Probability(0.5) // of nothing
     } else {
@@ -38,8 +51,7 @@ pub(super) fn structure(
     for (index, &family) in columns.families.iter().enumerate() {
         let own = (0..count).filter(|&c| columns.family[c] == index && !forced(c));
         let size = own.count() as f64;
-        let given = settings.families.iter().find(|(f, _)| *f == family);
-        odds.push(match given {
+        odds.push(match given(index) {
             Some(&(_, expected)) => wanted(inclusion, free, count, family, size, expected)?,
             // A prior that the user gives holds for all families alike.
             None if settings.inclusion.is_none() && family.is_usual() => {
@@ -60,6 +72,11 @@ pub(super) fn structure(
         }
     }
     let mut family = columns.family.clone();
+    let rare: Vec<usize> = (0..count).filter(|&c| second_choice(c)).collect();
+    if !rare.is_empty() {
+        rare.iter().for_each(|&c| family[c] = odds.len());
+        odds.push(reference(inclusion, count) * SECOND_CHOICE / (1.0 - SECOND_CHOICE));
+    }
     if free < count {
         (0..count)
             .filter(|&c| forced(c))
@@ -146,6 +163,7 @@ mod tests {
             lower: vec![f64::NEG_INFINITY; 9],
             forced: (0..9).map(|c| forced.contains(&c)).collect(),
             parent: Vec::new(),
+            second_choice: Vec::new(),
         }
     }
 
@@ -209,6 +227,21 @@ mod tests {
         near(expected(&some, &settings(None, &mine)), [2.5, 0.3, 1.5]);
         let all = columns(&[0, 1, 2, 3, 4, 5, 6, 7, 8]);
         near(expected(&all, &settings(None, &[])), [4.0, 3.0, 2.0]);
+    }
+
+    #[test]
+    fn second_choices_are_rare_unless_the_user_speaks_of_them() {
+        let mut some = columns(&[]);
+        some.second_choice = (0..9).map(|c| c == 1 || c == 4).collect();
+        // The third of their family is expected as the others are, m0 = 4.5 of 9.
+        near(expected(&some, &settings(None, &[])), [2.0, 0.51, 1.0]);
+        let mine = [(Family::Offset, 0.3)];
+        near(expected(&some, &settings(None, &mine)), [2.0, 0.3, 1.0]);
+        let half = Some(Inclusion::Probability(0.25));
+        near(expected(&some, &settings(half, &[])), [1.0, 0.75, 0.5]);
+        some.forced[1] = true;
+        let one = expected(&some, &settings(None, &[]))[1];
+        assert!((one - 1.505).abs() < 1e-12, "{one}");
     }
 
     #[test]

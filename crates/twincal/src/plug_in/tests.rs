@@ -54,6 +54,7 @@ fn the_automatic_prior_adds_no_noise_where_nearly_all_is_explained() {
         lower: vec![f64::NEG_INFINITY],
         forced: Vec::new(),
         parent: Vec::new(),
+        second_choice: Vec::new(),
     };
     let prior = PriorSettings {
         scaled_variance: Auto::Auto,
@@ -69,6 +70,7 @@ fn the_automatic_prior_adds_no_noise_where_nearly_all_is_explained() {
             per_joint: true,
             robust: false,
             varies_with_speed: false,
+            varies_with_load: false,
             uncertainty: NoiseUncertainty::PlugIn,
         },
         prior: &prior,

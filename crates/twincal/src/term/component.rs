@@ -19,6 +19,18 @@ pub struct Component {
     pub alias_of: Vec<String>,
 }
 
+impl Component {
+    /// True for what is wrong with a link that a payload, which is the usual reason, would look like in every motion.
+    #[must_use]
+    pub fn is_second_choice(&self) -> bool {
+        let inertial = matches!(
+            self.family,
+            Family::MassMoments | Family::Tensor | Family::MassScale
+        );
+        inertial && self.alias_of.iter().any(|other| other == payload::NAME)
+    }
+}
+
 /// A physical parameter of a component.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Parameter {
@@ -38,20 +50,24 @@ impl Parameter {
 }
 
 /// How coefficients become parameters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Meaning {
     /// The coefficients themselves.
     Coefficients,
-    /// Mass, first moments, tensor → mass, centre of mass, tensor.
-    Payload,
+    /// Mass, first moments, tensor about a centre → mass, centre of mass, tensor about the frame's origin.
+    Payload {
+        /// In the payload's frame, m.
+        centre: [f64; 3],
+    },
     /// Stiffness and preload → stiffness and rest position.
     Spring,
 }
 
 impl Meaning {
-    pub(super) fn of(family: Family) -> Self {
+    /// `centre` is what a payload's tensor is about.
+    pub(super) fn of(family: Family, centre: [f64; 3]) -> Self {
         match family {
-            Family::Payload => Self::Payload,
+            Family::Payload => Self::Payload { centre },
             Family::Spring => Self::Spring,
             _ => Self::Coefficients,
         }
@@ -64,7 +80,7 @@ impl Meaning {
                 .iter()
                 .map(|(name, unit)| Parameter::new(name, unit))
                 .collect(),
-            Self::Payload => payload::parameters(columns),
+            Self::Payload { .. } => payload::parameters(columns),
             Self::Spring => spring::parameters(columns),
         }
     }
@@ -73,7 +89,7 @@ impl Meaning {
     pub(super) fn values(self, beta: &[f64]) -> Vec<f64> {
         match self {
             Self::Coefficients => beta.to_vec(),
-            Self::Payload => payload::values(beta),
+            Self::Payload { centre } => payload::values(beta, centre),
             Self::Spring => spring::values(beta),
         }
     }

@@ -18,8 +18,10 @@ pub enum Family {
     Offset,
     /// Reflected inertia of the motor.
     MotorInertia,
-    /// A body at the tool: mass, first moments, inertia.
+    /// A body at the tool: mass and first moments.
     Payload,
+    /// Its inertia tensor, which may be out while the payload is in.
+    PayloadTensor,
     /// Mass and first moments of a link.
     MassMoments,
     /// Inertia tensor of a link.
@@ -71,6 +73,9 @@ impl Family {
         Self::Ripple,
     ];
 
+    /// Families that come without a switch of their own: with `terms`, with `generic`, with a payload.
+    pub const UNNAMED: [Self; 3] = [Self::User, Self::Generic, Self::PayloadTensor];
+
     /// What twincal proposes unasked for an arm with geared drives: all but `mass_scale` (a special case of
     /// `mass_moments` and `tensor`), `ripple` (it asks for a gear ratio), and `gain` and `encoder_zero`, which can imitate
     /// almost anything: on real logs they took what springs and counterbalances are.
@@ -110,6 +115,7 @@ impl Family {
             Self::Offset => "offset",
             Self::MotorInertia => "motor_inertia",
             Self::Payload => "payload",
+            Self::PayloadTensor => "payload_tensor",
             Self::MassMoments => "mass_moments",
             Self::Tensor => "tensor",
             Self::MassScale => "mass_scale",
@@ -132,8 +138,18 @@ impl Family {
     pub fn is_usual(self) -> bool {
         matches!(
             self,
-            Self::Viscous | Self::Coulomb | Self::MotorInertia | Self::Payload
+            Self::Viscous
+                | Self::Coulomb
+                | Self::MotorInertia
+                | Self::Payload
+                | Self::PayloadTensor
         )
+    }
+
+    /// True for all that a payload has.
+    #[must_use]
+    pub fn is_payload(self) -> bool {
+        matches!(self, Self::Payload | Self::PayloadTensor)
     }
 
     /// True for everything that dissipates.

@@ -7,7 +7,7 @@ use super::expression::{Graph, Id, Slot, Tape, Variable, bounded_values};
 use super::model_column::{ModelColumn, ModelColumns};
 use super::overlaps;
 use super::parts::{self, Parts, Torque};
-use super::propose::{About, last_link, proposals};
+use super::propose::{About, last_link, payload_mount, proposals};
 use super::sentence::{Estimate, sentence};
 use super::verdicts::statuses;
 use super::{Family, LibrarySettings, Status, Term, user};
@@ -44,6 +44,8 @@ pub struct Library {
     parts: Arc<Parts>,
     /// As the settings say.
     payload_frame: Option<String>,
+    /// What a payload's tensor is about, in its frame.
+    payload_centre: [f64; 3],
 }
 
 impl Library {
@@ -108,6 +110,10 @@ impl Library {
         };
         let statuses = statuses(&graph, &candidates, &verdicts, &acting, &mut findings)?;
 
+        let payload_centre = match about.robot {
+            Some(robot) if settings.has(Family::Payload) => payload_mount(robot, settings)?.centre,
+            _ => [0.0; 3],
+        };
         graph.forget_derivatives();
         let mut library = Self {
             terms: Vec::new(),
@@ -124,6 +130,7 @@ impl Library {
             model: model.map(Arc::new),
             parts: Arc::default(),
             payload_frame: settings.payload_frame.clone(),
+            payload_centre,
         };
         let judged = candidates.into_iter().zip(statuses).zip(acting);
         for (index, ((candidate, status), acting)) in judged.enumerate() {
@@ -256,12 +263,16 @@ impl Library {
                 (own.to_owned(), unit.clone())
             })
             .collect();
-        Meaning::of(component.family).parameters(&columns)
+        self.meaning(component.family).parameters(&columns)
     }
 
     /// Values of [`Library::parameters`] at coefficients `beta`, one per term of the component (0 for dropped ones).
     pub fn parameter_values(&self, component: usize, beta: &[f64]) -> Vec<f64> {
-        Meaning::of(self.components[component].family).values(beta)
+        self.meaning(self.components[component].family).values(beta)
+    }
+
+    fn meaning(&self, family: Family) -> Meaning {
+        Meaning::of(family, self.payload_centre)
     }
 
     /// The same library for a robot with other inertias and the same joints.
@@ -284,7 +295,7 @@ impl Library {
 
     /// `(joint, row in the joint's table)` of every column of the payload component.
     pub fn payload_entries(&self) -> Vec<(usize, usize)> {
-        let is_payload = |column: usize| self.terms[self.columns[column]].family == Family::Payload;
+        let is_payload = |column: usize| self.terms[self.columns[column]].family.is_payload();
         let of_joint = |(joint, columns): (usize, &Vec<usize>)| -> Vec<(usize, usize)> {
             let rows = columns.iter().enumerate();
             let own = rows.filter(|(_, column)| is_payload(**column));
@@ -299,9 +310,9 @@ impl Library {
 
     /// True if parameter `parameter` of a component is the coefficient of its term at the same place.
     pub fn is_coefficient(&self, component: usize, parameter: usize) -> bool {
-        match Meaning::of(self.components[component].family) {
+        match self.meaning(self.components[component].family) {
             Meaning::Coefficients => true,
-            Meaning::Payload => !(1..=3).contains(&parameter),
+            Meaning::Payload { centre } => parameter == 0 || (parameter > 3 && centre == [0.0; 3]),
             Meaning::Spring => parameter == 0,
         }
     }

@@ -12,8 +12,8 @@ pub(super) const COLUMNS: [(&str, &str); 4] =
 /// moments about the model's centre of mass (mass × shift of the centre), axes of the link's frame; the tensor about that
 /// point is unchanged.
 ///
-/// `mass` is the prior sd of the mass, kg, and `reach` the distance in m that makes a first moment out of it.
-pub(super) fn proposal(link: &LinkFrame, mass: f64, reach: f64) -> Proposal {
+/// `mass` is the prior sd of the mass, kg, and `moment` that of a first moment, kg·m.
+pub(super) fn proposal(link: &LinkFrame, mass: f64, moment: f64) -> Proposal {
     let name = format!("{}.mass_moments", link.name);
     let columns = COLUMNS
         .into_iter()
@@ -26,7 +26,7 @@ pub(super) fn proposal(link: &LinkFrame, mass: f64, reach: f64) -> Proposal {
                 format!("mass and centre of mass of {}", link.name),
                 link.column(parameter),
             )
-            .within(if parameter == 0 { mass } else { mass * reach })
+            .within(if parameter == 0 { mass } else { moment })
         })
         .collect();
     Proposal { name, columns }

@@ -77,8 +77,13 @@ impl LinkFrame {
     pub(super) fn column(&self, parameter: usize) -> ModelColumn {
         ModelColumn::Inertia {
             body: self.body,
-            weights: std::array::from_fn(|row| self.to_body[row][parameter]),
+            weights: self.weights(parameter),
         }
+    }
+
+    /// The body's ten parameters per unit of one of the link's.
+    pub(super) fn weights(&self, parameter: usize) -> [f64; 10] {
+        std::array::from_fn(|row| self.to_body[row][parameter])
     }
 }
 

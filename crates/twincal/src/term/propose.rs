@@ -3,12 +3,14 @@
 use super::candidate::{Joint, Proposal};
 use super::expression::Graph;
 use super::model_column::LinkFrame;
+use super::payload::Mount;
 use super::{
     Family, LibrarySettings, asymmetry, base_tilt, coulomb, coupled_friction, encoder_zero, gain,
     generic, load_friction, mass_moments, mass_scale, motor_inertia, offset, payload, potential,
     ripple, spring, stribeck, tensor, user, viscous,
 };
 use crate::error::{Error, Finding, Result, Severity};
+use crate::robot::spatial::{apply, transpose};
 use crate::robot::{Placement, Robot, did_you_mean, to_body_frame};
 
 /// Most columns a library may have.
@@ -17,8 +19,8 @@ const TERM_LIMIT: usize = 1000;
 const GENERIC_JOINTS: usize = 3;
 /// Prior sd of what a link's mass is off, as a share of it.
 const LINK_SHARE: f64 = 0.5;
-/// Prior sd of a payload as a share of all moving mass.
-const PAYLOAD_SHARE: f64 = 0.2;
+/// Prior sd of a payload as a share of all moving mass: about what arms are rated for.
+const PAYLOAD_SHARE: f64 = 0.3;
 /// Size of tools and workpieces, m.
 const PAYLOAD_REACH: f64 = 0.1;
 /// Share of all moving mass that counts for links that the model gives less.
@@ -139,7 +141,8 @@ pub(super) fn proposals(
 /// Payload and, link by link, mass moments, tensor and mass scale: of the link that each moving joint carries.
 ///
 /// Their prior is physical: a link's mass is off by half of it where it is off at all (of at least 2 % of all mass), a
-/// payload weighs a fifth of all that moves and is about 0.1 m large, and other lengths are 0.2 m.
+/// payload weighs three tenths of all that moves and is about 0.1 m large, and other lengths are 0.2 m. The link that carries the payload
+/// has the payload's: what both can say is told by prior odds alone, not by whose prior happens to fit.
 fn inertial(robot: &Robot, settings: &LibrarySettings) -> Result<Vec<Proposal>> {
     let names = robot.bodies();
     let parameters: Vec<[f64; 10]> = (0..names.len())
@@ -157,26 +160,39 @@ fn inertial(robot: &Robot, settings: &LibrarySettings) -> Result<Vec<Proposal>> 
             })
         })
         .collect();
-    let mass = |link: &LinkFrame| {
-        let own = parameters[link.body][0].max(LEAST_MASS_SHARE * total);
-        if own > 0.0 { LINK_SHARE * own } else { 1.0 }
+    let payload = match settings.has(Family::Payload) {
+        true => Some(payload_mount(robot, settings)?),
+        false => None,
+    };
+    let payload_mass = if total > 0.0 {
+        PAYLOAD_SHARE * total
+    } else {
+        1.0
+    };
+    let widths = |link: &LinkFrame| match &payload {
+        Some(mount) if mount.frame.body == link.body => mount.widths(payload_mass, PAYLOAD_REACH),
+        _ => {
+            let own = parameters[link.body][0].max(LEAST_MASS_SHARE * total);
+            let mass = if own > 0.0 { LINK_SHARE * own } else { 1.0 };
+            [mass, mass * REACH, mass * REACH * REACH]
+        }
     };
     let mut all = Vec::new();
-    if settings.has(Family::Payload) {
-        let frame = payload_frame(robot, settings)?;
-        let mass = if total > 0.0 {
-            PAYLOAD_SHARE * total
-        } else {
-            1.0
-        };
-        all.push(payload::proposal(&frame, mass, PAYLOAD_REACH));
+    if let Some(mount) = &payload {
+        all.push(payload::proposal(
+            mount,
+            mount.widths(payload_mass, PAYLOAD_REACH),
+        ));
     }
     let links = || links.iter();
     if settings.has(Family::MassMoments) {
-        all.extend(links().map(|link| mass_moments::proposal(link, mass(link), REACH)));
+        all.extend(links().map(|link| {
+            let [mass, moment, _] = widths(link);
+            mass_moments::proposal(link, mass, moment)
+        }));
     }
     if settings.has(Family::Tensor) {
-        all.extend(links().map(|link| tensor::proposal(link, mass(link) * REACH * REACH)));
+        all.extend(links().map(|link| tensor::proposal(link, widths(link)[2])));
     }
     if settings.has(Family::MassScale) {
         all.extend(links().map(|link| mass_scale::candidate(link, parameters[link.body]).into()));
@@ -198,8 +214,8 @@ fn at_centre_of_mass(robot: &Robot, link: &str, placement: Placement) -> Placeme
     }
 }
 
-/// The frame of `payload_frame`, or of the last link.
-fn payload_frame(robot: &Robot, settings: &LibrarySettings) -> Result<LinkFrame> {
+/// The frame of `payload_frame`, or of the last link, and the centre of mass of the link that the body is named after.
+pub(super) fn payload_mount(robot: &Robot, settings: &LibrarySettings) -> Result<Mount> {
     let name = match &settings.payload_frame {
         Some(name) => name.as_str(),
         None => last_link(robot),
@@ -212,10 +228,19 @@ fn payload_frame(robot: &Robot, settings: &LibrarySettings) -> Result<LinkFrame>
             remedy: did_you_mean(name, links.map(|link| link.name.as_str())),
         });
     };
-    Ok(LinkFrame {
-        name: name.to_owned(),
-        body,
-        to_body: to_body_frame(&placement),
+    let carrier = robot.bodies()[body];
+    let centre = match robot.body_of_link(carrier) {
+        Some((_, own)) => at_centre_of_mass(robot, carrier, own).translation,
+        None => placement.translation,
+    };
+    let from_frame = [0, 1, 2].map(|i| centre[i] - placement.translation[i]);
+    Ok(Mount {
+        centre: apply(&transpose(&placement.rotation), from_frame),
+        frame: LinkFrame {
+            name: name.to_owned(),
+            body,
+            to_body: to_body_frame(&placement),
+        },
     })
 }
 

@@ -2,7 +2,7 @@
 
 use super::JointSetting;
 use crate::error::{Error, Result};
-use crate::likelihood::{JointNoise, SpeedProfile};
+use crate::likelihood::JointNoise;
 use crate::posterior::Posterior;
 
 /// A posterior read from a file may have been cut or edited: nothing below may index out of range.
@@ -75,8 +75,7 @@ pub(super) fn check(posterior: &Posterior, joints: &[JointSetting<'_>]) -> Resul
             ..
         } = *joint.noise;
         let sound = weight > 0.0 && rho.abs() < 1.0 && interval_factor > 0.0 && out_of_band >= 0.0;
-        let profile = joint.noise.speed_profile.as_ref();
-        let sound = sound && profile.is_none_or(SpeedProfile::is_sound);
+        let sound = sound && joint.noise.spread.is_sound();
         let known = joint
             .columns
             .iter()

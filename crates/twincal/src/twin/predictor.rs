@@ -6,7 +6,7 @@ use super::kernel::{Bands, Constants, Group, Scratch};
 use super::{JointTorque, TorqueSignal};
 use crate::error::Result;
 use crate::lanes::{LANES, Lane};
-use crate::likelihood::{JointNoise, SpeedProfile};
+use crate::likelihood::{JointNoise, Spread};
 use crate::posterior::Posterior;
 use crate::posterior::mixture::Level;
 use crate::posterior::student::StudentT;
@@ -69,7 +69,7 @@ struct Joint {
     /// `f²/(w_j (1−ρ_j²))`.
     noise_factor: f64,
     out_of_band: f64,
-    profile: Option<SpeedProfile>,
+    spread: Spread,
     /// Rows that count as one: τ_j, with ar1 (1+ρ)/(1−ρ).
     memory: f64,
     /// |E[β]| of the joint's Coulomb friction, N·m; 0 if it is no candidate.
@@ -125,7 +125,7 @@ impl Predictor {
                 noise_factor: joint.noise.interval_factor.powi(2)
                     / (joint.noise.weight * (1.0 - joint.noise.rho * joint.noise.rho)),
                 out_of_band: joint.noise.out_of_band.powi(2),
-                profile: joint.noise.speed_profile.clone(),
+                spread: joint.noise.spread.clone(),
                 memory: joint.noise.memory(),
                 coulomb: joint.coulomb.map_or(0.0, |k| posterior.mean[k].abs()),
                 hull: widened(joint.hull),
@@ -182,7 +182,7 @@ impl Predictor {
     /// tau | z, y ~ t_{2 a_n}( tau_nom + xᵀμ_z,  (b_n/a_n) (f²/(w_j(1−ρ_j²)) + xᵀA_z⁻¹x) [+ s_out²] ),  mixed over z
     /// calibrated = tau_nom + xᵀE[β | y]
     /// ```
-    /// f is the joint's interval factor; where noise changes with speed, f² is multiplied by the profile's g(|q̇|). For [`TorqueSignal::Raw`] the variance s_out² of the torque outside the filter's
+    /// f is the joint's interval factor; where noise changes with speed or load, f² is multiplied by g(|q̇|) h(|τ_nom|). For [`TorqueSignal::Raw`] the variance s_out² of the torque outside the filter's
     /// band is added to scale² as it is: it was measured directly, φ does not multiply it. While a joint stands still,
     /// stiction holds any torque within ± its Coulomb coefficient: the interval is widened by that much on both sides.
     ///
@@ -323,12 +323,10 @@ impl Predictor {
 }
 
 impl Joint {
-    /// Relative noise variance of a row; 1 where velocity or profile are unknown.
+    /// Relative noise variance of a row; 1 where the motion is unknown.
     fn spread(&self, input: &JointInput<'_>, row: usize) -> f64 {
-        match (&self.profile, input.motion[1].get(row)) {
-            (Some(profile), Some(&velocity)) => profile.at(velocity),
-            _ => 1.0,
-        }
+        let velocity = input.motion[1].get(row);
+        velocity.map_or(1.0, |v| self.spread.at(*v, input.nominal[row]))
     }
 
     fn leaves_hull(&self, input: &JointInput<'_>, row: usize) -> bool {

@@ -23,7 +23,7 @@ pub struct LinkChange {
 /// after; where that has no inertia the heaviest link of the body.
 pub(super) fn home<'w>(writer: &'w Writer<'_>, body: usize, family: Family) -> &'w str {
     let robot = &writer.calibration.twin.robot;
-    let named = if family == Family::Payload {
+    let named = if family.is_payload() {
         writer.library.payload_frame(robot)
     } else {
         robot.bodies()[body]

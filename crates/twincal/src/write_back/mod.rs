@@ -385,6 +385,7 @@ fn reason(family: Family, format: &str) -> String {
         Family::Viscous
         | Family::Coulomb
         | Family::Payload
+        | Family::PayloadTensor
         | Family::MassMoments
         | Family::Tensor
         | Family::MassScale => "this",

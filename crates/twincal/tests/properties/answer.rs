@@ -74,6 +74,7 @@ impl Data {
             lower: vec![f64::NEG_INFINITY; self.columns],
             forced: Vec::new(),
             parent: Vec::new(),
+            second_choice: Vec::new(),
         };
         let mut plug_in = PlugIn::start(2, 2, 30.0);
         plug_in.weight = weight.to_vec();

@@ -175,6 +175,7 @@ pub(in crate::report) fn family_name(family: Family) -> &'static str {
         Family::Offset => "torque offset",
         Family::MotorInertia => "motor inertia",
         Family::Payload => "payload",
+        Family::PayloadTensor => "inertia of the payload",
         Family::MassMoments => "mass and centre of mass",
         Family::Tensor => "inertia tensor",
         Family::MassScale => "mass scale",

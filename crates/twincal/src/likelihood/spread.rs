@@ -1,4 +1,4 @@
-//! Noise that changes with a joint's speed: on real robots it is largest where friction turns round.
+//! Noise that changes with a joint's speed or load: on real robots it is largest where friction turns round.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,18 +7,47 @@ const BINS: usize = 6;
 /// Fewest effective rows in a bin.
 const FEWEST: f64 = 4.0;
 
-/// Relative noise variance g(|q̇|) of one joint: ln g is piecewise linear between the knots and constant beyond them; its mean
-/// over the training rows is 1.
+/// Relative noise variance of a row: `g(|q̇|) h(|τ_nom|)`, mean 1 over the training rows; a factor that is not learned is 1.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Spread {
+    /// g, by speed in rad/s or m/s.
+    pub speed: Option<Profile>,
+    /// h, by the size of the joint's nominal torque in N·m or N.
+    pub load: Option<Profile>,
+}
+
+impl Spread {
+    /// Relative noise variance at a velocity and a nominal torque.
+    pub fn at(&self, velocity: f64, nominal: f64) -> f64 {
+        let factor = |profile: &Option<Profile>, x: f64| {
+            let profile = profile.as_ref();
+            profile.map_or(1.0, |profile| profile.at(x))
+        };
+        factor(&self.speed, velocity) * factor(&self.load, nominal)
+    }
+
+    /// True if it can be evaluated: a file may have been damaged.
+    pub fn is_sound(&self) -> bool {
+        [&self.speed, &self.load]
+            .into_iter()
+            .flatten()
+            .all(Profile::is_sound)
+    }
+}
+
+/// Relative noise variance g(|x|) of one joint: ln g is piecewise linear between the knots and constant beyond them; its mean
+/// over the rows that it was learned from is 1.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SpeedProfile {
-    /// |q̇| of the knots, ascending, rad/s or m/s.
-    pub speed: Vec<f64>,
+pub struct Profile {
+    /// |x| of the knots, ascending.
+    pub knots: Vec<f64>,
     /// ln g there.
     pub log_variance: Vec<f64>,
 }
 
-impl SpeedProfile {
-    /// The profile of moving rows `(|q̇|, residual)`, of which `memory` count as one independent row; `None` where the
+impl Profile {
+    /// The profile of moving rows `(|x|, residual)`, of which `memory` count as one independent row; `None` where the
     /// rows do not ask for one.
     ///
     /// The mean squares of six bins with equal numbers of rows, in logarithms, each pulled to their mean by what chance
@@ -35,7 +64,7 @@ impl SpeedProfile {
         }
         let cut = |bin: usize| bin * rows.len() / BINS;
         let bins = (0..BINS).map(|bin| &rows[cut(bin)..cut(bin + 1)]);
-        let (mut speed, mut log): (Vec<f64>, Vec<f64>) = bins
+        let (mut knots, mut log): (Vec<f64>, Vec<f64>) = bins
             .map(|bin| {
                 let square = bin.iter().map(|(_, r)| r * r).sum::<f64>() / bin.len() as f64;
                 (bin[bin.len() / 2].0, square.ln())
@@ -44,12 +73,12 @@ impl SpeedProfile {
         if log.iter().any(|value| !value.is_finite()) {
             return None;
         }
-        // Knots at one speed would be no function of it.
-        if speed.windows(2).any(|pair| pair[0] >= pair[1]) {
+        // Knots at one place would be no function of it.
+        if knots.windows(2).any(|pair| pair[0] >= pair[1]) {
             let keep: Vec<usize> = (0..BINS)
-                .filter(|&i| i == 0 || speed[i] > speed[i - 1])
+                .filter(|&i| i == 0 || knots[i] > knots[i - 1])
                 .collect();
-            speed = keep.iter().map(|&i| speed[i]).collect();
+            knots = keep.iter().map(|&i| knots[i]).collect();
             log = keep.iter().map(|&i| log[i]).collect();
         }
         let count = log.len() as f64;
@@ -62,26 +91,31 @@ impl SpeedProfile {
         }
         let pull = truth / (truth + chance);
         let mut profile = Self {
-            speed,
+            knots,
             log_variance: log.iter().map(|l| pull * (l - mean)).collect(),
         };
-        let sum: f64 = rows.iter().map(|(speed, _)| profile.at(*speed)).sum();
-        let shift = (sum / rows.len() as f64).ln();
-        profile.log_variance.iter_mut().for_each(|l| *l -= shift);
+        let sum: f64 = rows.iter().map(|(x, _)| profile.at(*x)).sum();
+        profile.divide(sum / rows.len() as f64);
         Some(profile)
     }
 
-    /// g at a velocity.
-    pub fn at(&self, velocity: f64) -> f64 {
-        let speed = velocity.abs();
-        let after = self.speed.partition_point(|knot| *knot <= speed);
+    /// g becomes g/`factor`.
+    pub fn divide(&mut self, factor: f64) {
+        let shift = factor.ln();
+        self.log_variance.iter_mut().for_each(|l| *l -= shift);
+    }
+
+    /// g at x.
+    pub fn at(&self, x: f64) -> f64 {
+        let x = x.abs();
+        let after = self.knots.partition_point(|knot| *knot <= x);
         let log = match (after.checked_sub(1), self.log_variance.get(after)) {
             (None, first) => first.copied().unwrap_or(0.0),
             (Some(before), None) => self.log_variance.get(before).copied().unwrap_or(0.0),
             (Some(before), Some(next)) => {
-                let (from, to) = (self.speed[before], self.speed[after]);
+                let (from, to) = (self.knots[before], self.knots[after]);
                 let low = self.log_variance[before];
-                low + (next - low) * (speed - from) / (to - from)
+                low + (next - low) * (x - from) / (to - from)
             }
         };
         log.exp()
@@ -89,11 +123,11 @@ impl SpeedProfile {
 
     /// True if it can be evaluated: a file may have been damaged.
     pub fn is_sound(&self) -> bool {
-        !self.speed.is_empty()
-            && self.speed.len() == self.log_variance.len()
-            && self.speed.windows(2).all(|pair| pair[0] < pair[1])
+        !self.knots.is_empty()
+            && self.knots.len() == self.log_variance.len()
+            && self.knots.windows(2).all(|pair| pair[0] < pair[1])
             && self
-                .speed
+                .knots
                 .iter()
                 .chain(&self.log_variance)
                 .all(|v| v.is_finite())
@@ -128,7 +162,7 @@ mod tests {
     fn a_known_profile_is_found() {
         let mut random = Random::new(1, 0);
         let data = rows(&mut random, 24_000, -1.0);
-        let profile = SpeedProfile::of_rows(data.clone(), 1.0).unwrap();
+        let profile = Profile::of_rows(data.clone(), 1.0).unwrap();
         for (slow, fast) in [(0.3, 1.0), (1.0, 1.7), (0.5, 1.5)] {
             let change = (profile.at(slow) / profile.at(-fast)).ln();
             assert!(
@@ -138,8 +172,8 @@ mod tests {
         }
         let mean = data.iter().map(|(s, _)| profile.at(*s)).sum::<f64>() / 24_000.0;
         assert!((mean - 1.0).abs() < 1e-12);
-        assert_eq!(profile.at(0.0), profile.at(profile.speed[0]));
-        assert_eq!(profile.at(9.0), profile.at(profile.speed[5]));
+        assert_eq!(profile.at(0.0), profile.at(profile.knots[0]));
+        assert_eq!(profile.at(9.0), profile.at(profile.knots[5]));
         assert!(profile.is_sound() && profile.ratio() > 4.0);
     }
 
@@ -148,15 +182,12 @@ mod tests {
     fn constant_noise_has_no_profile_to_speak_of() {
         let mut random = Random::new(2, 0);
         for _ in 0..50 {
-            let profile = SpeedProfile::of_rows(rows(&mut random, 1200, 0.0), 1.0);
+            let profile = Profile::of_rows(rows(&mut random, 1200, 0.0), 1.0);
             let ratio = profile.map_or(1.0, |profile| profile.ratio());
             assert!(ratio < 1.25, "{ratio}");
         }
-        assert_eq!(
-            SpeedProfile::of_rows(rows(&mut random, 200, -1.0), 10.0),
-            None
-        );
-        assert_eq!(SpeedProfile::of_rows(vec![(1.0, 0.0); 600], 1.0), None);
-        assert_eq!(SpeedProfile::of_rows(Vec::new(), 1.0), None);
+        assert_eq!(Profile::of_rows(rows(&mut random, 200, -1.0), 10.0), None);
+        assert_eq!(Profile::of_rows(vec![(1.0, 0.0); 600], 1.0), None);
+        assert_eq!(Profile::of_rows(Vec::new(), 1.0), None);
     }
 }

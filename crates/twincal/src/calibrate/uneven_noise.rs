@@ -1,0 +1,86 @@
+//! Does the noise of a joint change with its speed or load? Said where it does and the fit assumes that it does not.
+
+use super::weigh::{MovingRow, moving};
+use crate::error::{Finding, Severity};
+use crate::likelihood::{NoiseSettings, Profile};
+use crate::observations::Part;
+use crate::plug_in::{Fit, residual_correlation_time};
+use crate::robot::Robot;
+
+/// Ratio of the largest to the smallest noise sd from which it is worth a word.
+const WORTH: f64 = 2.0;
+
+/// What noise may change with.
+struct Cause {
+    code: &'static str,
+    /// "at some speeds than at others".
+    words: &'static str,
+    key: &'static str,
+    value: fn(&MovingRow) -> f64,
+}
+
+const CAUSES: [Cause; 2] = [
+    Cause {
+        code: "noise_varies_with_speed",
+        words: "at some speeds than at others",
+        key: "noise.varies_with_speed",
+        value: |row| row.speed,
+    },
+    Cause {
+        code: "noise_varies_with_load",
+        words: "under some loads than under others",
+        key: "noise.varies_with_load",
+        value: |row| row.load,
+    },
+];
+
+/// One finding for all joints whose residual is much larger at some speeds than at others, and one for loads; neither where rows
+/// are weighed for it already.
+pub(super) fn findings(
+    robot: &Robot,
+    fit: &Fit,
+    training: &[Part<'_>],
+    noise: NoiseSettings,
+) -> Vec<Finding> {
+    if noise.varies_with_speed || noise.varies_with_load {
+        return Vec::new();
+    }
+    let mut found: [Vec<(&str, f64)>; 2] = Default::default();
+    for (joint, name) in robot.joint_names().into_iter().enumerate() {
+        let memory = residual_correlation_time(training, joint, &fit.posterior.mean);
+        let rows = moving(training, joint, &fit.posterior.mean);
+        for (found, cause) in found.iter_mut().zip(&CAUSES) {
+            let pairs = rows.iter().map(|row| ((cause.value)(row), row.residual));
+            if let Some(profile) = Profile::of_rows(pairs.collect(), memory)
+                && profile.ratio() > WORTH
+            {
+                found.push((name, profile.ratio()));
+            }
+        }
+    }
+    let all = found.into_iter().zip(&CAUSES);
+    all.filter_map(|(found, cause)| finding(found, cause))
+        .collect()
+}
+
+fn finding(mut found: Vec<(&str, f64)>, cause: &Cause) -> Option<Finding> {
+    found.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let (name, ratio) = found.first()?;
+    let others = match found.len() {
+        1 => String::new(),
+        n => format!(" (and {} more)", n - 1),
+    };
+    let Cause {
+        code, words, key, ..
+    } = cause;
+    Some(Finding::new(
+        Severity::Note,
+        code,
+        *name,
+        format!(
+            "joint `{name}`{others}: what is left is {ratio:.1} times larger {words}; intervals are too wide at \
+             some and too narrow at others: {key} = true"
+        ),
+        found.len() as u64,
+    ))
+}
