@@ -8,7 +8,7 @@ use crate::term::Family;
 /// Components that are expected where nothing is said.
 const DEFAULT_EXPECTED: f64 = 5.0;
 /// Prior probability of a component that says what a more usual one says.
-const SECOND_CHOICE: f64 = 0.005;
+const SECOND_CHOICE: f64 = 0.001;
 
 /// Family of every component, r_f of every family, and the inclusion prior, as [`crate::prior::Prior`] wants them.
 ///
@@ -17,8 +17,8 @@ const SECOND_CHOICE: f64 = 0.005;
 /// ```text
 /// b_f = C/m0 − 1             m0 components expected in total, families by their size
 /// b_f = C_f/m_f − 1          m_f expected of family f, where the user says so
-/// b_f = 1                    unasked, for what is as likely there as not (P(z = 1) = ½)
-/// b_f = 199                  second choices, which no motion tells from something more usual (P(z = 1) = 1/200)
+/// b_f = 1/p − 1              unasked, with the probability p of what is more usual than the rest ([`Family::usual`])
+/// b_f = 999                  second choices, which no motion tells from something more usual (P(z = 1) = 1/1000)
 /// ```
 /// Second choices are a family of their own after the others unless the user says how many are expected of theirs, or how likely
 /// anything is; forced components are another one, with odds that no data outweigh.
@@ -47,17 +47,18 @@ pub(super) fn structure(
     } else {
         inclusion(settings.inclusion, free)?
     };
-    let mut odds = Vec::with_capacity(columns.families.len() + 1);
+    let with_probability = |p: f64| reference(inclusion, count) * p / (1.0 - p);
+    let mut odds = Vec::with_capacity(columns.families.len() + 2);
     for (index, &family) in columns.families.iter().enumerate() {
         let own = (0..count).filter(|&c| columns.family[c] == index && !forced(c));
         let size = own.count() as f64;
         odds.push(match given(index) {
             Some(&(_, expected)) => wanted(inclusion, free, count, family, size, expected)?,
-            // A prior that the user gives holds for all families alike.
-            None if settings.inclusion.is_none() && family.is_usual() => {
-                reference(inclusion, count)
-            }
-            None => reference(inclusion, count) / reference(inclusion, free),
+            None => match family.usual() {
+                // A prior that the user gives holds for all families alike.
+                Some(p) if settings.inclusion.is_none() => with_probability(p),
+                _ => reference(inclusion, count) / reference(inclusion, free),
+            },
         });
     }
     for (family, expected) in &settings.families {
@@ -75,7 +76,7 @@ pub(super) fn structure(
     let rare: Vec<usize> = (0..count).filter(|&c| second_choice(c)).collect();
     if !rare.is_empty() {
         rare.iter().for_each(|&c| family[c] = odds.len());
-        odds.push(reference(inclusion, count) * SECOND_CHOICE / (1.0 - SECOND_CHOICE));
+        odds.push(with_probability(SECOND_CHOICE));
     }
     if free < count {
         (0..count)
@@ -234,14 +235,14 @@ mod tests {
         let mut some = columns(&[]);
         some.second_choice = (0..9).map(|c| c == 1 || c == 4).collect();
         // The third of their family is expected as the others are, m0 = 4.5 of 9.
-        near(expected(&some, &settings(None, &[])), [2.0, 0.51, 1.0]);
+        near(expected(&some, &settings(None, &[])), [2.0, 0.502, 1.0]);
         let mine = [(Family::Offset, 0.3)];
         near(expected(&some, &settings(None, &mine)), [2.0, 0.3, 1.0]);
         let half = Some(Inclusion::Probability(0.25));
         near(expected(&some, &settings(half, &[])), [1.0, 0.75, 0.5]);
         some.forced[1] = true;
         let one = expected(&some, &settings(None, &[]))[1];
-        assert!((one - 1.505).abs() < 1e-12, "{one}");
+        assert!((one - 1.501).abs() < 1e-12, "{one}");
     }
 
     #[test]

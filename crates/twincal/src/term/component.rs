@@ -20,14 +20,12 @@ pub struct Component {
 }
 
 impl Component {
-    /// True for what is wrong with a link that a payload, which is the usual reason, would look like in every motion.
+    /// True for what is wrong with a link that a payload, which is the usual reason, would look like in every motion: its mass and
+    /// first moments. A wrong tensor alone is no payload, which has a mass.
     #[must_use]
     pub fn is_second_choice(&self) -> bool {
-        let inertial = matches!(
-            self.family,
-            Family::MassMoments | Family::Tensor | Family::MassScale
-        );
-        inertial && self.alias_of.iter().any(|other| other == payload::NAME)
+        let has_mass = matches!(self.family, Family::MassMoments | Family::MassScale);
+        has_mass && self.alias_of.iter().any(|other| other == payload::NAME)
     }
 }
 
