@@ -396,6 +396,49 @@ fn the_preset_ur_rtde_reads_currents_by_drive_constants() {
     );
 }
 
+/// By joint's name, by number, by the config, by the preset; a joint may have none.
+#[test]
+fn temperatures_of_drives_are_read_where_they_are_logged() {
+    let temperature = |recording: &Recording, joint: usize| {
+        let values = recording.joints[joint].temperature.as_ref();
+        values.map(|values| values[1])
+    };
+    let rows = "0,1,2,30,31\n0.01,1,2,40,41\n";
+    for (header, found) in [
+        (
+            "t,q1,q2,axis_1.temperature,axis_2.temp",
+            [Some(40.0), Some(41.0)],
+        ),
+        ("t,q1,q2,other,temperature2", [None, Some(41.0)]),
+        ("t,q1,q2,temp_1,other", [Some(40.0), None]),
+        ("t,q1,q2,a,b", [None, None]),
+    ] {
+        let text = format!("{header}\n{rows}");
+        let (recording, _) = table(&text, 2, &LogOptions::default()).unwrap();
+        let read = [0, 1].map(|joint| temperature(&recording, joint));
+        assert_eq!(read, found, "{header}");
+    }
+    let text = format!("t,q1,q2,T0,T1\n{rows}");
+    let mapped = columns("temperature = \"T*\"");
+    let (recording, findings) = table(&text, 2, &mapped).unwrap();
+    assert_eq!(temperature(&recording, 1), Some(41.0));
+    let said = findings.iter().find(|f| f.code == "columns").unwrap();
+    contains(&said.message, &["axis_1 = q1 T0", "axis_2 = q2 T1"]);
+    let wrong = columns("temperature = { axis_1 = \"T7\" }");
+    contains(
+        &refused(table(&text, 2, &wrong)),
+        &["no column `T7`", "[columns] temperature"],
+    );
+    let mut options = LogOptions {
+        preset: Some(Preset::UrRtde),
+        ..LogOptions::default()
+    };
+    options.torque.drive_constant = constants(&AXES, 12.5);
+    let text = rtde("actual_current").replace("target_q", "joint_temperatures");
+    let (recording, _) = table(&text, 6, &options).unwrap();
+    assert_eq!(temperature(&recording, 5), Some(6.0));
+}
+
 #[test]
 fn case_31_target_moment_is_no_measurement() {
     let mut options = LogOptions {

@@ -50,7 +50,13 @@ pub(crate) fn log(name: &str, phase: f64, real: &Robot, noise: &mut Random) -> R
     }
     let joints = channels.map(|[q, qd, qdd, tau]| {
         let [qd, qdd, tau] = [qd, qdd, tau].map(Some);
-        Channels { q, qd, qdd, tau }
+        Channels {
+            q,
+            qd,
+            qdd,
+            tau,
+            temperature: None,
+        }
     });
     let (name, joints) = (name.into(), joints.to_vec());
     Recording {

@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::gram::{Gram, JointAccumulator};
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, slices, visit_slices};
-use crate::signal::{Pipeline, Trajectory};
+use crate::signal::{Pipeline, Recording, Trajectory};
 use crate::term::Library;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -26,6 +26,8 @@ pub struct JointObservations {
     pub standstill: Vec<bool>,
     /// Relative noise variance of a row, which `weight` contains already; empty: 1 each.
     pub spread: Vec<f64>,
+    /// Temperature of the drive, len; empty where it was not logged.
+    pub temperature: Vec<f64>,
     /// What a row counts: its column values and its y enter every sum multiplied by the square root; empty: 1 each.
     pub weight: Vec<f64>,
 }
@@ -189,6 +191,30 @@ impl Observations {
             let residual = rows.measured.iter().zip(&rows.nominal);
             kept.y.extend(residual.map(|(m, n)| m - n));
             kept.standstill.extend_from_slice(&rows.standstill);
+        }
+    }
+
+    /// Takes over the temperatures of the log that these rows were made of: between its samples they are linear, and constant
+    /// beyond them; samples without a number are skipped.
+    pub fn set_temperatures(&mut self, log: &Recording) {
+        for (rows, channels) in self.joints.iter_mut().zip(&log.joints) {
+            let logged = log.time.iter().zip(channels.temperature.iter().flatten());
+            let known: Vec<(f64, f64)> = logged
+                .filter(|(time, value)| time.is_finite() && value.is_finite())
+                .map(|(time, value)| (*time, *value))
+                .collect();
+            if known.is_empty() {
+                continue;
+            }
+            let at = |time: &f64| {
+                let after = known.partition_point(|(t, _)| t <= time);
+                match (after.checked_sub(1).map(|i| known[i]), known.get(after)) {
+                    (Some((t0, v0)), Some((t1, v1))) => v0 + (v1 - v0) * (time - t0) / (t1 - t0),
+                    (Some((_, value)), None) => value,
+                    (None, first) => first.map_or(f64::NAN, |(_, value)| *value),
+                }
+            };
+            rows.temperature = self.time.iter().map(at).collect();
         }
     }
 

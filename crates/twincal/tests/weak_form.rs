@@ -93,6 +93,7 @@ fn log(dof: usize, sd: f64) -> Recording {
             qd: None,
             qdd: None,
             tau: Some(vec![0.0; time.len()]),
+            temperature: None,
         })
         .collect();
     Recording {

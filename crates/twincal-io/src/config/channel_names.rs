@@ -118,4 +118,6 @@ pub struct ColumnsTable {
     pub qdd: ChannelNames,
     /// Torque column of each joint, joint side; N·m or N.
     pub tau: ChannelNames,
+    /// Temperature column of each joint's drive, °C or K; of tables, not of a bag's topics.
+    pub temperature: ChannelNames,
 }

@@ -95,6 +95,7 @@ impl Proposal {
             ("qd", &self.columns.qd),
             ("qdd", &self.columns.qdd),
             ("tau", &self.columns.tau),
+            ("temperature", &self.columns.temperature),
         ];
         let mut lines = Vec::new();
         if let Some(time) = &self.columns.time {

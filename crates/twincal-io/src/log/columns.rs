@@ -6,6 +6,8 @@
 //! | joint name and word, joined by `.`, `/`, `_` or `:`, either first | `q`, `pos`, `position`, `angle`; the bare joint name | `qd`, `dq`, `vel`, `velocity`, `speed` | `qdd`, `ddq`, `acc`, `accel`, `acceleration` | `tau`, `torque`, `effort`, `force`, `tau_meas` |
 //! | word and number, with or without `_` or in `[]`, 1 = first moving joint | `q1` | `qd1` | `qdd1` | `tau1` |
 //!
+//! Temperatures of the drives are `temperature` in `[columns]`, or a joint's name or number with `temperature` or `temp`; they explain drift.
+//!
 //! Time is `t`, `time`, `timestamp`, `stamp`, `sec`, `secs` or `seconds`, a unit may follow (`time_s`, `time [s]`, `t_ms`). Letter case is
 //! free where that leaves one column.
 
@@ -19,13 +21,15 @@ use std::collections::BTreeMap;
 use twincal::robot::{Robot, did_you_mean};
 use twincal::{Finding, Severity};
 
-/// Words for position, velocity, acceleration, torque.
-const WORDS: [&[&str]; 4] = [
+/// Words for position, velocity, acceleration, torque, temperature.
+const WORDS: [&[&str]; 5] = [
     &["q", "pos", "position", "angle"],
     &["qd", "dq", "vel", "velocity", "speed"],
     &["qdd", "ddq", "acc", "accel", "acceleration"],
     &["tau", "torque", "effort", "force", "tau_meas"],
+    &["temperature", "temp"],
 ];
+const TEMPERATURE: usize = 4;
 const QUANTITIES: [&str; 4] = ["position", "velocity", "acceleration", "torque"];
 const TIME_WORDS: [&str; 7] = ["t", "time", "timestamp", "stamp", "sec", "secs", "seconds"];
 const UNITS: [&str; 8] = ["s", "sec", "secs", "seconds", "ms", "us", "ns", "µs"];
@@ -49,6 +53,8 @@ pub struct Selection {
     pub time: Option<Channel>,
     /// Position, velocity, acceleration, torque of each moving joint; position is always there.
     pub joints: Vec<[Option<Channel>; 4]>,
+    /// Temperature of each moving joint's drive; empty: none.
+    pub temperatures: Vec<Option<Channel>>,
     /// How the columns were matched.
     pub findings: Vec<Finding>,
 }
@@ -57,13 +63,16 @@ pub struct Selection {
 pub(crate) struct Positions {
     pub(crate) time: Option<usize>,
     pub(crate) joints: Vec<[Option<usize>; 4]>,
+    pub(crate) temperatures: Vec<Option<usize>>,
 }
 
 impl Selection {
-    /// Columns to read, time first, then joint by joint.
+    /// Columns to read, time first, then joint by joint, then temperatures.
     pub fn file_columns(&self) -> Vec<usize> {
         let joints = self.joints.iter().flatten().flatten();
-        self.time.iter().chain(joints).map(|c| c.index).collect()
+        let temperatures = self.temperatures.iter().flatten();
+        let all = self.time.iter().chain(joints).chain(temperatures);
+        all.map(|c| c.index).collect()
     }
 
     pub(crate) fn positions(&self) -> Positions {
@@ -79,7 +88,13 @@ impl Selection {
             .iter()
             .map(|joint| joint.each_ref().map(|c| number(c.is_some())))
             .collect();
-        Positions { time, joints }
+        let temperatures = self.temperatures.iter();
+        let temperatures = temperatures.map(|c| number(c.is_some())).collect();
+        Positions {
+            time,
+            joints,
+            temperatures,
+        }
     }
 }
 
@@ -181,6 +196,7 @@ pub fn match_columns(
         by_joint_name(&header, "qdd", &columns.qdd, &joints)?,
         by_joint_name(&header, "tau", &columns.tau, &joints)?,
     ];
+    let temperatures = by_joint_name(&header, "temperature", &columns.temperature, &joints)?;
     let time = find_time(&header, options)?;
     let mut matched = Vec::with_capacity(joints.len());
     for (number, joint) in joints.iter().enumerate() {
@@ -196,14 +212,23 @@ pub fn match_columns(
         }
         matched.push(channels);
     }
+    let temperature = |(number, joint): (usize, &&str)| match temperatures.get(*joint) {
+        Some(column) => header.mapped("temperature", column).map(Some),
+        None => Ok(by_joint(&header, joint, TEMPERATURE)
+            .or_else(|| by_number(&header, number + 1, TEMPERATURE))
+            .map(|index| header.channel(index))),
+    };
+    let temperatures: Vec<Option<Channel>> =
+        (joints.iter().enumerate().map(temperature)).collect::<Result<_>>()?;
     refuse_shared_columns(file, &joints, &matched)?;
     refuse_foreign_joints(&header, robot, &matched)?;
     refuse_missing_joints(&header, &joints, &matched)?;
     refuse_model_torque(file, &joints, &matched, options)?;
-    let findings = vec![say(file, &joints, &time, &matched)];
+    let findings = vec![say(file, &joints, &time, &matched, &temperatures)];
     Ok(Selection {
         time,
         joints: matched,
+        temperatures,
         findings,
     })
 }
@@ -509,13 +534,16 @@ pub(super) fn say(
     joints: &[&str],
     time: &Option<Channel>,
     matched: &[[Option<Channel>; 4]],
+    temperatures: &[Option<Channel>],
 ) -> Finding {
     let mut parts = Vec::new();
     if let Some(time) = time {
         parts.push(format!("time = {}", time.name));
     }
-    for (joint, channels) in joints.iter().zip(matched) {
-        let columns: Vec<&str> = channels.iter().flatten().map(|c| c.name.as_str()).collect();
+    for (number, (joint, channels)) in joints.iter().zip(matched).enumerate() {
+        let temperature = temperatures.get(number).and_then(Option::as_ref);
+        let columns = channels.iter().flatten().chain(temperature);
+        let columns: Vec<&str> = columns.map(|c| c.name.as_str()).collect();
         let missing: Vec<&str> = (0..4)
             .filter(|&k| channels[k].is_none())
             .map(|k| QUANTITIES[k])

@@ -397,11 +397,13 @@ pub(crate) fn assemble(
     let joints = positions
         .joints
         .iter()
-        .map(|joint| Channels {
+        .enumerate()
+        .map(|(number, joint)| Channels {
             q: take(joint[0]).unwrap_or_default(),
             qd: take(joint[1]),
             qdd: take(joint[2]),
             tau: take(joint[3]),
+            temperature: take(positions.temperatures.get(number).copied().flatten()),
         })
         .collect();
     let recording = Recording {

@@ -1,9 +1,9 @@
 //! Column names of recorders that many people have.
 //!
-//! | preset | recorder | time | position | velocity | torque |
-//! |---|---|---|---|---|---|
-//! | `ur-rtde` | Universal Robots' RTDE `record.py`, and `ur_rtde` | `timestamp` | `actual_q_0` | `actual_qd_0` | `actual_current_0`, A |
-//! | `franka` | libfranka's `logToCSV` | `duration` or `time`, ms | `q[0]`, `state.q[0]` | `dq[0]` | `tau_J[0]` |
+//! | preset | recorder | time | position | velocity | torque | temperature |
+//! |---|---|---|---|---|---|---|
+//! | `ur-rtde` | Universal Robots' RTDE `record.py`, and `ur_rtde` | `timestamp` | `actual_q_0` | `actual_qd_0` | `actual_current_0`, A | `joint_temperatures_0` |
+//! | `franka` | libfranka's `logToCSV` | `duration` or `time`, ms | `q[0]`, `state.q[0]` | `dq[0]` | `tau_J[0]` | |
 //!
 //! Both count joints from 0. What `[columns]` says goes first.
 
@@ -39,18 +39,20 @@ impl Preset {
         }
     }
 
-    /// Names before and behind the joint's number: time, position, velocity, torque.
-    fn names(self) -> [&'static [(&'static str, &'static str)]; 3] {
+    /// Names before and behind the joint's number: position, velocity, torque, temperature.
+    fn names(self) -> [&'static [(&'static str, &'static str)]; 4] {
         match self {
             Self::UrRtde => [
                 &[("actual_q_", "")],
                 &[("actual_qd_", "")],
                 &[("actual_current_", "")],
+                &[("joint_temperatures_", "")],
             ],
             Self::Franka => [
                 &[("state.q[", "]"), ("q[", "]"), ("q_", "")],
                 &[("state.dq[", "]"), ("dq[", "]"), ("dq_", "")],
                 &[("state.tau_J[", "]"), ("tau_J[", "]"), ("tau_J_", "")],
+                &[],
             ],
         }
     }
@@ -88,7 +90,12 @@ pub(super) fn fill_in<'a>(
         let time = preset.times().iter().find(|name| has(name));
         columns.time = time.map(|name| (*name).to_owned());
     }
-    let tables = [&mut columns.q, &mut columns.qd, &mut columns.tau];
+    let tables = [
+        &mut columns.q,
+        &mut columns.qd,
+        &mut columns.tau,
+        &mut columns.temperature,
+    ];
     for (table, patterns) in tables.into_iter().zip(preset.names()) {
         for (number, joint) in robot.joint_names().into_iter().enumerate() {
             let name = patterns

@@ -205,6 +205,10 @@ fn wrong_paths_are_told_with_what_is_there() {
             ][..],
         ),
         (
+            "q = \"/arm/state:q[*]\"\ntemperature = \"/arm/state:T[*]\"",
+            &["[columns] temperature", "topics of a bag have none"],
+        ),
+        (
             "q = \"/arm/state:p[*]\"",
             &[
                 "topic `/arm/state` (my_msgs/msg/ArmState, cdr)",

@@ -67,7 +67,8 @@ impl Data {
                     let incidents = incidents(robot, pipeline, &trajectory);
                     leave_out(pipeline, &mut trajectory, &incidents);
                     findings.extend(incident_findings(&recording.name, &incidents));
-                    let observations = observe(robot, library, pipeline, &trajectory)?;
+                    let mut observations = observe(robot, library, pipeline, &trajectory)?;
+                    observations.set_temperatures(recording);
                     let summary = summary(recording, role, pipeline, &trajectory, &observations);
                     let log = Log {
                         incidents,

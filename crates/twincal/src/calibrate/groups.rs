@@ -11,6 +11,9 @@ const ALIKE: f64 = 0.95;
 const EXCLUSIVE: f64 = -0.5;
 /// Probability below which nobody asks which member it was.
 const WORTH_TELLING: f64 = 0.2;
+/// Probabilities between which a member keeps the question open which one it is.
+const UNLIKELY: f64 = 0.2;
+const SURE: f64 = 0.98;
 /// Nats by which another component may explain the same torque worse and still stand in for it.
 const WORSE: f64 = 1.0;
 /// Nats by which a component must explain torque better than nothing before others can stand in for it.
@@ -129,7 +132,7 @@ impl<'a> Candidates<'a> {
     }
 
     fn unsure(&self, k: usize) -> bool {
-        (0.02..0.98).contains(&self.pip[k])
+        (0.02..SURE).contains(&self.pip[k])
     }
 
     /// No motion tells what `a` does from what `b`, maybe with others, can do.
@@ -235,7 +238,9 @@ impl<'a> Candidates<'a> {
         if pip < WORTH_TELLING {
             return None;
         }
-        let settled = (members.iter()).all(|&k| !self.unsure(k) || self.is_inner(k));
+        // One story has it all, and no other is likely.
+        let mut stories = members.iter().filter(|&&k| !self.is_inner(k));
+        let settled = most >= SURE && stories.all(|&k| !(UNLIKELY..SURE).contains(&self.pip[k]));
         let alike = if every_motion {
             Alike::EveryMotion
         } else {

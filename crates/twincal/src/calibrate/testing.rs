@@ -59,6 +59,7 @@ impl Regression {
                 y,
                 standstill: vec![false; rows],
                 weight: Vec::new(),
+                temperature: Vec::new(),
                 spread: Vec::new(),
             }],
         }

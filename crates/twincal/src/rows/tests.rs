@@ -467,6 +467,7 @@ fn a_coarser_clock_changes_no_row() {
                 qd: Some(of_joint(&qd, joint)),
                 qdd: None,
                 tau: Some(of_joint(&tau, joint)),
+                temperature: None,
             })
             .collect(),
         time,

@@ -101,6 +101,7 @@ impl<'a> PreparedLog<'a> {
             qd: joint.qd.as_ref().map(|_| Vec::new()),
             qdd: joint.qdd.as_ref().map(|_| Vec::new()),
             tau: joint.tau.as_ref().map(|_| Vec::new()),
+            temperature: None,
         });
         PreparedLog {
             log: Cow::Owned(Recording {

@@ -79,6 +79,8 @@ pub struct Channels {
     pub qdd: Option<Vec<f64>>,
     /// N·m or N; absent for a log that is only to be predicted.
     pub tau: Option<Vec<f64>>,
+    /// Temperature of the drive, °C or K, if logged; NaN where it is not known. It explains drift and nothing else.
+    pub temperature: Option<Vec<f64>>,
 }
 
 /// What a robot carried in a log, beyond its model.

@@ -62,6 +62,7 @@ fn recording(
                 qd: derivatives.then(|| state.iter().map(|s| s[1]).collect()),
                 qdd: derivatives.then(|| state.iter().map(|s| s[2]).collect()),
                 tau: Some(state.iter().map(|s| s[2]).collect()),
+                temperature: None,
             }
         })
         .collect();

@@ -126,6 +126,7 @@ mod tests {
                 qd: qd.map(|qd| time.iter().map(|t| qd * 2.0 * (2.0 * t).cos()).collect()),
                 qdd: None,
                 tau: None,
+                temperature: None,
             }],
             time,
             payload: crate::signal::Payload::None,

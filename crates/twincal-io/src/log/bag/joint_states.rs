@@ -451,6 +451,7 @@ impl<'a> JointStates<'a> {
                 name: self.time_words(),
             }),
             joints,
+            temperatures: Vec::new(),
             findings: Vec::new(),
         };
         let names = self.robot.joint_names();
@@ -462,6 +463,7 @@ impl<'a> JointStates<'a> {
             &names,
             &selection.time,
             &selection.joints,
+            &[],
         ));
         // Time is in seconds already.
         let mut options = Cow::Borrowed(self.options);

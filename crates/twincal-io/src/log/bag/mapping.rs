@@ -117,6 +117,13 @@ impl Mapping {
     pub(super) fn new(file: &str, robot: &Robot, options: &LogOptions) -> Result<Option<Self>> {
         let joints = robot.joint_names();
         let columns = &options.columns;
+        if !columns.temperature.is_empty() {
+            return Err(refuse(
+                file,
+                "[columns] temperature names columns of a table, and topics of a bag have none",
+                "leave it out for bags",
+            ));
+        }
         let tables = [&columns.q, &columns.qd, &columns.tau, &columns.qdd];
         let mut topics: Vec<Mapped> = Vec::new();
         let mut add = |key: &str, list: usize, joint: usize, text: &str, all: bool| -> Result<()> {

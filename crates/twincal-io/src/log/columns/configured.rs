@@ -20,6 +20,7 @@ pub(in super::super) fn refuse_unknown_joints(
         ("qd", &columns.qd),
         ("qdd", &columns.qdd),
         ("tau", &columns.tau),
+        ("temperature", &columns.temperature),
     ];
     for (key, names) in tables {
         let ChannelNames::ByJoint(table) = names else {

@@ -37,7 +37,7 @@ pub(super) fn name_columns<'a>(
     let refuse =
         |problem: String, remedy: String| Error::content(Place::file(file), problem, remedy);
     let said = &options.columns;
-    if [&said.q, &said.qd, &said.qdd, &said.tau]
+    if [&said.q, &said.qd, &said.qdd, &said.tau, &said.temperature]
         .iter()
         .all(|names| names.is_empty())
     {
@@ -70,6 +70,7 @@ pub(super) fn name_columns<'a>(
         ("qd", &mut said.qd),
         ("qdd", &mut said.qdd),
         ("tau", &mut said.tau),
+        ("temperature", &mut said.temperature),
     ];
     for (channel, names_of) in channels {
         let mut by_joint = Vec::new();
