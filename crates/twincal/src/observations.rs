@@ -195,7 +195,7 @@ impl Observations {
     }
 
     /// Takes over the temperatures of the log that these rows were made of: between its samples they are linear, and constant
-    /// beyond them; samples without a number are skipped.
+    /// beyond them; samples without a number are skipped. A log whose stamps step back has none.
     pub fn set_temperatures(&mut self, log: &Recording) {
         for (rows, channels) in self.joints.iter_mut().zip(&log.joints) {
             let logged = log.time.iter().zip(channels.temperature.iter().flatten());
@@ -203,7 +203,7 @@ impl Observations {
                 .filter(|(time, value)| time.is_finite() && value.is_finite())
                 .map(|(time, value)| (*time, *value))
                 .collect();
-            if known.is_empty() {
+            if known.is_empty() || known.windows(2).any(|pair| pair[1].0 <= pair[0].0) {
                 continue;
             }
             let at = |time: &f64| {

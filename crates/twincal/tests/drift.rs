@@ -9,7 +9,7 @@ use twincal::posterior::random::Random;
 use twincal::signal::Auto;
 use twincal::term::Family;
 
-/// Viscous friction of the elbow falls by 0.04 N·m·s/rad per degree while its drive warms from 20 to 35 degrees; its temperature is
+/// Coulomb friction of the elbow, 1 N·m, falls by 0.04 N·m per degree while its drive warms from 20 to 35 degrees; its temperature is
 /// logged once a second, with nothing in between.
 fn warmed(logged: bool) -> Calibration {
     let mut noise = Random::new(31, 0);

@@ -125,3 +125,49 @@ fn a_log_without_the_load_is_predicted_without_it() {
     let scores = &result.validation.filtered;
     assert!(scores.rmse_calibrated < 0.105, "{scores:?}");
 }
+
+/// What is carried in every log is the payload, not a heavier last link: said or unsaid, motion cannot tell them apart.
+#[test]
+fn a_load_in_every_log_is_told_of_the_payload_and_not_of_its_link() {
+    let families = [Family::Payload, Family::MassMoments, Family::Viscous];
+    for payload in [Payload::Unknown, Payload::None] {
+        let loaded = log("loaded", 0.3, 0.6, 0.0, payload);
+        let heldout = log("held-out", 1.9, 0.6, 0.0, payload);
+        let result = calibrated(&[loaded], heldout, &families);
+        let pip = |name: &str| {
+            let component = result.components.iter().find(|c| c.name == name);
+            component.and_then(|c| c.pip).expect("a probability")
+        };
+        let (own, link) = (pip("payload"), pip("fore.mass_moments"));
+        assert!(own > 0.98 && link < 0.05, "{own} {link}");
+    }
+}
+
+/// On one joint mass at a distance and a tensor turn alike: then they are in or out together, and on two they are not.
+#[test]
+fn a_payload_of_one_joint_is_one() {
+    use twincal::robot::{JointDescription, JointKind, Robot, RobotDescription};
+    use twincal::term::{Library, LibrarySettings};
+    let settings = LibrarySettings {
+        families: vec![Family::Payload],
+        ..LibrarySettings::default()
+    };
+    let is_one = |robot: &Robot| {
+        let (library, _) = Library::propose(robot, &settings).expect("a library");
+        library.payload_is_one()
+    };
+    let two = two_link::arm(MODEL).expect("an arm");
+    let own = two.description();
+    let links: Vec<_> = own.links.iter().filter(|l| l.name != "upper").collect();
+    let (base, fore) = (links[0].name.as_str(), links[1].name.as_str());
+    let joint = JointDescription::new("elbow", JointKind::Revolute, base, fore);
+    let description = RobotDescription {
+        links: links.iter().map(|link| (*link).clone()).collect(),
+        joints: vec![joint],
+        ..own.clone()
+    };
+    let one = Robot::new(description, &Default::default())
+        .expect("an arm")
+        .0;
+    assert!(is_one(&one) && !is_one(&two));
+}

@@ -6,7 +6,7 @@
 //! | joint name and word, joined by `.`, `/`, `_` or `:`, either first | `q`, `pos`, `position`, `angle`; the bare joint name | `qd`, `dq`, `vel`, `velocity`, `speed` | `qdd`, `ddq`, `acc`, `accel`, `acceleration` | `tau`, `torque`, `effort`, `force`, `tau_meas` |
 //! | word and number, with or without `_` or in `[]`, 1 = first moving joint | `q1` | `qd1` | `qdd1` | `tau1` |
 //!
-//! Temperatures of the drives are `temperature` in `[columns]`, or a joint's name or number with `temperature` or `temp`; they explain drift.
+//! Temperatures of the drives are read where `[columns] temperature` or a preset names them; they explain drift.
 //!
 //! Time is `t`, `time`, `timestamp`, `stamp`, `sec`, `secs` or `seconds`, a unit may follow (`time_s`, `time [s]`, `t_ms`). Letter case is
 //! free where that leaves one column.
@@ -21,16 +21,20 @@ use std::collections::BTreeMap;
 use twincal::robot::{Robot, did_you_mean};
 use twincal::{Finding, Severity};
 
-/// Words for position, velocity, acceleration, torque, temperature.
-const WORDS: [&[&str]; 5] = [
+/// Words for position, velocity, acceleration, torque.
+const WORDS: [&[&str]; 4] = [
     &["q", "pos", "position", "angle"],
     &["qd", "dq", "vel", "velocity", "speed"],
     &["qdd", "ddq", "acc", "accel", "acceleration"],
     &["tau", "torque", "effort", "force", "tau_meas"],
-    &["temperature", "temp"],
 ];
-const TEMPERATURE: usize = 4;
-const QUANTITIES: [&str; 4] = ["position", "velocity", "acceleration", "torque"];
+const QUANTITIES: [&str; 5] = [
+    "position",
+    "velocity",
+    "acceleration",
+    "torque",
+    "temperature",
+];
 const TIME_WORDS: [&str; 7] = ["t", "time", "timestamp", "stamp", "sec", "secs", "seconds"];
 const UNITS: [&str; 8] = ["s", "sec", "secs", "seconds", "ms", "us", "ns", "µs"];
 
@@ -212,15 +216,15 @@ pub fn match_columns(
         }
         matched.push(channels);
     }
-    let temperature = |(number, joint): (usize, &&str)| match temperatures.get(*joint) {
-        Some(column) => header.mapped("temperature", column).map(Some),
-        None => Ok(by_joint(&header, joint, TEMPERATURE)
-            .or_else(|| by_number(&header, number + 1, TEMPERATURE))
-            .map(|index| header.channel(index))),
+    let temperature = |joint: &&str| {
+        let column = temperatures.get(*joint);
+        column
+            .map(|column| header.mapped("temperature", column))
+            .transpose()
     };
     let temperatures: Vec<Option<Channel>> =
-        (joints.iter().enumerate().map(temperature)).collect::<Result<_>>()?;
-    refuse_shared_columns(file, &joints, &matched)?;
+        joints.iter().map(temperature).collect::<Result<_>>()?;
+    refuse_shared_columns(file, &joints, &matched, &temperatures)?;
     refuse_foreign_joints(&header, robot, &matched)?;
     refuse_missing_joints(&header, &joints, &matched)?;
     refuse_model_torque(file, &joints, &matched, options)?;
@@ -346,10 +350,11 @@ fn refuse_shared_columns(
     file: &str,
     joints: &[&str],
     matched: &[[Option<Channel>; 4]],
+    temperatures: &[Option<Channel>],
 ) -> Result<()> {
     let mut taken: BTreeMap<usize, (usize, usize)> = BTreeMap::new();
-    for (joint, channels) in matched.iter().enumerate() {
-        for (quantity, channel) in channels.iter().enumerate() {
+    for (joint, (channels, temperature)) in matched.iter().zip(temperatures).enumerate() {
+        for (quantity, channel) in channels.iter().chain([temperature]).enumerate() {
             let Some(channel) = channel else { continue };
             let Some((other, same)) = taken.insert(channel.index, (joint, quantity)) else {
                 continue;

@@ -206,7 +206,7 @@ fn wrong_paths_are_told_with_what_is_there() {
         ),
         (
             "q = \"/arm/state:q[*]\"\ntemperature = \"/arm/state:T[*]\"",
-            &["[columns] temperature", "topics of a bag have none"],
+            &["[columns] temperature", "from tables only"],
         ),
         (
             "q = \"/arm/state:p[*]\"",

@@ -117,12 +117,15 @@ fn summary(
     summary
 }
 
-/// The verdict that all columns share, except that one seen column is enough for the component to be seen.
+/// The verdict that all columns share which are in or out with the first, except that one seen column is enough for the component to be
+/// seen.
 fn verdict(live: &[&TermSummary]) -> Option<Verdict> {
-    let seen = live
+    let first = live.first()?;
+    let mut together = live
         .iter()
-        .find(|term| term.verdict != Some(Verdict::NotSeen));
-    seen.or(live.first()).and_then(|term| term.verdict)
+        .filter(|term| term.term.family == first.term.family);
+    let seen = together.find(|term| term.verdict != Some(Verdict::NotSeen));
+    seen.unwrap_or(first).verdict
 }
 
 /// Mean, sd and central interval of every parameter, given that the component is in.

@@ -272,6 +272,12 @@ pub(super) fn carry_something<'a>(mut logs: impl Iterator<Item = &'a Recording>)
     logs.any(|log| log.payload == Payload::Unknown)
 }
 
+/// True if the payload acts in some of the fit logs and not in others, which tells it from the link that carries it.
+pub(super) fn tell_payload_apart(logs: &[Recording]) -> bool {
+    let unknown = |log: &Recording| log.payload == Payload::Unknown;
+    logs.iter().any(unknown) && !logs.iter().all(unknown)
+}
+
 /// Raw rows of a log that a standard deviation is measured on, and the times that they cover, s.
 fn spread(pipeline: &Pipeline, trajectory: &Trajectory) -> (Vec<Slice>, Vec<[f64; 2]>) {
     let kept = spread_raw(pipeline, trajectory, f64::NEG_INFINITY);

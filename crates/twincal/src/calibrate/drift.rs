@@ -12,6 +12,8 @@ const BLOCKS: usize = 8;
 const FEWEST: usize = 4;
 /// False alarms per fit.
 const ALARM: f64 = 1e-3;
+/// Fewest degrees over a run for anything to be told of temperature.
+const DEGREES: f64 = 1.0;
 /// A drift below this share of the residual's sd is not worth a word.
 const SHARE: f64 = 0.5;
 
@@ -93,7 +95,7 @@ fn warms(what: What, log: &str, joint: &str, warming: &Warming) -> Finding {
         joint,
         format!(
             "log `{log}`, joint `{joint}`: {subject} goes with the temperature, {slope:+.3} ± {error:.3} per degree from {low:.1} to \
-             {high:.1} (residual sd {sd:.3}); the twin holds the average: {remedy}"
+             {high:.1} (residual sd {sd:.3}), or with what else changed in that time; the twin holds the average: {remedy}"
         ),
         0,
     )
@@ -170,10 +172,11 @@ impl<'a> Rows<'a> {
             .sum();
         let freedom = count as f64 - 2.0;
         let error = (left / freedom / square).sqrt();
-        let chance = 2.0
-            * StudentsT::new(0.0, 1.0, freedom)
-                .ok()?
-                .sf((slope / error).abs());
+        let t = (slope / error).abs();
+        if t.is_nan() {
+            return None; // nothing is left at all
+        }
+        let chance = 2.0 * StudentsT::new(0.0, 1.0, freedom).ok()?.sf(t);
         let fold =
             |start: f64, pick: fn(f64, f64) -> f64| degrees.iter().copied().fold(start, pick);
         let range = [
@@ -182,7 +185,8 @@ impl<'a> Rows<'a> {
         ];
         let sd = self.sd();
         let change = (slope * (range[1] - range[0])).abs();
-        (chance < alarm && change > SHARE * sd).then_some(Warming {
+        let told = chance < alarm && change > SHARE * sd && range[1] - range[0] >= DEGREES;
+        told.then_some(Warming {
             slope,
             error,
             range,
@@ -312,6 +316,10 @@ mod tests {
         // Neither without a temperature nor with one that stays as it is.
         assert_eq!(warming(&data, &[], What::Friction), None);
         assert_eq!(warming(&data, &[30.0; 2400], What::Friction), None);
+        let hardly: Vec<f64> = temperature.iter().map(|t| 30.0 + 0.01 * t).collect();
+        assert_eq!(warming(&data, &hardly, What::Friction), None);
+        data.0.fill(0.0);
+        assert_eq!(warming(&data, &temperature, What::Friction), None);
     }
 
     #[test]

@@ -178,7 +178,8 @@ impl<'a> Candidates<'a> {
         let family = |k: usize| self.library.components()[self.component[k]].family;
         let link = |k: usize| self.name(k).rsplit_once('.').map(|(link, _)| link);
         let mut others: Vec<Vec<usize>> = Vec::new();
-        for k in (0..self.columns.len()).filter(|&k| k != own) {
+        let same = |k: usize| self.component[k] == self.component[own];
+        for k in (0..self.columns.len()).filter(|&k| !same(k)) {
             others.push(vec![k]);
             if family(k) == Family::MassMoments {
                 let tensor = (0..self.columns.len())

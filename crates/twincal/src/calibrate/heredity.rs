@@ -37,6 +37,15 @@ pub(super) fn parents(
         let mut known = Family::UNNAMED.into_iter().chain(Family::NAMED);
         place(word).is_none() && known.any(|family| family.word() == word)
     };
+    if let Some((child, above)) =
+        (pairs.iter()).find(|(child, _)| child == Family::PayloadTensor.word())
+    {
+        return Err(Error::Setting {
+            key: format!("prior.heredity.{child}"),
+            problem: format!("a payload's tensor needs the payload, not `{above}` as well"),
+            remedy: "leave this pair out".into(),
+        });
+    }
     let mut parent = vec![None; components.len()];
     for (child, above) in pairs.iter().filter(|(child, _)| is_family(child)) {
         let named = place(above);
@@ -155,7 +164,8 @@ mod tests {
             ("payload", "hip.stribeck"),
             ("hip.stribeck", "sin(2*q1)"),
         ];
-        let cases: [(&[(&str, &str)], &str); 7] = [
+        let cases: [(&[(&str, &str)], &str); 8] = [
+            (&[("payload_tensor", "coulomb")], "needs the payload"),
             (&[("coulomb", "coulomb")], "needs itself"),
             (&[("user", "coulomb")], "no user stands on"),
             (&[("payload", "coulomb")], "`coulomb`"),

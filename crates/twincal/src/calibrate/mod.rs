@@ -192,8 +192,7 @@ fn whole_road(
     findings.extend(lag_findings(&pipeline, &lags));
     let every_candidate = library.clone();
     let (library, zero_columns) = data.drop_zero_columns(library);
-    let payload_apart = data::carry_something(logs.iter().chain(heldout));
-    let columns = columns_of(robot, &library, settings, payload_apart)?;
+    let columns = columns_of(robot, &library, settings, data::tell_payload_apart(logs))?;
     findings.append(&mut data.findings);
     data.require_enough(robot, &columns)?;
 
@@ -244,7 +243,7 @@ fn whole_road(
         posterior: fitted.fit.posterior.clone(),
         noise: noise_of(robot, &fitted, &training, &out_of_band, &spreads),
         hull: data.hull(robot),
-        payload_where_unknown: payload_apart,
+        payload_where_unknown: data::carry_something(logs.iter().chain(heldout)),
     };
     let own = held_out::Own {
         twin: &skeleton,
@@ -419,9 +418,15 @@ fn columns_of(
     let mut last = None;
     for &index in library.columns() {
         let term = &library.terms()[index];
-        // A payload's tensor is in or out by itself.
-        if last != Some((term.component, term.family)) {
-            last = Some((term.component, term.family));
+        // A payload's tensor is in or out by itself, where motion can tell it from the payload's mass.
+        let family = match term.family {
+            Family::PayloadTensor if library.payload_is_one() => Family::Payload,
+            family => family,
+        };
+        if last != Some((term.component, family)) {
+            let alone = term.family == Family::PayloadTensor
+                && last.is_none_or(|(component, _)| component != term.component);
+            last = Some((term.component, family));
             let name = &library.components()[term.component].name;
             named.push(Named {
                 name,
@@ -431,7 +436,7 @@ fn columns_of(
             let component = &library.components()[term.component];
             columns
                 .second_choice
-                .push(!payload_apart && component.is_second_choice());
+                .push(alone || (!payload_apart && component.is_second_choice()));
             unknown.retain(|forced| *forced != name);
             let known = columns.families.iter().position(|f| *f == term.family);
             columns.family.push(known.unwrap_or_else(|| {

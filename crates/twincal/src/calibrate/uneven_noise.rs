@@ -17,6 +17,7 @@ struct Cause {
     words: &'static str,
     key: &'static str,
     value: fn(&MovingRow) -> f64,
+    allowed: fn(&NoiseSettings) -> bool,
 }
 
 const CAUSES: [Cause; 2] = [
@@ -25,32 +26,33 @@ const CAUSES: [Cause; 2] = [
         words: "at some speeds than at others",
         key: "noise.varies_with_speed",
         value: |row| row.speed,
+        allowed: |noise| noise.varies_with_speed,
     },
     Cause {
         code: "noise_varies_with_load",
         words: "under some loads than under others",
         key: "noise.varies_with_load",
         value: |row| row.load,
+        allowed: |noise| noise.varies_with_load,
     },
 ];
 
-/// One finding for all joints whose residual is much larger at some speeds than at others, and one for loads; neither where rows
-/// are weighed for it already.
+/// One finding for all joints whose residual is much larger at some speeds than at others, and one for loads, beyond what rows are weighed
+/// for already.
 pub(super) fn findings(
     robot: &Robot,
     fit: &Fit,
     training: &[Part<'_>],
     noise: NoiseSettings,
 ) -> Vec<Finding> {
-    if noise.varies_with_speed || noise.varies_with_load {
-        return Vec::new();
-    }
     let mut found: [Vec<(&str, f64)>; 2] = Default::default();
     for (joint, name) in robot.joint_names().into_iter().enumerate() {
         let memory = residual_correlation_time(training, joint, &fit.posterior.mean);
         let rows = moving(training, joint, &fit.posterior.mean);
-        for (found, cause) in found.iter_mut().zip(&CAUSES) {
-            let pairs = rows.iter().map(|row| ((cause.value)(row), row.residual));
+        let open = found.iter_mut().zip(&CAUSES);
+        for (found, cause) in open.filter(|(_, cause)| !(cause.allowed)(&noise)) {
+            let even = |row: &MovingRow| row.residual / row.spread.sqrt();
+            let pairs = rows.iter().map(|row| ((cause.value)(row), even(row)));
             if let Some(profile) = Profile::of_rows(pairs.collect(), memory)
                 && profile.ratio() > WORTH
             {

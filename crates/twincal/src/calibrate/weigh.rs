@@ -93,6 +93,8 @@ pub(super) struct MovingRow {
     /// |τ_nom|.
     pub(super) load: f64,
     pub(super) residual: f64,
+    /// Relative noise variance as the rows are weighed.
+    pub(super) spread: f64,
 }
 
 /// One round of backfitting: each factor from what the other leaves of the residual.
@@ -138,6 +140,7 @@ pub(super) fn moving(training: &[Part<'_>], joint: usize, beta: &[f64]) -> Vec<M
                     speed: velocity[row].abs(),
                     load: own.nominal[row].abs(),
                     residual,
+                    spread: own.spread.get(row).copied().unwrap_or(1.0),
                 }),
         );
     }

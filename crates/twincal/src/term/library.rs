@@ -46,6 +46,7 @@ pub struct Library {
     payload_frame: Option<String>,
     /// What a payload's tensor is about, in its frame.
     payload_centre: [f64; 3],
+    payload_is_one: bool,
 }
 
 impl Library {
@@ -131,6 +132,7 @@ impl Library {
             parts: Arc::default(),
             payload_frame: settings.payload_frame.clone(),
             payload_centre,
+            payload_is_one: false,
         };
         let judged = candidates.into_iter().zip(statuses).zip(acting);
         for (index, ((candidate, status), acting)) in judged.enumerate() {
@@ -158,7 +160,9 @@ impl Library {
                     .to_owned(),
             });
         }
-        let names = overlaps::spanning(&library, joints.len(), &random_motions(joints.len()));
+        let states = random_motions(joints.len());
+        library.payload_is_one = overlaps::payload_is_one(&library, joints.len(), &states);
+        let names = overlaps::spanning(&library, joints.len(), &states);
         for (component, names) in library.components.iter_mut().zip(names) {
             component.alias_of = names;
         }
@@ -291,6 +295,11 @@ impl Library {
             Some(name) => name,
             None => last_link(robot),
         }
+    }
+
+    /// True if no motion tells the payload's tensor from its mass and first moments: one joint, say, or only the last one.
+    pub fn payload_is_one(&self) -> bool {
+        self.payload_is_one
     }
 
     /// `(joint, row in the joint's table)` of every column of the payload component.

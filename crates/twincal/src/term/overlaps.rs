@@ -44,6 +44,26 @@ pub(super) fn spanning(library: &Library, joints: usize, states: &[Motions]) -> 
         .collect()
 }
 
+/// True if in every motion the tensor of the payload can do what its mass or a first moment does: then motion says nothing of the one
+/// without the other.
+pub(super) fn payload_is_one(library: &Library, joints: usize, states: &[Motions]) -> bool {
+    let terms = library.columns().iter().map(|&term| &library.terms()[term]);
+    let payload = terms.filter(|term| term.family.is_payload());
+    let families: Vec<(usize, Family)> =
+        payload.map(|term| (term.component, term.family)).collect();
+    let Some(&(component, _)) = families.first() else {
+        return false;
+    };
+    let all = &columns(library, joints, states)[component];
+    let of = |family: Family| {
+        let pairs = all.iter().zip(&families);
+        let own = pairs.filter(move |(_, (_, own))| *own == family);
+        own.map(|(column, _)| column)
+    };
+    let tensor = basis(of(Family::PayloadTensor));
+    of(Family::Payload).any(|column| within(column, &tensor))
+}
+
 /// Mass moments and tensor of the same link.
 fn links(components: &[Component]) -> Vec<(usize, usize)> {
     let of = |family: Family| {

@@ -107,7 +107,7 @@ pub struct Writer<'a> {
 }
 
 /// A component of a group that nobody can tell apart is written with the others from this probability on.
-const SHARE_OF_GROUP: f64 = 0.1;
+const SHARE_OF_GROUP: f64 = 0.05;
 
 impl<'a> Writer<'a> {
     /// Prepares the write-back of a calibration into a file that holds this.

@@ -117,10 +117,14 @@ impl Mapping {
     pub(super) fn new(file: &str, robot: &Robot, options: &LogOptions) -> Result<Option<Self>> {
         let joints = robot.joint_names();
         let columns = &options.columns;
-        if !columns.temperature.is_empty() {
+        let of_topic = match &columns.temperature {
+            ChannelNames::All(text) => is_source(text),
+            ChannelNames::ByJoint(table) => table.values().any(|text| is_source(text)),
+        };
+        if of_topic {
             return Err(refuse(
                 file,
-                "[columns] temperature names columns of a table, and topics of a bag have none",
+                "[columns] temperature names a topic: temperatures are read from tables only",
                 "leave it out for bags",
             ));
         }
