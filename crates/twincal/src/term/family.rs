@@ -133,12 +133,12 @@ impl Family {
     }
 
     /// Prior probability of what is more usual than the rest: nearly every geared joint has friction and a motor's inertia, and a
-    /// payload, which one log in ten or so carries unsaid, is the usual reason why the last link is not what the model says.
+    /// payload, which one log in five or so carries unsaid, is the usual reason why the last link is not what the model says.
     #[must_use]
     pub fn usual(self) -> Option<f64> {
         match self {
             Self::Viscous | Self::Coulomb | Self::MotorInertia | Self::PayloadTensor => Some(0.5),
-            Self::Payload => Some(0.1),
+            Self::Payload => Some(0.2),
             _ => None,
         }
     }

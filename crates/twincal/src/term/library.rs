@@ -1,5 +1,7 @@
 //! The library: all candidates of one robot in order, judged, compiled into one tape and one pass over the model.
 
+mod carried;
+
 use super::aliases::{Motions, channels, judge};
 use super::candidate::{Candidate, Joint, Proposal};
 use super::component::{Component, Meaning, Parameter};
@@ -7,7 +9,7 @@ use super::expression::{Graph, Id, Slot, Tape, Variable, bounded_values};
 use super::model_column::{ModelColumn, ModelColumns};
 use super::overlaps;
 use super::parts::{self, Parts, Torque};
-use super::propose::{About, last_link, payload_mount, proposals};
+use super::propose::{About, payload_mount, proposals};
 use super::sentence::{Estimate, sentence};
 use super::verdicts::statuses;
 use super::{Family, LibrarySettings, Status, Term, user};
@@ -287,34 +289,6 @@ impl Library {
             model,
             ..self.clone()
         }
-    }
-
-    /// The link in whose frame payloads are described.
-    pub fn payload_frame<'a>(&'a self, robot: &'a Robot) -> &'a str {
-        match &self.payload_frame {
-            Some(name) => name,
-            None => last_link(robot),
-        }
-    }
-
-    /// True if no motion tells the payload's tensor from its mass and first moments: one joint, say, or only the last one.
-    pub fn payload_is_one(&self) -> bool {
-        self.payload_is_one
-    }
-
-    /// `(joint, row in the joint's table)` of every column of the payload component.
-    pub fn payload_entries(&self) -> Vec<(usize, usize)> {
-        let is_payload = |column: usize| self.terms[self.columns[column]].family.is_payload();
-        let of_joint = |(joint, columns): (usize, &Vec<usize>)| -> Vec<(usize, usize)> {
-            let rows = columns.iter().enumerate();
-            let own = rows.filter(|(_, column)| is_payload(**column));
-            own.map(|(row, _)| (joint, row)).collect()
-        };
-        self.by_joint
-            .iter()
-            .enumerate()
-            .flat_map(of_joint)
-            .collect()
     }
 
     /// True if parameter `parameter` of a component is the coefficient of its term at the same place.
