@@ -12,7 +12,7 @@ use std::path::Path;
 use twincal::evaluator::{Beyond, Evaluator};
 use twincal::posterior::draws::draw;
 use twincal::robot::Inertia;
-use twincal::write_back::{Holds, LinkChange, Residual, WriteBack, Writer};
+use twincal::write_back::{Holds, LinkChange, Residual, WriteBack, Writer, Written};
 use twincal_io::artifact::{Artifact, Claim, MODEL_MJCF, MODEL_URDF, Maker, OutputFile, Replace};
 use twincal_io::export::code::{Language, source};
 use twincal_io::export::write_model;
@@ -358,7 +358,19 @@ fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
         terminal.say("  nothing: no found effect has a place there; the file is as it was");
     }
     for written in &change.written {
-        paragraph(&format!("{} ({})", written.words, written.place), terminal);
+        let Written {
+            words, place, pip, ..
+        } = written;
+        let text = if *pip >= 0.5 {
+            format!("{words} ({place})")
+        } else {
+            // The file holds the model average.
+            format!(
+                "{words} ({place}; {:.0} % of that, its probability)",
+                100.0 * pip
+            )
+        };
+        paragraph(&text, terminal);
     }
     let changed: Vec<String> = change.links.iter().filter_map(change_of).collect();
     if !changed.is_empty() {
