@@ -9,6 +9,7 @@ The time of `simulate` is not counted.
 
 import argparse
 import json
+import multiprocessing
 import os
 import statistics
 import subprocess
@@ -65,6 +66,11 @@ def log(name, minutes, seed=1):
     return columns
 
 
+def write(name, minutes, file):
+    """The log as a file."""
+    pq.write_table(pa.table(log(name, minutes)), file)
+
+
 def measured(command):
     """Wall time in s, largest resident memory in MB, and the standard error of one run."""
     began = time.perf_counter()
@@ -90,7 +96,10 @@ def main():
         folder.mkdir(parents=True, exist_ok=True)
         file = folder / f"{given.robot}-{given.minutes:g}.parquet"
         if not file.exists():
-            pq.write_table(pa.table(log(given.robot, given.minutes)), file)
+            # In a process of its own: a child's largest memory counts what its parent had when it was started.
+            maker = multiprocessing.get_context("spawn").Process(target=write, args=(given.robot, given.minutes, file))
+            maker.start()
+            maker.join()
         locked = ", ".join(f'"{joint}" = 0.0' for joint in arms.ROBOTS[given.robot].locked)
         config = f"[model]\nlocked = {{ {locked} }}\n"
         if given.families:
