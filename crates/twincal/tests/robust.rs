@@ -1,4 +1,4 @@
-//! Outliers in the torque of a simulated arm, and noise that changes with speed: what `[noise]` does to estimates and intervals.
+//! Outliers in the torque of a simulated arm, and noise that changes with speed or load: what `[noise]` does to estimates and intervals.
 
 #[path = "../examples/two_link.rs"]
 #[allow(dead_code, reason = "its `main` prints, which a test does not need")]

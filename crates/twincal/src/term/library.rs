@@ -48,6 +48,7 @@ pub struct Library {
     payload_frame: Option<String>,
     /// What a payload's tensor is about, in its frame.
     payload_centre: [f64; 3],
+    /// No motion tells its tensor from its mass and first moments.
     payload_is_one: bool,
 }
 

@@ -84,7 +84,7 @@ pub(super) fn proposal(mount: &Mount, widths: [f64; 3]) -> Proposal {
 /// I = (2 h·c − m c·c) E − (h cᵀ + c hᵀ − m c cᵀ),   h the first moments about the origin
 /// ```
 fn tensor_of_moments(centre: [f64; 3]) -> [[f64; 4]; 6] {
-    // The map to an outer frame has −c·c E + … of a mass, which is the other sign here.
+    // As seen from an outer frame first moments add the same, a mass the opposite of what stands above.
     let outer = to_body_frame(&Placement {
         translation: centre,
         ..Placement::IDENTITY
