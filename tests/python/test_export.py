@@ -25,6 +25,7 @@ import roll_out  # noqa: E402
 import simulate_arms as industrial  # noqa: E402
 
 PENDULUM = SHARED / "double_pendulum"
+UR10 = SHARED / "ur10"
 
 
 # ---- what is not changed
@@ -341,7 +342,21 @@ def test_mjcf_changes_nothing_but_numbers(planar):
     assert "not of that kind" in refused.stderr and not (planar / "arm.urdf").exists()
 
 
-# ---- a real robot
+# ---- real robots
+
+
+@pytest.mark.skipif(not UR10.is_dir(), reason="../shared/data/ur10 is not there")
+def test_bodies_of_a_real_robot_cost_next_to_no_torque(tmp_path):
+    """Its maker's model has centres of mass at the joints; what was found is no body until tensors that slow motion does not show are."""
+    fit(tmp_path, [UR10 / "run0.parquet"], "", model=UR10 / "model.urdf", expect=None)
+    said = twincal("export", "--twin", tmp_path / "out", "--to", "urdf", "-o", tmp_path / "exported.urdf", "--json")
+    told = json.loads(said.stdout)
+    assert told["projection"]["distance"] < 5 and told["projection"]["gap"] < 1e-6
+    assert max(told["lost"]) < 0.2 and max(told["correction"]) > 10
+    model = pin.buildModelFromUrdf(str(tmp_path / "exported.urdf"))
+    for inertia in list(model.inertias)[1:]:
+        moments = np.linalg.eigvalsh(inertia.inertia)
+        assert inertia.mass > 0 and moments[0] > 0 and moments[0] + moments[1] >= moments[2] * (1 - 1e-9)
 
 
 @pytest.mark.skipif(not PENDULUM.is_dir(), reason="../shared/data/double_pendulum is not there")

@@ -12,7 +12,7 @@ mod regrouped;
 mod states;
 mod trace;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub(crate) use states::{States, rms};
 pub use trace::Step;

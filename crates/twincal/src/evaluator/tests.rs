@@ -64,7 +64,7 @@ fn double_angles_and_derivatives_are_those_of_closed_forms() {
 }
 
 /// A tree: two arms on one turning body, sliders in both, one joint that mimics another, every link lopsided and every axis skew.
-fn tree() -> Robot {
+pub(crate) fn tree() -> Robot {
     use JointKind::{Prismatic, Revolute};
     let parents = [0, 1, 2, 1, 4, 5, 5];
     let kinds = [

@@ -215,7 +215,7 @@ fn link_columns(robot: &Robot) -> Vec<Vec<f64>> {
 
 /// Positions anywhere, velocities and accelerations such that gravity, acceleration and velocity matter alike; always
 /// the same ones. Layout of [`Motion`].
-pub(super) fn random_states(robot: &Robot, len: usize) -> [Vec<f64>; 3] {
+pub(crate) fn random_states(robot: &Robot, len: usize) -> [Vec<f64>; 3] {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     [PI, 2.0, 5.0].map(|scale| {
         (0..robot.dof() * len)

@@ -18,7 +18,7 @@ mod recursion;
 mod dynamics;
 mod block;
 pub mod regressor;
-mod base_parameters;
+pub(crate) mod base_parameters;
 mod gravity;
 mod derivative;
 mod mass_matrix;

@@ -1,6 +1,7 @@
 //! Inertias of links: from coefficients of bodies to mass, centre of mass and tensor of the link that a file names.
 
-use super::projection::{Block, project};
+use super::metric::torque_metric;
+use super::projection::{Link, project};
 use super::{Place, Projection, Writer};
 use crate::error::Result;
 use crate::robot::spatial::{apply, scale, transpose};
@@ -50,47 +51,46 @@ pub(super) fn changes(
     beta: &[f64],
 ) -> Result<(Vec<LinkChange>, Option<Projection>)> {
     let robot = &writer.calibration.twin.robot;
-    let columns: Vec<usize> = (0..held.len())
-        .filter(|&column| matches!(held[column], Some(Place::Inertia { .. })))
-        .collect();
-    let mut names: Vec<&str> = Vec::new();
-    let mut blocks: Vec<Block> = Vec::new();
-    for (at, &column) in columns.iter().enumerate() {
-        let Some(Place::Inertia { body, weights }) = &held[column] else {
+    let mut links: Vec<Link<'_>> = Vec::new();
+    for (column, place) in held.iter().enumerate() {
+        let Some(Place::Inertia { body, weights }) = place else {
             continue;
         };
         let term = &writer.library.terms()[writer.library.columns()[column]];
-        let link = home(writer, *body, term.family);
-        let known = names.iter().position(|name| *name == link);
+        let name = home(writer, *body, term.family);
+        let known = links.iter().position(|link| link.name == name);
         let index = known.unwrap_or_else(|| {
-            let nominal = robot.description().links.iter().find(|l| l.name == link);
+            let nominal = robot.description().links.iter().find(|l| l.name == name);
             let nominal = nominal.and_then(|link| link.inertia);
-            let parameters =
-                nominal.map_or([0.0; 10], |i| body_parameters(&i, &Placement::IDENTITY));
-            names.push(link);
-            blocks.push(Block::new(parameters, columns.len()));
-            names.len() - 1
+            let nominal = nominal.map_or([0.0; 10], |i| body_parameters(&i, &Placement::IDENTITY));
+            links.push(Link {
+                name,
+                nominal,
+                found: nominal,
+            });
+            links.len() - 1
         });
         let placement = robot
-            .body_of_link(link)
+            .body_of_link(name)
             .map_or(Placement::IDENTITY, |(_, placement)| placement);
         let map = to_body_frame(&inverse(&placement));
-        blocks[index].directions[at] = std::array::from_fn(|row| {
-            let terms = map[row].iter().zip(weights);
-            terms.map(|(a, w)| a * w).sum()
-        });
+        for (found, row) in links[index].found.iter_mut().zip(&map) {
+            let change = row.iter().zip(weights).map(|(a, w)| a * w);
+            *found += beta[column] * change.sum::<f64>();
+        }
     }
-    let own: Vec<f64> = columns.iter().map(|&column| beta[column]).collect();
-    let count = held.len();
-    let covariance: Vec<f64> = columns
-        .iter()
-        .flat_map(|&a| columns.iter().map(move |&b| (a, b)))
-        .map(|(a, b)| writer.covariance[a * count + b])
-        .collect();
-    let (parameters, projection) = project(&blocks, &own, &covariance, &names)?;
+    let metric = || {
+        torque_metric(
+            robot,
+            &writer.calibration.twin.noise,
+            writer.states.motion(),
+            &links,
+        )
+    };
+    let (parameters, projection) = project(&links, metric)?;
     let mut changes: Vec<LinkChange> = Vec::new();
     for link in &robot.description().links {
-        let Some(index) = names.iter().position(|name| *name == link.name) else {
+        let Some(index) = links.iter().position(|own| own.name == link.name) else {
             continue;
         };
         if let Some(after) = inertia_of(&parameters[index]) {

@@ -5,6 +5,7 @@
 
 mod joints;
 mod links;
+mod metric;
 mod pseudo_inertia;
 mod projection;
 mod lost;
@@ -102,7 +103,6 @@ pub struct Writer<'a> {
     calibration: &'a Calibration,
     holds: Holds,
     library: Library,
-    covariance: Vec<f64>,
     states: States,
 }
 
@@ -120,7 +120,6 @@ impl<'a> Writer<'a> {
         Ok(Self {
             calibration,
             holds,
-            covariance: calibration.twin.posterior.covariance(),
             library,
             states,
         })

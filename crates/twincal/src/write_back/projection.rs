@@ -1,10 +1,11 @@
-//! The nearest physical inertias in the metric of the posterior, with a proof that none is nearer.
+//! The nearest physical inertias in a metric M, with a proof that none is nearer.
 //!
 //! ```text
-//! minimise ½ (β − β̂)ᵀ Cov[β]⁻¹ (β − β̂)   subject to   P_l(π_l + D_l β) ⪰ 0   for every link l
+//! minimise ½ (π − π̂)ᵀ M (π − π̂)   subject to   P(π_l) ⪰ 0   for every link l
 //! ```
-//! In whitened coordinates u the objective is ½|u|² and every pseudo-inertia is affine: `A_l + Σ_i u_i F_li`. Path
-//! following with the barrier −ln|P|; `Z_l = P_l⁻¹/t` is dual feasible at every point, so the duality gap is known exactly:
+//! π holds the ten parameters of every link. In whitened coordinates u = Lᵀ (π − π̂), M = L Lᵀ, the objective is ½|u|² and every
+//! pseudo-inertia is affine: `A_l + Σ_i u_i F_li`. Path following with the barrier −ln|P|; `Z_l = P_l⁻¹/t` is dual feasible at
+//! every point, so the duality gap is known exactly:
 //!
 //! ```text
 //! ½|u|² ≥ optimum ≥ −½|F*Z|² − Σ_l ⟨Z_l, A_l⟩,     (F*Z)_i = Σ_l ⟨F_li, Z_l⟩
@@ -17,28 +18,20 @@ use crate::error::{Error, Result};
 use crate::linear_algebra::Cholesky;
 use serde::Serialize;
 
-/// One link whose inertia depends on the coefficients.
+/// A link whose inertia changes: ten parameters in its own frame.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Block {
-    /// Nominal parameters in the link's frame.
+pub(super) struct Link<'a> {
+    pub(super) name: &'a str,
+    /// As the nominal model has them.
     pub(super) nominal: [f64; 10],
-    /// What a unit of each coefficient adds.
-    pub(super) directions: Vec<[f64; 10]>,
+    /// As they were found.
+    pub(super) found: [f64; 10],
 }
 
-impl Block {
-    pub(super) fn new(nominal: [f64; 10], coefficients: usize) -> Self {
-        Self {
-            nominal,
-            directions: vec![[0.0; 10]; coefficients],
-        }
-    }
-
-    fn at(&self, beta: &[f64]) -> [f64; 10] {
-        std::array::from_fn(|k| {
-            let terms = self.directions.iter().zip(beta);
-            self.nominal[k] + terms.map(|(d, b)| d[k] * b).sum::<f64>()
-        })
+impl Link<'_> {
+    /// Natural units of the ten parameters: mass, mass × length, mass × length².
+    pub(super) fn units(&self) -> [f64; 10] {
+        Scale::of(self).units()
     }
 }
 
@@ -47,12 +40,10 @@ impl Block {
 pub struct Projection {
     /// Links that no body could be before.
     pub links: Vec<String>,
-    /// √((β − β̂)ᵀ Cov⁻¹ (β − β̂)): posterior standard deviations that the coefficients moved.
+    /// √((π − π̂)ᵀ M (π − π̂)): how far they moved, in standard deviations of what torque says of them.
     pub distance: f64,
     /// Upper bound of what a nearer solution could save of ½ distance².
     pub gap: f64,
-    /// Parameters that no component has were moved too: without that no body fits.
-    pub beyond: bool,
 }
 
 /// Smallest eigenvalue of the pseudo-inertia in units of the link's own size: digits in a file round.
@@ -63,54 +54,50 @@ const SIZE: f64 = 0.1;
 const LEAST_MASS: f64 = 1e-6;
 /// The gap ends at this share of the objective (or at this number).
 const GAP: f64 = 1e-9;
-/// Sd of parameters that no component has, in units of the link's own size.
-const BEYOND: f64 = 1e-3;
 
-/// Parameters of every link at the nearest physical coefficients.
+/// Parameters of every link at the nearest physical point; `metric` makes M (10 L × 10 L, row-major, positive definite), where it
+/// is needed.
 ///
 /// # Errors
 /// [`Error::Refused`] if there are none.
 pub(super) fn project(
-    blocks: &[Block],
-    beta: &[f64],
-    covariance: &[f64],
-    names: &[&str],
+    links: &[Link<'_>],
+    metric: impl FnOnce() -> Vec<f64>,
 ) -> Result<(Vec<[f64; 10]>, Option<Projection>)> {
-    let plain: Vec<[f64; 10]> = blocks.iter().map(|block| block.at(beta)).collect();
-    let scales: Vec<Scale> = blocks
-        .iter()
-        .zip(&plain)
-        .map(|(block, at)| Scale::of(block, at))
-        .collect();
-    let bad: Vec<String> = (0..blocks.len())
-        .filter(|&l| factor(&scales[l].inside(&plain[l])).is_none())
-        .map(|l| names[l].to_owned())
+    let scales: Vec<Scale> = links.iter().map(Scale::of).collect();
+    let impossible =
+        |(link, scale): &(&Link<'_>, &Scale)| factor(&scale.inside(&link.found)).is_none();
+    let bad: Vec<String> = (links.iter().zip(&scales))
+        .filter(impossible)
+        .map(|(link, _)| link.name.to_owned())
         .collect();
     if bad.is_empty() {
-        return Ok((plain, None));
+        return Ok((links.iter().map(|link| link.found).collect(), None));
     }
-    let whitened = Whitened::new(beta, covariance);
-    for beyond in [false, true] {
-        let problem = Problem::new(blocks, &plain, &scales, &whitened, beyond);
-        let Some(start) = problem.interior() else {
-            continue;
-        };
-        let (u, gap) = problem.solve(start);
-        let parameters: Vec<[f64; 10]> = (0..blocks.len())
-            .map(|l| problem.parameters(l, &plain[l], &u))
-            .collect();
-        let distance = u.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let projection = Projection {
-            links: bad,
-            distance,
-            gap,
-            beyond,
-        };
-        return Ok((parameters, Some(projection)));
-    }
-    Err(Error::Refused {
+    let refused = || Error::Refused {
         problem: format!("no physical inertia of {} fits the data", bad.join(", ")),
         remedy: "correct the inertias of these links in the model first".into(),
+    };
+    let problem = Problem::new(links, &scales, &metric()).ok_or_else(refused)?;
+    let start = problem.interior().ok_or_else(refused)?;
+    let (u, gap) = problem.solve(start);
+    let parameters = (links.iter().zip(&problem.steps))
+        .map(|(link, steps)| moved(&link.found, steps, &u))
+        .collect();
+    let distance = u.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let projection = Projection {
+        links: bad,
+        distance,
+        gap,
+    };
+    Ok((parameters, Some(projection)))
+}
+
+/// π̂ + Σ u_i step_i.
+fn moved(found: &[f64; 10], steps: &[[f64; 10]], u: &[f64]) -> [f64; 10] {
+    std::array::from_fn(|k| {
+        let terms = steps.iter().zip(u);
+        found[k] + terms.map(|(step, u)| step[k] * u).sum::<f64>()
     })
 }
 
@@ -122,8 +109,8 @@ struct Scale {
 }
 
 impl Scale {
-    fn of(block: &Block, at: &[f64; 10]) -> Self {
-        let p = &block.nominal;
+    fn of(link: &Link<'_>) -> Self {
+        let p = &link.nominal;
         let spread = 0.5 * (p[4] + p[7] + p[9]);
         let length = if p[0] > 0.0 && spread > 0.0 {
             (spread / p[0]).sqrt()
@@ -131,20 +118,22 @@ impl Scale {
             SIZE
         };
         Self {
-            mass: p[0].max(at[0].abs()).max(LEAST_MASS),
+            mass: p[0].max(link.found[0].abs()).max(LEAST_MASS),
             length,
         }
     }
 
+    fn units(&self) -> [f64; 10] {
+        std::array::from_fn(|k| {
+            let length = [1.0, self.length, self.length * self.length];
+            self.mass * length[usize::from(k > 0) + usize::from(k > 3)]
+        })
+    }
+
     /// P in these units.
     fn relative(&self, p: &[f64; 10]) -> Four {
-        let (m, l) = (self.mass, self.length);
-        let scaled = std::array::from_fn(|k| match k {
-            0 => p[0] / m,
-            1..=3 => p[k] / (m * l),
-            _ => p[k] / (m * l * l),
-        });
-        pseudo_inertia(&scaled)
+        let units = self.units();
+        pseudo_inertia(&std::array::from_fn(|k| p[k] / units[k]))
     }
 
     /// P − margin, which must be positive definite.
@@ -152,45 +141,6 @@ impl Scale {
         let mut inside = self.relative(p);
         (0..4).for_each(|i| inside[i][i] -= MARGIN);
         inside
-    }
-}
-
-/// β = β̂ + S L u with Cov = S L Lᵀ S, S the standard deviations.
-struct Whitened {
-    /// Row-major, coefficient × u.
-    map: Vec<f64>,
-    count: usize,
-}
-
-impl Whitened {
-    fn new(beta: &[f64], covariance: &[f64]) -> Self {
-        let count = beta.len();
-        let sd: Vec<f64> = (0..count)
-            .map(|k| covariance[k * count + k].max(0.0).sqrt())
-            .collect();
-        // A hair on the diagonal: coefficients that are exact multiples of each other.
-        let correlation = |hair: f64| -> Vec<f64> {
-            (0..count * count)
-                .map(|at| {
-                    let (i, k) = (at / count, at % count);
-                    let scale = (sd[i] * sd[k]).max(f64::MIN_POSITIVE);
-                    covariance[at] / scale + if i == k { hair } else { 0.0 }
-                })
-                .collect()
-        };
-        let root = [1e-12, 1e-9, 1e-6, 1.0]
-            .into_iter()
-            .find_map(|hair| Cholesky::new(&correlation(hair), count).ok());
-        let mut map = vec![0.0; count * count];
-        for i in 0..count {
-            for k in 0..=i {
-                let lower = root.as_ref().map_or(f64::from(u8::from(i == k)), |root| {
-                    root.lower()[i * count + k]
-                });
-                map[i * count + k] = sd[i] * lower;
-            }
-        }
-        Self { map, count }
     }
 }
 
@@ -206,55 +156,35 @@ struct Problem {
 }
 
 impl Problem {
-    fn new(
-        blocks: &[Block],
-        plain: &[[f64; 10]],
-        scales: &[Scale],
-        whitened: &Whitened,
-        beyond: bool,
-    ) -> Self {
-        let own = whitened.count;
-        let size = own + if beyond { 10 * blocks.len() } else { 0 };
-        let mut steps: Vec<Vec<[f64; 10]>> = Vec::new();
-        for (l, block) in blocks.iter().enumerate() {
-            let mut step = vec![[0.0; 10]; size];
-            for (i, step) in step.iter_mut().enumerate().take(own) {
-                for (k, direction) in block.directions.iter().enumerate() {
-                    let along = whitened.map[k * own + i];
-                    for (s, d) in step.iter_mut().zip(direction) {
-                        *s += along * d;
-                    }
-                }
+    /// `None` if the metric is not positive definite.
+    fn new(links: &[Link<'_>], scales: &[Scale], metric: &[f64]) -> Option<Self> {
+        let size = 10 * links.len();
+        let units: Vec<f64> = scales.iter().flat_map(Scale::units).collect();
+        let relative: Vec<f64> = (metric.iter().enumerate())
+            .map(|(at, m)| m * units[at / size] * units[at % size])
+            .collect();
+        let root = Cholesky::new(&relative, size).ok()?;
+        let mut steps = vec![vec![[0.0; 10]; size]; links.len()];
+        for i in 0..size {
+            // π − π̂ of u = e_i.
+            let mut step = vec![0.0; size];
+            step[i] = 1.0;
+            root.solve_upper(&mut step);
+            for (l, steps) in steps.iter_mut().enumerate() {
+                steps[i] = std::array::from_fn(|k| step[10 * l + k] * units[10 * l + k]);
             }
-            if beyond {
-                let Scale { mass, length } = scales[l];
-                for k in 0..10 {
-                    let unit = match k {
-                        0 => mass,
-                        1..=3 => mass * length,
-                        _ => mass * length * length,
-                    };
-                    step[own + 10 * l + k][k] = BEYOND * unit;
-                }
-            }
-            steps.push(step);
         }
         let slopes = (steps.iter().zip(scales))
             .map(|(steps, scale)| steps.iter().map(|s| scale.relative(s)).collect())
             .collect();
-        let constant = plain.iter().zip(scales).map(|(p, s)| s.inside(p)).collect();
-        Self {
+        let constant = (links.iter().zip(scales))
+            .map(|(link, scale)| scale.inside(&link.found))
+            .collect();
+        Some(Self {
             constant,
             slopes,
             steps,
             size,
-        }
-    }
-
-    fn parameters(&self, link: usize, plain: &[f64; 10], u: &[f64]) -> [f64; 10] {
-        std::array::from_fn(|k| {
-            let terms = self.steps[link].iter().zip(u);
-            plain[k] + terms.map(|(s, u)| s[k] * u).sum::<f64>()
         })
     }
 
@@ -374,7 +304,6 @@ impl Problem {
                 std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
             for (l, lower) in factors.iter().enumerate() {
                 let z = inverse(lower);
-                // Most coefficients act on one link only.
                 let mut active: Vec<(usize, Four)> = Vec::new();
                 let slopes = self.slopes[l].iter().chain(lifted.then_some(&identity));
                 for (i, slope) in slopes.enumerate() {

@@ -1,7 +1,13 @@
-//! Projection against a long brute-force search; pseudo-inertia against integrals.
+//! Projection against a long brute-force search; pseudo-inertia against integrals; its metric against the recursion.
 
-use super::projection::{Block, project};
+use super::metric::torque_metric;
+use super::projection::{Link, project};
 use super::pseudo_inertia::{factor, inverse, pseudo_inertia, times};
+use crate::evaluator::tests::tree;
+use crate::likelihood::{JointNoise, Spread};
+use crate::linear_algebra::Cholesky;
+use crate::robot::base_parameters::random_states;
+use crate::robot::{Motion, Placement, Robot, body_parameters, nominal_torque};
 
 #[test]
 fn a_reason_says_nothing_that_the_sign_of_the_effect_could_contradict() {
@@ -66,6 +72,14 @@ fn pseudo_inertia_is_the_integral_of_second_moments() {
     assert!(factor(&pseudo_inertia(&points(&[(-0.1, [0.1, 0.0, 0.0])]))).is_none());
 }
 
+/// A metric in which parameters are independent with these standard deviations.
+fn independent(sd: &[f64]) -> Vec<f64> {
+    let size = sd.len();
+    let mut metric = vec![0.0; size * size];
+    (0..size).for_each(|k| metric[k * (size + 1)] = sd[k].powi(-2));
+    metric
+}
+
 #[test]
 fn what_is_physical_stays_to_the_bit() {
     let nominal = points(&[
@@ -74,28 +88,44 @@ fn what_is_physical_stays_to_the_bit() {
         (1.0, [0.0, 0.0, 0.1]),
         (1.0, [-0.1, -0.1, -0.1]),
     ]);
-    let mut block = Block::new(nominal, 1);
-    block.directions[0][0] = 1.0;
-    let (parameters, projection) = project(&[block], &[0.25], &[1.0], &["link"]).unwrap();
+    let mut found = nominal;
+    found[0] += 0.25;
+    let link = Link {
+        name: "link",
+        nominal,
+        found,
+    };
+    let (parameters, projection) =
+        project(&[link], || unreachable!("no metric is needed")).unwrap();
     assert_eq!(projection, None);
-    assert_eq!(parameters[0][0], nominal[0] + 0.25);
-    assert_eq!(parameters[0][1..], nominal[1..]);
+    assert_eq!(parameters[0], found);
 }
 
-/// Two coefficients, the constraint in closed form: I = diag(a, b, c) about the centre with the triangle inequality.
-/// Coefficients change Ixx and Iyy with a correlated posterior; the nearest point of the half plane
-/// `Ixx + Iyy ≥ Izz` under the metric Cov⁻¹ is `β̂ + λ Cov n`, n = (1, 1).
+/// Two parameters, the constraint in closed form: I = diag(a, b, c) about the centre with the triangle inequality.
+/// Ixx and Iyy are known with a correlated error, all else is sure; the nearest point of the half plane
+/// `Ixx + Iyy ≥ Izz` under the metric Cov⁻¹ is `π̂ + λ Cov n`, n = (1, 1).
 #[test]
 fn triangle_inequality_is_met_at_the_nearest_point_of_the_metric() {
     let nominal = [2.0, 0.0, 0.0, 0.0, 0.02, 0.0, 0.0, 0.02, 0.0, 0.03];
-    let mut block = Block::new(nominal, 2);
-    block.directions[0][4] = 1.0;
-    block.directions[1][7] = 1.0;
-    let beta = [-0.008, -0.009];
+    let change = [-0.008, -0.009];
+    let mut found = nominal;
+    found[4] += change[0];
+    found[7] += change[1];
     let covariance = [4e-6, -1e-6, -1e-6, 1e-6];
-    let (parameters, projection) = project(&[block], &beta, &covariance, &["link"]).unwrap();
+    let mut metric = independent(&[1e-9; 10]);
+    let determinant = covariance[0] * covariance[3] - covariance[1] * covariance[2];
+    metric[44] = covariance[3] / determinant;
+    metric[77] = covariance[0] / determinant;
+    metric[47] = -covariance[1] / determinant;
+    metric[74] = -covariance[1] / determinant;
+    let link = Link {
+        name: "link",
+        nominal,
+        found,
+    };
+    let (parameters, projection) = project(&[link], || metric).unwrap();
     let projection = projection.unwrap();
-    let violation = 0.03 - (0.04 + beta[0] + beta[1]);
+    let violation = 0.03 - (0.04 + change[0] + change[1]);
     let along = [covariance[0] + covariance[1], covariance[2] + covariance[3]];
     let lambda = violation / (along[0] + along[1]);
     let wanted = [0.012 + lambda * along[0], 0.011 + lambda * along[1]];
@@ -111,43 +141,41 @@ fn triangle_inequality_is_met_at_the_nearest_point_of_the_metric() {
     let distance = violation / (along[0] + along[1]).sqrt();
     assert!((projection.distance - distance).abs() < 1e-3 * distance);
     assert!(projection.gap <= 1e-9 * projection.distance.powi(2));
-    assert!(!projection.beyond && projection.links == ["link"]);
+    assert!(projection.links == ["link"]);
     assert!(factor(&pseudo_inertia(&parameters[0])).is_some());
 }
 
 /// A payload of negative mass where the model has nothing: all that is left is next to nothing.
 #[test]
 fn a_body_of_negative_mass_becomes_almost_none() {
-    let mut block = Block::new([0.0; 10], 10);
-    for k in 0..10 {
-        block.directions[k][k] = 1.0;
-    }
-    let mut beta = [0.0; 10];
-    beta[0] = -0.3;
-    let mut covariance = [0.0; 100];
-    for k in 0..10 {
-        covariance[k * 11] = 1e-4;
-    }
-    let (parameters, projection) = project(&[block], &beta, &covariance, &["tool0"]).unwrap();
+    let mut found = [0.0; 10];
+    found[0] = -0.3;
+    let link = Link {
+        name: "tool0",
+        nominal: [0.0; 10],
+        found,
+    };
+    let (parameters, projection) = project(&[link], || independent(&[1e-2; 10])).unwrap();
     assert!(parameters[0][0] > 0.0 && parameters[0][0] < 1e-5);
     assert!((projection.unwrap().distance - 30.0).abs() < 0.1);
     assert!(factor(&pseudo_inertia(&parameters[0])).is_some());
 }
 
-/// A point mass whose mass alone is free has no interior: parameters that no component has move a little.
+/// A point mass is no body in the strict sense: a little of a tensor makes it one, its mass is the found one.
 #[test]
 fn a_point_mass_gets_a_body() {
-    let nominal = points(&[(1.0, [0.1, 0.0, 0.0])]);
-    let mut block = Block::new(nominal, 1);
-    block.directions[0] = points(&[(1.0, [0.1, 0.0, 0.0])]);
-    let (parameters, projection) = project(&[block], &[0.5], &[1e-4], &["link"]).unwrap();
-    assert!(projection.unwrap().beyond);
+    let link = Link {
+        name: "link",
+        nominal: points(&[(1.0, [0.1, 0.0, 0.0])]),
+        found: points(&[(1.5, [0.1, 0.0, 0.0])]),
+    };
+    let (parameters, projection) = project(&[link], || independent(&[1e-2; 10])).unwrap();
+    assert!(projection.is_some());
     assert!((parameters[0][0] - 1.5).abs() < 1e-3);
     assert!(factor(&pseudo_inertia(&parameters[0])).is_some());
 }
 
-/// Brute force: 20 000 points that are nearer than the answer in the metric, none of them a body. Six coefficients on two
-/// links at once, correlated.
+/// Brute force: 20 000 points that are nearer than the answer in the metric, none of them a body. Two links at once, errors correlated.
 #[test]
 fn nothing_nearer_is_physical() {
     let mut state = 7_u64;
@@ -163,43 +191,129 @@ fn nothing_nearer_is_physical() {
         (1.0, [0.0, 0.0, 0.08]),
         (1.0, [-0.1, -0.1, -0.1]),
     ]);
-    let mut blocks = [Block::new(nominal, 6), Block::new(nominal, 6)];
-    for k in 0..3 {
-        blocks[0].directions[k][4 + [0, 3, 5][k]] = 1.0;
-        blocks[1].directions[3 + k][1 + k] = 1.0;
-    }
-    let root: Vec<f64> = (0..36).map(|_| 0.05 * uniform()).collect();
-    let covariance: Vec<f64> = (0..36)
+    let link = |name, at: [usize; 3], by: [f64; 3]| {
+        let mut found = nominal;
+        at.iter().zip(by).for_each(|(&k, by)| found[k] += by);
+        Link {
+            name,
+            nominal,
+            found,
+        }
+    };
+    let links = [
+        link("a", [4, 7, 9], [-0.04, 0.02, -0.05]),
+        link("b", [1, 2, 3], [0.2, -0.25, 0.1]),
+    ];
+    // Cov = root rootᵀ + 1e-4, M its inverse.
+    let root: Vec<f64> = (0..400).map(|_| 0.03 * uniform()).collect();
+    let covariance: Vec<f64> = (0..400)
         .map(|at| {
-            let (i, j) = (at / 6, at % 6);
-            let sum: f64 = (0..6).map(|k| root[6 * i + k] * root[6 * j + k]).sum();
+            let (i, j) = (at / 20, at % 20);
+            let sum: f64 = (0..20).map(|k| root[20 * i + k] * root[20 * j + k]).sum();
             sum + if i == j { 1e-4 } else { 0.0 }
         })
         .collect();
-    let beta = [-0.04, 0.02, -0.05, 0.2, -0.25, 0.1];
-    let names = ["a", "b"];
-    let (answer, projection) = project(&blocks, &beta, &covariance, &names).unwrap();
+    let covariance = Cholesky::new(&covariance, 20).unwrap();
+    let (answer, projection) = project(&links, || covariance.inverse()).unwrap();
     let projection = projection.unwrap();
     assert_eq!(projection.links.len(), 2);
     assert!(answer.iter().all(|p| factor(&pseudo_inertia(p)).is_some()));
-    let lower = crate::linear_algebra::Cholesky::new(&covariance, 6).unwrap();
+    // Towards the answer and about it at random: a ball in twenty dimensions is nearly empty of bodies otherwise.
+    let found: Vec<f64> = links.iter().flat_map(|link| link.found).collect();
+    let mut towards: Vec<f64> = answer
+        .iter()
+        .flatten()
+        .zip(&found)
+        .map(|(a, f)| a - f)
+        .collect();
+    covariance.solve_lower(&mut towards);
     for _ in 0..20_000 {
-        let direction: Vec<f64> = (0..6).map(|_| uniform() + uniform() + uniform()).collect();
-        let length = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let radius = 0.999 * projection.distance * (uniform() + 0.5).powf(1.0 / 6.0);
-        let moved: Vec<f64> = (0..6)
-            .map(|i| {
-                let along = (0..=i).map(|k| lower.lower()[6 * i + k] * direction[k]);
-                beta[i] + radius / length * along.sum::<f64>()
-            })
+        let spread = uniform().abs();
+        let direction: Vec<f64> = towards
+            .iter()
+            .map(|u| u + spread * projection.distance * (uniform() + uniform()))
             .collect();
+        let length = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let radius = 0.999 * projection.distance;
         let body = |l: usize| {
             let p: [f64; 10] = std::array::from_fn(|k| {
-                let terms = blocks[l].directions.iter().zip(&moved);
-                nominal[k] + terms.map(|(d, b)| d[k] * b).sum::<f64>()
+                let i = 10 * l + k;
+                let along = (0..=i).map(|m| covariance.lower()[20 * i + m] * direction[m]);
+                found[i] + radius / length * along.sum::<f64>()
             });
             factor(&pseudo_inertia(&p)).is_some()
         };
-        assert!(!(body(0) && body(1)), "nearer and physical: {moved:?}");
+        assert!(!(body(0) && body(1)), "nearer and physical: {direction:?}");
     }
+}
+
+/// δᵀ M δ is what the robot with the change needs of other torque, by the recursion: links of a tree with sliders and a joint that
+/// mimics another.
+#[test]
+fn the_metric_is_the_square_of_the_torque_between_two_robots() {
+    let robot = tree();
+    let noise: Vec<JointNoise> = (robot.joint_names().iter().enumerate())
+        .map(|(j, name)| JointNoise {
+            joint: (*name).to_owned(),
+            sigma: 0.3 + 0.2 * j as f64,
+            rho: 0.0,
+            weight: 1.0,
+            n: 900.0,
+            n_eff: if j == 1 { 0.0 } else { 100.0 + 50.0 * j as f64 },
+            autocorrelation_time: 1.0,
+            interval_factor: 1.0,
+            out_of_band: 0.0,
+            spread: Spread::default(),
+            sampled: None,
+        })
+        .collect();
+    let [q, qd, qdd] = random_states(&robot, 150);
+    let motion = Motion {
+        len: 150,
+        q: &q,
+        qd: &qd,
+        qdd: &qdd,
+    };
+    let mut description = robot.description().clone();
+    let changed = ["link2", "link4", "link6", "link7"];
+    let mut links = Vec::new();
+    let mut change = Vec::new();
+    for (i, name) in changed.into_iter().enumerate() {
+        let link = description.links.iter_mut().find(|l| l.name == name);
+        let inertia = link.and_then(|link| link.inertia.as_mut()).unwrap();
+        let nominal = body_parameters(inertia, &Placement::IDENTITY);
+        inertia.mass += 0.2 + 0.1 * i as f64;
+        inertia.com[i % 3] += 0.03;
+        inertia.tensor[1][1] += 0.004;
+        let found = body_parameters(inertia, &Placement::IDENTITY);
+        change.extend(found.iter().zip(&nominal).map(|(f, n)| f - n));
+        links.push(Link {
+            name,
+            nominal,
+            found,
+        });
+    }
+    let (other, _) = Robot::new(description, robot.locked()).unwrap();
+    let torque = |robot: &Robot| {
+        let mut torque = vec![0.0; q.len()];
+        nominal_torque(robot, motion, &mut torque);
+        torque
+    };
+    let (here, there) = (torque(&robot), torque(&other));
+    let mut wanted = 0.0;
+    for (at, (a, b)) in here.iter().zip(&there).enumerate() {
+        let JointNoise { sigma, n_eff, .. } = noise[at / 150];
+        wanted += n_eff / (sigma * sigma * 150.0) * (a - b) * (a - b);
+    }
+    let units = links.iter().flat_map(Link::units);
+    wanted += change
+        .iter()
+        .zip(units)
+        .map(|(d, u)| (d / u).powi(2))
+        .sum::<f64>();
+    let metric = torque_metric(&robot, &noise, motion, &links);
+    let found: f64 = (0..metric.len())
+        .map(|at| change[at / change.len()] * metric[at] * change[at % change.len()])
+        .sum();
+    assert!((found / wanted - 1.0).abs() < 1e-10, "{found} {wanted}");
 }
