@@ -74,15 +74,13 @@ impl Angles {
             }
             let row = body.coordinate * motion.len;
             let q = &motion.q[row + block.start..row + block.end];
-            let mut angles = [0.0; BLOCK];
-            for k in 0..q.len() {
-                angles[k] = body.multiplier * q[k] + body.offset;
-            }
-            for k in 0..q.len().div_ceil(LANES) {
+            for (k, q) in q.chunks(LANES).enumerate() {
+                let mut angles: Lane = [0.0; LANES];
+                for (angle, q) in angles.iter_mut().zip(q) {
+                    *angle = body.multiplier * q + body.offset;
+                }
+                let (sine, cosine) = sin_cos(&angles);
                 let group = k * LANES..(k + 1) * LANES;
-                let mut lane: Lane = [0.0; LANES];
-                lane.copy_from_slice(&angles[group.clone()]);
-                let (sine, cosine) = sin_cos(&lane);
                 self.sines[i][group.clone()].copy_from_slice(&sine);
                 self.cosines[i][group].copy_from_slice(&cosine);
             }

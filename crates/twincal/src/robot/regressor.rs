@@ -10,8 +10,11 @@ use super::Robot;
 use super::base_parameters::random_states;
 use super::block::{Angles, BLOCK, Instructions, Registers, STRIDE};
 use super::dynamics::Motion;
-use super::lane_vectors::{V3, cross, cross_add, dot, dot_add, origin, store, to_child, turn_back};
+use super::lane_vectors::{
+    V3, cross, cross_add, dot, dot_add, load, origin, store, to_child, turn_back,
+};
 use super::recursion::{State, move_body};
+use crate::lanes::LANES;
 use pulp::Simd;
 use std::ops::Range;
 
@@ -202,6 +205,9 @@ impl Regressor {
     }
 }
 
+/// One for each sample of a vector.
+const ONES: [f64; LANES] = [1.0; LANES];
+
 struct Kernel<'a> {
     regressor: &'a Regressor,
     robot: &'a Robot,
@@ -239,6 +245,8 @@ impl pulp::WithSimd for Kernel<'_> {
         let mut first = samples.start;
         while first < samples.end {
             let last = samples.end.min(first + S::F64_LANES);
+            // Columns are linear in u and v: where these are 0 no sample is, and whole vectors can be stored.
+            let live = load(s, &ONES[..last - first]);
             for i in 0..bodies.len() {
                 let body = &bodies[i];
                 let (before, rest) = states.split_at_mut(i);
@@ -259,7 +267,7 @@ impl pulp::WithSimd for Kernel<'_> {
                             v = turn_back(s, state.cos, state.sin, v);
                         }
                     }
-                    let own = s.splat_f64s(regressor.own[pair]);
+                    let own = s.mul_f64s(live, s.splat_f64s(regressor.own[pair]));
                     if body.prismatic {
                         v[2] = s.add_f64s(v[2], own);
                     } else {
@@ -268,14 +276,7 @@ impl pulp::WithSimd for Kernel<'_> {
                     axes[pair] = [u, v];
                     let cells = &mut values[pair * 10 * STRIDE..(pair + 1) * 10 * STRIDE];
                     let at = first - samples.start;
-                    columns(
-                        s,
-                        &regressor.pairs[pair].present,
-                        [u, v],
-                        state,
-                        cells,
-                        at..at + last - first,
-                    );
+                    columns(s, &regressor.pairs[pair].present, [u, v], state, cells, at);
                 }
             }
             first = last;
@@ -298,18 +299,18 @@ fn columns<S: Simd>(
     [u, v]: [V3<S>; 2],
     state: &State<S::f64s>,
     cells: &mut [f64],
-    at: Range<usize>,
+    at: usize,
 ) {
     let State { w, wd, a, b, .. } = state;
     if present[0] {
-        put(s, cells, 0, &at, dot(s, v, *a));
+        put(s, cells, 0, at, dot(s, v, *a));
     }
     // Bᵀ v + a × u
     let turned: V3<S> = cross(s, *a, u);
     for k in 0..3 {
         if present[1 + k] {
             let column = [b[0][k], b[1][k], b[2][k]];
-            put(s, cells, 1 + k, &at, dot_add(s, column, v, turned[k]));
+            put(s, cells, 1 + k, at, dot_add(s, column, v, turned[k]));
         }
     }
     // u·(I ω̇) + (u × ω)·(I ω)
@@ -322,16 +323,13 @@ fn columns<S: Simd>(
         if i != j {
             value = s.mul_add_e_f64s(u[j], wd[i], s.mul_add_e_f64s(e[j], w[i], value));
         }
-        put(s, cells, 4 + k, &at, value);
+        put(s, cells, 4 + k, at, value);
     }
 }
 
-/// Writes the samples `at` of column `k`.
+/// Writes a whole vector of column `k`: masked stores are a dozen times slower on some machines.
 #[inline(always)]
-fn put<S: Simd>(s: S, cells: &mut [f64], k: usize, at: &Range<usize>, value: S::f64s) {
-    store(
-        s,
-        &mut cells[k * STRIDE + at.start..k * STRIDE + at.end],
-        value,
-    );
+fn put<S: Simd>(s: S, cells: &mut [f64], k: usize, at: usize, value: S::f64s) {
+    let start = k * STRIDE + at;
+    store(s, &mut cells[start..start + S::F64_LANES], value);
 }
