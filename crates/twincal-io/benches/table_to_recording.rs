@@ -118,9 +118,19 @@ fn main() {
     let blocks: Vec<Values<'_>> = values.iter().map(|v| Values::Numbers(v)).collect();
     let mut table = TableWriter::new(Vec::new(), TableFormat::Parquet, &kinds).expect("memory");
     table.push(&blocks).expect("memory");
-    files.push(folder.path().join("plain.parquet"));
+    files.push(folder.path().join("zstd.parquet"));
     std::fs::write(&files[2], table.finish().expect("memory")).expect("a file");
     drop(values);
+    let own = concat!(env!("CARGO_MANIFEST_DIR"), "/../../.venv/bin/python");
+    let python = std::env::var("TWINCAL_CHECK_PYTHON").unwrap_or_else(|_| own.into());
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/peers/tables.py");
+    // The same table as pyarrow and pandas write it unless told otherwise.
+    let snappy = folder.path().join("snappy.parquet");
+    let mut copy = Command::new(&python);
+    copy.arg(script).arg("--copy").args([&files[2], &snappy]);
+    if copy.status().is_ok_and(|status| status.success()) {
+        files.push(snappy);
+    }
 
     println!("7 joints, t, q, q̇, torque (22 columns), {ROWS} rows");
     let size = |path: &Path| std::fs::metadata(path).expect("a file").len();
@@ -137,19 +147,16 @@ fn main() {
     }
     let two = rayon::ThreadPoolBuilder::new().num_threads(2);
     let two = two.build().expect("threads");
-    let by_the_clock = (0..5).map(|_| {
-        let start = std::time::Instant::now();
-        let read = two.install(|| read_log(&files[2], &robot, &LogOptions::default()));
-        assert_eq!(read.expect("readable").0.time.len(), ROWS);
-        start.elapsed().as_secs_f64()
-    });
-    let seconds = by_the_clock.fold(f64::INFINITY, f64::min);
-    say(
-        "plain.parquet",
-        "twincal, two threads",
-        seconds,
-        size(&files[2]),
-    );
+    for path in &files[2..] {
+        let by_the_clock = (0..5).map(|_| {
+            let start = std::time::Instant::now();
+            let read = two.install(|| read_log(path, &robot, &LogOptions::default()));
+            assert_eq!(read.expect("readable").0.time.len(), ROWS);
+            start.elapsed().as_secs_f64()
+        });
+        let seconds = by_the_clock.fold(f64::INFINITY, f64::min);
+        say(&word(path), "twincal, two threads", seconds, size(path));
+    }
     for path in &files {
         let program = std::env::current_exe().expect("this bench");
         let output = Command::new(program).arg("--peak").arg(path).output();
@@ -171,9 +178,6 @@ fn main() {
         });
         say(&word(path), "csv crate and str::parse", seconds, size(path));
     }
-    let own = concat!(env!("CARGO_MANIFEST_DIR"), "/../../.venv/bin/python");
-    let python = std::env::var("TWINCAL_CHECK_PYTHON").unwrap_or_else(|_| own.into());
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/peers/tables.py");
     match Command::new(python).arg(script).args(&files).output() {
         Ok(output) if output.status.success() => {
             let text = String::from_utf8_lossy(&output.stdout);

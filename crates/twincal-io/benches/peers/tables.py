@@ -1,4 +1,5 @@
-"""pyarrow's least time to read the tables named on the command line, s per file, on one thread. Called by table_to_recording.rs."""
+"""pyarrow's least time to read the tables named on the command line, s per file, on one thread; `--copy FROM TO` writes a Parquet file
+again as pyarrow does unless told otherwise. Called by table_to_recording.rs."""
 
 import sys
 import time
@@ -12,6 +13,9 @@ READERS = {
     "parquet": lambda path: parquet.read_table(path, use_threads=False),
     "arrow": lambda path: feather.read_table(path, use_threads=False),
 }
+if sys.argv[1] == "--copy":
+    parquet.write_table(parquet.read_table(sys.argv[2]), sys.argv[3])
+    sys.exit()
 for path in sys.argv[1:]:
     read = READERS[path.rsplit(".", 1)[1]]
     best = float("inf")
