@@ -86,10 +86,18 @@ fn runs(tau: &[f64], inside: impl Fn(f64) -> bool) -> Vec<Range<usize>> {
 /// Length of the run of equal values in which the median sample stands.
 fn usual_run(tau: &[f64]) -> usize {
     let mut samples: BTreeMap<usize, usize> = BTreeMap::new();
+    // Nearly all runs are of one sample: these need no map.
+    let mut alone = 0;
     for run in tau.chunk_by(|a, b| a == b) {
-        *samples.entry(run.len()).or_default() += run.len();
+        match run.len() {
+            1 => alone += 1,
+            length => *samples.entry(length).or_default() += length,
+        }
     }
-    let mut seen = 0;
+    if alone > tau.len() / 2 {
+        return 1;
+    }
+    let mut seen = alone;
     let median = samples.iter().find(|(_, count)| {
         seen += **count;
         seen > tau.len() / 2
