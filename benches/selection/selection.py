@@ -2,6 +2,7 @@
 
     benches/selection/run                         every problem, 30 seeds; then table and figure into docs/
     benches/selection/run --seeds 3 --only white  fewer
+    benches/selection/run --first 31 --seeds 60   others
 
 Every (problem, seed) is one line of JSON in target/selection/runs: an interrupted run goes on where it stopped; a run with
 another program or another code wants --fresh.
@@ -150,7 +151,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     default = os.environ.get("TWINCAL", ROOT / "target" / "release" / "twincal")
     parser.add_argument("--twincal", type=Path, default=default, help="program (default: $TWINCAL or target/release/twincal)")
-    parser.add_argument("--seeds", type=int, default=30)
+    parser.add_argument("--seeds", type=int, default=30, help="last seed")
+    parser.add_argument("--first", type=int, default=1, help="first seed")
     parser.add_argument("--only", nargs="*", default=[], help="names of problems")
     parser.add_argument("--work", type=Path, default=ROOT / "target" / "selection", help="folder of runs and motions")
     parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="folder of selection.svg")
@@ -163,7 +165,7 @@ def main():
         shutil.rmtree(options.work / "runs", ignore_errors=True)
     for folder in ("runs", "motions"):
         (options.work / folder).mkdir(parents=True, exist_ok=True)
-    for seed in range(1, 1 if options.table else options.seeds + 1):
+    for seed in range(options.first, options.first if options.table else options.seeds + 1):
         for name, problem in problems.items():
             path = options.work / "runs" / f"{name}.jsonl"
             if path.exists() and any(json.loads(line)["seed"] == seed for line in path.read_text().splitlines()):

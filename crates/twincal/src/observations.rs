@@ -371,3 +371,46 @@ impl Part<'_> {
         residual
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::{Channels, Payload};
+
+    fn temperatures(time: &[f64], logged: &[f64]) -> Vec<f64> {
+        let mut observations = Observations {
+            time: vec![-1.0, 0.0, 0.5, 1.5, 3.0],
+            joints: vec![JointObservations::default()],
+            ..Observations::default()
+        };
+        let len = time.len();
+        observations.set_temperatures(&Recording {
+            name: "run".into(),
+            time: time.to_vec(),
+            joints: vec![Channels {
+                q: vec![0.0; len],
+                qd: None,
+                qdd: None,
+                tau: None,
+                temperature: Some(logged.to_vec()),
+            }],
+            payload: Payload::None,
+        });
+        observations.joints.remove(0).temperature
+    }
+
+    #[test]
+    fn temperatures_are_linear_between_samples_that_are_numbers() {
+        let found = temperatures(&[0.0, 1.0, 1.2, 2.0], &[30.0, 40.0, f64::NAN, 60.0]);
+        assert_eq!(found, [30.0, 30.0, 35.0, 50.0, 60.0]);
+        assert!(temperatures(&[0.0, 1.0], &[f64::NAN; 2]).is_empty());
+    }
+
+    #[test]
+    fn a_log_whose_stamps_step_back_has_no_temperatures() {
+        assert!(temperatures(&[0.0, 1.0, 0.9, 2.0], &[30.0, 40.0, 41.0, 60.0]).is_empty());
+        // A step between samples without a number binds nobody.
+        let hidden = temperatures(&[0.0, 1.0, 0.9, 2.0], &[30.0, 40.0, f64::NAN, 60.0]);
+        assert_eq!(hidden.len(), 5);
+    }
+}

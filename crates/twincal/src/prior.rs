@@ -102,6 +102,14 @@ impl Prior {
         }
     }
 
+    /// The components that are in, where every one is settled as [`Prior::settled`] does it.
+    pub fn settled_structure(&self) -> Option<Vec<bool>> {
+        let settled = |odds: &f64| *odds >= SETTLED || *odds <= 1.0 / SETTLED;
+        let inside = |&family: &usize| self.odds[family] >= SETTLED;
+        let all = self.odds.iter().all(settled);
+        all.then(|| self.family.iter().map(inside).collect())
+    }
+
     /// C.
     pub fn components(&self) -> usize {
         self.family.len()

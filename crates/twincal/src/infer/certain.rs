@@ -46,8 +46,8 @@ pub(super) struct Certain {
 
 /// The components that every model with weight holds.
 ///
-/// Any model makes a valid bound, a good one a sharp one: the heaviest of a posterior that is known to be near, or, without one, what
-/// the full model settles is integrated out and a better one looked for among the rest.
+/// Any model makes a valid bound, a good one a sharp one: the one that a settled prior asks for, the heaviest of a posterior that is known to be near, or, without
+/// these, what the full model settles is integrated out and a better one looked for among the rest.
 pub(super) fn components(
     standard: &Standard,
     problem: &Problem,
@@ -78,7 +78,11 @@ pub(super) fn components(
         spread: (0..size).map(|d| inverse[d * size + d]).collect(),
         factors: standard.blocks.iter().map(|b| b.factor.ln()).sum(),
     };
-    if let Some(reference) = near.and_then(|near| weight_of_heaviest(standard, problem, near)) {
+    let reference = match prior.settled_structure() {
+        Some(holds) => weight_of(standard, problem, &holds),
+        None => near.and_then(|near| weight_of_heaviest(standard, problem, near)),
+    };
+    if let Some(reference) = reference {
         return bounds.judge(reference);
     }
     let full = Moments {
@@ -117,6 +121,12 @@ pub(super) fn weight_of_heaviest(
     let mut holds = vec![false; prior.components()];
     let members = model.members.iter();
     members.for_each(|&k| holds[prior.component[k as usize]] = true);
+    weight_of(standard, problem, &holds)
+}
+
+/// ln of the weight of the model with these components, its bounds counted as the search's guide does; `None` where it has no prior probability.
+fn weight_of(standard: &Standard, problem: &Problem, holds: &[bool]) -> Option<f64> {
+    let prior = &problem.prior;
     let orphan = |c: usize| holds[c] && prior.parent_of(c).is_some_and(|p| !holds[p]);
     if (0..holds.len()).any(orphan) {
         return None;

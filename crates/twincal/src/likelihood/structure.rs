@@ -21,6 +21,7 @@ const SECOND_CHOICE: f64 = 1e-6;
 /// b_f = 1/p − 1              unasked, with the probability p of what is more usual than the rest ([`Family::usual`])
 /// b_f = 1e6 − 1              second choices, which no motion tells from something more usual (P(z = 1) = 1e-6)
 /// ```
+/// What a payload's tensor adds to the payload's probability, as its child, is taken off: with and without tensor together have p.
 /// Second choices are a family of their own after the others unless the user says how many are expected of theirs, or how likely
 /// anything is; forced components are another one, with odds that no data outweigh.
 ///
@@ -72,6 +73,11 @@ pub(super) fn structure(
                 remedy: "leave the key out, or ask for the family in [library]".into(),
             });
         }
+    }
+    let place = |family: Family| columns.families.iter().position(|f| *f == family);
+    let parts = [Family::Payload, Family::PayloadTensor].map(place);
+    if let ([Some(payload), Some(tensor)], None) = (parts, settings.inclusion) {
+        odds[payload] /= 1.0 + odds[tensor] / reference(inclusion, count);
     }
     let mut family = columns.family.clone();
     let rare: Vec<usize> = (0..count).filter(|&c| second_choice(c)).collect();
@@ -244,6 +250,32 @@ mod tests {
         some.forced[1] = true;
         let one = expected(&some, &settings(None, &[]))[1];
         assert!((one - 1.500_001).abs() < 1e-12, "{one}");
+    }
+
+    /// Out, in without its tensor, in with it: 2/3, and of the other third 1 in 100 without.
+    #[test]
+    fn a_payload_is_as_probable_as_it_is_whatever_its_tensor_is() {
+        let mut some = columns(&[]);
+        some.families = vec![Family::User, Family::Payload, Family::PayloadTensor];
+        some.family = vec![0, 0, 0, 0, 0, 0, 0, 1, 2];
+        let share = |settings: &PriorSettings| {
+            let (family, odds, inclusion) = structure(&some, settings).unwrap();
+            let mut prior = Prior::single(vec![1.0; 9], family, inclusion, (1.0, 1.0));
+            prior.odds = odds;
+            prior.parent = vec![None; 9];
+            prior.parent[8] = Some(7);
+            let p = |payload: usize, tensor: usize| {
+                let all = (0..=7).map(|m| {
+                    let ways = (1..=m).fold(1.0, |n, k| n * (8 - k) as f64 / k as f64);
+                    ways * prior.log_model(&[m, payload, tensor]).exp()
+                });
+                all.sum::<f64>() / prior.log_admissible().exp()
+            };
+            [p(0, 0), p(1, 0), p(1, 1)]
+        };
+        near(share(&settings(None, &[])), [2.0 / 3.0, 0.01 / 3.0, 0.33]);
+        let mine = [(Family::Payload, 0.1), (Family::PayloadTensor, 0.5)];
+        near(share(&settings(None, &mine)), [0.9, 0.05, 0.05]);
     }
 
     #[test]
