@@ -130,6 +130,8 @@ fn main() {
     copy.arg(script).arg("--copy").args([&files[2], &snappy]);
     if copy.status().is_ok_and(|status| status.success()) {
         files.push(snappy);
+    } else {
+        println!("snappy skipped: no pyarrow in .venv (./check makes it)");
     }
 
     println!("7 joints, t, q, q̇, torque (22 columns), {ROWS} rows");

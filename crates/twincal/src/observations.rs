@@ -411,6 +411,6 @@ mod tests {
         assert!(temperatures(&[0.0, 1.0, 0.9, 2.0], &[30.0, 40.0, 41.0, 60.0]).is_empty());
         // A step between samples without a number binds nobody.
         let hidden = temperatures(&[0.0, 1.0, 0.9, 2.0], &[30.0, 40.0, f64::NAN, 60.0]);
-        assert_eq!(hidden.len(), 5);
+        assert_eq!(hidden, [30.0, 30.0, 35.0, 50.0, 60.0]);
     }
 }

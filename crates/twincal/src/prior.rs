@@ -104,10 +104,12 @@ impl Prior {
 
     /// The components that are in, where every one is settled as [`Prior::settled`] does it.
     pub fn settled_structure(&self) -> Option<Vec<bool>> {
-        let settled = |odds: &f64| *odds >= SETTLED || *odds <= 1.0 / SETTLED;
-        let inside = |&family: &usize| self.odds[family] >= SETTLED;
-        let all = self.odds.iter().all(settled);
-        all.then(|| self.family.iter().map(inside).collect())
+        let inside = |&family: &usize| match self.odds[family] {
+            odds if odds >= SETTLED => Some(true),
+            odds if odds <= 1.0 / SETTLED => Some(false),
+            _ => None,
+        };
+        self.family.iter().map(inside).collect()
     }
 
     /// C.
@@ -197,6 +199,24 @@ mod tests {
             inclusion,
             (1e-3, 1e-3),
         )
+    }
+
+    #[test]
+    fn a_settled_prior_says_what_is_in() {
+        let open = prior(Inclusion::Probability(0.3));
+        assert_eq!(open.settled_structure(), None);
+        let inside = [true, false, false, true, true, false, true];
+        assert_eq!(
+            open.settled(&inside).settled_structure(),
+            Some(inside.to_vec())
+        );
+        // Also where one of the two families is empty.
+        for all in [[true; 7], [false; 7]] {
+            assert_eq!(open.settled(&all).settled_structure(), Some(all.to_vec()));
+        }
+        let mut half = open.settled(&inside);
+        half.odds[1] = 1.0;
+        assert_eq!(half.settled_structure(), None);
     }
 
     /// ln Γ by Stirling's series with recurrence: independent of the urn.

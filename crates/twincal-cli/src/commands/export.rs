@@ -406,9 +406,8 @@ fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
     }
     if let Some(projection) = &change.projection {
         let text = format!(
-            "no body can have the inertia found for {}: the one with the nearest torque was taken, {} standard deviations away",
-            projection.links.join(", "),
-            short(projection.distance)
+            "no body can have the inertia found for {}: the one with the nearest torque was taken",
+            projection.links.join(", ")
         );
         paragraph(&text, terminal);
     }

@@ -12,7 +12,9 @@ mod regrouped;
 mod states;
 mod trace;
 #[cfg(test)]
-pub(crate) mod tests;
+mod tests;
+#[cfg(test)]
+pub(crate) mod testing;
 
 pub(crate) use states::{States, rms};
 pub use trace::Step;

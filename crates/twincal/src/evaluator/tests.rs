@@ -4,13 +4,10 @@ use super::columns::{Columns, parameters};
 use super::coordinates::{Coordinate, Coordinates};
 use super::dynamics;
 use super::regrouped::regrouped;
+use super::testing::tree;
 use super::trace::{Step, Trace, values};
-use crate::robot::{
-    Inertia, JointDescription, JointKind, LinkDescription, Mimic, Motion, Robot, RobotDescription,
-    nominal_torque,
-};
+use crate::robot::{Motion, nominal_torque};
 use crate::term::{Family, Function, Library, LibrarySettings};
-use std::collections::BTreeMap;
 
 fn value(t: &Trace, id: u32, q: &[f64]) -> f64 {
     let at = |id: u32| value(t, id, q);
@@ -61,57 +58,6 @@ fn double_angles_and_derivatives_are_those_of_closed_forms() {
         let wanted = 2.0 * (2.0 * a).cos() * b + 2.0 * (2.0 * a).sin();
         assert!((value(&t, change[0], &q) - wanted).abs() < 1e-14);
     }
-}
-
-/// A tree: two arms on one turning body, sliders in both, one joint that mimics another, every link lopsided and every axis skew.
-pub(crate) fn tree() -> Robot {
-    use JointKind::{Prismatic, Revolute};
-    let parents = [0, 1, 2, 1, 4, 5, 5];
-    let kinds = [
-        Revolute, Revolute, Prismatic, Prismatic, Revolute, Revolute, Revolute,
-    ];
-    let links = (0..=parents.len()).map(|i| {
-        let x = i as f64;
-        LinkDescription {
-            name: format!("link{i}"),
-            inertia: (i > 0).then_some(Inertia {
-                mass: 1.0 + 0.3 * x,
-                com: [0.2, -0.1 * x, 0.15],
-                tensor: [
-                    [0.04, 0.005, -0.003],
-                    [0.005, 0.05, 0.004],
-                    [-0.003, 0.004, 0.03 + 0.001 * x],
-                ],
-            }),
-        }
-    });
-    let joints = parents
-        .iter()
-        .zip(kinds)
-        .enumerate()
-        .map(|(i, (parent, kind))| {
-            let name = |k: usize| format!("link{k}");
-            let mut joint =
-                JointDescription::new(&format!("joint{i}"), kind, &name(*parent), &name(i + 1));
-            joint.axis = [[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 2.0, 0.5]][i % 3];
-            joint.placement.translation = [0.3, 0.1 * i as f64, -0.2];
-            if i == 5 {
-                joint.mimic = Some(Mimic {
-                    joint: "joint1".into(),
-                    multiplier: -0.7,
-                    offset: 0.2,
-                });
-            }
-            joint
-        });
-    let description = RobotDescription {
-        name: "tree".to_owned(),
-        gravity: [3.0, -2.0, -9.0],
-        joints: joints.collect(),
-        links: links.collect(),
-        allow_unphysical: false,
-    };
-    Robot::new(description, &BTreeMap::new()).unwrap().0
 }
 
 /// A state without round numbers.

@@ -46,8 +46,8 @@ pub(super) struct Certain {
 
 /// The components that every model with weight holds.
 ///
-/// Any model makes a valid bound, a good one a sharp one: the one that a settled prior asks for, the heaviest of a posterior that is known to be near, or, without
-/// these, what the full model settles is integrated out and a better one looked for among the rest.
+/// Any model makes a valid bound, a good one a sharp one: the one that a settled prior asks for, or the heaviest of a posterior that
+/// is known to be near; without these, what the full model settles is integrated out and a better one looked for among the rest.
 pub(super) fn components(
     standard: &Standard,
     problem: &Problem,
@@ -124,7 +124,8 @@ pub(super) fn weight_of_heaviest(
     weight_of(standard, problem, &holds)
 }
 
-/// ln of the weight of the model with these components, its bounds counted as the search's guide does; `None` where it has no prior probability.
+/// ln of the weight of the model with these components, its bounds counted as the search's guide does; `None` where it has no prior
+/// probability.
 fn weight_of(standard: &Standard, problem: &Problem, holds: &[bool]) -> Option<f64> {
     let prior = &problem.prior;
     let orphan = |c: usize| holds[c] && prior.parent_of(c).is_some_and(|p| !holds[p]);

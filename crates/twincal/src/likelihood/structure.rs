@@ -7,8 +7,9 @@ use crate::term::Family;
 
 /// Components that are expected where nothing is said.
 const DEFAULT_EXPECTED: f64 = 5.0;
-/// Prior probability of a component that says what a more usual one says: so small that models which hold both, and share the effect between
-/// them in any way that the slabs allow, do not widen what is said of either (with 1/1000 a payload of 1.740 ± 0.002 kg was ± 0.055).
+/// Prior probability of a component that says what a more usual one says: so small that models which hold both, and share the
+/// effect between them in any way that the slabs allow, do not widen what is said of either (with 1/1000 a payload of
+/// 1.740 ± 0.002 kg was ± 0.055).
 const SECOND_CHOICE: f64 = 1e-6;
 
 /// Family of every component, r_f of every family, and the inclusion prior, as [`crate::prior::Prior`] wants them.

@@ -18,13 +18,15 @@ mod recursion;
 mod dynamics;
 mod block;
 pub mod regressor;
-pub(crate) mod base_parameters;
+mod base_parameters;
 mod gravity;
 mod derivative;
 mod mass_matrix;
 mod energy_regressor;
 mod energy;
 
+#[cfg(test)]
+pub(crate) use base_parameters::random_states;
 pub use base_parameters::{BaseParameters, DependentParameter, base_parameters};
 pub use block::{BLOCK, BlockWorkspace, Instructions, STRIDE};
 pub use derivative::position_derivative;

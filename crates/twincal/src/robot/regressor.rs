@@ -245,7 +245,8 @@ impl pulp::WithSimd for Kernel<'_> {
         let mut first = samples.start;
         while first < samples.end {
             let last = samples.end.min(first + S::F64_LANES);
-            // Columns are linear in u and v: where these are 0 no sample is, and whole vectors can be stored.
+            // Columns are linear in u and v, which are 0 in lanes without a sample: whole vectors can be stored. Everything else is
+            // finite there, since motion, sine and cosine are loaded as zeros.
             let live = load(s, &ONES[..last - first]);
             for i in 0..bodies.len() {
                 let body = &bodies[i];
@@ -327,7 +328,7 @@ fn columns<S: Simd>(
     }
 }
 
-/// Writes a whole vector of column `k`: masked stores are a dozen times slower on some machines.
+/// Writes a whole vector of column `k`: masked stores cost many times as much (Zen 3).
 #[inline(always)]
 fn put<S: Simd>(s: S, cells: &mut [f64], k: usize, at: usize, value: S::f64s) {
     let start = k * STRIDE + at;

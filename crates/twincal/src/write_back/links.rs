@@ -5,7 +5,7 @@ use super::projection::{Link, project};
 use super::{Place, Projection, Writer};
 use crate::error::Result;
 use crate::robot::spatial::{apply, scale, transpose};
-use crate::robot::{Inertia, Placement, body_parameters, inertia_of, to_body_frame};
+use crate::robot::{Inertia, Placement, Robot, body_parameters, inertia_of, to_body_frame};
 use crate::term::Family;
 use serde::Serialize;
 
@@ -44,11 +44,12 @@ pub(super) fn home<'w>(writer: &'w Writer<'_>, body: usize, family: Family) -> &
     heaviest.filter(|link| mass(link) > 0.0).unwrap_or(named)
 }
 
-/// New inertias of all links that `held` columns change, physical ones.
+/// New inertias of all links that `held` columns change, physical ones; `gravity`: where it changes too.
 pub(super) fn changes(
     writer: &Writer<'_>,
     held: &[Option<Place>],
     beta: &[f64],
+    gravity: Option<[f64; 3]>,
 ) -> Result<(Vec<LinkChange>, Option<Projection>)> {
     let robot = &writer.calibration.twin.robot;
     let mut links: Vec<Link<'_>> = Vec::new();
@@ -79,15 +80,16 @@ pub(super) fn changes(
             *found += beta[column] * change.sum::<f64>();
         }
     }
-    let metric = || {
-        torque_metric(
-            robot,
-            &writer.calibration.twin.noise,
-            writer.states.motion(),
-            &links,
-        )
+    let twin = &writer.calibration.twin;
+    // In the file changed inertias meet changed gravity.
+    let torque = || {
+        let mut description = robot.description().clone();
+        description.gravity = gravity.unwrap_or(description.gravity);
+        let (robot, _) = Robot::new(description, robot.locked())?;
+        let states = writer.states.motion();
+        Ok(torque_metric(&robot, &twin.noise, states, &links))
     };
-    let (parameters, projection) = project(&links, metric)?;
+    let (parameters, projection) = project(&links, torque)?;
     let mut changes: Vec<LinkChange> = Vec::new();
     for link in &robot.description().links {
         let Some(index) = links.iter().position(|own| own.name == link.name) else {

@@ -2,16 +2,21 @@
 
 use super::projection::Link;
 use crate::likelihood::JointNoise;
-use crate::robot::{BLOCK, Motion, Regressor, RegressorBlock, Robot, to_body_frame};
+use crate::robot::{
+    BLOCK, Motion, Regressor, RegressorBlock, Robot, nominal_torque, to_body_frame,
+};
 
-/// M of `½ δᵀ M δ`, δ the change of the ten parameters of every link, each in its link's frame (10 L × 10 L, row-major).
+/// Share of a joint's rms torque below which no noise is believed: a metric needs no more digits.
+const LEAST_NOISE: f64 = 1e-3;
+
+/// T of `½ δᵀ T δ`, δ the change of the ten parameters of every link, each in its link's frame (10 L × 10 L, row-major).
 ///
 /// ```text
-/// M = Σ_j n_eff,j/σ_j² · mean_s r_js r_jsᵀ  +  diag(1/unit²)
+/// T = Σ_j n_eff,j/σ_j² · mean_s r_js r_jsᵀ
 /// ```
 /// r_js: what each parameter adds to the torque of joint j in state s (the regressor's row); n_eff,j/σ_j²: what the training rows
-/// say of torque on that joint. With states as the training rows are it is the likelihood's part of the posterior's metric. The
-/// second part is weak: a parameter that no torque shows moves as little as it can in its link's own units.
+/// say of torque on that joint, σ_j at least a thousandth of its torque. On states spread like the training rows it would be the likelihood's part of the
+/// posterior's metric; on states spread evenly over their range it is the torque that an exported model may be asked for.
 ///
 /// All ten parameters count, also those without a component in the twin: what makes a body of first moments that were found is
 /// a tensor, which slow motion does not show.
@@ -23,9 +28,6 @@ pub(super) fn torque_metric(
 ) -> Vec<f64> {
     let size = 10 * links.len();
     let mut metric = vec![0.0; size * size];
-    for (k, unit) in links.iter().flat_map(Link::units).enumerate() {
-        metric[k * (size + 1)] = unit.powi(-2);
-    }
     let homes: Vec<Option<Home>> = links
         .iter()
         .map(|link| {
@@ -34,27 +36,22 @@ pub(super) fn torque_metric(
             Some(Home { body, map })
         })
         .collect();
+    let weights = weights(robot, noise, states);
     let regressor = Regressor::new(robot);
     let mut block = regressor.block(robot);
     let mut row = vec![0.0; size];
     for start in (0..states.len).step_by(BLOCK) {
         let samples = start..(start + BLOCK).min(states.len);
         regressor.evaluate(robot, states, samples.clone(), &mut block);
-        for (joint, noise) in noise.iter().enumerate() {
-            let weight = noise.n_eff / (noise.sigma * noise.sigma * states.len as f64);
-            if !(weight > 0.0 && weight.is_finite()) {
-                continue;
-            }
+        for (joint, &weight) in weights.iter().enumerate() {
+            let own = regressor.pairs().iter().enumerate();
+            let own: Vec<_> = own.filter(|(_, pair)| pair.coordinate == joint).collect();
             for sample in 0..samples.len() {
                 row.fill(0.0);
-                for (pair, known) in regressor.pairs().iter().enumerate() {
-                    let here = |home: &&Home| home.body == known.body;
-                    for (own, home) in row.chunks_exact_mut(10).zip(&homes) {
-                        if known.coordinate == joint
-                            && let Some(home) = home.as_ref().filter(here)
-                        {
-                            home.add(&block, pair, sample, own);
-                        }
+                for (row, home) in row.chunks_exact_mut(10).zip(&homes) {
+                    let Some(home) = home else { continue };
+                    for (index, _) in own.iter().filter(|(_, pair)| pair.body == home.body) {
+                        home.add(&block, *index, sample, row);
                     }
                 }
                 add_square(&mut metric, &row, weight);
@@ -62,6 +59,21 @@ pub(super) fn torque_metric(
         }
     }
     metric
+}
+
+/// n_eff/σ² of every joint, per state.
+fn weights(robot: &Robot, noise: &[JointNoise], states: Motion<'_>) -> Vec<f64> {
+    let mut torque = vec![0.0; states.q.len()];
+    nominal_torque(robot, states, &mut torque);
+    let joints = torque.chunks_exact(states.len).zip(noise);
+    joints
+        .map(|(torque, noise)| {
+            let mean = torque.iter().map(|t| t * t).sum::<f64>() / states.len as f64;
+            let variance = (noise.sigma * noise.sigma).max(LEAST_NOISE * LEAST_NOISE * mean);
+            let weight = noise.n_eff / (variance * states.len as f64);
+            if weight.is_finite() { weight } else { 0.0 }
+        })
+        .collect()
 }
 
 /// Where a link is: its body, and that body's parameters of a unit of each of the link's own.

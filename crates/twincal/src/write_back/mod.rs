@@ -179,9 +179,9 @@ impl<'a> Writer<'a> {
         let held: Vec<Option<Place>> = (held.into_iter().enumerate())
             .map(|(column, place)| place.filter(|_| whole[self.component(column)]))
             .collect();
-        let (links, projection) = links::changes(self, &held, beta)?;
-        let joints = joints::changes(robot, &held, beta, self.holds);
         let gravity = gravity(robot, &held, beta);
+        let (links, projection) = links::changes(self, &held, beta, gravity)?;
+        let joints = joints::changes(robot, &held, beta, self.holds);
         let mut change = WriteBack {
             links,
             joints,

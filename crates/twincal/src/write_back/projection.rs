@@ -1,11 +1,15 @@
-//! The nearest physical inertias in a metric M, with a proof that none is nearer.
+//! The physical inertias with the nearest torque, with a proof that none is nearer.
 //!
 //! ```text
-//! minimise ½ (π − π̂)ᵀ M (π − π̂)   subject to   P(π_l) ⪰ 0   for every link l
+//! minimise ½ (π − π̂)ᵀ T (π − π̂) + ½ Σ ((π − π°)/unit)²   subject to   P(π_l) ⪰ ε   for every link l
 //! ```
-//! π holds the ten parameters of every link. In whitened coordinates u = Lᵀ (π − π̂), M = L Lᵀ, the objective is ½|u|² and every
-//! pseudo-inertia is affine: `A_l + Σ_i u_i F_li`. Path following with the barrier −ln|P|; `Z_l = P_l⁻¹/t` is dual feasible at
-//! every point, so the duality gap is known exactly:
+//! π holds the ten parameters of every link, π̂ what was found. T is the square of the torque between them ([`super::metric`]). The second part
+//! is weak: it draws what no torque shows towards π°, which for a link that was found to be no body is its nominal tensor about the centre of mass that was found. ε is 1e-6 in
+//! the link's own units.
+//!
+//! Both parts are ½ (π − π*)ᵀ M (π − π*) and a constant, M = T + diag(1/unit²). In whitened coordinates u = Lᵀ (π − π*), M = L Lᵀ, that is ½|u|²
+//! and every pseudo-inertia is affine: `P − ε = A_l + Σ_i u_i F_li`. Path following with the barrier −ln|P − ε|; `Z_l = (P_l − ε)⁻¹/t` is
+//! dual feasible at every point, so the duality gap is known exactly:
 //!
 //! ```text
 //! ½|u|² ≥ optimum ≥ −½|F*Z|² − Σ_l ⟨Z_l, A_l⟩,     (F*Z)_i = Σ_l ⟨F_li, Z_l⟩
@@ -16,6 +20,7 @@
 use super::pseudo_inertia::{Four, factor, inner, inverse, log_determinant, pseudo_inertia, times};
 use crate::error::{Error, Result};
 use crate::linear_algebra::Cholesky;
+use crate::robot::{Inertia, Placement, body_parameters, inertia_of};
 use serde::Serialize;
 
 /// A link whose inertia changes: ten parameters in its own frame.
@@ -28,21 +33,14 @@ pub(super) struct Link<'a> {
     pub(super) found: [f64; 10],
 }
 
-impl Link<'_> {
-    /// Natural units of the ten parameters: mass, mass × length, mass × length².
-    pub(super) fn units(&self) -> [f64; 10] {
-        Scale::of(self).units()
-    }
-}
-
 /// How inertias were made physical.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Projection {
     /// Links that no body could be before.
     pub links: Vec<String>,
-    /// √((π − π̂)ᵀ M (π − π̂)): how far they moved, in standard deviations of what torque says of them.
+    /// √((π − π̂)ᵀ T (π − π̂)): how far their torque moved, in standard deviations of what the data say of it.
     pub distance: f64,
-    /// Upper bound of what a nearer solution could save of ½ distance².
+    /// Upper bound of what another physical solution could save of the objective.
     pub gap: f64,
 }
 
@@ -52,53 +50,70 @@ const MARGIN: f64 = 1e-6;
 const SIZE: f64 = 0.1;
 /// Smallest mass that makes a scale, kg.
 const LEAST_MASS: f64 = 1e-6;
-/// The gap ends at this share of the objective (or at this number).
+/// The gap ends at this share of the objective (or at this number), and is refused above the second one.
 const GAP: f64 = 1e-9;
+const MOST_GAP: f64 = 1e-4;
+/// Squared Newton decrement below which full steps are taken.
+const NEAR: f64 = 0.05;
+/// Where the path ends at the latest: the barrier then weighs less than rounding.
+const LAST: f64 = 1e18;
+/// Share of a link's scale below which a found mass says nothing of where it is.
+const LIGHT: f64 = 1e-3;
 
-/// Parameters of every link at the nearest physical point; `metric` makes M (10 L × 10 L, row-major, positive definite), where it
-/// is needed.
+/// Parameters of every link at the nearest physical point; `torque` makes T (10 L × 10 L, row-major), where it is needed.
 ///
 /// # Errors
-/// [`Error::Refused`] if there are none.
+/// Those of `torque`; [`Error::Refused`] where rounding lets no point be found or proven.
 pub(super) fn project(
     links: &[Link<'_>],
-    metric: impl FnOnce() -> Vec<f64>,
+    torque: impl FnOnce() -> Result<Vec<f64>>,
 ) -> Result<(Vec<[f64; 10]>, Option<Projection>)> {
     let scales: Vec<Scale> = links.iter().map(Scale::of).collect();
-    let impossible =
-        |(link, scale): &(&Link<'_>, &Scale)| factor(&scale.inside(&link.found)).is_none();
-    let bad: Vec<String> = (links.iter().zip(&scales))
-        .filter(impossible)
-        .map(|(link, _)| link.name.to_owned())
+    let impossible: Vec<bool> = (links.iter().zip(&scales))
+        .map(|(link, scale)| factor(&scale.inside(&link.found)).is_none())
         .collect();
-    if bad.is_empty() {
+    if !impossible.contains(&true) {
         return Ok((links.iter().map(|link| link.found).collect(), None));
     }
+    let named = links.iter().zip(&impossible).filter(|(_, bad)| **bad);
+    let bad: Vec<String> = named.map(|(link, _)| link.name.to_owned()).collect();
     let refused = || Error::Refused {
-        problem: format!("no physical inertia of {} fits the data", bad.join(", ")),
-        remedy: "correct the inertias of these links in the model first".into(),
+        problem: format!(
+            "the physical inertia nearest to what was found for {} drowns in rounding",
+            bad.join(", ")
+        ),
+        remedy: "look for inertias of these links in the model that are off by orders of magnitude"
+            .into(),
     };
-    let problem = Problem::new(links, &scales, &metric()).ok_or_else(refused)?;
+    let found: Vec<f64> = links.iter().flat_map(|link| link.found).collect();
+    let sound: Vec<f64> = (links.iter().zip(&scales).zip(&impossible))
+        .flat_map(|((link, scale), bad)| if *bad { scale.sound(link) } else { link.found })
+        .collect();
+    let torque = torque()?;
+    let problem = Problem::new(&scales, &torque, &found, &sound).ok_or_else(refused)?;
     let start = problem.interior().ok_or_else(refused)?;
     let (u, gap) = problem.solve(start);
-    let parameters = (links.iter().zip(&problem.steps))
-        .map(|(link, steps)| moved(&link.found, steps, &u))
+    let objective = 0.5 * u.iter().map(|x| x * x).sum::<f64>();
+    if gap.is_nan() || gap > MOST_GAP * objective.max(1.0) {
+        return Err(refused());
+    }
+    let parameters = problem.at(&u);
+    let moved: Vec<f64> = parameters
+        .iter()
+        .flatten()
+        .zip(&found)
+        .map(|(p, f)| p - f)
         .collect();
-    let distance = u.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let rows = torque.chunks_exact(found.len()).zip(&moved);
+    let square: f64 = rows
+        .map(|(row, m)| m * row.iter().zip(&moved).map(|(t, n)| t * n).sum::<f64>())
+        .sum();
     let projection = Projection {
         links: bad,
-        distance,
+        distance: square.max(0.0).sqrt(),
         gap,
     };
     Ok((parameters, Some(projection)))
-}
-
-/// π̂ + Σ u_i step_i.
-fn moved(found: &[f64; 10], steps: &[[f64; 10]], u: &[f64]) -> [f64; 10] {
-    std::array::from_fn(|k| {
-        let terms = steps.iter().zip(u);
-        found[k] + terms.map(|(step, u)| step[k] * u).sum::<f64>()
-    })
 }
 
 /// Units in which a link's pseudo-inertia is about 1.
@@ -109,18 +124,36 @@ struct Scale {
 }
 
 impl Scale {
+    /// The length: the nominal radius of gyration or how far out mass was found, whichever is larger.
     fn of(link: &Link<'_>) -> Self {
-        let p = &link.nominal;
-        let spread = 0.5 * (p[4] + p[7] + p[9]);
-        let length = if p[0] > 0.0 && spread > 0.0 {
-            (spread / p[0]).sqrt()
-        } else {
-            SIZE
-        };
+        let (p, found) = (&link.nominal, &link.found);
+        let mass = p[0].max(found[0].abs()).max(LEAST_MASS);
+        let turning = 0.5 * (p[4] + p[7] + p[9]).max(0.0);
+        let radius = (turning / mass).sqrt();
+        let out = found[1].hypot(found[2]).hypot(found[3]) / mass;
+        let length = radius.max(out);
         Self {
-            mass: p[0].max(link.found[0].abs()).max(LEAST_MASS),
-            length,
+            mass,
+            length: if length > 0.0 { length } else { SIZE },
         }
+    }
+
+    /// A body with mass and centre of mass as they were found, and the nominal tensor about it in proportion; without a nominal one that of
+    /// a ball of half the scale's length.
+    fn sound(&self, link: &Link<'_>) -> [f64; 10] {
+        let mass = link.found[0].max(LIGHT * self.mass);
+        let nominal = inertia_of(&link.nominal);
+        let com = if link.found[0] > LIGHT * self.mass {
+            [1, 2, 3].map(|k| link.found[k] / mass)
+        } else {
+            nominal.map_or([0.0; 3], |nominal| nominal.com)
+        };
+        let ball = 0.1 * mass * self.length * self.length;
+        let tensor = nominal.map_or(
+            [[ball, 0.0, 0.0], [0.0, ball, 0.0], [0.0, 0.0, ball]],
+            |nominal| (nominal.tensor).map(|row| row.map(|x| x * mass / nominal.mass)),
+        );
+        body_parameters(&Inertia { mass, com, tensor }, &Placement::IDENTITY)
     }
 
     fn units(&self) -> [f64; 10] {
@@ -146,6 +179,8 @@ impl Scale {
 
 /// The problem in whitened coordinates and relative units.
 struct Problem {
+    /// π* of every link.
+    centre: Vec<[f64; 10]>,
     /// A_l.
     constant: Vec<Four>,
     /// F_li.
@@ -156,36 +191,70 @@ struct Problem {
 }
 
 impl Problem {
-    /// `None` if the metric is not positive definite.
-    fn new(links: &[Link<'_>], scales: &[Scale], metric: &[f64]) -> Option<Self> {
-        let size = 10 * links.len();
+    /// `None` if M is not positive definite.
+    fn new(scales: &[Scale], torque: &[f64], found: &[f64], sound: &[f64]) -> Option<Self> {
+        let size = found.len();
         let units: Vec<f64> = scales.iter().flat_map(Scale::units).collect();
-        let relative: Vec<f64> = (metric.iter().enumerate())
-            .map(|(at, m)| m * units[at / size] * units[at % size])
+        let relative: Vec<f64> = (torque.iter().enumerate())
+            .map(|(at, t)| {
+                let (i, k) = (at / size, at % size);
+                t * units[i] * units[k] + f64::from(u8::from(i == k))
+            })
             .collect();
         let root = Cholesky::new(&relative, size).ok()?;
-        let mut steps = vec![vec![[0.0; 10]; size]; links.len()];
+        // π* − π̂ = M⁻¹ diag(1/unit²) (π° − π̂)
+        let ends = sound.iter().zip(found).zip(&units);
+        let mut shift: Vec<f64> = ends.map(|((s, f), unit)| (s - f) / unit).collect();
+        root.solve(&mut shift);
+        let per_link = |values: &[f64]| -> Vec<[f64; 10]> {
+            let natural: Vec<f64> = values
+                .iter()
+                .zip(&units)
+                .map(|(v, unit)| v * unit)
+                .collect();
+            let (links, _) = natural.as_chunks::<10>();
+            links.to_vec()
+        };
+        let mut centre = per_link(&shift);
+        for (centre, found) in centre.iter_mut().flatten().zip(found) {
+            *centre += found;
+        }
+        let mut steps = vec![Vec::with_capacity(size); scales.len()];
         for i in 0..size {
-            // π − π̂ of u = e_i.
+            // π − π* of u = e_i.
             let mut step = vec![0.0; size];
             step[i] = 1.0;
             root.solve_upper(&mut step);
-            for (l, steps) in steps.iter_mut().enumerate() {
-                steps[i] = std::array::from_fn(|k| step[10 * l + k] * units[10 * l + k]);
+            for (steps, step) in steps.iter_mut().zip(per_link(&step)) {
+                steps.push(step);
             }
         }
         let slopes = (steps.iter().zip(scales))
             .map(|(steps, scale)| steps.iter().map(|s| scale.relative(s)).collect())
             .collect();
-        let constant = (links.iter().zip(scales))
-            .map(|(link, scale)| scale.inside(&link.found))
+        let constant = (centre.iter().zip(scales))
+            .map(|(centre, scale)| scale.inside(centre))
             .collect();
         Some(Self {
+            centre,
             constant,
             slopes,
             steps,
             size,
         })
+    }
+
+    /// Parameters of every link at u.
+    fn at(&self, u: &[f64]) -> Vec<[f64; 10]> {
+        let links = self.centre.iter().zip(&self.steps);
+        links
+            .map(|(centre, steps)| {
+                std::array::from_fn(|k| {
+                    let terms = steps.iter().zip(u);
+                    centre[k] + terms.map(|(step, u)| step[k] * u).sum::<f64>()
+                })
+            })
+            .collect()
     }
 
     /// A_l + Σ u_i F_li + lift.
@@ -228,20 +297,24 @@ impl Problem {
         None
     }
 
-    /// The optimum from a strictly feasible start, and the duality gap there.
+    /// The optimum from a strictly feasible start, and the duality gap there; the best point where rounding ends the path.
     fn solve(&self, mut u: Vec<f64>) -> (Vec<f64>, f64) {
-        let mut t = 1.0;
-        let mut gap = f64::INFINITY;
-        for _ in 0..60 {
+        let value = |u: &[f64]| 0.5 * u.iter().map(|x| x * x).sum::<f64>();
+        // Objective and barrier weigh alike at first.
+        let mut t = 1.0 / value(&u).max(1.0);
+        let mut best = (u.clone(), f64::INFINITY);
+        while t < LAST {
             self.newton(&mut u, t, false);
-            gap = self.gap(&u, t);
-            let value = 0.5 * u.iter().map(|x| x * x).sum::<f64>();
-            if gap <= GAP * value.max(1e-3) {
+            let gap = self.gap(&u, t);
+            if gap < best.1 {
+                best = (u.clone(), gap);
+            }
+            if gap <= GAP * value(&u).max(1e-3) {
                 break;
             }
             t *= 8.0;
         }
-        (u, gap)
+        best
     }
 
     /// ½|u|² minus the dual value of Z_l = P_l⁻¹/t.
@@ -332,9 +405,10 @@ impl Problem {
             let mut length = 1.0;
             let moved = loop {
                 let trial: Vec<f64> = x.iter().zip(&step).map(|(x, s)| x + length * s).collect();
-                let enough = self
-                    .value(&trial, t, lifted)
-                    .is_some_and(|there| there <= here - 0.1 * length * decrement);
+                // The function is self-concordant: near the centre full steps converge, and what they gain drowns in rounding.
+                let enough = self.value(&trial, t, lifted).is_some_and(|there| {
+                    decrement < NEAR || there <= here - 0.1 * length * decrement
+                });
                 if enough {
                     break Some(trial);
                 }
