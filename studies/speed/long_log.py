@@ -1,6 +1,6 @@
-"""How long a fit of a long log takes, and how much memory: from Parquet to result.json and report.
+"""How long a fit of a long log takes, and how much memory: from Parquet or MCAP to result.json and report.
 
-    python studies/speed/long_log.py [--robot panda] [--minutes 10] [--threads 2] [--repeat 3] [--families payload,tensor,…]
+    python studies/speed/long_log.py [--robot panda] [--minutes 10] [--threads 2] [--repeat 3] [--families payload,tensor,…] [--mcap]
 
 The arm is that of studies/industrial_arms with its defects, logged at 1 kHz as joint positions, velocities and torques. Every repeat
 is one run of `twincal fit` in a new process, with default settings or with the candidate families named; printed are the median wall time and the largest memory.
@@ -25,6 +25,7 @@ import pyarrow.parquet as pq
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "studies/industrial_arms"))
+sys.path.insert(0, str(ROOT / "examples/bags"))
 import simulate_arms as arms  # noqa: E402
 
 PROGRAM = Path(os.environ.get("TWINCAL", ROOT / "target/release/twincal"))
@@ -67,8 +68,25 @@ def log(name, minutes, seed=1):
 
 
 def write(name, minutes, file):
-    """The log as a file."""
-    pq.write_table(pa.table(log(name, minutes)), file)
+    """The log as a file: columns, or one JointState message per row in chunks packed by zstd."""
+    columns = log(name, minutes)
+    if file.suffix == ".parquet":
+        pq.write_table(pa.table(columns), file)
+        return
+    from csv_to_mcap import DEFINITION, START
+    from mcap_ros2.writer import Writer
+
+    joints = list(arms.load(name).names)[1:]
+    channels = [np.stack([columns[f"{short}{j + 1}"] for j in range(len(joints))], axis=1).tolist() for short in ("q", "qd", "tau")]
+    with open(file, "wb") as out:
+        writer = Writer(out)
+        schema = writer.register_msgdef("sensor_msgs/msg/JointState", DEFINITION)
+        for number, (t, *values) in enumerate(zip(columns["t"].tolist(), *channels)):
+            stamp = START * 10**9 + round(t * 1e9)
+            header = {"stamp": {"sec": stamp // 10**9, "nanosec": stamp % 10**9}, "frame_id": ""}
+            message = {"header": header, "name": joints} | dict(zip(("position", "velocity", "effort"), values))
+            writer.write_message("/joint_states", schema, message, stamp, stamp, number)
+        writer.finish()
 
 
 def measured(command):
@@ -90,11 +108,12 @@ def main():
     arguments.add_argument("--repeat", type=int, default=3)
     arguments.add_argument("--folder", type=Path, help="keep the log here and use it again")
     arguments.add_argument("--families", help="[library] families, with commas between [default: all that are on by default]")
+    arguments.add_argument("--mcap", action="store_true", help="as MCAP instead of Parquet")
     given = arguments.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
         folder = given.folder or Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
-        file = folder / f"{given.robot}-{given.minutes:g}.parquet"
+        file = folder / f"{given.robot}-{given.minutes:g}.{'mcap' if given.mcap else 'parquet'}"
         if not file.exists():
             # In a process of its own: a child's largest memory counts what its parent had when it was started.
             maker = multiprocessing.get_context("spawn").Process(target=write, args=(given.robot, given.minutes, file))
