@@ -29,20 +29,29 @@ uint32 nanosec
 """
 
 
-def main(source, target, joints):
-    """One message per row, on /joint_states."""
-    with open(source, newline="") as rows, open(target, "wb") as out:
+def record(target, joints, rows):
+    """One message per row (seconds, positions, velocities, efforts), on /joint_states."""
+    with open(target, "wb") as out:
         writer = Writer(out)
         schema = writer.register_msgdef("sensor_msgs/msg/JointState", DEFINITION)
-        for number, row in enumerate(csv.DictReader(rows)):
-            stamp = START * 10**9 + round(float(row["t"]) * 1e9)
+        for number, (t, position, velocity, effort) in enumerate(rows):
+            stamp = START * 10**9 + round(t * 1e9)
             header = {"stamp": {"sec": stamp // 10**9, "nanosec": stamp % 10**9}, "frame_id": ""}
-            message = {"header": header, "name": joints}
-            for field, short in (("position", "q"), ("velocity", "qd"), ("effort", "tau")):
-                names = [f"{short}{j + 1}" for j in range(len(joints))]
-                message[field] = [float(row[name]) for name in names] if names[0] in row else []
+            message = {"header": header, "name": joints, "position": position, "velocity": velocity, "effort": effort}
             writer.write_message("/joint_states", schema, message, stamp, stamp, number)
         writer.finish()
+
+
+def main(source, target, joints):
+    """The rows of a CSV log as messages."""
+
+    def numbers(row, short):
+        names = [f"{short}{j + 1}" for j in range(len(joints))]
+        return [float(row[name]) for name in names] if names[0] in row else []
+
+    with open(source, newline="") as log:
+        rows = csv.DictReader(log)
+        record(target, joints, ((float(row["t"]), *(numbers(row, short) for short in ("q", "qd", "tau"))) for row in rows))
 
 
 if __name__ == "__main__":

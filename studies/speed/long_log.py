@@ -73,20 +73,11 @@ def write(name, minutes, file):
     if file.suffix == ".parquet":
         pq.write_table(pa.table(columns), file)
         return
-    from csv_to_mcap import DEFINITION, START
-    from mcap_ros2.writer import Writer
+    from csv_to_mcap import record
 
     joints = list(arms.load(name).names)[1:]
     channels = [np.stack([columns[f"{short}{j + 1}"] for j in range(len(joints))], axis=1).tolist() for short in ("q", "qd", "tau")]
-    with open(file, "wb") as out:
-        writer = Writer(out)
-        schema = writer.register_msgdef("sensor_msgs/msg/JointState", DEFINITION)
-        for number, (t, *values) in enumerate(zip(columns["t"].tolist(), *channels)):
-            stamp = START * 10**9 + round(t * 1e9)
-            header = {"stamp": {"sec": stamp // 10**9, "nanosec": stamp % 10**9}, "frame_id": ""}
-            message = {"header": header, "name": joints} | dict(zip(("position", "velocity", "effort"), values))
-            writer.write_message("/joint_states", schema, message, stamp, stamp, number)
-        writer.finish()
+    record(file, joints, zip(columns["t"].tolist(), *channels))
 
 
 def measured(command):

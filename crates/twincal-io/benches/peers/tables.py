@@ -13,7 +13,7 @@ READERS = {
     "parquet": lambda path: parquet.read_table(path, use_threads=False),
     "arrow": lambda path: feather.read_table(path, use_threads=False),
 }
-if sys.argv[1] == "--copy":
+if sys.argv[1:2] == ["--copy"]:
     parquet.write_table(parquet.read_table(sys.argv[2]), sys.argv[3])
     sys.exit()
 for path in sys.argv[1:]:

@@ -94,7 +94,7 @@ impl Home {
     }
 }
 
-/// M += weight · row rowᵀ.
+/// T += weight · row rowᵀ.
 fn add_square(metric: &mut [f64], row: &[f64], weight: f64) {
     for (a, metric) in row.iter().zip(metric.chunks_exact_mut(row.len())) {
         if *a != 0.0 {

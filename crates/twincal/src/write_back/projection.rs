@@ -3,12 +3,12 @@
 //! ```text
 //! minimise ½ (π − π̂)ᵀ T (π − π̂) + ½ Σ ((π − π°)/unit)²   subject to   P(π_l) ⪰ ε   for every link l
 //! ```
-//! π holds the ten parameters of every link, π̂ what was found. T is the square of the torque between them ([`super::metric`]). The second part
-//! is weak: it draws what no torque shows towards π°, which for a link that was found to be no body is its nominal tensor about the centre of mass that was found. ε is 1e-6 in
-//! the link's own units.
+//! π holds the ten parameters of every link, π̂ what was found. T is the square of the torque between them ([`super::metric`]). The
+//! second part is weak: it draws what no torque shows towards π°, which for a link that was found to be no body is its nominal
+//! tensor about the centre of mass that was found. ε is 1e-6 in the link's own units.
 //!
-//! Both parts are ½ (π − π*)ᵀ M (π − π*) and a constant, M = T + diag(1/unit²). In whitened coordinates u = Lᵀ (π − π*), M = L Lᵀ, that is ½|u|²
-//! and every pseudo-inertia is affine: `P − ε = A_l + Σ_i u_i F_li`. Path following with the barrier −ln|P − ε|; `Z_l = (P_l − ε)⁻¹/t` is
+//! Both parts are ½ (π − π*)ᵀ M (π − π*) and a constant, M = T + diag(1/unit²). In whitened coordinates u = Lᵀ (π − π*),
+//! M = L Lᵀ, that is ½|u|² and every pseudo-inertia is affine: `P − ε = A_l + Σ_i u_i F_li`. Path following with the barrier −ln|P − ε|; `Z_l = (P_l − ε)⁻¹/t` is
 //! dual feasible at every point, so the duality gap is known exactly:
 //!
 //! ```text
