@@ -64,15 +64,22 @@ impl StoredTwin {
             what: TWIN.into(),
             problem,
         };
-        let twin = serde_json::to_vec(self).map_err(|e| internal(e.to_string()))?;
-        // What cannot be read back must not be written.
-        serde_json::from_slice::<Self>(&twin)
-            .map_err(|e| internal(format!("{e}, after `{}`", before(&twin, e.column()))))?;
-        let report = crate::report::render(&self.calibration, &self.context)?;
+        let twin = || -> Result<Vec<u8>> {
+            let twin = serde_json::to_vec(self).map_err(|e| internal(e.to_string()))?;
+            // What cannot be read back must not be written.
+            serde_json::from_slice::<Self>(&twin)
+                .map_err(|e| internal(format!("{e}, after `{}`", before(&twin, e.column()))))?;
+            Ok(twin)
+        };
+        let shown = || {
+            let report = crate::report::render(&self.calibration, &self.context);
+            (self.result_json(), report)
+        };
+        let (twin, (result, report)) = rayon::join(twin, shown);
         let mut files = vec![
-            (RESULT, self.result_json()?.into_bytes()),
-            (TWIN, twin),
-            (REPORT, report.into_bytes()),
+            (RESULT, result?.into_bytes()),
+            (TWIN, twin?),
+            (REPORT, report?.into_bytes()),
             (RUN_LOG, run_log.into_bytes()),
         ];
         files.extend(more);

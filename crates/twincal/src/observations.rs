@@ -1,5 +1,7 @@
 //! The rows of one log, kept at the filtered rate: what residuals, blocks and held-out scores are computed from.
 
+mod products;
+
 use crate::error::Result;
 use crate::gram::{Gram, JointAccumulator};
 use crate::robot::Robot;
@@ -362,13 +364,31 @@ impl Part<'_> {
     pub fn residual(&self, joint: usize, beta: &[f64], range: Range<usize>) -> Vec<f64> {
         let (len, rows) = (self.observations.len(), &self.observations.joints[joint]);
         let mut residual = rows.y[range.clone()].to_vec();
-        for (i, &column) in rows.columns.iter().enumerate() {
-            let x = &rows.x[i * len + range.start..i * len + range.end];
-            for (r, x) in residual.iter_mut().zip(x) {
-                *r -= x * beta[column];
-            }
-        }
+        let beta: Vec<f64> = rows.columns.iter().map(|&column| beta[column]).collect();
+        products::subtract(rows.of_rows(len, &range), &beta, &mut residual);
         residual
+    }
+
+    /// `xᵀ C x` of every row of a joint; C: `covariance[a * count + b]` of columns a and b out of `count`.
+    pub fn quadratic_forms(&self, joint: usize, covariance: &[f64], count: usize) -> Vec<f64> {
+        let (len, rows) = (self.observations.len(), &self.observations.joints[joint]);
+        let columns = || rows.columns.iter();
+        let own: Vec<f64> = columns()
+            .flat_map(|a| columns().map(move |b| covariance[a * count + b]))
+            .collect();
+        let mut forms = vec![0.0; self.rows.len()];
+        products::quadratic(rows.of_rows(len, &self.rows), &own, &mut forms);
+        forms
+    }
+}
+
+impl JointObservations {
+    /// The columns from the first row of `range` on, out of `len` rows.
+    fn of_rows(&self, len: usize, range: &Range<usize>) -> products::Columns<'_> {
+        products::Columns {
+            x: self.x.get(range.start..).unwrap_or_default(),
+            stride: len,
+        }
     }
 }
 

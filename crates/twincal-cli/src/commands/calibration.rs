@@ -9,9 +9,10 @@ use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use twincal::calibrate::{Calibration, Stage, Stopped, calibrate};
+use twincal::calibrate::{Calibration, CalibrationSettings, Stage, Stopped, calibrate};
 use twincal_io::artifact::{Claim, Maker, REPORT};
 use twincal_io::config::{Config, Settings};
+use twincal_io::memory;
 use twincal_io::report::ReportContext;
 use twincal_io::twin_json::StoredTwin;
 
@@ -72,11 +73,15 @@ impl Job<'_> {
     fn calibrate(&mut self, progress: &Progress) -> Result<Calibration, Stopped> {
         let (logs, heldout) = (&mut self.logs, &mut self.heldout);
         let step = |stage| progress.step(&stage_words(stage));
+        let settings = CalibrationSettings {
+            most_bytes: memory::available().map(|available| available.bytes),
+            ..self.settings.calibration.clone()
+        };
         let mut calibration = calibrate(
             &self.robot.robot,
             std::mem::take(&mut logs.recordings),
             std::mem::take(&mut heldout.recordings),
-            &self.settings.calibration,
+            &settings,
             &step,
         );
         let read = [&self.robot.findings, &logs.findings, &heldout.findings];

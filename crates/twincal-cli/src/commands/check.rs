@@ -48,8 +48,7 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     progress.step(&format!("reading {}", flags.twin.to_string_lossy()));
     let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, false)?;
     let twin = &stored.calibration.twin;
-    let terms = twin.posterior.inclusion.len() as u64;
-    let mut logs = LogInput::read(&flags.logs, &twin.robot, &settings.log, terms, &progress)?;
+    let mut logs = LogInput::read(&flags.logs, &twin.robot, &settings.log, &progress)?;
     progress.step("predicting the logs");
     let mut found = std::mem::take(&mut logs.findings);
     let validation = score(twin, &logs, &mut found).map_err(|error| logs.as_given(error))?;

@@ -43,13 +43,11 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     let progress = Progress::new();
     progress.step(&format!("reading {}", model.to_string_lossy()));
     let robot = RobotInput::read(model, &settings)?;
-    let terms = super::inputs::terms_at_most(&robot.robot, &settings);
-    let logs = LogInput::read(given, &robot.robot, &settings.log, terms, &progress)?;
+    let logs = LogInput::read(given, &robot.robot, &settings.log, &progress)?;
     let heldout = LogInput::read(
         &settings.log.heldout,
         &robot.robot,
         &settings.log,
-        terms,
         &progress,
     )?;
     every_log_once(&logs, &heldout)?;

@@ -14,8 +14,9 @@ use twincal_io::model::{Model, ModelFormat, read_model};
 use twincal_io::report::FileHash;
 use twincal_io::{Error, memory};
 
-/// Doubles per sample and joint that alignment, filtering and rows hold at once, beside the table itself.
-const DOUBLES_PER_SAMPLE: u64 = 24;
+/// Doubles per sample and joint that alignment and filtering hold at once beside the recordings themselves: pieces on even clocks (4),
+/// smooth motion with torques (5), what passes by. What rows take is asked when it is known how many there are.
+const DOUBLES_PER_SAMPLE: u64 = 12;
 
 /// The robot and what its file says.
 pub(super) struct RobotInput {
@@ -61,12 +62,11 @@ pub(super) struct LogInput {
 }
 
 impl LogInput {
-    /// Reads logs; `terms` is how many candidate columns each row may get.
+    /// Reads logs.
     pub(super) fn read(
         paths: &[PathBuf],
         robot: &Robot,
         settings: &LogSettings,
-        terms: u64,
         progress: &Progress,
     ) -> Outcome<Self> {
         let mut rows = 0;
@@ -86,7 +86,7 @@ impl LogInput {
             };
             let (recording, findings) = log;
             rows += recording.time.len() as u64;
-            let bytes = rows.saturating_mul(robot.dof() as u64 * 8 * (DOUBLES_PER_SAMPLE + terms));
+            let bytes = rows.saturating_mul(robot.dof() as u64 * 8 * DOUBLES_PER_SAMPLE);
             memory::require(
                 &path.to_string_lossy(),
                 bytes,
@@ -189,11 +189,4 @@ fn sha256_of_log(path: &Path) -> Result<String, Error> {
         lines += &format!("{}  {name}\n", sha256_of_file(&file)?);
     }
     Ok(sha256(lines.as_bytes()))
-}
-
-/// Candidate columns at most, for the estimate of memory.
-pub(super) fn terms_at_most(robot: &Robot, settings: &Settings) -> u64 {
-    // The generic family of three joints is the largest that is on by default.
-    const GENERIC: u64 = 200;
-    settings.calibration.library.terms.len() as u64 + 4 * robot.dof() as u64 + GENERIC
 }

@@ -81,7 +81,7 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
     };
     progress.step(&format!("reading {}", model.to_string_lossy()));
     let robot = RobotInput::read(model, &settings)?;
-    let mut logs = LogInput::read(logs, &robot.robot, &settings.log, 0, &progress)?;
+    let mut logs = LogInput::read(logs, &robot.robot, &settings.log, &progress)?;
     drop(progress);
     let mut found = robot.findings;
     found.append(&mut logs.findings);

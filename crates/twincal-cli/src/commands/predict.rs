@@ -59,8 +59,7 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
     progress.step(&format!("reading {}", flags.twin.to_string_lossy()));
     let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, false)?;
     let twin = &stored.calibration.twin;
-    let terms = twin.posterior.inclusion.len() as u64;
-    let mut logs = LogInput::read(&flags.logs, &twin.robot, &settings.log, terms, &progress)?;
+    let mut logs = LogInput::read(&flags.logs, &twin.robot, &settings.log, &progress)?;
     progress.step("predicting the logs");
     let mut prediction = Prediction {
         findings: std::mem::take(&mut logs.findings),

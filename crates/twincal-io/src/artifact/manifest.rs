@@ -1,6 +1,7 @@
 //! `manifest.json`: format version, who wrote the artefact, and the checksum of every file.
 
 use crate::error::{Error, Place, Result};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -71,7 +72,7 @@ impl Manifest {
             twincal: env!("CARGO_PKG_VERSION").into(),
             made_by,
             files: files
-                .iter()
+                .par_iter()
                 .map(|(name, bytes)| ((*name).to_owned(), entry(bytes)))
                 .collect(),
         }

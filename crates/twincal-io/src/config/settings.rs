@@ -287,6 +287,7 @@ impl Config {
             prior: self.prior()?,
             noise: self.noise(),
             inference: self.inference()?,
+            most_bytes: None,
         })
     }
 

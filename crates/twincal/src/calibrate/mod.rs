@@ -13,6 +13,7 @@ mod outlook;
 mod prior_conflict;
 mod repeat;
 mod result;
+mod room;
 mod sandwich;
 mod stopped;
 mod summary;
@@ -73,6 +74,8 @@ pub struct CalibrationSettings {
     pub noise: NoiseSettings,
     /// `[inference]`.
     pub inference: InferenceSettings,
+    /// Bytes that the rows of all logs may take; `None`: any number.
+    pub most_bytes: Option<u64>,
 }
 
 impl Default for CalibrationSettings {
@@ -114,6 +117,7 @@ impl Default for CalibrationSettings {
                 seed: 1,
                 allow_disagreement: false,
             },
+            most_bytes: None,
         }
     }
 }
@@ -183,6 +187,12 @@ fn whole_road(
     // eq. (1)–(4): residual torque and Euler–Lagrange columns, filtered alike
     let ready = heldout.iter().map(|log| prepare(robot, log, &pipeline));
     let others: Vec<PreparedLog<'_>> = ready.collect::<Result<_>>()?;
+    room::require(
+        settings.most_bytes,
+        &library,
+        &pipeline,
+        prepared.iter().chain(&others),
+    )?;
     let (mut data, trajectories) = Data::read(robot, &library, &pipeline, &prepared, &others)?;
     findings.extend(self_check(robot, &pipeline, trajectories.all())?);
     let lags: Vec<LogLag> = trajectories

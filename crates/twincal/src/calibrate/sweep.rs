@@ -16,7 +16,7 @@ use crate::twin::Twin;
 use rayon::prelude::*;
 
 /// Factors on the cut-off.
-const FACTORS: [f64; 2] = [0.7, 1.4];
+pub(super) const FACTORS: [f64; 2] = [0.7, 1.4];
 
 /// Posterior means at 0.7, 1 and 1.4 f_c with the plug-ins of the fit; empty with the filter off, and where rows are weighed
 /// (`noise.robust`, `noise.varies_with_speed`, `noise.varies_with_load`): rows of another cut-off have no weights.

@@ -1,6 +1,7 @@
 //! From rows to statistics: samples are gathered into small column-contiguous buffers and multiplied there.
 
-use super::products::{BLOCK, LANES, Products, STRIDE};
+use super::buffer::{BLOCK, Buffer, LANES};
+use super::products::Products;
 use super::{JointGram, Symmetric};
 use pulp::{Simd, WithSimd};
 
@@ -18,11 +19,13 @@ pub struct OpenRun {
 pub struct JointAccumulator {
     gram: JointGram,
     arch: pulp::Arch,
-    /// Rows and their first differences, column after column, [`STRIDE`] apart.
-    rows: Vec<f64>,
-    steps: Vec<f64>,
+    /// Rows and their first differences.
+    rows: Buffer,
+    steps: Buffer,
     /// Rows waiting in the buffers.
     waiting: usize,
+    /// Those of them that start a run.
+    starts: Vec<usize>,
     s0: Products,
     d: Products,
     run: OpenRun,
@@ -37,13 +40,13 @@ impl JointAccumulator {
     /// Goes on where [`JointAccumulator::cut`] stopped.
     pub fn resume(columns: Vec<u32>, run: OpenRun) -> Self {
         let width = columns.len() + 1;
-        let buffer = vec![0.0; Products::buffer_len(width)];
         Self {
             gram: JointGram::empty(columns),
             arch: pulp::Arch::new(),
-            rows: buffer.clone(),
-            steps: buffer,
+            rows: Buffer::new(width),
+            steps: Buffer::new(width),
             waiting: 0,
+            starts: Vec::new(),
             s0: Products::new(width),
             d: Products::new(width),
             run,
@@ -99,20 +102,16 @@ impl JointAccumulator {
             } else {
                 &y[row..row + count]
             };
-            let at = i * STRIDE + self.waiting;
-            // The first row of a run has no predecessor: its difference is none, not its distance from zero.
-            let before = if starts { column[0] } else { last[i] };
-            self.arch.dispatch(Differences {
-                column,
-                before,
-                rows: &mut self.rows[at..at + count],
-                steps: &mut self.steps[at..at + count],
-            });
+            if self.waiting == 0 {
+                *self.rows.before_mut(i) = last[i];
+            }
+            self.rows.column_mut(i)[self.waiting..][..count].copy_from_slice(column);
             if starts {
                 last[i] = column[0];
             }
         }
         if starts {
+            self.starts.push(self.waiting);
             self.gram.starts += 1.0;
             self.gram.first.add_outer(last);
         }
@@ -136,13 +135,27 @@ impl JointAccumulator {
         }
         // Whole vectors: what is missing of the last one counts as zero.
         let samples = self.waiting.next_multiple_of(LANES);
-        for i in 0..=self.gram.columns.len() {
-            let unused = i * STRIDE + self.waiting..i * STRIDE + samples;
-            self.rows[unused.clone()].fill(0.0);
-            self.steps[unused].fill(0.0);
+        let width = self.gram.columns.len() + 1;
+        for i in 0..width {
+            self.rows.column_mut(i)[self.waiting..samples].fill(0.0);
+        }
+        self.arch.dispatch(Differences {
+            rows: &self.rows,
+            steps: &mut self.steps,
+            width,
+            samples: self.waiting,
+        });
+        for i in 0..width {
+            let steps = self.steps.column_mut(i);
+            steps[self.waiting..samples].fill(0.0);
+            // The first row of a run has no predecessor: its difference is none, not its distance from another run.
+            for &start in &self.starts {
+                steps[start] = 0.0;
+            }
         }
         self.s0.add(self.arch, &self.rows, samples);
         self.d.add(self.arch, &self.steps, samples);
+        self.starts.clear();
         self.waiting = 0;
     }
 
@@ -165,23 +178,22 @@ impl JointAccumulator {
         let size = self.gram.columns.len() + 1;
         self.gram.s0 = Symmetric {
             size,
-            values: self.s0.matrix(size),
+            values: self.s0.into_matrix(),
         };
         self.gram.d = Symmetric {
             size,
-            values: self.d.matrix(size),
+            values: self.d.into_matrix(),
         };
         (self.gram, self.run)
     }
 }
 
-/// Copies a column and writes its first differences beside it.
+/// Writes the first differences of all columns.
 struct Differences<'a> {
-    column: &'a [f64],
-    /// What stands before the first value.
-    before: f64,
-    rows: &'a mut [f64],
-    steps: &'a mut [f64],
+    rows: &'a Buffer,
+    steps: &'a mut Buffer,
+    width: usize,
+    samples: usize,
 }
 
 impl WithSimd for Differences<'_> {
@@ -189,18 +201,12 @@ impl WithSimd for Differences<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Self {
-            column,
-            before,
-            rows,
-            steps,
-        } = self;
-        rows[0] = column[0];
-        steps[0] = column[0] - before;
-        let places = rows[1..].iter_mut().zip(&mut steps[1..]);
-        for ((row, step), pair) in places.zip(column.windows(2)) {
-            *row = pair[1];
-            *step = pair[1] - pair[0];
+        for i in 0..self.width {
+            let rows = &self.rows.with_before(i)[..=self.samples];
+            let steps = &mut self.steps.column_mut(i)[..self.samples];
+            for (k, step) in steps.iter_mut().enumerate() {
+                *step = rows[k + 1] - rows[k];
+            }
         }
     }
 }

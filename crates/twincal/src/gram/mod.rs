@@ -1,6 +1,7 @@
 //! Sufficient statistics: the narrow waist (method section 4). Left of it cost grows with the log, right of it not.
 
 mod accumulate;
+mod buffer;
 mod products;
 
 pub use accumulate::{JointAccumulator, OpenRun};

@@ -7,6 +7,7 @@ use super::{Incident, IncidentKind};
 use crate::linear_algebra::Cholesky;
 use crate::robot::{Motion, Robot, nominal_torque};
 use crate::signal::{Pipeline, Segment, Trajectory};
+use rayon::prelude::*;
 
 /// How many times the 95 % quantile of what is left a spike reaches, and where it begins and ends.
 const PEAK: f64 = 5.0;
@@ -55,12 +56,12 @@ pub(super) fn spikes(
         .map(|segment| Bins::new(robot, segment, width, stopped))
         .collect();
     // with how many times the quantile it reaches
-    let mut found: Vec<(f64, Incident)> = Vec::new();
-    for (joint, name) in names.into_iter().enumerate() {
-        if let Some(left) = Left::new(&bins, joint) {
-            found.extend(left.spikes(&bins, name));
-        }
-    }
+    let of_joint = |(joint, name)| {
+        let left = Left::new(&bins, joint)?;
+        Some(left.spikes(&bins, name))
+    };
+    let of_joints: Vec<_> = names.into_par_iter().enumerate().map(of_joint).collect();
+    let mut found: Vec<(f64, Incident)> = of_joints.into_iter().flatten().flatten().collect();
     found.sort_by(|a, b| a.1.span[0].total_cmp(&b.1.span[0]));
     let mut merged: Vec<(f64, Incident)> = Vec::new();
     for (times, incident) in found {

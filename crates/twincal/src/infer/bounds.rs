@@ -23,6 +23,7 @@ use crate::error::Result;
 use crate::linear_algebra::Cholesky;
 use crate::posterior::{Model, Problem, Site};
 use propagation::propagate;
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 /// A bound this many standard deviations below the mean does not act: its mass is 1 − 6e-16.
@@ -58,10 +59,14 @@ pub(super) fn apply(
     }
     let before: Vec<Model> = listed.models.clone();
     let mut listed = listed;
+    let rows = listed.models.par_iter_mut().zip(&listed.positions);
+    let log_ratios: Vec<f64> = rows
+        .map(|(model, positions)| truncate(standard, model, positions, weights))
+        .collect::<Result<_>>()?;
     let mut acts = false;
-    let rows = listed.models.iter_mut().zip(&listed.positions);
-    for ((model, positions), log_weight) in rows.zip(&mut log_weights) {
-        let log_ratio = truncate(standard, model, positions, weights)?;
+    for ((model, log_ratio), log_weight) in
+        (listed.models.iter().zip(log_ratios)).zip(&mut log_weights)
+    {
         acts |= log_ratio.abs() > 1e-12 || !model.sites.is_empty();
         *log_weight += log_ratio;
     }

@@ -266,23 +266,9 @@ fn squared_errors(
     posterior: &Posterior,
     covariance: &[f64],
 ) -> Vec<LeftOutRow> {
-    let (len, rows) = (part.observations.len(), &part.observations.joints[joint]);
-    let count = posterior.mean.len();
+    let rows = &part.observations.joints[joint];
     let residual = part.residual(joint, &posterior.mean, part.rows.clone());
-    let mut epistemic = vec![0.0; residual.len()];
-    for (i, &a) in rows.columns.iter().enumerate() {
-        for (k, &b) in rows.columns.iter().enumerate().take(i + 1) {
-            let value = covariance[a * count + b] * if i == k { 1.0 } else { 2.0 };
-            if value == 0.0 {
-                continue;
-            }
-            let xa = &rows.x[i * len + part.rows.start..i * len + part.rows.end];
-            let xb = &rows.x[k * len + part.rows.start..k * len + part.rows.end];
-            for ((e, xa), xb) in epistemic.iter_mut().zip(xa).zip(xb) {
-                *e += value * xa * xb;
-            }
-        }
-    }
+    let epistemic = part.quadratic_forms(joint, covariance, posterior.mean.len());
     part.rows
         .clone()
         .zip(residual.iter().zip(epistemic))

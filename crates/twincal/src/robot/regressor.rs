@@ -151,7 +151,8 @@ impl Regressor {
         samples: Range<usize>,
         block: &mut RegressorBlock,
     ) {
-        self.evaluate_with(Instructions::Widest, robot, motion, samples, block);
+        let instructions = Instructions::for_samples(samples.len());
+        self.evaluate_with(instructions, robot, motion, samples, block);
     }
 
     /// [`Regressor::evaluate`] on chosen instructions: to compare them, or to have the same bytes on different machines.

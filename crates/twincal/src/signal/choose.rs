@@ -11,6 +11,7 @@ use super::prepare::{JointFacts, Prepared, prepare};
 use super::thin::{coarsest, factor};
 use super::{Auto, DerivedFrom, Pipeline, Recording, SignalSettings};
 use crate::error::{Error, Finding, Result, Severity};
+use rayon::prelude::*;
 
 /// v_s where the pipeline is on and nothing is said, rad/s or m/s.
 const COULOMB_VELOCITY: f64 = 0.02;
@@ -288,18 +289,19 @@ fn on(
     if prepared.iter().all(|p| factor(&pipeline, p.interval) == 1) {
         pipeline.motion_interval = 0.0;
     }
+    let seen: Vec<(f64, bool, Vec<Finding>)> = (joints.par_iter().enumerate())
+        .map(|(joint, facts)| {
+            let mut said = Vec::new();
+            let spectra = of_joint(joint);
+            let resolved = velocity_resolution(joint, facts, logs, &spectra, &pipeline, &mut said);
+            let threshold = coulomb_velocity.max(resolved);
+            (threshold, !moves(joint, prepared, threshold, cutoff), said)
+        })
+        .collect();
     let mut still = Vec::with_capacity(joints.len());
-    for (joint, facts) in joints.iter().enumerate() {
-        let resolved = velocity_resolution(
-            joint,
-            facts,
-            logs,
-            &of_joint(joint),
-            &pipeline,
-            &mut findings,
-        );
-        let threshold = coulomb_velocity.max(resolved);
-        still.push(!moves(joint, prepared, threshold, cutoff));
+    for (threshold, stands, said) in seen {
+        findings.extend(said);
+        still.push(stands);
         pipeline.standstill_velocity.push(threshold);
     }
     findings.extend(unexcited(joints, &still, &pipeline.standstill_velocity)?);

@@ -122,6 +122,9 @@ pub fn hardly_driven<'a>(
 ) -> Vec<Finding> {
     let logs: Vec<&Recording> = logs.into_iter().collect();
     let mut findings = Vec::new();
+    if logs.len() < 2 {
+        return findings;
+    }
     for (joint, name) in robot.joint_names().into_iter().enumerate() {
         let torque: Vec<Option<f64>> = logs.iter().map(|log| torque_rms(log, joint)).collect();
         let largest = torque.iter().flatten().copied().fold(0.0, f64::max);

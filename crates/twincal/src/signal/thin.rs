@@ -22,7 +22,7 @@ const SAMPLES_PER_PERIOD: f64 = 7.0;
 const STEPS_PER_REVERSAL: f64 = 0.5;
 /// Peak over root mean square of the acceleration that is reckoned with.
 const PEAK: f64 = 3.0;
-/// Samples that are filtered at a time.
+/// Samples that are filtered at a time, about.
 const CHUNK: usize = 64;
 
 /// Longest sampling interval, s, that loses nothing of the motion: 0 for every sample.
@@ -89,9 +89,11 @@ fn thinned(piece: &mut Piece<'_>, pipeline: &Pipeline, every: usize) -> Option<(
 fn decimated(kernel: &[f64], every: usize, count: usize, signals: &[&[f64]]) -> Vec<Vec<f64>> {
     let mut decimator = Decimator::new(kernel, every, count, signals.len());
     let end = (count - 1) * every + kernel.len();
-    let mut chunk = Vec::with_capacity(signals.len() * CHUNK);
-    for from in (0..end).step_by(CHUNK) {
-        let to = end.min(from + CHUNK);
+    // Whole steps, so that all chunks are weighed alike.
+    let samples = (CHUNK / every).max(1) * every;
+    let mut chunk = Vec::with_capacity(signals.len() * samples);
+    for from in (0..end).step_by(samples) {
+        let to = end.min(from + samples);
         chunk.clear();
         for x in signals {
             chunk.extend(x[from..to].iter().map(|value| value - x[0]));

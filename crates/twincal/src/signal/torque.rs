@@ -55,11 +55,11 @@ pub fn constant_torque<'a>(
     let mut findings = Vec::new();
     for log in logs {
         let moving: Vec<(&str, &[f64])> = (names.iter().zip(&log.joints))
-            .filter(|(_, channels)| range(&channels.q) > TRAVEL)
+            .filter(|(_, channels)| varies(&channels.q, TRAVEL))
             .filter_map(|(name, channels)| Some((*name, channels.tau.as_deref()?)))
             .collect();
         let constant: Vec<String> = (moving.iter())
-            .filter(|(_, tau)| range(tau) <= 0.0)
+            .filter(|(_, tau)| !varies(tau, 0.0))
             .map(|(name, tau)| {
                 let value = tau.iter().find(|v| v.is_finite()).unwrap_or(&f64::NAN);
                 format!("`{name}` is {value}")
@@ -89,10 +89,11 @@ pub fn constant_torque<'a>(
     findings
 }
 
-/// Largest less smallest finite value; −∞ without any.
-fn range(values: &[f64]) -> f64 {
-    let finite = values.iter().filter(|v| v.is_finite());
-    let ends = |(low, high): (f64, f64), v: &f64| (low.min(*v), high.max(*v));
-    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), ends);
-    high - low
+/// Whether two finite values are more than `by` apart; looks no further than to the first such two.
+fn varies(values: &[f64], by: f64) -> bool {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    values.iter().filter(|v| v.is_finite()).any(|v| {
+        (low, high) = (low.min(*v), high.max(*v));
+        high - low > by
+    })
 }

@@ -140,7 +140,7 @@ impl Family {
         match self {
             Self::Viscous | Self::Coulomb | Self::MotorInertia => Some(0.5),
             Self::Payload => Some(1.0 / 3.0),
-            Self::PayloadTensor => Some(0.99),
+            Self::PayloadTensor => Some(0.9999),
             _ => None,
         }
     }

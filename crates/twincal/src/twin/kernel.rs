@@ -124,14 +124,13 @@ fn locate(constants: &Constants<'_>, scratch: &mut Scratch, x: &[Lane], noise: &
             for lane in 0..LANES {
                 location[lane] += mean * column[lane];
             }
-            let mut along = [0.0; LANES];
-            for &later in &geometry.places[i..] {
-                let (r, column) = (geometry.root[entry], &x[later as usize]);
-                for lane in 0..LANES {
-                    along[lane] += r * column[lane];
-                }
-                entry += 1;
-            }
+            let count = geometry.places.len() - i;
+            let along = product(
+                &geometry.root[entry..entry + count],
+                &geometry.places[i..],
+                x,
+            );
+            entry += count;
             for lane in 0..LANES {
                 spread[lane] += along[lane] * along[lane];
             }
@@ -152,6 +151,29 @@ fn locate(constants: &Constants<'_>, scratch: &mut Scratch, x: &[Lane], noise: &
         scratch.scales.push(scale);
         scratch.inverses.push(inverse);
     }
+}
+
+/// `Σ_k r_k x_k` over the places of a row of R: four sums side by side, since each waits for its last addition.
+#[inline(always)]
+fn product(root: &[f64], places: &[u32], x: &[Lane]) -> Lane {
+    let mut sums = [[0.0; LANES]; 4];
+    let (root_fours, root_rest) = root.as_chunks::<4>();
+    let (place_fours, place_rest) = places.as_chunks::<4>();
+    for (root, places) in root_fours.iter().zip(place_fours) {
+        for k in 0..4 {
+            let column = &x[places[k] as usize];
+            for lane in 0..LANES {
+                sums[k][lane] += root[k] * column[lane];
+            }
+        }
+    }
+    for (root, place) in root_rest.iter().zip(place_rest) {
+        let column = &x[*place as usize];
+        for lane in 0..LANES {
+            sums[0][lane] += root * column[lane];
+        }
+    }
+    std::array::from_fn(|lane| (sums[0][lane] + sums[1][lane]) + (sums[2][lane] + sums[3][lane]))
 }
 
 /// Var[xᵀβ | y] = E[φ q] + Var over components of xᵀμ.

@@ -106,7 +106,7 @@ pub(super) fn examine(
     };
     all.lock_what_is_not_logged(model, paths, &mut settings)?;
     all.map_columns(paths, &settings);
-    let read = LogInput::read(paths, &all.robot.robot, &settings.log, 0, progress);
+    let read = LogInput::read(paths, &all.robot.robot, &settings.log, progress);
     all.findings.append(&mut all.robot.findings);
     let mut logs = match read {
         Ok(logs) => logs,
