@@ -1,8 +1,9 @@
 //! From rows to statistics: samples are gathered into small column-contiguous buffers and multiplied there.
 
-use super::buffer::{BLOCK, Buffer, LANES};
+use super::buffer::{BLOCK, Buffer};
 use super::products::Products;
 use super::{JointGram, Symmetric};
+use crate::lanes::LANES;
 use pulp::{Simd, WithSimd};
 
 /// What a part of a log must know of the part before it: the last row of a run that is still open.

@@ -1,6 +1,7 @@
 //! Inner products of all pairs of columns: square register tiles on the CPU's widest vectors.
 
-use super::buffer::{BLOCK, Buffer, LANES};
+use super::buffer::{BLOCK, Buffer};
+use crate::lanes::LANES;
 use pulp::{Simd, WithSimd};
 
 /// Rows of tiles that share what was loaded of a column of tiles: their columns stay in the first-level cache.

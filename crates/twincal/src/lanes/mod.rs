@@ -5,9 +5,11 @@
 //! widest vectors. The functions below use only + − × and bit operations, each rounded once: every instruction set
 //! gives the same bytes.
 
+mod aligned;
 mod log_exp;
 mod trig;
 
+pub use aligned::{Aligned, Line};
 pub use log_exp::{exp, ln};
 pub use trig::sin_cos;
 

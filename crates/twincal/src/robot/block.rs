@@ -3,9 +3,9 @@
 use super::Robot;
 use super::bodies::Body;
 use super::dynamics::Motion;
-use super::lane_vectors::{load, store};
+use super::lane_vectors::{load, load_any, store};
 use super::recursion::State;
-use crate::lanes::{LANES, Lane, sin_cos};
+use crate::lanes::{LANES, Lane, Line, sin_cos};
 use pulp::Simd;
 use std::any::Any;
 use std::ops::Range;
@@ -60,8 +60,8 @@ impl Instructions {
 /// Sines and cosines of the joints of one block.
 #[derive(Debug, Clone)]
 pub(super) struct Angles {
-    sines: Vec<[f64; BLOCK]>,
-    cosines: Vec<[f64; BLOCK]>,
+    sines: Vec<Line<[f64; BLOCK]>>,
+    cosines: Vec<Line<[f64; BLOCK]>>,
     /// First sample of the block.
     start: usize,
 }
@@ -70,8 +70,8 @@ impl Angles {
     /// Room for `bodies` joints.
     pub(super) fn new(bodies: usize) -> Self {
         Self {
-            sines: vec![[0.0; BLOCK]; bodies],
-            cosines: vec![[1.0; BLOCK]; bodies],
+            sines: vec![Line([0.0; BLOCK]); bodies],
+            cosines: vec![Line([1.0; BLOCK]); bodies],
             start: 0,
         }
     }
@@ -80,6 +80,9 @@ impl Angles {
     #[inline(always)]
     pub(super) fn fill(&mut self, bodies: &[Body], motion: &Motion<'_>, block: Range<usize>) {
         self.start = block.start;
+        if block.len() == 1 {
+            return self.fill_one(bodies, motion, block.start);
+        }
         for i in 0..bodies.len() {
             let body = &bodies[i];
             if body.prismatic {
@@ -94,8 +97,28 @@ impl Angles {
                 }
                 let (sine, cosine) = sin_cos(&angles);
                 let group = k * LANES..(k + 1) * LANES;
-                self.sines[i][group.clone()].copy_from_slice(&sine);
-                self.cosines[i][group].copy_from_slice(&cosine);
+                self.sines[i].0[group.clone()].copy_from_slice(&sine);
+                self.cosines[i].0[group].copy_from_slice(&cosine);
+            }
+        }
+    }
+
+    /// One sample: joints side by side in the lanes, the same bytes as sample by sample.
+    #[inline(always)]
+    fn fill_one(&mut self, bodies: &[Body], motion: &Motion<'_>, sample: usize) {
+        for (chunk, bodies) in bodies.chunks(LANES).enumerate() {
+            let mut angles: Lane = [0.0; LANES];
+            for (angle, body) in angles.iter_mut().zip(bodies) {
+                let q = motion.q[body.coordinate * motion.len + sample];
+                *angle = body.multiplier * q + body.offset;
+            }
+            let (sine, cosine) = sin_cos(&angles);
+            for (lane, body) in bodies.iter().enumerate() {
+                if !body.prismatic {
+                    let i = chunk * LANES + lane;
+                    self.sines[i].0[..LANES].fill(sine[lane]);
+                    self.cosines[i].0[..LANES].fill(cosine[lane]);
+                }
             }
         }
     }
@@ -115,15 +138,16 @@ impl Angles {
         let row = body.coordinate * motion.len;
         let (from, to) = (row + group.start, row + group.end);
         let (m, c) = (s.splat_f64s(body.multiplier), s.splat_f64s(body.offset));
-        let q = load(s, &motion.q[from..to]);
-        let qd = load(s, &motion.qd[from..to]);
-        let qdd = load(s, &motion.qdd[from..to]);
+        let q = load_any(s, &motion.q[from..to]);
+        let qd = load_any(s, &motion.qd[from..to]);
+        let qdd = load_any(s, &motion.qdd[from..to]);
         state.position = s.mul_add_e_f64s(m, q, c);
         state.velocity = s.mul_f64s(m, qd);
         state.acceleration = s.mul_f64s(m, qdd);
-        let local = group.start - self.start..group.end - self.start;
-        state.sin = load(s, &self.sines[i][local.clone()]);
-        state.cos = load(s, &self.cosines[i][local]);
+        // Whole vectors: groups of lanes are filled to their end.
+        let local = group.start - self.start..group.start - self.start + S::F64_LANES;
+        state.sin = load(s, &self.sines[i].0[local.clone()]);
+        state.cos = load(s, &self.cosines[i].0[local]);
     }
 }
 

@@ -16,6 +16,15 @@ pub(super) fn load<S: Simd>(s: S, cells: &[f64]) -> S::f64s {
     }
 }
 
+/// As many samples as `cells` holds; behind them anything finite: one sample alone fills the vector, which costs no mask.
+#[inline(always)]
+pub(super) fn load_any<S: Simd>(s: S, cells: &[f64]) -> S::f64s {
+    match cells {
+        [one] => s.splat_f64s(*one),
+        _ => load(s, cells),
+    }
+}
+
 /// The first samples of `value`, as many as `cells` takes.
 #[inline(always)]
 pub(super) fn store<S: Simd>(s: S, cells: &mut [f64], value: S::f64s) {

@@ -9,8 +9,9 @@ use super::lane_vectors::{
 };
 use pulp::Simd;
 
-/// What one body needs and leaves behind.
+/// What one body needs and leaves behind, from a cache line on.
 #[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
 pub(crate) struct State<F> {
     /// cos of the joint angle (1 for a slider).
     pub(crate) cos: F,

@@ -14,7 +14,7 @@ use super::lane_vectors::{
     V3, cross, cross_add, dot, dot_add, load, origin, store, to_child, turn_back,
 };
 use super::recursion::{State, move_body};
-use crate::lanes::LANES;
+use crate::lanes::{Aligned, LANES, Line};
 use pulp::Simd;
 use std::ops::Range;
 
@@ -44,7 +44,7 @@ pub struct Regressor {
 /// What [`Regressor::evaluate`] leaves behind, and its memory; one per thread.
 #[derive(Debug, Clone)]
 pub struct RegressorBlock {
-    values: Vec<f64>,
+    values: Aligned,
     /// Samples of the block before: nothing but zeros stands behind them.
     filled: usize,
     angles: Angles,
@@ -124,7 +124,7 @@ impl Regressor {
     /// Memory for one thread.
     pub fn block(&self, robot: &Robot) -> RegressorBlock {
         RegressorBlock {
-            values: vec![0.0; self.pairs.len() * 10 * STRIDE],
+            values: Aligned::zeros(self.pairs.len() * 10 * STRIDE),
             filled: 0,
             angles: Angles::new(robot.bodies.len()),
             registers: Registers::default(),
@@ -241,13 +241,13 @@ impl pulp::WithSimd for Kernel<'_> {
         let gravity = robot.description.gravity;
         let zero = s.splat_f64s(0.0);
         let states = registers.slice(bodies.len(), State::new(zero));
-        let axes = axes.slice(regressor.pairs.len(), [[zero; 3]; 2]);
+        let axes = axes.slice(regressor.pairs.len(), Line([[zero; 3]; 2]));
         angles.fill(bodies, &motion, samples.clone());
         let mut first = samples.start;
         while first < samples.end {
             let last = samples.end.min(first + S::F64_LANES);
             // Columns are linear in u and v, which are 0 in lanes without a sample: whole vectors can be stored. Everything else is
-            // finite there, since motion, sine and cosine are loaded as zeros.
+            // finite there, where motion is: motion of one sample stands in all lanes, of several there are zeros.
             let live = load(s, &ONES[..last - first]);
             for i in 0..bodies.len() {
                 let body = &bodies[i];
@@ -260,7 +260,7 @@ impl pulp::WithSimd for Kernel<'_> {
                     // u' = Rᵀ u, v' = Rᵀ (v + u × p), then the body's own joint
                     let [mut u, mut v] = [[zero; 3]; 2];
                     if let Some(parent) = regressor.parents[pair] {
-                        [u, v] = axes[parent];
+                        Line([u, v]) = axes[parent];
                         v = cross_add(s, u, p, v);
                         u = to_child(s, body, u);
                         v = to_child(s, body, v);
@@ -275,7 +275,7 @@ impl pulp::WithSimd for Kernel<'_> {
                     } else {
                         u[2] = s.add_f64s(u[2], own);
                     }
-                    axes[pair] = [u, v];
+                    axes[pair] = Line([u, v]);
                     let cells = &mut values[pair * 10 * STRIDE..(pair + 1) * 10 * STRIDE];
                     let at = first - samples.start;
                     columns(s, &regressor.pairs[pair].present, [u, v], state, cells, at);

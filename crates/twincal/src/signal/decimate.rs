@@ -3,6 +3,7 @@
 //! A row is the plain sum `Σ_k kernel_k x_{row·step + k}` in the order of the samples: the same bytes however the samples
 //! were cut and on any thread.
 
+use crate::lanes::Line;
 use pulp::{Arch, Simd, WithSimd};
 
 /// Rows of a group: what the widest vector holds. Two groups are added to side by side.
@@ -25,7 +26,7 @@ pub(crate) struct Decimator<'a> {
 #[derive(Debug, Default)]
 struct Weights {
     /// `values[group * len + sample]`, one for each row of the group.
-    values: Vec<[f64; ROWS]>,
+    values: Vec<Line<[f64; ROWS]>>,
     /// How many samples lie between the start of the first row's window and the first sample at hand, how many samples and groups
     /// there are. Where that stays the same, so do the weights.
     made_for: Option<(isize, usize, usize)>,
@@ -90,10 +91,10 @@ impl Weights {
         }
         self.made_for = wanted;
         self.values.clear();
-        self.values.resize(groups * len, [0.0; ROWS]);
+        self.values.resize(groups * len, Line([0.0; ROWS]));
         for (group, values) in self.values.chunks_exact_mut(len).enumerate() {
             for (sample, weights) in values.iter_mut().enumerate() {
-                for (lane, weight) in weights.iter_mut().enumerate() {
+                for (lane, weight) in weights.0.iter_mut().enumerate() {
                     let row = group * ROWS + lane;
                     let tap = before + sample as isize - (row * step) as isize;
                     // Rows behind the last one are padding.
@@ -109,7 +110,7 @@ impl Weights {
 
 /// See [`Decimator::add`].
 struct Add<'a> {
-    weights: &'a [[f64; ROWS]],
+    weights: &'a [Line<[f64; ROWS]>],
     len: usize,
     signals: &'a [(usize, &'a [f64])],
     sums: &'a mut [f64],
@@ -164,7 +165,7 @@ impl Add<'_> {
         values: &[f64],
     ) {
         let len = self.len;
-        let weights: [&[[f64; ROWS]]; G] =
+        let weights: [&[Line<[f64; ROWS]>]; G] =
             std::array::from_fn(|g| &self.weights[(group + g) * len..][..len]);
         let signals: [&[f64]; N] = std::array::from_fn(|n| &values[n * len..][..len]);
         let own = first * self.stride + self.row + group * ROWS;
@@ -179,7 +180,7 @@ impl Add<'_> {
             for n in 0..N {
                 let x = signals[n][sample];
                 for g in 0..G {
-                    let weight = &weights[g][sample];
+                    let weight = &weights[g][sample].0;
                     for r in 0..ROWS {
                         sums[n][g][r] = multiply_add::<S>(weight[r], x, sums[n][g][r]);
                     }
