@@ -97,7 +97,7 @@ pub fn observe(
                 Ok(blocks)
             })
             .collect::<Result<_>>()?;
-        blocks.iter().flatten().for_each(|block| out.add(block));
+        out.add(&blocks.into_iter().flatten().collect::<Vec<_>>());
     }
     Ok(out)
 }
@@ -169,31 +169,31 @@ impl Observations {
     }
 
     /// Puts the next rows behind those there are.
-    fn add(&mut self, block: &Block) {
-        let (from, len) = (self.time.len(), block.time.len());
-        if block.first {
-            self.starts.push(from);
-        }
-        self.time.extend_from_slice(&block.time);
-        for (to, values) in [&mut self.q, &mut self.qd, &mut self.qdd]
-            .into_iter()
-            .zip(&block.motion)
-        {
-            for (to, joint) in to.iter_mut().zip(values.chunks_exact(len.max(1))) {
-                to.extend_from_slice(joint);
+    fn add(&mut self, blocks: &[Block]) {
+        let from = self.time.len();
+        for block in blocks {
+            let len = block.time.len();
+            if block.first {
+                self.starts.push(self.time.len());
+            }
+            self.time.extend_from_slice(&block.time);
+            for (to, values) in [&mut self.q, &mut self.qd, &mut self.qdd]
+                .into_iter()
+                .zip(&block.motion)
+            {
+                for (to, joint) in to.iter_mut().zip(values.chunks_exact(len.max(1))) {
+                    to.extend_from_slice(joint);
+                }
             }
         }
-        for (kept, rows) in self.joints.iter_mut().zip(&block.joints) {
-            let total = kept.x.len() / kept.columns.len().max(1);
-            for (i, column) in rows.x.chunks_exact(len.max(1)).enumerate() {
-                kept.x[i * total + from..][..len].copy_from_slice(column);
+        let joints = self.joints.par_iter_mut().enumerate();
+        joints.for_each(|(joint, kept)| {
+            let mut from = from;
+            for block in blocks {
+                kept.add(from, block.time.len(), &block.joints[joint]);
+                from += block.time.len();
             }
-            kept.measured.extend_from_slice(&rows.measured);
-            kept.nominal.extend_from_slice(&rows.nominal);
-            let residual = rows.measured.iter().zip(&rows.nominal);
-            kept.y.extend(residual.map(|(m, n)| m - n));
-            kept.standstill.extend_from_slice(&rows.standstill);
-        }
+        });
     }
 
     /// Takes over the temperatures of the log that these rows were made of: between its samples they are linear, and constant
@@ -251,6 +251,9 @@ impl Observations {
 
     /// Drops regression columns and renumbers the others, as [`Library::without_columns`] does.
     pub fn drop_columns(&mut self, dropped: &[usize]) {
+        if dropped.is_empty() {
+            return;
+        }
         let len = self.len();
         for joint in &mut self.joints {
             let kept: Vec<usize> = (0..joint.columns.len())
@@ -383,6 +386,19 @@ impl Part<'_> {
 }
 
 impl JointObservations {
+    /// The next `len` rows, from row `from` on.
+    fn add(&mut self, from: usize, len: usize, rows: &BlockJoint) {
+        let total = self.x.len() / self.columns.len().max(1);
+        for (i, column) in rows.x.chunks_exact(len.max(1)).enumerate() {
+            self.x[i * total + from..][..len].copy_from_slice(column);
+        }
+        self.measured.extend_from_slice(&rows.measured);
+        self.nominal.extend_from_slice(&rows.nominal);
+        let residual = rows.measured.iter().zip(&rows.nominal);
+        self.y.extend(residual.map(|(m, n)| m - n));
+        self.standstill.extend_from_slice(&rows.standstill);
+    }
+
     /// The columns from the first row of `range` on, out of `len` rows.
     fn of_rows(&self, len: usize, range: &Range<usize>) -> products::Columns<'_> {
         products::Columns {

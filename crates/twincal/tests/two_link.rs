@@ -5,7 +5,7 @@
 mod two_link;
 
 use std::sync::LazyLock;
-use twincal::calibrate::Calibration;
+use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::posterior::random::Random;
 use twincal::signal::align;
 use twincal::twin::Twin;
@@ -221,4 +221,29 @@ fn a_twin_from_json_predicts_the_same_bytes_and_scores_like_the_calibration() {
     let wanted = &result.validation.filtered;
     assert!((one.filtered.rmse_calibrated / wanted.rmse_calibrated - 1.0).abs() < 1e-12);
     assert_eq!(one.filtered.coverage95, wanted.coverage95);
+}
+
+#[test]
+fn case_105_rows_that_do_not_fit_into_memory_are_refused_with_the_log_and_both_numbers() {
+    let real = two_link::arm(2.6).expect("an arm");
+    let log = two_link::log("long", 0.3, &real, &mut Random::new(3, 0));
+    let with = |most_bytes| {
+        let settings = CalibrationSettings {
+            most_bytes,
+            ..CalibrationSettings::default()
+        };
+        let nominal = two_link::arm(2.0).expect("an arm");
+        calibrate(
+            &nominal,
+            std::slice::from_ref(&log),
+            &[],
+            &settings,
+            &|_| {},
+        )
+    };
+    let text = with(Some(100_000)).expect_err("a refusal").to_string();
+    for words in ["long", "MB of memory", "0.1 MB are free", "rate_hz"] {
+        assert!(text.contains(words), "{text}");
+    }
+    assert!(with(Some(1 << 32)).is_ok());
 }

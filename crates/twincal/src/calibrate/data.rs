@@ -365,11 +365,14 @@ fn summary(
         .map(|w| w[1] - w[0])
         .filter(|d| *d > 0.0)
         .collect();
-    intervals.sort_by(f64::total_cmp);
-    let median = intervals
-        .get(intervals.len() / 2)
-        .copied()
-        .unwrap_or(f64::INFINITY);
+    let median = match intervals.len() {
+        0 => f64::INFINITY,
+        count => {
+            *intervals
+                .select_nth_unstable_by(count / 2, f64::total_cmp)
+                .1
+        }
+    };
     let ends = (
         recording.time.first().copied().unwrap_or(0.0),
         recording.time.last().copied().unwrap_or(0.0),

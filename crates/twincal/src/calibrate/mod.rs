@@ -221,19 +221,15 @@ fn whole_road(
     }
     findings.extend(findings_of_fit(robot, &fitted, settings, &training));
     let mean = &fitted.fit.posterior.mean;
-    findings.extend(heavy_tails::findings(
-        robot,
-        &training,
-        mean,
-        settings.noise.robust,
-    ));
-    findings.extend(drift::findings(robot, &training, mean));
-    findings.extend(uneven_noise::findings(
-        robot,
-        &fitted.fit,
-        &training,
-        settings.noise,
-    ));
+    let robust = settings.noise.robust;
+    let (tails, (drifts, uneven)) = rayon::join(
+        || heavy_tails::findings(robot, &training, mean, robust),
+        || {
+            let uneven = uneven_noise::findings(robot, &fitted.fit, &training, settings.noise);
+            (drift::findings(robot, &training, mean), uneven)
+        },
+    );
+    findings.extend(tails.into_iter().chain(drifts).chain(uneven));
     let inside = compact::members(&fitted.fit.problem, &fitted.fit.posterior);
     let compact = compact::refit(&fitted.fit.problem, &inside, &fitted.fit.posterior)?;
 
