@@ -134,13 +134,14 @@ impl Family {
 
     /// Prior probability of what is more usual than the rest: nearly every geared joint has friction and a motor's inertia, and a
     /// payload, which one log in three or so carries unsaid, is the usual reason why the last link is not what the model says. What has
-    /// mass somewhere has a tensor about any other point: that of a payload is next to certain where the payload is in.
+    /// mass somewhere has a tensor about any other point: that of a payload is next to certain where the payload is in, but one
+    /// small and near the link's own centre of mass may well be none.
     #[must_use]
     pub fn usual(self) -> Option<f64> {
         match self {
             Self::Viscous | Self::Coulomb | Self::MotorInertia => Some(0.5),
             Self::Payload => Some(1.0 / 3.0),
-            Self::PayloadTensor => Some(0.9999),
+            Self::PayloadTensor => Some(0.999),
             _ => None,
         }
     }
