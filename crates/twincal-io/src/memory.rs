@@ -36,6 +36,11 @@ pub fn available() -> Option<Available> {
         .min_by_key(|available| available.bytes)
 }
 
+/// Bytes that work may take: what is available less what inference, threads and the allocator take besides.
+pub fn spare() -> Option<u64> {
+    available().map(|available| available.bytes.saturating_sub(RESERVE))
+}
+
 /// The address-space limit (`ulimit -v`), bytes; `None` where there is none.
 pub fn address_space_limit() -> Option<u64> {
     getrlimit(Resource::As).current

@@ -296,6 +296,32 @@ fn the_energy_regressor_gives_the_energies_and_its_euler_lagrange_image_is_the_r
     }
 }
 
+/// The same bytes wherever a sample stands and however many stand beside it, one alone included.
+#[test]
+fn a_regressor_does_not_depend_on_the_samples_beside() {
+    for robot in full_robots() {
+        let len = 64;
+        let [q, qd, qdd] = &motion(&robot, len);
+        let motion = Motion { len, q, qd, qdd };
+        let regressor = Regressor::new(&robot);
+        let (mut whole, mut some) = (regressor.block(&robot), regressor.block(&robot));
+        regressor.evaluate(&robot, motion, 0..len, &mut whole);
+        for samples in [17..18, 0..2, 30..34, 5..10, 40..49, 63..64] {
+            regressor.evaluate(&robot, motion, samples.clone(), &mut some);
+            for p in 0..regressor.pairs().len() {
+                for k in 0..10 {
+                    let (a, b) = (&whole.column(p, k)[samples.clone()], some.column(p, k));
+                    assert_eq!(
+                        a,
+                        &b[..samples.len()],
+                        "pair {p}, parameter {k}, {samples:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn mass_matrices_of_a_block_are_those_of_its_samples() {
     for robot in full_robots() {

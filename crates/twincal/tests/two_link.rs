@@ -7,7 +7,8 @@ mod two_link;
 use std::sync::LazyLock;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::posterior::random::Random;
-use twincal::signal::align;
+use twincal::rows::{RowSignal, count_rows};
+use twincal::signal::{Auto, Raw, align, choose_pipeline, prepare};
 use twincal::twin::Twin;
 use twincal::validate::{HeldOut, Split};
 
@@ -242,8 +243,53 @@ fn case_105_rows_that_do_not_fit_into_memory_are_refused_with_the_log_and_both_n
         )
     };
     let text = with(Some(100_000)).expect_err("a refusal").to_string();
-    for words in ["long", "MB of memory", "0.1 MB are free", "rate_hz"] {
+    for words in ["long", "needs about", "0.1 MB are free", "rate_hz"] {
         assert!(text.contains(words), "{text}");
     }
     assert!(with(Some(1 << 32)).is_ok());
+}
+
+/// The estimate of rows before there are any: what the rows are, and at most the filter's length in each piece more. Also for a clock that
+/// starts again, for a rate that is no whole number of samples, and with the filter off.
+#[test]
+fn rows_at_most_are_close_to_the_rows_that_there_are() {
+    let real = two_link::arm(2.6).expect("an arm");
+    let log = two_link::log("run", 0.3, &real, &mut Random::new(3, 0));
+    let mut twice = log.clone();
+    twice.time.extend_from_slice(&log.time);
+    for joint in &mut twice.joints {
+        joint.q.extend_from_within(..);
+        for channel in [&mut joint.qd, &mut joint.qdd, &mut joint.tau]
+            .into_iter()
+            .flatten()
+        {
+            channel.extend_from_within(..);
+        }
+    }
+    for (cutoff_hz, rate_hz) in [
+        (Auto::Auto, Auto::Auto),
+        (Auto::Value(8.0), Auto::Value(67.5)),
+        (Auto::Value(0.0), Auto::Auto),
+    ] {
+        for (log, pieces) in [(&log, 1), (&twice, 2)] {
+            let mut settings = CalibrationSettings::default().signal;
+            (settings.cutoff_hz, settings.rate_hz) = (cutoff_hz, rate_hz);
+            let logs = std::slice::from_ref(log);
+            let (pipeline, _) = choose_pipeline(&real, logs, &settings).expect("a pipeline");
+            let ready = prepare(&real, log, &pipeline).expect("a log");
+            let (trajectory, _) = ready.align(&pipeline, Raw::None).expect("a trajectory");
+            let rows = count_rows(&pipeline, &trajectory, RowSignal::Filtered);
+            let most = ready.rows_at_most(&pipeline);
+            let trimmed = if pipeline.is_off() {
+                0.0
+            } else {
+                2.0 * pipeline.kernel_length() + 1.0
+            };
+            let more = pieces * (trimmed * pipeline.rate_hz).ceil() as usize;
+            assert!(
+                rows > 20 && rows <= most && most <= rows + more,
+                "{cutoff_hz:?}: {rows} {most} {more}"
+            );
+        }
+    }
 }

@@ -74,7 +74,7 @@ impl Job<'_> {
         let (logs, heldout) = (&mut self.logs, &mut self.heldout);
         let step = |stage| progress.step(&stage_words(stage));
         let settings = CalibrationSettings {
-            most_bytes: memory::available().map(|available| available.bytes),
+            most_bytes: memory::spare(),
             ..self.settings.calibration.clone()
         };
         let mut calibration = calibrate(

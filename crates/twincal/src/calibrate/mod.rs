@@ -61,7 +61,7 @@ use data::Data;
 use heredity::Named;
 use std::borrow::Cow;
 
-/// Everything a calibration can be told; each field is a table of `twincal.toml`.
+/// Everything a calibration can be told; each field but the last is a table of `twincal.toml`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationSettings {
     /// `[library]`.
@@ -74,7 +74,7 @@ pub struct CalibrationSettings {
     pub noise: NoiseSettings,
     /// `[inference]`.
     pub inference: InferenceSettings,
-    /// Bytes that the rows of all logs may take; `None`: any number.
+    /// Bytes that are free for what is made of the recordings (no key of `twincal.toml`); `None`: any number.
     pub most_bytes: Option<u64>,
 }
 
@@ -187,12 +187,9 @@ fn whole_road(
     // eq. (1)–(4): residual torque and Euler–Lagrange columns, filtered alike
     let ready = heldout.iter().map(|log| prepare(robot, log, &pipeline));
     let others: Vec<PreparedLog<'_>> = ready.collect::<Result<_>>()?;
-    room::require(
-        settings.most_bytes,
-        &library,
-        &pipeline,
-        prepared.iter().chain(&others),
-    )?;
+    let sweeps = !settings.noise.weighs_rows();
+    let all = (&prepared[..], &others[..]);
+    room::require(settings.most_bytes, &library, &pipeline, all, sweeps)?;
     let (mut data, trajectories) = Data::read(robot, &library, &pipeline, &prepared, &others)?;
     findings.extend(self_check(robot, &pipeline, trajectories.all())?);
     let lags: Vec<LogLag> = trajectories

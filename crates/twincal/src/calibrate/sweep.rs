@@ -42,12 +42,7 @@ pub(super) fn cutoff(
     // One after the other: of a long log one more trajectory fits in memory, two do not. Each uses all cores.
     let mut moved: Vec<(f64, Gram)> = Vec::with_capacity(FACTORS.len());
     for factor in FACTORS {
-        let scaled = Pipeline {
-            cutoff_hz: factor * pipeline.cutoff_hz,
-            motion_cutoff_hz: factor * pipeline.motion_cutoff_hz,
-            rate_hz: factor * pipeline.rate_hz,
-            ..pipeline.clone()
-        };
+        let scaled = scaled(pipeline, factor);
         let Ok(observations) = rows(robot, library, &scaled, logs, data) else {
             continue;
         };
@@ -70,6 +65,16 @@ pub(super) fn cutoff(
     points.extend(moved);
     points.sort_by(|a, b| a.cutoff_hz.total_cmp(&b.cutoff_hz));
     Ok(points)
+}
+
+/// The same filters at `factor` times the cut-off.
+pub(super) fn scaled(pipeline: &Pipeline, factor: f64) -> Pipeline {
+    Pipeline {
+        cutoff_hz: factor * pipeline.cutoff_hz,
+        motion_cutoff_hz: factor * pipeline.motion_cutoff_hz,
+        rate_hz: factor * pipeline.rate_hz,
+        ..pipeline.clone()
+    }
 }
 
 /// Selected terms whose estimate moves by more than its sd over the sweep.

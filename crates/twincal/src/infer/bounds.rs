@@ -60,13 +60,14 @@ pub(super) fn apply(
     let before: Vec<Model> = listed.models.clone();
     let mut listed = listed;
     let rows = listed.models.par_iter_mut().zip(&listed.positions);
-    let log_ratios: Vec<f64> = rows
+    let log_ratios: Vec<Result<f64>> = rows
         .map(|(model, positions)| truncate(standard, model, positions, weights))
-        .collect::<Result<_>>()?;
+        .collect();
     let mut acts = false;
-    for ((model, log_ratio), log_weight) in
-        (listed.models.iter().zip(log_ratios)).zip(&mut log_weights)
-    {
+    let models = listed.models.iter().zip(log_ratios);
+    for ((model, log_ratio), log_weight) in models.zip(&mut log_weights) {
+        // Of several errors the first model's, on any number of threads.
+        let log_ratio = log_ratio?;
         acts |= log_ratio.abs() > 1e-12 || !model.sites.is_empty();
         *log_weight += log_ratio;
     }

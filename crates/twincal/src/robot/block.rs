@@ -29,20 +29,7 @@ pub enum Instructions {
     Portable,
 }
 
-/// Samples that 256 bits hold.
-const FEW: usize = 4;
-
 impl Instructions {
-    /// The narrowest vectors that hold all samples: of wider ones every load and store costs more. The same bytes, since products and
-    /// sums are fused on both.
-    pub(super) fn for_samples(samples: usize) -> Self {
-        if samples <= FEW {
-            Self::Avx2
-        } else {
-            Self::Widest
-        }
-    }
-
     /// Runs `kernel` compiled for these instructions.
     pub(super) fn dispatch<K: pulp::WithSimd>(self, kernel: K) -> K::Output {
         match self {

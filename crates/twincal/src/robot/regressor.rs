@@ -54,7 +54,7 @@ pub struct RegressorBlock {
 
 impl RegressorBlock {
     /// Column of parameter `parameter` of pair `pair`: one value per sample of the block, N·m per unit of the
-    /// parameter (N for a slider); 0 behind the last sample. Length [`BLOCK`].
+    /// parameter (N for a slider); 0 behind the last sample where motion is finite. Length [`BLOCK`].
     ///
     /// # Panics
     /// If there is no such pair or parameter.
@@ -151,8 +151,7 @@ impl Regressor {
         samples: Range<usize>,
         block: &mut RegressorBlock,
     ) {
-        let instructions = Instructions::for_samples(samples.len());
-        self.evaluate_with(instructions, robot, motion, samples, block);
+        self.evaluate_with(Instructions::Widest, robot, motion, samples, block);
     }
 
     /// [`Regressor::evaluate`] on chosen instructions: to compare them, or to have the same bytes on different machines.

@@ -93,6 +93,23 @@ impl<'a> PreparedLog<'a> {
         &self.log
     }
 
+    /// Samples of all pieces, on the clock at which motion is held.
+    pub fn samples(&self) -> usize {
+        self.pieces
+            .pieces
+            .iter()
+            .map(|piece| piece.time.len())
+            .sum()
+    }
+
+    /// Rows that a fit with this pipeline keeps at most: filters trim the ends of pieces.
+    pub fn rows_at_most(&self, pipeline: &Pipeline) -> usize {
+        let pieces = self.pieces.pieces.iter();
+        pieces
+            .map(|piece| piece.time.len().div_ceil(pipeline.step(piece.interval)))
+            .sum()
+    }
+
     /// What [`Raw::None`] needs, without the recording: of that only its name and its load are left, and which channels it had.
     #[must_use]
     pub fn detached(self) -> PreparedLog<'static> {

@@ -51,7 +51,7 @@ impl<'a> Decimator<'a> {
         self.stride
     }
 
-    /// Rows of `count` signals from signal `first` on, `stride` apart.
+    /// Rows of `count` signals from signal `first` on, `stride` apart; what stands behind the last row has no meaning.
     pub(crate) fn sums(&self, first: usize, count: usize) -> &[f64] {
         &self.sums[first * self.stride..(first + count) * self.stride]
     }
@@ -97,7 +97,6 @@ impl Weights {
                 for (lane, weight) in weights.0.iter_mut().enumerate() {
                     let row = group * ROWS + lane;
                     let tap = before + sample as isize - (row * step) as isize;
-                    // Rows behind the last one are padding.
                     *weight = usize::try_from(tap)
                         .ok()
                         .and_then(|tap| kernel.get(tap))
@@ -142,7 +141,7 @@ impl Add<'_> {
         for &(first, values) in self.signals {
             let count = values.len() / len;
             let mut i = 0;
-            while S::REGISTER_COUNT >= 32 && i + 4 <= count {
+            while S::REGISTER_COUNT >= 32 && S::F64_LANES >= ROWS && i + 4 <= count {
                 self.some::<S, G, 4>(group, first + i, &values[i * len..]);
                 i += 4;
             }
@@ -196,7 +195,7 @@ impl Add<'_> {
     }
 }
 
-/// `a b + c`, rounded once where the instructions of `S` can, which on x86-64 all with four lanes and more can.
+/// `a b + c`, rounded once on instructions with four lanes and more, which all can.
 #[inline(always)]
 fn multiply_add<S: Simd>(a: f64, b: f64, c: f64) -> f64 {
     if S::F64_LANES >= 4 {

@@ -134,8 +134,8 @@ impl Family {
 
     /// Prior probability of what is more usual than the rest: nearly every geared joint has friction and a motor's inertia, and a
     /// payload, which one log in three or so carries unsaid, is the usual reason why the last link is not what the model says. What has
-    /// mass somewhere has a tensor about any other point: that of a payload is next to certain where the payload is in, but one
-    /// small and near the link's own centre of mass may well be none.
+    /// mass somewhere has a tensor about any other point: that of a payload is next to certain where the payload is in; not quite,
+    /// because the tensor of a small payload near the link's own centre of mass is too small to be seen.
     #[must_use]
     pub fn usual(self) -> Option<f64> {
         match self {
