@@ -64,12 +64,13 @@ fn brute_force(problem: &Problem, draws: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>
     (share(&pip), mean, sd)
 }
 
-/// Bounds at 0 and a little below, some of them far above the free estimate, with and without heredity. 20 000 draws per model: a standard error
-/// of 0.0035 of a PIP; EP and φ at its mean (60 rows) are allowed 0.03, and 0.15 sd for the mean.
+/// Bounds at 0 and a little below, some of them far above the free estimate, with and without heredity. 20 000 draws per model: a
+/// standard error of 0.0035 of a PIP; EP and φ at its mean (60 rows) are allowed 0.03, and 0.15 sd for the mean.
 #[test]
 fn bounded_posteriors_equal_brute_force() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);
-    let cases: [(u64, &[usize], &[(usize, usize)]); 5] = [
+    type Case<'a> = (u64, &'a [usize], &'a [(usize, usize)]);
+    let cases: [Case<'_>; 5] = [
         (1, &[2, 2, 1, 1], &[]),
         (2, &[1, 1, 1, 1, 1], &[]),
         (3, &[3, 1, 2], &[]),
