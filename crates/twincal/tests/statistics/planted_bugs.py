@@ -83,8 +83,8 @@ BUGS = [
     (
         "the difference over a cut lost",
         "gram/accumulate.rs",
-        "let before = if starts { column[0] } else { last[i] };",
-        "let before = column[0];",
+        "*self.rows.before_mut(i) = last[i];",
+        "*self.rows.before_mut(i) = column[0];",
     ),
     (
         "a component leaves and its square does not follow",
