@@ -23,7 +23,7 @@ use write::{Bag, Message};
 const MESSAGES: u64 = 600_000;
 
 /// Processor time of this process so far, s, of threads that have ended too: chunks are unpacked beside the reading. Counted in
-/// hundredths; other work on the machine does not count.
+/// hundredths; other work on the machine does not count. Panics where the system is not Linux: there is nothing to measure then.
 fn processor_time() -> f64 {
     let text = std::fs::read_to_string("/proc/self/stat").expect("Linux");
     // The name of the program, in brackets, may hold spaces; user and system time are the 12th and 13th field behind it.
