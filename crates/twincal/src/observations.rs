@@ -1,6 +1,10 @@
 //! The rows of one log, kept at the filtered rate: what residuals, blocks and held-out scores are computed from.
 
+mod blocks;
+mod room;
 mod products;
+
+pub(crate) use room::Room;
 
 use crate::error::Result;
 use crate::gram::{Gram, JointAccumulator};
@@ -217,6 +221,17 @@ impl Observations {
                 }
             };
             rows.temperature = self.time.iter().map(at).collect();
+        }
+    }
+
+    /// Takes the rows of some times (s, from and to) out of every fit: as standstill of all joints.
+    pub(crate) fn leave_out(&mut self, times: &[[f64; 2]]) {
+        for (row, time) in self.time.iter().enumerate() {
+            if times.iter().any(|[from, to]| from <= time && time <= to) {
+                for joint in &mut self.joints {
+                    joint.standstill[row] = true;
+                }
+            }
         }
     }
 

@@ -10,6 +10,7 @@ use crate::terminal::Terminal;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use twincal::calibrate::{Calibration, CalibrationSettings, Stage, Stopped, calibrate};
+use twincal::signal::Log;
 use twincal_io::artifact::{Claim, Maker, REPORT};
 use twincal_io::config::{Config, Settings};
 use twincal_io::memory;
@@ -23,8 +24,8 @@ pub(super) struct Job<'a> {
     pub(super) config: &'a Config,
     pub(super) settings: &'a Settings,
     pub(super) robot: RobotInput,
-    pub(super) logs: LogInput,
-    pub(super) heldout: LogInput,
+    pub(super) logs: LogInput<Log<'static>>,
+    pub(super) heldout: LogInput<Log<'static>>,
     /// Folder of the result.
     pub(super) output: &'a Path,
     pub(super) watch: Stopwatch,
@@ -79,8 +80,8 @@ impl Job<'_> {
         };
         let mut calibration = calibrate(
             &self.robot.robot,
-            std::mem::take(&mut logs.recordings),
-            std::mem::take(&mut heldout.recordings),
+            std::mem::take(&mut logs.logs),
+            std::mem::take(&mut heldout.logs),
             &settings,
             &step,
         );

@@ -99,7 +99,7 @@ fn score(twin: &Twin, logs: &LogInput, findings: &mut Vec<Finding>) -> Result<Va
     let predictor = twin.predictor(&library)?;
     let names = twin.robot.joint_names();
     let mut scores = HeldOut::new(names.clone());
-    for recording in &logs.recordings {
+    for recording in &logs.logs {
         recording.require_torque(&names)?;
         let (trajectory, more) = twin.align(recording)?;
         findings.extend(more);

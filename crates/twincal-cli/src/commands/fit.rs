@@ -8,6 +8,8 @@ use crate::clock::Stopwatch;
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
+use std::path::PathBuf;
+use twincal::signal::{Auto, Log};
 use twincal_io::artifact::{Claim, Maker, Replace};
 
 pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
@@ -43,13 +45,13 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     let progress = Progress::new();
     progress.step(&format!("reading {}", model.to_string_lossy()));
     let robot = RobotInput::read(model, &settings)?;
-    let logs = LogInput::read(given, &robot.robot, &settings.log, &progress)?;
-    let heldout = LogInput::read(
-        &settings.log.heldout,
-        &robot.robot,
-        &settings.log,
-        &progress,
-    )?;
+    // Without a filter every sample is a row, and all are in memory whatever the reader does.
+    let read = match settings.calibration.signal.cutoff_hz {
+        Auto::Value(0.0) => LogInput::in_memory,
+        _ => LogInput::<Log<'static>>::read,
+    };
+    let read = |paths: &[PathBuf]| read(paths, &robot.robot, &settings.log, &progress);
+    let (logs, heldout) = (read(given)?, read(&settings.log.heldout)?);
     every_log_once(&logs, &heldout)?;
     let command = command(model, given, &settings.log.heldout, &config.in_force());
     let job = Job {
@@ -69,7 +71,7 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
 }
 
 /// A log that is fitted says nothing of what was not, and counts for one experiment only.
-fn every_log_once(logs: &LogInput, heldout: &LogInput) -> Outcome<()> {
+fn every_log_once<T>(logs: &LogInput<T>, heldout: &LogInput<T>) -> Outcome<()> {
     for (i, file) in heldout.files.iter().enumerate() {
         if logs.files.iter().any(|log| log.sha256 == file.sha256) {
             return Err(Failure::usage(

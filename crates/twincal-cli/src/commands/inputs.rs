@@ -3,13 +3,14 @@
 use crate::failure::{Failure, Outcome};
 use crate::names::display_names;
 use crate::progress::Progress;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::robot::Robot;
-use twincal::signal::Recording;
+use twincal::signal::{Log, Recording};
 use twincal_io::artifact::{MODEL_MJCF, MODEL_URDF, sha256, sha256_of_file};
 use twincal_io::config::{LogSettings, Settings};
-use twincal_io::log::{files_of, parse_log, read_log};
+use twincal_io::log::{LogOptions, files_of, open_log, parse_log, read_log};
 use twincal_io::model::{Model, ModelFormat, read_model};
 use twincal_io::report::FileHash;
 use twincal_io::{Error, memory};
@@ -52,16 +53,70 @@ impl RobotInput {
     }
 }
 
-/// Logs as read, with what was dropped or assumed.
-#[derive(Default)]
-pub(super) struct LogInput {
-    pub(super) recordings: Vec<Recording>,
+/// Logs as read, with what was dropped or assumed: recordings, or logs that may be in chapters.
+pub(super) struct LogInput<T = Recording> {
+    pub(super) logs: Vec<T>,
     pub(super) files: Vec<FileHash>,
     pub(super) findings: Vec<Finding>,
     given: Vec<PathBuf>,
 }
 
-impl LogInput {
+/// A log of either kind.
+pub(super) trait OneLog: Sized + Send {
+    fn read(
+        path: &Path,
+        robot: &Robot,
+        options: &LogOptions,
+    ) -> Result<(Self, Vec<Finding>), Error>;
+    /// Samples that are in memory at once.
+    fn samples(&self) -> usize;
+    /// Gives it the name that it has in results; returns that which it had.
+    fn rename(&mut self, name: &str) -> String;
+}
+
+impl OneLog for Recording {
+    fn read(
+        path: &Path,
+        robot: &Robot,
+        options: &LogOptions,
+    ) -> Result<(Self, Vec<Finding>), Error> {
+        read_log(path, robot, options)
+    }
+
+    fn samples(&self) -> usize {
+        self.time.len()
+    }
+
+    fn rename(&mut self, name: &str) -> String {
+        std::mem::replace(&mut self.name, name.into())
+    }
+}
+
+impl OneLog for Log<'static> {
+    fn read(
+        path: &Path,
+        robot: &Robot,
+        options: &LogOptions,
+    ) -> Result<(Self, Vec<Finding>), Error> {
+        open_log(path, robot, options)
+    }
+
+    fn samples(&self) -> usize {
+        match self {
+            Self::Whole(recording) => recording.time.len(),
+            Self::Long(long) => long.samples.iter().copied().max().unwrap_or(0),
+        }
+    }
+
+    fn rename(&mut self, name: &str) -> String {
+        match self {
+            Self::Whole(recording) => recording.to_mut().rename(name),
+            Self::Long(long) => std::mem::replace(&mut long.name, name.into()),
+        }
+    }
+}
+
+impl<T: OneLog> LogInput<T> {
     /// Reads logs.
     pub(super) fn read(
         paths: &[PathBuf],
@@ -69,14 +124,11 @@ impl LogInput {
         settings: &LogSettings,
         progress: &Progress,
     ) -> Outcome<Self> {
-        let mut rows = 0;
-        let mut input = Self {
-            given: paths.to_vec(),
-            ..Self::default()
-        };
+        let mut samples = 0;
+        let mut input = Self::new(paths.to_vec());
         for (path, name) in paths.iter().zip(display_names(paths)) {
             progress.step(&format!("reading {}", path.to_string_lossy()));
-            let read = || read_log(path, robot, &settings.options(path));
+            let read = || T::read(path, robot, &settings.options(path));
             let (log, checksum) = if path.is_file() || path.is_dir() {
                 let (log, checksum) = rayon::join(read, || sha256_of_log(path));
                 (log?, checksum)
@@ -84,15 +136,15 @@ impl LogInput {
                 // A pipe can be read once, and may have no end.
                 (read()?, sha256_of_log(path))
             };
-            let (recording, findings) = log;
-            rows += recording.time.len() as u64;
-            let bytes = rows.saturating_mul(robot.dof() as u64 * 8 * DOUBLES_PER_SAMPLE);
+            let (log, findings) = log;
+            samples += log.samples() as u64;
+            let bytes = samples.saturating_mul(robot.dof() as u64 * 8 * DOUBLES_PER_SAMPLE);
             memory::require(
                 &path.to_string_lossy(),
                 bytes,
                 "give fewer or shorter logs, or raise the limit",
             )?;
-            input.push(recording, findings, &name);
+            input.push(log, findings, &name);
             input.files.push(FileHash {
                 name,
                 sha256: checksum?,
@@ -101,17 +153,40 @@ impl LogInput {
         Ok(input)
     }
 
+    fn new(given: Vec<PathBuf>) -> Self {
+        Self {
+            logs: Vec::new(),
+            files: Vec::new(),
+            findings: Vec::new(),
+            given,
+        }
+    }
+
+    /// Takes a log under the name that it has in results.
+    fn push(&mut self, mut log: T, findings: Vec<Finding>, name: &str) {
+        let given = log.rename(name);
+        self.logs.push(log);
+        self.findings
+            .extend(findings.into_iter().map(|finding| Finding {
+                subject: finding.subject.replace(&given, name),
+                message: finding.message.replace(&given, name),
+                ..finding
+            }));
+    }
+}
+
+impl LogInput<Log<'static>> {
     /// Logs that the program carries.
     pub(super) fn carried(
         logs: &[(&str, &'static [u8])],
         robot: &Robot,
         settings: &LogSettings,
     ) -> Outcome<Self> {
-        let mut input = Self::default();
+        let mut input = Self::new(Vec::new());
         for (name, bytes) in logs {
             let (recording, findings) =
                 parse_log(name, bytes, robot, &settings.options(Path::new(name)))?;
-            input.push(recording, findings, name);
+            input.push(Log::Whole(Cow::Owned(recording)), findings, name);
             input.files.push(FileHash {
                 name: (*name).into(),
                 sha256: sha256(bytes),
@@ -121,18 +196,30 @@ impl LogInput {
         Ok(input)
     }
 
-    /// Takes a log under the name that it has in results.
-    fn push(&mut self, mut recording: Recording, findings: Vec<Finding>, name: &str) {
-        let given = std::mem::replace(&mut recording.name, name.into());
-        self.recordings.push(recording);
-        self.findings
-            .extend(findings.into_iter().map(|finding| Finding {
-                subject: finding.subject.replace(&given, name),
-                message: finding.message.replace(&given, name),
-                ..finding
-            }));
+    /// The same with every log in memory.
+    pub(super) fn in_memory(
+        paths: &[PathBuf],
+        robot: &Robot,
+        settings: &LogSettings,
+        progress: &Progress,
+    ) -> Outcome<Self> {
+        let LogInput {
+            logs,
+            files,
+            findings,
+            given,
+        } = LogInput::<Recording>::read(paths, robot, settings, progress)?;
+        let whole = |recording| Log::Whole(Cow::Owned(recording));
+        Ok(Self {
+            logs: logs.into_iter().map(whole).collect(),
+            files,
+            findings,
+            given,
+        })
     }
+}
 
+impl<T> LogInput<T> {
     /// The error with the log named as it was given instead of as it stands in results.
     pub(super) fn as_given(&self, error: twincal::Error) -> twincal::Error {
         match error {

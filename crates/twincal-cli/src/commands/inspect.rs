@@ -86,13 +86,13 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
     let mut found = robot.findings;
     found.append(&mut logs.findings);
     let mut overviews = Vec::new();
-    for recording in &logs.recordings {
+    for recording in &logs.logs {
         let (overview, more) =
             describe(&robot.robot, recording).map_err(|error| logs.as_given(error))?;
         overviews.push(overview);
         found.extend(more);
     }
-    found.extend(hardly_driven(&robot.robot, &logs.recordings));
+    found.extend(hardly_driven(&robot.robot, &logs.logs[..])?);
     let (mut aligned, more) = compare(&robot.robot, &logs, &settings.calibration.signal)?;
     for finding in more {
         if !found.contains(&finding) {
@@ -121,10 +121,10 @@ fn compare(
     logs: &LogInput,
     signal: &SignalSettings,
 ) -> Outcome<(Option<Aligned>, Vec<Finding>)> {
-    let Ok((pipeline, _)) = choose_pipeline(robot, &logs.recordings, signal) else {
+    let Ok((pipeline, _)) = choose_pipeline(robot, &logs.logs, signal) else {
         return Ok((None, Vec::new()));
     };
-    let found = checkup(robot, &logs.recordings, &pipeline).map_err(|e| logs.as_given(e))?;
+    let found = checkup(robot, &logs.logs, &pipeline).map_err(|e| logs.as_given(e))?;
     Ok((Some((pipeline, found.trajectories)), found.findings))
 }
 

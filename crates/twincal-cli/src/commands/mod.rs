@@ -50,7 +50,7 @@ fn start_threads(threads: Option<usize>) -> Outcome<()> {
         .map_err(|e| {
             Failure::usage(
                 format!("cannot start the threads: {e}"),
-                "give fewer with --threads or raise the limits",
+                "give fewer with --threads, or raise the limits of memory (ulimit -v) and processes (ulimit -u)",
             )
         })
 }

@@ -65,13 +65,11 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
         findings: std::mem::take(&mut logs.findings),
         ..Prediction::default()
     };
-    let missing = logs.recordings.iter();
+    let missing = logs.logs.iter();
     let missing = missing.filter_map(|recording| missing_torque(&twin.robot, recording));
     prediction.findings.extend(missing);
     // A prediction needs motion alone: measured torque stands beside it, row by row.
-    prediction.measured = (logs.recordings.iter_mut())
-        .map(Recording::take_torque)
-        .collect();
+    prediction.measured = (logs.logs.iter_mut()).map(Recording::take_torque).collect();
     match output {
         Some((format, place, mut output)) => {
             let written = match output.file() {
@@ -95,11 +93,7 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
         findings,
         ..
     } = prediction;
-    let input_rows = logs
-        .recordings
-        .iter()
-        .map(|recording| recording.time.len())
-        .sum();
+    let input_rows = logs.logs.iter().map(|recording| recording.time.len()).sum();
     let output = flags
         .output
         .as_ref()
@@ -168,7 +162,7 @@ impl Prediction {
             Err(e) => return Ok(Err(e)),
         };
         let all_measured = std::mem::take(&mut self.measured);
-        for (recording, measured) in logs.recordings.iter().zip(&all_measured) {
+        for (recording, measured) in logs.logs.iter().zip(&all_measured) {
             let log = (recording, measured.as_slice());
             let written = self.write_log(twin, &library, &predictor, log, &mut table);
             if let Err(e) = written.map_err(|error| logs.as_given(error))? {

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | which column is which channel | `columns.rs` |
 //! | names of well-known recorders | `preset.rs` |
+//! | numbers to a recording, or to chapters of a long one | `assemble.rs`, `cells.rs`, `scratch.rs` |
 //! | text tables | `csv/` |
 //! | Parquet | `parquet.rs`, checked first by `pages.rs`; `shared_file.rs` for several threads |
 //! | Arrow IPC | `arrow/` |
@@ -12,7 +13,9 @@
 //! | what the logged torque is | `torque.rs` |
 
 mod arrow;
+mod assemble;
 mod bag;
+mod cells;
 mod columns;
 mod csv;
 mod header;
@@ -20,9 +23,12 @@ mod npz;
 mod pages;
 mod parquet;
 mod preset;
+mod scratch;
 mod shared_file;
 mod torque;
 
+pub(crate) use assemble::assemble;
+pub(crate) use cells::Cells;
 pub use columns::{Channel, Selection, joints_without_column, match_columns};
 pub use header::read_header;
 pub use preset::Preset;
@@ -30,18 +36,15 @@ pub use torque::{TorqueOptions, TorqueSource};
 
 use crate::config::ColumnsTable;
 use crate::error::{Error, Place, Result};
-use crate::memory;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use twincal::Finding;
 use twincal::robot::Robot;
-use twincal::signal::{Channels, Payload, Recording};
-use twincal::{Finding, Severity};
+use twincal::signal::{Log, Payload, Recording};
 
 /// Most columns of a table.
 pub const MAX_COLUMNS: usize = 100_000;
-/// Share of rows dropped as unreadable beyond which the log counts as degraded.
-const DROPPED_LIMIT: f64 = 0.01;
 
 /// How logs are read.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -62,35 +65,6 @@ pub struct LogOptions {
     pub payload: Payload,
 }
 
-/// A table's selected columns as they stand in the file; missing cells are NaN.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Cells {
-    /// One per selected column, all of one length.
-    pub(crate) columns: Vec<Vec<f64>>,
-    /// Rows that could not be read and were dropped.
-    pub(crate) dropped: u64,
-    /// First of them, in words.
-    pub(crate) first_dropped: Option<String>,
-}
-
-impl Cells {
-    /// Room for `rows` numbers in each of `columns` columns, if there is that much memory.
-    ///
-    /// # Errors
-    /// [`Error::Content`] about the file `name` with both sizes.
-    pub(crate) fn reserve(name: &str, rows: usize, columns: usize) -> Result<Self> {
-        memory::require(
-            name,
-            (rows as u64).saturating_mul(columns as u64 * 8),
-            "read a shorter log, or one with fewer columns",
-        )?;
-        Ok(Self {
-            columns: (0..columns).map(|_| Vec::with_capacity(rows)).collect(),
-            ..Self::default()
-        })
-    }
-}
-
 /// Reads one log: CSV with any delimiter, Parquet, Arrow, NPZ, MCAP, a SQLite bag (told by their first bytes, not by their names) or the folder
 /// of a rosbag2.
 ///
@@ -104,13 +78,61 @@ pub fn read_log(
     robot: &Robot,
     options: &LogOptions,
 ) -> Result<(Recording, Vec<Finding>)> {
+    in_memory(read(path, robot, options, false)?)
+}
+
+/// The same, but a log that is long (128 MiB of numbers) is left in a temporary file and comes in chapters: memory does not grow with
+/// it. NPZ files are always read whole, and so are bags whose joints come in several messages.
+///
+/// # Errors
+/// Those of [`read_log`], and [`Error::System`] without room for the temporary file.
+pub fn open_log(
+    path: &Path,
+    robot: &Robot,
+    options: &LogOptions,
+) -> Result<(Log<'static>, Vec<Finding>)> {
+    read(path, robot, options, true)
+}
+
+/// What was read without chapters.
+fn in_memory((log, findings): (Log<'static>, Vec<Finding>)) -> Result<(Recording, Vec<Finding>)> {
+    let recording = match log {
+        Log::Whole(recording) => recording.into_owned(),
+        Log::Long(long) => long.whole()?,
+    };
+    Ok((recording, findings))
+}
+
+/// What every reader has to know.
+#[derive(Clone, Copy)]
+pub(crate) struct Request<'a> {
+    /// The file as given.
+    pub(crate) name: &'a str,
+    pub(crate) robot: &'a Robot,
+    pub(crate) options: &'a LogOptions,
+    /// Whether a long log may come in chapters.
+    pub(crate) chapters: bool,
+}
+
+fn read(
+    path: &Path,
+    robot: &Robot,
+    options: &LogOptions,
+    chapters: bool,
+) -> Result<(Log<'static>, Vec<Finding>)> {
     let name = path.display().to_string();
     let system =
         |e: &std::io::Error| Error::system(&name, "read", e, "check the path and its permissions");
+    let request = Request {
+        name: &name,
+        robot,
+        options,
+        chapters,
+    };
     let mut file = File::open(path).map_err(|e| system(&e))?;
     let metadata = file.metadata().map_err(|e| system(&e))?;
     if metadata.is_dir() {
-        return finish(bag::read(path, robot, options)?, robot, options);
+        return bag::read(path, request);
     }
     let mut head = Vec::new();
     (&mut file)
@@ -127,24 +149,23 @@ pub fn read_log(
     if kind != Kind::Text {
         file.seek(SeekFrom::Start(0)).map_err(|e| system(&e))?;
     }
-    let read = match kind {
+    match kind {
         Kind::Parquet => {
             let pages = file.try_clone().map_err(|e| system(&e))?;
             let chunks = shared_file::SharedFile::new(file).map_err(|e| system(&e))?;
-            parquet::read(chunks, pages, &name, robot, options)?
+            parquet::read(chunks, pages, request)
         }
-        Kind::Arrow => arrow::read(file, &name, robot, options)?,
-        Kind::Npz => npz::read(BufReader::new(file), &name, robot, options)?,
-        Kind::Mcap | Kind::Sqlite | Kind::Zstd => bag::read(path, robot, options)?,
-        Kind::FirstFeather => return Err(first_feather(&name)),
-        Kind::LfsPointer => return Err(lfs_pointer(&name)),
+        Kind::Arrow => arrow::read(file, request),
+        Kind::Npz => npz::read(BufReader::new(file), request),
+        Kind::Mcap | Kind::Sqlite | Kind::Zstd => bag::read(path, request),
+        Kind::FirstFeather => Err(first_feather(&name)),
+        Kind::LfsPointer => Err(lfs_pointer(&name)),
         // The bytes already taken go first.
         Kind::Text => {
             let head = std::io::Cursor::new(head);
-            csv_table(head.chain(file), metadata.len(), &name, robot, options)?
+            csv_table(head.chain(file), metadata.len(), request)
         }
-    };
-    finish(read, robot, options)
+    }
 }
 
 /// The files that a log consists of: itself, or what a rosbag2 folder names.
@@ -204,22 +225,26 @@ pub fn parse_log(
     robot: &Robot,
     options: &LogOptions,
 ) -> Result<(Recording, Vec<Finding>)> {
+    let request = Request {
+        name,
+        robot,
+        options,
+        chapters: false,
+    };
     let read = match Kind::of(bytes) {
         Kind::Parquet => {
             let pages = std::io::Cursor::new(bytes);
             let bytes = bytes::Bytes::from_static(bytes);
-            parquet::read(bytes, pages, name, robot, options)?
+            parquet::read(bytes, pages, request)?
         }
-        Kind::Mcap => bag::read_mcap(&mut std::io::Cursor::new(bytes), name, robot, options)?,
-        Kind::Arrow => arrow::read(std::io::Cursor::new(bytes), name, robot, options)?,
-        Kind::Npz => npz::read(std::io::Cursor::new(bytes), name, robot, options)?,
+        Kind::Mcap => bag::read_mcap(&mut std::io::Cursor::new(bytes), request)?,
+        Kind::Arrow => arrow::read(std::io::Cursor::new(bytes), request)?,
+        Kind::Npz => npz::read(std::io::Cursor::new(bytes), request)?,
         Kind::FirstFeather => return Err(first_feather(name)),
         Kind::LfsPointer => return Err(lfs_pointer(name)),
-        Kind::Text | Kind::Sqlite | Kind::Zstd => {
-            csv_table(bytes, bytes.len() as u64, name, robot, options)?
-        }
+        Kind::Text | Kind::Sqlite | Kind::Zstd => csv_table(bytes, bytes.len() as u64, request)?,
     };
-    finish(read, robot, options)
+    in_memory(read)
 }
 
 /// What a file is by its first bytes.
@@ -258,16 +283,6 @@ impl Kind {
     }
 }
 
-/// What is done to every log, whatever its form.
-fn finish(
-    (mut recording, mut findings): (Recording, Vec<Finding>),
-    robot: &Robot,
-    options: &LogOptions,
-) -> Result<(Recording, Vec<Finding>)> {
-    torque::to_joint_torque(&mut recording, robot, options, &mut findings)?;
-    Ok((recording, findings))
-}
-
 /// Reads a CSV log from any source; `name` is what messages call it, `bytes` its length if known (else 0).
 ///
 /// # Errors
@@ -279,179 +294,34 @@ pub fn read_csv(
     robot: &Robot,
     options: &LogOptions,
 ) -> Result<(Recording, Vec<Finding>)> {
-    let read = csv_table(source, bytes, name, robot, options)?;
-    finish(read, robot, options)
+    let request = Request {
+        name,
+        robot,
+        options,
+        chapters: false,
+    };
+    in_memory(csv_table(source, bytes, request)?)
 }
 
 fn csv_table(
     source: impl Read,
     bytes: u64,
-    name: &str,
-    robot: &Robot,
-    options: &LogOptions,
-) -> Result<(Recording, Vec<Finding>)> {
+    request: Request<'_>,
+) -> Result<(Log<'static>, Vec<Finding>)> {
+    let Request {
+        name,
+        robot,
+        options,
+        chapters,
+    } = request;
     let mut table = csv::Table::open(source, bytes, name)?;
     let selection = match_columns(name, table.header(), robot, options)?;
     let wanted = selection.file_columns();
-    let cells = table.read(&wanted, options.lenient)?;
+    let cells = table.read(&wanted, options.lenient, chapters)?;
     let mut findings = table.into_findings();
-    let recording = assemble(
-        name,
-        table_rows(&cells),
-        cells,
-        &selection,
-        options,
-        &mut findings,
-    )?;
-    Ok((recording, findings))
+    let log = assemble(request, cells, selection, &mut findings)?;
+    Ok((log, findings))
 }
 
-fn table_rows(cells: &Cells) -> usize {
-    cells.columns.first().map_or(0, Vec::len)
-}
-
-/// Cells to a recording: time from the file or the rate, channels per joint.
-pub(crate) fn assemble(
-    name: &str,
-    rows: usize,
-    mut cells: Cells,
-    selection: &Selection,
-    options: &LogOptions,
-    findings: &mut Vec<Finding>,
-) -> Result<Recording> {
-    findings.extend(selection.findings.iter().cloned());
-    if rows == 0 {
-        return Err(Error::content(
-            Place::file(name),
-            "has a header but no rows",
-            "record a motion and export it again",
-        ));
-    }
-    if cells.dropped > 0 {
-        let share = cells.dropped as f64 / (rows as f64 + cells.dropped as f64);
-        let severity = if share > DROPPED_LIMIT {
-            Severity::Degraded
-        } else {
-            Severity::Warning
-        };
-        let first = cells.first_dropped.take().unwrap_or_default();
-        let message = format!(
-            "{} rows ({:.2} %) could not be read and were dropped; the first: {first}",
-            cells.dropped,
-            100.0 * share
-        );
-        findings.push(Finding::new(
-            severity,
-            "unreadable_rows",
-            name,
-            message,
-            cells.dropped,
-        ));
-    }
-    let mut take = |index: Option<usize>| index.map(|i| std::mem::take(&mut cells.columns[i]));
-    let positions = selection.positions();
-    let time = match options.rate_hz {
-        Some(rate) => {
-            if !(rate.is_finite() && rate > 0.0) {
-                let key = "--rate";
-                return Err(twincal::Error::Setting {
-                    key: key.into(),
-                    problem: format!("{rate} Hz is out of range"),
-                    remedy: "give the sampling rate in Hz, above 0".into(),
-                }
-                .into());
-            }
-            if selection.time.is_some() {
-                let message = format!("time stamps were replaced by row / {rate} Hz as told");
-                findings.push(Finding::new(
-                    Severity::Note,
-                    "time_replaced",
-                    name,
-                    message,
-                    rows as u64,
-                ));
-            }
-            (0..rows).map(|row| row as f64 / rate).collect()
-        }
-        None => {
-            let mut time = take(positions.time).unwrap_or_default();
-            if let Some(unit) = options.columns.time_unit.filter(|unit| unit.ticks() != 1.0) {
-                time.iter_mut().for_each(|time| *time /= unit.ticks());
-                let message = format!(
-                    "time stamps were taken as {} as [columns] time_unit says",
-                    unit.word()
-                );
-                findings.push(Finding::new(Severity::Note, "time_unit", name, message, 0));
-            } else if let Some(preset) = options.preset.filter(|p| wants_ticks(*p, options)) {
-                time.iter_mut().for_each(|time| *time /= preset.ticks());
-                let message = format!(
-                    "time stamps were divided by {} as the preset `{}` says",
-                    preset.ticks(),
-                    preset.name()
-                );
-                findings.push(Finding::new(Severity::Note, "time_unit", name, message, 0));
-            }
-            time
-        }
-    };
-    let joints = positions
-        .joints
-        .iter()
-        .enumerate()
-        .map(|(number, joint)| Channels {
-            q: take(joint[0]).unwrap_or_default(),
-            qd: take(joint[1]),
-            qdd: take(joint[2]),
-            tau: take(joint[3]),
-            temperature: take(positions.temperatures.get(number).copied().flatten()),
-        })
-        .collect();
-    let recording = Recording {
-        name: name.to_owned(),
-        time,
-        joints,
-        payload: options.payload,
-    };
-    refuse_empty_columns(name, &recording, selection)?;
-    Ok(recording)
-}
-
-/// Whether a preset's own clock counts: not where the config states the unit.
-fn wants_ticks(preset: Preset, options: &LogOptions) -> bool {
-    preset.ticks() != 1.0 && options.columns.time_unit.is_none()
-}
-
-/// A column without a single number is a mistake in the export, not a gap.
-fn refuse_empty_columns(name: &str, recording: &Recording, selection: &Selection) -> Result<()> {
-    let check = |values: &[f64], column: &Option<String>| match column {
-        Some(column) if values.iter().all(|v| !v.is_finite()) => Err(Error::content(
-            Place::file(name),
-            format!(
-                "column `{column}` is NaN or empty in all {} rows",
-                values.len()
-            ),
-            "export it again, or map another column in [columns]",
-        )),
-        _ => Ok(()),
-    };
-    if let Some(time) = selection
-        .time
-        .as_ref()
-        .filter(|_| !recording.time.is_empty())
-    {
-        check(&recording.time, &Some(time.name.clone()))?;
-    }
-    for (channels, joint) in recording.joints.iter().zip(&selection.joints) {
-        let names = joint.each_ref().map(|c| c.as_ref().map(|c| c.name.clone()));
-        check(&channels.q, &names[0])?;
-        for (values, column) in [&channels.qd, &channels.qdd, &channels.tau]
-            .into_iter()
-            .zip(&names[1..])
-        {
-            if let Some(values) = values {
-                check(values, column)?;
-            }
-        }
-    }
-    Ok(())
-}
+#[cfg(test)]
+mod tests;

@@ -6,13 +6,12 @@
 
 mod arrays;
 
-use super::{Cells, LogOptions, assemble, match_columns};
+use super::{Cells, Request, assemble, match_columns};
 use crate::error::{Error, Place, Result};
 use crate::memory;
 use std::io::{BufReader, Read, Seek};
 use twincal::Finding;
-use twincal::robot::Robot;
-use twincal::signal::Recording;
+use twincal::signal::Log;
 use zip::ZipArchive;
 use zip::read::ZipFile;
 
@@ -93,10 +92,14 @@ struct Array {
 /// Reads an NPZ log.
 pub(super) fn read(
     source: impl Read + Seek,
-    name: &str,
-    robot: &Robot,
-    options: &LogOptions,
-) -> Result<(Recording, Vec<Finding>)> {
+    request: Request<'_>,
+) -> Result<(Log<'static>, Vec<Finding>)> {
+    let Request {
+        name,
+        robot,
+        options,
+        ..
+    } = request;
     let refuse = |problem: String, remedy: &str| Error::content(Place::file(name), problem, remedy);
     let mut archive = ZipArchive::new(source)
         .map_err(|e| refuse(format!("is not a whole NPZ file: {e}"), "write it again"))?;
@@ -160,10 +163,7 @@ pub(super) fn read(
     }
     let bytes = (rows as u64).saturating_mul(wanted.len() as u64 * 8);
     memory::require(name, bytes, "read a shorter log")?;
-    let mut cells = Cells {
-        columns: vec![Vec::new(); wanted.len()],
-        ..Cells::default()
-    };
+    let mut cells = Cells::new(wanted.len(), false);
     for array in used {
         let targets: Vec<Option<usize>> = (array.first..array.first + array.width)
             .map(|column| wanted.iter().position(|w| *w == column))
@@ -174,8 +174,9 @@ pub(super) fn read(
             .map_err(|e| refuse(format!("array `{key}` is damaged: {e}"), "write it again"))?;
     }
     let mut findings = Vec::new();
-    let recording = assemble(name, rows, cells, &selection, options, &mut findings)?;
-    Ok((recording, findings))
+    let request = Request { options, ..request };
+    let log = assemble(request, cells, selection, &mut findings)?;
+    Ok((log, findings))
 }
 
 /// An entry with its key, if it does not claim to grow beyond reason.

@@ -1,7 +1,8 @@
 //! Parquet logs: columns side by side into doubles, after the file's claims about itself have been checked.
 
+use super::cells::Sink;
 use super::pages::check_chunk;
-use super::{Cells, LogOptions, assemble, match_columns};
+use super::{Cells, Request, assemble, match_columns};
 use crate::error::{Error, Place, Result};
 use parquet::basic::{Compression, LogicalType, Repetition, TimeUnit, Type};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
@@ -14,8 +15,7 @@ use rayon::prelude::*;
 use std::io::{Read, Seek};
 use twincal::Finding;
 use twincal::Severity;
-use twincal::robot::Robot;
-use twincal::signal::Recording;
+use twincal::signal::Log;
 
 /// Values read at a time.
 const BATCH: usize = 8192;
@@ -34,10 +34,14 @@ fn broken(name: &str, error: &ParquetError) -> Error {
 pub(super) fn read(
     chunks: impl ChunkReader + 'static,
     mut pages: impl Read + Seek,
-    name: &str,
-    robot: &Robot,
-    options: &LogOptions,
-) -> Result<(Recording, Vec<Finding>)> {
+    request: Request<'_>,
+) -> Result<(Log<'static>, Vec<Finding>)> {
+    let Request {
+        name,
+        robot,
+        options,
+        chapters,
+    } = request;
     let reader = SerializedFileReader::new(chunks).map_err(|e| broken(name, &e))?;
     let metadata = reader.metadata();
     let columns: Vec<_> = metadata.file_metadata().schema_descr().columns().to_vec();
@@ -55,11 +59,12 @@ pub(super) fn read(
     } else {
         wanted.len()
     };
-    let mut cells = Cells::reserve(name, rows, wanted.len())?;
+    let mut cells = Cells::reserve(name, rows, wanted.len(), chapters)?;
+    let mut sinks = cells.sinks();
     for group in 0..reader.num_row_groups() {
         let group = reader.get_row_group(group).map_err(|e| broken(name, &e))?;
         // A thread holds the page that it is at, packed and unpacked.
-        let read: Vec<_> = (cells.columns.par_iter_mut().zip(&wanted))
+        let read: Vec<_> = (sinks.par_iter_mut().zip(&wanted))
             .with_min_len(side_by_side)
             .map(|(values, &index)| append(group.get_column_reader(index)?, values))
             .collect();
@@ -68,29 +73,20 @@ pub(super) fn read(
             read.map_err(|e| broken(name, &e))?;
         }
     }
-    if let Some(short) = cells.columns.iter().position(|c| c.len() != rows) {
+    if let Some(short) = sinks.iter().position(|column| column.len() != rows) {
         return Err(Error::content(
             Place::file(name),
             format!(
                 "column `{}` has {} values, the file declares {rows} rows",
                 header[wanted[short]],
-                cells.columns[short].len()
+                sinks[short].len()
             ),
             "copy or export it again",
         ));
     }
-    for (values, scale) in cells
-        .columns
-        .iter_mut()
-        .zip(scales)
-        .filter(|(_, scale)| *scale != 1.0)
-    {
-        for value in values {
-            *value /= scale;
-        }
-    }
-    let recording = assemble(name, rows, cells, &selection, options, &mut findings)?;
-    Ok((recording, findings))
+    cells.scales = scales;
+    let log = assemble(request, cells, selection, &mut findings)?;
+    Ok((log, findings))
 }
 
 /// Refuses types that are no numbers; ticks per second of stamps whose type states their unit, else 1.
@@ -204,7 +200,7 @@ fn readable(name: &str, column: &str, codec: Compression) -> Result<()> {
 }
 
 /// Appends one column chunk, nulls as NaN.
-fn append(column: ColumnReader, values: &mut Vec<f64>) -> std::result::Result<(), ParquetError> {
+fn append(column: ColumnReader, values: &mut Sink<'_>) -> std::result::Result<(), ParquetError> {
     match column {
         ColumnReader::DoubleColumnReader(reader) => append_typed(reader, values, |v| v),
         ColumnReader::FloatColumnReader(reader) => append_typed(reader, values, f64::from),
@@ -218,7 +214,7 @@ fn append(column: ColumnReader, values: &mut Vec<f64>) -> std::result::Result<()
 
 fn append_typed<T: DataType>(
     mut reader: ColumnReaderImpl<T>,
-    values: &mut Vec<f64>,
+    values: &mut Sink<'_>,
     convert: impl Fn(T::T) -> f64,
 ) -> std::result::Result<(), ParquetError>
 where
@@ -233,20 +229,20 @@ where
             return Ok(());
         }
         if levels.is_empty() {
-            values.extend(batch.drain(..).map(&convert));
+            values.extend(batch.drain(..).map(&convert))?;
             continue;
         }
         // A level below the deepest is a null.
         let deepest = levels.iter().copied().max().filter(|_| read > 0);
         let mut present = batch.drain(..);
-        for level in &levels {
+        values.extend(levels.iter().map(|level| {
             let value = if Some(*level) == deepest {
                 present.next()
             } else {
                 None
             };
-            values.push(value.map_or(f64::NAN, &convert));
-        }
+            value.map_or(f64::NAN, &convert)
+        }))?;
     }
 }
 

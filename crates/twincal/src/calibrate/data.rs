@@ -3,13 +3,17 @@
 use super::refuse;
 use super::result::LogSummary;
 use crate::error::{Finding, Result, Severity};
-use crate::incidents::{Incident, incident_findings, incidents, leave_out};
+use crate::gram::Gram;
+use crate::incidents::{Evidence, Incident, incident_findings, leave_out, left_out};
 use crate::likelihood::Columns;
-use crate::observations::{Observations, Part, observe};
+use crate::observations::{JointObservations, Observations, Part, Room, observe};
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, Slice, count_rows, spread_raw, visit_slices};
-use crate::signal::{Payload, Pipeline, PreparedLog, Raw, Recording, Trajectory};
+use crate::signal::{
+    self, LongReady, Payload, Pipeline, PreparedLog, Raw, ReadyLog, Recording, Trajectory,
+};
 use crate::term::Library;
+use crate::twin::Twin;
 use rayon::prelude::*;
 
 /// A column whose root mean square is below this share of what it is when the robot moves anyhow is zero on these data:
@@ -18,12 +22,17 @@ const ZERO: f64 = 1e-12;
 /// Rows per column of the largest joint below which nothing is fitted (case 7).
 const ROWS_PER_COLUMN: usize = 3;
 
+/// Samples of smooth motion that are kept of a log in chapters, about: raw scores, the lag and the self-check look at no more.
+const KEPT_OF_LONG: usize = 1 << 16;
+
 /// One log, ready.
 pub(super) struct Log {
     /// Contacts and protective stops, which are left out.
     incidents: Vec<Incident>,
     pub(super) observations: Observations,
     pub(super) summary: LogSummary,
+    /// First and last stamp, s.
+    ends: [f64; 2],
 }
 
 /// The logs' motion, apart from their rows: it is dropped first.
@@ -52,32 +61,20 @@ impl Data {
         robot: &Robot,
         library: &Library,
         pipeline: &Pipeline,
-        logs: &[PreparedLog<'_>],
-        heldout: &[PreparedLog<'_>],
+        logs: &[ReadyLog<'_>],
+        heldout: &[ReadyLog<'_>],
     ) -> Result<(Self, Trajectories)> {
         let mut findings = Vec::new();
-        let unknown = carry_something(logs.iter().chain(heldout).map(PreparedLog::recording));
-        let mut read = |logs: &[PreparedLog<'_>], role: &str| -> Result<(Vec<Log>, Vec<_>)> {
-            logs.iter()
-                .map(|log| {
-                    let recording = log.recording();
-                    let (mut trajectory, mut more) =
-                        trajectory(pipeline, log, unknown, Raw::Spread)?;
-                    findings.append(&mut more);
-                    let incidents = incidents(robot, pipeline, &trajectory);
-                    leave_out(pipeline, &mut trajectory, &incidents);
-                    findings.extend(incident_findings(&recording.name, &incidents));
-                    let mut observations = observe(robot, library, pipeline, &trajectory)?;
-                    observations.set_temperatures(recording);
-                    let summary = summary(recording, role, pipeline, &trajectory, &observations);
-                    let log = Log {
-                        incidents,
-                        observations,
-                        summary,
-                    };
-                    Ok((log, trajectory))
-                })
-                .collect()
+        let loads = logs.iter().chain(heldout).map(ReadyLog::payload);
+        let reader = Reader {
+            robot,
+            library,
+            pipeline,
+            unknown: carry_something(loads),
+        };
+        let mut read = |logs: &[ReadyLog<'_>], role: &str| -> Result<(Vec<Log>, Vec<_>)> {
+            let one = |log| reader.log(log, role, &mut findings);
+            logs.iter().map(one).collect()
         };
         let (fit, of_fit) = read(logs, "fit")?;
         let (heldout, of_heldout) = read(heldout, "heldout")?;
@@ -235,46 +232,199 @@ impl Data {
     }
 }
 
-/// A log as a trajectory; `unknown`: see [`carry_something`].
-fn trajectory(
-    pipeline: &Pipeline,
-    log: &PreparedLog<'_>,
+/// What rows are made with.
+struct Reader<'a> {
+    robot: &'a Robot,
+    library: &'a Library,
+    pipeline: &'a Pipeline,
+    /// See [`carry_something`].
     unknown: bool,
-    raw: Raw,
-) -> Result<(Trajectory, Vec<Finding>)> {
-    let (mut trajectory, findings) = log.align(pipeline, raw)?;
-    trajectory.payload_acts = !unknown || log.recording().payload == Payload::Unknown;
-    Ok((trajectory, findings))
 }
 
-/// The rows of the fit logs at another cut-off; what is left out stays left out.
-pub(super) fn rows(
-    robot: &Robot,
-    library: &Library,
-    pipeline: &Pipeline,
-    prepared: &[PreparedLog<'_>],
-    data: &Data,
-) -> Result<Vec<Observations>> {
-    let unknown = carry_something(prepared.iter().map(PreparedLog::recording));
-    prepared
-        .iter()
-        .zip(&data.fit)
-        .map(|(log, own)| {
-            let (mut trajectory, _) = trajectory(pipeline, log, unknown, Raw::None)?;
-            leave_out(pipeline, &mut trajectory, &own.incidents);
-            observe(robot, library, pipeline, &trajectory)
+impl Reader<'_> {
+    fn log(
+        &self,
+        log: &ReadyLog<'_>,
+        role: &str,
+        findings: &mut Vec<Finding>,
+    ) -> Result<(Log, Trajectory)> {
+        let (robot, pipeline) = (self.robot, self.pipeline);
+        let mut evidence = Evidence::default();
+        let (mut log, mut trajectory) = match log {
+            ReadyLog::Whole(log) => self.recording(log, role, &mut evidence, findings)?,
+            ReadyLog::Long(long) => self.chapters(long, role, &mut evidence, findings)?,
+        };
+        log.incidents = evidence.incidents(robot, pipeline);
+        leave_out(pipeline, &mut trajectory, &log.incidents);
+        log.observations
+            .leave_out(&left_out(pipeline, &log.incidents));
+        log.summary.count_rows(&log.observations);
+        findings.extend(incident_findings(&log.summary.name, &log.incidents));
+        Ok((log, trajectory))
+    }
+
+    fn chapters(
+        &self,
+        long: &LongReady,
+        role: &str,
+        evidence: &mut Evidence,
+        findings: &mut Vec<Finding>,
+    ) -> Result<(Log, Trajectory)> {
+        findings.push(long.log.say());
+        let share = long.log.chapters();
+        let mut room = Room::new(long.rows_at_most(self.pipeline));
+        let (mut summaries, mut kept): (_, Option<Trajectory>) = (Vec::new(), None);
+        let mut ends: Option<[f64; 2]> = None;
+        long.visit(self.pipeline, findings, |chapter, said| {
+            let (log, trajectory) = self.recording(chapter, role, evidence, said)?;
+            let mut trajectory = trajectory.thinned_out(KEPT_OF_LONG / share);
+            match &mut kept {
+                Some(kept) => kept.segments.append(&mut trajectory.segments),
+                None => kept = Some(trajectory),
+            }
+            room.append(log.observations);
+            summaries.push(log.summary);
+            let [first, last] = log.ends;
+            ends = Some([ends.map_or(first, |ends| ends[0]), last]);
+            Ok(())
+        })?;
+        let ends = ends.unwrap_or_default();
+        let summary = LogSummary::joined(summaries, ends[1] - ends[0]);
+        let (summary, trajectory) = summary.zip(kept).ok_or_else(|| {
+            let problem = format!("log `{}` has no chapters", long.log.name);
+            refuse(problem, "give a log with samples")
+        })?;
+        let log = Log {
+            incidents: Vec::new(),
+            observations: room.into_rows(),
+            summary,
+            ends,
+        };
+        Ok((log, trajectory))
+    }
+
+    /// A recording as rows and as motion, with nothing left out yet.
+    fn recording(
+        &self,
+        log: &PreparedLog<'_>,
+        role: &str,
+        evidence: &mut Evidence,
+        findings: &mut Vec<Finding>,
+    ) -> Result<(Log, Trajectory)> {
+        let (robot, library, pipeline) = (self.robot, self.library, self.pipeline);
+        let recording = log.recording();
+        let (trajectory, mut more) = self.trajectory(log, Raw::Spread)?;
+        findings.append(&mut more);
+        evidence.take(robot, pipeline, &trajectory);
+        let mut observations = observe(robot, library, pipeline, &trajectory)?;
+        observations.set_temperatures(recording);
+        let time = &recording.time;
+        let ends = time.first().zip(time.last()).map(|(a, b)| [*a, *b]);
+        let log = Log {
+            incidents: Vec::new(),
+            summary: summary(recording, role, pipeline, &trajectory),
+            observations,
+            ends: ends.unwrap_or_default(),
+        };
+        Ok((log, trajectory))
+    }
+
+    fn trajectory(&self, log: &PreparedLog<'_>, raw: Raw) -> Result<(Trajectory, Vec<Finding>)> {
+        let (mut trajectory, findings) = log.align(self.pipeline, raw)?;
+        trajectory.payload_acts = !self.unknown || trajectory.payload == Payload::Unknown;
+        Ok((trajectory, findings))
+    }
+
+    /// Statistics of a recording's rows; the incidents stay left out.
+    fn gram(&self, log: &PreparedLog<'_>, incidents: &[Incident]) -> Result<Gram> {
+        let (mut trajectory, _) = self.trajectory(log, Raw::None)?;
+        leave_out(self.pipeline, &mut trajectory, incidents);
+        let rows = observe(self.robot, self.library, self.pipeline, &trajectory)?;
+        Ok(rows.whole().gram())
+    }
+}
+
+impl LogSummary {
+    /// Of chapters, which last `duration` s together.
+    fn joined(chapters: Vec<Self>, duration: f64) -> Option<Self> {
+        let mut rates: Vec<f64> = chapters.iter().map(|chapter| chapter.rate_hz).collect();
+        rates.sort_by(f64::total_cmp);
+        let mut chapters = chapters.into_iter();
+        let mut all = chapters.next()?;
+        for chapter in chapters {
+            all.samples += chapter.samples;
+            all.segments += chapter.segments;
+        }
+        Some(Self {
+            duration,
+            rate_hz: rates[rates.len() / 2],
+            ..all
         })
-        .collect()
+    }
+
+    /// Counts the rows of each joint, moving and not.
+    fn count_rows(&mut self, observations: &Observations) {
+        let still = |joint: &JointObservations| {
+            let still = joint.standstill.iter().filter(|still| **still);
+            still.count() as u64
+        };
+        self.standstill = observations.joints.iter().map(still).collect();
+        let moving = |still: &u64| observations.len() as u64 - still;
+        self.rows = self.standstill.iter().map(moving).collect();
+    }
+}
+
+/// Statistics of the fit logs at other cut-offs than the one they were prepared for; what the fit left out stays left out. `None`
+/// without rows, and where a log cannot have that cut-off.
+///
+/// # Errors
+/// Of chapters that cannot be read.
+pub(super) fn grams_at(
+    twin: &Twin,
+    library: &Library,
+    pipelines: &[Pipeline],
+    logs: &[ReadyLog<'_>],
+    data: &Data,
+) -> Result<Vec<Option<Gram>>> {
+    let reader = |pipeline| Reader {
+        robot: &twin.robot,
+        library,
+        pipeline,
+        unknown: carry_something(logs.iter().map(ReadyLog::payload)),
+    };
+    let readers: Vec<Reader<'_>> = pipelines.iter().map(reader).collect();
+    let mut sums = vec![Some(Gram::default()); readers.len()];
+    for (log, own) in logs.iter().zip(&data.fit) {
+        // One cut-off after the other: of a long log one more trajectory fits in memory, two do not. Each uses all cores.
+        let mut add = |log: &PreparedLog<'_>| {
+            for (reader, kept) in readers.iter().zip(&mut sums) {
+                let gram = reader.gram(log, &own.incidents);
+                match (kept.as_mut(), gram) {
+                    (Some(sum), Ok(gram)) => *sum += &gram,
+                    _ => *kept = None,
+                }
+            }
+        };
+        match log {
+            ReadyLog::Whole(log) => add(log),
+            ReadyLog::Long(long) => long.visit(&twin.pipeline, &mut Vec::new(), |chapter, _| {
+                add(chapter);
+                Ok(())
+            })?,
+        }
+    }
+    let with_rows = |sum: Option<Gram>| sum.filter(|sum| sum.joints.iter().any(|j| j.n > 0.0));
+    Ok(sums.into_iter().map(with_rows).collect())
 }
 
 /// True if some log says that the robot carried something unknown: then the payload component acts in those logs only.
-pub(super) fn carry_something<'a>(mut logs: impl Iterator<Item = &'a Recording>) -> bool {
-    logs.any(|log| log.payload == Payload::Unknown)
+pub(super) fn carry_something(mut payloads: impl Iterator<Item = Payload>) -> bool {
+    payloads.any(|payload| payload == Payload::Unknown)
 }
 
 /// True if the payload acts in some of the fit logs and not in others, which tells it from the link that carries it.
-pub(super) fn tell_payload_apart(logs: &[Recording]) -> bool {
-    let unknown = |log: &Recording| log.payload == Payload::Unknown;
+pub(super) fn tell_payload_apart(logs: &[signal::Log<'_>]) -> bool {
+    let unknown = |log: &signal::Log<'_>| log.payload() == Payload::Unknown;
     logs.iter().any(unknown) && !logs.iter().all(unknown)
 }
 
@@ -357,7 +507,6 @@ fn summary(
     role: &str,
     pipeline: &Pipeline,
     trajectory: &Trajectory,
-    observations: &Observations,
 ) -> LogSummary {
     let mut intervals: Vec<f64> = recording
         .time
@@ -377,13 +526,6 @@ fn summary(
         recording.time.first().copied().unwrap_or(0.0),
         recording.time.last().copied().unwrap_or(0.0),
     );
-    let still = |joint: usize| {
-        observations.joints[joint]
-            .standstill
-            .iter()
-            .filter(|s| **s)
-            .count() as u64
-    };
     let longest = trajectory.segments.iter().max_by_key(|s| s.time.len());
     LogSummary {
         name: recording.name.clone(),
@@ -393,9 +535,7 @@ fn summary(
         rate_hz: 1.0 / median,
         kept_rate_hz: longest.map_or(0.0, |segment| pipeline.kept_rate(segment.interval)),
         segments: trajectory.segments.len() as u64,
-        rows: (0..trajectory.dof)
-            .map(|joint| observations.len() as u64 - still(joint))
-            .collect(),
-        standstill: (0..trajectory.dof).map(still).collect(),
+        rows: Vec::new(),
+        standstill: Vec::new(),
     }
 }

@@ -1,11 +1,11 @@
 //! Held-out truth: what to leave out, fit without it, predict it, score it.
 
-use super::data::{Data, Trajectories};
+use super::data::{Data, Log, Trajectories};
 use super::summary::LEAST_EFFECTIVE_ROWS;
 use super::{CalibrationSettings, Fitted, Stage, compact, estimate, noise_of};
 use crate::error::{Finding, Result, Severity};
 use crate::likelihood::{Columns, JointNoise};
-use crate::observations::Part;
+use crate::observations::{Observations, Part};
 use crate::posterior::Posterior;
 use crate::signal::{Pipeline, Trajectory};
 use crate::term::Library;
@@ -28,7 +28,15 @@ pub(super) struct Plan<'a> {
 struct Fold<'a> {
     training: Vec<Part<'a>>,
     /// Motion of logs and the time in s from which on they are held out.
-    held_out: Vec<(&'a Trajectory, f64)>,
+    held_out: Vec<LeftOut<'a>>,
+}
+
+/// What is left out of one log: its rows and motion from a time on, s.
+#[derive(Clone, Copy)]
+struct LeftOut<'a> {
+    rows: &'a Observations,
+    motion: &'a Trajectory,
+    from: f64,
 }
 
 /// The twin that was fitted to all logs, and the posterior of its compact form.
@@ -90,14 +98,16 @@ pub(super) fn validate(
             twin: &predictor,
             compact: Some(&compact),
         };
-        for (trajectory, from) in &fold.held_out {
-            held_out.score(
+        for left_out in &fold.held_out {
+            let LeftOut { rows, motion, from } = *left_out;
+            held_out.score_kept(predictors, rows, from);
+            held_out.score_raw(
                 &twin.robot,
                 library,
                 &twin.pipeline,
-                predictors,
-                trajectory,
-                *from,
+                predictors.twin,
+                motion,
+                from,
             )?;
         }
     }
@@ -112,8 +122,9 @@ fn says_something(noise: &[JointNoise]) -> bool {
 }
 
 /// A fold that is left out of the scores.
-fn not_scored(held_out: &[(&Trajectory, f64)], noise: &[JointNoise]) -> Finding {
-    let names: Vec<&str> = held_out.iter().map(|(log, _)| log.name.as_str()).collect();
+fn not_scored(held_out: &[LeftOut<'_>], noise: &[JointNoise]) -> Finding {
+    let names = held_out.iter().map(|left_out| left_out.rows.log.as_str());
+    let names: Vec<&str> = names.collect();
     let names = names.join(", ");
     let most = noise.iter().map(|joint| joint.n_eff).fold(0.0, f64::max);
     Finding::new(
@@ -150,9 +161,13 @@ pub(super) fn plan<'a>(
     trajectories: &'a Trajectories,
     pipeline: &Pipeline,
 ) -> Plan<'a> {
-    let whole = |trajectory: &'a Trajectory| (trajectory, f64::NEG_INFINITY);
+    let whole = |(log, motion): (&'a Log, &'a Trajectory)| LeftOut {
+        rows: &log.observations,
+        motion,
+        from: f64::NEG_INFINITY,
+    };
     if !data.heldout.is_empty() {
-        let held_out = trajectories.heldout.iter().map(whole);
+        let held_out = data.heldout.iter().zip(&trajectories.heldout).map(whole);
         let fold = Fold {
             training: Vec::new(),
             held_out: held_out.collect(),
@@ -168,7 +183,7 @@ pub(super) fn plan<'a>(
                 .filter(|&log| log != out)
                 .map(|log| data.fit[log].observations.whole())
                 .collect(),
-            held_out: vec![whole(&trajectories.fit[out])],
+            held_out: vec![whole((&data.fit[out], &trajectories.fit[out]))],
         });
         return Plan {
             split: Split::LeaveOneLogOut,
@@ -180,13 +195,17 @@ pub(super) fn plan<'a>(
         training: Vec::new(),
         held_out: Vec::new(),
     };
-    for (log, trajectory) in data.fit.iter().zip(&trajectories.fit) {
+    for (log, motion) in data.fit.iter().zip(&trajectories.fit) {
         let (end, from) = last_thirty(&log.observations.time, gap);
         fold.training.push(Part {
             observations: &log.observations,
             rows: 0..end,
         });
-        fold.held_out.push((trajectory, from));
+        fold.held_out.push(LeftOut {
+            rows: &log.observations,
+            motion,
+            from,
+        });
     }
     Plan {
         split: Split::LastThirty,

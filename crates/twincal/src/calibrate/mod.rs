@@ -52,14 +52,13 @@ use crate::prior::PriorSettings;
 use crate::robot::Robot;
 use crate::self_check::self_check;
 use crate::signal::{
-    Auto, Corrections, PreparedLog, Recording, SignalSettings, choose_and_prepare, constant_torque,
-    hardly_driven, prepare,
+    Auto, Corrections, Log, Logs, ReadyLog, SignalSettings, choose_and_prepare, constant_torque,
+    hardly_driven, ready,
 };
 use crate::term::{Family, Library, LibrarySettings};
 use crate::twin::Twin;
 use data::Data;
 use heredity::Named;
-use std::borrow::Cow;
 
 /// Everything a calibration can be told; each field but the last is a table of `twincal.toml`.
 #[derive(Debug, Clone, PartialEq)]
@@ -148,8 +147,8 @@ pub enum Stage {
 /// paper eq. (1)–(5); method sections 1–8.
 pub fn calibrate<'a>(
     robot: &Robot,
-    logs: impl Into<Cow<'a, [Recording]>>,
-    heldout: impl Into<Cow<'a, [Recording]>>,
+    logs: impl Into<Logs<'a>>,
+    heldout: impl Into<Logs<'a>>,
     settings: &CalibrationSettings,
     progress: &dyn Fn(Stage),
 ) -> std::result::Result<Calibration, Stopped> {
@@ -162,21 +161,23 @@ pub fn calibrate<'a>(
 /// [`calibrate`]; `findings` holds what was found where it ends early.
 fn whole_road(
     robot: &Robot,
-    recordings: (Cow<'_, [Recording]>, Cow<'_, [Recording]>),
+    recordings: (Logs<'_>, Logs<'_>),
     settings: &CalibrationSettings,
     progress: &dyn Fn(Stage),
     findings: &mut Vec<Finding>,
 ) -> Result<Calibration> {
-    let (logs, heldout) = (&*recordings.0, &*recordings.1);
+    let (logs, heldout) = (&recordings.0.0[..], &recordings.1.0[..]);
     // the same filters for every log, and candidates for this robot
     progress(Stage::Rows);
     for log in logs.iter().chain(heldout) {
-        log.require_torque(&robot.joint_names())?;
+        let names = robot.joint_names();
+        log.any_recording(|recording| recording.require_torque(&names))?;
     }
     let (pipeline, more, prepared) = choose_and_prepare(robot, logs, &settings.signal)?;
     findings.extend(more);
-    findings.extend(constant_torque(robot, logs.iter().chain(heldout)));
-    findings.extend(hardly_driven(robot, logs.iter().chain(heldout)));
+    let every_log: Vec<Log<'_>> = logs.iter().chain(heldout).map(Log::lent).collect();
+    findings.extend(constant_torque(robot, every_log.clone())?);
+    findings.extend(hardly_driven(robot, every_log.clone())?);
     let library_settings = LibrarySettings {
         coulomb_velocity: pipeline.coulomb_velocity,
         ..settings.library.clone()
@@ -185,8 +186,8 @@ fn whole_road(
     findings.extend(more);
 
     // eq. (1)–(4): residual torque and Euler–Lagrange columns, filtered alike
-    let ready = heldout.iter().map(|log| prepare(robot, log, &pipeline));
-    let others: Vec<PreparedLog<'_>> = ready.collect::<Result<_>>()?;
+    let others = heldout.iter().map(|log| ready(robot, log, &pipeline));
+    let others: Vec<ReadyLog<'_>> = others.collect::<Result<_>>()?;
     let sweeps = !settings.noise.weighs_rows();
     let all = (&prepared[..], &others[..]);
     room::require(settings.most_bytes, &library, &pipeline, all, sweeps)?;
@@ -246,7 +247,7 @@ fn whole_road(
         posterior: fitted.fit.posterior.clone(),
         noise: noise_of(robot, &fitted, &training, &out_of_band, &spreads),
         hull: data.hull(robot),
-        payload_where_unknown: data::carry_something(logs.iter().chain(heldout)),
+        payload_where_unknown: data::carry_something(every_log.iter().map(Log::payload)),
     };
     let own = held_out::Own {
         twin: &skeleton,
@@ -256,9 +257,8 @@ fn whole_road(
     findings.extend(more);
 
     // What follows reads the smoothed logs at other cut-offs and nothing of the recordings.
-    drop((trajectories, others));
-    let prepared: Vec<PreparedLog<'static>> =
-        prepared.into_iter().map(PreparedLog::detached).collect();
+    drop((trajectories, others, every_log));
+    let prepared: Vec<ReadyLog<'static>> = prepared.into_iter().map(ReadyLog::detached).collect();
     drop(recordings);
 
     progress(Stage::Sensitivity);

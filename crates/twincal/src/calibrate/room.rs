@@ -2,7 +2,7 @@
 
 use super::sweep::{FACTORS, scaled};
 use crate::error::{Error, Result};
-use crate::signal::{Pipeline, PreparedLog};
+use crate::signal::{Pipeline, ReadyLog};
 use crate::term::Library;
 
 /// Numbers of a row and joint besides its columns: motion, torques, weight.
@@ -19,21 +19,23 @@ pub(super) fn require(
     most: Option<u64>,
     library: &Library,
     pipeline: &Pipeline,
-    (fit, heldout): (&[PreparedLog<'_>], &[PreparedLog<'_>]),
+    (fit, heldout): (&[ReadyLog<'_>], &[ReadyLog<'_>]),
     sweeps: bool,
 ) -> Result<()> {
     let Some(most) = most else {
         return Ok(());
     };
-    let rows = |log: &PreparedLog<'_>| log.rows_at_most(pipeline);
+    let rows = |log: &ReadyLog<'_>| log.rows_at_most(pipeline);
     let widest = scaled(pipeline, FACTORS.into_iter().fold(0.0, f64::max));
     let again: usize = if sweeps && !pipeline.is_off() {
-        fit.iter().map(|log| log.rows_at_most(&widest)).sum()
+        // One log, or chapter, after the other.
+        let of_log = |log: &ReadyLog<'_>| log.rows_at_most(&widest) / log.chapters();
+        fit.iter().map(of_log).max().unwrap_or(0)
     } else {
         0
     };
     let all = || fit.iter().chain(heldout);
-    let samples: usize = all().map(PreparedLog::samples).sum();
+    let samples: usize = all().map(ReadyLog::samples).sum();
     let numbers: usize = (0..library.joints())
         .map(|joint| library.columns_of_joint(joint).len() + BESIDE)
         .sum();
@@ -43,7 +45,7 @@ pub(super) fn require(
     let longest = all().max_by_key(|log| rows(log));
     match longest {
         Some(log) if needed > most as f64 => Err(Error::Log {
-            log: log.recording().name.clone(),
+            log: log.name().to_owned(),
             problem: format!(
                 "fitting all logs needs about {:.1} MB of memory, and {:.1} MB are free; this log has {} rows of {} columns",
                 1e-6 * needed,

@@ -1,16 +1,15 @@
 //! Does an estimate depend on the cut-off? The same fit at 0.7 and 1.4 times f_c (method section 1).
 
 use super::CalibrationSettings;
-use super::data::{Data, rows};
+use super::data::{Data, grams_at};
 use super::result::SweepPoint;
 use crate::error::{Finding, Result, Severity};
 use crate::gram::Gram;
 use crate::infer::approximate;
 use crate::likelihood::{Columns, assemble};
-use crate::observations::{Observations, Part};
-use crate::plug_in::{Fit, total};
+use crate::plug_in::Fit;
 use crate::posterior::Posterior;
-use crate::signal::{Pipeline, PreparedLog};
+use crate::signal::{Pipeline, ReadyLog};
 use crate::term::Library;
 use crate::twin::Twin;
 use rayon::prelude::*;
@@ -25,13 +24,13 @@ pub(super) const FACTORS: [f64; 2] = [0.7, 1.4];
 pub(super) fn cutoff(
     twin: &Twin,
     library: &Library,
-    logs: &[PreparedLog<'_>],
+    logs: &[ReadyLog<'_>],
     data: &Data,
     columns: &Columns,
     settings: &CalibrationSettings,
     fit: &Fit,
 ) -> Result<Vec<SweepPoint>> {
-    let (robot, pipeline) = (&twin.robot, &twin.pipeline);
+    let pipeline = &twin.pipeline;
     if pipeline.cutoff_hz == 0.0 || settings.noise.weighs_rows() {
         return Ok(Vec::new());
     }
@@ -39,18 +38,13 @@ pub(super) fn cutoff(
         cutoff_hz: pipeline.cutoff_hz,
         mean: fit.posterior.mean.clone(),
     }];
-    // One after the other: of a long log one more trajectory fits in memory, two do not. Each uses all cores.
-    let mut moved: Vec<(f64, Gram)> = Vec::with_capacity(FACTORS.len());
-    for factor in FACTORS {
-        let scaled = scaled(pipeline, factor);
-        let Ok(observations) = rows(robot, library, &scaled, logs, data) else {
-            continue;
-        };
-        let parts: Vec<Part<'_>> = observations.iter().map(Observations::whole).collect();
-        if parts.iter().any(|part| !part.rows.is_empty()) {
-            moved.push((scaled.cutoff_hz, total(&parts)));
-        }
-    }
+    let scaled: Vec<Pipeline> = FACTORS.iter().map(|f| scaled(pipeline, *f)).collect();
+    let grams = grams_at(twin, library, &scaled, logs, data)?;
+    let cutoffs = scaled.iter().map(|scaled| scaled.cutoff_hz);
+    let moved: Vec<(f64, Gram)> = cutoffs
+        .zip(grams)
+        .filter_map(|(cutoff_hz, gram)| Some((cutoff_hz, gram?)))
+        .collect();
     let moved: Vec<SweepPoint> = moved
         .into_par_iter()
         .map(|(cutoff_hz, gram)| {

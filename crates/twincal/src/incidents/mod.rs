@@ -9,6 +9,7 @@ use crate::error::{Finding, Severity};
 use crate::robot::Robot;
 use crate::signal::{Pipeline, Trajectory};
 use serde::{Deserialize, Serialize};
+use spikes::Bins;
 
 /// Incidents that a message lists.
 const LISTED: usize = 5;
@@ -38,32 +39,63 @@ pub struct Incident {
     pub samples: u64,
 }
 
-/// Finds the incidents of a log, in time order for each kind; none with the pipeline off, where every input row is one
-/// row whatever happened there.
-pub fn incidents(robot: &Robot, pipeline: &Pipeline, trajectory: &Trajectory) -> Vec<Incident> {
-    if pipeline.is_off() || trajectory.segments.iter().any(|s| s.tau.is_empty()) {
-        return Vec::new();
+/// What a log shows of incidents, part by part: what is far beyond the usual is told by all of them together.
+#[derive(Debug, Default)]
+pub struct Evidence {
+    stops: Vec<Incident>,
+    bins: Vec<Bins>,
+}
+
+impl Evidence {
+    /// Takes the next part of a log; nothing with the pipeline off, where every input row is one row whatever happened there, and
+    /// without torque.
+    pub fn take(&mut self, robot: &Robot, pipeline: &Pipeline, trajectory: &Trajectory) {
+        if pipeline.is_off() || trajectory.segments.iter().any(|s| s.tau.is_empty()) {
+            return;
+        }
+        let stops = stops::stops(robot, pipeline, trajectory);
+        let stopped: Vec<[f64; 2]> = stops.iter().map(|stop| stop.span).collect();
+        self.stops.extend(stops);
+        let bins = spikes::bins(robot, pipeline, trajectory, &stopped);
+        self.bins.extend(bins);
     }
-    let mut found = stops::stops(robot, pipeline, trajectory);
-    let stopped: Vec<[f64; 2]> = found.iter().map(|stop| stop.span).collect();
-    found.extend(spikes::spikes(robot, pipeline, trajectory, &stopped));
-    found
+
+    /// The incidents, in time order for each kind.
+    #[must_use]
+    pub fn incidents(self, robot: &Robot, pipeline: &Pipeline) -> Vec<Incident> {
+        let mut found = self.stops;
+        found.extend(spikes::spikes(robot, pipeline, &self.bins));
+        found
+    }
+}
+
+/// Finds the incidents of a log, see [`Evidence`].
+pub fn incidents(robot: &Robot, pipeline: &Pipeline, trajectory: &Trajectory) -> Vec<Incident> {
+    let mut evidence = Evidence::default();
+    evidence.take(robot, pipeline, trajectory);
+    evidence.incidents(robot, pipeline)
 }
 
 /// Takes the incidents of a log out of the fit, for all joints: what hits a link acts on every joint before it.
 pub fn leave_out(pipeline: &Pipeline, trajectory: &mut Trajectory, incidents: &[Incident]) {
-    // No row that is left shares a sample with an incident.
-    let margin = pipeline.filter_half_length() + pipeline.motion_half_length();
+    let spans = left_out(pipeline, incidents);
     for segment in &mut trajectory.segments {
         let len = segment.time.len();
-        for [first, last] in incidents.iter().map(|incident| incident.span) {
-            let from = segment.time.partition_point(|t| *t < first - margin);
-            let to = segment.time.partition_point(|t| *t <= last + margin);
+        for [first, last] in &spans {
+            let from = segment.time.partition_point(|t| t < first);
+            let to = segment.time.partition_point(|t| t <= last);
             for joint in 0..trajectory.dof {
                 segment.standstill[joint * len + from..joint * len + to.max(from)].fill(true);
             }
         }
     }
+}
+
+/// The times that incidents take out of the fit, s: no row that is left shares a sample with one.
+pub fn left_out(pipeline: &Pipeline, incidents: &[Incident]) -> Vec<[f64; 2]> {
+    let margin = pipeline.filter_half_length() + pipeline.motion_half_length();
+    let span = |incident: &Incident| [incident.span[0] - margin, incident.span[1] + margin];
+    incidents.iter().map(span).collect()
 }
 
 /// One warning per log and kind.

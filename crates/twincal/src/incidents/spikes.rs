@@ -34,31 +34,41 @@ const RIDGE: f64 = 1e-9;
 /// Columns: nominal torque, velocity, two shapes of dry friction, velocity squared, acceleration, one.
 const COLUMNS: usize = 7;
 
-/// Spikes of all joints; those that overlap are one, of the joint in which it is largest.
-pub(super) fn spikes(
+/// A trajectory in bins; `stopped`: spans in which the drives were off, s.
+pub(super) fn bins(
     robot: &Robot,
     pipeline: &Pipeline,
     trajectory: &Trajectory,
     stopped: &[[f64; 2]],
-) -> Vec<Incident> {
-    let names = robot.joint_names();
-    let first = trajectory.segments.first();
-    let (interval, logged) = first.map_or((1.0, 1.0), |s| (s.interval, s.logged_interval));
-    let (width, joined) = if pipeline.is_off() {
-        (1, JOINED_SAMPLES * interval)
-    } else {
-        let period = 1.0 / pipeline.cutoff_hz;
-        (((BIN * period / interval) as usize).max(1), JOINED * period)
+) -> Vec<Bins> {
+    let width = |interval: f64| {
+        if pipeline.is_off() {
+            1
+        } else {
+            ((BIN / pipeline.cutoff_hz / interval) as usize).max(1)
+        }
     };
-    let bins: Vec<Bins> = trajectory
-        .segments
-        .iter()
+    let first = trajectory.segments.first();
+    let width = first.map_or(1, |segment| width(segment.interval));
+    let segments = trajectory.segments.iter();
+    segments
         .map(|segment| Bins::new(robot, segment, width, stopped))
-        .collect();
+        .collect()
+}
+
+/// Spikes of all joints; those that overlap are one, of the joint in which it is largest.
+pub(super) fn spikes(robot: &Robot, pipeline: &Pipeline, bins: &[Bins]) -> Vec<Incident> {
+    let names = robot.joint_names();
+    let [interval, logged] = bins.first().map_or([1.0; 2], |bins| bins.intervals);
+    let joined = if pipeline.is_off() {
+        JOINED_SAMPLES * interval
+    } else {
+        JOINED / pipeline.cutoff_hz
+    };
     // with how many times the quantile it reaches
     let of_joint = |(joint, name)| {
-        let left = Left::new(&bins, joint)?;
-        Some(left.spikes(&bins, name))
+        let left = Left::new(bins, joint)?;
+        Some(left.spikes(bins, name))
     };
     let of_joints: Vec<_> = names.into_par_iter().enumerate().map(of_joint).collect();
     let mut found: Vec<(f64, Incident)> = of_joints.into_iter().flatten().flatten().collect();
@@ -85,7 +95,10 @@ pub(super) fn spikes(
 }
 
 /// A segment, averaged over bins.
-struct Bins {
+#[derive(Debug)]
+pub(super) struct Bins {
+    /// Sampling intervals of the segment and of the log, s.
+    intervals: [f64; 2],
     /// First and last stamp of each bin, s.
     spans: Vec<[f64; 2]>,
     /// Samples of each bin.
@@ -95,6 +108,8 @@ struct Bins {
     qdd: Vec<f64>,
     tau: Vec<f64>,
     nominal: Vec<f64>,
+    /// The shapes of dry friction: means of the shapes, since where a joint turns round that is not the shape of the mean.
+    dry: [Vec<f64>; 2],
     /// Whether the joint moves in the whole bin, alike.
     moves: Vec<bool>,
 }
@@ -112,6 +127,14 @@ impl Bins {
         };
         let [q, qd, qdd, tau] =
             [&segment.q, &segment.qd, &segment.qdd, &segment.tau].map(|values| mean(values));
+        let shape = |velocity: f64| -> Vec<f64> {
+            let of_bin = |bin: &[f64]| {
+                bin.iter().map(|qd| (qd / velocity).tanh()).sum::<f64>() / width as f64
+            };
+            let joints = segment.qd.par_chunks_exact(len.max(1));
+            let bins = joints.flat_map_iter(|joint| joint.chunks_exact(width).map(of_bin));
+            bins.collect()
+        };
         let mut nominal = vec![0.0; dof * count];
         let motion = Motion {
             len: count,
@@ -135,12 +158,14 @@ impl Bins {
             .map(|(bin, span)| !stops(span) && bin.iter().all(|still| !still))
             .collect();
         Self {
+            intervals: [segment.interval, segment.logged_interval],
             spans,
             width: (width * segment.thinning()) as u64,
             qd,
             qdd,
             tau,
             nominal,
+            dry: DRY.map(shape),
             moves,
         }
     }
@@ -149,8 +174,8 @@ impl Bins {
     fn columns(&self, joint: usize, bin: usize) -> [f64; COLUMNS] {
         let at = joint * self.spans.len() + bin;
         let (v, a) = (self.qd[at], self.qdd[at]);
-        let dry = DRY.map(|velocity| (v / velocity).tanh());
-        [self.nominal[at], v, dry[0], dry[1], v.abs() * v, a, 1.0]
+        let [slow, fast] = self.dry.each_ref().map(|dry| dry[at]);
+        [self.nominal[at], v, slow, fast, v.abs() * v, a, 1.0]
     }
 }
 

@@ -5,11 +5,14 @@ use super::clock::even_interval;
 use super::cutoff::{
     JointSpectra, automatic, derived_from, motion_band, rms_acceleration, spectra,
 };
-use super::encoder::velocity_resolution;
+use super::encoder::{Encoder, quantum, velocity_resolution};
 use super::fir::{column_half_seconds, column_kernel, motion_half_seconds, noise_gain};
-use super::prepare::{JointFacts, Prepared, prepare};
+use super::prepare::{JointFacts, Piece, Prepared, prepare};
 use super::thin::{coarsest, factor};
-use super::{Auto, DerivedFrom, Pipeline, Recording, SignalSettings};
+use super::{
+    Auto, Channels, DerivedFrom, Log, LongLog, LongReady, Pipeline, ReadyLog, Recording,
+    SignalSettings,
+};
 use crate::error::{Error, Finding, Result, Severity};
 use rayon::prelude::*;
 
@@ -30,12 +33,51 @@ fn setting(key: &str, problem: String, remedy: &str) -> Error {
     }
 }
 
+/// What choosing has to know of a recording.
+struct Survey {
+    /// Median step, s.
+    interval: f64,
+    /// Longest stretch without a cut, s.
+    longest: f64,
+    /// `None` where it is too short for one.
+    spectra: Option<Vec<JointSpectra>>,
+    /// Whether velocity and acceleration are logged, by joint.
+    logged: Vec<[bool; 2]>,
+}
+
+impl Survey {
+    fn of(recording: &Recording, prepared: &Prepared<'_>) -> Self {
+        let seconds = |piece: &Piece<'_>| piece.time.len() as f64 * piece.interval;
+        let joints = recording.joints.iter();
+        Self {
+            interval: prepared.interval,
+            longest: prepared.pieces.iter().map(seconds).fold(0.0, f64::max),
+            spectra: spectra(prepared),
+            logged: (joints.map(|joint| [joint.qd.is_some(), joint.qdd.is_some()])).collect(),
+        }
+    }
+}
+
+/// Logs before the pipeline is known.
+struct Candidates<'a> {
+    /// Those in memory, cut and unfolded.
+    whole: Vec<(&'a Recording, Prepared<'a>, Vec<Finding>)>,
+    long: Vec<(&'a LongLog, Chapters)>,
+}
+
+/// What is known of the chapters of a log.
+struct Chapters {
+    surveys: Vec<Survey>,
+    /// Steps of the encoders, by joint and chapter.
+    steps: Vec<Vec<Option<f64>>>,
+}
+
 /// See [`super::choose_and_prepare`].
 pub(crate) fn choose<'a>(
     joints: &[JointFacts],
-    logs: &'a [Recording],
+    logs: &'a [Log<'_>],
     settings: &SignalSettings,
-) -> Result<(Pipeline, Vec<Finding>, Vec<PreparedLog<'a>>)> {
+) -> Result<(Pipeline, Vec<Finding>, Vec<ReadyLog<'a>>)> {
     check_settings(settings)?;
     if logs.is_empty() {
         return Err(Error::Refused {
@@ -48,25 +90,144 @@ pub(crate) fn choose<'a>(
         settings.cutoff_hz == Auto::Value(0.0),
     );
     corrections.check(joints, is_off)?;
-    let mut prepared = Vec::with_capacity(logs.len());
-    // What is wrong with single logs is said when they are aligned.
-    let mut unsaid = Vec::with_capacity(logs.len());
+    let mut candidates = Candidates {
+        whole: Vec::new(),
+        long: Vec::new(),
+    };
     for log in logs {
-        let mut findings = Vec::new();
-        prepared.push(prepare(joints, log, is_off, corrections, &mut findings)?);
-        unsaid.push(findings);
+        match log {
+            Log::Whole(recording) => {
+                // What is wrong with single logs is said when they are aligned.
+                let mut unsaid = Vec::new();
+                let pieces = prepare(joints, recording, is_off, corrections, &mut unsaid)?;
+                candidates.whole.push((recording, pieces, unsaid));
+            }
+            Log::Long(long) if is_off => return Err(needs_a_filter(long)),
+            Log::Long(long) => {
+                let chapters = Chapters::read(joints, long, settings)?;
+                candidates.long.push((long, chapters));
+            }
+        }
     }
     let (pipeline, findings) = if is_off {
-        off(joints, logs, settings)?
+        let recordings: Vec<&Recording> = candidates.whole.iter().map(|whole| whole.0).collect();
+        off(joints, &recordings, settings)?
     } else {
-        on(joints, logs, &prepared, settings)?
+        on(joints, logs[0].name(), &candidates, settings)?
     };
-    let ready = logs.iter().zip(prepared).zip(unsaid);
-    let ready = ready.map(|((log, pieces), findings)| {
-        PreparedLog::of(joints.to_vec(), log, pieces, findings, &pipeline)
-    });
-    let ready = ready.collect();
+    let Candidates { whole, long } = candidates;
+    let (mut whole, mut long) = (whole.into_iter(), long.into_iter());
+    let ready = |log: &Log<'_>| match log {
+        Log::Whole(_) => whole.next().map(|(recording, pieces, findings)| {
+            let joints = joints.to_vec();
+            ReadyLog::Whole(PreparedLog::of(
+                joints, recording, pieces, findings, &pipeline,
+            ))
+        }),
+        Log::Long(_) => long.next().map(|(log, chapters)| {
+            ReadyLog::Long(LongReady {
+                log: log.clone(),
+                joints: joints.to_vec(),
+                interval: chapters.interval(),
+            })
+        }),
+    };
+    let ready = logs.iter().filter_map(ready).collect();
     Ok((pipeline, findings, ready))
+}
+
+fn needs_a_filter(long: &LongLog) -> Error {
+    Error::Log {
+        log: long.name.clone(),
+        problem: "is read in chapters, which only a filter can do without".into(),
+        remedy: "set [signal] cutoff_hz to \"auto\" or a number, or read it whole".into(),
+    }
+}
+
+impl Chapters {
+    fn read(joints: &[JointFacts], long: &LongLog, settings: &SignalSettings) -> Result<Self> {
+        let (mut surveys, mut steps) = (Vec::new(), vec![Vec::new(); joints.len()]);
+        long.visit(&mut Vec::new(), |chapter, said| {
+            let prepared = prepare(joints, chapter, false, &settings.corrections, said)?;
+            surveys.push(Survey::of(chapter, &prepared));
+            let step = |channels: &Channels| quantum(std::iter::once(channels.q.as_slice()));
+            let of_chapter: Vec<Option<f64>> = chapter.joints.par_iter().map(step).collect();
+            for (steps, step) in steps.iter_mut().zip(of_chapter) {
+                steps.push(step);
+            }
+            Ok(())
+        })?;
+        Ok(Self { surveys, steps })
+    }
+
+    /// Median step, s.
+    fn interval(&self) -> f64 {
+        let mut all: Vec<f64> = self.surveys.iter().map(|survey| survey.interval).collect();
+        all.sort_by(f64::total_cmp);
+        all[all.len() / 2]
+    }
+
+    /// The step of a joint's encoder, if at least every second chapter has one.
+    fn step(&self, joint: usize) -> Option<f64> {
+        let steps = &self.steps[joint];
+        let known = || steps.iter().flatten().copied();
+        (2 * known().count() >= steps.len()).then(|| known().fold(f64::INFINITY, f64::min))
+    }
+}
+
+impl Candidates<'_> {
+    /// The step of a joint's encoder: of the logs in memory together, and of each log in chapters.
+    fn step(&self, joint: usize) -> Option<f64> {
+        let whole = self
+            .whole
+            .iter()
+            .map(|whole| whole.0.joints[joint].q.as_slice());
+        let long = self
+            .long
+            .iter()
+            .filter_map(|(_, chapters)| chapters.step(joint));
+        quantum(whole)
+            .into_iter()
+            .chain(long)
+            .min_by(f64::total_cmp)
+    }
+
+    /// By joint: displaced anywhere by more than its threshold, rad/s or m/s, times half a period of the cut-off in that time.
+    fn move_by(
+        &self,
+        joints: &[JointFacts],
+        thresholds: &[f64],
+        cutoff: f64,
+        settings: &SignalSettings,
+    ) -> Result<Vec<bool>> {
+        let see = |moving: &mut Vec<bool>, prepared: &Prepared<'_>| {
+            (moving.par_iter_mut().zip(thresholds).enumerate())
+                .filter(|(_, (moving, _))| !**moving)
+                .for_each(|(joint, (moving, threshold))| {
+                    *moving = moves(joint, prepared, *threshold, cutoff);
+                });
+        };
+        let mut moving = vec![false; joints.len()];
+        for (_, prepared, _) in &self.whole {
+            see(&mut moving, prepared);
+        }
+        for (long, _) in &self.long {
+            // Nearly always the first chapter says it all.
+            for chapter in 0..long.chapters() {
+                if moving.iter().all(|moves| *moves) {
+                    break;
+                }
+                let recording = long.chapter(chapter)?;
+                let corrections = &settings.corrections;
+                if let Ok(prepared) =
+                    prepare(joints, &recording, false, corrections, &mut Vec::new())
+                {
+                    see(&mut moving, &prepared);
+                }
+            }
+        }
+        Ok(moving)
+    }
 }
 
 fn check_settings(settings: &SignalSettings) -> Result<()> {
@@ -141,7 +302,7 @@ fn unexcited(joints: &[JointFacts], still: &[bool], limits: &[f64]) -> Result<Ve
 /// Pipeline off: rows are the input rows, so motion has to be complete.
 fn off(
     joints: &[JointFacts],
-    logs: &[Recording],
+    logs: &[&Recording],
     settings: &SignalSettings,
 ) -> Result<(Pipeline, Vec<Finding>)> {
     let mut still = vec![true; joints.len()];
@@ -214,26 +375,29 @@ pub(crate) fn require_derivatives(joints: &[JointFacts], log: &Recording) -> Res
 /// Pipeline on.
 fn on(
     joints: &[JointFacts],
-    logs: &[Recording],
-    prepared: &[Prepared<'_>],
+    first_log: &str,
+    candidates: &Candidates<'_>,
     settings: &SignalSettings,
 ) -> Result<(Pipeline, Vec<Finding>)> {
     let coulomb_velocity = settings.coulomb_velocity.unwrap_or(COULOMB_VELOCITY);
-    let lowest_rate = prepared
+    let whole = candidates.whole.iter();
+    let surveys: Vec<Survey> = whole
+        .map(|(recording, prepared, _)| Survey::of(recording, prepared))
+        .collect();
+    let chapters = candidates.long.iter();
+    let seen: Vec<&Survey> = surveys
         .iter()
-        .map(|p| 1.0 / p.interval)
+        .chain(chapters.flat_map(|(_, chapters)| &chapters.surveys))
+        .collect();
+    let lowest_rate = seen
+        .iter()
+        .map(|survey| 1.0 / survey.interval)
         .fold(f64::INFINITY, f64::min);
-    let seconds = |p: &Prepared<'_>| {
-        p.pieces
-            .iter()
-            .map(|piece| piece.time.len() as f64 * piece.interval)
-            .fold(0.0, f64::max)
-    };
-    let longest = prepared.iter().map(seconds).fold(0.0, f64::max);
-    let all: Vec<Vec<JointSpectra>> = prepared.iter().filter_map(spectra).collect();
+    let longest = seen.iter().map(|survey| survey.longest).fold(0.0, f64::max);
+    let all: Vec<&Vec<JointSpectra>> = seen.iter().filter_map(|s| s.spectra.as_ref()).collect();
     if all.is_empty() {
         return Err(Error::Log {
-            log: logs[0].name.clone(),
+            log: first_log.to_owned(),
             problem: format!(
                 "the longest stretch without a cut is {longest:.3} s, too short for a spectrum"
             ),
@@ -255,7 +419,7 @@ fn on(
         Auto::Value(value) => value,
         Auto::Auto => automatic(&moving, longest, lowest_rate),
     };
-    let (rate, mut findings) = limits(logs, cutoff, longest, lowest_rate, settings)?;
+    let (rate, mut findings) = limits(first_log, cutoff, longest, lowest_rate, settings)?;
     let motion_cutoff = (4.0 * cutoff).min(MOTION_LIMIT * lowest_rate);
     if motion_cutoff < 4.0 * cutoff {
         findings.push(Finding::new(
@@ -286,26 +450,35 @@ fn on(
             .collect(),
         corrections: settings.corrections.clone(),
     };
-    if prepared.iter().all(|p| factor(&pipeline, p.interval) == 1) {
+    if seen
+        .iter()
+        .all(|survey| factor(&pipeline, survey.interval) == 1)
+    {
         pipeline.motion_interval = 0.0;
     }
-    let seen: Vec<(f64, bool, Vec<Finding>)> = (joints.par_iter().enumerate())
+    let resolved: Vec<(f64, Vec<Finding>)> = (joints.par_iter().enumerate())
         .map(|(joint, facts)| {
             let mut said = Vec::new();
+            let logged = [0, 1].map(|channel| seen.iter().all(|s| s.logged[joint][channel]));
+            let encoder = Encoder {
+                facts,
+                logged,
+                step: candidates.step(joint),
+            };
             let spectra = of_joint(joint);
-            let resolved = velocity_resolution(joint, facts, logs, &spectra, &pipeline, &mut said);
-            let threshold = coulomb_velocity.max(resolved);
-            (threshold, !moves(joint, prepared, threshold, cutoff), said)
+            let resolved = velocity_resolution(joint, &encoder, &spectra, &pipeline, &mut said);
+            (coulomb_velocity.max(resolved), said)
         })
         .collect();
-    let mut still = Vec::with_capacity(joints.len());
-    for (threshold, stands, said) in seen {
+    for (threshold, said) in resolved {
         findings.extend(said);
-        still.push(stands);
         pipeline.standstill_velocity.push(threshold);
     }
-    findings.extend(unexcited(joints, &still, &pipeline.standstill_velocity)?);
-    let kept = pipeline.common_rate(prepared.iter().map(|p| pipeline.kept_rate(p.interval)));
+    let thresholds = &pipeline.standstill_velocity;
+    let moving = candidates.move_by(joints, thresholds, cutoff, settings)?;
+    let still: Vec<bool> = moving.iter().map(|moves| !moves).collect();
+    findings.extend(unexcited(joints, &still, thresholds)?);
+    let kept = pipeline.common_rate(seen.iter().map(|s| pipeline.kept_rate(s.interval)));
     let taps = column_kernel(cutoff, 1.0 / lowest_rate);
     findings.push(Finding::new(
         Severity::Note,
@@ -324,8 +497,8 @@ fn on(
 }
 
 /// Whether a joint is anywhere displaced by more than `threshold` times half a period of the cut-off in that time.
-fn moves(joint: usize, prepared: &[Prepared<'_>], threshold: f64, cutoff: f64) -> bool {
-    prepared.iter().flat_map(|p| &p.pieces).any(|piece| {
+fn moves(joint: usize, prepared: &Prepared<'_>, threshold: f64, cutoff: f64) -> bool {
+    prepared.pieces.iter().any(|piece| {
         let lag = ((0.5 / cutoff / piece.interval).round() as usize).max(1);
         let least = threshold * lag as f64 * piece.interval;
         let q = &piece.joints[joint].q;
@@ -337,7 +510,7 @@ fn moves(joint: usize, prepared: &[Prepared<'_>], threshold: f64, cutoff: f64) -
 
 /// Rate of kept rows, after checking that the filters fit the logs.
 fn limits(
-    logs: &[Recording],
+    first_log: &str,
     cutoff: f64,
     longest: f64,
     lowest_rate: f64,
@@ -385,7 +558,7 @@ fn limits(
         + FEWEST_ROWS / rate;
     if longest < needed {
         return Err(Error::Log {
-            log: logs[0].name.clone(),
+            log: first_log.to_owned(),
             problem: format!(
                 "the longest stretch without a cut is {longest:.3} s; filters at {cutoff} Hz need {needed:.3} s for {FEWEST_ROWS} rows"
             ),

@@ -1,7 +1,7 @@
 //! What a log holds, before anything is fitted: rates, cuts, motion and torque per joint.
 
 use super::prepare::{Piece, Values, joint_facts, prepare};
-use super::{Corrections, Recording};
+use super::{Corrections, Log, Logs, Recording};
 use crate::error::{Finding, Result, Severity};
 use crate::robot::Robot;
 use serde::{Deserialize, Serialize};
@@ -116,26 +116,26 @@ pub fn describe(robot: &Robot, log: &Recording) -> Result<(LogOverview, Vec<Find
 
 /// Joints whose torque in a log is below a fifth of what it is in another log: they were hardly driven there, and
 /// their motion is that of a passive joint.
-pub fn hardly_driven<'a>(
-    robot: &Robot,
-    logs: impl IntoIterator<Item = &'a Recording>,
-) -> Vec<Finding> {
-    let logs: Vec<&Recording> = logs.into_iter().collect();
+///
+/// # Errors
+/// Of chapters that cannot be read.
+pub fn hardly_driven<'a>(robot: &Robot, logs: impl Into<Logs<'a>>) -> Result<Vec<Finding>> {
+    let Logs(logs) = logs.into();
     let mut findings = Vec::new();
     if logs.len() < 2 {
-        return findings;
+        return Ok(findings);
     }
+    let torques: Vec<Vec<Option<f64>>> = logs.iter().map(torque_rms).collect::<Result<_>>()?;
     for (joint, name) in robot.joint_names().into_iter().enumerate() {
-        let torque: Vec<Option<f64>> = logs.iter().map(|log| torque_rms(log, joint)).collect();
-        let largest = torque.iter().flatten().copied().fold(0.0, f64::max);
-        for (log, torque) in logs.iter().zip(torque) {
-            let Some(torque) = torque.filter(|t| *t < HARDLY_DRIVEN * largest) else {
+        let largest = (torques.iter().filter_map(|log| log[joint])).fold(0.0, f64::max);
+        for (log, torque) in logs.iter().zip(&torques) {
+            let Some(torque) = torque[joint].filter(|t| *t < HARDLY_DRIVEN * largest) else {
                 continue;
             };
             findings.push(Finding::new(
                 Severity::Note,
                 "joint_not_driven",
-                &log.name,
+                log.name(),
                 format!(
                     "joint `{name}` is hardly driven: rms torque {torque:.3e}, {:.1} % of its largest in any log",
                     100.0 * torque / largest
@@ -144,14 +144,25 @@ pub fn hardly_driven<'a>(
             ));
         }
     }
-    findings
+    Ok(findings)
 }
 
-/// Root mean square of a joint's finite torques; `None` without any.
-fn torque_rms(log: &Recording, joint: usize) -> Option<f64> {
-    let tau = log.joints[joint].tau.as_deref()?;
-    let finite: Vec<f64> = tau.iter().copied().filter(|t| t.is_finite()).collect();
-    (!finite.is_empty()).then(|| rms(&finite))
+/// Root mean square of each joint's finite torques; `None` without any.
+fn torque_rms(log: &Log<'_>) -> Result<Vec<Option<f64>>> {
+    let mut sums: Vec<(f64, usize)> = Vec::new();
+    log.until(|recording| {
+        sums.resize(recording.joints.len(), (0.0, 0));
+        for ((sum, count), channels) in sums.iter_mut().zip(&recording.joints) {
+            let torque = channels.tau.iter().flatten().filter(|t| t.is_finite());
+            for tau in torque {
+                *sum += tau * tau;
+                *count += 1;
+            }
+        }
+        false
+    })?;
+    let mean = |(sum, count)| (count > 0).then(|| f64::sqrt(sum / count as f64));
+    Ok(sums.into_iter().map(mean).collect())
 }
 
 fn rms(x: &[f64]) -> f64 {

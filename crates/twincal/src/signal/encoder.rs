@@ -4,21 +4,32 @@ use super::cutoff::JointSpectra;
 use super::fir::{MotionKernels, noise_gain};
 use super::prepare::JointFacts;
 use super::spectrum::Noise;
-use super::{DerivedFrom, Pipeline, Recording};
+use super::{DerivedFrom, Pipeline};
 use crate::error::{Finding, Severity};
+
+/// What is known of the encoder of a joint before anything is filtered.
+pub(crate) struct Encoder<'a> {
+    /// Its joint.
+    pub(crate) facts: &'a JointFacts,
+    /// Whether all logs hold its velocity, and its acceleration.
+    pub(crate) logged: [bool; 2],
+    /// Its step, rad or m, if it has one.
+    pub(crate) step: Option<f64>,
+}
 
 /// Velocity that the encoder resolves after the motion filter; says what noise the derivatives carry.
 pub(crate) fn velocity_resolution(
     joint: usize,
-    facts: &JointFacts,
-    logs: &[Recording],
+    encoder: &Encoder<'_>,
     spectra: &[&JointSpectra],
     pipeline: &Pipeline,
     findings: &mut Vec<Finding>,
 ) -> f64 {
-    let channels = || logs.iter().map(move |log| &log.joints[joint]);
-    let has_qd = channels().all(|c| c.qd.is_some());
-    let has_qdd = channels().all(|c| c.qdd.is_some());
+    let Encoder {
+        facts,
+        logged: [has_qd, has_qdd],
+        step,
+    } = *encoder;
     let derived = pipeline.derived_from[joint];
     let (mut velocity, mut acceleration, mut position) = (0.0_f64, 0.0_f64, 0.0_f64);
     let mut travel = 0.0_f64;
@@ -54,7 +65,6 @@ pub(crate) fn velocity_resolution(
             0,
         ));
     }
-    let step = quantum(channels().map(|c| c.q.as_slice()));
     let stepping = step.map_or(0.0, |step| 4.0 * pipeline.motion_cutoff_hz * step);
     if let Some(step) = step.filter(|_| stepping > pipeline.coulomb_velocity) {
         let [velocity, acceleration] = quantisation_floor(step, spectra, pipeline);

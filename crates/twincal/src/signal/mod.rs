@@ -9,6 +9,7 @@ pub(crate) mod decimate;
 mod correct;
 mod fourier;
 mod jumps;
+mod long;
 mod cutoff;
 mod describe;
 mod encoder;
@@ -16,6 +17,7 @@ pub(crate) mod fir;
 pub(crate) mod interpolate;
 mod mask;
 mod prepare;
+mod ready;
 mod saturation;
 mod spectrum;
 pub(crate) mod spline;
@@ -30,6 +32,8 @@ pub use agreement::{Agreement, velocity_agreement};
 pub use align::{PreparedLog, Raw};
 pub use correct::{Corrections, Lag};
 pub use describe::{JointOverview, LogOverview, describe, hardly_driven};
+pub use long::{Log, Logs, LongLog, ReadChapter};
+pub use ready::{LongReady, ReadyLog};
 pub use steps::{Steps, steps};
 pub use torque::{constant_torque, missing_torque};
 
@@ -39,6 +43,10 @@ use serde::{Deserialize, Serialize};
 
 /// Rates that differ by less than this share are one: clocks are known no better.
 const SAME_RATE: f64 = 1e-6;
+
+/// Shortest stretch of [`Trajectory::thinned_out`], samples, and most of them in a segment.
+const STRETCH: usize = 2048;
+const MOST_STRETCHES: usize = 8;
 
 fn is_zero(value: &f64) -> bool {
     *value == 0.0
@@ -193,6 +201,51 @@ pub struct Segment {
 }
 
 impl Segment {
+    /// Some of its samples.
+    fn cut(&self, dof: usize, range: std::ops::Range<usize>) -> Self {
+        let len = self.time.len();
+        fn part<T: Copy>(
+            values: &[T],
+            dof: usize,
+            len: usize,
+            range: &std::ops::Range<usize>,
+        ) -> Vec<T> {
+            if values.is_empty() {
+                return Vec::new();
+            }
+            let joints = (0..dof).flat_map(|joint| &values[joint * len..][range.clone()]);
+            joints.copied().collect()
+        }
+        let of = |values: &[f64]| part(values, dof, len, &range);
+        let time = self.time[range.clone()].to_vec();
+        let logged = self.logged.as_ref().map(|logged| {
+            let (first, last) = (time[0], time[time.len() - 1]);
+            let from = logged.time.partition_point(|t| *t < first);
+            let own = from..logged.time.partition_point(|t| *t <= last).max(from);
+            LoggedSamples {
+                tau: part(&logged.tau, dof, logged.time.len(), &own),
+                input_rows: logged.input_rows[own.clone()].to_vec(),
+                time: logged.time[own].to_vec(),
+            }
+        });
+        Self {
+            input_rows: self
+                .input_rows
+                .get(range.clone())
+                .unwrap_or_default()
+                .to_vec(),
+            logged,
+            q: of(&self.q),
+            qd: of(&self.qd),
+            qdd: of(&self.qdd),
+            tau: of(&self.tau),
+            standstill: part(&self.standstill, dof, len, &range),
+            interval: self.interval,
+            logged_interval: self.logged_interval,
+            time,
+        }
+    }
+
     /// How many samples of the log one sample stands for.
     pub(crate) fn thinning(&self) -> usize {
         (self.interval / self.logged_interval).round().max(1.0) as usize
@@ -223,6 +276,35 @@ pub struct Trajectory {
     pub payload: Payload,
     /// False where the payload component does not act: in logs without a payload beside logs with an unknown one.
     pub payload_acts: bool,
+}
+
+impl Trajectory {
+    /// The same with about `samples` of its samples, in stretches that are spread evenly; its filtered rows are none of the log's.
+    pub(crate) fn thinned_out(mut self, samples: usize) -> Self {
+        let all: usize = self.segments.iter().map(|segment| segment.time.len()).sum();
+        if all <= samples {
+            return self;
+        }
+        let (mut seen, mut taken, mut kept) = (0, 0, Vec::new());
+        for segment in &self.segments {
+            let len = segment.time.len();
+            seen += len;
+            let due = (samples * seen / all).saturating_sub(taken).min(len);
+            // Of many short segments some are kept whole.
+            if due < len.min(STRETCH) {
+                continue;
+            }
+            let stretches = (due / STRETCH).clamp(1, MOST_STRETCHES);
+            let (of_each, apart) = (due / stretches, len / stretches);
+            kept.extend((0..stretches).map(|i| {
+                let from = i * apart + (apart - of_each) / 2;
+                segment.cut(self.dof, from..from + of_each)
+            }));
+            taken += stretches * of_each;
+        }
+        self.segments = kept;
+        self
+    }
 }
 
 impl Pipeline {
@@ -330,19 +412,20 @@ pub fn choose_pipeline(
     logs: &[Recording],
     settings: &SignalSettings,
 ) -> Result<(Pipeline, Vec<Finding>)> {
-    let (pipeline, findings, _) = choose_and_prepare(robot, logs, settings)?;
+    let logs = Logs::from(logs);
+    let (pipeline, findings, _) = choose_and_prepare(robot, &logs.0, settings)?;
     Ok((pipeline, findings))
 }
 
-/// [`choose_pipeline`] and [`prepare`] in one: logs are cut and unfolded once.
+/// [`choose_pipeline`] and [`ready`] in one: logs in memory are cut and unfolded once.
 ///
 /// # Errors
 /// Those of both.
 pub fn choose_and_prepare<'a>(
     robot: &Robot,
-    logs: &'a [Recording],
+    logs: &'a [Log<'_>],
     settings: &SignalSettings,
-) -> Result<(Pipeline, Vec<Finding>, Vec<PreparedLog<'a>>)> {
+) -> Result<(Pipeline, Vec<Finding>, Vec<ReadyLog<'a>>)> {
     choose::choose(&prepare::joint_facts(robot), logs, settings)
 }
 
@@ -372,6 +455,14 @@ pub fn prepare<'a>(
     pipeline: &Pipeline,
 ) -> Result<PreparedLog<'a>> {
     PreparedLog::new(prepare::joint_facts(robot), log, pipeline)
+}
+
+/// [`prepare`] of a log that may be in chapters.
+///
+/// # Errors
+/// As [`align`], and of chapters that cannot be read.
+pub fn ready<'a>(robot: &Robot, log: &'a Log<'_>, pipeline: &Pipeline) -> Result<ReadyLog<'a>> {
+    ReadyLog::new(&prepare::joint_facts(robot), log, pipeline)
 }
 
 #[cfg(test)]

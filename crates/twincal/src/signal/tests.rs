@@ -89,9 +89,13 @@ fn aligned(log: &Recording, pipeline: &Pipeline) -> Result<(Trajectory, Vec<Find
 }
 
 fn pipeline(log: &Recording) -> Pipeline {
-    choose::choose(&joints(), std::slice::from_ref(log), &settings(Auto::Auto))
-        .unwrap()
-        .0
+    chosen(log, &settings(Auto::Auto)).unwrap().0
+}
+
+fn chosen(log: &Recording, settings: &SignalSettings) -> Result<(Pipeline, Vec<Finding>)> {
+    let logs = Logs::from(std::slice::from_ref(log));
+    let (pipeline, findings, _) = choose::choose(&joints(), &logs.0, settings)?;
+    Ok((pipeline, findings))
 }
 
 /// Root mean square error of q̇ and q̈ over both joints.
@@ -198,12 +202,7 @@ fn logged_derivatives_pass_the_same_kernel() {
 fn without_filter_every_row_is_taken_as_it_is() {
     let mut log = recording(100.0, 3.0, 0.2, 0.0, true);
     log.joints[1].q[17] = f64::NAN;
-    let (off, _, _) = choose::choose(
-        &joints(),
-        std::slice::from_ref(&log),
-        &settings(Auto::Value(0.0)),
-    )
-    .unwrap();
+    let (off, _) = chosen(&log, &settings(Auto::Value(0.0))).unwrap();
     assert!(off.is_off() && off.coulomb_velocity == 0.0);
     assert_eq!(off.kernel_length(), 0.0);
     let (trajectory, findings) = aligned(&log, &off).unwrap();
@@ -233,13 +232,13 @@ fn without_filter_every_row_is_taken_as_it_is() {
 
 #[test]
 fn unfit_settings_are_refused_with_the_key() {
-    let log = [recording(100.0, 20.0, 0.2, 0.0, false)];
+    let log = recording(100.0, 20.0, 0.2, 0.0, false);
     let choose = |cutoff: f64, rate: Auto| {
         let settings = SignalSettings {
             rate_hz: rate,
             ..settings(Auto::Value(cutoff))
         };
-        choose::choose(&joints(), &log, &settings)
+        chosen(&log, &settings)
     };
     for (cutoff, rate, part) in [
         (-1.0, Auto::Auto, "signal.cutoff_hz"),
@@ -251,9 +250,9 @@ fn unfit_settings_are_refused_with_the_key() {
         let message = choose(cutoff, rate).unwrap_err().to_string();
         assert!(message.contains(part), "{message}");
     }
-    let (_, findings, _) = choose(5.0, Auto::Value(6.0)).unwrap();
+    let (_, findings) = choose(5.0, Auto::Value(6.0)).unwrap();
     assert!(findings.iter().any(|f| f.code == "rows_alias"));
-    let (pipeline, findings, _) = choose(20.0, Auto::Auto).unwrap();
+    let (pipeline, findings) = choose(20.0, Auto::Auto).unwrap();
     assert!((pipeline.motion_cutoff_hz - 45.0).abs() < 1e-9);
     assert!(findings.iter().any(|f| f.code == "motion_filter_capped"));
 }

@@ -1,7 +1,7 @@
 //! What measured torque lacks: samples of it, or any change in it.
 
-use super::Recording;
-use crate::error::{Finding, Severity};
+use super::{Channels, Logs, Recording};
+use crate::error::{Finding, Result, Severity};
 use crate::robot::Robot;
 
 /// A joint that travels less in a log stands still there, rad or m.
@@ -47,21 +47,32 @@ pub fn missing_torque(robot: &Robot, log: &Recording) -> Option<Finding> {
 
 /// Torque that never changes while its joint moves: drives off, or a column that was not recorded. One joint like that may be
 /// a passive one; a log in which every moving joint is like that is degraded, unless the robot swung freely.
-pub fn constant_torque<'a>(
-    robot: &Robot,
-    logs: impl IntoIterator<Item = &'a Recording>,
-) -> Vec<Finding> {
+///
+/// # Errors
+/// Of chapters that cannot be read.
+pub fn constant_torque<'a>(robot: &Robot, logs: impl Into<Logs<'a>>) -> Result<Vec<Finding>> {
     let names = robot.joint_names();
     let mut findings = Vec::new();
-    for log in logs {
-        let moving: Vec<(&str, &[f64])> = (names.iter().zip(&log.joints))
-            .filter(|(_, channels)| varies(&channels.q, TRAVEL))
-            .filter_map(|(name, channels)| Some((*name, channels.tau.as_deref()?)))
+    for log in logs.into().0 {
+        let mut seen = vec![Seen::default(); names.len()];
+        log.until(|recording| {
+            for (seen, channels) in seen.iter_mut().zip(&recording.joints) {
+                seen.see(channels);
+            }
+            seen.iter().all(Seen::is_enough)
+        })?;
+        let moving: Vec<(&str, Range)> = (names.iter().zip(&seen))
+            .filter(|(_, seen)| seen.travel.is_wider(TRAVEL))
+            .filter_map(|(name, seen)| Some((*name, seen.torque?)))
             .collect();
         let constant: Vec<String> = (moving.iter())
-            .filter(|(_, tau)| !varies(tau, 0.0))
-            .map(|(name, tau)| {
-                let value = tau.iter().find(|v| v.is_finite()).unwrap_or(&f64::NAN);
+            .filter(|(_, torque)| !torque.is_wider(0.0))
+            .map(|(name, torque)| {
+                let value = if torque.low.is_finite() {
+                    torque.low
+                } else {
+                    f64::NAN
+                };
                 format!("`{name}` is {value}")
             })
             .collect();
@@ -78,7 +89,7 @@ pub fn constant_torque<'a>(
         findings.push(Finding::new(
             severity,
             "constant_torque",
-            &log.name,
+            log.name(),
             format!(
                 "torque never changes while the joint moves (joint {shown} throughout): {cause}; what is found there is wrong \
                  unless it swung freely; map the measured torque in [columns] tau, or leave this log out"
@@ -86,14 +97,62 @@ pub fn constant_torque<'a>(
             constant.len() as u64,
         ));
     }
-    findings
+    Ok(findings)
 }
 
-/// Whether two finite values are more than `by` apart; looks no further than to the first such two.
-fn varies(values: &[f64], by: f64) -> bool {
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    values.iter().filter(|v| v.is_finite()).any(|v| {
-        (low, high) = (low.min(*v), high.max(*v));
-        high - low > by
-    })
+/// Ranges of a joint's position and torque, as far as the questions here need them.
+#[derive(Debug, Clone, Copy, Default)]
+struct Seen {
+    travel: Range,
+    /// `None` where no torque is logged.
+    torque: Option<Range>,
+}
+
+impl Seen {
+    /// Whether more samples would change nothing.
+    fn is_enough(&self) -> bool {
+        let varies = self.torque.is_some_and(|torque| torque.is_wider(0.0));
+        varies && self.travel.is_wider(TRAVEL)
+    }
+
+    fn see(&mut self, channels: &Channels) {
+        self.travel.widen(&channels.q, TRAVEL);
+        if let Some(tau) = &channels.tau {
+            self.torque.get_or_insert_default().widen(tau, 0.0);
+        }
+    }
+}
+
+/// Smallest and largest finite value so far.
+#[derive(Debug, Clone, Copy)]
+struct Range {
+    low: f64,
+    high: f64,
+}
+
+impl Default for Range {
+    /// Of nothing.
+    fn default() -> Self {
+        Self {
+            low: f64::INFINITY,
+            high: f64::NEG_INFINITY,
+        }
+    }
+}
+
+impl Range {
+    /// Whether two values are more than `by` apart.
+    fn is_wider(self, by: f64) -> bool {
+        self.high - self.low > by
+    }
+
+    /// Takes more values, no further than to where it is wider than `enough`.
+    fn widen(&mut self, values: &[f64], enough: f64) {
+        for value in values.iter().filter(|v| v.is_finite()) {
+            if self.is_wider(enough) {
+                return;
+            }
+            (self.low, self.high) = (self.low.min(*value), self.high.max(*value));
+        }
+    }
 }

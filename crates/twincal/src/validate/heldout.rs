@@ -6,6 +6,7 @@ use super::{
     Validation,
 };
 use crate::error::Result;
+use crate::observations::Observations;
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, slices, spread_raw, visit_slices};
 use crate::signal::{Pipeline, Trajectory};
@@ -85,11 +86,7 @@ impl HeldOut {
         trajectory: &Trajectory,
         from: f64,
     ) -> Result<()> {
-        let named = |joint: &String| Trace::new(&trajectory.name, joint);
-        let mut collected = Collected {
-            traces: self.names.iter().map(named).collect(),
-            stretches: vec![Vec::new(); self.names.len()],
-        };
+        let mut collected = self.collect(&trajectory.name);
         let filtered = slices(pipeline, trajectory, RowSignal::Filtered, from, usize::MAX);
         visit_slices(
             robot,
@@ -103,11 +100,37 @@ impl HeldOut {
                 Ok(())
             },
         )?;
-        self.conformal.push(collected.stretches);
-        for mut trace in collected.traces {
-            trace.thin();
-            self.traces.push(trace);
-        }
+        self.add(collected);
+        self.score_raw(robot, library, pipeline, predictors.twin, trajectory, from)
+    }
+
+    /// [`HeldOut::score`] of filtered rows that are there already: no sample is evaluated again.
+    pub(crate) fn score_kept(
+        &mut self,
+        predictors: Predictors<'_>,
+        observations: &Observations,
+        from: f64,
+    ) {
+        let mut collected = self.collect(&observations.log);
+        observations.visit_since(from, &mut |block| {
+            self.push_filtered(block, predictors, &mut collected);
+        });
+        self.add(collected);
+    }
+
+    /// The raw rows of [`HeldOut::score`] alone.
+    ///
+    /// # Errors
+    /// Those of [`visit_slices`].
+    pub(crate) fn score_raw(
+        &mut self,
+        robot: &Robot,
+        library: &Library,
+        pipeline: &Pipeline,
+        twin: &Predictor,
+        trajectory: &Trajectory,
+        from: f64,
+    ) -> Result<()> {
         let keepers: Vec<ScoreKeeper> = spread_raw(pipeline, trajectory, from)
             .into_par_iter()
             .map(|slice| {
@@ -120,7 +143,7 @@ impl HeldOut {
                     RowSignal::Raw,
                     &[slice],
                     &mut |block| {
-                        let torques = predictors.twin.block(block, TorqueSignal::Raw);
+                        let torques = twin.block(block, TorqueSignal::Raw);
                         for (joint, torque) in torques.iter().enumerate() {
                             keeper.push(joint, block.joints[joint].measured, torque);
                         }
@@ -132,6 +155,22 @@ impl HeldOut {
             .collect::<Result<_>>()?;
         keepers.iter().for_each(|keeper| self.raw += keeper);
         Ok(())
+    }
+
+    fn collect(&self, log: &str) -> Collected {
+        let named = |joint: &String| Trace::new(log, joint);
+        Collected {
+            traces: self.names.iter().map(named).collect(),
+            stretches: vec![Vec::new(); self.names.len()],
+        }
+    }
+
+    fn add(&mut self, collected: Collected) {
+        self.conformal.push(collected.stretches);
+        for mut trace in collected.traces {
+            trace.thin();
+            self.traces.push(trace);
+        }
     }
 
     fn push_filtered(

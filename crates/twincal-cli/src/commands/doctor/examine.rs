@@ -216,10 +216,10 @@ impl Examination {
     /// Overviews, filters, comparison and outlook, as far as each of them goes.
     fn look(&mut self, logs: &mut LogInput, settings: &Settings) {
         let robot = &self.robot.robot;
-        let mut together = filtered(robot, &logs.recordings, settings);
+        let mut together = filtered(robot, &logs.logs, settings);
         if together.is_err() {
             // Which of them it is, and whether other units help.
-            for recording in &mut logs.recordings {
+            for recording in &mut logs.logs {
                 let one = std::slice::from_ref(recording);
                 let Err(error) = filtered(robot, one, settings) else {
                     continue;
@@ -234,23 +234,30 @@ impl Examination {
                 }
                 self.refusals.push(Failure::from(error).into());
             }
-            (logs.recordings).retain(|recording| describe(robot, recording).is_ok());
-            together = filtered(robot, &logs.recordings, settings);
+            (logs.logs).retain(|recording| describe(robot, recording).is_ok());
+            together = filtered(robot, &logs.logs, settings);
         }
         let names = robot.joint_names();
-        let torque = logs.recordings.iter().map(|log| log.require_torque(&names));
+        let torque = logs.logs.iter().map(|log| log.require_torque(&names));
         let without = torque.filter_map(Result::err).map(Failure::from);
         self.refusals.extend(without.map(Refusal::from));
-        for recording in &logs.recordings {
+        for recording in &logs.logs {
             if let Ok((overview, more)) = describe(robot, recording) {
                 self.overviews.push(overview);
                 self.steps.push(steps(robot, recording));
                 self.findings.extend(more);
             }
         }
-        self.findings.extend(hardly_driven(robot, &logs.recordings));
-        self.findings
-            .extend(constant_torque(robot, &logs.recordings));
+        let recordings = &logs.logs[..];
+        for said in [
+            hardly_driven(robot, recordings),
+            constant_torque(robot, recordings),
+        ] {
+            match said {
+                Ok(said) => self.findings.extend(said),
+                Err(error) => self.refusals.push(Failure::from(error).into()),
+            }
+        }
         let (pipeline, more, mut checkup) = match together {
             Ok(filtered) => filtered,
             Err(error) => {

@@ -5,7 +5,8 @@
 
 mod layout;
 
-use super::{Cells, LogOptions, MAX_COLUMNS, assemble, match_columns};
+use super::cells::Sink;
+use super::{Cells, MAX_COLUMNS, Request, assemble, match_columns};
 use crate::error::{Error, Place, Result};
 use arrow_ipc::{
     CompressionType, Endianness, MessageHeader, MetadataVersion, RecordBatch, Schema,
@@ -13,8 +14,7 @@ use arrow_ipc::{
 };
 use layout::{Form, Numbers, Position};
 use std::io::{self, Read, Seek, SeekFrom};
-use twincal::robot::Robot;
-use twincal::signal::Recording;
+use twincal::signal::Log as GivenLog;
 use twincal::{Finding, Severity};
 
 /// What an Arrow file begins and ends with.
@@ -31,10 +31,14 @@ const BLOCK: usize = 1 << 16;
 /// Reads an Arrow IPC file or stream.
 pub(super) fn read(
     source: impl Read + Seek,
-    name: &str,
-    robot: &Robot,
-    options: &LogOptions,
-) -> Result<(Recording, Vec<Finding>)> {
+    request: Request<'_>,
+) -> Result<(GivenLog<'static>, Vec<Finding>)> {
+    let Request {
+        name,
+        robot,
+        options,
+        chapters,
+    } = request;
     let mut log = Log::open(source, name)?;
     let selection = match_columns(name, &log.header()?, robot, options)?;
     let wanted = selection.file_columns();
@@ -47,10 +51,11 @@ pub(super) fn read(
             .checked_add(batch.rows)
             .ok_or_else(|| log.refuse("declares more rows than can be counted".into()))?;
     }
-    let mut cells = Cells::reserve(name, rows, wanted.len())?;
+    let mut cells = Cells::reserve(name, rows, wanted.len(), chapters)?;
+    let mut sinks = cells.sinks();
     for at in log.batches.clone() {
         let batch = log.batch(at, &columns)?;
-        for ((values, column), chunk) in cells.columns.iter_mut().zip(&columns).zip(&batch.chunks) {
+        for ((values, column), chunk) in sinks.iter_mut().zip(&columns).zip(&batch.chunks) {
             log.append(&batch, *chunk, column.numbers.form, values)
                 .map_err(|e| {
                     log.refuse(format!(
@@ -61,13 +66,10 @@ pub(super) fn read(
                 })?;
         }
     }
-    for (values, column) in cells.columns.iter_mut().zip(&columns) {
-        if let Some((ticks, _)) = column.numbers.ticks.filter(|(ticks, _)| *ticks != 1.0) {
-            values.iter_mut().for_each(|value| *value /= ticks);
-        }
-    }
-    let recording = assemble(name, rows, cells, &selection, options, &mut findings)?;
-    Ok((recording, findings))
+    let ticks = |column: &Column| column.numbers.ticks.map_or(1.0, |(ticks, _)| ticks);
+    cells.scales = columns.iter().map(ticks).collect();
+    let log = assemble(request, cells, selection, &mut findings)?;
+    Ok((log, findings))
 }
 
 /// Column names of an Arrow IPC file or stream.
@@ -427,31 +429,36 @@ impl<'a, R: Read + Seek> Log<'a, R> {
         batch: &Batch,
         chunk: Chunk,
         form: Form,
-        values: &mut Vec<f64>,
+        sink: &mut Sink<'_>,
     ) -> io::Result<()> {
-        let first = values.len();
+        let mut present = Vec::new();
+        if let Some(valid) = chunk.valid {
+            let bits = self.unpacked(valid, batch.compression)?;
+            let bytes = batch.rows.div_ceil(8) as u64;
+            bits.take(bytes).read_to_end(&mut present)?;
+            if (present.len() as u64) < bytes {
+                return Err(io::ErrorKind::UnexpectedEof.into());
+            }
+        }
         let mut block = vec![0; BLOCK];
-        let mut left = batch.rows * form.width() as usize;
+        let mut values = Vec::with_capacity(BLOCK);
+        let (mut row, mut left) = (0, batch.rows * form.width() as usize);
         let mut numbers = self.unpacked(chunk.values, batch.compression)?;
         while left > 0 {
             let part = &mut block[..left.min(BLOCK)];
             numbers.read_exact(part)?;
-            form.append(part, values);
-            left -= part.len();
-        }
-        drop(numbers);
-        let Some(valid) = chunk.valid else {
-            return Ok(());
-        };
-        let mut bits = self.unpacked(valid, batch.compression)?;
-        for eight in values[first..].chunks_mut(8) {
-            let mut byte = [0];
-            bits.read_exact(&mut byte)?;
-            for (bit, value) in eight.iter_mut().enumerate() {
-                if byte[0] >> bit & 1 == 0 {
+            form.append(part, &mut values);
+            for value in &mut values {
+                let known = present
+                    .get(row / 8)
+                    .is_none_or(|byte| byte >> (row % 8) & 1 == 1);
+                if !known {
                     *value = f64::NAN;
                 }
+                row += 1;
             }
+            sink.extend(values.drain(..))?;
+            left -= part.len();
         }
         Ok(())
     }

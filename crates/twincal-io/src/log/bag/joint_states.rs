@@ -9,17 +9,18 @@ mod topics;
 
 use super::joint_state::{Encoding, decode};
 use super::mapping::{Mapping, Schema};
-use super::merge::{LISTS as PART_LISTS, Part, merge};
+use super::merge::{IN_TABLES, LISTS as PART_LISTS, Part, in_table, merge};
 use super::path::is_source;
 use crate::error::{Error, Place, Result};
 use crate::log::columns::{refuse_model_torque, say as say_columns};
-use crate::log::{Cells, Channel, LogOptions, Selection, TorqueSource, assemble};
+use crate::log::{Channel, LogOptions, Request, Selection, TorqueSource, assemble};
 use crate::memory;
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::rc::Rc;
 use topics::CONVERT;
 use twincal::robot::Robot;
-use twincal::signal::Recording;
+use twincal::signal::Log;
 use twincal::{Finding, Severity};
 
 /// Message types that are read.
@@ -33,8 +34,8 @@ const LATE_NS: i64 = 500_000_000;
 const LATE_MESSAGES: usize = 1024;
 /// Share of late messages beyond which they are worth a warning.
 const LATE_SHARE: f64 = 0.01;
-/// Rows between two looks at the memory that is left.
-const LOOK: usize = 1 << 16;
+/// Rows between two looks at the memory that is left; tests of this crate look more often.
+const LOOK: usize = if cfg!(test) { 1 << 12 } else { 1 << 16 };
 /// Most lists of names of one topic.
 const MAX_LAYOUTS: usize = 256;
 /// Words for the lists of a message.
@@ -73,6 +74,8 @@ pub(super) struct JointStates<'a> {
     file: &'a str,
     robot: &'a Robot,
     options: &'a LogOptions,
+    /// A long log may leave memory.
+    chapters: bool,
     /// Name in messages of each moving joint.
     wanted: Vec<String>,
     mapping: Option<Mapping>,
@@ -94,7 +97,13 @@ pub(super) struct JointStates<'a> {
 impl<'a> JointStates<'a> {
     /// # Errors
     /// [`Error::Content`] for a mapping that cannot be understood.
-    pub(super) fn new(file: &'a str, robot: &'a Robot, options: &'a LogOptions) -> Result<Self> {
+    pub(super) fn new(request: Request<'a>) -> Result<Self> {
+        let Request {
+            name: file,
+            robot,
+            options,
+            chapters,
+        } = request;
         let wanted = robot
             .joint_names()
             .iter()
@@ -107,6 +116,7 @@ impl<'a> JointStates<'a> {
             file,
             robot,
             options,
+            chapters,
             wanted,
             mapping: Mapping::new(file, robot, options)?,
             topics: Vec::new(),
@@ -286,6 +296,11 @@ impl<'a> JointStates<'a> {
         self.rows += 1;
         if self.rows.is_multiple_of(LOOK) {
             // Growing vectors hold up to three times their content while they move.
+            if self.chapters {
+                for part in &mut self.parts {
+                    part.settle(self.file, LATE_MESSAGES)?;
+                }
+            }
             let bytes: u64 = self.parts.iter().map(Part::bytes).sum();
             memory::require(
                 self.file,
@@ -382,7 +397,8 @@ impl<'a> JointStates<'a> {
         Ok(Some(layouts.len() - 1))
     }
 
-    /// The recording, with all that was assumed.
+    /// The log, with all that was assumed; `None` where parts have to be brought together of which one has left memory: it must be read
+    /// again without chapters.
     ///
     /// # Errors
     /// [`Error::Content`] if no topic or more than one can be read, joints of the model are missing, effort is missing or the parts do
@@ -390,7 +406,7 @@ impl<'a> JointStates<'a> {
     pub(super) fn finish(
         mut self,
         mut findings: Vec<Finding>,
-    ) -> Result<(Recording, Vec<Finding>)> {
+    ) -> Result<Option<(Log<'static>, Vec<Finding>)>> {
         self.check_topics()?;
         if self.rows == 0 {
             let problem = match (&self.first_dropped, self.dropped) {
@@ -406,43 +422,60 @@ impl<'a> JointStates<'a> {
         if let Some(mapping) = &self.mapping {
             mapping.say(self.file, &mut findings)?;
         }
-        let (time, columns) = merge(
-            self.file,
-            &mut self.parts,
-            &parts,
-            |part| self.topics[self.part_topics[part]].name.as_str(),
-            self.robot,
-            &mut findings,
-        )?;
-        // Columns as they stand in a table: time, then what is there of each joint.
-        let mut cells = Cells {
-            columns: vec![time],
-            dropped: self.dropped,
-            first_dropped: self.first_dropped.take(),
-        };
-        let mut channel = |name: String, values: Vec<f64>| {
-            cells.columns.push(values);
-            Channel {
-                index: cells.columns.len() - 1,
-                name,
+        let used: BTreeSet<usize> = parts.iter().flatten().flatten().copied().collect();
+        let long = used.iter().find(|part| self.parts[**part].is_long());
+        let (mut cells, there) = match (long, used.len()) {
+            (None, _) => {
+                let (time, columns) = merge(
+                    self.file,
+                    &mut self.parts,
+                    &parts,
+                    |part| self.topics[self.part_topics[part]].name.as_str(),
+                    self.robot,
+                    &mut findings,
+                )?;
+                in_table(time, columns)
             }
+            (Some(&part), 1) => {
+                let part = &mut self.parts[part];
+                let there: Vec<[bool; PART_LISTS]> = (parts.iter().enumerate())
+                    .map(|(joint, lists)| {
+                        std::array::from_fn(|list| {
+                            lists[list].is_some() && part.column(joint, list).is_some()
+                        })
+                    })
+                    .collect();
+                match part.table() {
+                    Some(cells)
+                        if cells.columns.len()
+                            == 1 + there.as_flattened().iter().filter(|there| **there).count() =>
+                    {
+                        (cells, there)
+                    }
+                    // Lists that nobody asks for are among them.
+                    _ => return Ok(None),
+                }
+            }
+            _ => return Ok(None),
         };
-        let joints: Vec<[Option<Channel>; 4]> = (columns.into_iter().zip(&parts).enumerate())
-            .map(|(joint, (values, parts))| {
-                let named = |list: usize, part: Option<usize>| {
+        cells.dropped = self.dropped;
+        cells.first_dropped = self.first_dropped.take();
+        let mut index = 0;
+        let mut channel = |there: bool, name: String| {
+            index += usize::from(there);
+            there.then_some(Channel { index, name })
+        };
+        let joints: Vec<[Option<Channel>; 4]> = (there.into_iter().zip(&parts).enumerate())
+            .map(|(joint, (there, parts))| {
+                let named = |list: usize| {
                     if let Some(words) = self.mapping.as_ref().and_then(|m| m.words(joint, list)) {
                         return words;
                     }
+                    let part = parts[list];
                     let topic = part.map_or("", |part| &self.topics[self.part_topics[part]].name);
                     format!("{topic} {}[{}]", CHANNELS[list], self.wanted[joint])
                 };
-                let [q, qd, tau, qdd] = values;
-                [
-                    q.map(|q| channel(named(0, parts[0]), q)),
-                    qd.map(|qd| channel(named(1, parts[1]), qd)),
-                    qdd.map(|qdd| channel(named(3, parts[3]), qdd)),
-                    tau.map(|tau| channel(named(2, parts[2]), tau)),
-                ]
+                IN_TABLES.map(|list| channel(there[list], named(list)))
             })
             .collect();
         let selection = Selection {
@@ -470,9 +503,14 @@ impl<'a> JointStates<'a> {
         if self.options.columns.time_unit.is_some() {
             options.to_mut().columns.time_unit = None;
         }
-        let rows = cells.columns[0].len();
-        let recording = assemble(self.file, rows, cells, &selection, &options, &mut findings)?;
-        Ok((recording, findings))
+        let request = Request {
+            name: self.file,
+            robot: self.robot,
+            options: &options,
+            chapters: self.chapters,
+        };
+        let log = assemble(request, cells, selection, &mut findings)?;
+        Ok(Some((log, findings)))
     }
 
     fn say(&self, findings: &mut Vec<Finding>) {

@@ -2,6 +2,7 @@
 
 use super::joint_state::Doubles;
 use crate::error::{Error, Place, Result};
+use crate::log::Cells;
 use crate::memory;
 use std::collections::BTreeSet;
 use twincal::robot::{JointKind, Robot};
@@ -16,7 +17,7 @@ const COVERED: f64 = 0.5;
 pub(super) const LISTS: usize = 4;
 
 /// Messages of one topic that name the same joints.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub(super) struct Part {
     /// Moving joints of the model.
     pub(super) joints: Vec<usize>,
@@ -30,6 +31,23 @@ pub(super) struct Part {
     columns: Vec<Vec<f64>>,
     /// First row behind the last step back of the clock.
     floor: usize,
+    /// Rows before these, of a long log.
+    earlier: Option<Earlier>,
+}
+
+/// Rows that no late message can be put before: time in seconds, and the columns.
+#[derive(Debug)]
+struct Earlier {
+    cells: Cells,
+    /// Which of the part's columns they are, in the order of a table: position, velocity, acceleration, effort of joint by joint.
+    columns: Vec<usize>,
+}
+
+/// Order of a joint's lists in a table.
+pub(super) const IN_TABLES: [usize; LISTS] = [0, 1, 3, 2];
+
+fn seconds(stamps: &[i64]) -> impl Iterator<Item = f64> {
+    stamps.iter().map(|&ns| ns as f64 / 1e9)
 }
 
 /// Where a message goes.
@@ -142,6 +160,48 @@ impl Part {
         Some(LISTS * at + list)
     }
 
+    /// Moves rows of a long log to where they may leave memory, but for the last ones: `late` messages may still be put before these.
+    ///
+    /// # Errors
+    /// Those of [`Cells::settle`].
+    pub(super) fn settle(&mut self, file: &str, late: usize) -> Result<()> {
+        let rows = self.stamps.len();
+        let earlier = match &mut self.earlier {
+            Some(earlier) => earlier,
+            none => {
+                let columns: Vec<usize> = (0..self.joints.len())
+                    .flat_map(|joint| IN_TABLES.map(|list| LISTS * joint + list))
+                    .filter(|column| !self.columns[*column].is_empty())
+                    .collect();
+                if !Cells::is_long(rows, columns.len() + 1) {
+                    return Ok(());
+                }
+                none.insert(Earlier {
+                    cells: Cells::new(columns.len() + 1, true),
+                    columns,
+                })
+            }
+        };
+        // Twice as many stay, so that the first of them is never the first row of the log.
+        let moved = rows.saturating_sub(2 * late);
+        earlier.take(&mut self.stamps, &mut self.columns, moved);
+        self.floor = self.floor.saturating_sub(moved);
+        earlier.cells.settle(file, 0)
+    }
+
+    /// Whether rows have left memory.
+    pub(super) fn is_long(&self) -> bool {
+        self.earlier.is_some()
+    }
+
+    /// All rows of a part that [`Part::is_long`] as a table: time, then the columns that are there, joint by joint.
+    pub(super) fn table(&mut self) -> Option<Cells> {
+        let mut earlier = self.earlier.take()?;
+        let rows = self.stamps.len();
+        earlier.take(&mut self.stamps, &mut self.columns, rows);
+        Some(earlier.cells)
+    }
+
     fn median_step(&self) -> f64 {
         let mut steps: Vec<i64> = self.stamps.windows(2).map(|w| w[1] - w[0]).collect();
         if steps.is_empty() {
@@ -186,8 +246,36 @@ impl Part {
     }
 }
 
+impl Earlier {
+    /// Takes the first `count` rows of a part.
+    fn take(&mut self, stamps: &mut Vec<i64>, columns: &mut [Vec<f64>], count: usize) {
+        let (time, values) = self.cells.columns.split_at_mut(1);
+        time[0].extend(seconds(&stamps[..count]));
+        stamps.drain(..count);
+        for (to, &from) in values.iter_mut().zip(&self.columns) {
+            to.extend(columns[from].drain(..count));
+        }
+    }
+}
+
 /// Position, velocity, effort and acceleration of each joint.
-type Columns = Vec<[Option<Vec<f64>>; LISTS]>;
+pub(super) type Columns = Vec<[Option<Vec<f64>>; LISTS]>;
+
+/// Columns as they stand in a table, time first, and which of each joint's lists are there.
+pub(super) fn in_table(time: Vec<f64>, columns: Columns) -> (Cells, Vec<[bool; LISTS]>) {
+    let there = columns
+        .iter()
+        .map(|lists| lists.each_ref().map(Option::is_some))
+        .collect();
+    let mut cells = Cells::new(0, false);
+    cells.columns.push(time);
+    for mut lists in columns {
+        cells
+            .columns
+            .extend(IN_TABLES.into_iter().filter_map(|list| lists[list].take()));
+    }
+    (cells, there)
+}
 
 /// Time in seconds and the columns of each joint, all on the stamps of the slowest part that is used.
 pub(super) fn merge<'t>(
@@ -199,7 +287,6 @@ pub(super) fn merge<'t>(
     findings: &mut Vec<Finding>,
 ) -> Result<(Vec<f64>, Columns)> {
     let used: BTreeSet<usize> = chosen.iter().flatten().flatten().copied().collect();
-    let seconds = |stamps: &[i64]| stamps.iter().map(|&ns| ns as f64 / 1e9).collect();
     let slowest = used
         .iter()
         .copied()
@@ -215,7 +302,7 @@ pub(super) fn merge<'t>(
                 })
             })
             .collect();
-        return Ok((seconds(&part.stamps), columns));
+        return Ok((seconds(&part.stamps).collect(), columns));
     }
     let names = robot.joint_names();
     let describe = |part: usize| {
@@ -290,5 +377,5 @@ pub(super) fn merge<'t>(
         message,
         lost as u64,
     ));
-    Ok((seconds(&stamps), columns))
+    Ok((seconds(&stamps).collect(), columns))
 }

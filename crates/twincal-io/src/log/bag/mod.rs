@@ -25,15 +25,14 @@ mod suggest;
 mod unpack;
 mod value;
 
-use super::{Kind, LogOptions};
+use super::{Kind, Request};
 use crate::error::{Error, Place, Result};
 use joint_states::JointStates;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 use twincal::Finding;
-use twincal::robot::Robot;
-use twincal::signal::Recording;
+use twincal::signal::Log;
 
 /// Bytes read from a file at a time.
 const BUFFER: usize = 1 << 18;
@@ -41,28 +40,45 @@ const BUFFER: usize = 1 << 18;
 /// Reads an MCAP file.
 pub(super) fn read_mcap(
     source: &mut (impl Read + Seek),
-    file: &str,
-    robot: &Robot,
-    options: &LogOptions,
-) -> Result<(Recording, Vec<Finding>)> {
-    let mut states = JointStates::new(file, robot, options)?;
-    let findings = mcap::read(source, file, &mut states)?;
-    states.finish(findings)
+    request: Request<'_>,
+) -> Result<(Log<'static>, Vec<Finding>)> {
+    let mut once = |request: Request<'_>| {
+        let mut states = JointStates::new(request)?;
+        let findings = mcap::read(source, request.name, &mut states)?;
+        states.finish(findings)
+    };
+    whole_if_it_must(request, &mut once)
+}
+
+/// Reads in chapters if that is wanted, and again as a whole where messages have to be brought together.
+fn whole_if_it_must(
+    request: Request<'_>,
+    read: &mut dyn FnMut(Request<'_>) -> Result<Option<(Log<'static>, Vec<Finding>)>>,
+) -> Result<(Log<'static>, Vec<Finding>)> {
+    if let Some(read) = read(request)? {
+        return Ok(read);
+    }
+    let whole = Request {
+        chapters: false,
+        ..request
+    };
+    read(whole)?.ok_or_else(|| Error::Internal {
+        what: request.name.to_owned(),
+        problem: "a log in memory was told to be read again".into(),
+    })
 }
 
 /// Reads a bag: one file, packed or not, or a folder.
-pub(super) fn read(
-    path: &Path,
-    robot: &Robot,
-    options: &LogOptions,
-) -> Result<(Recording, Vec<Finding>)> {
-    let name = path.display().to_string();
-    let mut states = JointStates::new(&name, robot, options)?;
-    let (files, mut findings) = files(path)?;
-    for file in files {
-        findings.extend(read_file(&file, &mut states)?);
-    }
-    states.finish(findings)
+pub(super) fn read(path: &Path, request: Request<'_>) -> Result<(Log<'static>, Vec<Finding>)> {
+    let (files, findings) = files(path)?;
+    let mut once = |request: Request<'_>| {
+        let (mut states, mut findings) = (JointStates::new(request)?, findings.clone());
+        for file in &files {
+            findings.extend(read_file(file, &mut states)?);
+        }
+        states.finish(findings)
+    };
+    whole_if_it_must(request, &mut once)
 }
 
 /// The files that a log consists of: itself, or the files of a folder.

@@ -13,6 +13,9 @@ use lines::Lines;
 use std::io::Read;
 use twincal::{Finding, Severity};
 
+/// Rows between two looks at whether the table is long.
+const SETTLE: u64 = 1 << 14;
+
 /// A text table whose header has been read.
 pub(super) struct Table<R: Read> {
     name: String,
@@ -73,12 +76,14 @@ impl<R: Read> Table<R> {
         &self.header
     }
 
-    /// Reads all rows of the columns `wanted` (indices into the header).
-    pub(super) fn read(&mut self, wanted: &[usize], lenient: bool) -> Result<Cells> {
-        let mut cells = Cells {
-            columns: vec![Vec::new(); wanted.len()],
-            ..Cells::default()
-        };
+    /// Reads all rows of the columns `wanted` (indices into the header); `chapters`: a long table may be left on disk.
+    pub(super) fn read(
+        &mut self,
+        wanted: &[usize],
+        lenient: bool,
+        chapters: bool,
+    ) -> Result<Cells> {
+        let mut cells = Cells::new(wanted.len(), chapters);
         // Fields in file order with the column of `cells` they go to.
         let mut order: Vec<(usize, usize)> = wanted
             .iter()
@@ -124,11 +129,15 @@ impl<R: Read> Table<R> {
             text += taken as u64;
             if rows == 1000 {
                 let expected = self.bytes as f64 * rows as f64 / text as f64;
-                self.check_memory(expected, wanted.len())?;
                 // Columns that grow again and again are copied again and again.
+                let bytes = cells.bytes_in_memory(1.01 * expected);
+                self.check_memory(bytes)?;
                 for column in &mut cells.columns {
-                    column.reserve((1.01 * expected) as usize);
+                    column.reserve(bytes as usize / 8 / wanted.len().max(1));
                 }
+            }
+            if rows.is_multiple_of(SETTLE) {
+                cells.settle(&self.name, 0)?;
             }
         }
         Ok(cells)
@@ -156,9 +165,9 @@ impl<R: Read> Table<R> {
     }
 
     /// Refuses what will not fit before it is allocated: rows are estimated from the first 1000.
-    fn check_memory(&self, rows: f64, columns: usize) -> Result<()> {
+    fn check_memory(&self, bytes: f64) -> Result<()> {
         // Where the estimate falls short, growing vectors hold up to three times their content while they move.
-        let needed = rows * columns as f64 * 8.0 * 3.0;
+        let needed = 3.0 * bytes;
         memory::require(
             &self.name,
             needed as u64,
@@ -329,7 +338,7 @@ mod tests {
         }
         let read = |text: &str| {
             let mut table = Table::open(text.as_bytes(), text.len() as u64, "run.csv").unwrap();
-            table.read(&[3, 1], false)
+            table.read(&[3, 1], false, false)
         };
         let cells = read(&text).unwrap();
         for (found, expected) in cells.columns.iter().zip(&expected) {

@@ -1,0 +1,204 @@
+//! A long log in chapters is the log in memory, number by number, whatever its form. (A log is long from 1 MiB on here.)
+
+#[path = "../../tests/common/logs.rs"]
+#[allow(dead_code, reason = "other tests use the rest")]
+mod logs;
+#[path = "../../tests/log_bags/write.rs"]
+#[allow(dead_code, reason = "other tests use the rest")]
+mod write;
+
+use super::*;
+use crate::table::{ColumnKind, TableFormat, TableWriter, Values};
+use std::fmt::Write as _;
+use std::io::Write as _;
+use twincal::robot::JointKind;
+use twincal::signal::LongLog;
+use write::{Bag, Message};
+
+const ROWS: usize = 40_000;
+const NAMES: [&str; 2] = ["shoulder", "elbow"];
+
+fn robot() -> Robot {
+    logs::robot(&NAMES.map(|name| (name, JointKind::Revolute)))
+}
+
+/// Column `column` of `t,q1,qd1,tau1,q2,qd2,tau2`; one value in a thousand is missing.
+fn value(column: usize, row: usize) -> f64 {
+    match column {
+        0 => row as f64 * 1e-3,
+        _ if (row + 100 * column).is_multiple_of(1000) => f64::NAN,
+        _ => (column as f64) + (0.01 * row as f64).sin(),
+    }
+}
+
+const HEADER: [&str; 7] = ["t", "q1", "qd1", "tau1", "q2", "qd2", "tau2"];
+
+/// Reads a file whole and in chapters; the chapters must be many and equal to the whole, and say the same.
+fn compare(bytes: &[u8], ending: &str, options: &LogOptions) -> LongLog {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(format!("run.{ending}"));
+    std::fs::File::create(&path)
+        .unwrap()
+        .write_all(bytes)
+        .unwrap();
+    let (whole, said) = read_log(&path, &robot(), options).unwrap();
+    let (log, also_said) = open_log(&path, &robot(), options).unwrap();
+    assert_eq!(said, also_said);
+    let Log::Long(long) = log else {
+        panic!("{ending}: not in chapters");
+    };
+    assert!(long.chapters() >= 5, "{} chapters", long.chapters());
+    assert_eq!(long.samples.iter().sum::<usize>(), whole.time.len());
+    let joined = long.whole().unwrap();
+    let bits = |recording: &Recording| -> Vec<Vec<u64>> {
+        let joints = recording.joints.iter();
+        let channels = joints.flat_map(|j| {
+            [
+                Some(&j.q),
+                j.qd.as_ref(),
+                j.qdd.as_ref(),
+                j.tau.as_ref(),
+                j.temperature.as_ref(),
+            ]
+        });
+        let all = std::iter::once(&recording.time).chain(channels.flatten());
+        all.map(|values| values.iter().map(|v| v.to_bits()).collect())
+            .collect()
+    };
+    assert!(bits(&joined) == bits(&whole), "{ending}: other numbers");
+    assert_eq!((joined.name, joined.payload), (whole.name, whole.payload));
+    long
+}
+
+fn csv() -> String {
+    let mut text = HEADER.join(",") + "\n";
+    for row in 0..ROWS {
+        let cells: Vec<String> = (0..HEADER.len())
+            .map(|column| match value(column, row) {
+                gap if gap.is_nan() => String::new(),
+                value => format!("{value:.9}"),
+            })
+            .collect();
+        writeln!(text, "{}", cells.join(",")).unwrap();
+    }
+    text
+}
+
+#[test]
+fn csv_comes_in_chapters() {
+    let text = csv();
+    compare(text.as_bytes(), "csv", &LogOptions::default());
+    // What is said of rows counts all of them, and time by the rate goes on from chapter to chapter.
+    let mut options = LogOptions {
+        rate_hz: Some(500.0),
+        lenient: true,
+        ..LogOptions::default()
+    };
+    let spoilt = text.replacen("\n5.000000000,", "\nx,", 1);
+    let long = compare(spoilt.as_bytes(), "csv", &options);
+    let last = long.chapter(long.chapters() - 1).unwrap();
+    assert_eq!(last.time.last(), Some(&((ROWS - 2) as f64 / 500.0)));
+    // Torque as it is told, in every chapter.
+    options.torque.source = Some(TorqueSource::Motor);
+    options.torque.gear_ratio = [("shoulder", 100.0), ("elbow", 50.0)]
+        .map(|(joint, ratio)| (joint.to_owned(), ratio))
+        .into();
+    let long = compare(spoilt.as_bytes(), "csv", &options);
+    let tau = long.chapter(2).unwrap().joints.swap_remove(1).tau.unwrap();
+    let row = long.samples[..2].iter().sum::<usize>() + 7;
+    // One row was dropped before.
+    assert!((tau[7] - 50.0 * value(6, row + 1)).abs() < 1e-6);
+}
+
+#[test]
+fn parquet_comes_in_chapters() {
+    let columns: Vec<(String, ColumnKind)> = HEADER
+        .map(|name| (name.to_owned(), ColumnKind::Number))
+        .to_vec();
+    let mut table = TableWriter::new(Vec::new(), TableFormat::Parquet, &columns).unwrap();
+    for block in 0..4 {
+        let rows = block * ROWS / 4..(block + 1) * ROWS / 4;
+        let values: Vec<Vec<f64>> = (0..HEADER.len())
+            .map(|column| rows.clone().map(|row| value(column, row)).collect())
+            .collect();
+        let values: Vec<Values<'_>> = values
+            .iter()
+            .map(|column| Values::Numbers(column))
+            .collect();
+        table.push(&values).unwrap();
+    }
+    let bytes = table.finish().unwrap();
+    compare(&bytes, "parquet", &LogOptions::default());
+}
+
+fn bag(topics: &[(&str, &[&str])], late: bool) -> Vec<u8> {
+    let mut bag = Bag::with_chunks(None, 64 << 10);
+    for (topic, _) in topics {
+        bag.topic(topic, Some(write::JOINT_STATE), "cdr");
+    }
+    for i in 0..ROWS as u64 {
+        // Every thousandth message comes three later than its stamp says.
+        let i = match i % 1000 {
+            500..503 if late => i + 1,
+            503 if late => i - 3,
+            _ => i,
+        };
+        for (topic, names) in topics {
+            let mut message = Message::moving(i, names);
+            message.stamp = 1_700_000_000_000_000_000 + i * 1_000_000;
+            bag.message(topic, &message);
+        }
+    }
+    bag.finish()
+}
+
+#[test]
+fn bags_come_in_chapters_in_the_order_of_their_stamps() {
+    let long = compare(
+        &bag(&[("/joint_states", &NAMES)], true),
+        "mcap",
+        &LogOptions::default(),
+    );
+    let time = long.whole().unwrap().time;
+    assert!(time.len() == ROWS && time.windows(2).all(|pair| pair[0] < pair[1]));
+}
+
+/// Parts need each other's rows: such a bag is read whole.
+#[test]
+fn bags_in_parts_are_read_whole() {
+    let bytes = bag(&[("/left", &NAMES[..1]), ("/right", &NAMES[1..])], false);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    std::fs::write(&path, bytes).unwrap();
+    let options = LogOptions {
+        topics: vec!["/left".into(), "/right".into()],
+        ..LogOptions::default()
+    };
+    let (whole, said) = read_log(&path, &robot(), &options).unwrap();
+    let (log, also_said) = open_log(&path, &robot(), &options).unwrap();
+    assert!(matches!(&log, Log::Whole(recording) if **recording == whole) && said == also_said);
+}
+
+#[test]
+fn a_column_without_numbers_is_named_whether_the_log_is_long_or_not() {
+    let text: String = csv()
+        .lines()
+        .map(|line| {
+            format!(
+                "{line},{}\n",
+                if line.starts_with('t') { "qdd1" } else { "" }
+            )
+        })
+        .collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.csv");
+    std::fs::write(&path, text).unwrap();
+    let options = LogOptions::default();
+    let whole = read_log(&path, &robot(), &options).unwrap_err().to_string();
+    let long = open_log(&path, &robot(), &options).unwrap_err().to_string();
+    assert!(
+        whole.contains("column `qdd1` is NaN or empty in all 40000 rows"),
+        "{whole}"
+    );
+    assert_eq!(whole, long);
+}

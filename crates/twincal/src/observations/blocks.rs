@@ -1,0 +1,53 @@
+//! Kept rows as the blocks that made them: what predictors and scores take.
+
+use super::Observations;
+use crate::rows::{JointRows, MAX_BLOCK, RowBlock};
+
+impl Observations {
+    /// Visits the rows at or after time `since` (s; −∞: all of them), in order, as [`crate::rows::visit_rows`] does but for the input
+    /// rows, which are not kept.
+    pub(crate) fn visit_since(&self, since: f64, visit: &mut dyn FnMut(&RowBlock<'_>)) {
+        let ends = self.starts.iter().skip(1).copied();
+        let ends = ends.chain(std::iter::once(self.len()));
+        for (segment, (&start, end)) in self.starts.iter().zip(ends).enumerate() {
+            let mut from = start + self.time[start..end].partition_point(|t| *t < since);
+            while from < end {
+                let to = end.min(from + MAX_BLOCK);
+                self.visit_block(segment, from == start, from..to, visit);
+                from = to;
+            }
+        }
+    }
+
+    fn visit_block(
+        &self,
+        segment: usize,
+        first: bool,
+        rows: std::ops::Range<usize>,
+        visit: &mut dyn FnMut(&RowBlock<'_>),
+    ) {
+        let gather = |joints: &[Vec<f64>]| -> Vec<f64> {
+            let own = joints.iter().flat_map(|joint| &joint[rows.clone()]);
+            own.copied().collect()
+        };
+        let joints = self.joints.iter().map(|joint| JointRows {
+            columns: &joint.columns,
+            stride: self.len(),
+            x: joint.x.get(rows.start..).unwrap_or_default(),
+            measured: &joint.measured[rows.clone()],
+            nominal: &joint.nominal[rows.clone()],
+            standstill: &joint.standstill[rows.clone()],
+        });
+        visit(&RowBlock {
+            segment,
+            first,
+            len: rows.len(),
+            time: &self.time[rows.clone()],
+            input_rows: &[],
+            q: &gather(&self.q),
+            qd: &gather(&self.qd),
+            qdd: &gather(&self.qdd),
+            joints: joints.collect(),
+        });
+    }
+}

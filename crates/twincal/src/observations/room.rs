@@ -1,0 +1,147 @@
+//! Rows of consecutive parts of a log as one, in memory that is taken once.
+
+use super::{JointObservations, Observations};
+
+/// Room for the rows of a log, column by column; what is not filled is never touched.
+#[derive(Debug)]
+pub(crate) struct Room {
+    /// Rows that there is room for.
+    most: usize,
+    rows: Observations,
+}
+
+impl Room {
+    /// For `most` rows.
+    pub(crate) fn new(most: usize) -> Self {
+        Self {
+            most: most.max(1),
+            rows: Observations::default(),
+        }
+    }
+
+    /// Puts the next part behind those before.
+    pub(crate) fn append(&mut self, part: Observations) {
+        let (from, len) = (self.rows.len(), part.len());
+        let all = &mut self.rows;
+        all.log = part.log;
+        all.starts
+            .extend(part.starts.iter().map(|start| start + from));
+        all.time.extend(part.time);
+        for (to, from) in [
+            (&mut all.q, part.q),
+            (&mut all.qd, part.qd),
+            (&mut all.qdd, part.qdd),
+        ] {
+            to.resize(from.len(), Vec::new());
+            to.iter_mut()
+                .zip(from)
+                .for_each(|(to, from)| to.extend(from));
+        }
+        if from + len > self.most {
+            self.widen(2 * (from + len));
+        }
+        let most = self.most;
+        self.rows
+            .joints
+            .resize(part.joints.len(), JointObservations::default());
+        for (to, part) in self.rows.joints.iter_mut().zip(part.joints) {
+            to.append(part, from, len, most);
+        }
+    }
+
+    /// Takes more room than was asked for first.
+    fn widen(&mut self, most: usize) {
+        for joint in &mut self.rows.joints {
+            let mut x = vec![0.0; joint.columns.len() * most];
+            for (to, from) in x
+                .chunks_exact_mut(most)
+                .zip(joint.x.chunks_exact(self.most))
+            {
+                to[..self.most].copy_from_slice(from);
+            }
+            joint.x = x;
+        }
+        self.most = most;
+    }
+
+    /// The rows that there are.
+    pub(crate) fn into_rows(mut self) -> Observations {
+        let len = self.rows.len();
+        for joint in &mut self.rows.joints {
+            for column in 0..joint.columns.len() {
+                let from = column * self.most;
+                joint.x.copy_within(from..from + len, column * len);
+            }
+            joint.x.truncate(joint.columns.len() * len);
+            joint.x.shrink_to_fit();
+        }
+        self.rows
+    }
+}
+
+impl JointObservations {
+    /// Puts `len` rows of a part behind the `from` that there are, with room for `most`.
+    fn append(&mut self, part: Self, from: usize, len: usize, most: usize) {
+        if self.x.is_empty() {
+            self.x = vec![0.0; part.columns.len() * most];
+            self.columns = part.columns;
+        }
+        for (to, values) in (self.x.chunks_exact_mut(most)).zip(part.x.chunks_exact(len.max(1))) {
+            to[from..from + len].copy_from_slice(values);
+        }
+        // A temperature that is missing in one part is missing in all.
+        if part.temperature.len() == len && self.temperature.len() == from {
+            self.temperature.extend(part.temperature);
+        } else {
+            self.temperature.clear();
+        }
+        self.measured.extend(part.measured);
+        self.nominal.extend(part.nominal);
+        self.y.extend(part.y);
+        self.standstill.extend(part.standstill);
+        self.spread.extend(part.spread);
+        self.weight.extend(part.weight);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn part(first: usize, len: usize) -> Observations {
+        let value = |column: usize| (0..len).map(move |row| (100 * column + first + row) as f64);
+        let joint = |columns: Vec<usize>| JointObservations {
+            x: columns.iter().flat_map(|column| value(*column)).collect(),
+            measured: value(7).collect(),
+            nominal: value(8).collect(),
+            y: value(9).collect(),
+            standstill: (0..len).map(|row| (first + row) % 3 == 0).collect(),
+            temperature: value(10).collect(),
+            columns,
+            ..JointObservations::default()
+        };
+        let motion = vec![value(1).collect(), value(2).collect()];
+        Observations {
+            log: "run".into(),
+            time: value(0).collect(),
+            starts: vec![0, len / 2],
+            q: motion.clone(),
+            qd: motion.clone(),
+            qdd: motion,
+            joints: vec![joint(vec![0, 2, 5]), joint(Vec::new())],
+        }
+    }
+
+    #[test]
+    fn parts_behind_each_other_are_the_whole_however_much_room_there_was() {
+        let mut whole = part(0, 26);
+        whole.starts = vec![0, 5, 10, 15, 20, 23];
+        for most in [0, 7, 26, 1000] {
+            let mut room = Room::new(most);
+            for (first, len) in [(0, 10), (10, 10), (20, 6)] {
+                room.append(part(first, len));
+            }
+            assert_eq!(room.into_rows(), whole, "room for {most}");
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! A log in chapters says what the same log in memory says: the truth, the same incidents, and what is wrong with single chapters.
+
+#[path = "../examples/two_link.rs"]
+#[allow(dead_code, reason = "its `main`, log and study are not needed here")]
+mod two_link;
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
+use twincal::posterior::random::Random;
+use twincal::robot::{Workspace, inverse_dynamics};
+use twincal::signal::{Channels, Log, LongLog, Payload, ReadChapter, Recording};
+use twincal::term::Family;
+
+const RATE: f64 = 200.0;
+const SAMPLES: usize = 48_000;
+const CHAPTERS: usize = 4;
+/// What the arm carries and its model does not know, kg at the tip; friction, N·m·s/rad and N·m.
+const LOAD: f64 = 0.6;
+const VISCOUS: f64 = 0.7;
+const COULOMB: f64 = 0.5;
+
+/// Four minutes of the arm, with white noise of 0.1 N·m.
+fn recording() -> Recording {
+    let real = two_link::arm(2.0 + LOAD).expect("an arm");
+    let mut noise = Random::new(3, 0);
+    let (mut workspace, mut tau) = (Workspace::new(&real), [0.0; 2]);
+    let mut joints = [(); 2].map(|()| [(); 3].map(|()| Vec::with_capacity(SAMPLES)));
+    let time: Vec<f64> = (0..SAMPLES).map(|i| i as f64 / RATE).collect();
+    let rates = [[0.11, 0.37, 0.53], [0.17, 0.29, 0.61]];
+    for t in &time {
+        let wave = |joint: usize, derivative: i32| -> f64 {
+            let one = |f: f64| {
+                let w = TAU * f;
+                0.5 * w.powi(derivative) * (w * t + 0.25 * TAU * f64::from(derivative)).sin()
+            };
+            rates[joint].into_iter().map(one).sum()
+        };
+        let [q, qd, qdd] = [0, 1, 2].map(|derivative| [wave(0, derivative), wave(1, derivative)]);
+        inverse_dynamics(&real, &mut workspace, &q, &qd, &qdd, &mut tau);
+        tau[0] += VISCOUS * qd[0];
+        tau[1] += COULOMB * (qd[1] / 0.02).tanh();
+        for (j, channels) in joints.iter_mut().enumerate() {
+            let values = [q[j], qd[j], tau[j] + 0.1 * noise.normal()];
+            channels
+                .iter_mut()
+                .zip(values)
+                .for_each(|(all, value)| all.push(value));
+        }
+    }
+    let joints = joints.map(|[q, qd, tau]| Channels {
+        q,
+        qd: Some(qd),
+        qdd: None,
+        tau: Some(tau),
+        temperature: None,
+    });
+    Recording {
+        name: "run".into(),
+        time,
+        joints: joints.to_vec(),
+        payload: Payload::None,
+    }
+}
+
+/// A recording cut where a reader would cut it.
+#[derive(Debug)]
+struct Cut(Recording);
+
+impl Cut {
+    fn range(chapter: usize) -> std::ops::Range<usize> {
+        let at = |chapter| chapter * SAMPLES / CHAPTERS;
+        at(chapter)..at(chapter + 1)
+    }
+}
+
+impl ReadChapter for Cut {
+    fn read(&self, chapter: usize) -> twincal::Result<Recording> {
+        let part = |values: &Vec<f64>| values[Self::range(chapter)].to_vec();
+        let joint = |joint: &Channels| Channels {
+            q: part(&joint.q),
+            qd: joint.qd.as_ref().map(part),
+            qdd: joint.qdd.as_ref().map(part),
+            tau: joint.tau.as_ref().map(part),
+            temperature: None,
+        };
+        Ok(Recording {
+            name: String::new(),
+            time: part(&self.0.time),
+            joints: self.0.joints.iter().map(joint).collect(),
+            payload: Payload::None,
+        })
+    }
+}
+
+fn in_chapters(recording: Recording) -> Log<'static> {
+    Log::Long(LongLog {
+        name: recording.name.clone(),
+        payload: Payload::None,
+        samples: (0..CHAPTERS)
+            .map(|chapter| Cut::range(chapter).len())
+            .collect(),
+        source: Arc::new(Cut(recording)),
+    })
+}
+
+fn calibrated(log: Log<'static>) -> Calibration {
+    let nominal = two_link::arm(2.0).expect("an arm");
+    let mut settings = CalibrationSettings::default();
+    settings.library.families = vec![
+        Family::Payload,
+        Family::Viscous,
+        Family::Coulomb,
+        Family::Offset,
+    ];
+    let none: &[Recording] = &[];
+    calibrate(&nominal, vec![log], none, &settings, &|_| {}).expect("a calibration")
+}
+
+fn selected(result: &Calibration) -> Vec<&str> {
+    let all = result.components.iter().filter(|c| c.selected);
+    all.map(|component| component.name.as_str()).collect()
+}
+
+fn said<'a>(result: &'a Calibration, code: &str) -> Vec<&'a str> {
+    let all = result.findings.iter().filter(|f| f.code == code);
+    all.map(|finding| finding.message.as_str()).collect()
+}
+
+/// 3 parameters at 4.5 sd: false alarm 2e-5 for either log; the seed is fixed.
+#[test]
+fn chapters_say_what_the_whole_log_says() {
+    let recording = recording();
+    let long = calibrated(in_chapters(recording.clone()));
+    let whole = calibrated(Log::Whole(std::borrow::Cow::Owned(recording)));
+    let truth = [
+        ("payload", LOAD),
+        ("shoulder.viscous", VISCOUS),
+        ("elbow.coulomb", COULOMB),
+    ];
+    for result in [&whole, &long] {
+        assert_eq!(
+            selected(result).len(),
+            truth.len(),
+            "{:?}",
+            selected(result)
+        );
+        for (name, value) in truth {
+            let component = result.components.iter().find(|c| c.name == name);
+            let found = &component.expect("a component").parameters[0];
+            let far = (found.mean - value).abs() / found.sd;
+            assert!(
+                far < 4.5,
+                "{name}: {} ± {}, in truth {value}",
+                found.mean,
+                found.sd
+            );
+        }
+        assert!((result.validation.raw.rmse_calibrated - 0.1).abs() < 0.005);
+    }
+    let (logs, of_whole) = (&long.logs[0], &whole.logs[0]);
+    assert_eq!(
+        (logs.samples, logs.segments),
+        (SAMPLES as u64, CHAPTERS as u64)
+    );
+    assert!((logs.rate_hz - RATE).abs() < 1e-6 && logs.duration == of_whole.duration);
+    // Three cuts cost the filters' two ends each, no more: 1.3 s at 5 Hz, 12.5 rows/s.
+    let lost = of_whole.rows[0] - logs.rows[0];
+    assert!((1..=3 * 20).contains(&lost), "{lost} rows");
+    assert_eq!(said(&long, "chapters").len(), 1, "{:?}", long.findings);
+    assert_eq!(said(&whole, "chapters").len(), 0);
+    // What is told of single logs is told once, not once per chapter.
+    assert_eq!(said(&long, "borders").len(), 1);
+    assert!(said(&long, "borders")[0].ends_with("(in chapter 1 of 4; 3 more are alike)"));
+}
+
+#[test]
+fn what_is_wrong_with_a_chapter_is_told_and_costs_no_other() {
+    let mut recording = recording();
+    // Something is hit in the second chapter, and the torque of the third is gone.
+    for i in 0..20 {
+        recording.joints[1].tau.as_mut().expect("torque")[18_000 + i] += 15.0;
+    }
+    for row in Cut::range(2) {
+        recording.joints[0].tau.as_mut().expect("torque")[row] = f64::NAN;
+    }
+    let long = calibrated(in_chapters(recording.clone()));
+    let whole = calibrated(Log::Whole(std::borrow::Cow::Owned(recording)));
+    assert_eq!(said(&long, "torque_spike"), said(&whole, "torque_spike"));
+    assert!(
+        said(&long, "torque_spike")[0].contains("once"),
+        "{:?}",
+        long.findings
+    );
+    let left_out = said(&long, "chapters_left_out");
+    assert!(left_out[0].starts_with("1 of 4 chapters cannot be used and were left out; the first is number 3: torque of joint `shoulder`"), "{left_out:?}");
+    assert_eq!(selected(&long), selected(&whole));
+    assert_eq!(long.logs[0].segments, 3);
+}
+
+#[test]
+fn without_a_usable_chapter_the_first_says_why() {
+    let mut recording = recording();
+    recording.joints[0].q.fill(f64::NAN);
+    let nominal = two_link::arm(2.0).expect("an arm");
+    let none: &[Recording] = &[];
+    let settings = CalibrationSettings::default();
+    let logs = vec![in_chapters(recording)];
+    let stopped = calibrate(&nominal, logs, none, &settings, &|_| {}).expect_err("no position");
+    let words = stopped.error.to_string();
+    assert!(
+        words.contains("position of joint `shoulder` is NaN or infinite"),
+        "{words}"
+    );
+}
+
+/// What a reader says when a chapter cannot be read again is the error, not a chapter that is left out.
+#[test]
+fn a_chapter_that_cannot_be_read_again_ends_the_calibration() {
+    #[derive(Debug)]
+    struct Broken(Cut);
+    impl ReadChapter for Broken {
+        fn read(&self, chapter: usize) -> twincal::Result<Recording> {
+            if chapter == 3 {
+                return Err(twincal::Error::Log {
+                    log: "run".into(),
+                    problem: "the disk is gone".into(),
+                    remedy: "look for it".into(),
+                });
+            }
+            self.0.read(chapter)
+        }
+    }
+    let nominal = two_link::arm(2.0).expect("an arm");
+    let Log::Long(long) = in_chapters(recording()) else {
+        unreachable!("it is long");
+    };
+    let log = Log::Long(LongLog {
+        source: Arc::new(Broken(Cut(recording()))),
+        ..long
+    });
+    let none: &[Recording] = &[];
+    let settings = CalibrationSettings::default();
+    let stopped = calibrate(&nominal, vec![log], none, &settings, &|_| {}).expect_err("no disk");
+    assert!(stopped.error.to_string().contains("the disk is gone"));
+}
