@@ -201,7 +201,6 @@ impl Densities {
         };
         for set in 0u32..1 << count {
             if (0..count).any(|c| orphan(set, c)) {
-                models.push((f64::NEG_INFINITY, set, vec![0.0; size], vec![0.0; size]));
                 continue;
             }
             let members: Vec<usize> = (0..size)
@@ -253,11 +252,11 @@ impl Densities {
             pip: vec![0.0; count],
             mean: vec![0.0; size],
             sd: vec![0.0; size],
-            weights: Vec::new(),
+            weights: vec![0.0; 1 << count],
         };
         for (log, set, mean, second) in &models {
             let weight = (log - top).exp() / total;
-            out.weights.push(weight);
+            out.weights[*set as usize] = weight;
             (0..count)
                 .filter(|c| set >> c & 1 == 1)
                 .for_each(|c| out.pip[c] += weight);

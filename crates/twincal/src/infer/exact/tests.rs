@@ -492,6 +492,35 @@ fn heredity_equals_multivariate_t_densities() {
     agrees_with_densities(&data, "with certain components");
 }
 
+/// The same where the child is decided first and neither is in the lanes (the first three that are open, at most), in tasks and
+/// above them, beside what is certain: only the set of what is in tells the parent that it may not stay out.
+#[test]
+fn no_parent_stays_out_below_its_child() {
+    let chain: Vec<(usize, usize)> = (3..17).map(|c| (c, c + 1)).collect();
+    let long = [&[3, 3, 3, 2][..], &[1; 14]].concat();
+    let cases = [
+        grouped(80, &[3, 3, 3, 2, 1], 40, true).with_parents(&[(3, 4)]),
+        grouped(81, &[5, 5, 5, 4, 3, 2], 40, true).with_parents(&[(3, 4), (4, 5)]),
+        grouped(82, &[4, 4, 4, 2, 2, 1], 40, true).with_parents(&[(0, 5), (3, 5), (4, 5)]),
+        grouped(83, &long, 20, true).with_parents(&chain),
+        acting(3, &[10, 6, 4, 4, 1, 6, 1, 4], 150, true, 2.0).with_parents(&[(2, 4), (7, 4)]),
+    ];
+    for (number, data) in cases.iter().enumerate() {
+        let prior = &data.problem.prior;
+        let standard = Standard::new(&data.problem).unwrap();
+        let sure = certain::components(&standard, &data.problem, None);
+        let (order, certain) = certain::order(prior, &sure);
+        assert_eq!(certain > 0, number == 4);
+        let below = &order[certain + 3..];
+        let before = |(place, &parent): (usize, &usize)| {
+            let child = |&c: &usize| prior.parent_of(c) == Some(parent);
+            below[..place].iter().any(child)
+        };
+        assert!(below.iter().enumerate().any(before), "{number}: {order:?}");
+        agrees_with_densities(data, &number.to_string());
+    }
+}
+
 #[track_caller]
 fn agrees_with_densities(data: &Grouped, what: &str) {
     let prior = &data.problem.prior;
