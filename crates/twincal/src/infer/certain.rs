@@ -240,3 +240,107 @@ pub(super) fn order(prior: &Prior, certain: &Certain) -> (Vec<usize>, usize) {
     });
     (order, certain.iter().filter(|c| **c).count())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::infer::testing::{Densities, grouped};
+    use crate::infer::{approximate, exact};
+
+    /// The problem with its structure settled, and with odds a hair short of that: as good as settled, but by the general road,
+    /// where a model to measure by is looked for.
+    fn roads(problem: &Problem, inside: &[bool]) -> [Problem; 2] {
+        let mut settled = problem.clone();
+        settled.prior = problem.prior.settled(inside);
+        let mut general = settled.clone();
+        general.prior.odds = vec![0.99 * SETTLED, 1.0 / (0.99 * SETTLED)];
+        assert_eq!(settled.prior.settled_structure().as_deref(), Some(inside));
+        assert_eq!(general.prior.settled_structure(), None);
+        [settled, general]
+    }
+
+    fn judged(problem: &Problem) -> Certain {
+        components(&Standard::new(problem).unwrap(), problem, None)
+    }
+
+    /// Every structure of five components, with and without bounds: what is in is certain and nothing else, as by the general road,
+    /// and what it was measured by is the whole evidence, by multivariate t densities.
+    #[test]
+    fn a_settled_structure_is_its_own_measure() {
+        let mut data = grouped(6, &[2, 2, 1, 3, 1], 60, true);
+        let (mut acting, mut distant) = (0, 0);
+        for set in 0..1 << 5 {
+            let inside: Vec<bool> = (0..5).map(|c| set >> c & 1 == 1).collect();
+            let [settled, general] = roads(&data.problem, &inside);
+            let certain = judged(&settled);
+            assert_eq!(certain.sure, inside);
+            assert_eq!(certain, judged(&general), "{set:b}");
+
+            let standard = Standard::new(&settled).unwrap();
+            let weight = weight_of(&standard, &settled, &inside).unwrap();
+            let free = std::mem::replace(&mut data.problem, settled);
+            let truth = Densities::new(&data);
+            let off = standard.log_evidence(weight) - truth.log_evidence;
+            assert!(off.abs() < 1e-9 * truth.log_evidence.abs(), "{set:b}");
+            let got = exact::enumerate(&data.problem).unwrap();
+            for k in 0..got.mean.len() {
+                let off = (got.mean[k] - truth.mean[k]).abs();
+                assert!(off < 1e-9 * (1.0 + truth.sd[k]), "{set:b}: mean {k}");
+                let off = (got.sd[k] - truth.sd[k]).abs();
+                assert!(off < 1e-7, "{set:b}: sd {k}");
+            }
+            data.problem = free;
+
+            let mut bounded = data.problem.clone();
+            for (k, lower) in bounded.prior.lower.iter_mut().enumerate() {
+                *lower = [f64::NEG_INFINITY, -0.1, -1e3][k % 3];
+            }
+            let [settled, general] = roads(&bounded, &inside);
+            let certain = judged(&settled);
+            assert_eq!(certain, judged(&general), "{set:b} with bounds");
+            distant += certain.settled.iter().filter(|s| **s).count();
+            acting += certain.settled.iter().filter(|s| !**s).count();
+        }
+        assert!(acting > 0 && distant > 0, "{acting} {distant}");
+    }
+
+    /// Two columns that are settled to be out and explain the torque together only: y = b + 2.5 u + e of columns b, w + u/10 and
+    /// w − u/10. Neither can leave alone (500 ln 7 > ln [`SETTLED`]), so that the general road measures by a model e^400 too light and
+    /// leaves b open. By the settled structure b is certain; the posterior is that of b alone either way.
+    #[test]
+    fn a_settled_structure_needs_no_climb() {
+        let problem = Problem {
+            gram: vec![1.0, 0.0, 0.0, 0.0, 1.01, 0.99, 0.0, 0.99, 1.01],
+            xy: vec![1.8, 0.25, -0.25],
+            yy: 1.8 * 1.8 + 2.5 * 2.5 + 1.0,
+            n: 1000.0,
+            log_constant: 0.0,
+            prior: Prior::single(
+                vec![1e6; 3],
+                vec![0; 3],
+                crate::prior::Inclusion::Probability(0.5),
+                (0.01, 1e-6),
+            ),
+            names: ["b", "plus", "minus"].map(String::from).to_vec(),
+        };
+        let inside = [true, false, false];
+        let [settled, general] = roads(&problem, &inside);
+        assert_eq!(judged(&general).sure, [false; 3]);
+        assert_eq!(judged(&settled).sure, inside);
+
+        let precision = 1.0 + 1e-6;
+        let mean = 1.8 / precision;
+        let scale = 1e-6 + 0.5 * (problem.yy - 1.8 * mean);
+        let sd = (scale / (500.01 - 1.0) / precision).sqrt();
+        for (road, got) in [
+            ("settled", exact::enumerate(&settled).unwrap()),
+            ("general", exact::enumerate(&general).unwrap()),
+            ("search", approximate(&settled, None).unwrap()),
+        ] {
+            assert_eq!(got.models[0].members, [0], "{road}");
+            assert!((got.mean[0] - mean).abs() < 1e-9 * sd, "{road}: mean");
+            assert!((got.sd[0] / sd - 1.0).abs() < 1e-9, "{road}: sd");
+            assert!(got.mean[1..].iter().all(|m| m.abs() < 1e-9), "{road}");
+        }
+    }
+}
