@@ -3,6 +3,7 @@
 use super::scratch::Scratch;
 use crate::error::{Error, Result};
 use crate::memory;
+use rayon::prelude::*;
 use std::io;
 use std::ops::Range;
 
@@ -290,7 +291,7 @@ impl Spilled {
             self.scratch
                 .read(chapter.table, column, chapter.rows.clone())
         };
-        (0..self.finite.len()).map(column).collect()
+        (0..self.finite.len()).into_par_iter().map(column).collect()
     }
 }
 

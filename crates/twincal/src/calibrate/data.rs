@@ -33,6 +33,8 @@ pub(super) struct Log {
     pub(super) summary: LogSummary,
     /// First and last stamp, s.
     ends: [f64; 2],
+    /// Of a log in chapters, statistics at the cut-offs of the sweep with nothing left out: made while its chapters were there.
+    elsewhere: Vec<Option<Gram>>,
 }
 
 /// The logs' motion, apart from their rows: it is dropped first.
@@ -56,11 +58,11 @@ pub(super) struct Data {
 }
 
 impl Data {
-    /// Aligns and filters every log.
+    /// Aligns and filters every log; `elsewhere`: the pipelines of the sweep.
     pub(super) fn read(
         robot: &Robot,
         library: &Library,
-        pipeline: &Pipeline,
+        (pipeline, elsewhere): (&Pipeline, &[Pipeline]),
         logs: &[ReadyLog<'_>],
         heldout: &[ReadyLog<'_>],
     ) -> Result<(Self, Trajectories)> {
@@ -72,12 +74,12 @@ impl Data {
             pipeline,
             unknown: carry_something(loads),
         };
-        let mut read = |logs: &[ReadyLog<'_>], role: &str| -> Result<(Vec<Log>, Vec<_>)> {
+        let mut read = |logs: &[ReadyLog<'_>], role: Role<'_>| -> Result<(Vec<Log>, Vec<_>)> {
             let one = |log| reader.log(log, role, &mut findings);
             logs.iter().map(one).collect()
         };
-        let (fit, of_fit) = read(logs, "fit")?;
-        let (heldout, of_heldout) = read(heldout, "heldout")?;
+        let (fit, of_fit) = read(logs, Role::Fit(elsewhere))?;
+        let (heldout, of_heldout) = read(heldout, Role::HeldOut)?;
         let data = Self {
             fit,
             heldout,
@@ -134,6 +136,9 @@ impl Data {
         }
         for log in self.fit.iter_mut().chain(&mut self.heldout) {
             log.observations.drop_columns(&zero);
+            for gram in log.elsewhere.iter_mut().flatten() {
+                gram.drop_columns(&zero);
+            }
         }
         (library.without_columns(&zero), zero)
     }
@@ -232,7 +237,31 @@ impl Data {
     }
 }
 
+/// What a log is for; logs that are fitted are swept, with these pipelines.
+#[derive(Clone, Copy)]
+enum Role<'a> {
+    Fit(&'a [Pipeline]),
+    HeldOut,
+}
+
+impl<'a> Role<'a> {
+    fn word(self) -> &'static str {
+        match self {
+            Self::Fit(_) => "fit",
+            Self::HeldOut => "heldout",
+        }
+    }
+
+    fn elsewhere(self) -> &'a [Pipeline] {
+        match self {
+            Self::Fit(elsewhere) => elsewhere,
+            Self::HeldOut => &[],
+        }
+    }
+}
+
 /// What rows are made with.
+#[derive(Clone, Copy)]
 struct Reader<'a> {
     robot: &'a Robot,
     library: &'a Library,
@@ -245,7 +274,7 @@ impl Reader<'_> {
     fn log(
         &self,
         log: &ReadyLog<'_>,
-        role: &str,
+        role: Role<'_>,
         findings: &mut Vec<Finding>,
     ) -> Result<(Log, Trajectory)> {
         let (robot, pipeline) = (self.robot, self.pipeline);
@@ -266,7 +295,7 @@ impl Reader<'_> {
     fn chapters(
         &self,
         long: &LongReady,
-        role: &str,
+        role: Role<'_>,
         evidence: &mut Evidence,
         findings: &mut Vec<Finding>,
     ) -> Result<(Log, Trajectory)> {
@@ -275,6 +304,7 @@ impl Reader<'_> {
         let mut room = Room::new(long.rows_at_most(self.pipeline));
         let (mut summaries, mut kept): (_, Option<Trajectory>) = (Vec::new(), None);
         let mut ends: Option<[f64; 2]> = None;
+        let mut elsewhere = vec![Some(Gram::default()); role.elsewhere().len()];
         long.visit(self.pipeline, findings, |chapter, said| {
             let (log, trajectory) = self.recording(chapter, role, evidence, said)?;
             let mut trajectory = trajectory.thinned_out(KEPT_OF_LONG / share);
@@ -283,6 +313,7 @@ impl Reader<'_> {
                 None => kept = Some(trajectory),
             }
             room.append(log.observations);
+            self.add_at(role.elsewhere(), chapter, &[], &mut elsewhere);
             summaries.push(log.summary);
             let [first, last] = log.ends;
             ends = Some([ends.map_or(first, |ends| ends[0]), last]);
@@ -299,6 +330,7 @@ impl Reader<'_> {
             observations: room.into_rows(),
             summary,
             ends,
+            elsewhere,
         };
         Ok((log, trajectory))
     }
@@ -307,7 +339,7 @@ impl Reader<'_> {
     fn recording(
         &self,
         log: &PreparedLog<'_>,
-        role: &str,
+        role: Role<'_>,
         evidence: &mut Evidence,
         findings: &mut Vec<Finding>,
     ) -> Result<(Log, Trajectory)> {
@@ -322,9 +354,10 @@ impl Reader<'_> {
         let ends = time.first().zip(time.last()).map(|(a, b)| [*a, *b]);
         let log = Log {
             incidents: Vec::new(),
-            summary: summary(recording, role, pipeline, &trajectory),
+            summary: summary(recording, role.word(), pipeline, &trajectory),
             observations,
             ends: ends.unwrap_or_default(),
+            elsewhere: Vec::new(),
         };
         Ok((log, trajectory))
     }
@@ -333,6 +366,24 @@ impl Reader<'_> {
         let (mut trajectory, findings) = log.align(self.pipeline, raw)?;
         trajectory.payload_acts = !self.unknown || trajectory.payload == Payload::Unknown;
         Ok((trajectory, findings))
+    }
+
+    /// Adds a recording's statistics with other pipelines, one after the other: of a long log one more trajectory fits in memory, two do
+    /// not; each uses all cores. `None` for a pipeline that it cannot have.
+    fn add_at(
+        &self,
+        pipelines: &[Pipeline],
+        log: &PreparedLog<'_>,
+        incidents: &[Incident],
+        sums: &mut [Option<Gram>],
+    ) {
+        for (pipeline, kept) in pipelines.iter().zip(sums) {
+            let gram = Reader { pipeline, ..*self }.gram(log, incidents);
+            match (kept.as_mut(), gram) {
+                (Some(sum), Ok(gram)) => *sum += &gram,
+                _ => *kept = None,
+            }
+        }
     }
 
     /// Statistics of a recording's rows; the incidents stay left out.
@@ -386,29 +437,26 @@ pub(super) fn grams_at(
     logs: &[ReadyLog<'_>],
     data: &Data,
 ) -> Result<Vec<Option<Gram>>> {
-    let reader = |pipeline| Reader {
+    let reader = Reader {
         robot: &twin.robot,
         library,
-        pipeline,
+        pipeline: &twin.pipeline,
         unknown: carry_something(logs.iter().map(ReadyLog::payload)),
     };
-    let readers: Vec<Reader<'_>> = pipelines.iter().map(reader).collect();
-    let mut sums = vec![Some(Gram::default()); readers.len()];
+    let mut sums = vec![Some(Gram::default()); pipelines.len()];
     for (log, own) in logs.iter().zip(&data.fit) {
-        // One cut-off after the other: of a long log one more trajectory fits in memory, two do not. Each uses all cores.
-        let mut add = |log: &PreparedLog<'_>| {
-            for (reader, kept) in readers.iter().zip(&mut sums) {
-                let gram = reader.gram(log, &own.incidents);
-                match (kept.as_mut(), gram) {
-                    (Some(sum), Ok(gram)) => *sum += &gram,
-                    _ => *kept = None,
+        match log {
+            ReadyLog::Whole(log) => reader.add_at(pipelines, log, &own.incidents, &mut sums),
+            ReadyLog::Long(_) if own.incidents.is_empty() => {
+                for (sum, gram) in sums.iter_mut().zip(&own.elsewhere) {
+                    match (sum.as_mut(), gram) {
+                        (Some(sum), Some(gram)) => *sum += gram,
+                        _ => *sum = None,
+                    }
                 }
             }
-        };
-        match log {
-            ReadyLog::Whole(log) => add(log),
             ReadyLog::Long(long) => long.visit(&twin.pipeline, &mut Vec::new(), |chapter, _| {
-                add(chapter);
+                reader.add_at(pipelines, chapter, &own.incidents, &mut sums);
                 Ok(())
             })?,
         }

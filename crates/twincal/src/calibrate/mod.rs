@@ -191,7 +191,9 @@ fn whole_road(
     let sweeps = !settings.noise.weighs_rows();
     let all = (&prepared[..], &others[..]);
     room::require(settings.most_bytes, &library, &pipeline, all, sweeps)?;
-    let (mut data, trajectories) = Data::read(robot, &library, &pipeline, &prepared, &others)?;
+    let elsewhere = sweep::pipelines(&pipeline, settings);
+    let pipelines = (&pipeline, &elsewhere[..]);
+    let (mut data, trajectories) = Data::read(robot, &library, pipelines, &prepared, &others)?;
     findings.extend(self_check(robot, &pipeline, trajectories.all())?);
     let lags: Vec<LogLag> = trajectories
         .all()

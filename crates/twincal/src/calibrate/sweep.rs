@@ -31,14 +31,14 @@ pub(super) fn cutoff(
     fit: &Fit,
 ) -> Result<Vec<SweepPoint>> {
     let pipeline = &twin.pipeline;
-    if pipeline.cutoff_hz == 0.0 || settings.noise.weighs_rows() {
+    let scaled = pipelines(pipeline, settings);
+    if scaled.is_empty() {
         return Ok(Vec::new());
     }
     let mut points = vec![SweepPoint {
         cutoff_hz: pipeline.cutoff_hz,
         mean: fit.posterior.mean.clone(),
     }];
-    let scaled: Vec<Pipeline> = FACTORS.iter().map(|f| scaled(pipeline, *f)).collect();
     let grams = grams_at(twin, library, &scaled, logs, data)?;
     let cutoffs = scaled.iter().map(|scaled| scaled.cutoff_hz);
     let moved: Vec<(f64, Gram)> = cutoffs
@@ -59,6 +59,14 @@ pub(super) fn cutoff(
     points.extend(moved);
     points.sort_by(|a, b| a.cutoff_hz.total_cmp(&b.cutoff_hz));
     Ok(points)
+}
+
+/// The pipelines of the sweep beside that of the fit: none without a filter, and where rows are weighed.
+pub(super) fn pipelines(pipeline: &Pipeline, settings: &CalibrationSettings) -> Vec<Pipeline> {
+    if pipeline.is_off() || settings.noise.weighs_rows() {
+        return Vec::new();
+    }
+    FACTORS.iter().map(|f| scaled(pipeline, *f)).collect()
 }
 
 /// The same filters at `factor` times the cut-off.

@@ -42,6 +42,19 @@ impl Symmetric {
     }
 }
 
+impl Symmetric {
+    /// The part of some rows and the same columns.
+    fn of(&self, rows: &[usize]) -> Self {
+        let entries = rows
+            .iter()
+            .flat_map(|i| rows.iter().map(|j| self.at(*i, *j)));
+        Self {
+            size: rows.len(),
+            values: entries.collect(),
+        }
+    }
+}
+
 impl AddAssign<&Symmetric> for Symmetric {
     fn add_assign(&mut self, other: &Symmetric) {
         for (a, b) in self.values.iter_mut().zip(&other.values) {
@@ -147,6 +160,36 @@ impl AddAssign<&JointGram> for JointGram {
 pub struct Gram {
     /// One per moving joint.
     pub joints: Vec<JointGram>,
+}
+
+impl Gram {
+    /// Takes columns out, by their numbers, which ascend; those behind move up.
+    pub fn drop_columns(&mut self, dropped: &[usize]) {
+        if dropped.is_empty() {
+            return;
+        }
+        for joint in &mut self.joints {
+            let kept: Vec<usize> = (0..joint.columns.len())
+                .filter(|i| !dropped.contains(&(joint.columns[*i] as usize)))
+                .collect();
+            let moved = |i: &usize| {
+                let column = joint.columns[*i];
+                column - dropped.partition_point(|d| *d < column as usize) as u32
+            };
+            let columns = kept.iter().map(moved).collect();
+            // The torque stands behind the columns.
+            let rows: Vec<usize> = kept.into_iter().chain([joint.columns.len()]).collect();
+            for sum in [
+                &mut joint.s0,
+                &mut joint.d,
+                &mut joint.first,
+                &mut joint.last,
+            ] {
+                *sum = sum.of(&rows);
+            }
+            joint.columns = columns;
+        }
+    }
 }
 
 impl AddAssign<&Gram> for Gram {

@@ -55,13 +55,23 @@ impl LongLog {
     pub(crate) fn visit(
         &self,
         findings: &mut Vec<Finding>,
-        mut visit: impl FnMut(&Recording, &mut Vec<Finding>) -> Result<()>,
+        mut visit: impl FnMut(&Recording, &mut Vec<Finding>) -> Result<()> + Send,
     ) -> Result<()> {
         let (mut said, mut unused, mut rows) = (Vec::new(), Vec::new(), 0);
+        let mut next = Some(self.chapter(0)?);
         for chapter in 0..self.chapters() {
-            let recording = self.chapter(chapter)?;
+            let Some(recording) = next.take() else {
+                break;
+            };
             let mut of_chapter = Vec::new();
-            match visit(&recording, &mut of_chapter) {
+            // The next chapter is read meanwhile.
+            let ahead = chapter + 1;
+            let (visited, read) = rayon::join(
+                || visit(&recording, &mut of_chapter),
+                || (ahead < self.chapters()).then(|| self.chapter(ahead)),
+            );
+            next = read.transpose()?;
+            match visited {
                 Ok(()) => said.extend(of_chapter.into_iter().map(|finding| (chapter, finding))),
                 Err(Error::Log {
                     log,

@@ -111,7 +111,7 @@ impl LongReady {
         &self,
         pipeline: &Pipeline,
         findings: &mut Vec<Finding>,
-        mut visit: impl FnMut(&PreparedLog<'_>, &mut Vec<Finding>) -> Result<()>,
+        mut visit: impl FnMut(&PreparedLog<'_>, &mut Vec<Finding>) -> Result<()> + Send,
     ) -> Result<()> {
         self.log.visit(findings, |chapter, said| {
             visit(
