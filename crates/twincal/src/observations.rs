@@ -1,6 +1,7 @@
 //! The rows of one log, kept at the filtered rate: what residuals, blocks and held-out scores are computed from.
 
 mod blocks;
+mod columns;
 mod room;
 mod products;
 
@@ -36,6 +37,8 @@ pub struct JointObservations {
     pub temperature: Vec<f64>,
     /// What a row counts: its column values and its y enter every sum multiplied by the square root; empty: 1 each.
     pub weight: Vec<f64>,
+    /// The columns of a long log, which are not in `x` then.
+    pub(crate) shelved: Option<columns::Shelved>,
 }
 
 /// Rows of one log.
@@ -274,10 +277,13 @@ impl Observations {
             let kept: Vec<usize> = (0..joint.columns.len())
                 .filter(|&i| !dropped.contains(&joint.columns[i]))
                 .collect();
-            joint.x = kept
-                .iter()
-                .flat_map(|&i| joint.x[i * len..(i + 1) * len].iter().copied())
-                .collect();
+            match &mut joint.shelved {
+                Some(shelved) => shelved.keep(&kept),
+                None => {
+                    let column = |i: &usize| joint.x[i * len..(i + 1) * len].iter().copied();
+                    joint.x = kept.iter().flat_map(column).collect();
+                }
+            }
             joint.columns = kept
                 .iter()
                 .map(|&i| {
@@ -305,29 +311,29 @@ impl Part<'_> {
         let mut accumulator = JointAccumulator::new(columns);
         let keep: Vec<bool> = rows.standstill.iter().map(|still| !still).collect();
         for range in self.runs_between_starts() {
-            let x = if rows.columns.is_empty() {
-                &[][..]
-            } else {
-                &rows.x[range.start..]
-            };
-            let keep = &keep[range.clone()];
-            if rows.weight.is_empty() {
-                let y = &rows.y[range.clone()];
-                accumulator.push_block(x, all.len(), y, keep, true);
-            } else {
-                let root: Vec<f64> = rows.weight[range.clone()]
-                    .iter()
-                    .map(|u| u.sqrt())
-                    .collect();
+            let start = range.start;
+            rows.visit_columns(all.len(), range, &mut |range, columns| {
+                let (keep, first) = (&keep[range.clone()], range.start == start);
+                let x = if rows.columns.is_empty() {
+                    &[]
+                } else {
+                    columns.x
+                };
+                if rows.weight.is_empty() {
+                    accumulator.push_block(x, columns.stride, &rows.y[range], keep, first);
+                    return;
+                }
+                let roots = rows.weight[range.clone()].iter().map(|u| u.sqrt());
+                let root: Vec<f64> = roots.collect();
                 let scaled = |values: &[f64]| -> Vec<f64> {
                     values.iter().zip(&root).map(|(v, u)| v * u).collect()
                 };
-                let (count, len) = (range.len(), all.len());
+                let count = range.len();
                 let x: Vec<f64> = (0..rows.columns.len())
-                    .flat_map(|i| scaled(&x[i * len..i * len + count]))
+                    .flat_map(|i| scaled(columns.of(i, 0, count)))
                     .collect();
-                accumulator.push_block(&x, count, &scaled(&rows.y[range]), keep, true);
-            }
+                accumulator.push_block(&x, count, &scaled(&rows.y[range]), keep, first);
+            });
         }
         accumulator.finish()
     }
@@ -383,7 +389,11 @@ impl Part<'_> {
         let (len, rows) = (self.observations.len(), &self.observations.joints[joint]);
         let mut residual = rows.y[range.clone()].to_vec();
         let beta: Vec<f64> = rows.columns.iter().map(|&column| beta[column]).collect();
-        products::subtract(rows.of_rows(len, &range), &beta, &mut residual);
+        let first = range.start;
+        rows.visit_columns(len, range, &mut |piece, columns| {
+            let own = &mut residual[piece.start - first..piece.end - first];
+            products::subtract(columns, &beta, own);
+        });
         residual
     }
 
@@ -395,7 +405,11 @@ impl Part<'_> {
             .flat_map(|a| columns().map(move |b| covariance[a * count + b]))
             .collect();
         let mut forms = vec![0.0; self.rows.len()];
-        products::quadratic(rows.of_rows(len, &self.rows), &own, &mut forms);
+        let first = self.rows.start;
+        rows.visit_columns(len, self.rows.clone(), &mut |piece, columns| {
+            let forms = &mut forms[piece.start - first..piece.end - first];
+            products::quadratic(columns, &own, forms);
+        });
         forms
     }
 }
@@ -412,14 +426,6 @@ impl JointObservations {
         let residual = rows.measured.iter().zip(&rows.nominal);
         self.y.extend(residual.map(|(m, n)| m - n));
         self.standstill.extend_from_slice(&rows.standstill);
-    }
-
-    /// The columns from the first row of `range` on, out of `len` rows.
-    fn of_rows(&self, len: usize, range: &Range<usize>) -> products::Columns<'_> {
-        products::Columns {
-            x: self.x.get(range.start..).unwrap_or_default(),
-            stride: len,
-        }
     }
 }
 

@@ -5,11 +5,11 @@
 mod two_link;
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::posterior::random::Random;
 use twincal::robot::{Workspace, inverse_dynamics};
-use twincal::signal::{Channels, Log, LongLog, Payload, ReadChapter, Recording};
+use twincal::signal::{Channels, Log, LongLog, Payload, ReadChapter, Recording, Shelf};
 use twincal::term::Family;
 
 const RATE: f64 = 200.0;
@@ -93,6 +93,37 @@ impl ReadChapter for Cut {
     }
 }
 
+/// Rows that are put away are in no vector of the calibration's own.
+#[derive(Debug, Default)]
+struct Attic {
+    numbers: Mutex<Vec<f64>>,
+    broken: bool,
+}
+
+impl Shelf for Attic {
+    fn put(&self, numbers: &[f64]) -> twincal::Result<u64> {
+        let mut all = self.numbers.lock().expect("no panic");
+        all.extend_from_slice(numbers);
+        Ok((all.len() - numbers.len()) as u64)
+    }
+
+    fn get(&self, place: u64, numbers: &mut [f64]) {
+        let all = self.numbers.lock().expect("no panic");
+        numbers.copy_from_slice(&all[place as usize..][..numbers.len()]);
+        if self.broken {
+            numbers.fill(f64::NAN);
+        }
+    }
+
+    fn failure(&self) -> Option<twincal::Error> {
+        self.broken.then(|| twincal::Error::Log {
+            log: "run".into(),
+            problem: "the attic burnt down".into(),
+            remedy: "build another".into(),
+        })
+    }
+}
+
 fn in_chapters(recording: Recording) -> Log<'static> {
     Log::Long(LongLog {
         name: recording.name.clone(),
@@ -101,6 +132,7 @@ fn in_chapters(recording: Recording) -> Log<'static> {
             .map(|chapter| Cut::range(chapter).len())
             .collect(),
         source: Arc::new(Cut(recording)),
+        shelf: None,
     })
 }
 
@@ -125,6 +157,70 @@ fn selected(result: &Calibration) -> Vec<&str> {
 fn said<'a>(result: &'a Calibration, code: &str) -> Vec<&'a str> {
     let all = result.findings.iter().filter(|f| f.code == code);
     all.map(|finding| finding.message.as_str()).collect()
+}
+
+fn with_shelf(log: Log<'static>, shelf: Arc<dyn Shelf>) -> Log<'static> {
+    match log {
+        Log::Long(long) => Log::Long(LongLog {
+            shelf: Some(shelf),
+            ..long
+        }),
+        whole => whole,
+    }
+}
+
+/// Where rows lie changes no more than the order of sums.
+#[test]
+fn rows_on_a_shelf_are_rows() {
+    let attic = Arc::new(Attic::default());
+    let kept = calibrated(in_chapters(recording()));
+    let put_away = calibrated(with_shelf(in_chapters(recording()), attic.clone()));
+    assert!(attic.numbers.lock().expect("no panic").len() > 10_000);
+    assert_eq!(kept.validation.split, put_away.validation.split);
+    let close = |a: f64, b: f64, what: &str| {
+        assert!(
+            (a - b).abs() <= 1e-6 * a.abs().max(1e-6),
+            "{what}: {a}, {b}"
+        );
+    };
+    for (a, b) in kept.terms.iter().zip(&put_away.terms) {
+        for (a, b) in [
+            (a.pip, b.pip),
+            (a.conditional_mean, b.conditional_mean),
+            (a.conditional_sd, b.conditional_sd),
+            (a.sandwich_sd, b.sandwich_sd),
+        ] {
+            assert_eq!(a.is_some(), b.is_some());
+            close(a.unwrap_or(0.0), b.unwrap_or(0.0), "a term");
+        }
+    }
+    for (a, b) in (kept.validation.filtered.joints.iter()).zip(&put_away.validation.filtered.joints)
+    {
+        close(a.rmse_calibrated, b.rmse_calibrated, "held-out error");
+        close(a.epistemic_sd, b.epistemic_sd, "its epistemic part");
+    }
+    for (a, b) in kept.sweep.iter().zip(&put_away.sweep) {
+        close(a.cutoff_hz, b.cutoff_hz, "cut-off");
+        a.mean
+            .iter()
+            .zip(&b.mean)
+            .for_each(|(a, b)| close(*a, *b, "sweep"));
+    }
+    assert_eq!((kept.sweep.len(), put_away.sweep.len()), (3, 3));
+}
+
+#[test]
+fn rows_that_do_not_come_back_end_the_calibration_with_the_reason() {
+    let attic = Attic {
+        broken: true,
+        ..Attic::default()
+    };
+    let log = with_shelf(in_chapters(recording()), Arc::new(attic));
+    let nominal = two_link::arm(2.0).expect("an arm");
+    let none: &[Recording] = &[];
+    let settings = CalibrationSettings::default();
+    let stopped = calibrate(&nominal, vec![log], none, &settings, &|_| {}).expect_err("no rows");
+    assert!(stopped.error.to_string().contains("the attic burnt down"));
 }
 
 /// 3 parameters at 4.5 sd: false alarm 2e-5 for either log; the seed is fixed.
@@ -157,6 +253,17 @@ fn chapters_say_what_the_whole_log_says() {
             );
         }
         assert!((result.validation.raw.rmse_calibrated - 0.1).abs() < 0.005);
+    }
+    // The sweep's rows of a log in chapters are made with those of the fit, and are the same but for the ends of chapters.
+    for (a, b) in whole.sweep.iter().zip(&long.sweep) {
+        for (k, (a, b)) in a.mean.iter().zip(&b.mean).enumerate() {
+            let sd = whole.terms[k].conditional_sd.unwrap_or(f64::INFINITY);
+            assert!(
+                (a - b).abs() < 0.5 * sd,
+                "{}: {a}, {b} ± {sd}",
+                whole.terms[k].term.name
+            );
+        }
     }
     let (logs, of_whole) = (&long.logs[0], &whole.logs[0]);
     assert_eq!(

@@ -2,6 +2,7 @@
 
 use super::cells::{Cells, Chapter, Spilled};
 use super::columns::Selection;
+use super::scratch::TemporaryShelf;
 use super::torque::to_joint_torque;
 use super::{LogOptions, Preset, Request};
 use crate::error::{Error, Place, Result};
@@ -57,6 +58,9 @@ pub(crate) fn assemble(
         chapters,
         make,
     };
+    let remedy = "set TMPDIR to a folder where files can be made";
+    let shelf = TemporaryShelf::new(name)
+        .map_err(|e| Error::system(name, "keep its numbers in a temporary file", &e, remedy))?;
     // What is assumed of one chapter is assumed of all.
     table.recording(0, findings)?;
     Ok(Log::Long(LongLog {
@@ -64,6 +68,7 @@ pub(crate) fn assemble(
         payload: request.options.payload,
         samples: table.chapters.iter().map(Chapter::len).collect(),
         source: Arc::new(table),
+        shelf: Some(Arc::new(shelf)),
     }))
 }
 
@@ -93,7 +98,12 @@ impl OnDisk {
         let chapter = &self.chapters[chapter];
         let columns = self.spilled.read(chapter).map_err(|e| {
             let remedy = "look at the disk that holds temporary files (TMPDIR)";
-            Error::system(&self.make.name, "read again the numbers of", &e, remedy)
+            Error::system(
+                &self.make.name,
+                "read its numbers back from a temporary file",
+                &e,
+                remedy,
+            )
         })?;
         self.make.recording(columns, chapter.first, findings)
     }

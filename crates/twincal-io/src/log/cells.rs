@@ -100,7 +100,7 @@ fn chapter_rows(columns: usize) -> usize {
 fn no_room(name: &str, error: &io::Error) -> Error {
     Error::system(
         name,
-        "keep the numbers on disk of",
+        "keep its numbers in a temporary file",
         error,
         "set TMPDIR to a folder with as much room as the log has numbers (8 bytes each)",
     )

@@ -4,9 +4,10 @@ use std::fs::File;
 use std::io;
 use std::ops::Range;
 use std::os::unix::fs::FileExt;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+use twincal::signal::Shelf;
 
-/// Numbers that pass through memory at a time.
-const BLOCK: usize = 1 << 13;
 const BYTES: usize = size_of::<f64>();
 
 /// Tables one behind the other, each column by column.
@@ -55,14 +56,8 @@ impl Scratch {
         row: usize,
         values: &[f64],
     ) -> io::Result<()> {
-        let mut bytes = Vec::with_capacity(BLOCK * BYTES);
-        for (block, values) in values.chunks(BLOCK).enumerate() {
-            bytes.clear();
-            bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
-            let place = self.place(table, column, row + block * BLOCK);
-            self.file.write_all_at(&bytes, place)?;
-        }
-        Ok(())
+        let place = self.place(table, column, row);
+        self.file.write_all_at(bytemuck::cast_slice(values), place)
     }
 
     /// Some rows of a column.
@@ -72,16 +67,67 @@ impl Scratch {
         column: usize,
         rows: Range<usize>,
     ) -> io::Result<Vec<f64>> {
-        let mut values = Vec::with_capacity(rows.len());
-        let mut bytes = vec![0; BLOCK.min(rows.len()) * BYTES];
-        for row in rows.clone().step_by(BLOCK) {
-            let bytes = &mut bytes[..BLOCK.min(rows.end - row) * BYTES];
-            self.file
-                .read_exact_at(bytes, self.place(table, column, row))?;
-            let (numbers, _) = bytes.as_chunks::<BYTES>();
-            values.extend(numbers.iter().map(|number| f64::from_le_bytes(*number)));
-        }
+        let mut values = vec![0.0; rows.len()];
+        let place = self.place(table, column, rows.start);
+        let bytes = bytemuck::cast_slice_mut(&mut values);
+        self.file.read_exact_at(bytes, place)?;
         Ok(values)
+    }
+}
+
+/// Numbers that the calibration of long logs puts away, in a temporary file of their own.
+#[derive(Debug)]
+pub(crate) struct TemporaryShelf {
+    log: String,
+    file: File,
+    /// Bytes so far.
+    end: AtomicU64,
+    failure: OnceLock<twincal::Error>,
+}
+
+impl TemporaryShelf {
+    /// For what is made of a log of this name.
+    pub(crate) fn new(log: &str) -> io::Result<Self> {
+        Ok(Self {
+            log: log.to_owned(),
+            file: tempfile::tempfile()?,
+            end: AtomicU64::new(0),
+            failure: OnceLock::new(),
+        })
+    }
+
+    fn error(&self, what: &str, error: &io::Error) -> twincal::Error {
+        twincal::Error::Log {
+            log: self.log.clone(),
+            problem: format!("its rows cannot be {what} disk: {error}"),
+            remedy: "look at the folder of temporary files, or set TMPDIR to one with more room"
+                .into(),
+        }
+    }
+}
+
+impl Shelf for TemporaryShelf {
+    fn put(&self, numbers: &[f64]) -> twincal::Result<u64> {
+        let bytes: &[u8] = bytemuck::cast_slice(numbers);
+        let place = self.end.fetch_add(bytes.len() as u64, Ordering::Relaxed);
+        let written = self.file.write_all_at(bytes, place);
+        written.map_err(|e| self.error("put on", &e))?;
+        Ok(place)
+    }
+
+    fn get(&self, place: u64, numbers: &mut [f64]) {
+        let read = self
+            .file
+            .read_exact_at(bytemuck::cast_slice_mut(numbers), place);
+        if let Err(error) = read {
+            numbers.fill(f64::NAN);
+            // Only the first is told.
+            let _ = self.failure.set(self.error("read back from", &error));
+        }
+    }
+
+    fn failure(&self) -> Option<twincal::Error> {
+        self.failure.get().cloned()
     }
 }
 
@@ -118,5 +164,28 @@ mod tests {
             assert_eq!(read, expected);
         }
         assert!(scratch.read(1, 1, 1..4).is_err(), "nothing is there");
+    }
+
+    #[test]
+    fn what_is_put_away_comes_back_or_says_why() {
+        let shelf = TemporaryShelf::new("run").unwrap();
+        let numbers = [[1.5, f64::MIN_POSITIVE, -0.0], [4.0, 5.0, 1e300]];
+        let places: Vec<u64> = numbers
+            .iter()
+            .map(|three| shelf.put(three).unwrap())
+            .collect();
+        let mut back = [0.0; 3];
+        for (place, expected) in places.iter().zip(&numbers).rev() {
+            shelf.get(*place, &mut back);
+            assert_eq!(back.map(f64::to_bits), expected.map(f64::to_bits));
+        }
+        assert_eq!(shelf.failure(), None);
+        shelf.get(places[1] + 8, &mut back);
+        assert!(back.iter().all(|number| number.is_nan()));
+        let words = shelf.failure().expect("a failure").to_string();
+        assert!(
+            words.starts_with("log `run`: its rows cannot be read back from disk"),
+            "{words}"
+        );
     }
 }

@@ -104,15 +104,14 @@ impl Data {
         for log in &self.fit {
             let len = log.observations.len();
             for joint in &log.observations.joints {
-                for (i, &column) in joint.columns.iter().enumerate() {
-                    let values = &joint.x[i * len..(i + 1) * len];
-                    square[column] += values
-                        .iter()
-                        .zip(&joint.standstill)
-                        .filter(|(_, still)| !**still)
-                        .map(|(x, _)| x * x)
-                        .sum::<f64>();
-                }
+                joint.visit_columns(len, 0..len, &mut |rows, values| {
+                    let still = &joint.standstill[rows.clone()];
+                    for (i, &column) in joint.columns.iter().enumerate() {
+                        let own = values.of(i, 0, rows.len()).iter().zip(still);
+                        let moving = own.filter(|(_, still)| !**still);
+                        square[column] += moving.map(|(x, _)| x * x).sum::<f64>();
+                    }
+                });
             }
         }
         let lengths = self.fit.iter().map(|log| log.observations.len());
@@ -301,7 +300,7 @@ impl Reader<'_> {
     ) -> Result<(Log, Trajectory)> {
         findings.push(long.log.say());
         let share = long.log.chapters();
-        let mut room = Room::new(long.rows_at_most(self.pipeline));
+        let mut room = Room::new(long.rows_at_most(self.pipeline), long.log.shelf.clone());
         let (mut summaries, mut kept): (_, Option<Trajectory>) = (Vec::new(), None);
         let mut ends: Option<[f64; 2]> = None;
         let mut elsewhere = vec![Some(Gram::default()); role.elsewhere().len()];
@@ -312,7 +311,7 @@ impl Reader<'_> {
                 Some(kept) => kept.segments.append(&mut trajectory.segments),
                 None => kept = Some(trajectory),
             }
-            room.append(log.observations);
+            room.append(log.observations)?;
             self.add_at(role.elsewhere(), chapter, &[], &mut elsewhere);
             summaries.push(log.summary);
             let [first, last] = log.ends;

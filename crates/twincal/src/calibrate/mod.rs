@@ -154,7 +154,14 @@ pub fn calibrate<'a>(
 ) -> std::result::Result<Calibration, Stopped> {
     let mut findings = Vec::new();
     let recordings = (logs.into(), heldout.into());
+    let every_log = recordings.0.0.iter().chain(&recordings.1.0);
+    let shelves: Vec<_> = every_log.filter_map(Log::shelf).collect();
     let calibration = whole_road(robot, recordings, settings, progress, &mut findings);
+    // Numbers that could not be read back are behind whatever came out.
+    let calibration = match shelves.iter().find_map(|shelf| shelf.failure()) {
+        Some(failure) => Err(failure),
+        None => calibration,
+    };
     calibration.map_err(|error| Stopped { error, findings })
 }
 

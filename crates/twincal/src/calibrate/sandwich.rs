@@ -92,12 +92,15 @@ fn score(fit: &Fit, compact: &Posterior, model: &Model, block: &Part<'_>) -> Vec
             *r *= if rows.standstill[row] { 0.0 } else { counts };
         }
         let factor = fit.plug_in.factor(joint);
-        for (i, &column) in rows.columns.iter().enumerate() {
-            let Some(at) = place[column] else { continue };
-            let x = &rows.x[i * len + block.rows.start..i * len + block.rows.end];
-            let sum: f64 = x.iter().zip(&residual).map(|(x, r)| x * r).sum();
-            score[at] += factor * sum;
-        }
+        rows.visit_columns(len, block.rows.clone(), &mut |piece, columns| {
+            let residual = &residual[piece.start - block.rows.start..][..piece.len()];
+            for (i, &column) in rows.columns.iter().enumerate() {
+                let Some(at) = place[column] else { continue };
+                let x = columns.of(i, 0, piece.len());
+                let sum: f64 = x.iter().zip(residual).map(|(x, r)| x * r).sum();
+                score[at] += factor * sum;
+            }
+        });
     }
     score
 }

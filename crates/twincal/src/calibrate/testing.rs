@@ -59,6 +59,7 @@ impl Regression {
                 y,
                 standstill: vec![false; rows],
                 weight: Vec::new(),
+                shelved: None,
                 temperature: Vec::new(),
                 spread: Vec::new(),
             }],

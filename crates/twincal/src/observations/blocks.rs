@@ -12,7 +12,9 @@ impl Observations {
         for (segment, (&start, end)) in self.starts.iter().zip(ends).enumerate() {
             let mut from = start + self.time[start..end].partition_point(|t| *t < since);
             while from < end {
-                let to = end.min(from + MAX_BLOCK);
+                let joints = self.joints.iter();
+                let together = joints.map(|joint| joint.together_until(from, end)).min();
+                let to = end.min(from + MAX_BLOCK).min(together.unwrap_or(end));
                 self.visit_block(segment, from == start, from..to, visit);
                 from = to;
             }
@@ -30,10 +32,23 @@ impl Observations {
             let own = joints.iter().flat_map(|joint| &joint[rows.clone()]);
             own.copied().collect()
         };
-        let joints = self.joints.iter().map(|joint| JointRows {
+        // The columns of all joints at these rows, which are together.
+        let mut held = vec![(Vec::new(), self.len()); self.joints.len()];
+        for (joint, held) in self.joints.iter().zip(&mut held) {
+            if joint.shelved.is_some() {
+                joint.visit_columns(self.len(), rows.clone(), &mut |_, columns| {
+                    *held = (columns.x.to_vec(), columns.stride);
+                });
+            }
+        }
+        let joints = self.joints.iter().zip(&held);
+        let joints = joints.map(|(joint, (held, stride))| JointRows {
             columns: &joint.columns,
-            stride: self.len(),
-            x: joint.x.get(rows.start..).unwrap_or_default(),
+            stride: *stride,
+            x: match &joint.shelved {
+                Some(_) => held,
+                None => joint.x.get(rows.start..).unwrap_or_default(),
+            },
             measured: &joint.measured[rows.clone()],
             nominal: &joint.nominal[rows.clone()],
             standstill: &joint.standstill[rows.clone()],

@@ -7,14 +7,15 @@ const ROWS: usize = 64;
 
 /// Columns of some rows: row r of column i is `x[i * stride + r]`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Columns<'a> {
-    pub(super) x: &'a [f64],
-    pub(super) stride: usize,
+pub(crate) struct Columns<'a> {
+    pub(crate) x: &'a [f64],
+    pub(crate) stride: usize,
 }
 
 impl<'a> Columns<'a> {
+    /// `len` rows of a column from row `from` on.
     #[inline(always)]
-    fn of(self, column: usize, from: usize, len: usize) -> &'a [f64] {
+    pub(crate) fn of(self, column: usize, from: usize, len: usize) -> &'a [f64] {
         &self.x[column * self.stride + from..][..len]
     }
 }

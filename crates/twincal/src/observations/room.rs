@@ -1,6 +1,10 @@
 //! Rows of consecutive parts of a log as one, in memory that is taken once.
 
+use super::columns::Shelved;
 use super::{JointObservations, Observations};
+use crate::error::Result;
+use crate::signal::Shelf;
+use std::sync::Arc;
 
 /// Room for the rows of a log, column by column; what is not filled is never touched.
 #[derive(Debug)]
@@ -8,19 +12,25 @@ pub(crate) struct Room {
     /// Rows that there is room for.
     most: usize,
     rows: Observations,
+    /// Where columns go that need not stay in memory.
+    shelf: Option<Arc<dyn Shelf>>,
 }
 
 impl Room {
-    /// For `most` rows.
-    pub(crate) fn new(most: usize) -> Self {
+    /// For `most` rows; with a shelf columns go there.
+    pub(crate) fn new(most: usize, shelf: Option<Arc<dyn Shelf>>) -> Self {
         Self {
+            shelf,
             most: most.max(1),
             rows: Observations::default(),
         }
     }
 
     /// Puts the next part behind those before.
-    pub(crate) fn append(&mut self, part: Observations) {
+    ///
+    /// # Errors
+    /// Those of [`Shelf::put`].
+    pub(crate) fn append(&mut self, part: Observations) -> Result<()> {
         let (from, len) = (self.rows.len(), part.len());
         let all = &mut self.rows;
         all.log = part.log;
@@ -44,14 +54,24 @@ impl Room {
         self.rows
             .joints
             .resize(part.joints.len(), JointObservations::default());
-        for (to, part) in self.rows.joints.iter_mut().zip(part.joints) {
-            to.append(part, from, len, most);
+        for (to, mut part) in self.rows.joints.iter_mut().zip(part.joints) {
+            if let Some(shelf) = &self.shelf {
+                let columns = part.columns.len();
+                let new = || Shelved::new(shelf.clone(), columns);
+                let x = std::mem::take(&mut part.x);
+                to.shelved.get_or_insert_with(new).append(&x, len)?;
+                to.columns.clone_from(&part.columns);
+            } else {
+                to.append_columns(&part, from, len, most);
+            }
+            to.append(part, from, len);
         }
+        Ok(())
     }
 
     /// Takes more room than was asked for first.
     fn widen(&mut self, most: usize) {
-        for joint in &mut self.rows.joints {
+        for joint in self.rows.joints.iter_mut().filter(|j| j.shelved.is_none()) {
             let mut x = vec![0.0; joint.columns.len() * most];
             for (to, from) in x
                 .chunks_exact_mut(most)
@@ -67,7 +87,7 @@ impl Room {
     /// The rows that there are.
     pub(crate) fn into_rows(mut self) -> Observations {
         let len = self.rows.len();
-        for joint in &mut self.rows.joints {
+        for joint in self.rows.joints.iter_mut().filter(|j| j.shelved.is_none()) {
             for column in 0..joint.columns.len() {
                 let from = column * self.most;
                 joint.x.copy_within(from..from + len, column * len);
@@ -80,15 +100,19 @@ impl Room {
 }
 
 impl JointObservations {
-    /// Puts `len` rows of a part behind the `from` that there are, with room for `most`.
-    fn append(&mut self, part: Self, from: usize, len: usize, most: usize) {
+    /// Puts the columns of `len` rows behind the `from` that there are, with room for `most`.
+    fn append_columns(&mut self, part: &Self, from: usize, len: usize, most: usize) {
         if self.x.is_empty() {
             self.x = vec![0.0; part.columns.len() * most];
-            self.columns = part.columns;
+            self.columns.clone_from(&part.columns);
         }
         for (to, values) in (self.x.chunks_exact_mut(most)).zip(part.x.chunks_exact(len.max(1))) {
             to[from..from + len].copy_from_slice(values);
         }
+    }
+
+    /// Puts the rest of `len` rows behind the `from` that there are.
+    fn append(&mut self, part: Self, from: usize, len: usize) {
         // A temperature that is missing in one part is missing in all.
         if part.temperature.len() == len && self.temperature.len() == from {
             self.temperature.extend(part.temperature);
@@ -137,9 +161,9 @@ mod tests {
         let mut whole = part(0, 26);
         whole.starts = vec![0, 5, 10, 15, 20, 23];
         for most in [0, 7, 26, 1000] {
-            let mut room = Room::new(most);
+            let mut room = Room::new(most, None);
             for (first, len) in [(0, 10), (10, 10), (20, 6)] {
-                room.append(part(first, len));
+                room.append(part(first, len)).unwrap();
             }
             assert_eq!(room.into_rows(), whole, "room for {most}");
         }

@@ -29,6 +29,7 @@ fn log() -> Observations {
             y,
             standstill: vec![false; ROWS],
             weight: Vec::new(),
+            shelved: None,
             temperature: Vec::new(),
             spread: Vec::new(),
         }],

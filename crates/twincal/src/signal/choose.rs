@@ -22,6 +22,8 @@ const COULOMB_VELOCITY: f64 = 0.02;
 pub(crate) const MOTION_LIMIT: f64 = 0.45;
 /// Column filter's highest cut-off as a share of the log's rate: 2.5 f_c is then the rate itself.
 pub(crate) const COLUMN_LIMIT: f64 = 0.4;
+/// Chapters of a long log whose spectra are looked at, evenly spread.
+const SPECTRA: usize = 8;
 /// Kept rows that the longest segment must give at least.
 const FEWEST_ROWS: f64 = 10.0;
 
@@ -46,13 +48,13 @@ struct Survey {
 }
 
 impl Survey {
-    fn of(recording: &Recording, prepared: &Prepared<'_>) -> Self {
+    fn of(recording: &Recording, prepared: &Prepared<'_>, with_spectra: bool) -> Self {
         let seconds = |piece: &Piece<'_>| piece.time.len() as f64 * piece.interval;
         let joints = recording.joints.iter();
         Self {
             interval: prepared.interval,
             longest: prepared.pieces.iter().map(seconds).fold(0.0, f64::max),
-            spectra: spectra(prepared),
+            spectra: with_spectra.then(|| spectra(prepared)).flatten(),
             logged: (joints.map(|joint| [joint.qd.is_some(), joint.qdd.is_some()])).collect(),
         }
     }
@@ -147,9 +149,13 @@ fn needs_a_filter(long: &LongLog) -> Error {
 impl Chapters {
     fn read(joints: &[JointFacts], long: &LongLog, settings: &SignalSettings) -> Result<Self> {
         let (mut surveys, mut steps) = (Vec::new(), vec![Vec::new(); joints.len()]);
+        let (mut number, chapters) = (0, long.chapters());
+        let share = |number: usize| number * SPECTRA / chapters;
         long.visit(&mut Vec::new(), |chapter, said| {
             let prepared = prepare(joints, chapter, false, &settings.corrections, said)?;
-            surveys.push(Survey::of(chapter, &prepared));
+            let spread = chapters <= SPECTRA || share(number + 1) > share(number);
+            number += 1;
+            surveys.push(Survey::of(chapter, &prepared, spread));
             let step = |channels: &Channels| quantum(std::iter::once(channels.q.as_slice()));
             let of_chapter: Vec<Option<f64>> = chapter.joints.par_iter().map(step).collect();
             for (steps, step) in steps.iter_mut().zip(of_chapter) {
@@ -157,6 +163,16 @@ impl Chapters {
             }
             Ok(())
         })?;
+        // Those that were looked at speak for all.
+        let of_all = surveys.len() as f64;
+        let mut known: Vec<_> = surveys
+            .iter_mut()
+            .filter_map(|s| s.spectra.as_mut())
+            .collect();
+        let factor = of_all / known.len() as f64;
+        for joint in known.iter_mut().flat_map(|joints| joints.iter_mut()) {
+            joint.duration *= factor;
+        }
         Ok(Self { surveys, steps })
     }
 
@@ -382,7 +398,7 @@ fn on(
     let coulomb_velocity = settings.coulomb_velocity.unwrap_or(COULOMB_VELOCITY);
     let whole = candidates.whole.iter();
     let surveys: Vec<Survey> = whole
-        .map(|(recording, prepared, _)| Survey::of(recording, prepared))
+        .map(|(recording, prepared, _)| Survey::of(recording, prepared, true))
         .collect();
     let chapters = candidates.long.iter();
     let seen: Vec<&Survey> = surveys

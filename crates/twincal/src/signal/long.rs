@@ -18,6 +18,22 @@ pub trait ReadChapter: Debug + Send + Sync {
     fn read(&self, chapter: usize) -> Result<Recording>;
 }
 
+/// Where numbers that are made of a long log are put away, so that they need not stay in memory.
+pub trait Shelf: Debug + Send + Sync {
+    /// Puts numbers away; the place where they are.
+    ///
+    /// # Errors
+    /// [`Error::Log`] where there is no room.
+    fn put(&self, numbers: &[f64]) -> Result<u64>;
+
+    /// Takes back as many as were put there. Where they cannot be read they are NaN, and [`Shelf::failure`] says why: those who sum
+    /// over rows have no better answer, and the calibration ends with it.
+    fn get(&self, place: u64, numbers: &mut [f64]);
+
+    /// The first failure of [`Shelf::get`].
+    fn failure(&self) -> Option<Error>;
+}
+
 /// A log in chapters: all have the same joints and the same channels.
 #[derive(Debug, Clone)]
 pub struct LongLog {
@@ -29,6 +45,8 @@ pub struct LongLog {
     pub samples: Vec<usize>,
     /// Where they are.
     pub source: Arc<dyn ReadChapter>,
+    /// Where its rows may be put; `None`: they stay in memory.
+    pub shelf: Option<Arc<dyn Shelf>>,
 }
 
 impl LongLog {
@@ -175,6 +193,14 @@ impl Log<'_> {
         match self {
             Self::Whole(recording) => recording.payload,
             Self::Long(long) => long.payload,
+        }
+    }
+
+    /// Where its rows may be put.
+    pub(crate) fn shelf(&self) -> Option<Arc<dyn Shelf>> {
+        match self {
+            Self::Whole(_) => None,
+            Self::Long(long) => long.shelf.clone(),
         }
     }
 
