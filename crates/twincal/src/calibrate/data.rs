@@ -306,6 +306,9 @@ impl Reader<'_> {
         let mut elsewhere = vec![Some(Gram::default()); role.elsewhere().len()];
         long.visit(self.pipeline, findings, |chapter, said| {
             let (log, trajectory) = self.recording(chapter, role, evidence, said)?;
+            if let Some(shelf) = &long.log.shelf {
+                evidence.put_away(shelf)?;
+            }
             let mut trajectory = trajectory.thinned_out(KEPT_OF_LONG / share);
             match &mut kept {
                 Some(kept) => kept.segments.append(&mut trajectory.segments),

@@ -2,14 +2,16 @@
 //!
 //! Such stretches are told, listed and left out of the fit; the robot is not calibrated on a collision, nor on brakes.
 
+mod bins;
 mod spikes;
 mod stops;
 
-use crate::error::{Finding, Severity};
+use crate::error::{Finding, Result, Severity};
 use crate::robot::Robot;
-use crate::signal::{Pipeline, Trajectory};
+use crate::signal::{Pipeline, Shelf, Trajectory};
+use bins::Bins;
 use serde::{Deserialize, Serialize};
-use spikes::Bins;
+use std::sync::Arc;
 
 /// Incidents that a message lists.
 const LISTED: usize = 5;
@@ -56,8 +58,18 @@ impl Evidence {
         let stops = stops::stops(robot, pipeline, trajectory);
         let stopped: Vec<[f64; 2]> = stops.iter().map(|stop| stop.span).collect();
         self.stops.extend(stops);
-        let bins = spikes::bins(robot, pipeline, trajectory, &stopped);
+        let bins = bins::bins(robot, pipeline, trajectory, &stopped);
         self.bins.extend(bins);
+    }
+
+    /// Leaves most of what was taken on a shelf.
+    ///
+    /// # Errors
+    /// Those of [`Shelf::put`].
+    pub fn put_away(&mut self, shelf: &Arc<dyn Shelf>) -> Result<()> {
+        self.bins
+            .iter_mut()
+            .try_for_each(|bins| bins.put_away(shelf))
     }
 
     /// The incidents, in time order for each kind.

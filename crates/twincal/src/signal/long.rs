@@ -34,6 +34,46 @@ pub trait Shelf: Debug + Send + Sync {
     fn failure(&self) -> Option<Error>;
 }
 
+/// Numbers in memory or on a shelf.
+#[derive(Debug, Clone)]
+pub(crate) enum Numbers {
+    Memory(Vec<f64>),
+    Shelf {
+        shelf: Arc<dyn Shelf>,
+        place: u64,
+        len: usize,
+    },
+}
+
+impl Numbers {
+    /// Leaves them on a shelf, if they are not on one.
+    ///
+    /// # Errors
+    /// Those of [`Shelf::put`].
+    pub(crate) fn put_away(&mut self, shelf: &Arc<dyn Shelf>) -> Result<()> {
+        if let Self::Memory(numbers) = self {
+            *self = Self::Shelf {
+                place: shelf.put(numbers)?,
+                len: numbers.len(),
+                shelf: shelf.clone(),
+            };
+        }
+        Ok(())
+    }
+
+    /// All of them.
+    pub(crate) fn get(&self) -> Cow<'_, [f64]> {
+        match self {
+            Self::Memory(numbers) => Cow::Borrowed(numbers),
+            Self::Shelf { shelf, place, len } => {
+                let mut numbers = vec![0.0; *len];
+                shelf.get(*place, &mut numbers);
+                Cow::Owned(numbers)
+            }
+        }
+    }
+}
+
 /// A log in chapters: all have the same joints and the same channels.
 #[derive(Debug, Clone)]
 pub struct LongLog {

@@ -32,6 +32,7 @@ pub use agreement::{Agreement, velocity_agreement};
 pub use align::{PreparedLog, Raw};
 pub use correct::{Corrections, Lag};
 pub use describe::{JointOverview, LogOverview, describe, hardly_driven};
+pub(crate) use long::Numbers;
 pub use long::{Log, Logs, LongLog, ReadChapter, Shelf};
 pub use ready::{LongReady, ReadyLog};
 pub use steps::{Steps, steps};
