@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::gram::{Gram, JointAccumulator};
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, slices, visit_slices};
-use crate::signal::{Pipeline, Recording, Trajectory};
+use crate::signal::{Numbers, Pipeline, Recording, Trajectory};
 use crate::term::Library;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -51,11 +51,11 @@ pub struct Observations {
     /// First row of each segment, ascending, starting with 0.
     pub starts: Vec<usize>,
     /// Positions, joint × len.
-    pub q: Vec<Vec<f64>>,
+    pub q: Vec<Numbers>,
     /// Velocities.
-    pub qd: Vec<Vec<f64>>,
+    pub qd: Vec<Numbers>,
     /// Accelerations.
-    pub qdd: Vec<Vec<f64>>,
+    pub qdd: Vec<Numbers>,
     /// Per moving joint.
     pub joints: Vec<JointObservations>,
 }
@@ -104,7 +104,7 @@ pub fn observe(
                 Ok(blocks)
             })
             .collect::<Result<_>>()?;
-        out.add(&blocks.into_iter().flatten().collect::<Vec<_>>());
+        out.add(&blocks.into_iter().flatten().collect::<Vec<_>>())?;
     }
     Ok(out)
 }
@@ -151,7 +151,7 @@ impl Observations {
     /// Without rows yet, but with room for `len`.
     fn empty(library: &Library, trajectory: &Trajectory, len: usize) -> Self {
         let dof = trajectory.dof;
-        let room = || (0..dof).map(|_| Vec::with_capacity(len)).collect();
+        let room = || (0..dof).map(|_| Vec::with_capacity(len).into()).collect();
         let joint = |joint: usize| {
             let columns = library.columns_of_joint(joint).to_vec();
             JointObservations {
@@ -176,7 +176,7 @@ impl Observations {
     }
 
     /// Puts the next rows behind those there are.
-    fn add(&mut self, blocks: &[Block]) {
+    fn add(&mut self, blocks: &[Block]) -> Result<()> {
         let from = self.time.len();
         for block in blocks {
             let len = block.time.len();
@@ -189,7 +189,7 @@ impl Observations {
                 .zip(&block.motion)
             {
                 for (to, joint) in to.iter_mut().zip(values.chunks_exact(len.max(1))) {
-                    to.extend_from_slice(joint);
+                    to.append(joint)?;
                 }
             }
         }
@@ -201,6 +201,7 @@ impl Observations {
                 from += block.time.len();
             }
         });
+        Ok(())
     }
 
     /// Takes over the temperatures of the log that these rows were made of: between its samples they are linear, and constant

@@ -107,9 +107,9 @@ impl Shelf for Attic {
         Ok((all.len() - numbers.len()) as u64)
     }
 
-    fn get(&self, place: u64, numbers: &mut [f64]) {
+    fn get(&self, place: u64, skip: usize, numbers: &mut [f64]) {
         let all = self.numbers.lock().expect("no panic");
-        numbers.copy_from_slice(&all[place as usize..][..numbers.len()]);
+        numbers.copy_from_slice(&all[place as usize + skip..][..numbers.len()]);
         if self.broken {
             numbers.fill(f64::NAN);
         }

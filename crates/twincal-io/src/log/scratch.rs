@@ -115,7 +115,8 @@ impl Shelf for TemporaryShelf {
         Ok(place)
     }
 
-    fn get(&self, place: u64, numbers: &mut [f64]) {
+    fn get(&self, place: u64, skip: usize, numbers: &mut [f64]) {
+        let place = place + (skip * BYTES) as u64;
         let read = self
             .file
             .read_exact_at(bytemuck::cast_slice_mut(numbers), place);
@@ -176,11 +177,13 @@ mod tests {
             .collect();
         let mut back = [0.0; 3];
         for (place, expected) in places.iter().zip(&numbers).rev() {
-            shelf.get(*place, &mut back);
+            shelf.get(*place, 0, &mut back);
             assert_eq!(back.map(f64::to_bits), expected.map(f64::to_bits));
         }
+        shelf.get(places[1], 1, &mut back[..2]);
+        assert_eq!(back[..2], [5.0, 1e300]);
         assert_eq!(shelf.failure(), None);
-        shelf.get(places[1] + 8, &mut back);
+        shelf.get(places[1], 1, &mut back);
         assert!(back.iter().all(|number| number.is_nan()));
         let words = shelf.failure().expect("a failure").to_string();
         assert!(

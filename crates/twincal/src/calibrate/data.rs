@@ -224,7 +224,7 @@ impl Data {
                         &log.observations.qdd[joint],
                     ];
                     for (i, values) in motion.into_iter().enumerate() {
-                        for &value in values {
+                        for &value in &*values.get() {
                             hull[2 * i] = hull[2 * i].min(value);
                             hull[2 * i + 1] = hull[2 * i + 1].max(value);
                         }

@@ -5,6 +5,7 @@ use crate::error::{Finding, Severity};
 use crate::observations::{Observations, Part};
 use crate::robot::Robot;
 use statrs::distribution::{ContinuousCDF, StudentsT};
+use std::borrow::Cow;
 
 /// Blocks that each third of a run is cut into; their means vary as independent rows would not.
 const BLOCKS: usize = 8;
@@ -116,7 +117,7 @@ struct Warming {
 /// Moving rows of one joint: residual, direction of motion, temperature.
 struct Rows<'a> {
     residual: &'a [f64],
-    velocity: &'a [f64],
+    velocity: Cow<'a, [f64]>,
     still: &'a [bool],
     /// Empty where it was not logged.
     temperature: &'a [f64],
@@ -127,7 +128,7 @@ impl<'a> Rows<'a> {
         let end = start + residual.len();
         Self {
             residual,
-            velocity: &observations.qd[joint][start..end],
+            velocity: observations.qd[joint].some(start..end),
             still: &observations.joints[joint].standstill[start..end],
             temperature: (observations.joints[joint].temperature)
                 .get(start..end)
@@ -273,7 +274,7 @@ mod tests {
     fn drift(data: &(Vec<f64>, Vec<f64>, Vec<bool>), what: What) -> Option<(f64, f64)> {
         let rows = Rows {
             residual: &data.0,
-            velocity: &data.1,
+            velocity: Cow::Borrowed(&data.1),
             still: &data.2,
             temperature: &[],
         };
@@ -287,7 +288,7 @@ mod tests {
     ) -> Option<Warming> {
         let rows = Rows {
             residual: &data.0,
-            velocity: &data.1,
+            velocity: Cow::Borrowed(&data.1),
             still: &data.2,
             temperature,
         };

@@ -48,9 +48,9 @@ impl Regression {
             log: "log".into(),
             time: (0..rows).map(|row| 0.01 * row as f64).collect(),
             starts: vec![0],
-            q: vec![vec![0.0; rows]],
-            qd: vec![vec![1.0; rows]],
-            qdd: vec![vec![0.0; rows]],
+            q: vec![vec![0.0; rows].into()],
+            qd: vec![vec![1.0; rows].into()],
+            qdd: vec![vec![0.0; rows].into()],
             joints: vec![JointObservations {
                 columns: (0..beta.len()).collect(),
                 x,

@@ -41,10 +41,12 @@ fn states(robot: &Robot, data: &Data) -> States {
     for joint in 0..robot.dof() {
         for log in &data.fit {
             let all = &log.observations;
+            let motion = [&all.q, &all.qd, &all.qdd].map(|motion| motion[joint].get());
             for row in (0..all.len()).step_by(step) {
-                states.q.push(all.q[joint][row]);
-                states.qd.push(all.qd[joint][row]);
-                states.qdd.push(all.qdd[joint][row]);
+                let [q, qd, qdd] = [0, 1, 2].map(|channel| motion[channel][row]);
+                states.q.push(q);
+                states.qd.push(qd);
+                states.qdd.push(qdd);
                 states.still.push(all.joints[joint].standstill[row]);
             }
         }

@@ -132,7 +132,7 @@ pub(super) fn moving(training: &[Part<'_>], joint: usize, beta: &[f64]) -> Vec<M
     for part in training {
         let residual = part.residual(joint, beta, part.rows.clone());
         let own = &part.observations.joints[joint];
-        let velocity = &part.observations.qd[joint];
+        let velocity = part.observations.qd[joint].get();
         let all = part.rows.clone().zip(residual);
         rows.extend(
             all.filter(|(row, _)| !own.standstill[*row])
@@ -162,7 +162,7 @@ fn set(
     for log in &mut data.fit {
         let own = &mut log.observations;
         let residual = own.whole().residual(joint, beta, 0..own.len());
-        let velocity = &own.qd[joint];
+        let velocity = own.qd[joint].get();
         let kept = &mut own.joints[joint];
         let motion = velocity.iter().zip(&kept.nominal);
         kept.spread = motion.map(|(v, load)| spread.at(*v, *load)).collect();

@@ -2,6 +2,7 @@
 
 use super::Observations;
 use crate::rows::{JointRows, MAX_BLOCK, RowBlock};
+use crate::signal::Numbers;
 
 impl Observations {
     /// Visits the rows at or after time `since` (s; −∞: all of them), in order, as [`crate::rows::visit_rows`] does but for the input
@@ -28,9 +29,9 @@ impl Observations {
         rows: std::ops::Range<usize>,
         visit: &mut dyn FnMut(&RowBlock<'_>),
     ) {
-        let gather = |joints: &[Vec<f64>]| -> Vec<f64> {
-            let own = joints.iter().flat_map(|joint| &joint[rows.clone()]);
-            own.copied().collect()
+        let gather = |joints: &[Numbers]| -> Vec<f64> {
+            let own = joints.iter().map(|joint| joint.some(rows.clone()));
+            own.flat_map(|own| own.into_owned()).collect()
         };
         // The columns of all joints at these rows, which are together.
         let mut held = vec![(Vec::new(), self.len()); self.joints.len()];

@@ -81,7 +81,7 @@ impl Shelved {
         {
             let len = block.rows.len();
             numbers.resize(self.stored * len, 0.0);
-            self.shelf.get(block.place, &mut numbers);
+            self.shelf.get(block.place, 0, &mut numbers);
             if self.kept.len() < self.stored {
                 for (to, from) in self.kept.iter().enumerate() {
                     numbers.copy_within(from * len..(from + 1) * len, to * len);

@@ -3,7 +3,7 @@
 use super::columns::Shelved;
 use super::{JointObservations, Observations};
 use crate::error::Result;
-use crate::signal::Shelf;
+use crate::signal::{Numbers, Shelf};
 use std::sync::Arc;
 
 /// Room for the rows of a log, column by column; what is not filled is never touched.
@@ -42,10 +42,13 @@ impl Room {
             (&mut all.qd, part.qd),
             (&mut all.qdd, part.qdd),
         ] {
-            to.resize(from.len(), Vec::new());
-            to.iter_mut()
-                .zip(from)
-                .for_each(|(to, from)| to.extend(from));
+            to.resize(from.len(), Numbers::default());
+            for (to, from) in to.iter_mut().zip(from) {
+                if let Some(shelf) = &self.shelf {
+                    to.put_away(shelf)?;
+                }
+                to.append(&from.get())?;
+            }
         }
         if from + len > self.most {
             self.widen(2 * (from + len));
@@ -64,7 +67,7 @@ impl Room {
             } else {
                 to.append_columns(&part, from, len, most);
             }
-            to.append(part, from, len);
+            to.append(part, from, len, most);
         }
         Ok(())
     }
@@ -111,8 +114,14 @@ impl JointObservations {
         }
     }
 
-    /// Puts the rest of `len` rows behind the `from` that there are.
-    fn append(&mut self, part: Self, from: usize, len: usize) {
+    /// Puts the rest of `len` rows behind the `from` that there are, with room for `most`.
+    fn append(&mut self, part: Self, from: usize, len: usize, most: usize) {
+        // Taken once: vectors that grow beside chapters that come and go leave holes that nothing fits into.
+        for numbers in [&mut self.measured, &mut self.nominal, &mut self.y] {
+            numbers.reserve_exact(most.saturating_sub(numbers.len()));
+        }
+        self.standstill
+            .reserve_exact(most.saturating_sub(self.standstill.len()));
         // A temperature that is missing in one part is missing in all.
         if part.temperature.len() == len && self.temperature.len() == from {
             self.temperature.extend(part.temperature);
@@ -144,7 +153,9 @@ mod tests {
             columns,
             ..JointObservations::default()
         };
-        let motion = vec![value(1).collect(), value(2).collect()];
+        let motion: Vec<Numbers> = [1, 2]
+            .map(|c| value(c).collect::<Vec<f64>>().into())
+            .to_vec();
         Observations {
             log: "run".into(),
             time: value(0).collect(),

@@ -18,9 +18,9 @@ fn log() -> Observations {
         log: "log".into(),
         time: (0..ROWS).map(|row| 0.01 * row as f64).collect(),
         starts: vec![0],
-        q: vec![vec![0.0; ROWS]],
-        qd: vec![vec![1.0; ROWS]],
-        qdd: vec![vec![0.0; ROWS]],
+        q: vec![vec![0.0; ROWS].into()],
+        qd: vec![vec![1.0; ROWS].into()],
+        qdd: vec![vec![0.0; ROWS].into()],
         joints: vec![JointObservations {
             columns: vec![0],
             x,
