@@ -148,7 +148,9 @@ mod tests {
             measured: value(7).collect(),
             nominal: value(8).collect(),
             y: value(9).collect(),
-            standstill: (0..len).map(|row| (first + row) % 3 == 0).collect(),
+            standstill: (0..len)
+                .map(|row| (first + row).is_multiple_of(3))
+                .collect(),
             temperature: value(10).collect(),
             columns,
             ..JointObservations::default()

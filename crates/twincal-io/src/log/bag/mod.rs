@@ -38,10 +38,7 @@ use twincal::signal::Log;
 const BUFFER: usize = 1 << 18;
 
 /// Reads an MCAP file.
-pub(super) fn read_mcap(
-    source: &mut (impl Read + Seek),
-    request: Request<'_>,
-) -> Result<(Log<'static>, Vec<Finding>)> {
+pub(super) fn read_mcap(source: &mut (impl Read + Seek), request: Request<'_>) -> Result<ReadLog> {
     let mut once = |request: Request<'_>| {
         let mut states = JointStates::new(request)?;
         let findings = mcap::read(source, request.name, &mut states)?;
@@ -50,11 +47,14 @@ pub(super) fn read_mcap(
     whole_if_it_must(request, &mut once)
 }
 
+/// A log with what was found in it.
+type ReadLog = (Log<'static>, Vec<Finding>);
+
 /// Reads in chapters if that is wanted, and again as a whole where messages have to be brought together.
 fn whole_if_it_must(
     request: Request<'_>,
-    read: &mut dyn FnMut(Request<'_>) -> Result<Option<(Log<'static>, Vec<Finding>)>>,
-) -> Result<(Log<'static>, Vec<Finding>)> {
+    read: &mut dyn FnMut(Request<'_>) -> Result<Option<ReadLog>>,
+) -> Result<ReadLog> {
     if let Some(read) = read(request)? {
         return Ok(read);
     }
@@ -69,7 +69,7 @@ fn whole_if_it_must(
 }
 
 /// Reads a bag: one file, packed or not, or a folder.
-pub(super) fn read(path: &Path, request: Request<'_>) -> Result<(Log<'static>, Vec<Finding>)> {
+pub(super) fn read(path: &Path, request: Request<'_>) -> Result<ReadLog> {
     let (files, findings) = files(path)?;
     let mut once = |request: Request<'_>| {
         let (mut states, mut findings) = (JointStates::new(request)?, findings.clone());
