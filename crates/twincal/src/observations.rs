@@ -21,7 +21,7 @@ use std::ops::Range;
 pub struct JointObservations {
     /// Regression columns that are structurally non-zero on this joint, ascending.
     pub columns: Vec<usize>,
-    /// Their values, columns × len, N·m per unit of β.
+    /// Their values, columns × len, N·m per unit of β; empty where they were put away (logs in chapters).
     pub x: Vec<f64>,
     /// Measured torque, len, N·m.
     pub measured: Vec<f64>,

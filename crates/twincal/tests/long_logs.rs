@@ -65,18 +65,21 @@ fn recording() -> Recording {
 
 /// A recording cut where a reader would cut it.
 #[derive(Debug)]
-struct Cut(Recording);
+struct Cut {
+    recording: Recording,
+    chapters: usize,
+}
 
 impl Cut {
-    fn range(chapter: usize) -> std::ops::Range<usize> {
-        let at = |chapter| chapter * SAMPLES / CHAPTERS;
+    fn range(&self, chapter: usize) -> std::ops::Range<usize> {
+        let at = |chapter| chapter * SAMPLES / self.chapters;
         at(chapter)..at(chapter + 1)
     }
 }
 
 impl ReadChapter for Cut {
     fn read(&self, chapter: usize) -> twincal::Result<Recording> {
-        let part = |values: &Vec<f64>| values[Self::range(chapter)].to_vec();
+        let part = |values: &Vec<f64>| values[self.range(chapter)].to_vec();
         let joint = |joint: &Channels| Channels {
             q: part(&joint.q),
             qd: joint.qd.as_ref().map(part),
@@ -86,8 +89,8 @@ impl ReadChapter for Cut {
         };
         Ok(Recording {
             name: String::new(),
-            time: part(&self.0.time),
-            joints: self.0.joints.iter().map(joint).collect(),
+            time: part(&self.recording.time),
+            joints: self.recording.joints.iter().map(joint).collect(),
             payload: Payload::None,
         })
     }
@@ -98,12 +101,17 @@ impl ReadChapter for Cut {
 struct Attic {
     numbers: Mutex<Vec<f64>>,
     broken: bool,
+    /// Numbers that there is room for; `None`: any.
+    room: Option<usize>,
 }
 
 impl Shelf for Attic {
     fn put(&self, numbers: &[f64]) -> twincal::Result<u64> {
         let mut all = self.numbers.lock().expect("no panic");
         all.extend_from_slice(numbers);
+        if let Some(failure) = self.room.filter(|room| all.len() > *room).map(|_| full()) {
+            return Err(failure);
+        }
         Ok((all.len() - numbers.len()) as u64)
     }
 
@@ -116,6 +124,10 @@ impl Shelf for Attic {
     }
 
     fn failure(&self) -> Option<twincal::Error> {
+        let used = self.numbers.lock().expect("no panic").len();
+        if self.room.is_some_and(|room| used > room) {
+            return Some(full());
+        }
         self.broken.then(|| twincal::Error::Log {
             log: "run".into(),
             problem: "the attic burnt down".into(),
@@ -124,14 +136,31 @@ impl Shelf for Attic {
     }
 }
 
+fn full() -> twincal::Error {
+    twincal::Error::Log {
+        log: "run".into(),
+        problem: "the attic is full".into(),
+        remedy: "throw something away".into(),
+    }
+}
+
 fn in_chapters(recording: Recording) -> Log<'static> {
+    cut(recording, CHAPTERS)
+}
+
+fn cut(recording: Recording, chapters: usize) -> Log<'static> {
+    let name = recording.name.clone();
+    let cut = Cut {
+        recording,
+        chapters,
+    };
     Log::Long(LongLog {
-        name: recording.name.clone(),
+        name,
         payload: Payload::None,
-        samples: (0..CHAPTERS)
-            .map(|chapter| Cut::range(chapter).len())
+        samples: (0..chapters)
+            .map(|chapter| cut.range(chapter).len())
             .collect(),
-        source: Arc::new(Cut(recording)),
+        source: Arc::new(cut),
         shelf: None,
     })
 }
@@ -223,6 +252,46 @@ fn rows_that_do_not_come_back_end_the_calibration_with_the_reason() {
     assert!(stopped.error.to_string().contains("the attic burnt down"));
 }
 
+/// No room is no fault of a chapter, wherever it is noticed: nothing is fitted to a part of the log.
+#[test]
+fn a_shelf_that_is_full_ends_the_calibration() {
+    for room in [0, 20_000, 100_000, 200_000] {
+        let attic = Attic {
+            room: Some(room),
+            ..Attic::default()
+        };
+        let log = with_shelf(in_chapters(recording()), Arc::new(attic));
+        let nominal = two_link::arm(2.0).expect("an arm");
+        let none: &[Recording] = &[];
+        let settings = CalibrationSettings::default();
+        let stopped =
+            calibrate(&nominal, vec![log], none, &settings, &|_| {}).expect_err("no room");
+        assert!(
+            stopped.error.to_string().contains("the attic is full"),
+            "{room}"
+        );
+    }
+}
+
+/// Of many short chapters motion is kept, too: raw scores, the lag and the noise out of the band are there.
+#[test]
+fn many_chapters_lose_no_raw_rows() {
+    let long = calibrated(cut(recording(), 40));
+    assert_eq!(long.logs[0].segments, 40);
+    assert!(
+        long.validation
+            .raw
+            .joints
+            .iter()
+            .all(|joint| joint.rows > 200)
+    );
+    assert!((long.validation.raw.rmse_calibrated - 0.1).abs() < 0.01);
+    // White noise of 0.1 N·m: what the filter takes out is nearly all of it.
+    for noise in &long.twin.noise {
+        assert!((noise.out_of_band - 0.1).abs() < 0.02, "{noise:?}");
+    }
+}
+
 /// 3 parameters at 4.5 sd: false alarm 2e-5 for either log; the seed is fixed.
 #[test]
 fn chapters_say_what_the_whole_log_says() {
@@ -288,7 +357,7 @@ fn what_is_wrong_with_a_chapter_is_told_and_costs_no_other() {
     for i in 0..20 {
         recording.joints[1].tau.as_mut().expect("torque")[18_000 + i] += 15.0;
     }
-    for row in Cut::range(2) {
+    for row in SAMPLES / 2..3 * SAMPLES / 4 {
         recording.joints[0].tau.as_mut().expect("torque")[row] = f64::NAN;
     }
     let long = calibrated(in_chapters(recording.clone()));
@@ -325,7 +394,7 @@ fn without_a_usable_chapter_the_first_says_why() {
 #[test]
 fn a_chapter_that_cannot_be_read_again_ends_the_calibration() {
     #[derive(Debug)]
-    struct Broken(Cut);
+    struct Broken(Arc<dyn ReadChapter>);
     impl ReadChapter for Broken {
         fn read(&self, chapter: usize) -> twincal::Result<Recording> {
             if chapter == 3 {
@@ -343,7 +412,7 @@ fn a_chapter_that_cannot_be_read_again_ends_the_calibration() {
         unreachable!("it is long");
     };
     let log = Log::Long(LongLog {
-        source: Arc::new(Broken(Cut(recording()))),
+        source: Arc::new(Broken(long.source)),
         ..long
     });
     let none: &[Recording] = &[];

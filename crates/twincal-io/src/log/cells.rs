@@ -1,7 +1,7 @@
 //! The numbers of a table while it is read: in memory, and on disk where they are many and may come in chapters.
 
 use super::scratch::Scratch;
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
 use crate::memory;
 use rayon::prelude::*;
 use std::io;
@@ -10,7 +10,7 @@ use std::ops::Range;
 /// Bytes of numbers from which a log is long; tests of this crate have less patience.
 const LONG: usize = if cfg!(test) { 1 << 20 } else { 128 << 20 };
 /// Bytes of a chapter, and its rows at least: filters take some seconds at either end.
-const CHAPTER: usize = LONG / 4;
+const CHAPTER: usize = LONG / 8;
 const FEWEST_ROWS: usize = if cfg!(test) { 1 << 10 } else { 1 << 17 };
 const BYTES: usize = size_of::<f64>();
 
@@ -59,6 +59,8 @@ pub(crate) enum Sink<'a> {
         column: usize,
         row: usize,
         finite: &'a mut bool,
+        /// Why numbers could not be written.
+        failure: Option<io::Error>,
     },
 }
 
@@ -72,10 +74,15 @@ impl Sink<'_> {
                 column,
                 row,
                 finite,
+                failure,
             } => {
                 let values: Vec<f64> = values.collect();
                 **finite = **finite || values.iter().any(|value| value.is_finite());
-                scratch.write(0, *column, *row, &values)?;
+                if let Err(error) = scratch.write(0, *column, *row, &values) {
+                    let kind = error.kind();
+                    failure.get_or_insert(error);
+                    return Err(kind.into());
+                }
                 *row += values.len();
             }
         }
@@ -89,6 +96,17 @@ impl Sink<'_> {
             Self::Disk { row, .. } => *row,
         }
     }
+}
+
+/// What a disk without room did to one of the columns; `None` where the mistake is in the table.
+pub(crate) fn disk_failure(name: &str, sinks: &[Sink<'_>]) -> Option<Error> {
+    sinks.iter().find_map(|sink| match sink {
+        Sink::Disk {
+            failure: Some(error),
+            ..
+        } => Some(no_room(name, error)),
+        _ => None,
+    })
 }
 
 /// Rows of a chapter of a table of so many columns.
@@ -135,6 +153,20 @@ impl Cells {
         let mut cells = Self::new(columns, may_spill);
         if may_spill && Self::is_long(rows, columns) {
             let mut scratch = Scratch::new(columns).map_err(|e| no_room(name, &e))?;
+            // Asked before anything is written: a file may declare more rows than it has bytes.
+            let bytes = (rows as u64).saturating_mul((columns * BYTES) as u64);
+            let room = scratch.room().map_err(|e| no_room(name, &e))?;
+            if bytes > room {
+                return Err(Error::content(
+                    Place::file(name),
+                    format!(
+                        "holds {} MB of numbers, the folder of temporary files has room for {} MB",
+                        bytes.div_ceil(1_000_000),
+                        room / 1_000_000
+                    ),
+                    "set TMPDIR to a folder with more room, or read a shorter log",
+                ));
+            }
             scratch.table(rows);
             cells.spilled = Some(Spilled {
                 scratch,
@@ -168,6 +200,7 @@ impl Cells {
                     column,
                     row: 0,
                     finite,
+                    failure: None,
                 };
                 finite.iter_mut().enumerate().map(sink).collect()
             }
@@ -198,7 +231,8 @@ impl Cells {
             return Ok(());
         }
         let mut from = 0;
-        while from + chapter + but <= rows {
+        // No chapter at the end is shorter than half a usual one.
+        while from + chapter + but.max(chapter / 2) <= rows {
             self.spill(from..from + chapter)
                 .map_err(|e| no_room(name, &e))?;
             from += chapter;
@@ -263,7 +297,7 @@ impl Spilled {
         self.finite[column]
     }
 
-    /// Its rows in chapters that are as long as each other, nearly: short rests belong to the chapter before.
+    /// Its rows in chapters that are as long as each other, nearly: each table is cut evenly.
     pub(crate) fn chapters(&self) -> Vec<Chapter> {
         let usual = chapter_rows(self.finite.len());
         let (mut chapters, mut first) = (Vec::new(), 0);
@@ -338,7 +372,7 @@ mod tests {
         let mut row = 0;
         for chapter in &chapters {
             assert_eq!(chapter.first, row);
-            assert!(chapter.len() <= 2 * usual);
+            assert!((usual / 2..2 * usual).contains(&chapter.len()));
             let read = spilled.read(chapter).unwrap();
             for (column, values) in read.iter().enumerate().filter(|(column, _)| *column != 7) {
                 let expected = (row..row + chapter.len()).map(|row| value(column, row));

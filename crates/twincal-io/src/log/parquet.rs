@@ -1,6 +1,6 @@
 //! Parquet logs: columns side by side into doubles, after the file's claims about itself have been checked.
 
-use super::cells::Sink;
+use super::cells::{Sink, disk_failure};
 use super::pages::check_chunk;
 use super::{Cells, Request, assemble, match_columns};
 use crate::error::{Error, Place, Result};
@@ -70,7 +70,7 @@ pub(super) fn read(
             .collect();
         // The first column with a mistake, whichever thread was first.
         for read in read {
-            read.map_err(|e| broken(name, &e))?;
+            read.map_err(|e| disk_failure(name, &sinks).unwrap_or_else(|| broken(name, &e)))?;
         }
     }
     if let Some(short) = sinks.iter().position(|column| column.len() != rows) {

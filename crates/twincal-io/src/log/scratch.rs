@@ -35,6 +35,12 @@ impl Scratch {
         })
     }
 
+    /// Bytes that there is room for on its disk.
+    pub(crate) fn room(&self) -> io::Result<u64> {
+        let disk = rustix::fs::fstatvfs(&self.file)?;
+        Ok(disk.f_bavail.saturating_mul(disk.f_frsize))
+    }
+
     /// Room for one more table; its number.
     pub(crate) fn table(&mut self, rows: usize) -> usize {
         let end = |table: &Table| table.start + (table.rows * self.columns * BYTES) as u64;
@@ -110,8 +116,12 @@ impl Shelf for TemporaryShelf {
     fn put(&self, numbers: &[f64]) -> twincal::Result<u64> {
         let bytes: &[u8] = bytemuck::cast_slice(numbers);
         let place = self.end.fetch_add(bytes.len() as u64, Ordering::Relaxed);
-        let written = self.file.write_all_at(bytes, place);
-        written.map_err(|e| self.error("put on", &e))?;
+        self.file.write_all_at(bytes, place).map_err(|e| {
+            let error = self.error("put on", &e);
+            // Only the first is told.
+            let _ = self.failure.set(error.clone());
+            error
+        })?;
         Ok(place)
     }
 

@@ -22,7 +22,9 @@ const ZERO: f64 = 1e-12;
 /// Rows per column of the largest joint below which nothing is fitted (case 7).
 const ROWS_PER_COLUMN: usize = 3;
 
-/// Samples of smooth motion that are kept of a log in chapters, about: raw scores, the lag and the self-check look at no more.
+/// Chapters of a long log whose smooth motion is kept, and samples of them together, about: raw scores, the lag and the self-check
+/// look at no more.
+const MOTION_OF: usize = 16;
 const KEPT_OF_LONG: usize = 1 << 16;
 
 /// One log, ready.
@@ -55,6 +57,8 @@ pub(super) struct Data {
     pub(super) fit: Vec<Log>,
     pub(super) heldout: Vec<Log>,
     pub(super) findings: Vec<Finding>,
+    /// See [`carry_something`].
+    unknown: bool,
 }
 
 impl Data {
@@ -84,6 +88,7 @@ impl Data {
             fit,
             heldout,
             findings,
+            unknown: reader.unknown,
         };
         let trajectories = Trajectories {
             fit: of_fit,
@@ -299,28 +304,48 @@ impl Reader<'_> {
         findings: &mut Vec<Finding>,
     ) -> Result<(Log, Trajectory)> {
         findings.push(long.log.say());
-        let share = long.log.chapters();
+        // Motion of a few chapters, evenly spread.
+        let chapters = long.log.chapters();
+        let slots = chapters.min(MOTION_OF);
+        let mut taken = vec![false; slots];
+        let mut warm = vec![false; self.robot.dof()];
         let mut room = Room::new(long.rows_at_most(self.pipeline), long.log.shelf.clone());
         let (mut summaries, mut kept): (_, Option<Trajectory>) = (Vec::new(), None);
         let mut ends: Option<[f64; 2]> = None;
         let mut elsewhere = vec![Some(Gram::default()); role.elsewhere().len()];
-        long.visit(self.pipeline, findings, |chapter, said| {
+        long.visit(self.pipeline, findings, |number, chapter, said| {
             let (log, trajectory) = self.recording(chapter, role, evidence, said)?;
             if let Some(shelf) = &long.log.shelf {
                 evidence.put_away(shelf)?;
             }
-            let mut trajectory = trajectory.thinned_out(KEPT_OF_LONG / share);
-            match &mut kept {
-                Some(kept) => kept.segments.append(&mut trajectory.segments),
-                None => kept = Some(trajectory),
+            if !std::mem::replace(&mut taken[number * slots / chapters], true) {
+                let mut trajectory = trajectory.thinned_out(KEPT_OF_LONG / slots);
+                match &mut kept {
+                    Some(kept) => kept.segments.append(&mut trajectory.segments),
+                    None => kept = Some(trajectory),
+                }
+            }
+            for (warm, rows) in warm.iter_mut().zip(&log.observations.joints) {
+                *warm |= !rows.temperature.is_empty();
             }
             room.append(log.observations)?;
-            self.add_at(role.elsewhere(), chapter, &[], &mut elsewhere);
+            self.add_at(role.elsewhere(), chapter, (&[], true), &mut elsewhere);
             summaries.push(log.summary);
             let [first, last] = log.ends;
             ends = Some([ends.map_or(first, |ends| ends[0]), last]);
             Ok(())
         })?;
+        let observations = room.into_rows();
+        let cold = |(warm, rows): (&bool, &JointObservations)| *warm && rows.temperature.is_empty();
+        if warm.iter().zip(&observations.joints).any(cold) {
+            findings.push(Finding::new(
+                Severity::Warning,
+                "temperature_left_out",
+                &long.log.name,
+                "a temperature is missing in some chapters and was left out of all: drift is not compared with it",
+                0,
+            ));
+        }
         let ends = ends.unwrap_or_default();
         let summary = LogSummary::joined(summaries, ends[1] - ends[0]);
         let (summary, trajectory) = summary.zip(kept).ok_or_else(|| {
@@ -329,7 +354,7 @@ impl Reader<'_> {
         })?;
         let log = Log {
             incidents: Vec::new(),
-            observations: room.into_rows(),
+            observations,
             summary,
             ends,
             elsewhere,
@@ -349,8 +374,8 @@ impl Reader<'_> {
         let recording = log.recording();
         let (trajectory, mut more) = self.trajectory(log, Raw::Spread)?;
         findings.append(&mut more);
-        evidence.take(robot, pipeline, &trajectory);
         let mut observations = observe(robot, library, pipeline, &trajectory)?;
+        evidence.take(robot, pipeline, &trajectory);
         observations.set_temperatures(recording);
         let time = &recording.time;
         let ends = time.first().zip(time.last()).map(|(a, b)| [*a, *b]);
@@ -371,18 +396,19 @@ impl Reader<'_> {
     }
 
     /// Adds a recording's statistics with other pipelines, one after the other: of a long log one more trajectory fits in memory, two do
-    /// not; each uses all cores. `None` for a pipeline that it cannot have.
+    /// not; each uses all cores. A pipeline that it cannot have gets `None`, or of a chapter (`part`) no more.
     fn add_at(
         &self,
         pipelines: &[Pipeline],
         log: &PreparedLog<'_>,
-        incidents: &[Incident],
+        (incidents, part): (&[Incident], bool),
         sums: &mut [Option<Gram>],
     ) {
         for (pipeline, kept) in pipelines.iter().zip(sums) {
             let gram = Reader { pipeline, ..*self }.gram(log, incidents);
             match (kept.as_mut(), gram) {
                 (Some(sum), Ok(gram)) => *sum += &gram,
+                (_, Err(_)) if part => {}
                 _ => *kept = None,
             }
         }
@@ -402,6 +428,8 @@ impl LogSummary {
     fn joined(chapters: Vec<Self>, duration: f64) -> Option<Self> {
         let mut rates: Vec<f64> = chapters.iter().map(|chapter| chapter.rate_hz).collect();
         rates.sort_by(f64::total_cmp);
+        let longest = chapters.iter().max_by_key(|chapter| chapter.samples)?;
+        let kept_rate_hz = longest.kept_rate_hz;
         let mut chapters = chapters.into_iter();
         let mut all = chapters.next()?;
         for chapter in chapters {
@@ -411,6 +439,7 @@ impl LogSummary {
         Some(Self {
             duration,
             rate_hz: rates[rates.len() / 2],
+            kept_rate_hz,
             ..all
         })
     }
@@ -443,12 +472,14 @@ pub(super) fn grams_at(
         robot: &twin.robot,
         library,
         pipeline: &twin.pipeline,
-        unknown: carry_something(logs.iter().map(ReadyLog::payload)),
+        unknown: data.unknown,
     };
     let mut sums = vec![Some(Gram::default()); pipelines.len()];
     for (log, own) in logs.iter().zip(&data.fit) {
         match log {
-            ReadyLog::Whole(log) => reader.add_at(pipelines, log, &own.incidents, &mut sums),
+            ReadyLog::Whole(log) => {
+                reader.add_at(pipelines, log, (&own.incidents, false), &mut sums);
+            }
             ReadyLog::Long(_) if own.incidents.is_empty() => {
                 for (sum, gram) in sums.iter_mut().zip(&own.elsewhere) {
                     match (sum.as_mut(), gram) {
@@ -457,10 +488,12 @@ pub(super) fn grams_at(
                     }
                 }
             }
-            ReadyLog::Long(long) => long.visit(&twin.pipeline, &mut Vec::new(), |chapter, _| {
-                reader.add_at(pipelines, chapter, &own.incidents, &mut sums);
-                Ok(())
-            })?,
+            ReadyLog::Long(long) => {
+                long.visit(&twin.pipeline, &mut Vec::new(), |_, chapter, _| {
+                    reader.add_at(pipelines, chapter, (&own.incidents, true), &mut sums);
+                    Ok(())
+                })?
+            }
         }
     }
     let with_rows = |sum: Option<Gram>| sum.filter(|sum| sum.joints.iter().any(|j| j.n > 0.0));

@@ -7,6 +7,8 @@ use crate::term::Library;
 
 /// Numbers of a row and joint besides its columns: motion, torques, weight.
 const BESIDE: usize = 10;
+/// The same of a row whose columns and motion are put away.
+const LEFT: usize = 6;
 /// Numbers of a sample and joint: pieces (4), smooth motion with torques (5), the same at another cut-off (5).
 const OF_A_SAMPLE: usize = 14;
 
@@ -39,7 +41,17 @@ pub(super) fn require(
     let numbers: usize = (0..library.joints())
         .map(|joint| library.columns_of_joint(joint).len() + BESIDE)
         .sum();
-    let needed = (all().map(rows).sum::<usize>() + again) as f64 * numbers as f64
+    // Rows that are put away leave torques, weights and what is summed over them.
+    let of_rows = |log: &ReadyLog<'_>| {
+        let numbers = if log.puts_away() {
+            library.joints() * LEFT
+        } else {
+            numbers
+        };
+        rows(log) as f64 * numbers as f64
+    };
+    let needed = all().map(of_rows).sum::<f64>()
+        + again as f64 * numbers as f64
         + (samples * library.joints() * OF_A_SAMPLE) as f64;
     let needed = needed * size_of::<f64>() as f64;
     let longest = all().max_by_key(|log| rows(log));

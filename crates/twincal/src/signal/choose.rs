@@ -149,17 +149,22 @@ fn needs_a_filter(long: &LongLog) -> Error {
 impl Chapters {
     fn read(joints: &[JointFacts], long: &LongLog, settings: &SignalSettings) -> Result<Self> {
         let (mut surveys, mut steps) = (Vec::new(), vec![Vec::new(); joints.len()]);
-        let (mut number, chapters) = (0, long.chapters());
-        let share = |number: usize| number * SPECTRA / chapters;
-        long.visit(&mut Vec::new(), |chapter, said| {
+        let mut looked_at = [false; SPECTRA];
+        let chapters = long.chapters();
+        long.visit(&mut Vec::new(), |number, chapter, said| {
             let prepared = prepare(joints, chapter, false, &settings.corrections, said)?;
-            let spread = chapters <= SPECTRA || share(number + 1) > share(number);
-            number += 1;
-            surveys.push(Survey::of(chapter, &prepared, spread));
+            let looked_at = &mut looked_at[number * SPECTRA / chapters];
+            let survey = Survey::of(chapter, &prepared, chapters <= SPECTRA || !*looked_at);
+            *looked_at |= survey.spectra.is_some();
+            surveys.push(survey);
             let step = |channels: &Channels| quantum(std::iter::once(channels.q.as_slice()));
             let of_chapter: Vec<Option<f64>> = chapter.joints.par_iter().map(step).collect();
-            for (steps, step) in steps.iter_mut().zip(of_chapter) {
-                steps.push(step);
+            let all = steps.iter_mut().zip(of_chapter).zip(&chapter.joints);
+            for ((steps, step), channels) in all {
+                // A joint at rest says nothing of its encoder.
+                if channels.q.iter().any(|q| *q != channels.q[0]) {
+                    steps.push(step);
+                }
             }
             Ok(())
         })?;
@@ -169,7 +174,7 @@ impl Chapters {
             .iter_mut()
             .filter_map(|s| s.spectra.as_mut())
             .collect();
-        let factor = of_all / known.len() as f64;
+        let factor = of_all / known.len().max(1) as f64;
         for joint in known.iter_mut().flat_map(|joints| joints.iter_mut()) {
             joint.duration *= factor;
         }
@@ -187,7 +192,8 @@ impl Chapters {
     fn step(&self, joint: usize) -> Option<f64> {
         let steps = &self.steps[joint];
         let known = || steps.iter().flatten().copied();
-        (2 * known().count() >= steps.len()).then(|| known().fold(f64::INFINITY, f64::min))
+        let count = known().count();
+        (count > 0 && 2 * count >= steps.len()).then(|| known().fold(f64::INFINITY, f64::min))
     }
 }
 
@@ -405,10 +411,16 @@ fn on(
         .iter()
         .chain(chapters.flat_map(|(_, chapters)| &chapters.surveys))
         .collect();
-    let lowest_rate = seen
+    // Of a log in chapters its usual one: a chapter that is slower is left out where it must be.
+    let of_long = candidates
+        .long
         .iter()
-        .map(|survey| 1.0 / survey.interval)
-        .fold(f64::INFINITY, f64::min);
+        .map(|(_, chapters)| chapters.interval());
+    let intervals: Vec<f64> = (surveys.iter().map(|survey| survey.interval))
+        .chain(of_long)
+        .collect();
+    let rates = intervals.iter().map(|interval| 1.0 / interval);
+    let lowest_rate = rates.fold(f64::INFINITY, f64::min);
     let longest = seen.iter().map(|survey| survey.longest).fold(0.0, f64::max);
     let all: Vec<&Vec<JointSpectra>> = seen.iter().filter_map(|s| s.spectra.as_ref()).collect();
     if all.is_empty() {
@@ -466,9 +478,9 @@ fn on(
             .collect(),
         corrections: settings.corrections.clone(),
     };
-    if seen
+    if intervals
         .iter()
-        .all(|survey| factor(&pipeline, survey.interval) == 1)
+        .all(|interval| factor(&pipeline, *interval) == 1)
     {
         pipeline.motion_interval = 0.0;
     }
@@ -494,7 +506,11 @@ fn on(
     let moving = candidates.move_by(joints, thresholds, cutoff, settings)?;
     let still: Vec<bool> = moving.iter().map(|moves| !moves).collect();
     findings.extend(unexcited(joints, &still, thresholds)?);
-    let kept = pipeline.common_rate(seen.iter().map(|s| pipeline.kept_rate(s.interval)));
+    let kept = pipeline.common_rate(
+        intervals
+            .iter()
+            .map(|interval| pipeline.kept_rate(*interval)),
+    );
     let taps = column_kernel(cutoff, 1.0 / lowest_rate);
     findings.push(Finding::new(
         Severity::Note,

@@ -10,6 +10,9 @@ use std::fmt::Debug;
 use std::ops::Range;
 use std::sync::Arc;
 
+/// Share of the samples in chapters that cannot be used beyond which the log counts as degraded.
+const LEFT_OUT_LIMIT: f64 = 0.01;
+
 /// Where the chapters of a log come from.
 pub trait ReadChapter: Debug + Send + Sync {
     /// Chapter number `chapter`, counted from 0; its name and what was carried do not matter.
@@ -31,7 +34,7 @@ pub trait Shelf: Debug + Send + Sync {
     /// NaN, and [`Shelf::failure`] says why: those who sum over rows have no better answer, and the calibration ends with it.
     fn get(&self, place: u64, skip: usize, numbers: &mut [f64]);
 
-    /// The first failure of [`Shelf::get`].
+    /// The first failure of [`Shelf::put`] or [`Shelf::get`].
     fn failure(&self) -> Option<Error>;
 }
 
@@ -73,7 +76,7 @@ impl PartialEq for Numbers {
 
 impl Numbers {
     /// How many there are.
-    pub(crate) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         match self {
             Self::Memory(numbers) => numbers.len(),
             Self::Shelf { len, .. } => *len,
@@ -86,13 +89,13 @@ impl Numbers {
     /// Those of [`Shelf::put`].
     pub(crate) fn put_away(&mut self, shelf: &Arc<dyn Shelf>) -> Result<()> {
         if let Self::Memory(numbers) = self {
-            let numbers = std::mem::take(numbers);
-            *self = Self::Shelf {
+            let mut away = Self::Shelf {
                 shelf: shelf.clone(),
                 blocks: Vec::new(),
                 len: 0,
             };
-            self.append(&numbers)?;
+            away.append(numbers)?;
+            *self = away;
         }
         Ok(())
     }
@@ -113,13 +116,21 @@ impl Numbers {
         Ok(())
     }
 
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     /// All of them.
-    pub(crate) fn get(&self) -> Cow<'_, [f64]> {
+    pub fn get(&self) -> Cow<'_, [f64]> {
         self.some(0..self.len())
     }
 
     /// Some of them.
-    pub(crate) fn some(&self, range: Range<usize>) -> Cow<'_, [f64]> {
+    ///
+    /// # Panics
+    /// If there are not so many.
+    pub fn some(&self, range: Range<usize>) -> Cow<'_, [f64]> {
         let (shelf, blocks, len) = match self {
             Self::Memory(numbers) => return Cow::Borrowed(&numbers[range]),
             Self::Shelf { shelf, blocks, len } => (shelf, blocks, *len),
@@ -144,7 +155,7 @@ pub struct LongLog {
     pub name: String,
     /// What the robot carried.
     pub payload: Payload,
-    /// Samples of each chapter.
+    /// Samples of each chapter: at least one chapter, at least one sample in each.
     pub samples: Vec<usize>,
     /// Where they are.
     pub source: Arc<dyn ReadChapter>,
@@ -169,14 +180,14 @@ impl LongLog {
         Ok(recording)
     }
 
-    /// Visits all chapters in order; one that cannot be used is left out, and said, unless none can.
+    /// Visits all chapters in order, by their number; one that cannot be used is left out, and said, unless none can.
     ///
     /// # Errors
     /// Of chapters that cannot be read, the first of all if no chapter can be used, and any that is not about the log.
     pub(crate) fn visit(
         &self,
         findings: &mut Vec<Finding>,
-        mut visit: impl FnMut(&Recording, &mut Vec<Finding>) -> Result<()> + Send,
+        mut visit: impl FnMut(usize, &Recording, &mut Vec<Finding>) -> Result<()> + Send,
     ) -> Result<()> {
         let (mut said, mut unused, mut rows) = (Vec::new(), Vec::new(), 0);
         let mut next = Some(self.chapter(0)?);
@@ -188,10 +199,14 @@ impl LongLog {
             // The next chapter is read meanwhile.
             let ahead = chapter + 1;
             let (visited, read) = rayon::join(
-                || visit(&recording, &mut of_chapter),
+                || visit(chapter, &recording, &mut of_chapter),
                 || (ahead < self.chapters()).then(|| self.chapter(ahead)),
             );
             next = read.transpose()?;
+            // What cannot be put away is no fault of the chapter.
+            if let Some(failure) = self.shelf.as_ref().and_then(|shelf| shelf.failure()) {
+                return Err(failure);
+            }
             match visited {
                 Ok(()) => said.extend(of_chapter.into_iter().map(|finding| (chapter, finding))),
                 Err(Error::Log {
@@ -206,7 +221,20 @@ impl LongLog {
             }
         }
         let chapters = self.chapters();
+        let unfolded = said
+            .iter()
+            .any(|(_, finding)| finding.code == "wrapped_angle");
         findings.extend(told_once(said, chapters));
+        if unfolded {
+            findings.push(Finding::new(
+                Severity::Warning,
+                "unfolded_by_chapter",
+                &self.name,
+                "angles were unfolded chapter by chapter: positions of two chapters may differ by whole turns, which springs and the range \
+                 of the training data see; log angles that are not folded",
+                0,
+            ));
+        }
         let count = unused.len();
         if let Some((chapter, log, problem, remedy)) = unused.into_iter().next() {
             if count == chapters {
@@ -216,8 +244,14 @@ impl LongLog {
                     remedy,
                 });
             }
+            let all: usize = self.samples.iter().sum();
+            let severity = if rows as f64 > LEFT_OUT_LIMIT * all as f64 {
+                Severity::Degraded
+            } else {
+                Severity::Warning
+            };
             findings.push(Finding::new(
-                Severity::Warning,
+                severity,
                 "chapters_left_out",
                 &self.name,
                 format!(

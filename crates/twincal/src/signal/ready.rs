@@ -35,12 +35,14 @@ impl<'a> ReadyLog<'a> {
             }
             Log::Long(log) => {
                 let first = log.chapter(0)?;
-                let samples = first.time.len().max(2);
-                let span = first.time[first.time.len() - 1] - first.time[0];
+                let steps = first.time.windows(2).map(|pair| pair[1] - pair[0]);
+                let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
+                steps.sort_by(f64::total_cmp);
+                let interval = steps.get(steps.len() / 2).copied();
                 Self::Long(LongReady {
                     log: log.clone(),
                     joints: joints.to_vec(),
-                    interval: span / (samples - 1) as f64,
+                    interval: interval.unwrap_or(f64::INFINITY),
                 })
             }
         })
@@ -70,11 +72,20 @@ impl<'a> ReadyLog<'a> {
         }
     }
 
+    /// Whether the columns and the motion of its rows leave memory.
+    pub fn puts_away(&self) -> bool {
+        match self {
+            Self::Whole(_) => false,
+            Self::Long(long) => long.log.shelf.is_some(),
+        }
+    }
+
     /// Samples that are held at once, on the clock at which motion is held.
     pub fn samples(&self) -> usize {
         match self {
             Self::Whole(log) => log.samples(),
-            Self::Long(long) => long.log.samples.iter().copied().max().unwrap_or(0),
+            // The next chapter is read while one is visited.
+            Self::Long(long) => 2 * long.log.samples.iter().copied().max().unwrap_or(0),
         }
     }
 
@@ -111,10 +122,11 @@ impl LongReady {
         &self,
         pipeline: &Pipeline,
         findings: &mut Vec<Finding>,
-        mut visit: impl FnMut(&PreparedLog<'_>, &mut Vec<Finding>) -> Result<()> + Send,
+        mut visit: impl FnMut(usize, &PreparedLog<'_>, &mut Vec<Finding>) -> Result<()> + Send,
     ) -> Result<()> {
-        self.log.visit(findings, |chapter, said| {
+        self.log.visit(findings, |number, chapter, said| {
             visit(
+                number,
                 &PreparedLog::new(self.joints.clone(), chapter, pipeline)?,
                 said,
             )

@@ -5,7 +5,7 @@
 
 mod layout;
 
-use super::cells::Sink;
+use super::cells::{Sink, disk_failure};
 use super::{Cells, MAX_COLUMNS, Request, assemble, match_columns};
 use crate::error::{Error, Place, Result};
 use arrow_ipc::{
@@ -56,14 +56,16 @@ pub(super) fn read(
     for at in log.batches.clone() {
         let batch = log.batch(at, &columns)?;
         for ((values, column), chunk) in sinks.iter_mut().zip(&columns).zip(&batch.chunks) {
-            log.append(&batch, *chunk, column.numbers.form, values)
-                .map_err(|e| {
+            let appended = log.append(&batch, *chunk, column.numbers.form, values);
+            if let Err(error) = appended {
+                return Err(disk_failure(name, &sinks).unwrap_or_else(|| {
                     log.refuse(format!(
                         "column `{}`, record batch at byte {at}: {}",
                         column.name,
-                        reason(&e)
+                        reason(&error)
                     ))
-                })?;
+                }));
+            }
         }
     }
     let ticks = |column: &Column| column.numbers.ticks.map_or(1.0, |(ticks, _)| ticks);

@@ -189,6 +189,12 @@ impl Part {
         earlier.cells.settle(file, 0)
     }
 
+    /// All rows, in memory or not.
+    pub(super) fn rows(&self) -> usize {
+        let earlier = self.earlier.as_ref();
+        earlier.map_or(0, |earlier| earlier.cells.rows()) + self.stamps.len()
+    }
+
     /// Whether rows have left memory.
     pub(super) fn is_long(&self) -> bool {
         self.earlier.is_some()
