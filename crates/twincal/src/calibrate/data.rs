@@ -1,17 +1,16 @@
 //! The logs of a calibration as rows, with what was read, dropped and masked.
 
+use super::reader::{Reader, Role};
 use super::refuse;
 use super::result::LogSummary;
 use crate::error::{Finding, Result, Severity};
 use crate::gram::Gram;
-use crate::incidents::{Evidence, Incident, incident_findings, leave_out, left_out};
+use crate::incidents::Incident;
 use crate::likelihood::Columns;
-use crate::observations::{JointObservations, Observations, Part, Room, observe};
+use crate::observations::{Observations, Part};
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, Slice, count_rows, spread_raw, visit_slices};
-use crate::signal::{
-    self, LongReady, Payload, Pipeline, PreparedLog, Raw, ReadyLog, Recording, Trajectory,
-};
+use crate::signal::{self, Payload, Pipeline, ReadyLog, Trajectory};
 use crate::term::Library;
 use crate::twin::Twin;
 use rayon::prelude::*;
@@ -22,21 +21,16 @@ const ZERO: f64 = 1e-12;
 /// Rows per column of the largest joint below which nothing is fitted (case 7).
 const ROWS_PER_COLUMN: usize = 3;
 
-/// Chapters of a long log whose smooth motion is kept, and samples of them together, about: raw scores, the lag and the self-check
-/// look at no more.
-const MOTION_OF: usize = 16;
-const KEPT_OF_LONG: usize = 1 << 16;
-
 /// One log, ready.
 pub(super) struct Log {
     /// Contacts and protective stops, which are left out.
-    incidents: Vec<Incident>,
+    pub(super) incidents: Vec<Incident>,
     pub(super) observations: Observations,
     pub(super) summary: LogSummary,
     /// First and last stamp, s.
-    ends: [f64; 2],
+    pub(super) ends: [f64; 2],
     /// Of a log in chapters, statistics at the cut-offs of the sweep with nothing left out: made while its chapters were there.
-    elsewhere: Vec<Option<Gram>>,
+    pub(super) elsewhere: Vec<Option<Gram>>,
 }
 
 /// The logs' motion, apart from their rows: it is dropped first.
@@ -241,221 +235,6 @@ impl Data {
     }
 }
 
-/// What a log is for; logs that are fitted are swept, with these pipelines.
-#[derive(Clone, Copy)]
-enum Role<'a> {
-    Fit(&'a [Pipeline]),
-    HeldOut,
-}
-
-impl<'a> Role<'a> {
-    fn word(self) -> &'static str {
-        match self {
-            Self::Fit(_) => "fit",
-            Self::HeldOut => "heldout",
-        }
-    }
-
-    fn elsewhere(self) -> &'a [Pipeline] {
-        match self {
-            Self::Fit(elsewhere) => elsewhere,
-            Self::HeldOut => &[],
-        }
-    }
-}
-
-/// What rows are made with.
-#[derive(Clone, Copy)]
-struct Reader<'a> {
-    robot: &'a Robot,
-    library: &'a Library,
-    pipeline: &'a Pipeline,
-    /// See [`carry_something`].
-    unknown: bool,
-}
-
-impl Reader<'_> {
-    fn log(
-        &self,
-        log: &ReadyLog<'_>,
-        role: Role<'_>,
-        findings: &mut Vec<Finding>,
-    ) -> Result<(Log, Trajectory)> {
-        let (robot, pipeline) = (self.robot, self.pipeline);
-        let mut evidence = Evidence::default();
-        let (mut log, mut trajectory) = match log {
-            ReadyLog::Whole(log) => self.recording(log, role, &mut evidence, findings)?,
-            ReadyLog::Long(long) => self.chapters(long, role, &mut evidence, findings)?,
-        };
-        log.incidents = evidence.incidents(robot, pipeline);
-        leave_out(pipeline, &mut trajectory, &log.incidents);
-        log.observations
-            .leave_out(&left_out(pipeline, &log.incidents));
-        log.summary.count_rows(&log.observations);
-        findings.extend(incident_findings(&log.summary.name, &log.incidents));
-        Ok((log, trajectory))
-    }
-
-    fn chapters(
-        &self,
-        long: &LongReady,
-        role: Role<'_>,
-        evidence: &mut Evidence,
-        findings: &mut Vec<Finding>,
-    ) -> Result<(Log, Trajectory)> {
-        findings.push(long.log.say());
-        // Motion of a few chapters, evenly spread.
-        let chapters = long.log.chapters();
-        let slots = chapters.min(MOTION_OF);
-        let mut taken = vec![false; slots];
-        let mut warm = vec![false; self.robot.dof()];
-        let mut room = Room::new(long.rows_at_most(self.pipeline), long.log.shelf.clone());
-        let (mut summaries, mut kept): (_, Option<Trajectory>) = (Vec::new(), None);
-        let mut ends: Option<[f64; 2]> = None;
-        let mut elsewhere = vec![Some(Gram::default()); role.elsewhere().len()];
-        long.visit(self.pipeline, findings, |number, chapter, said| {
-            let (log, trajectory) = self.recording(chapter, role, evidence, said)?;
-            if let Some(shelf) = &long.log.shelf {
-                evidence.put_away(shelf)?;
-            }
-            if !std::mem::replace(&mut taken[number * slots / chapters], true) {
-                let mut trajectory = trajectory.thinned_out(KEPT_OF_LONG / slots);
-                match &mut kept {
-                    Some(kept) => kept.segments.append(&mut trajectory.segments),
-                    None => kept = Some(trajectory),
-                }
-            }
-            for (warm, rows) in warm.iter_mut().zip(&log.observations.joints) {
-                *warm |= !rows.temperature.is_empty();
-            }
-            room.append(log.observations)?;
-            self.add_at(role.elsewhere(), chapter, (&[], true), &mut elsewhere);
-            summaries.push(log.summary);
-            let [first, last] = log.ends;
-            ends = Some([ends.map_or(first, |ends| ends[0]), last]);
-            Ok(())
-        })?;
-        let observations = room.into_rows();
-        let cold = |(warm, rows): (&bool, &JointObservations)| *warm && rows.temperature.is_empty();
-        if warm.iter().zip(&observations.joints).any(cold) {
-            findings.push(Finding::new(
-                Severity::Warning,
-                "temperature_left_out",
-                &long.log.name,
-                "a temperature is missing in some chapters and was left out of all: drift is not compared with it",
-                0,
-            ));
-        }
-        let ends = ends.unwrap_or_default();
-        let summary = LogSummary::joined(summaries, ends[1] - ends[0]);
-        let (summary, trajectory) = summary.zip(kept).ok_or_else(|| {
-            let problem = format!("log `{}` has no chapters", long.log.name);
-            refuse(problem, "give a log with samples")
-        })?;
-        let log = Log {
-            incidents: Vec::new(),
-            observations,
-            summary,
-            ends,
-            elsewhere,
-        };
-        Ok((log, trajectory))
-    }
-
-    /// A recording as rows and as motion, with nothing left out yet.
-    fn recording(
-        &self,
-        log: &PreparedLog<'_>,
-        role: Role<'_>,
-        evidence: &mut Evidence,
-        findings: &mut Vec<Finding>,
-    ) -> Result<(Log, Trajectory)> {
-        let (robot, library, pipeline) = (self.robot, self.library, self.pipeline);
-        let recording = log.recording();
-        let (trajectory, mut more) = self.trajectory(log, Raw::Spread)?;
-        findings.append(&mut more);
-        let mut observations = observe(robot, library, pipeline, &trajectory)?;
-        evidence.take(robot, pipeline, &trajectory);
-        observations.set_temperatures(recording);
-        let time = &recording.time;
-        let ends = time.first().zip(time.last()).map(|(a, b)| [*a, *b]);
-        let log = Log {
-            incidents: Vec::new(),
-            summary: summary(recording, role.word(), pipeline, &trajectory),
-            observations,
-            ends: ends.unwrap_or_default(),
-            elsewhere: Vec::new(),
-        };
-        Ok((log, trajectory))
-    }
-
-    fn trajectory(&self, log: &PreparedLog<'_>, raw: Raw) -> Result<(Trajectory, Vec<Finding>)> {
-        let (mut trajectory, findings) = log.align(self.pipeline, raw)?;
-        trajectory.payload_acts = !self.unknown || trajectory.payload == Payload::Unknown;
-        Ok((trajectory, findings))
-    }
-
-    /// Adds a recording's statistics with other pipelines, one after the other: of a long log one more trajectory fits in memory, two do
-    /// not; each uses all cores. A pipeline that it cannot have gets `None`, or of a chapter (`part`) no more.
-    fn add_at(
-        &self,
-        pipelines: &[Pipeline],
-        log: &PreparedLog<'_>,
-        (incidents, part): (&[Incident], bool),
-        sums: &mut [Option<Gram>],
-    ) {
-        for (pipeline, kept) in pipelines.iter().zip(sums) {
-            let gram = Reader { pipeline, ..*self }.gram(log, incidents);
-            match (kept.as_mut(), gram) {
-                (Some(sum), Ok(gram)) => *sum += &gram,
-                (_, Err(_)) if part => {}
-                _ => *kept = None,
-            }
-        }
-    }
-
-    /// Statistics of a recording's rows; the incidents stay left out.
-    fn gram(&self, log: &PreparedLog<'_>, incidents: &[Incident]) -> Result<Gram> {
-        let (mut trajectory, _) = self.trajectory(log, Raw::None)?;
-        leave_out(self.pipeline, &mut trajectory, incidents);
-        let rows = observe(self.robot, self.library, self.pipeline, &trajectory)?;
-        Ok(rows.whole().gram())
-    }
-}
-
-impl LogSummary {
-    /// Of chapters, which last `duration` s together.
-    fn joined(chapters: Vec<Self>, duration: f64) -> Option<Self> {
-        let mut rates: Vec<f64> = chapters.iter().map(|chapter| chapter.rate_hz).collect();
-        rates.sort_by(f64::total_cmp);
-        let longest = chapters.iter().max_by_key(|chapter| chapter.samples)?;
-        let kept_rate_hz = longest.kept_rate_hz;
-        let mut chapters = chapters.into_iter();
-        let mut all = chapters.next()?;
-        for chapter in chapters {
-            all.samples += chapter.samples;
-            all.segments += chapter.segments;
-        }
-        Some(Self {
-            duration,
-            rate_hz: rates[rates.len() / 2],
-            kept_rate_hz,
-            ..all
-        })
-    }
-
-    /// Counts the rows of each joint, moving and not.
-    fn count_rows(&mut self, observations: &Observations) {
-        let still = |joint: &JointObservations| {
-            let still = joint.standstill.iter().filter(|still| **still);
-            still.count() as u64
-        };
-        self.standstill = observations.joints.iter().map(still).collect();
-        let moving = |still: &u64| observations.len() as u64 - still;
-        self.rows = self.standstill.iter().map(moving).collect();
-    }
-}
-
 /// Statistics of the fit logs at other cut-offs than the one they were prepared for; what the fit left out stays left out. `None`
 /// without rows, and where a log cannot have that cut-off.
 ///
@@ -582,43 +361,5 @@ fn add_squares(sum: &mut (f64, f64), values: &[f64], standstill: &[bool]) {
             sum.0 += value * value;
             sum.1 += 1.0;
         }
-    }
-}
-
-fn summary(
-    recording: &Recording,
-    role: &str,
-    pipeline: &Pipeline,
-    trajectory: &Trajectory,
-) -> LogSummary {
-    let mut intervals: Vec<f64> = recording
-        .time
-        .windows(2)
-        .map(|w| w[1] - w[0])
-        .filter(|d| *d > 0.0)
-        .collect();
-    let median = match intervals.len() {
-        0 => f64::INFINITY,
-        count => {
-            *intervals
-                .select_nth_unstable_by(count / 2, f64::total_cmp)
-                .1
-        }
-    };
-    let ends = (
-        recording.time.first().copied().unwrap_or(0.0),
-        recording.time.last().copied().unwrap_or(0.0),
-    );
-    let longest = trajectory.segments.iter().max_by_key(|s| s.time.len());
-    LogSummary {
-        name: recording.name.clone(),
-        role: role.into(),
-        samples: recording.time.len() as u64,
-        duration: ends.1 - ends.0,
-        rate_hz: 1.0 / median,
-        kept_rate_hz: longest.map_or(0.0, |segment| pipeline.kept_rate(segment.interval)),
-        segments: trajectory.segments.len() as u64,
-        rows: Vec::new(),
-        standstill: Vec::new(),
     }
 }

@@ -11,6 +11,7 @@ mod held_out;
 mod heredity;
 mod outlook;
 mod prior_conflict;
+mod reader;
 mod repeat;
 mod result;
 mod room;

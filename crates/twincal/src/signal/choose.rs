@@ -2,16 +2,14 @@
 
 use super::align::PreparedLog;
 use super::clock::even_interval;
-use super::cutoff::{
-    JointSpectra, automatic, derived_from, motion_band, rms_acceleration, spectra,
-};
-use super::encoder::{Encoder, quantum, velocity_resolution};
+use super::cutoff::{JointSpectra, automatic, derived_from, motion_band, rms_acceleration};
+use super::encoder::{Encoder, velocity_resolution};
 use super::fir::{column_half_seconds, column_kernel, motion_half_seconds, noise_gain};
-use super::prepare::{JointFacts, Piece, Prepared, prepare};
+use super::prepare::{JointFacts, prepare};
+use super::survey::{Candidates, Chapters, Survey};
 use super::thin::{coarsest, factor};
 use super::{
-    Auto, Channels, DerivedFrom, Log, LongLog, LongReady, Pipeline, ReadyLog, Recording,
-    SignalSettings,
+    Auto, DerivedFrom, Log, LongLog, LongReady, Pipeline, ReadyLog, Recording, SignalSettings,
 };
 use crate::error::{Error, Finding, Result, Severity};
 use rayon::prelude::*;
@@ -22,8 +20,6 @@ const COULOMB_VELOCITY: f64 = 0.02;
 pub(crate) const MOTION_LIMIT: f64 = 0.45;
 /// Column filter's highest cut-off as a share of the log's rate: 2.5 f_c is then the rate itself.
 pub(crate) const COLUMN_LIMIT: f64 = 0.4;
-/// Chapters of a long log whose spectra are looked at, evenly spread.
-const SPECTRA: usize = 8;
 /// Kept rows that the longest segment must give at least.
 const FEWEST_ROWS: f64 = 10.0;
 
@@ -33,45 +29,6 @@ fn setting(key: &str, problem: String, remedy: &str) -> Error {
         problem,
         remedy: remedy.into(),
     }
-}
-
-/// What choosing has to know of a recording.
-struct Survey {
-    /// Median step, s.
-    interval: f64,
-    /// Longest stretch without a cut, s.
-    longest: f64,
-    /// `None` where it is too short for one.
-    spectra: Option<Vec<JointSpectra>>,
-    /// Whether velocity and acceleration are logged, by joint.
-    logged: Vec<[bool; 2]>,
-}
-
-impl Survey {
-    fn of(recording: &Recording, prepared: &Prepared<'_>, with_spectra: bool) -> Self {
-        let seconds = |piece: &Piece<'_>| piece.time.len() as f64 * piece.interval;
-        let joints = recording.joints.iter();
-        Self {
-            interval: prepared.interval,
-            longest: prepared.pieces.iter().map(seconds).fold(0.0, f64::max),
-            spectra: with_spectra.then(|| spectra(prepared)).flatten(),
-            logged: (joints.map(|joint| [joint.qd.is_some(), joint.qdd.is_some()])).collect(),
-        }
-    }
-}
-
-/// Logs before the pipeline is known.
-struct Candidates<'a> {
-    /// Those in memory, cut and unfolded.
-    whole: Vec<(&'a Recording, Prepared<'a>, Vec<Finding>)>,
-    long: Vec<(&'a LongLog, Chapters)>,
-}
-
-/// What is known of the chapters of a log.
-struct Chapters {
-    surveys: Vec<Survey>,
-    /// Steps of the encoders, by joint and chapter.
-    steps: Vec<Vec<Option<f64>>>,
 }
 
 /// See [`super::choose_and_prepare`].
@@ -143,112 +100,6 @@ fn needs_a_filter(long: &LongLog) -> Error {
         log: long.name.clone(),
         problem: "is read in chapters, which only a filter can do without".into(),
         remedy: "set [signal] cutoff_hz to \"auto\" or a number, or read it whole".into(),
-    }
-}
-
-impl Chapters {
-    fn read(joints: &[JointFacts], long: &LongLog, settings: &SignalSettings) -> Result<Self> {
-        let (mut surveys, mut steps) = (Vec::new(), vec![Vec::new(); joints.len()]);
-        let mut looked_at = [false; SPECTRA];
-        let chapters = long.chapters();
-        long.visit(&mut Vec::new(), |number, chapter, said| {
-            let prepared = prepare(joints, chapter, false, &settings.corrections, said)?;
-            let looked_at = &mut looked_at[number * SPECTRA / chapters];
-            let survey = Survey::of(chapter, &prepared, chapters <= SPECTRA || !*looked_at);
-            *looked_at |= survey.spectra.is_some();
-            surveys.push(survey);
-            let step = |channels: &Channels| quantum(std::iter::once(channels.q.as_slice()));
-            let of_chapter: Vec<Option<f64>> = chapter.joints.par_iter().map(step).collect();
-            let all = steps.iter_mut().zip(of_chapter).zip(&chapter.joints);
-            for ((steps, step), channels) in all {
-                // A joint at rest says nothing of its encoder.
-                if channels.q.iter().any(|q| *q != channels.q[0]) {
-                    steps.push(step);
-                }
-            }
-            Ok(())
-        })?;
-        // Those that were looked at speak for all.
-        let of_all = surveys.len() as f64;
-        let mut known: Vec<_> = surveys
-            .iter_mut()
-            .filter_map(|s| s.spectra.as_mut())
-            .collect();
-        let factor = of_all / known.len().max(1) as f64;
-        for joint in known.iter_mut().flat_map(|joints| joints.iter_mut()) {
-            joint.duration *= factor;
-        }
-        Ok(Self { surveys, steps })
-    }
-
-    /// Median step, s.
-    fn interval(&self) -> f64 {
-        let mut all: Vec<f64> = self.surveys.iter().map(|survey| survey.interval).collect();
-        all.sort_by(f64::total_cmp);
-        all[all.len() / 2]
-    }
-
-    /// The step of a joint's encoder, if at least every second chapter has one.
-    fn step(&self, joint: usize) -> Option<f64> {
-        let steps = &self.steps[joint];
-        let known = || steps.iter().flatten().copied();
-        let count = known().count();
-        (count > 0 && 2 * count >= steps.len()).then(|| known().fold(f64::INFINITY, f64::min))
-    }
-}
-
-impl Candidates<'_> {
-    /// The step of a joint's encoder: of the logs in memory together, and of each log in chapters.
-    fn step(&self, joint: usize) -> Option<f64> {
-        let whole = self
-            .whole
-            .iter()
-            .map(|whole| whole.0.joints[joint].q.as_slice());
-        let long = self
-            .long
-            .iter()
-            .filter_map(|(_, chapters)| chapters.step(joint));
-        quantum(whole)
-            .into_iter()
-            .chain(long)
-            .min_by(f64::total_cmp)
-    }
-
-    /// By joint: displaced anywhere by more than its threshold, rad/s or m/s, times half a period of the cut-off in that time.
-    fn move_by(
-        &self,
-        joints: &[JointFacts],
-        thresholds: &[f64],
-        cutoff: f64,
-        settings: &SignalSettings,
-    ) -> Result<Vec<bool>> {
-        let see = |moving: &mut Vec<bool>, prepared: &Prepared<'_>| {
-            (moving.par_iter_mut().zip(thresholds).enumerate())
-                .filter(|(_, (moving, _))| !**moving)
-                .for_each(|(joint, (moving, threshold))| {
-                    *moving = moves(joint, prepared, *threshold, cutoff);
-                });
-        };
-        let mut moving = vec![false; joints.len()];
-        for (_, prepared, _) in &self.whole {
-            see(&mut moving, prepared);
-        }
-        for (long, _) in &self.long {
-            // Nearly always the first chapter says it all.
-            for chapter in 0..long.chapters() {
-                if moving.iter().all(|moves| *moves) {
-                    break;
-                }
-                let recording = long.chapter(chapter)?;
-                let corrections = &settings.corrections;
-                if let Ok(prepared) =
-                    prepare(joints, &recording, false, corrections, &mut Vec::new())
-                {
-                    see(&mut moving, &prepared);
-                }
-            }
-        }
-        Ok(moving)
     }
 }
 
@@ -526,18 +377,6 @@ fn on(
         0,
     ));
     Ok((pipeline, findings))
-}
-
-/// Whether a joint is anywhere displaced by more than `threshold` times half a period of the cut-off in that time.
-fn moves(joint: usize, prepared: &Prepared<'_>, threshold: f64, cutoff: f64) -> bool {
-    prepared.pieces.iter().any(|piece| {
-        let lag = ((0.5 / cutoff / piece.interval).round() as usize).max(1);
-        let least = threshold * lag as f64 * piece.interval;
-        let q = &piece.joints[joint].q;
-        q.iter()
-            .zip(q.iter().skip(lag))
-            .any(|(a, b)| (b - a).abs() > least)
-    })
 }
 
 /// Rate of kept rows, after checking that the filters fit the logs.

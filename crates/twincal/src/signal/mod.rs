@@ -23,6 +23,7 @@ mod spectrum;
 pub(crate) mod spline;
 mod standstill;
 mod steps;
+mod survey;
 mod thin;
 mod torque;
 mod units;
