@@ -110,7 +110,7 @@ pub(crate) fn disk_failure(name: &str, sinks: &[Sink<'_>]) -> Option<Error> {
 }
 
 /// Rows of a chapter of a table of so many columns.
-fn chapter_rows(columns: usize) -> usize {
+pub(crate) fn chapter_rows(columns: usize) -> usize {
     (CHAPTER / BYTES / columns.max(1)).max(FEWEST_ROWS)
 }
 
@@ -138,6 +138,17 @@ impl Cells {
             may_spill,
             ..Self::default()
         }
+    }
+
+    /// No rows yet of a table that is long.
+    ///
+    /// # Errors
+    /// [`Error::System`] without a temporary file.
+    pub(crate) fn on_disk(name: &str, columns: usize) -> Result<Self> {
+        Ok(Self {
+            spilled: Some(Spilled::new(columns).map_err(|e| no_room(name, &e))?),
+            ..Self::new(columns, true)
+        })
     }
 
     /// Room for `rows` of `columns`.
@@ -254,11 +265,7 @@ impl Cells {
         let columns = self.columns.len();
         let spilled = match &mut self.spilled {
             Some(spilled) => spilled,
-            none => none.insert(Spilled {
-                scratch: Scratch::new(columns)?,
-                tables: Vec::new(),
-                finite: vec![false; columns],
-            }),
+            none => none.insert(Spilled::new(columns)?),
         };
         let table = spilled.scratch.table(rows.len());
         spilled.tables.push(rows.len());
@@ -292,6 +299,14 @@ impl Cells {
 }
 
 impl Spilled {
+    fn new(columns: usize) -> io::Result<Self> {
+        Ok(Self {
+            scratch: Scratch::new(columns)?,
+            tables: Vec::new(),
+            finite: vec![false; columns],
+        })
+    }
+
     /// Whether a column has a finite value.
     pub(crate) fn has_values(&self, column: usize) -> bool {
         self.finite[column]

@@ -3,6 +3,7 @@
 use super::joint_state::Doubles;
 use crate::error::{Error, Place, Result};
 use crate::log::Cells;
+use crate::log::cells::chapter_rows;
 use crate::memory;
 use std::collections::BTreeSet;
 use twincal::robot::{JointKind, Robot};
@@ -42,6 +43,9 @@ struct Earlier {
     /// Which of the part's columns they are, in the order of a table: position, velocity, acceleration, effort of joint by joint.
     columns: Vec<usize>,
 }
+
+/// Rows that a part of a long log keeps room for.
+const KEPT: usize = 1 << 17;
 
 /// Order of a joint's lists in a table.
 pub(super) const IN_TABLES: [usize; LISTS] = [0, 1, 3, 2];
@@ -177,16 +181,26 @@ impl Part {
                     return Ok(());
                 }
                 none.insert(Earlier {
-                    cells: Cells::new(columns.len() + 1, true),
+                    cells: Cells::on_disk(file, columns.len() + 1)?,
                     columns,
                 })
             }
         };
         // Twice as many stay, so that the first of them is never the first row of the log.
         let moved = rows.saturating_sub(2 * late);
-        earlier.take(&mut self.stamps, &mut self.columns, moved);
+        let mut left = moved;
+        while left > 0 {
+            // Chapter by chapter: all at once they would be in memory twice.
+            let piece = left.min(chapter_rows(earlier.columns.len() + 1));
+            earlier.take(&mut self.stamps, &mut self.columns, piece);
+            earlier.cells.settle(file, 0)?;
+            left -= piece;
+        }
+        for column in &mut self.columns {
+            column.shrink_to(KEPT);
+        }
         self.floor = self.floor.saturating_sub(moved);
-        earlier.cells.settle(file, 0)
+        Ok(())
     }
 
     /// All rows, in memory or not.
