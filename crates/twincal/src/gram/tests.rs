@@ -122,6 +122,34 @@ fn plain(log: &Log) -> JointGram {
     gram
 }
 
+/// What is left is the statistics of the columns that are left, under their new numbers.
+#[test]
+fn columns_that_are_dropped_were_never_there() {
+    let log = Log::new(3, 6, 400, true);
+    let kept = [0, 2, 3, 5];
+    let column = |i: &usize| &log.x[i * log.rows..(i + 1) * log.rows];
+    let fewer = Log {
+        columns: kept.len(),
+        x: kept.iter().flat_map(column).copied().collect(),
+        ..log.clone()
+    };
+    let mut gram = Gram {
+        joints: vec![log.gram(37)],
+    };
+    gram.drop_columns(&[1, 4]);
+    let (left, expected) = (&gram.joints[0], plain(&fewer));
+    assert_eq!(left.columns, expected.columns);
+    assert_eq!((left.n, left.starts), (expected.n, expected.starts));
+    for (a, b) in [
+        (&left.s0, &expected.s0),
+        (&left.d, &expected.d),
+        (&left.first, &expected.first),
+        (&left.last, &expected.last),
+    ] {
+        assert!(close(a, b, 400.0));
+    }
+}
+
 #[test]
 fn statistics_equal_their_definition() {
     for (columns, rows) in [

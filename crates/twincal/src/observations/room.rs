@@ -181,4 +181,65 @@ mod tests {
             assert_eq!(room.into_rows(), whole, "room for {most}");
         }
     }
+
+    /// Numbers behind each other.
+    #[derive(Debug, Default)]
+    struct Attic(std::sync::Mutex<Vec<f64>>);
+
+    impl Shelf for Attic {
+        fn put(&self, numbers: &[f64]) -> Result<u64> {
+            let mut all = self.0.lock().unwrap();
+            all.extend_from_slice(numbers);
+            Ok((all.len() - numbers.len()) as u64)
+        }
+
+        fn get(&self, place: u64, skip: usize, numbers: &mut [f64]) {
+            let all = self.0.lock().unwrap();
+            numbers.copy_from_slice(&all[place as usize + skip..][..numbers.len()]);
+        }
+
+        fn failure(&self) -> Option<crate::error::Error> {
+            None
+        }
+    }
+
+    /// Columns that are dropped while the rest lies on a shelf, over several blocks and from the middle of one on.
+    #[test]
+    fn columns_on_a_shelf_are_dropped_as_in_memory() {
+        let parts = [(0, 700), (700, 300), (1000, 40)];
+        let filled = |shelf: Option<Arc<dyn Shelf>>| {
+            let mut room = Room::new(1040, shelf);
+            for (first, len) in parts {
+                room.append(part(first, len)).unwrap();
+            }
+            let mut rows = room.into_rows();
+            rows.drop_columns(&[2]);
+            rows
+        };
+        let (memory, shelf) = (filled(None), filled(Some(Arc::new(Attic::default()))));
+        assert_eq!(memory.joints[0].columns, [0, 4]);
+        assert_eq!(shelf.joints[0].columns, [0, 4]);
+        assert!(shelf.joints[0].x.is_empty() && memory.q == shelf.q);
+        for range in [0..1040, 250..731, 256..512, 1039..1040, 5..5] {
+            let of = |rows: &Observations| {
+                let mut columns = vec![Vec::new(); 2];
+                rows.joints[0].visit_columns(1040, range.clone(), &mut |piece, values| {
+                    for (i, column) in columns.iter_mut().enumerate() {
+                        column.extend_from_slice(values.of(i, 0, piece.len()));
+                    }
+                });
+                columns
+            };
+            let expected: Vec<Vec<f64>> = [0, 5]
+                .map(|column| {
+                    range
+                        .clone()
+                        .map(|row| (100 * column + row) as f64)
+                        .collect()
+                })
+                .to_vec();
+            assert_eq!(of(&shelf), expected, "{range:?}");
+            assert_eq!(of(&memory), expected, "{range:?}");
+        }
+    }
 }
