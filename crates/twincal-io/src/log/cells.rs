@@ -228,11 +228,11 @@ impl Cells {
         }
     }
 
-    /// Moves rows in memory to disk where they are many, but for the last `but` of them. To be called every few thousand rows.
+    /// Moves rows in memory to disk where they are many, but for half a chapter. To be called every few thousand rows.
     ///
     /// # Errors
     /// [`Error::System`] where they cannot be written.
-    pub(crate) fn settle(&mut self, name: &str, but: usize) -> Result<()> {
+    pub(crate) fn settle(&mut self, name: &str) -> Result<()> {
         if !self.may_spill {
             return Ok(());
         }
@@ -243,7 +243,7 @@ impl Cells {
         }
         let mut from = 0;
         // No chapter at the end is shorter than half a usual one.
-        while from + chapter + but.max(chapter / 2) <= rows {
+        while from + chapter + chapter / 2 <= rows {
             self.spill(from..from + chapter)
                 .map_err(|e| no_room(name, &e))?;
             from += chapter;
@@ -371,7 +371,7 @@ mod tests {
                 });
             }
             if row % 64 == 0 {
-                cells.settle("run", 100).unwrap();
+                cells.settle("run").unwrap();
                 most = most.max(cells.rows_in_memory());
             }
         }

@@ -114,6 +114,13 @@ pub(crate) struct Request<'a> {
     pub(crate) chapters: bool,
 }
 
+impl Request<'_> {
+    /// Which of the columns of a table are wanted.
+    fn select(&self, header: &[String]) -> Result<Selection> {
+        match_columns(self.name, header, self.robot, self.options)
+    }
+}
+
 fn read(
     path: &Path,
     robot: &Robot,
@@ -308,16 +315,10 @@ fn csv_table(
     bytes: u64,
     request: Request<'_>,
 ) -> Result<(Log<'static>, Vec<Finding>)> {
-    let Request {
-        name,
-        robot,
-        options,
-        chapters,
-    } = request;
-    let mut table = csv::Table::open(source, bytes, name)?;
-    let selection = match_columns(name, table.header(), robot, options)?;
+    let mut table = csv::Table::open(source, bytes, request.name)?;
+    let selection = request.select(table.header())?;
     let wanted = selection.file_columns();
-    let cells = table.read(&wanted, options.lenient, chapters)?;
+    let cells = table.read(&wanted, request.options.lenient, request.chapters)?;
     let mut findings = table.into_findings();
     let log = assemble(request, cells, selection, &mut findings)?;
     Ok((log, findings))

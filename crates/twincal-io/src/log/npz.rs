@@ -6,7 +6,7 @@
 
 mod arrays;
 
-use super::{Cells, Request, assemble, match_columns};
+use super::{Cells, Request, assemble};
 use crate::error::{Error, Place, Result};
 use crate::memory;
 use std::io::{BufReader, Read, Seek};
@@ -94,12 +94,7 @@ pub(super) fn read(
     source: impl Read + Seek,
     request: Request<'_>,
 ) -> Result<(Log<'static>, Vec<Finding>)> {
-    let Request {
-        name,
-        robot,
-        options,
-        ..
-    } = request;
+    let name = request.name;
     let refuse = |problem: String, remedy: &str| Error::content(Place::file(name), problem, remedy);
     let mut archive = ZipArchive::new(source)
         .map_err(|e| refuse(format!("is not a whole NPZ file: {e}"), "write it again"))?;
@@ -143,8 +138,16 @@ pub(super) fn read(
         }
         array.width = columns.len() - array.first;
     }
-    let options = &*arrays::name_columns(name, &arrays, &names, &mut columns, robot, options)?;
-    let selection = match_columns(name, &columns, robot, options)?;
+    let options = &*arrays::name_columns(
+        name,
+        &arrays,
+        &names,
+        &mut columns,
+        request.robot,
+        request.options,
+    )?;
+    let request = Request { options, ..request };
+    let selection = request.select(&columns)?;
     let wanted = selection.file_columns();
     let uses = |array: &&Array| {
         let range = array.first..array.first + array.width;
@@ -174,7 +177,6 @@ pub(super) fn read(
             .map_err(|e| refuse(format!("array `{key}` is damaged: {e}"), "write it again"))?;
     }
     let mut findings = Vec::new();
-    let request = Request { options, ..request };
     let log = assemble(request, cells, selection, &mut findings)?;
     Ok((log, findings))
 }

@@ -2,7 +2,7 @@
 
 use super::cells::{Sink, disk_failure};
 use super::pages::check_chunk;
-use super::{Cells, Request, assemble, match_columns};
+use super::{Cells, Request, assemble};
 use crate::error::{Error, Place, Result};
 use parquet::basic::{Compression, LogicalType, Repetition, TimeUnit, Type};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
@@ -36,17 +36,12 @@ pub(super) fn read(
     mut pages: impl Read + Seek,
     request: Request<'_>,
 ) -> Result<(Log<'static>, Vec<Finding>)> {
-    let Request {
-        name,
-        robot,
-        options,
-        chapters,
-    } = request;
+    let name = request.name;
     let reader = SerializedFileReader::new(chunks).map_err(|e| broken(name, &e))?;
     let metadata = reader.metadata();
     let columns: Vec<_> = metadata.file_metadata().schema_descr().columns().to_vec();
     let header: Vec<String> = columns.iter().map(|c| c.path().string()).collect();
-    let selection = match_columns(name, &header, robot, options)?;
+    let selection = request.select(&header)?;
     let wanted = selection.file_columns();
     let mut findings = Vec::new();
     let mut scales = Vec::with_capacity(wanted.len());
@@ -59,7 +54,7 @@ pub(super) fn read(
     } else {
         wanted.len()
     };
-    let mut cells = Cells::reserve(name, rows, wanted.len(), chapters)?;
+    let mut cells = Cells::reserve(name, rows, wanted.len(), request.chapters)?;
     let mut sinks = cells.sinks();
     for group in 0..reader.num_row_groups() {
         let group = reader.get_row_group(group).map_err(|e| broken(name, &e))?;

@@ -6,7 +6,7 @@
 mod layout;
 
 use super::cells::{Sink, disk_failure};
-use super::{Cells, MAX_COLUMNS, Request, assemble, match_columns};
+use super::{Cells, MAX_COLUMNS, Request, assemble};
 use crate::error::{Error, Place, Result};
 use arrow_ipc::{
     CompressionType, Endianness, MessageHeader, MetadataVersion, RecordBatch, Schema,
@@ -33,14 +33,9 @@ pub(super) fn read(
     source: impl Read + Seek,
     request: Request<'_>,
 ) -> Result<(GivenLog<'static>, Vec<Finding>)> {
-    let Request {
-        name,
-        robot,
-        options,
-        chapters,
-    } = request;
+    let name = request.name;
     let mut log = Log::open(source, name)?;
-    let selection = match_columns(name, &log.header()?, robot, options)?;
+    let selection = request.select(&log.header()?)?;
     let wanted = selection.file_columns();
     let mut findings = Vec::new();
     let columns = log.columns(&wanted, &mut findings)?;
@@ -51,7 +46,7 @@ pub(super) fn read(
             .checked_add(batch.rows)
             .ok_or_else(|| log.refuse("declares more rows than can be counted".into()))?;
     }
-    let mut cells = Cells::reserve(name, rows, wanted.len(), chapters)?;
+    let mut cells = Cells::reserve(name, rows, wanted.len(), request.chapters)?;
     let mut sinks = cells.sinks();
     for at in log.batches.clone() {
         let batch = log.batch(at, &columns)?;

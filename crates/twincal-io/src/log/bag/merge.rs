@@ -193,7 +193,7 @@ impl Part {
             // Chapter by chapter: all at once they would be in memory twice.
             let piece = left.min(chapter_rows(earlier.columns.len() + 1));
             earlier.take(&mut self.stamps, &mut self.columns, piece);
-            earlier.cells.settle(file, 0)?;
+            earlier.cells.settle(file)?;
             left -= piece;
         }
         for column in &mut self.columns {

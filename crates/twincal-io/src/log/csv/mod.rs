@@ -137,7 +137,7 @@ impl<R: Read> Table<R> {
                 }
             }
             if rows.is_multiple_of(SETTLE) {
-                cells.settle(&self.name, 0)?;
+                cells.settle(&self.name)?;
             }
         }
         Ok(cells)
