@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.csv
 import pyarrow.feather
 import pyarrow.parquet
@@ -20,10 +21,13 @@ families = ["payload", "viscous", "coulomb", "offset"]
 
 
 MEASURED = """
-import os, subprocess, sys
-child = subprocess.Popen(sys.argv[1:], stdout=subprocess.DEVNULL)
-_, status, usage = os.wait4(child.pid, 0)
-print(usage.ru_maxrss / 1024)
+import os, subprocess, sys, tempfile
+with tempfile.TemporaryFile() as words:
+    child = subprocess.Popen(sys.argv[1:], stdout=words)
+    _, status, usage = os.wait4(child.pid, 0)
+    words.seek(0)
+    print(usage.ru_maxrss / 1024)
+    print(words.read().decode(), end="")
 sys.exit(os.waitstatus_to_exitcode(status))
 """
 
@@ -61,15 +65,22 @@ def log(minutes, seed=1):
     return pa.table(columns)
 
 
+def run(*command):
+    """What a command prints, and the largest memory that it took, MB."""
+    command = [program("twincal"), *map(str, command), "--threads", "2"]
+    # Through a small process: the largest memory of a child counts what its parent had when it was started.
+    done = subprocess.run([sys.executable, "-c", MEASURED, *command], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    memory, _, words = done.stdout.partition("\n")
+    return words, float(memory)
+
+
 def fitted(folder, file):
     """result.json of a fit, and the largest memory that it took, MB."""
     (folder / "twincal.toml").write_text(CONFIG)
-    command = [program("twincal"), "fit", file, "--model", ASSETS / "arm.urdf", "--config", folder / "twincal.toml",
-               "-o", folder / "out", "--force", "--threads", "2"]  # fmt: skip
-    # Through a small process: the largest memory of a child counts what its parent had when it was started.
-    done = subprocess.run([sys.executable, "-c", MEASURED, *map(str, command)], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return json.loads((folder / "out/result.json").read_text()), float(done.stdout)
+    config = folder / "twincal.toml"
+    _, memory = run("fit", file, "--model", ASSETS / "arm.urdf", "--config", config, "-o", folder / "out", "--force")
+    return json.loads((folder / "out/result.json").read_text()), memory
 
 
 def agrees(result):
@@ -112,3 +123,39 @@ def test_other_forms_come_in_chapters_too(tmp_path, long_log, form):
     assert result["logs"][0]["samples"] == long_log.num_rows
     assert any(finding["code"] == "chapters" for finding in result["findings"])
     assert memory < 270, memory
+
+
+def test_all_commands_take_long_logs_in_chapters(tmp_path, long_log):
+    """Twice the log, the same memory; every row predicted, as by a twin that reads the same rows as a short log."""
+    table, model, config = long_log, ASSETS / "arm.urdf", tmp_path / "twincal.toml"
+    short, long, longer = (tmp_path / f"{name}.parquet" for name in ("short", "long", "longer"))
+    pa.parquet.write_table(table, long)
+    end = table["t"][-1].as_py() + 1 / RATE
+    again = table.set_column(0, "t", pc.add(table["t"], end))
+    pa.parquet.write_table(pa.concat_tables([table, again]), longer)
+    fitted(tmp_path, long)
+    memory = {}
+    for file in (long, longer):
+        for command in (["predict", file, "--twin", tmp_path / "out", "-o", tmp_path / f"of_{file.name}", "--force"],
+                        ["check", file, "--twin", tmp_path / "out", "--json"],
+                        ["inspect", model, file, "--config", config, "--json"],
+                        ["doctor", file, "--model", model, "--config", config, "--json"]):  # fmt: skip
+            words, memory[command[0], file.stem] = run(*command)
+            if command[0] in ("inspect", "doctor"):
+                (seen,) = json.loads(words)["logs"]
+                assert (seen["samples"], seen["segments"]) == (pa.parquet.read_metadata(file).num_rows, 1)
+                for j in range(2):
+                    assert abs(seen["joints"][j]["q_sd"] / np.std(table[f"q{j + 1}"].to_numpy()) - 1) < 1e-3
+    for command in ("predict", "check", "inspect", "doctor"):
+        assert memory[command, "longer"] - memory[command, "long"] < 32, memory
+    # What lies around the place where the first two chapters meet, as a log of its own.
+    rows = np.arange(100_000, 500_000)
+    pa.parquet.write_table(table.take(rows), short)
+    run("predict", short, "--twin", tmp_path / "out", "-o", tmp_path / "of_short.parquet")
+    whole, part = (pa.parquet.read_table(tmp_path / f"of_{name}.parquet") for name in ("long", "short"))
+    assert len(whole) > len(table) - 1000 and len(part) > len(rows) - 1000
+    place = np.searchsorted(whole["t"].to_numpy(), part["t"].to_numpy())
+    for name in part.column_names:
+        wanted, got = part[name].to_numpy(), whole[name].to_numpy()[place]
+        # Columns are evaluated on a coarse clock that begins elsewhere.
+        assert np.abs(wanted.astype(float) - got.astype(float)).max() < 1e-4, name

@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::posterior::random::Random;
 use twincal::rows::{RowSignal, count_rows};
-use twincal::signal::{Auto, Raw, align, choose_pipeline, prepare};
+use twincal::signal::{Auto, Log, Raw, choose_pipeline, prepare};
 use twincal::twin::Twin;
 use twincal::validate::{HeldOut, Split};
 
@@ -191,16 +191,14 @@ fn a_twin_from_json_predicts_the_same_bytes_and_scores_like_the_calibration() {
     let score = |twin: &Twin| {
         let library = twin.library().expect("a library");
         let predictor = twin.predictor(&library).expect("a predictor");
-        let (trajectory, _) = align(&twin.robot, &heldout, &twin.pipeline).expect("a trajectory");
         let mut scores = HeldOut::new(twin.robot.joint_names());
         scores
             .score(
-                &twin.robot,
+                twin,
                 &library,
-                &twin.pipeline,
-                (&predictor).into(),
-                &trajectory,
-                f64::NEG_INFINITY,
+                &predictor,
+                &Log::from(&heldout),
+                &mut Vec::new(),
             )
             .expect("scores");
         scores.finish(Split::HeldoutLogs)

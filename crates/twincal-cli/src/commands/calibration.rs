@@ -10,7 +10,6 @@ use crate::terminal::Terminal;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use twincal::calibrate::{Calibration, CalibrationSettings, Stage, Stopped, calibrate};
-use twincal::signal::Log;
 use twincal_io::artifact::{Claim, Maker, REPORT};
 use twincal_io::config::{Config, Settings};
 use twincal_io::memory;
@@ -24,8 +23,8 @@ pub(super) struct Job<'a> {
     pub(super) config: &'a Config,
     pub(super) settings: &'a Settings,
     pub(super) robot: RobotInput,
-    pub(super) logs: LogInput<Log<'static>>,
-    pub(super) heldout: LogInput<Log<'static>>,
+    pub(super) logs: LogInput,
+    pub(super) heldout: LogInput,
     /// Folder of the result.
     pub(super) output: &'a Path,
     pub(super) watch: Stopwatch,

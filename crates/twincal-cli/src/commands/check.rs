@@ -1,6 +1,6 @@
 //! `twincal check`: scores of a twin on new logs against its gates.
 
-use super::inputs::LogInput;
+use super::inputs::{LogInput, Long};
 use super::summary::{Notes, findings, paragraph, percent, scores, significant};
 use super::{code_of, print_json, require_strict, settings, start_threads};
 use crate::args::Check;
@@ -48,7 +48,13 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     progress.step(&format!("reading {}", flags.twin.to_string_lossy()));
     let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, false)?;
     let twin = &stored.calibration.twin;
-    let mut logs = LogInput::read(&flags.logs, &twin.robot, &settings.log, &progress)?;
+    let mut logs = LogInput::read(
+        &flags.logs,
+        &twin.robot,
+        &settings.log,
+        Long::InChapters,
+        &progress,
+    )?;
     progress.step("predicting the logs");
     let mut found = std::mem::take(&mut logs.findings);
     let validation = score(twin, &logs, &mut found).map_err(|error| logs.as_given(error))?;
@@ -97,20 +103,9 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
 fn score(twin: &Twin, logs: &LogInput, findings: &mut Vec<Finding>) -> Result<Validation> {
     let library = twin.library()?;
     let predictor = twin.predictor(&library)?;
-    let names = twin.robot.joint_names();
-    let mut scores = HeldOut::new(names.clone());
-    for recording in &logs.logs {
-        recording.require_torque(&names)?;
-        let (trajectory, more) = twin.align(recording)?;
-        findings.extend(more);
-        scores.score(
-            &twin.robot,
-            &library,
-            &twin.pipeline,
-            (&predictor).into(),
-            &trajectory,
-            f64::NEG_INFINITY,
-        )?;
+    let mut scores = HeldOut::new(twin.robot.joint_names());
+    for log in &logs.logs {
+        scores.score(twin, &library, &predictor, log, findings)?;
     }
     Ok(scores.finish(Split::HeldoutLogs))
 }

@@ -1,17 +1,17 @@
 //! Logs beside their model before anything is fitted: what `inspect` and `doctor` share.
 
 use std::collections::BTreeMap;
-use twincal::incidents::{Incident, incident_findings, incidents, leave_out};
+use twincal::incidents::{Incident, motion};
 use twincal::lag::{LogLag, estimate_lag, lag_findings};
 use twincal::robot::Robot;
 use twincal::self_check::{JointCheck, look};
-use twincal::signal::{Agreement, Pipeline, Recording, Trajectory, align, velocity_agreement};
+use twincal::signal::{Agreement, Log, Pipeline, Trajectory, velocity_agreement};
 use twincal::{Error, Finding, Severity};
 
 /// Logs as a fit would filter them, and what log and model say of each other.
 #[derive(Default)]
 pub(super) struct Checkup {
-    /// Logs that could be filtered; incidents are masked.
+    /// Logs that could be filtered, long ones in part; incidents are masked.
     pub(super) trajectories: Vec<Trajectory>,
     /// Why others could not.
     pub(super) refused: Vec<Error>,
@@ -28,16 +28,16 @@ pub(super) struct Checkup {
 /// Filters the logs, looks for incidents and lags, and compares with the model.
 ///
 /// # Errors
-/// Positions in degrees.
+/// Positions in degrees, and chapters that cannot be read.
 pub(super) fn checkup(
     robot: &Robot,
-    recordings: &[Recording],
+    logs: &[Log<'_>],
     pipeline: &Pipeline,
 ) -> twincal::Result<Checkup> {
     let mut checkup = Checkup::default();
-    for recording in recordings {
-        let (mut trajectory, more) = match align(robot, recording, pipeline) {
-            Ok(aligned) => aligned,
+    for log in logs {
+        let (trajectory, happened, more) = match motion(robot, pipeline, log) {
+            Ok(seen) => seen,
             Err(error) => {
                 checkup.refused.push(error);
                 continue;
@@ -45,15 +45,13 @@ pub(super) fn checkup(
         };
         let warnings = more.into_iter().filter(|f| f.severity > Severity::Note);
         checkup.findings.extend(warnings);
-        let happened = incidents(robot, pipeline, &trajectory);
-        leave_out(pipeline, &mut trajectory, &happened);
-        let said = incident_findings(&recording.name, &happened);
-        checkup.findings.extend(said);
-        let name = &recording.name;
+        let name = log.name().to_owned();
         checkup.incidents.insert(name.clone(), happened);
-        if recording.joints.iter().all(|joint| joint.qd.is_some()) && !pipeline.is_off() {
+        let with_velocity =
+            log.any_recording(|log| Ok(log.joints.iter().all(|joint| joint.qd.is_some())))?;
+        if with_velocity && !pipeline.is_off() {
             let agreement = velocity_agreement(&trajectory, &pipeline.standstill_velocity);
-            checkup.agreement.insert(name.clone(), agreement);
+            checkup.agreement.insert(name, agreement);
         }
         checkup.trajectories.push(trajectory);
     }

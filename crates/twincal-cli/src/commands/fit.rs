@@ -1,7 +1,7 @@
 //! `twincal fit`: from logs and a model to a calibrated twin.
 
 use super::calibration::{Job, command, say_where};
-use super::inputs::{LogInput, RobotInput};
+use super::inputs::{LogInput, Long, RobotInput};
 use super::{settings, start_threads};
 use crate::args::Fit;
 use crate::clock::Stopwatch;
@@ -9,7 +9,7 @@ use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::path::PathBuf;
-use twincal::signal::{Auto, Log};
+use twincal::signal::Auto;
 use twincal_io::artifact::{Claim, Maker, Replace};
 
 pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
@@ -46,11 +46,12 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     progress.step(&format!("reading {}", model.to_string_lossy()));
     let robot = RobotInput::read(model, &settings)?;
     // Without a filter every sample is a row, and all are in memory whatever the reader does.
-    let read = match settings.calibration.signal.cutoff_hz {
-        Auto::Value(0.0) => LogInput::in_memory,
-        _ => LogInput::<Log<'static>>::read,
+    let long = match settings.calibration.signal.cutoff_hz {
+        Auto::Value(0.0) => Long::InMemory,
+        _ => Long::InChapters,
     };
-    let read = |paths: &[PathBuf]| read(paths, &robot.robot, &settings.log, &progress);
+    let read =
+        |paths: &[PathBuf]| LogInput::read(paths, &robot.robot, &settings.log, long, &progress);
     let (logs, heldout) = (read(given)?, read(&settings.log.heldout)?);
     every_log_once(&logs, &heldout)?;
     let command = command(model, given, &settings.log.heldout, &config.in_force());
@@ -71,7 +72,7 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
 }
 
 /// A log that is fitted says nothing of what was not, and counts for one experiment only.
-fn every_log_once<T>(logs: &LogInput<T>, heldout: &LogInput<T>) -> Outcome<()> {
+fn every_log_once(logs: &LogInput, heldout: &LogInput) -> Outcome<()> {
     for (i, file) in heldout.files.iter().enumerate() {
         if logs.files.iter().any(|log| log.sha256 == file.sha256) {
             return Err(Failure::usage(

@@ -3,11 +3,10 @@
 use crate::failure::{Failure, Outcome};
 use crate::names::display_names;
 use crate::progress::Progress;
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::robot::Robot;
-use twincal::signal::{Log, Recording};
+use twincal::signal::Log;
 use twincal_io::artifact::{MODEL_MJCF, MODEL_URDF, sha256, sha256_of_file};
 use twincal_io::config::{LogSettings, Settings};
 use twincal_io::log::{LogOptions, files_of, open_log, parse_log, read_log};
@@ -53,82 +52,54 @@ impl RobotInput {
     }
 }
 
-/// Logs as read, with what was dropped or assumed: recordings, or logs that may be in chapters.
-pub(super) struct LogInput<T = Recording> {
-    pub(super) logs: Vec<T>,
+/// Logs as read, with what was dropped or assumed.
+pub(super) struct LogInput {
+    pub(super) logs: Vec<Log<'static>>,
     pub(super) files: Vec<FileHash>,
     pub(super) findings: Vec<Finding>,
     given: Vec<PathBuf>,
 }
 
-/// A log of either kind.
-pub(super) trait OneLog: Sized + Send {
-    fn read(
-        path: &Path,
-        robot: &Robot,
-        options: &LogOptions,
-    ) -> Result<(Self, Vec<Finding>), Error>;
-    /// Samples that are in memory at once.
-    fn samples(&self) -> usize;
-    /// Gives it the name that it has in results; returns that which it had.
-    fn rename(&mut self, name: &str) -> String;
+/// What becomes of long logs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Long {
+    /// They come in chapters.
+    InChapters,
+    /// They stay in memory.
+    InMemory,
 }
 
-impl OneLog for Recording {
+impl Long {
     fn read(
+        self,
         path: &Path,
         robot: &Robot,
         options: &LogOptions,
-    ) -> Result<(Self, Vec<Finding>), Error> {
-        read_log(path, robot, options)
-    }
-
-    fn samples(&self) -> usize {
-        self.time.len()
-    }
-
-    fn rename(&mut self, name: &str) -> String {
-        std::mem::replace(&mut self.name, name.into())
-    }
-}
-
-impl OneLog for Log<'static> {
-    fn read(
-        path: &Path,
-        robot: &Robot,
-        options: &LogOptions,
-    ) -> Result<(Self, Vec<Finding>), Error> {
-        open_log(path, robot, options)
-    }
-
-    fn samples(&self) -> usize {
+    ) -> Result<(Log<'static>, Vec<Finding>), Error> {
         match self {
-            Self::Whole(recording) => recording.time.len(),
-            Self::Long(long) => long.samples.iter().copied().max().unwrap_or(0),
-        }
-    }
-
-    fn rename(&mut self, name: &str) -> String {
-        match self {
-            Self::Whole(recording) => recording.to_mut().rename(name),
-            Self::Long(long) => std::mem::replace(&mut long.name, name.into()),
+            Self::InChapters => open_log(path, robot, options),
+            Self::InMemory => {
+                let (recording, findings) = read_log(path, robot, options)?;
+                Ok((recording.into(), findings))
+            }
         }
     }
 }
 
-impl<T: OneLog> LogInput<T> {
+impl LogInput {
     /// Reads logs.
     pub(super) fn read(
         paths: &[PathBuf],
         robot: &Robot,
         settings: &LogSettings,
+        long: Long,
         progress: &Progress,
     ) -> Outcome<Self> {
         let mut samples = 0;
         let mut input = Self::new(paths.to_vec());
         for (path, name) in paths.iter().zip(display_names(paths)) {
             progress.step(&format!("reading {}", path.to_string_lossy()));
-            let read = || T::read(path, robot, &settings.options(path));
+            let read = || long.read(path, robot, &settings.options(path));
             let (log, checksum) = if path.is_file() || path.is_dir() {
                 let (log, checksum) = rayon::join(read, || sha256_of_log(path));
                 (log?, checksum)
@@ -137,7 +108,7 @@ impl<T: OneLog> LogInput<T> {
                 (read()?, sha256_of_log(path))
             };
             let (log, findings) = log;
-            samples += log.samples() as u64;
+            samples += in_memory(&log);
             let bytes = samples.saturating_mul(robot.dof() as u64 * 8 * DOUBLES_PER_SAMPLE);
             memory::require(
                 &path.to_string_lossy(),
@@ -163,7 +134,7 @@ impl<T: OneLog> LogInput<T> {
     }
 
     /// Takes a log under the name that it has in results.
-    fn push(&mut self, mut log: T, findings: Vec<Finding>, name: &str) {
+    fn push(&mut self, mut log: Log<'static>, findings: Vec<Finding>, name: &str) {
         let given = log.rename(name);
         self.logs.push(log);
         self.findings
@@ -173,9 +144,7 @@ impl<T: OneLog> LogInput<T> {
                 ..finding
             }));
     }
-}
 
-impl LogInput<Log<'static>> {
     /// Logs that the program carries.
     pub(super) fn carried(
         logs: &[(&str, &'static [u8])],
@@ -186,7 +155,7 @@ impl LogInput<Log<'static>> {
         for (name, bytes) in logs {
             let (recording, findings) =
                 parse_log(name, bytes, robot, &settings.options(Path::new(name)))?;
-            input.push(Log::Whole(Cow::Owned(recording)), findings, name);
+            input.push(recording.into(), findings, name);
             input.files.push(FileHash {
                 name: (*name).into(),
                 sha256: sha256(bytes),
@@ -196,30 +165,6 @@ impl LogInput<Log<'static>> {
         Ok(input)
     }
 
-    /// The same with every log in memory.
-    pub(super) fn in_memory(
-        paths: &[PathBuf],
-        robot: &Robot,
-        settings: &LogSettings,
-        progress: &Progress,
-    ) -> Outcome<Self> {
-        let LogInput {
-            logs,
-            files,
-            findings,
-            given,
-        } = LogInput::<Recording>::read(paths, robot, settings, progress)?;
-        let whole = |recording| Log::Whole(Cow::Owned(recording));
-        Ok(Self {
-            logs: logs.into_iter().map(whole).collect(),
-            files,
-            findings,
-            given,
-        })
-    }
-}
-
-impl<T> LogInput<T> {
     /// The error with the log named as it was given instead of as it stands in results.
     pub(super) fn as_given(&self, error: twincal::Error) -> twincal::Error {
         match error {
@@ -238,6 +183,14 @@ impl<T> LogInput<T> {
             }
             other => other,
         }
+    }
+}
+
+/// Samples of a log that are in memory at once.
+fn in_memory(log: &Log<'_>) -> u64 {
+    match log {
+        Log::Whole(_) => log.samples(),
+        Log::Long(long) => long.samples().iter().copied().max().unwrap_or(0) as u64,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use self::library::{BaseRow, ComponentRow, base_row, component_rows};
 use super::checkup::checkup;
-use super::inputs::{LogInput, RobotInput};
+use super::inputs::{LogInput, Long, RobotInput};
 use super::summary::{Notes, findings, paragraph, significant};
 use super::table::{print_table, table};
 use super::{code_of, print_json, require_strict, settings, start_threads};
@@ -16,7 +16,7 @@ use twincal::calibrate::{Outlook, outlook};
 use twincal::excitation::Unseen;
 use twincal::robot::{JointKind, Mimic, Robot};
 use twincal::signal::{
-    LogOverview, Pipeline, SignalSettings, Trajectory, choose_pipeline, describe, hardly_driven,
+    LogOverview, Pipeline, SignalSettings, Trajectory, choose_and_prepare, describe, hardly_driven,
 };
 
 pub(super) mod library;
@@ -81,14 +81,19 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
     };
     progress.step(&format!("reading {}", model.to_string_lossy()));
     let robot = RobotInput::read(model, &settings)?;
-    let mut logs = LogInput::read(logs, &robot.robot, &settings.log, &progress)?;
+    let mut logs = LogInput::read(
+        logs,
+        &robot.robot,
+        &settings.log,
+        Long::InChapters,
+        &progress,
+    )?;
     drop(progress);
     let mut found = robot.findings;
     found.append(&mut logs.findings);
     let mut overviews = Vec::new();
-    for recording in &logs.logs {
-        let (overview, more) =
-            describe(&robot.robot, recording).map_err(|error| logs.as_given(error))?;
+    for log in &logs.logs {
+        let (overview, more) = describe(&robot.robot, log).map_err(|error| logs.as_given(error))?;
         overviews.push(overview);
         found.extend(more);
     }
@@ -121,7 +126,7 @@ fn compare(
     logs: &LogInput,
     signal: &SignalSettings,
 ) -> Outcome<(Option<Aligned>, Vec<Finding>)> {
-    let Ok((pipeline, _)) = choose_pipeline(robot, &logs.logs, signal) else {
+    let Ok((pipeline, _, _)) = choose_and_prepare(robot, &logs.logs, signal) else {
         return Ok((None, Vec::new()));
     };
     let found = checkup(robot, &logs.logs, &pipeline).map_err(|e| logs.as_given(e))?;

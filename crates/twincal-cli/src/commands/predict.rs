@@ -1,6 +1,6 @@
 //! `twincal predict`: torque with intervals, one row per input row.
 
-use super::inputs::{LogInput, refuse_input_as_output};
+use super::inputs::{LogInput, Long, refuse_input_as_output};
 use super::summary::{Notes, paragraph};
 use super::{code_of, print_json, require_strict, settings, start_threads};
 use crate::args::Predict;
@@ -9,8 +9,9 @@ use crate::progress::Progress;
 use crate::terminal::Terminal;
 use serde::Serialize;
 use std::io::{self, BufWriter, Write};
-use twincal::rows::{RowSignal, visit_rows};
-use twincal::signal::{Recording, missing_torque};
+use std::ops::Range;
+use twincal::rows::{RowBlock, RowSignal, visit_rows};
+use twincal::signal::{Log, Recording, missing_torque};
 use twincal::term::Library;
 use twincal::twin::{Predictor, TorqueSignal, Twin};
 use twincal::{Finding, Result, Severity};
@@ -26,9 +27,9 @@ const CHANNELS: [&str; 5] = ["tau_meas", "tau_nom", "tau", "tau_low95", "tau_hig
 struct Predicted {
     schema: u64,
     output: Option<String>,
-    rows: usize,
-    input_rows: usize,
-    extrapolating: usize,
+    rows: u64,
+    input_rows: u64,
+    extrapolating: u64,
     signal: &'static str,
     findings: Vec<Finding>,
 }
@@ -59,21 +60,27 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
     progress.step(&format!("reading {}", flags.twin.to_string_lossy()));
     let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, false)?;
     let twin = &stored.calibration.twin;
-    let mut logs = LogInput::read(&flags.logs, &twin.robot, &settings.log, &progress)?;
+    let mut logs = LogInput::read(
+        &flags.logs,
+        &twin.robot,
+        &settings.log,
+        Long::InChapters,
+        &progress,
+    )?;
     progress.step("predicting the logs");
     let mut prediction = Prediction {
         findings: std::mem::take(&mut logs.findings),
         ..Prediction::default()
     };
-    let missing = logs.logs.iter();
-    let missing = missing.filter_map(|recording| missing_torque(&twin.robot, recording));
-    prediction.findings.extend(missing);
-    // A prediction needs motion alone: measured torque stands beside it, row by row.
-    prediction.measured = (logs.logs.iter_mut()).map(Recording::take_torque).collect();
+    for log in &logs.logs {
+        let missing = missing_torque(&twin.robot, log)?;
+        prediction.findings.extend(missing);
+    }
+    let input_rows = logs.logs.iter().map(Log::samples).sum();
     match output {
         Some((format, place, mut output)) => {
             let written = match output.file() {
-                Some(file) => prediction.write(twin, &logs, format, BufWriter::new(file))?,
+                Some(file) => prediction.write(twin, &mut logs, format, BufWriter::new(file))?,
                 None => Ok(()),
             };
             require_strict(settings.log.strict, &prediction.findings)?;
@@ -81,7 +88,7 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
             terminal.complete(place);
         }
         None => {
-            let written = prediction.write(twin, &logs, TableFormat::Csv, terminal.rows())?;
+            let written = prediction.write(twin, &mut logs, TableFormat::Csv, terminal.rows())?;
             terminal.wrote(written);
         }
     }
@@ -91,9 +98,7 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
         rows,
         extrapolating,
         findings,
-        ..
     } = prediction;
-    let input_rows = logs.logs.iter().map(|recording| recording.time.len()).sum();
     let output = flags
         .output
         .as_ref()
@@ -139,11 +144,26 @@ fn notes(findings: &[Finding], terminal: &mut Terminal) {
 /// Rows written so far.
 #[derive(Default)]
 struct Prediction {
-    rows: usize,
-    extrapolating: usize,
+    rows: u64,
+    extrapolating: u64,
     findings: Vec<Finding>,
-    /// Measured torque by log and joint, at the rows of the log.
-    measured: Vec<Vec<Option<Vec<f64>>>>,
+}
+
+/// What rows are predicted with.
+struct Model<'a> {
+    twin: &'a Twin,
+    library: &'a Library,
+    predictor: &'a Predictor,
+}
+
+/// The stretch of a log that is predicted.
+struct Stretch<'a> {
+    /// Motion alone: measured torque stands beside it, row by row, and what it lacks cuts nothing.
+    motion: &'a Recording,
+    /// Rows of `motion` that are wanted.
+    own: Range<usize>,
+    /// Torque of these rows as logged, by joint.
+    measured: Vec<Option<&'a [f64]>>,
 }
 
 impl Prediction {
@@ -151,20 +171,23 @@ impl Prediction {
     fn write(
         &mut self,
         twin: &Twin,
-        logs: &LogInput,
+        logs: &mut LogInput,
         format: TableFormat,
         writer: impl Write + Send,
     ) -> Outcome<io::Result<()>> {
         let library = twin.library()?;
         let predictor = twin.predictor(&library)?;
+        let model = Model {
+            twin,
+            library: &library,
+            predictor: &predictor,
+        };
         let mut table = match TableWriter::new(writer, format, &columns(twin)) {
             Ok(table) => table,
             Err(e) => return Ok(Err(e)),
         };
-        let all_measured = std::mem::take(&mut self.measured);
-        for (recording, measured) in logs.logs.iter().zip(&all_measured) {
-            let log = (recording, measured.as_slice());
-            let written = self.write_log(twin, &library, &predictor, log, &mut table);
+        for log in std::mem::take(&mut logs.logs) {
+            let written = self.write_log(&model, log, &mut table);
             if let Err(e) = written.map_err(|error| logs.as_given(error))? {
                 return Ok(Err(e));
             }
@@ -174,18 +197,59 @@ impl Prediction {
 
     fn write_log<W: Write + Send>(
         &mut self,
-        twin: &Twin,
-        library: &Library,
-        predictor: &Predictor,
-        (recording, logged): (&Recording, &[Option<Vec<f64>>]),
+        model: &Model<'_>,
+        log: Log<'_>,
         table: &mut TableWriter<W>,
     ) -> Result<io::Result<()>> {
-        let (trajectory, more) = twin.align(recording)?;
-        self.findings.extend(more);
+        let mut findings = Vec::new();
+        let mut written = Ok(());
+        match log {
+            Log::Whole(recording) => {
+                let mut motion = recording.into_owned();
+                let measured = motion.take_torque();
+                let stretch = Stretch {
+                    motion: &motion,
+                    own: 0..motion.time.len(),
+                    measured: measured.iter().map(Option::as_deref).collect(),
+                };
+                written = self.write_stretch(model, &stretch, table, &mut findings)?;
+            }
+            Log::Long(long) => {
+                findings.push(long.say(false));
+                let pipeline = &model.twin.pipeline;
+                long.visit_motion(pipeline, &mut findings, |part, said| {
+                    if written.is_err() {
+                        return Ok(());
+                    }
+                    let joints = part.chapter.joints.iter();
+                    let stretch = Stretch {
+                        motion: &part.motion,
+                        own: part.own.clone(),
+                        measured: joints.map(|joint| joint.tau.as_deref()).collect(),
+                    };
+                    written = self.write_stretch(model, &stretch, table, said)?;
+                    Ok(())
+                })?;
+            }
+        }
+        self.findings.append(&mut findings);
+        Ok(written)
+    }
+
+    fn write_stretch<W: Write + Send>(
+        &mut self,
+        model: &Model<'_>,
+        stretch: &Stretch<'_>,
+        table: &mut TableWriter<W>,
+        findings: &mut Vec<Finding>,
+    ) -> Result<io::Result<()>> {
+        let twin = model.twin;
+        let (trajectory, more) = twin.align(stretch.motion)?;
+        findings.extend(more);
         let mut written = Ok(());
         visit_rows(
             &twin.robot,
-            library,
+            model.library,
             &twin.pipeline,
             &trajectory,
             RowSignal::Raw,
@@ -193,44 +257,60 @@ impl Prediction {
                 if written.is_err() {
                     return Ok(());
                 }
-                let torques = predictor.block(block, TorqueSignal::Raw);
-                let of_rows = |values: &[f64]| {
-                    block
-                        .input_rows
-                        .iter()
-                        .map(|&row| values[row])
-                        .collect::<Vec<_>>()
-                };
-                let time = of_rows(&recording.time);
-                let finite = |value: f64| if value.is_finite() { value } else { f64::NAN };
-                let measured: Vec<Vec<f64>> = (logged.iter())
-                    .map(|tau| match tau {
-                        Some(tau) => of_rows(tau).into_iter().map(finite).collect(),
-                        None => vec![f64::NAN; block.len],
-                    })
-                    .collect();
-                let outside: Vec<bool> = (0..block.len)
-                    .map(|row| torques.iter().any(|torque| torque.extrapolating[row]))
-                    .collect();
-                let mut values = vec![Values::Numbers(&time)];
-                for (measured, torque) in measured.iter().zip(&torques) {
-                    let of_joint = [
-                        measured,
-                        &torque.nominal,
-                        &torque.calibrated,
-                        &torque.low,
-                        &torque.high,
-                    ];
-                    values.extend(of_joint.map(|numbers| Values::Numbers(numbers)));
+                // Rows ascend: those of the stretch are one range of the block's.
+                let first = block
+                    .input_rows
+                    .partition_point(|&row| row < stretch.own.start);
+                let end = block
+                    .input_rows
+                    .partition_point(|&row| row < stretch.own.end);
+                if first < end {
+                    written = self.write_rows(model, stretch, (block, first..end), table);
                 }
-                values.push(Values::Flags(&outside));
-                self.rows += block.len;
-                self.extrapolating += outside.iter().filter(|outside| **outside).count();
-                written = table.push(&values);
                 Ok(())
             },
         )?;
         Ok(written)
+    }
+
+    fn write_rows<W: Write + Send>(
+        &mut self,
+        model: &Model<'_>,
+        stretch: &Stretch<'_>,
+        (block, range): (&RowBlock<'_>, Range<usize>),
+        table: &mut TableWriter<W>,
+    ) -> io::Result<()> {
+        let torques = model.predictor.block(block, TorqueSignal::Raw);
+        let rows = &block.input_rows[range.clone()];
+        let time: Vec<f64> = rows.iter().map(|&row| stretch.motion.time[row]).collect();
+        let finite = |value: f64| if value.is_finite() { value } else { f64::NAN };
+        let measured: Vec<Vec<f64>> = (stretch.measured.iter())
+            .map(|tau| match tau {
+                Some(tau) => {
+                    let own = rows.iter().map(|&row| tau[row - stretch.own.start]);
+                    own.map(finite).collect()
+                }
+                None => vec![f64::NAN; rows.len()],
+            })
+            .collect();
+        let outside: Vec<bool> = (range.clone())
+            .map(|row| torques.iter().any(|torque| torque.extrapolating[row]))
+            .collect();
+        let mut values = vec![Values::Numbers(&time)];
+        for (measured, torque) in measured.iter().zip(&torques) {
+            values.push(Values::Numbers(measured));
+            let of_joint = [
+                &torque.nominal,
+                &torque.calibrated,
+                &torque.low,
+                &torque.high,
+            ];
+            values.extend(of_joint.map(|numbers| Values::Numbers(&numbers[range.clone()])));
+        }
+        values.push(Values::Flags(&outside));
+        self.rows += rows.len() as u64;
+        self.extrapolating += outside.iter().filter(|outside| **outside).count() as u64;
+        table.push(&values)
     }
 }
 

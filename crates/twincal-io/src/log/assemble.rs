@@ -63,13 +63,12 @@ pub(crate) fn assemble(
         .map_err(|e| Error::system(name, "keep its numbers in a temporary file", &e, remedy))?;
     // What is assumed of one chapter is assumed of all.
     table.recording(0, findings)?;
-    Ok(Log::Long(LongLog {
-        name: name.to_owned(),
-        payload: request.options.payload,
-        samples: table.chapters.iter().map(Chapter::len).collect(),
-        source: Arc::new(table),
-        shelf: Some(Arc::new(shelf)),
-    }))
+    let samples = table.chapters.iter().map(Chapter::len).collect();
+    let mut long =
+        LongLog::new(request.robot, samples, Arc::new(table))?.with_shelf(Arc::new(shelf));
+    name.clone_into(&mut long.name);
+    long.payload = request.options.payload;
+    Ok(Log::Long(long))
 }
 
 /// How columns become a recording.
@@ -96,30 +95,46 @@ struct OnDisk {
 impl OnDisk {
     fn recording(&self, chapter: usize, findings: &mut Vec<Finding>) -> Result<Recording> {
         let chapter = &self.chapters[chapter];
-        let columns = self.spilled.read(chapter).map_err(|e| {
-            let remedy = "look at the disk that holds temporary files (TMPDIR)";
-            Error::system(
-                &self.make.name,
-                "read its numbers back from a temporary file",
-                &e,
-                remedy,
-            )
-        })?;
+        let columns = (self.spilled.read(chapter)).map_err(|e| self.unreadable(&e))?;
         self.make.recording(columns, chapter.first, findings)
+    }
+
+    fn unreadable(&self, error: &std::io::Error) -> Error {
+        Error::system(
+            &self.make.name,
+            "read its numbers back from a temporary file",
+            error,
+            "look at the disk that holds temporary files (TMPDIR)",
+        )
+    }
+
+    /// The error as the core knows it.
+    fn of_core(&self, error: Error) -> twincal::Error {
+        match error {
+            Error::Core(error) => error,
+            error => twincal::Error::Log {
+                log: self.make.name.clone(),
+                problem: error.to_string(),
+                remedy: "or give fewer or shorter logs".into(),
+            },
+        }
     }
 }
 
 impl ReadChapter for OnDisk {
     fn read(&self, chapter: usize) -> twincal::Result<Recording> {
         self.recording(chapter, &mut Vec::new())
-            .map_err(|error| match error {
-                Error::Core(error) => error,
-                error => twincal::Error::Log {
-                    log: self.make.name.clone(),
-                    problem: error.to_string(),
-                    remedy: "or give fewer or shorter logs".into(),
-                },
-            })
+            .map_err(|error| self.of_core(error))
+    }
+
+    fn positions(&self, chapter: usize, joint: usize) -> twincal::Result<Vec<f64>> {
+        let Some(column) = self.make.selection.positions().joints[joint][0] else {
+            return Ok(Vec::new());
+        };
+        let read = self.spilled.read_column(&self.chapters[chapter], column);
+        let mut q = read.map_err(|e| self.of_core(self.unreadable(&e)))?;
+        self.make.scale(column, &mut q);
+        Ok(q)
     }
 }
 
@@ -132,10 +147,8 @@ impl Make {
         findings: &mut Vec<Finding>,
     ) -> Result<Recording> {
         let rows = columns.first().map_or(0, Vec::len);
-        for (values, scale) in columns.iter_mut().zip(&self.scales) {
-            if *scale != 1.0 {
-                values.iter_mut().for_each(|value| *value /= scale);
-            }
+        for (column, values) in columns.iter_mut().enumerate() {
+            self.scale(column, values);
         }
         let positions = self.selection.positions();
         let mut take = |index: Option<usize>| index.map(|i| std::mem::take(&mut columns[i]));
@@ -161,6 +174,14 @@ impl Make {
         };
         to_joint_torque(&mut recording, &self.robot, &self.options, findings)?;
         Ok(recording)
+    }
+
+    /// Divides the numbers of a column by its scale.
+    fn scale(&self, column: usize, values: &mut [f64]) {
+        let scale = self.scales.get(column).copied().unwrap_or(1.0);
+        if scale != 1.0 {
+            values.iter_mut().for_each(|value| *value /= scale);
+        }
     }
 
     /// Time of some rows, s.

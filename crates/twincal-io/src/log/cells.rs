@@ -336,11 +336,17 @@ impl Spilled {
     /// # Errors
     /// Of the disk.
     pub(crate) fn read(&self, chapter: &Chapter) -> io::Result<Vec<Vec<f64>>> {
-        let column = |column| {
-            self.scratch
-                .read(chapter.table, column, chapter.rows.clone())
-        };
+        let column = |column| self.read_column(chapter, column);
         (0..self.finite.len()).into_par_iter().map(column).collect()
+    }
+
+    /// One of them.
+    ///
+    /// # Errors
+    /// Of the disk.
+    pub(crate) fn read_column(&self, chapter: &Chapter, column: usize) -> io::Result<Vec<f64>> {
+        self.scratch
+            .read(chapter.table, column, chapter.rows.clone())
     }
 }
 

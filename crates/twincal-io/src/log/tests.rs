@@ -48,7 +48,7 @@ fn compare(bytes: &[u8], ending: &str, options: &LogOptions) -> LongLog {
         panic!("{ending}: not in chapters");
     };
     assert!(long.chapters() >= 5, "{} chapters", long.chapters());
-    assert_eq!(long.samples.iter().sum::<usize>(), whole.time.len());
+    assert_eq!(long.samples().iter().sum::<usize>(), whole.time.len());
     let joined = long.whole().unwrap();
     let bits = |recording: &Recording| -> Vec<Vec<u64>> {
         let joints = recording.joints.iter();
@@ -112,7 +112,7 @@ fn csv_comes_in_chapters() {
         .swap_remove(1)
         .tau
         .unwrap();
-    let row = long.samples[..late].iter().sum::<usize>() + 7;
+    let row = long.samples()[..late].iter().sum::<usize>() + 7;
     // One row was dropped before.
     assert!((tau[7] - 50.0 * value(6, row + 1)).abs() < 1e-6);
 }

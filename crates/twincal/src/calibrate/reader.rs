@@ -1,7 +1,6 @@
 //! One log to rows, whole or chapter by chapter.
 
 use super::data::Log;
-use super::refuse;
 use super::result::LogSummary;
 use crate::error::{Finding, Result, Severity};
 use crate::gram::Gram;
@@ -9,14 +8,10 @@ use crate::incidents::{Evidence, Incident, incident_findings, leave_out, left_ou
 use crate::observations::{JointObservations, Observations, Room, observe};
 use crate::robot::Robot;
 use crate::signal::{
-    LongReady, Payload, Pipeline, PreparedLog, Raw, ReadyLog, Recording, Trajectory,
+    FewChapters, LongReady, Payload, Pipeline, PreparedLog, Raw, ReadyLog, Recording, Trajectory,
+    median_step,
 };
 use crate::term::Library;
-
-/// Chapters of a long log whose smooth motion is kept, and samples of them together, about: raw scores, the lag and the self-check
-/// look at no more.
-const MOTION_OF: usize = 16;
-const KEPT_OF_LONG: usize = 1 << 16;
 
 /// What a log is for; logs that are fitted are swept, with these pipelines.
 #[derive(Clone, Copy)]
@@ -81,28 +76,19 @@ impl Reader<'_> {
         evidence: &mut Evidence,
         findings: &mut Vec<Finding>,
     ) -> Result<(Log, Trajectory)> {
-        findings.push(long.log.say());
-        // Motion of a few chapters, evenly spread.
-        let chapters = long.log.chapters();
-        let slots = chapters.min(MOTION_OF);
-        let mut taken = vec![false; slots];
+        findings.push(long.log.say(true));
+        let mut motion = FewChapters::new(long.log.chapters());
         let mut warm = vec![false; self.robot.dof()];
-        let mut room = Room::new(long.rows_at_most(self.pipeline), long.log.shelf.clone());
-        let (mut summaries, mut kept): (_, Option<Trajectory>) = (Vec::new(), None);
+        let mut room = Room::new(long.rows_at_most(self.pipeline), long.log.shelf().cloned());
+        let mut summaries = Vec::new();
         let mut ends: Option<[f64; 2]> = None;
         let mut elsewhere = vec![Some(Gram::default()); role.elsewhere().len()];
         long.visit(self.pipeline, findings, |number, chapter, said| {
             let (log, trajectory) = self.recording(chapter, role, evidence, said)?;
-            if let Some(shelf) = &long.log.shelf {
+            if let Some(shelf) = long.log.shelf() {
                 evidence.put_away(shelf)?;
             }
-            if !std::mem::replace(&mut taken[number * slots / chapters], true) {
-                let mut trajectory = trajectory.thinned_out(KEPT_OF_LONG / slots);
-                match &mut kept {
-                    Some(kept) => kept.segments.append(&mut trajectory.segments),
-                    None => kept = Some(trajectory),
-                }
-            }
+            motion.take(number, trajectory);
             for (warm, rows) in warm.iter_mut().zip(&log.observations.joints) {
                 *warm |= !rows.temperature.is_empty();
             }
@@ -126,10 +112,10 @@ impl Reader<'_> {
         }
         let ends = ends.unwrap_or_default();
         let summary = LogSummary::joined(summaries, ends[1] - ends[0]);
-        let (summary, trajectory) = summary.zip(kept).ok_or_else(|| {
-            let problem = format!("log `{}` has no chapters", long.log.name);
-            refuse(problem, "give a log with samples")
-        })?;
+        let (mut summary, trajectory) =
+            (summary.zip(motion.into_trajectory())).ok_or_else(|| long.log.without_chapters())?;
+        // Chapters that cannot be used were logged all the same.
+        summary.samples = long.log.samples().iter().map(|n| *n as u64).sum();
         let log = Log {
             incidents: Vec::new(),
             observations,
@@ -211,7 +197,6 @@ impl LogSummary {
         let mut chapters = chapters.into_iter();
         let mut all = chapters.next()?;
         for chapter in chapters {
-            all.samples += chapter.samples;
             all.segments += chapter.segments;
         }
         Some(Self {
@@ -240,20 +225,7 @@ fn summary(
     pipeline: &Pipeline,
     trajectory: &Trajectory,
 ) -> LogSummary {
-    let mut intervals: Vec<f64> = recording
-        .time
-        .windows(2)
-        .map(|w| w[1] - w[0])
-        .filter(|d| *d > 0.0)
-        .collect();
-    let median = match intervals.len() {
-        0 => f64::INFINITY,
-        count => {
-            *intervals
-                .select_nth_unstable_by(count / 2, f64::total_cmp)
-                .1
-        }
-    };
+    let median = median_step(&recording.time).unwrap_or(f64::INFINITY);
     let ends = (
         recording.time.first().copied().unwrap_or(0.0),
         recording.time.last().copied().unwrap_or(0.0),

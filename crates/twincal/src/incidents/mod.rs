@@ -8,7 +8,7 @@ mod stops;
 
 use crate::error::{Finding, Result, Severity};
 use crate::robot::Robot;
-use crate::signal::{Pipeline, Shelf, Trajectory};
+use crate::signal::{FewChapters, Log, Pipeline, Raw, Shelf, Trajectory, align, prepare};
 use bins::Bins;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -81,11 +81,46 @@ impl Evidence {
     }
 }
 
-/// Finds the incidents of a log, see [`Evidence`].
-pub fn incidents(robot: &Robot, pipeline: &Pipeline, trajectory: &Trajectory) -> Vec<Incident> {
+/// A log as motion with its incidents left out, the incidents, and what was found on the way; of a log in chapters the motion of a few
+/// of them.
+///
+/// # Errors
+/// Those of [`align`], and of chapters that cannot be read.
+pub fn motion(
+    robot: &Robot,
+    pipeline: &Pipeline,
+    log: &Log<'_>,
+) -> Result<(Trajectory, Vec<Incident>, Vec<Finding>)> {
+    let mut findings = Vec::new();
     let mut evidence = Evidence::default();
-    evidence.take(robot, pipeline, trajectory);
-    evidence.incidents(robot, pipeline)
+    let mut trajectory = match log {
+        Log::Whole(recording) => {
+            let (trajectory, said) = align(robot, recording, pipeline)?;
+            findings = said;
+            evidence.take(robot, pipeline, &trajectory);
+            trajectory
+        }
+        Log::Long(long) => {
+            let mut few = FewChapters::new(long.chapters());
+            long.visit(&mut findings, |number, chapter, said| {
+                let prepared = prepare(robot, chapter, pipeline)?;
+                let (trajectory, more) = prepared.align(pipeline, Raw::Spread)?;
+                said.extend(more);
+                evidence.take(robot, pipeline, &trajectory);
+                if let Some(shelf) = long.shelf() {
+                    evidence.put_away(shelf)?;
+                }
+                few.take(number, trajectory);
+                Ok(())
+            })?;
+            few.into_trajectory()
+                .ok_or_else(|| long.without_chapters())?
+        }
+    };
+    let found = evidence.incidents(robot, pipeline);
+    leave_out(pipeline, &mut trajectory, &found);
+    findings.extend(incident_findings(log.name(), &found));
+    Ok((trajectory, found, findings))
 }
 
 /// Takes the incidents of a log out of the fit, for all joints: what hits a link acts on every joint before it.

@@ -13,7 +13,9 @@ fn pipeline() -> Pipeline {
 }
 
 fn found(trajectory: &Trajectory) -> Vec<Incident> {
-    incidents(&arm(1.0), &pipeline(), trajectory)
+    let mut evidence = Evidence::default();
+    evidence.take(&arm(1.0), &pipeline(), trajectory);
+    evidence.incidents(&arm(1.0), &pipeline())
 }
 
 #[test]

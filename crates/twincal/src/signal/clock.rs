@@ -5,7 +5,7 @@ use crate::error::{Error, Finding, Result, Severity};
 use rayon::prelude::*;
 
 /// A step longer than this many median intervals is a gap: the log is cut there.
-const GAP: f64 = 5.0;
+pub(crate) const GAP: f64 = 5.0;
 /// Share of intervals' deviation (99 % of them) beyond which a jitter warning is given.
 const JITTER: f64 = 0.2;
 /// Stamps closer than this share of the median interval are one sample, seen twice.
@@ -200,29 +200,35 @@ fn slower_channels(kept: &[usize], samples: usize) -> Option<usize> {
     (regular * 10 >= sorted.len() * 9 && kept.len() * every * 5 > samples * 4).then_some(every)
 }
 
-/// Median of the steps that go forward.
+/// Median of the steps between stamps that go forward, s; `None` where time does not pass.
+pub(crate) fn median_step(time: &[f64]) -> Option<f64> {
+    median_positive(time.windows(2).map(|pair| pair[1] - pair[0]))
+}
+
+fn median_positive(steps: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
+    let middle = steps.len() / 2;
+    (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// [`median_step`] of the rows that are kept, if it is plausible.
 fn median_interval(
     log: &Recording,
     kept: &[usize],
     every_row: bool,
     findings: &mut Vec<Finding>,
 ) -> Result<f64> {
-    let mut steps: Vec<f64> = kept
+    let steps = kept
         .windows(2)
-        .map(|pair| log.time[pair[1]] - log.time[pair[0]])
-        .filter(|step| *step > 0.0)
-        .collect();
-    if steps.is_empty() {
+        .map(|pair| log.time[pair[1]] - log.time[pair[0]]);
+    let Some(interval) = median_positive(steps) else {
         let stamp = kept.first().map_or(f64::NAN, |&row| log.time[row]);
         return Err(log_error(
             log,
             format!("no time passes: every time stamp is {stamp}"),
             "map the right time column, or give the sampling rate with --rate HZ",
         ));
-    }
-    let middle = steps.len() / 2;
-    let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-    let interval = *median;
+    };
     if (1e-5..0.5).contains(&interval) {
         return Ok(interval);
     }

@@ -1,9 +1,11 @@
 //! What a log holds, before anything is fitted: rates, cuts, motion and torque per joint.
 
-use super::prepare::{Piece, Values, joint_facts, prepare};
+use super::clock::GAP;
+use super::prepare::{JointFacts, Piece, Values, joint_facts, prepare};
 use super::{Corrections, Log, Logs, Recording};
 use crate::error::{Finding, Result, Severity};
 use crate::robot::Robot;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Share of a joint's largest rms torque over the logs below which it was hardly driven.
@@ -52,66 +54,167 @@ pub struct LogOverview {
 /// Describes a log; findings are those of [`super::align`] without filters.
 ///
 /// # Errors
-/// Like [`super::align`].
-pub fn describe(robot: &Robot, log: &Recording) -> Result<(LogOverview, Vec<Finding>)> {
+/// Like [`super::align`], and of chapters that cannot be read.
+pub fn describe(robot: &Robot, log: &Log<'_>) -> Result<(LogOverview, Vec<Finding>)> {
     let facts = joint_facts(robot);
+    let mut sums = Sums::new(facts.len());
     let mut findings = Vec::new();
-    let prepared = prepare(&facts, log, false, &Corrections::default(), &mut findings)?;
-    let joints = facts
-        .iter()
-        .enumerate()
-        .map(|(joint, facts)| {
-            let gather = |pick: &dyn Fn(&Values<'_>) -> Vec<f64>| -> Vec<f64> {
-                prepared
-                    .pieces
-                    .iter()
-                    .flat_map(|p| pick(&p.joints[joint]))
-                    .collect()
-            };
-            let q = gather(&|c| c.q.to_vec());
-            let qd = gather(&|c| match &c.qd {
-                Some(qd) => qd.to_vec(),
-                None => {
-                    c.q.windows(6)
-                        .map(|w| (w[5] - w[0]) / (5.0 * prepared.interval))
-                        .collect()
-                }
-            });
-            let channels = &log.joints[joint];
-            let tau = channels
-                .tau
-                .as_ref()
-                .map(|_| gather(&|c| c.tau.as_deref().unwrap_or_default().to_vec()));
-            JointOverview {
-                joint: facts.name.clone(),
-                q_range: q
-                    .iter()
-                    .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| {
-                        [l.min(*v), h.max(*v)]
-                    }),
-                q_sd: sd(&q),
-                qd_rms: rms(&qd),
-                tau_sd: tau.as_deref().map(sd),
-                tau_rms: tau.as_deref().map(rms),
-                has_qd: channels.qd.is_some(),
-                has_qdd: channels.qdd.is_some(),
-            }
-        })
-        .collect();
-    let overview = LogOverview {
-        name: log.name.clone(),
-        samples: log.time.len() as u64,
-        duration: prepared
-            .pieces
+    match log {
+        Log::Whole(recording) => sums.add(&facts, recording, &mut findings)?,
+        Log::Long(long) => {
+            findings.push(long.say(false));
+            long.visit(&mut findings, |_, chapter, said| {
+                sums.add(&facts, chapter, said)
+            })?;
+        }
+    }
+    Ok((sums.overview(log, &facts), findings))
+}
+
+/// What adds up over the chapters of a log.
+struct Sums {
+    duration: f64,
+    /// Median step of each chapter, s.
+    intervals: Vec<f64>,
+    segments: u64,
+    resampled: bool,
+    /// Last stamp so far, s.
+    end: Option<f64>,
+    joints: Vec<JointSums>,
+}
+
+#[derive(Clone, Default)]
+struct JointSums {
+    /// Smallest and largest position; `None` before any.
+    range: Option<[f64; 2]>,
+    q: Moments,
+    qd: Moments,
+    tau: Moments,
+    has_qd: bool,
+    has_qdd: bool,
+    has_tau: bool,
+}
+
+impl Sums {
+    fn new(joints: usize) -> Self {
+        Self {
+            duration: 0.0,
+            intervals: Vec::new(),
+            segments: 0,
+            resampled: false,
+            end: None,
+            joints: vec![JointSums::default(); joints],
+        }
+    }
+
+    fn add(
+        &mut self,
+        facts: &[JointFacts],
+        log: &Recording,
+        findings: &mut Vec<Finding>,
+    ) -> Result<()> {
+        let prepared = prepare(facts, log, false, &Corrections::default(), findings)?;
+        let (pieces, interval) = (&prepared.pieces, prepared.interval);
+        self.duration += pieces
             .iter()
             .map(|p| p.time.len() as f64 * p.interval)
-            .sum(),
-        rate_hz: 1.0 / prepared.interval,
-        segments: prepared.pieces.len() as u64,
-        resampled: prepared.pieces.iter().any(Piece::resampled),
-        joints,
-    };
-    Ok((overview, findings))
+            .sum::<f64>();
+        self.segments += pieces.len() as u64;
+        // A chapter is no cut of the log.
+        let step = (log.time.first().zip(self.end)).map(|(start, end)| start - end);
+        if step.is_some_and(|step| (0.0..=GAP * interval).contains(&step)) && !pieces.is_empty() {
+            self.segments = self.segments.saturating_sub(1).max(1);
+        }
+        self.end = log.time.last().copied();
+        self.intervals.push(interval);
+        self.resampled |= pieces.iter().any(Piece::resampled);
+        let joints = self.joints.par_iter_mut().zip(&log.joints).enumerate();
+        joints.for_each(|(joint, (sums, channels))| {
+            (sums.has_qd, sums.has_qdd) = (channels.qd.is_some(), channels.qdd.is_some());
+            sums.has_tau = channels.tau.is_some();
+            for piece in pieces {
+                sums.add(&piece.joints[joint], interval);
+            }
+        });
+        Ok(())
+    }
+
+    fn overview(mut self, log: &Log<'_>, facts: &[JointFacts]) -> LogOverview {
+        self.intervals.sort_by(f64::total_cmp);
+        let interval = self.intervals.get(self.intervals.len() / 2).copied();
+        let joint = |(facts, sums): (&JointFacts, &JointSums)| JointOverview {
+            joint: facts.name.clone(),
+            q_range: sums.range.unwrap_or([f64::NAN; 2]),
+            q_sd: sums.q.sd(),
+            qd_rms: sums.qd.rms(),
+            tau_sd: sums.has_tau.then(|| sums.tau.sd()),
+            tau_rms: sums.has_tau.then(|| sums.tau.rms()),
+            has_qd: sums.has_qd,
+            has_qdd: sums.has_qdd,
+        };
+        LogOverview {
+            name: log.name().to_owned(),
+            samples: log.samples(),
+            duration: self.duration,
+            rate_hz: 1.0 / interval.unwrap_or(f64::NAN),
+            segments: self.segments,
+            resampled: self.resampled,
+            joints: facts.iter().zip(&self.joints).map(joint).collect(),
+        }
+    }
+}
+
+impl JointSums {
+    fn add(&mut self, values: &Values<'_>, interval: f64) {
+        for q in &*values.q {
+            let [low, high] = self.range.unwrap_or([*q; 2]);
+            self.range = Some([low.min(*q), high.max(*q)]);
+        }
+        self.q.add(&values.q);
+        match &values.qd {
+            Some(qd) => self.qd.add(qd),
+            None => {
+                let windows = values.q.windows(6);
+                let differences: Vec<f64> =
+                    windows.map(|w| (w[5] - w[0]) / (5.0 * interval)).collect();
+                self.qd.add(&differences);
+            }
+        }
+        self.tau.add(values.tau.as_deref().unwrap_or_default());
+    }
+}
+
+/// Mean and spread of numbers that come in parts.
+#[derive(Debug, Clone, Copy, Default)]
+struct Moments {
+    count: f64,
+    mean: f64,
+    /// `Σ (x − mean)²`.
+    squares: f64,
+}
+
+impl Moments {
+    /// Chan, Golub & LeVeque (1983), eq. 2.1.
+    fn add(&mut self, x: &[f64]) {
+        if x.is_empty() {
+            return;
+        }
+        let count = x.len() as f64;
+        let mean = x.iter().sum::<f64>() / count;
+        let squares: f64 = x.iter().map(|x| (x - mean).powi(2)).sum();
+        let (all, apart) = (self.count + count, mean - self.mean);
+        self.squares += squares + apart * apart * self.count * count / all;
+        self.mean += apart * count / all;
+        self.count = all;
+    }
+
+    fn sd(&self) -> f64 {
+        (self.squares / self.count.max(1.0)).sqrt()
+    }
+
+    fn rms(&self) -> f64 {
+        self.mean.hypot(self.sd())
+    }
 }
 
 /// Joints whose torque in a log is below a fifth of what it is in another log: they were hardly driven there, and
@@ -163,13 +266,4 @@ fn torque_rms(log: &Log<'_>) -> Result<Vec<Option<f64>>> {
     })?;
     let mean = |(sum, count)| (count > 0).then(|| f64::sqrt(sum / count as f64));
     Ok(sums.into_iter().map(mean).collect())
-}
-
-fn rms(x: &[f64]) -> f64 {
-    (x.iter().map(|v| v * v).sum::<f64>() / x.len().max(1) as f64).sqrt()
-}
-
-fn sd(x: &[f64]) -> f64 {
-    let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
-    (x.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / x.len().max(1) as f64).sqrt()
 }

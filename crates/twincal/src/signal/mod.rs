@@ -2,6 +2,7 @@
 
 mod agreement;
 mod align;
+mod chapters;
 mod choose;
 mod clock;
 pub(crate) mod convolve;
@@ -13,12 +14,14 @@ mod long;
 mod cutoff;
 mod describe;
 mod encoder;
+mod few_chapters;
 pub(crate) mod fir;
 pub(crate) mod interpolate;
 mod mask;
 mod prepare;
 mod ready;
 mod saturation;
+mod shelf;
 mod spectrum;
 pub(crate) mod spline;
 mod standstill;
@@ -31,10 +34,14 @@ mod unwrap;
 
 pub use agreement::{Agreement, velocity_agreement};
 pub use align::{PreparedLog, Raw};
+pub use chapters::ChapterMotion;
+pub(crate) use clock::median_step;
 pub use correct::{Corrections, Lag};
 pub use describe::{JointOverview, LogOverview, describe, hardly_driven};
-pub use long::{Log, Logs, LongLog, Numbers, ReadChapter, Shelf};
+pub(crate) use few_chapters::FewChapters;
+pub use long::{Log, Logs, LongLog, ReadChapter};
 pub use ready::{LongReady, ReadyLog};
+pub use shelf::{Numbers, Shelf};
 pub use steps::{Steps, steps};
 pub use torque::{constant_torque, missing_torque};
 

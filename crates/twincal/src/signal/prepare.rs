@@ -4,7 +4,7 @@ use super::clock::{Run, even_interval, read_clock, report_jitter};
 use super::jumps::cut_jumps;
 use super::spline::resample;
 use super::units::refuse_degrees;
-use super::unwrap::unwrap_angle;
+use super::unwrap::{unfolded, unwrap_angle};
 use super::{Corrections, Recording};
 use crate::error::{Error, Finding, Result, Severity};
 use crate::robot::{JointKind, Robot};
@@ -309,32 +309,25 @@ fn unfold(
         if jumps == 0 {
             return None;
         }
-        let (done, severity) = if every_row {
-            (
-                "left as logged because the filter is off: unfold them if the library has springs",
-                Severity::Warning,
-            )
-        } else {
-            ("unfolded", Severity::Note)
-        };
-        let finding = Finding::new(
-            severity,
-            "wrapped_angle",
-            &log.name,
-            format!(
-                "joint `{}`: {jumps} jumps by a full turn, {done}",
-                facts.name
-            ),
-            jumps,
-        );
         if every_row {
+            let name = &facts.name;
+            let finding = Finding::new(
+                Severity::Warning,
+                "wrapped_angle",
+                &log.name,
+                format!(
+                    "joint `{name}`: {jumps} jumps by a full turn, left as logged because the filter is off: unfold them if the library has \
+                     springs"
+                ),
+                jumps,
+            );
             return Some((finding, None));
         }
         let mut all = log.joints[joint].q.clone();
         for (row, value) in runs.iter().flat_map(|run| run.rows.iter()).zip(q) {
             all[*row] = value;
         }
-        Some((finding, Some(all)))
+        Some((unfolded(&log.name, &facts.name, jumps), Some(all)))
     };
     let found: Vec<Option<(Finding, Option<Vec<f64>>)>> =
         joints.par_iter().enumerate().map(one).collect();

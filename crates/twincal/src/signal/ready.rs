@@ -1,5 +1,6 @@
 //! A log that is ready for any cut-off: prepared in memory, or prepared again chapter by chapter whenever it is visited.
 
+use super::clock::median_step;
 use super::prepare::JointFacts;
 use super::{Log, LongLog, Payload, Pipeline, PreparedLog};
 use crate::error::{Finding, Result};
@@ -35,10 +36,7 @@ impl<'a> ReadyLog<'a> {
             }
             Log::Long(log) => {
                 let first = log.chapter(0)?;
-                let steps = first.time.windows(2).map(|pair| pair[1] - pair[0]);
-                let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
-                steps.sort_by(f64::total_cmp);
-                let interval = steps.get(steps.len() / 2).copied();
+                let interval = median_step(&first.time);
                 Self::Long(LongReady {
                     log: log.clone(),
                     joints: joints.to_vec(),

@@ -3,6 +3,7 @@
 use super::cutoff::{JointSpectra, spectra};
 use super::encoder::quantum;
 use super::prepare::{JointFacts, Piece, Prepared, prepare};
+use super::steps::{changes, common_step};
 use super::{Channels, LongLog, Recording, SignalSettings};
 use crate::error::{Finding, Result};
 use rayon::prelude::*;
@@ -69,7 +70,7 @@ impl Chapters {
             let all = steps.iter_mut().zip(of_chapter).zip(&chapter.joints);
             for ((steps, step), channels) in all {
                 // A joint at rest says nothing of its encoder.
-                if channels.q.iter().any(|q| *q != channels.q[0]) {
+                if changes(&channels.q) {
                     steps.push(step);
                 }
             }
@@ -97,10 +98,7 @@ impl Chapters {
 
     /// The step of a joint's encoder, if at least every second chapter has one.
     pub(super) fn step(&self, joint: usize) -> Option<f64> {
-        let steps = &self.steps[joint];
-        let known = || steps.iter().flatten().copied();
-        let count = known().count();
-        (count > 0 && 2 * count >= steps.len()).then(|| known().fold(f64::INFINITY, f64::min))
+        common_step(&self.steps[joint])
     }
 }
 

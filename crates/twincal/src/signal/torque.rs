@@ -1,6 +1,6 @@
 //! What measured torque lacks: samples of it, or any change in it.
 
-use super::{Channels, Logs, Recording};
+use super::{Channels, Log, Logs, Recording};
 use crate::error::{Finding, Result, Severity};
 use crate::robot::Robot;
 
@@ -21,28 +21,37 @@ impl Recording {
 }
 
 /// Says how much measured torque a log lacks that is only to be predicted; nothing is lost from the prediction.
-pub fn missing_torque(robot: &Robot, log: &Recording) -> Option<Finding> {
-    let samples = log.time.len();
-    let lacking = |values: &Vec<f64>| values.iter().filter(|v| !v.is_finite()).count();
-    let joints: Vec<(&str, usize)> = (robot.joint_names().into_iter().zip(&log.joints))
-        .filter_map(|(name, channels)| Some((name, channels.tau.as_ref().map(lacking)?)))
-        .filter(|(_, count)| *count > 0)
-        .collect();
-    let most = joints.iter().map(|(_, count)| *count).max()?;
-    let words: Vec<String> = (joints.iter().take(NAMED))
+///
+/// # Errors
+/// Of chapters that cannot be read.
+pub fn missing_torque(robot: &Robot, log: &Log<'_>) -> Result<Option<Finding>> {
+    let mut lacking = vec![0_usize; robot.dof()];
+    log.until(|recording| {
+        for (lacking, channels) in lacking.iter_mut().zip(&recording.joints) {
+            let values = channels.tau.iter().flatten();
+            *lacking += values.filter(|value| !value.is_finite()).count();
+        }
+        false
+    })?;
+    let joints = robot.joint_names().into_iter().zip(&lacking);
+    let words: Vec<String> = (joints.filter(|(_, count)| **count > 0).take(NAMED))
         .map(|(name, count)| format!("joint `{name}`: {count}"))
         .collect();
-    Some(Finding::new(
-        Severity::Warning,
-        "missing_torque",
-        &log.name,
-        format!(
-            "measured torque is NaN or infinite in some of {samples} rows ({}): they are predicted all the same, with no \
-             measured torque beside",
-            words.join(", ")
-        ),
-        most as u64,
-    ))
+    let most = lacking.iter().copied().max().unwrap_or(0);
+    Ok((most > 0).then(|| {
+        let samples = log.samples();
+        Finding::new(
+            Severity::Warning,
+            "missing_torque",
+            log.name(),
+            format!(
+                "measured torque is NaN or infinite in some of {samples} rows ({}): they are predicted all the same, with no \
+                 measured torque beside",
+                words.join(", ")
+            ),
+            most as u64,
+        )
+    }))
 }
 
 /// Torque that never changes while its joint moves: drives off, or a column that was not recorded. One joint like that may be

@@ -1,6 +1,154 @@
 //! Angles that a counter folded into one turn, unfolded.
 
+use super::clock::{GAP, median_step};
+use super::{ReadChapter, Recording};
+use crate::error::{Finding, Result, Severity};
+use crate::robot::{JointKind, Robot};
+use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
+
+/// Range of an angle, rad, that can have been folded: more than half a turn, not more than a whole one.
+fn can_be_folded(low: f64, high: f64) -> bool {
+    high - low > PI && high - low <= TAU * 1.001
+}
+
+/// Turns that a folded angle has made.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Turns {
+    turns: f64,
+    /// As logged.
+    last: Option<f64>,
+}
+
+impl Turns {
+    /// Unfolds the next value; whether it jumped. What is not finite is not there.
+    fn unfold(&mut self, value: &mut f64) -> bool {
+        if !value.is_finite() {
+            return false;
+        }
+        let step = self.last.map_or(0.0, |last| *value - last);
+        self.last = Some(*value);
+        let jumps = step.abs() > PI;
+        if jumps {
+            self.turns -= step.signum();
+        }
+        *value += self.turns * TAU;
+        jumps
+    }
+}
+
+/// How the angles of a log in chapters are folded, which only the whole log shows.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Folding {
+    /// Those that are.
+    angles: Vec<Folded>,
+}
+
+/// A folded angle.
+#[derive(Debug, Clone)]
+struct Folded {
+    joint: usize,
+    name: String,
+    jumps: u64,
+    /// Before each chapter.
+    turns: Vec<Turns>,
+}
+
+impl Folding {
+    /// Looks at all positions, by the rule of [`unwrap_angle`]; a jump right where two chapters meet alone is none.
+    ///
+    /// # Errors
+    /// Those of [`ReadChapter::read`].
+    pub(crate) fn find(robot: &Robot, chapters: usize, source: &dyn ReadChapter) -> Result<Self> {
+        let names = robot.joint_names();
+        let angles: Vec<Option<Folded>> = (names.par_iter().enumerate())
+            .map(|(joint, name)| match robot.joint_kind(joint) {
+                JointKind::Revolute | JointKind::Continuous => {
+                    Folded::find(joint, name, chapters, source)
+                }
+                _ => Ok(None),
+            })
+            .collect::<Result<_>>()?;
+        Ok(Self {
+            angles: angles.into_iter().flatten().collect(),
+        })
+    }
+
+    /// Unfolds the angles of a chapter.
+    pub(crate) fn unfold(&self, chapter: usize, recording: &mut Recording) {
+        for angle in &self.angles {
+            let mut turns = angle.turns[chapter];
+            for value in &mut recording.joints[angle.joint].q {
+                turns.unfold(value);
+            }
+        }
+    }
+
+    /// What was unfolded.
+    pub(crate) fn findings(&self, log: &str) -> impl Iterator<Item = Finding> {
+        self.angles
+            .iter()
+            .map(move |angle| unfolded(log, &angle.name, angle.jumps))
+    }
+}
+
+impl Folded {
+    fn find(
+        joint: usize,
+        name: &str,
+        chapters: usize,
+        source: &dyn ReadChapter,
+    ) -> Result<Option<Self>> {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        let mut now = Turns::default();
+        let (mut turns, mut jumped, mut jumps) = (Vec::with_capacity(chapters), Vec::new(), 0);
+        for chapter in 0..chapters {
+            turns.push(now);
+            let before = jumps;
+            for mut value in source.positions(chapter, joint)? {
+                if value.is_finite() {
+                    (low, high) = (low.min(value), high.max(value));
+                }
+                jumps += u64::from(now.unfold(&mut value));
+            }
+            if high - low > PI && !can_be_folded(low, high) {
+                return Ok(None);
+            }
+            if jumps > before {
+                jumped.push(chapter);
+            }
+        }
+        if !can_be_folded(low, high) {
+            return Ok(None);
+        }
+        for chapter in jumped {
+            let Recording { time, joints, .. } = source.read(chapter)?;
+            let limit = GAP * median_step(&time).unwrap_or(f64::INFINITY);
+            let pairs = time.windows(2).zip(joints[joint].q.windows(2));
+            let mut pairs = pairs.map(|(t, q)| (t[1] - t[0], (q[1] - q[0]).abs()));
+            if pairs.any(|(step, jump)| jump > PI && (0.0..=limit).contains(&step)) {
+                return Ok(Some(Self {
+                    joint,
+                    name: name.to_owned(),
+                    jumps,
+                    turns,
+                }));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// Says that a joint's angle was unfolded.
+pub(crate) fn unfolded(log: &str, joint: &str, jumps: u64) -> Finding {
+    Finding::new(
+        Severity::Note,
+        "wrapped_angle",
+        log,
+        format!("joint `{joint}`: {jumps} jumps by a full turn, unfolded"),
+        jumps,
+    )
+}
 
 /// Unfolds an angle in place and returns the number of jumps.
 ///
@@ -13,7 +161,7 @@ pub(crate) fn unwrap_angle(q: &mut [f64], cuts: &[usize]) -> u64 {
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
             (l.min(*v), h.max(*v))
         });
-    if high - low > TAU * 1.001 || high - low <= PI {
+    if !can_be_folded(low, high) {
         return 0;
     }
     let mut jumps = 0;
@@ -22,17 +170,9 @@ pub(crate) fn unwrap_angle(q: &mut [f64], cuts: &[usize]) -> u64 {
     if !folded {
         return 0;
     }
-    let mut turns = 0.0;
-    let mut last = q[0];
-    for i in 1..q.len() {
-        let raw = q[i];
-        let step = raw - last;
-        if step.abs() > PI {
-            turns -= step.signum();
-            jumps += 1;
-        }
-        last = raw;
-        q[i] = raw + turns * TAU;
+    let mut turns = Turns::default();
+    for value in q.iter_mut() {
+        jumps += u64::from(turns.unfold(value));
     }
     jumps
 }

@@ -5,13 +5,13 @@ use super::{
     ConformalKeeper, PitKeeper, Reliability, RivalKeeper, ScoreKeeper, Split, Trace, TraceRows,
     Validation,
 };
-use crate::error::Result;
+use crate::error::{Finding, Result};
 use crate::observations::Observations;
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, slices, spread_raw, visit_slices};
-use crate::signal::{Pipeline, Trajectory};
+use crate::signal::{FewChapters, Log, Pipeline, Recording, Trajectory};
 use crate::term::Library;
-use crate::twin::{JointTorque, Predictor, TorqueSignal};
+use crate::twin::{JointTorque, Predictor, TorqueSignal, Twin};
 use rayon::prelude::*;
 use std::ops::AddAssign;
 
@@ -72,36 +72,71 @@ impl HeldOut {
         }
     }
 
-    /// Predicts the rows of a trajectory that were not used to fit the predictors, those at or after the time `from` in s
-    /// (−∞: all of them), and scores them: raw rows of long logs in evenly spread pieces, see [`spread_raw`].
+    /// Predicts the rows of a log that was not used to fit the twin, and scores them: filtered rows all, raw rows of long logs in evenly
+    /// spread pieces, see [`spread_raw`].
     ///
     /// # Errors
-    /// Those of [`visit_slices`].
+    /// [`crate::Error::Log`] for a log without torque, those of [`Twin::align`] and [`visit_slices`], and of chapters that cannot be read.
     pub fn score(
         &mut self,
-        robot: &Robot,
+        twin: &Twin,
         library: &Library,
-        pipeline: &Pipeline,
-        predictors: Predictors<'_>,
-        trajectory: &Trajectory,
-        from: f64,
+        predictor: &Predictor,
+        log: &Log<'_>,
+        findings: &mut Vec<Finding>,
     ) -> Result<()> {
-        let mut collected = self.collect(&trajectory.name);
-        let filtered = slices(pipeline, trajectory, RowSignal::Filtered, from, usize::MAX);
-        visit_slices(
+        let mut collected = self.collect(log.name());
+        let names = twin.robot.joint_names();
+        let mut part = |recording: &Recording, said: &mut Vec<Finding>| -> Result<Trajectory> {
+            recording.require_torque(&names)?;
+            let (trajectory, more) = twin.align(recording)?;
+            said.extend(more);
+            let signal = RowSignal::Filtered;
+            let slices = slices(
+                &twin.pipeline,
+                &trajectory,
+                signal,
+                f64::NEG_INFINITY,
+                usize::MAX,
+            );
+            visit_slices(
+                &twin.robot,
+                library,
+                &twin.pipeline,
+                &trajectory,
+                signal,
+                &slices,
+                &mut |block| {
+                    self.push_filtered(block, predictor.into(), &mut collected);
+                    Ok(())
+                },
+            )?;
+            Ok(trajectory)
+        };
+        let trajectory = match log {
+            Log::Whole(recording) => part(recording, findings)?,
+            Log::Long(long) => {
+                findings.push(long.say(true));
+                let mut few = FewChapters::new(long.chapters());
+                long.visit(findings, |number, chapter, said| {
+                    few.take(number, part(chapter, said)?);
+                    Ok(())
+                })?;
+                few.into_trajectory()
+                    .ok_or_else(|| long.without_chapters())?
+            }
+        };
+        // One trajectory, however many chapters it has.
+        self.add(collected);
+        let (robot, pipeline) = (&twin.robot, &twin.pipeline);
+        self.score_raw(
             robot,
             library,
             pipeline,
-            trajectory,
-            RowSignal::Filtered,
-            &filtered,
-            &mut |block| {
-                self.push_filtered(block, predictors, &mut collected);
-                Ok(())
-            },
-        )?;
-        self.add(collected);
-        self.score_raw(robot, library, pipeline, predictors.twin, trajectory, from)
+            predictor,
+            &trajectory,
+            f64::NEG_INFINITY,
+        )
     }
 
     /// [`HeldOut::score`] of filtered rows that are there already: no sample is evaluated again.

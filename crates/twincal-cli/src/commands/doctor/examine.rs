@@ -1,7 +1,8 @@
 //! Everything that can be said of logs and a model before a fit, also of logs that `fit` refuses.
 
 use super::super::checkup::{Checkup, checkup};
-use super::super::inputs::{LogInput, RobotInput};
+use super::super::inputs::{LogInput, Long, RobotInput};
+use super::units::converted;
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use serde::Serialize;
@@ -9,18 +10,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::calibrate::{Outlook, outlook};
-use twincal::robot::{JointKind, Robot};
+use twincal::robot::Robot;
 use twincal::signal::{
-    LogOverview, Pipeline, Recording, Steps, choose_pipeline, constant_torque, describe,
+    Log, LogOverview, Pipeline, Steps, choose_and_prepare, constant_torque, describe,
     hardly_driven, steps,
 };
 use twincal_io::config::Settings;
 use twincal_io::log::{
     LogOptions, Preset, TorqueSource, joints_without_column, match_columns, read_header,
 };
-
-/// Radians per degree.
-const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// Why `fit` would stop.
 #[derive(Debug, Clone, Serialize)]
@@ -106,7 +104,8 @@ pub(super) fn examine(
     };
     all.lock_what_is_not_logged(model, paths, &mut settings)?;
     all.map_columns(paths, &settings);
-    let read = LogInput::read(paths, &all.robot.robot, &settings.log, progress);
+    let robot = &all.robot.robot;
+    let read = LogInput::read(paths, robot, &settings.log, Long::InChapters, progress);
     all.findings.append(&mut all.robot.findings);
     let mut logs = match read {
         Ok(logs) => logs,
@@ -219,8 +218,8 @@ impl Examination {
         let mut together = filtered(robot, &logs.logs, settings);
         if together.is_err() {
             // Which of them it is, and whether other units help.
-            for recording in &mut logs.logs {
-                let one = std::slice::from_ref(recording);
+            for log in &mut logs.logs {
+                let one = std::slice::from_ref(log);
                 let Err(error) = filtered(robot, one, settings) else {
                     continue;
                 };
@@ -228,31 +227,33 @@ impl Examination {
                 if matches!(error, twincal::Error::Refused { .. }) {
                     continue;
                 }
-                if let Some((mended, words)) = converted(robot, recording, &error, settings) {
+                if let Some((mended, words)) = converted(robot, log, &error, settings) {
                     self.converted.push(words);
-                    *recording = mended;
+                    *log = mended;
                 }
                 self.refusals.push(Failure::from(error).into());
             }
-            (logs.logs).retain(|recording| describe(robot, recording).is_ok());
+            (logs.logs).retain(|log| describe(robot, log).is_ok());
             together = filtered(robot, &logs.logs, settings);
         }
         let names = robot.joint_names();
-        let torque = logs.logs.iter().map(|log| log.require_torque(&names));
-        let without = torque.filter_map(Result::err).map(Failure::from);
-        self.refusals.extend(without.map(Refusal::from));
-        for recording in &logs.logs {
-            if let Ok((overview, more)) = describe(robot, recording) {
+        for log in &logs.logs {
+            let with_torque = log.any_recording(|recording| recording.require_torque(&names));
+            if let Err(error) = with_torque {
+                self.refusals.push(Failure::from(error).into());
+            }
+        }
+        for log in &logs.logs {
+            if let Ok(((overview, more), steps)) =
+                describe(robot, log).and_then(|seen| Ok((seen, steps(robot, log)?)))
+            {
                 self.overviews.push(overview);
-                self.steps.push(steps(robot, recording));
+                self.steps.push(steps);
                 self.findings.extend(more);
             }
         }
-        let recordings = &logs.logs[..];
-        for said in [
-            hardly_driven(robot, recordings),
-            constant_torque(robot, recordings),
-        ] {
+        let logs = &logs.logs[..];
+        for said in [hardly_driven(robot, logs), constant_torque(robot, logs)] {
             match said {
                 Ok(said) => self.findings.extend(said),
                 Err(error) => self.refusals.push(Failure::from(error).into()),
@@ -304,76 +305,19 @@ fn taken_as(options: &LogOptions) -> &'static str {
 }
 
 /// Logs as far as the comparison with the model.
-fn filtered(
+pub(super) fn filtered(
     robot: &Robot,
-    recordings: &[Recording],
+    logs: &[Log<'_>],
     settings: &Settings,
 ) -> twincal::Result<(Pipeline, Vec<Finding>, Checkup)> {
-    for recording in recordings {
-        describe(robot, recording)?;
+    for log in logs {
+        describe(robot, log)?;
     }
     let signal = &settings.calibration.signal;
-    let (pipeline, findings) = choose_pipeline(robot, recordings, signal)?;
-    let mut checkup = checkup(robot, recordings, &pipeline)?;
+    let (pipeline, findings, _) = choose_and_prepare(robot, logs, signal)?;
+    let mut checkup = checkup(robot, logs, &pipeline)?;
     match checkup.refused.pop() {
         Some(error) => Err(error),
         None => Ok((pipeline, findings, checkup)),
     }
-}
-
-/// The log in units with which it comes further, and what was converted.
-fn converted(
-    robot: &Robot,
-    recording: &Recording,
-    error: &twincal::Error,
-    settings: &Settings,
-) -> Option<(Recording, String)> {
-    let twincal::Error::Log { problem, .. } = error else {
-        return None;
-    };
-    let works = |log: &Recording| filtered(robot, std::slice::from_ref(log), settings).is_ok();
-    if problem.contains("look like") && problem.contains("time step") {
-        for (unit, size) in [
-            ("milliseconds", 1e-3),
-            ("microseconds", 1e-6),
-            ("nanoseconds", 1e-9),
-        ] {
-            if problem.contains(unit) {
-                let mut log = recording.clone();
-                log.time.iter_mut().for_each(|t| *t *= size);
-                let further = describe(robot, &log).is_ok();
-                return further
-                    .then(|| (log, format!("{}: time was taken as {unit}", recording.name)));
-            }
-        }
-    }
-    if problem.contains("degrees") {
-        for (what, channels) in [
-            (
-                "positions, velocities and accelerations",
-                [true, true, true],
-            ),
-            ("velocities", [false, true, false]),
-            ("positions", [true, false, false]),
-        ] {
-            let mut log = recording.clone();
-            for (joint, own) in log.joints.iter_mut().enumerate() {
-                if robot.joint_kind(joint) == JointKind::Prismatic {
-                    continue;
-                }
-                let values = [Some(&mut own.q), own.qd.as_mut(), own.qdd.as_mut()];
-                let wanted = values.into_iter().zip(channels).filter(|(_, take)| *take);
-                for value in wanted.filter_map(|(values, _)| values).flatten() {
-                    *value *= DEGREE;
-                }
-            }
-            if works(&log) {
-                return Some((
-                    log,
-                    format!("{}: {what} were taken as degrees", recording.name),
-                ));
-            }
-        }
-    }
-    None
 }

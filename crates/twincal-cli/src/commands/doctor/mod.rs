@@ -5,6 +5,7 @@ mod examine;
 mod mends;
 mod print;
 mod propose;
+mod units;
 
 use super::inspect::library::{ComponentRow, component_rows};
 use super::{code_of, print_json, require_strict, settings, start_threads};

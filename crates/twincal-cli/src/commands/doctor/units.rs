@@ -1,0 +1,133 @@
+//! A log in other units than it seems to be in, to see whether it comes further: for the look alone.
+
+use super::examine::filtered;
+use std::sync::Arc;
+use twincal::robot::{JointKind, Robot};
+use twincal::signal::{Log, LongLog, ReadChapter, Recording, describe};
+use twincal_io::config::Settings;
+
+/// Radians per degree.
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+/// What the numbers of a log are multiplied by.
+#[derive(Debug, Clone)]
+struct Units {
+    time: f64,
+    /// By joint: of position, and of velocity and acceleration.
+    joints: Vec<[f64; 2]>,
+}
+
+impl Units {
+    fn change(&self, log: &mut Recording) {
+        log.time.iter_mut().for_each(|t| *t *= self.time);
+        for (own, [position, rates]) in log.joints.iter_mut().zip(&self.joints) {
+            own.q.iter_mut().for_each(|q| *q *= position);
+            for values in [own.qd.as_mut(), own.qdd.as_mut()].into_iter().flatten() {
+                values.iter_mut().for_each(|value| *value *= rates);
+            }
+        }
+    }
+
+    /// The log in these units; `None` where it cannot be read again.
+    fn of(self, robot: &Robot, log: &Log<'static>) -> Option<Log<'static>> {
+        match log {
+            Log::Whole(recording) => {
+                let mut recording = recording.clone().into_owned();
+                self.change(&mut recording);
+                Some(recording.into())
+            }
+            Log::Long(long) => {
+                let source = InUnits {
+                    source: long.source().clone(),
+                    units: self,
+                };
+                let changed = LongLog::new(robot, long.samples().to_vec(), Arc::new(source));
+                let mut changed = changed.ok()?;
+                changed.name.clone_from(&long.name);
+                changed.payload = long.payload;
+                Some(Log::Long(match long.shelf() {
+                    Some(shelf) => changed.with_shelf(shelf.clone()),
+                    None => changed,
+                }))
+            }
+        }
+    }
+}
+
+/// The chapters of a log in other units.
+#[derive(Debug)]
+struct InUnits {
+    source: Arc<dyn ReadChapter>,
+    units: Units,
+}
+
+impl ReadChapter for InUnits {
+    fn read(&self, chapter: usize) -> twincal::Result<Recording> {
+        let mut recording = self.source.read(chapter)?;
+        self.units.change(&mut recording);
+        Ok(recording)
+    }
+
+    fn positions(&self, chapter: usize, joint: usize) -> twincal::Result<Vec<f64>> {
+        let mut q = self.source.positions(chapter, joint)?;
+        let [position, _] = self.units.joints[joint];
+        q.iter_mut().for_each(|q| *q *= position);
+        Ok(q)
+    }
+}
+
+/// The log in units with which it comes further, and what was converted.
+pub(super) fn converted(
+    robot: &Robot,
+    log: &Log<'static>,
+    error: &twincal::Error,
+    settings: &Settings,
+) -> Option<(Log<'static>, String)> {
+    let twincal::Error::Log { problem, .. } = error else {
+        return None;
+    };
+    let as_logged = vec![[1.0; 2]; robot.dof()];
+    if problem.contains("look like") && problem.contains("time step") {
+        for (unit, time) in [
+            ("milliseconds", 1e-3),
+            ("microseconds", 1e-6),
+            ("nanoseconds", 1e-9),
+        ] {
+            if problem.contains(unit) {
+                let units = Units {
+                    time,
+                    joints: as_logged,
+                };
+                let changed = units.of(robot, log)?;
+                let words = format!("{}: time was taken as {unit}", log.name());
+                return describe(robot, &changed)
+                    .is_ok()
+                    .then_some((changed, words));
+            }
+        }
+        return None;
+    }
+    if !problem.contains("degrees") {
+        return None;
+    }
+    for (what, factors) in [
+        ("positions, velocities and accelerations", [DEGREE, DEGREE]),
+        ("velocities", [1.0, DEGREE]),
+        ("positions", [DEGREE, 1.0]),
+    ] {
+        let of_joint = |joint| match robot.joint_kind(joint) {
+            JointKind::Prismatic => [1.0; 2],
+            _ => factors,
+        };
+        let units = Units {
+            time: 1.0,
+            joints: (0..robot.dof()).map(of_joint).collect(),
+        };
+        let changed = units.of(robot, log)?;
+        if filtered(robot, std::slice::from_ref(&changed), settings).is_ok() {
+            let words = format!("{}: {what} were taken as degrees", log.name());
+            return Some((changed, words));
+        }
+    }
+    None
+}
