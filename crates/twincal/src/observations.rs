@@ -24,9 +24,9 @@ pub struct JointObservations {
     /// Their values, columns × len, N·m per unit of β; empty where they were put away (logs in chapters).
     pub x: Vec<f64>,
     /// Measured torque, len, N·m.
-    pub measured: Vec<f64>,
+    pub measured: Numbers,
     /// Nominal torque, len, N·m.
-    pub nominal: Vec<f64>,
+    pub nominal: Numbers,
     /// Residual torque of eq. (1), len, N·m.
     pub y: Vec<f64>,
     /// Rows at which the joint stands still; they are no observations of anything but stiction.
@@ -157,8 +157,8 @@ impl Observations {
             JointObservations {
                 x: vec![0.0; columns.len() * len],
                 columns,
-                measured: Vec::with_capacity(len),
-                nominal: Vec::with_capacity(len),
+                measured: Vec::with_capacity(len).into(),
+                nominal: Vec::with_capacity(len).into(),
                 y: Vec::with_capacity(len),
                 standstill: Vec::with_capacity(len),
                 ..JointObservations::default()
@@ -194,14 +194,14 @@ impl Observations {
             }
         }
         let joints = self.joints.par_iter_mut().enumerate();
-        joints.for_each(|(joint, kept)| {
+        joints.try_for_each(|(joint, kept)| {
             let mut from = from;
             for block in blocks {
-                kept.add(from, block.time.len(), &block.joints[joint]);
+                kept.add(from, block.time.len(), &block.joints[joint])?;
                 from += block.time.len();
             }
-        });
-        Ok(())
+            Ok(())
+        })
     }
 
     /// Takes over the temperatures of the log that these rows were made of: between its samples they are linear, and constant
@@ -417,16 +417,17 @@ impl Part<'_> {
 
 impl JointObservations {
     /// The next `len` rows, from row `from` on.
-    fn add(&mut self, from: usize, len: usize, rows: &BlockJoint) {
+    fn add(&mut self, from: usize, len: usize, rows: &BlockJoint) -> Result<()> {
         let total = self.x.len() / self.columns.len().max(1);
         for (i, column) in rows.x.chunks_exact(len.max(1)).enumerate() {
             self.x[i * total + from..][..len].copy_from_slice(column);
         }
-        self.measured.extend_from_slice(&rows.measured);
-        self.nominal.extend_from_slice(&rows.nominal);
+        self.measured.append(&rows.measured)?;
+        self.nominal.append(&rows.nominal)?;
         let residual = rows.measured.iter().zip(&rows.nominal);
         self.y.extend(residual.map(|(m, n)| m - n));
         self.standstill.extend_from_slice(&rows.standstill);
+        Ok(())
     }
 }
 

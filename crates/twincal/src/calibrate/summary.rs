@@ -382,8 +382,7 @@ fn findings_of_posterior(
         .fit
         .iter()
         .flat_map(|log| &log.observations.joints)
-        .flat_map(|joint| &joint.measured)
-        .map(|m| m * m)
+        .map(|joint| joint.measured.get().iter().map(|m| m * m).sum::<f64>())
         .sum();
     if problem.yy <= 1e-18 * measured {
         findings.push(Finding::new(

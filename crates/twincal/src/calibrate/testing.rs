@@ -54,8 +54,8 @@ impl Regression {
             joints: vec![JointObservations {
                 columns: (0..beta.len()).collect(),
                 x,
-                measured: y.clone(),
-                nominal: vec![0.0; rows],
+                measured: y.clone().into(),
+                nominal: vec![0.0; rows].into(),
                 y,
                 standstill: vec![false; rows],
                 weight: Vec::new(),

@@ -133,12 +133,13 @@ pub(super) fn moving(training: &[Part<'_>], joint: usize, beta: &[f64]) -> Vec<M
         let residual = part.residual(joint, beta, part.rows.clone());
         let own = &part.observations.joints[joint];
         let velocity = part.observations.qd[joint].get();
+        let nominal = own.nominal.get();
         let all = part.rows.clone().zip(residual);
         rows.extend(
             all.filter(|(row, _)| !own.standstill[*row])
                 .map(|(row, residual)| MovingRow {
                     speed: velocity[row].abs(),
-                    load: own.nominal[row].abs(),
+                    load: nominal[row].abs(),
                     residual,
                     spread: own.spread.get(row).copied().unwrap_or(1.0),
                 }),
@@ -164,7 +165,8 @@ fn set(
         let residual = own.whole().residual(joint, beta, 0..own.len());
         let velocity = own.qd[joint].get();
         let kept = &mut own.joints[joint];
-        let motion = velocity.iter().zip(&kept.nominal);
+        let nominal = kept.nominal.get();
+        let motion = velocity.iter().zip(&*nominal);
         kept.spread = motion.map(|(v, load)| spread.at(*v, *load)).collect();
         kept.weight = residual
             .iter()

@@ -3,6 +3,7 @@
 use super::Observations;
 use crate::rows::{JointRows, MAX_BLOCK, RowBlock};
 use crate::signal::Numbers;
+use std::borrow::Cow;
 
 impl Observations {
     /// Visits the rows at or after time `since` (s; −∞: all of them), in order, as [`crate::rows::visit_rows`] does but for the input
@@ -42,16 +43,21 @@ impl Observations {
                 });
             }
         }
-        let joints = self.joints.iter().zip(&held);
-        let joints = joints.map(|(joint, (held, stride))| JointRows {
+        let torques = self.joints.iter().map(|joint| {
+            let [measured, nominal] = [&joint.measured, &joint.nominal];
+            [measured.some(rows.clone()), nominal.some(rows.clone())]
+        });
+        let torques: Vec<[Cow<'_, [f64]>; 2]> = torques.collect();
+        let joints = self.joints.iter().zip(&held).zip(&torques);
+        let joints = joints.map(|((joint, (held, stride)), [measured, nominal])| JointRows {
             columns: &joint.columns,
             stride: *stride,
             x: match &joint.shelved {
                 Some(_) => held,
                 None => joint.x.get(rows.start..).unwrap_or_default(),
             },
-            measured: &joint.measured[rows.clone()],
-            nominal: &joint.nominal[rows.clone()],
+            measured,
+            nominal,
             standstill: &joint.standstill[rows.clone()],
         });
         visit(&RowBlock {

@@ -67,7 +67,11 @@ impl Room {
             } else {
                 to.append_columns(&part, from, len, most);
             }
-            to.append(part, from, len, most);
+            if let Some(shelf) = &self.shelf {
+                to.measured.put_away(shelf)?;
+                to.nominal.put_away(shelf)?;
+            }
+            to.append(part, from, len, most)?;
         }
         Ok(())
     }
@@ -115,11 +119,11 @@ impl JointObservations {
     }
 
     /// Puts the rest of `len` rows behind the `from` that there are, with room for `most`.
-    fn append(&mut self, part: Self, from: usize, len: usize, most: usize) {
+    fn append(&mut self, part: Self, from: usize, len: usize, most: usize) -> Result<()> {
         // Taken once: vectors that grow beside chapters that come and go leave holes that nothing fits into.
-        for numbers in [&mut self.measured, &mut self.nominal, &mut self.y] {
-            numbers.reserve_exact(most.saturating_sub(numbers.len()));
-        }
+        self.measured.reserve(most);
+        self.nominal.reserve(most);
+        self.y.reserve_exact(most.saturating_sub(self.y.len()));
         self.standstill
             .reserve_exact(most.saturating_sub(self.standstill.len()));
         // A temperature that is missing in one part is missing in all.
@@ -128,12 +132,13 @@ impl JointObservations {
         } else {
             self.temperature.clear();
         }
-        self.measured.extend(part.measured);
-        self.nominal.extend(part.nominal);
+        self.measured.append(&part.measured.get())?;
+        self.nominal.append(&part.nominal.get())?;
         self.y.extend(part.y);
         self.standstill.extend(part.standstill);
         self.spread.extend(part.spread);
         self.weight.extend(part.weight);
+        Ok(())
     }
 }
 
@@ -145,8 +150,8 @@ mod tests {
         let value = |column: usize| (0..len).map(move |row| (100 * column + first + row) as f64);
         let joint = |columns: Vec<usize>| JointObservations {
             x: columns.iter().flat_map(|column| value(*column)).collect(),
-            measured: value(7).collect(),
-            nominal: value(8).collect(),
+            measured: value(7).collect::<Vec<_>>().into(),
+            nominal: value(8).collect::<Vec<_>>().into(),
             y: value(9).collect(),
             standstill: (0..len)
                 .map(|row| (first + row).is_multiple_of(3))

@@ -235,9 +235,11 @@ pub fn residual_runs(training: &[Part<'_>], joint: usize, beta: &[f64]) -> Vec<V
 /// Integrated autocorrelation time of a joint's residual, rows, at least 1.
 pub fn residual_correlation_time(training: &[Part<'_>], joint: usize, beta: &[f64]) -> f64 {
     let runs = residual_runs(training, joint, beta);
-    let measured = training.iter().flat_map(|part| {
-        let torque = &part.observations.joints[joint].measured;
-        torque[part.rows.clone()].iter().map(|tau| tau * tau)
+    let measured = training.iter().map(|part| {
+        let torque = part.observations.joints[joint]
+            .measured
+            .some(part.rows.clone());
+        torque.iter().map(|tau| tau * tau).sum::<f64>()
     });
     let left: f64 = runs.iter().flatten().map(|r| r * r).sum();
     if left <= ROUNDING * measured.sum::<f64>() {

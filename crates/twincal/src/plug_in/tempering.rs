@@ -34,21 +34,23 @@ pub struct LeftOut {
     pub interval_factor: Vec<f64>,
 }
 
-/// What became of one left-out row.
-#[derive(Clone, Copy)]
-struct LeftOutRow {
-    square: f64,
-    /// Epistemic variance `xᵀ Cov x`.
-    epistemic: f64,
-    /// Relative noise variance.
+/// What the left-out moving rows of one joint add up to: of a long log they are too many to be kept for every multiplier.
+#[derive(Debug, Default)]
+struct LeftOutJoint {
+    /// Log predictive density.
+    density: f64,
+    /// `Σ (squared error − epistemic variance)`, (N·m)².
+    excess: f64,
+    /// Sum of the relative noise variances.
     spread: f64,
+    /// With robust noise, of every row the relative variance that 1.96 sd of it would need beyond the epistemic one, (N·m)².
+    needed: Vec<f64>,
 }
 
-/// One prediction of a left-out part, joint by joint.
+/// One prediction of a left-out part.
 struct Prediction {
-    /// Per joint, per moving row.
-    rows: Vec<Vec<LeftOutRow>>,
-    /// √(E[φ]) of the fold that predicted.
+    joints: Vec<LeftOutJoint>,
+    /// E[φ] of the fold that predicted.
     noise: f64,
 }
 
@@ -101,7 +103,7 @@ pub fn fit_tempered(
             known,
         )?;
         let predicted = predict_left_out(&folds, columns, settings, &fitted)?;
-        let score = score(&predicted, &fitted.plug_in, settings.noise.robust);
+        let score = score(&predicted, &fitted.plug_in);
         Ok((fitted, predicted, score))
     };
     let weighed: Vec<_> = MULTIPLIERS.into_par_iter().map(weigh).collect();
@@ -244,66 +246,65 @@ fn predict_left_out(
             let problem = assemble(kept, columns, plug_in, settings.prior)?;
             let posterior = approximate(&problem, Some(&whole.posterior))?;
             let covariance = posterior.covariance();
-            let joints = plug_in.weight.len();
-            let mut rows = vec![Vec::new(); joints];
-            for part in out {
-                for (joint, rows) in rows.iter_mut().enumerate() {
-                    rows.extend(squared_errors(part, joint, &posterior, &covariance));
+            let robust = settings.noise.robust;
+            let joint = |joint: usize| {
+                let noise = posterior.noise / plug_in.weight[joint];
+                let mut sums = LeftOutJoint::default();
+                for part in out {
+                    sums.add(part, joint, &posterior, &covariance, (noise, robust));
                 }
-            }
+                sums
+            };
             Ok(Prediction {
-                rows,
+                joints: (0..plug_in.weight.len()).map(joint).collect(),
                 noise: posterior.noise,
             })
         })
         .collect()
 }
 
-/// Squared error and variances of every moving row of a joint.
-fn squared_errors(
-    part: &Part<'_>,
-    joint: usize,
-    posterior: &Posterior,
-    covariance: &[f64],
-) -> Vec<LeftOutRow> {
-    let rows = &part.observations.joints[joint];
-    let residual = part.residual(joint, &posterior.mean, part.rows.clone());
-    let epistemic = part.quadratic_forms(joint, covariance, posterior.mean.len());
-    part.rows
-        .clone()
-        .zip(residual.iter().zip(epistemic))
-        .filter(|(row, _)| !rows.standstill[*row])
-        .map(|(row, (r, epistemic))| LeftOutRow {
-            square: r * r,
-            epistemic: epistemic.max(0.0),
-            spread: rows.spread.get(row).copied().unwrap_or(1.0),
-        })
-        .collect()
-}
-
-/// Log predictive density of the left-out rows, normal or Student-t, each joint's sum divided by its autocorrelation time.
-fn score(predictions: &[Prediction], plug_in: &PlugIn, robust: bool) -> f64 {
-    let mut sum = 0.0;
-    for prediction in predictions {
-        for (joint, rows) in prediction.rows.iter().enumerate() {
-            let noise = prediction.noise / plug_in.weight[joint];
-            let density: f64 = rows
-                .iter()
-                .map(|row| {
-                    let square = row.square;
-                    let variance = (row.spread * noise + row.epistemic).max(f64::MIN_POSITIVE);
-                    let tail = if robust {
-                        (FREEDOM + 1.0) * (square / (FREEDOM * variance)).ln_1p()
-                    } else {
-                        square / variance
-                    };
-                    -0.5 * (std::f64::consts::TAU * variance).ln() - 0.5 * tail
-                })
-                .sum();
-            sum += density / plug_in.autocorrelation_time[joint];
+impl LeftOutJoint {
+    /// Every moving row of a joint; the density is normal or, with robust noise, Student-t.
+    fn add(
+        &mut self,
+        part: &Part<'_>,
+        joint: usize,
+        posterior: &Posterior,
+        covariance: &[f64],
+        (noise, robust): (f64, bool),
+    ) {
+        let rows = &part.observations.joints[joint];
+        let residual = part.residual(joint, &posterior.mean, part.rows.clone());
+        let epistemic = part.quadratic_forms(joint, covariance, posterior.mean.len());
+        for (row, (r, epistemic)) in part.rows.clone().zip(residual.iter().zip(epistemic)) {
+            if rows.standstill[row] {
+                continue;
+            }
+            let (square, epistemic) = (r * r, epistemic.max(0.0));
+            let spread = rows.spread.get(row).copied().unwrap_or(1.0);
+            let variance = (spread * noise + epistemic).max(f64::MIN_POSITIVE);
+            let tail = if robust {
+                (FREEDOM + 1.0) * (square / (FREEDOM * variance)).ln_1p()
+            } else {
+                square / variance
+            };
+            self.density += -0.5 * (std::f64::consts::TAU * variance).ln() - 0.5 * tail;
+            self.excess += square - epistemic;
+            self.spread += spread;
+            if robust {
+                self.needed.push((square / NORMAL95 - epistemic) / spread);
+            }
         }
     }
-    sum
+}
+
+/// Log predictive density of the left-out rows, each joint's sum divided by its autocorrelation time.
+fn score(predictions: &[Prediction], plug_in: &PlugIn) -> f64 {
+    let joints = predictions.iter().flat_map(|prediction| {
+        let joints = prediction.joints.iter();
+        joints.zip(&plug_in.autocorrelation_time)
+    });
+    joints.map(|(joint, time)| joint.density / time).sum()
 }
 
 /// Factor that lets the 95 % interval of a normal distribution hold 95 % of the left-out rows, at least 1.
@@ -315,10 +316,8 @@ fn robust_factors(predictions: &[Prediction], plug_in: &PlugIn) -> Vec<f64> {
                 .iter()
                 .flat_map(|prediction| {
                     let noise = prediction.noise / plug_in.weight[joint];
-                    let rows = prediction.rows[joint].iter();
-                    rows.map(move |row| {
-                        (row.square / NORMAL95 - row.epistemic) / (row.spread * noise)
-                    })
+                    let rows = prediction.joints[joint].needed.iter();
+                    rows.map(move |needed| needed / noise)
                 })
                 .filter(|factor| factor.is_finite())
                 .collect();
@@ -337,10 +336,9 @@ fn interval_factors(predictions: &[Prediction], plug_in: &PlugIn) -> Vec<f64> {
         .map(|joint| {
             let (mut excess, mut noise) = (0.0, 0.0);
             for prediction in predictions {
-                for row in &prediction.rows[joint] {
-                    excess += row.square - row.epistemic;
-                    noise += row.spread * prediction.noise / plug_in.weight[joint];
-                }
+                let sums = &prediction.joints[joint];
+                excess += sums.excess;
+                noise += sums.spread * prediction.noise / plug_in.weight[joint];
             }
             if noise > 0.0 {
                 (excess / noise).max(1.0).sqrt()

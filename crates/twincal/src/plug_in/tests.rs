@@ -24,8 +24,8 @@ fn log() -> Observations {
         joints: vec![JointObservations {
             columns: vec![0],
             x,
-            measured: y.clone(),
-            nominal: vec![0.0; ROWS],
+            measured: y.clone().into(),
+            nominal: vec![0.0; ROWS].into(),
             y,
             standstill: vec![false; ROWS],
             weight: Vec::new(),

@@ -84,6 +84,13 @@ impl Numbers {
         Ok(())
     }
 
+    /// Takes memory for as many in all, where they are in memory.
+    pub(crate) fn reserve(&mut self, most: usize) {
+        if let Self::Memory(numbers) = self {
+            numbers.reserve_exact(most.saturating_sub(numbers.len()));
+        }
+    }
+
     /// Puts more behind them, where they are.
     ///
     /// # Errors

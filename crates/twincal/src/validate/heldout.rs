@@ -9,7 +9,7 @@ use crate::error::{Finding, Result};
 use crate::observations::Observations;
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, slices, spread_raw, visit_slices};
-use crate::signal::{FewChapters, Log, Pipeline, Recording, Trajectory};
+use crate::signal::{FewChapters, Log, Pipeline, Recording, Trajectory, median_step};
 use crate::term::Library;
 use crate::twin::{JointTorque, Predictor, TorqueSignal, Twin};
 use rayon::prelude::*;
@@ -50,6 +50,8 @@ impl<'a> From<&'a Predictor> for Predictors<'a> {
 
 /// What one trajectory collects while its blocks come in.
 struct Collected {
+    /// Rows so far.
+    rows: usize,
     traces: Vec<Trace>,
     /// Per joint and row: by how much the interval must be stretched.
     stretches: Vec<Vec<f64>>,
@@ -85,7 +87,7 @@ impl HeldOut {
         log: &Log<'_>,
         findings: &mut Vec<Finding>,
     ) -> Result<()> {
-        let mut collected = self.collect(log.name());
+        let mut collected = self.collect(log.name(), rows_about(log, &twin.pipeline)?);
         let names = twin.robot.joint_names();
         let mut part = |recording: &Recording, said: &mut Vec<Finding>| -> Result<Trajectory> {
             recording.require_torque(&names)?;
@@ -146,7 +148,8 @@ impl HeldOut {
         observations: &Observations,
         from: f64,
     ) {
-        let mut collected = self.collect(&observations.log);
+        let rows = observations.time.iter().filter(|t| **t >= from).count();
+        let mut collected = self.collect(&observations.log, rows);
         observations.visit_since(from, &mut |block| {
             self.push_filtered(block, predictors, &mut collected);
         });
@@ -192,9 +195,11 @@ impl HeldOut {
         Ok(())
     }
 
-    fn collect(&self, log: &str) -> Collected {
-        let named = |joint: &String| Trace::new(log, joint);
+    /// For about so many rows of a log.
+    fn collect(&self, log: &str, rows: usize) -> Collected {
+        let named = |joint: &String| Trace::new(log, joint, rows);
         Collected {
+            rows: 0,
             traces: self.names.iter().map(named).collect(),
             stretches: vec![Vec::new(); self.names.len()],
         }
@@ -202,10 +207,7 @@ impl HeldOut {
 
     fn add(&mut self, collected: Collected) {
         self.conformal.push(collected.stretches);
-        for mut trace in collected.traces {
-            trace.thin();
-            self.traces.push(trace);
-        }
+        self.traces.extend(collected.traces);
     }
 
     fn push_filtered(
@@ -232,15 +234,19 @@ impl HeldOut {
             collected.stretches[joint].extend(measured.iter().enumerate().map(|(row, &y)| {
                 stretch(torque.low[row], torque.calibrated[row], torque.high[row], y)
             }));
-            collected.traces[joint].extend(&TraceRows {
-                time: block.time,
-                q: &block.q[own.clone()],
-                qd: &block.qd[own],
-                measured,
-                standstill,
-                torque,
-            });
+            collected.traces[joint].extend(
+                collected.rows,
+                &TraceRows {
+                    time: block.time,
+                    q: &block.q[own.clone()],
+                    qd: &block.qd[own],
+                    measured,
+                    standstill,
+                    torque,
+                },
+            );
         }
+        collected.rows += block.len;
     }
 
     /// The scores of everything seen.
@@ -267,6 +273,13 @@ impl HeldOut {
             traces: self.traces,
         }
     }
+}
+
+/// Filtered rows of a log, and a few more: those at the ends of its stretches.
+fn rows_about(log: &Log<'_>, pipeline: &Pipeline) -> Result<usize> {
+    let interval = log.any_recording(|recording| Ok(median_step(&recording.time)))?;
+    let step = interval.map_or(1, |interval| pipeline.step(interval));
+    Ok(log.samples() as usize / step)
 }
 
 impl AddAssign for HeldOut {

@@ -1,4 +1,4 @@
-//! Traces for figures: long ones are thinned, and say so.
+//! Traces for figures: of long ones some rows are kept, and they say so.
 
 use super::Trace;
 use crate::twin::JointTorque;
@@ -24,22 +24,22 @@ pub struct TraceRows<'a> {
 }
 
 impl Trace {
-    /// An empty trace of `joint` in `log`.
+    /// An empty trace of `joint` in `log`, which keeps every `step`-th of `rows` rows, `step` the smallest that leaves at most [`MAX_POINTS`].
     #[must_use]
-    pub fn new(log: impl Into<String>, joint: impl Into<String>) -> Self {
+    pub fn new(log: impl Into<String>, joint: impl Into<String>, rows: usize) -> Self {
         Self {
             log: log.into(),
             joint: joint.into(),
-            step: 1,
+            step: rows.div_ceil(MAX_POINTS).max(1),
             ..Self::default()
         }
     }
 
-    /// Puts rows at the end; all of them are kept until [`Trace::thin`].
+    /// Takes the next rows, `seen` of the log's having been seen before.
     ///
     /// # Panics
     /// If the slices differ in length.
-    pub fn extend(&mut self, rows: &TraceRows<'_>) {
+    pub fn extend(&mut self, seen: usize, rows: &TraceRows<'_>) {
         let count = rows.torque.nominal.len();
         let lengths = [
             rows.time.len(),
@@ -51,44 +51,24 @@ impl Trace {
             lengths.iter().all(|&length| length == count),
             "{lengths:?} values for {count} predicted rows"
         );
-        self.time.extend_from_slice(rows.time);
-        self.q.extend_from_slice(rows.q);
-        self.qd.extend_from_slice(rows.qd);
-        self.measured.extend_from_slice(rows.measured);
-        self.nominal.extend_from_slice(&rows.torque.nominal);
-        self.calibrated.extend_from_slice(&rows.torque.calibrated);
-        self.low.extend_from_slice(&rows.torque.low);
-        self.high.extend_from_slice(&rows.torque.high);
-        self.pit.extend_from_slice(&rows.torque.pit);
-        if rows.standstill.is_empty() {
-            self.standstill.resize(self.time.len(), false);
-        } else {
-            self.standstill.extend_from_slice(rows.standstill);
-        }
-    }
-
-    /// Keeps every `step`-th row, `step` the smallest that leaves at most [`MAX_POINTS`]; scores must be taken before.
-    pub fn thin(&mut self) {
-        let step = self.time.len().div_ceil(MAX_POINTS).max(1);
-        if step == 1 {
-            return;
-        }
-        let keep = |values: &mut Vec<f64>| *values = values.iter().copied().step_by(step).collect();
-        for values in [
-            &mut self.time,
-            &mut self.q,
-            &mut self.qd,
-            &mut self.measured,
-            &mut self.nominal,
-            &mut self.calibrated,
-            &mut self.low,
-            &mut self.high,
-            &mut self.pit,
+        let (step, first) = (self.step, (self.step - seen % self.step) % self.step);
+        let torque = rows.torque;
+        for (kept, values) in [
+            (&mut self.time, rows.time),
+            (&mut self.q, rows.q),
+            (&mut self.qd, rows.qd),
+            (&mut self.measured, rows.measured),
+            (&mut self.nominal, &torque.nominal),
+            (&mut self.calibrated, &torque.calibrated),
+            (&mut self.low, &torque.low),
+            (&mut self.high, &torque.high),
+            (&mut self.pit, &torque.pit),
         ] {
-            keep(values);
+            kept.extend(values.iter().skip(first).step_by(step));
         }
-        self.standstill = self.standstill.iter().copied().step_by(step).collect();
-        self.step *= step;
+        let still = |row: usize| rows.standstill.get(row).copied().unwrap_or(false);
+        let taken = (0..count).skip(first).step_by(step);
+        self.standstill.extend(taken.map(still));
     }
 }
 
@@ -101,25 +81,28 @@ mod tests {
         let rows = 4001;
         let time: Vec<f64> = (0..rows).map(f64::from).collect();
         let values = vec![0.0; rows as usize];
-        let torque = JointTorque {
-            nominal: values.clone(),
-            calibrated: values.clone(),
-            low: values.clone(),
-            high: values.clone(),
-            pit: values.clone(),
+        let torque = |len: usize| JointTorque {
+            nominal: vec![0.0; len],
+            calibrated: vec![0.0; len],
+            low: vec![0.0; len],
+            high: vec![0.0; len],
+            pit: vec![0.0; len],
             ..JointTorque::default()
         };
-        let part = TraceRows {
-            time: &time,
-            q: &values,
-            qd: &values,
-            measured: &values,
-            standstill: &[],
-            torque: &torque,
-        };
-        let mut trace = Trace::new("run.csv", "elbow");
-        trace.extend(&part);
-        trace.thin();
+        let mut trace = Trace::new("run.csv", "elbow", rows as usize);
+        // Whatever comes together.
+        for start in (0..rows as usize).step_by(1000) {
+            let own = start..(start + 1000).min(rows as usize);
+            let part = TraceRows {
+                time: &time[own.clone()],
+                q: &values[own.clone()],
+                qd: &values[own.clone()],
+                measured: &values[own.clone()],
+                standstill: &[],
+                torque: &torque(own.len()),
+            };
+            trace.extend(start, &part);
+        }
         assert_eq!((trace.step, trace.time.len()), (3, 1334));
         assert!(trace.time.windows(2).all(|pair| pair[1] - pair[0] == 3.0));
         for length in [
@@ -130,8 +113,5 @@ mod tests {
         ] {
             assert_eq!(length, 1334);
         }
-        let once = trace.clone();
-        trace.thin();
-        assert_eq!(trace, once);
     }
 }
