@@ -9,6 +9,8 @@ mod write;
 
 use super::*;
 use crate::table::{ColumnKind, TableFormat, TableWriter, Values};
+use proptest::prelude::*;
+use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 use std::fmt::Write as _;
 use std::io::Write as _;
 use twincal::robot::JointKind;
@@ -50,24 +52,26 @@ fn compare(bytes: &[u8], ending: &str, options: &LogOptions) -> LongLog {
     assert!(long.chapters() >= 5, "{} chapters", long.chapters());
     assert_eq!(long.samples().iter().sum::<usize>(), whole.time.len());
     let joined = long.whole().unwrap();
-    let bits = |recording: &Recording| -> Vec<Vec<u64>> {
-        let joints = recording.joints.iter();
-        let channels = joints.flat_map(|j| {
-            [
-                Some(&j.q),
-                j.qd.as_ref(),
-                j.qdd.as_ref(),
-                j.tau.as_ref(),
-                j.temperature.as_ref(),
-            ]
-        });
-        let all = std::iter::once(&recording.time).chain(channels.flatten());
-        all.map(|values| values.iter().map(|v| v.to_bits()).collect())
-            .collect()
-    };
     assert!(bits(&joined) == bits(&whole), "{ending}: other numbers");
     assert_eq!((joined.name, joined.payload), (whole.name, whole.payload));
     long
+}
+
+/// The numbers of a recording, bit by bit.
+fn bits(recording: &Recording) -> Vec<Vec<u64>> {
+    let joints = recording.joints.iter();
+    let channels = joints.flat_map(|j| {
+        [
+            Some(&j.q),
+            j.qd.as_ref(),
+            j.qdd.as_ref(),
+            j.tau.as_ref(),
+            j.temperature.as_ref(),
+        ]
+    });
+    let all = std::iter::once(&recording.time).chain(channels.flatten());
+    all.map(|values| values.iter().map(|v| v.to_bits()).collect())
+        .collect()
 }
 
 fn csv() -> String {
@@ -117,8 +121,7 @@ fn csv_comes_in_chapters() {
     assert!((tau[7] - 50.0 * value(6, row + 1)).abs() < 1e-6);
 }
 
-#[test]
-fn parquet_comes_in_chapters() {
+fn parquet() -> Vec<u8> {
     let columns: Vec<(String, ColumnKind)> = HEADER
         .map(|name| (name.to_owned(), ColumnKind::Number))
         .to_vec();
@@ -134,8 +137,12 @@ fn parquet_comes_in_chapters() {
             .collect();
         table.push(&values).unwrap();
     }
-    let bytes = table.finish().unwrap();
-    compare(&bytes, "parquet", &LogOptions::default());
+    table.finish().unwrap()
+}
+
+#[test]
+fn parquet_comes_in_chapters() {
+    compare(&parquet(), "parquet", &LogOptions::default());
 }
 
 fn bag(topics: &[(&str, &[&str])], late: bool) -> Vec<u8> {
@@ -208,4 +215,76 @@ fn a_column_without_numbers_is_named_whether_the_log_is_long_or_not() {
         "{whole}"
     );
     assert_eq!(whole, long);
+}
+
+/// Long files with changed bytes, cut or doubled in part: what is said of them is the same in chapters and in memory, and the numbers are, where
+/// there are any.
+#[test]
+fn damage_is_read_in_chapters_as_in_memory() {
+    let topics: [(&str, &[&str]); 1] = [("/joint_states", &NAMES)];
+    let files = [
+        ("csv", csv().into_bytes()),
+        ("parquet", parquet()),
+        ("mcap", bag(&topics, true)),
+    ];
+    // Sliders: a changed angle may look folded, and chapters come unfolded.
+    let robot = logs::robot(&NAMES.map(|name| (name, JointKind::Prismatic)));
+    let folder = tempfile::tempdir().unwrap();
+    let mut runner = TestRunner::new_with_rng(
+        ProptestConfig::default(),
+        TestRng::deterministic_rng(RngAlgorithm::ChaCha),
+    );
+    let (mut read, mut long) = (0, 0);
+    for (ending, good) in &files {
+        let path = folder.path().join(format!("run.{ending}"));
+        for case in 0..40 {
+            let rng = runner.rng();
+            let mut bytes = good.clone();
+            for _ in 0..rng.random_range(1..6) {
+                let at = rng.random_range(0..bytes.len());
+                bytes[at] = rng.random();
+            }
+            let at = rng.random_range(0..bytes.len());
+            match case % 8 {
+                0 => bytes.truncate(at),
+                1 => {
+                    let part = bytes[at..bytes.len().min(at + 5000)].to_vec();
+                    bytes.splice(at..at, part);
+                }
+                _ => {}
+            }
+            std::fs::write(&path, &bytes).unwrap();
+            for lenient in [false, true] {
+                let options = LogOptions {
+                    lenient,
+                    ..LogOptions::default()
+                };
+                let whole = read_log(&path, &robot, &options);
+                let chapters = open_log(&path, &robot, &options);
+                match (whole, chapters) {
+                    (Ok((whole, said)), Ok((log, also_said))) => {
+                        assert_eq!(said, also_said, "{ending} {case}");
+                        read += 1;
+                        let joined = match log {
+                            Log::Whole(recording) => recording.into_owned(),
+                            Log::Long(log) => {
+                                long += 1;
+                                log.whole().unwrap()
+                            }
+                        };
+                        assert!(bits(&joined) == bits(&whole), "{ending} {case}");
+                    }
+                    (Err(one), Err(other)) => {
+                        assert_eq!(one.to_string(), other.to_string(), "{ending} {case}");
+                    }
+                    (one, other) => panic!(
+                        "{ending} {case}: {:?} in memory, {:?} in chapters",
+                        one.map(|_| ()),
+                        other.map(|_| ())
+                    ),
+                }
+            }
+        }
+    }
+    assert!(read > 60 && long > 50, "{read} read, {long} in chapters");
 }
