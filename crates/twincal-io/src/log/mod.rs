@@ -82,7 +82,7 @@ pub fn read_log(
 }
 
 /// The same, but a log that is long (128 MiB of numbers) is left in a temporary file and comes in chapters: memory does not grow with
-/// it. NPZ files are always read whole, and so are bags whose joints come in several messages.
+/// it. Bags whose joints come in several messages are always read whole.
 ///
 /// # Errors
 /// Those of [`read_log`], and [`Error::System`] without room for the temporary file.

@@ -6,9 +6,9 @@
 
 mod arrays;
 
+use super::cells::{Sink, disk_failure};
 use super::{Cells, Request, assemble};
 use crate::error::{Error, Place, Result};
-use crate::memory;
 use std::io::{BufReader, Read, Seek};
 use twincal::Finding;
 use twincal::signal::Log;
@@ -24,6 +24,8 @@ const MAX_HEADER: usize = 1 << 16;
 /// Most arrays and most joints of an array.
 const MAX_ARRAYS: usize = 10_000;
 const MAX_JOINTS: usize = 1_000;
+/// Rows that are read at a time.
+const BLOCK: usize = 4096;
 /// Keys of the array of names.
 const NAMES: [&str; 3] = ["joints", "joint_names", "names"];
 
@@ -164,17 +166,18 @@ pub(super) fn read(
             "save arrays of samples × joints with one row per time stamp",
         ));
     }
-    let bytes = (rows as u64).saturating_mul(wanted.len() as u64 * 8);
-    memory::require(name, bytes, "read a shorter log")?;
-    let mut cells = Cells::new(wanted.len(), false);
+    let mut cells = Cells::reserve(name, rows, wanted.len(), request.chapters)?;
+    let mut sinks = cells.sinks();
     for array in used {
         let targets: Vec<Option<usize>> = (array.first..array.first + array.width)
             .map(|column| wanted.iter().position(|w| *w == column))
             .collect();
         let (key, mut file) = open(&mut archive, array.entry, name)?;
         header(&mut file, name, &key)?;
-        values(file, array, rows, &targets, &mut cells.columns)
-            .map_err(|e| refuse(format!("array `{key}` is damaged: {e}"), "write it again"))?;
+        if let Err(e) = values(file, array, rows, &targets, &mut sinks) {
+            let damaged = || refuse(format!("array `{key}` is damaged: {e}"), "write it again");
+            return Err(disk_failure(name, &sinks).unwrap_or_else(damaged));
+        }
     }
     let mut findings = Vec::new();
     let log = assemble(request, cells, selection, &mut findings)?;
@@ -334,26 +337,30 @@ fn values<R: Read + Seek>(
     array: &Array,
     rows: usize,
     targets: &[Option<usize>],
-    columns: &mut [Vec<f64>],
+    sinks: &mut [Sink<'_>],
 ) -> std::io::Result<()> {
     let Header {
         number, big_endian, ..
     } = array.header;
     let size = number.bytes();
-    // One line of cells at a time: a row, or a cell of a column.
+    // Column after column, or all columns row by row.
     let by_column = array.header.by_column && array.header.shape.len() == 2;
-    let (lines, cells) = if by_column {
-        (rows * array.width, 1)
+    let (passes, width) = if by_column {
+        (array.width, 1)
     } else {
-        (rows, array.width)
+        (1, array.width)
     };
-    let mut line = vec![0; cells * size];
-    for at in 0..lines {
-        file.read_exact(&mut line)?;
-        for (cell, bytes) in line.chunks_exact(size).enumerate() {
-            let column = if by_column { at / rows } else { cell };
-            if let Some(to) = targets[column] {
-                columns[to].push(number.value(big_endian, bytes));
+    let mut block = Vec::new();
+    for pass in 0..passes {
+        for from in (0..rows).step_by(BLOCK) {
+            let count = BLOCK.min(rows - from);
+            block.resize(count * width * size, 0);
+            file.read_exact(&mut block)?;
+            for (place, target) in targets[pass..][..width].iter().enumerate() {
+                let cells = block.chunks_exact(size).skip(place).step_by(width);
+                if let Some(to) = target {
+                    sinks[*to].extend(cells.map(|cell| number.value(big_endian, cell)))?;
+                }
             }
         }
     }

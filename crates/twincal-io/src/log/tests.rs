@@ -16,6 +16,8 @@ use std::io::Write as _;
 use twincal::robot::JointKind;
 use twincal::signal::LongLog;
 use write::{Bag, Message};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
 
 const ROWS: usize = 40_000;
 const NAMES: [&str; 2] = ["shoulder", "elbow"];
@@ -145,6 +147,60 @@ fn parquet_comes_in_chapters() {
     compare(&parquet(), "parquet", &LogOptions::default());
 }
 
+/// Arrays of NumPy: time, position and torque of both joints row by row, velocity column by column.
+fn npz(method: CompressionMethod) -> Vec<u8> {
+    let mut file = ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    let row_by_row = |columns: &[usize]| -> Vec<f64> {
+        let rows = (0..ROWS).flat_map(|row| columns.iter().map(move |column| (*column, row)));
+        rows.map(|(column, row)| value(column, row)).collect()
+    };
+    let velocity = [2, 5]
+        .iter()
+        .flat_map(|column| (0..ROWS).map(move |row| value(*column, row)));
+    for (key, fortran, shape, values) in [
+        ("t", "False", format!("({ROWS},)"), row_by_row(&[0])),
+        ("q", "False", format!("({ROWS}, 2)"), row_by_row(&[1, 4])),
+        ("qd", "True", format!("({ROWS}, 2)"), velocity.collect()),
+        ("tau", "False", format!("({ROWS}, 2)"), row_by_row(&[3, 6])),
+    ] {
+        let options = SimpleFileOptions::default().compression_method(method);
+        file.start_file(format!("{key}.npy"), options).unwrap();
+        let header =
+            format!("{{'descr': '<f8', 'fortran_order': {fortran}, 'shape': {shape}, }}\n");
+        file.write_all(b"\x93NUMPY\x01\x00").unwrap();
+        file.write_all(&(header.len() as u16).to_le_bytes())
+            .unwrap();
+        file.write_all(header.as_bytes()).unwrap();
+        for value in values {
+            file.write_all(&value.to_le_bytes()).unwrap();
+        }
+    }
+    file.finish().unwrap().into_inner()
+}
+
+#[test]
+fn npz_comes_in_chapters() {
+    for method in [CompressionMethod::Stored, CompressionMethod::Deflated] {
+        let long = compare(&npz(method), "npz", &LogOptions::default());
+        let Recording { time, joints, .. } = long.whole().unwrap();
+        for row in [0, 7, ROWS / 2, ROWS - 1] {
+            let [a, b] = [&joints[0], &joints[1]];
+            let got = [
+                time[row],
+                a.q[row],
+                a.qd.as_ref().unwrap()[row],
+                a.tau.as_ref().unwrap()[row],
+                b.q[row],
+                b.qd.as_ref().unwrap()[row],
+                b.tau.as_ref().unwrap()[row],
+            ];
+            for (column, got) in got.into_iter().enumerate() {
+                assert!(got == value(column, row) || got.is_nan() && value(column, row).is_nan());
+            }
+        }
+    }
+}
+
 fn bag(topics: &[(&str, &[&str])], late: bool) -> Vec<u8> {
     let mut bag = Bag::with_chunks(None, 64 << 10);
     for (topic, _) in topics {
@@ -226,6 +282,7 @@ fn damage_is_read_in_chapters_as_in_memory() {
         ("csv", csv().into_bytes()),
         ("parquet", parquet()),
         ("mcap", bag(&topics, true)),
+        ("npz", npz(CompressionMethod::Stored)),
     ];
     // Sliders: a changed angle may look folded, and chapters come unfolded.
     let robot = logs::robot(&NAMES.map(|name| (name, JointKind::Prismatic)));
