@@ -102,7 +102,7 @@ def measure(data, seed, options, folder):
     def ours(config, which=logs):
         return program.fit(options.twincal, data.model, [which["train"]], [which["heldout"]], data.config() + config, folder)
 
-    results = {("twincal", "filtered"): ours("")}
+    results = {("twincal", "filtered"): ours(options.settings.replace("\\n", "\n"))}
     if not options.quick:
         results["twincal, ar1", "filtered"] = ours('[noise]\nmodel = "ar1"\n')
         results["the paper's", "filtered"] = ours(program.PAPER)
@@ -158,6 +158,7 @@ def main():
     parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="folder of selection.svg")
     parser.add_argument("--fresh", action="store_true", help="forget earlier runs")
     parser.add_argument("--quick", action="store_true", help="only twincal as it comes")
+    parser.add_argument("--settings", default="", help="TOML for twincal beside the library, with --quick and a --work of its own")
     parser.add_argument("--table", action="store_true", help="only table and figure, of the runs there are")
     options = parser.parse_args()
     problems = {name: p for name, p in PROBLEMS.items() if not options.only or name in options.only}
