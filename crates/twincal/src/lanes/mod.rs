@@ -3,7 +3,7 @@
 //! No unsafe code here: [`pulp`] holds the dispatch. A kernel is a type whose work sits in `#[inline(always)]` functions
 //! over `[f64; 8]`; `pulp::Arch::new().dispatch(kernel)` runs the copy of it that was compiled for this machine's
 //! widest vectors. The functions below use only + − × and bit operations, each rounded once: every instruction set
-//! gives the same bytes.
+//! gives the same bytes; [`sin_cos_fused`], for the robot's recursion, fuses where the instructions can.
 
 mod aligned;
 mod log_exp;
@@ -11,7 +11,7 @@ mod trig;
 
 pub use aligned::{Aligned, Line};
 pub use log_exp::{exp, ln};
-pub use trig::sin_cos;
+pub use trig::{sin_cos, sin_cos_fused};
 
 /// Samples per lane group.
 pub const LANES: usize = 8;

@@ -16,6 +16,12 @@ const HALF_PI: [f64; 4] = [
     2.022_266_248_711_166_5e-21,
     8.478_427_660_368_9e-32,
 ];
+/// π/2 in three pieces of 53 bits, for fused multiply-add.
+const HALF_PI_WIDE: [f64; 3] = [
+    std::f64::consts::FRAC_PI_2,
+    6.123_233_995_736_766e-17,
+    -1.497_384_904_859_169_8e-33,
+];
 /// sin(r) = r + r³ (S₀ + S₁ r² + …) on |r| ≤ π/4.
 const SIN: [f64; 6] = [
     -0.166_666_666_666_666_32,
@@ -44,6 +50,24 @@ const COS: [f64; 6] = [
 /// Argument reduction after Cody and Waite, polynomials of FreeBSD's msun (fdlibm) `k_sin.c`, `k_cos.c`.
 #[inline(always)]
 pub fn sin_cos(x: &Lane) -> (Lane, Lane) {
+    on_lanes(x, reduced)
+}
+
+/// [`sin_cos`] with fused multiply-add inside code compiled for vectors that have it: a quarter fewer operations, at most 2 ulp as well,
+/// but not the bytes of the other; without such vectors the same as [`sin_cos`].
+#[inline(always)]
+pub fn sin_cos_fused<S: pulp::Simd>(_simd: S, x: &Lane) -> (Lane, Lane) {
+    // All of pulp's vectors of these processors have it, and one number at a time may not.
+    let fuses = cfg!(any(target_arch = "x86_64", target_arch = "aarch64")) && S::F64_LANES > 1;
+    if fuses {
+        on_lanes(x, reduced_fused)
+    } else {
+        on_lanes(x, reduced)
+    }
+}
+
+#[inline(always)]
+fn on_lanes(x: &Lane, reduced: impl Fn(f64) -> (f64, f64)) -> (Lane, Lane) {
     let mut sin = [0.0; LANES];
     let mut cos = [0.0; LANES];
     let mut inside = true;
@@ -100,6 +124,44 @@ fn reduced(x: f64) -> (f64, f64) {
     let one = 1.0 - half;
     let cos = one + (((1.0 - one) - half) + (z * even - r * tail));
 
+    turned(quadrant, sin, cos)
+}
+
+/// [`reduced`] with fused multiply-add.
+#[inline(always)]
+fn reduced_fused(x: f64) -> (f64, f64) {
+    let shifted = x.mul_add(TWO_OVER_PI, ROUND);
+    let quadrant = shifted.to_bits();
+    let k = shifted - ROUND;
+    // x − k P₀ is exact: a multiple of 2⁻⁵³ below 1. k P₁ is product + error.
+    let near = (-k).mul_add(HALF_PI_WIDE[0], x);
+    let product = k * HALF_PI_WIDE[1];
+    let error = k.mul_add(HALF_PI_WIDE[1], -product);
+    let (r, rest) = two_sum(near, -product);
+    let tail = (-k).mul_add(HALF_PI_WIDE[2], rest - error);
+
+    let z = r * r;
+    let cube = z * r;
+    let odd = z.mul_add(SIN[5], SIN[4]);
+    let odd = z.mul_add(odd, SIN[3]);
+    let odd = z.mul_add(odd, SIN[2]);
+    let odd = z.mul_add(odd, SIN[1]);
+    let inner = z.mul_add((-cube).mul_add(odd, 0.5 * tail), -tail);
+    let sin = r - (-cube).mul_add(SIN[0], inner);
+    let even = z.mul_add(COS[5], COS[4]);
+    let even = z.mul_add(even, COS[3]);
+    let even = z.mul_add(even, COS[2]);
+    let even = z.mul_add(even, COS[1]);
+    let even = z * z.mul_add(even, COS[0]);
+    let one = z.mul_add(-0.5, 1.0);
+    let lost = z.mul_add(-0.5, 1.0 - one);
+    let cos = one + (lost + z.mul_add(even, -(r * tail)));
+    turned(quadrant, sin, cos)
+}
+
+/// Sine and cosine of an angle from those of what is left of it beyond `quadrant` quarter turns.
+#[inline(always)]
+fn turned(quadrant: u64, sin: f64, cos: f64) -> (f64, f64) {
     // odd quadrants exchange the two, quadrants 2, 3 negate the sine, 1, 2 the cosine
     let exchange = 0_u64.wrapping_sub(quadrant & 1);
     let (s, c) = (sin.to_bits(), cos.to_bits());
@@ -138,7 +200,18 @@ mod tests {
         key(a).abs_diff(key(b))
     }
 
-    /// Largest distance from the platform's libm (below 1 ulp itself), in both outputs, with and without dispatch.
+    /// The same with fused multiply-add where the machine has it.
+    struct Fused<'a>(&'a Lane);
+
+    impl pulp::WithSimd for Fused<'_> {
+        type Output = (Lane, Lane);
+        #[inline(always)]
+        fn with_simd<S: pulp::Simd>(self, simd: S) -> Self::Output {
+            sin_cos_fused(simd, self.0)
+        }
+    }
+
+    /// Largest distance from the platform's libm (below 1 ulp itself), in both outputs, with and without dispatch, fused and not.
     fn worst(points: &[f64]) -> u64 {
         let mut worst = 0;
         for chunk in points.chunks(LANES) {
@@ -146,6 +219,7 @@ mod tests {
             x[..chunk.len()].copy_from_slice(chunk);
             let plain = sin_cos(&x);
             let dispatched = pulp::Arch::new().dispatch(SinCos(&x));
+            let fused = pulp::Arch::new().dispatch(Fused(&x));
             for lane in 0..LANES {
                 assert_eq!(
                     plain.0[lane].to_bits(),
@@ -160,9 +234,9 @@ mod tests {
                     x[lane]
                 );
                 let (s, c) = x[lane].sin_cos();
-                worst = worst
-                    .max(ulps(plain.0[lane], s))
-                    .max(ulps(plain.1[lane], c));
+                for (sin, cos) in [&plain, &fused].map(|(sin, cos)| (sin[lane], cos[lane])) {
+                    worst = worst.max(ulps(sin, s)).max(ulps(cos, c));
+                }
             }
         }
         worst

@@ -5,7 +5,7 @@ use super::bodies::Body;
 use super::dynamics::Motion;
 use super::lane_vectors::{load, load_any, store};
 use super::recursion::State;
-use crate::lanes::{LANES, Lane, Line, sin_cos};
+use crate::lanes::{LANES, Lane, Line, sin_cos_fused};
 use pulp::Simd;
 use std::any::Any;
 use std::ops::Range;
@@ -65,10 +65,16 @@ impl Angles {
 
     /// Sines and cosines of the samples `block` (at most [`BLOCK`]) of a motion.
     #[inline(always)]
-    pub(super) fn fill(&mut self, bodies: &[Body], motion: &Motion<'_>, block: Range<usize>) {
+    pub(super) fn fill<S: Simd>(
+        &mut self,
+        s: S,
+        bodies: &[Body],
+        motion: &Motion<'_>,
+        block: Range<usize>,
+    ) {
         self.start = block.start;
         if block.len() == 1 {
-            return self.fill_one(bodies, motion, block.start);
+            return self.fill_one(s, bodies, motion, block.start);
         }
         for i in 0..bodies.len() {
             let body = &bodies[i];
@@ -82,7 +88,7 @@ impl Angles {
                 for (angle, q) in angles.iter_mut().zip(q) {
                     *angle = body.multiplier * q + body.offset;
                 }
-                let (sine, cosine) = sin_cos(&angles);
+                let (sine, cosine) = sin_cos_fused(s, &angles);
                 let group = k * LANES..(k + 1) * LANES;
                 self.sines[i].0[group.clone()].copy_from_slice(&sine);
                 self.cosines[i].0[group].copy_from_slice(&cosine);
@@ -92,14 +98,14 @@ impl Angles {
 
     /// One sample: joints side by side in the lanes, the same bytes as sample by sample.
     #[inline(always)]
-    fn fill_one(&mut self, bodies: &[Body], motion: &Motion<'_>, sample: usize) {
+    fn fill_one<S: Simd>(&mut self, s: S, bodies: &[Body], motion: &Motion<'_>, sample: usize) {
         for (chunk, bodies) in bodies.chunks(LANES).enumerate() {
             let mut angles: Lane = [0.0; LANES];
             for (angle, body) in angles.iter_mut().zip(bodies) {
                 let q = motion.q[body.coordinate * motion.len + sample];
                 *angle = body.multiplier * q + body.offset;
             }
-            let (sine, cosine) = sin_cos(&angles);
+            let (sine, cosine) = sin_cos_fused(s, &angles);
             for (lane, body) in bodies.iter().enumerate() {
                 if !body.prismatic {
                     let i = chunk * LANES + lane;
@@ -249,7 +255,7 @@ impl<K: Group> pulp::WithSimd for Drive<'_, K> {
         } = workspace;
         let bodies = &robot.bodies[..];
         let states = states.slice(bodies.len(), State::new(s.splat_f64s(0.0)));
-        angles.fill(bodies, &motion, samples.clone());
+        angles.fill(s, bodies, &motion, samples.clone());
         let mut first = samples.start;
         while first < samples.end {
             let last = samples.end.min(first + S::F64_LANES);

@@ -161,7 +161,7 @@ impl pulp::WithSimd for Batch<'_> {
         let mut start = 0;
         while start < motion.len {
             let end = motion.len.min(start + BLOCK);
-            angles.fill(bodies, &motion, start..end);
+            angles.fill(s, bodies, &motion, start..end);
             let mut first = start;
             while first < end {
                 let last = end.min(first + S::F64_LANES);

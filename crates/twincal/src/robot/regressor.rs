@@ -241,7 +241,7 @@ impl pulp::WithSimd for Kernel<'_> {
         let zero = s.splat_f64s(0.0);
         let states = registers.slice(bodies.len(), State::new(zero));
         let axes = axes.slice(regressor.pairs.len(), Line([[zero; 3]; 2]));
-        angles.fill(bodies, &motion, samples.clone());
+        angles.fill(s, bodies, &motion, samples.clone());
         let mut first = samples.start;
         while first < samples.end {
             let last = samples.end.min(first + S::F64_LANES);
