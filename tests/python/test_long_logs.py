@@ -153,7 +153,8 @@ def test_all_commands_take_long_logs_in_chapters(tmp_path, long_log):
     pa.parquet.write_table(table.take(rows), short)
     run("predict", short, "--twin", tmp_path / "out", "-o", tmp_path / "of_short.parquet")
     whole, part = (pa.parquet.read_table(tmp_path / f"of_{name}.parquet") for name in ("long", "short"))
-    assert len(whole) > len(table) - 1000 and len(part) > len(rows) - 1000
+    # Only the ends of the log have no prediction: no row is lost where chapters meet.
+    assert len(whole) > len(table) - 500 and np.diff(whole["t"].to_numpy()).max() < 1.5 / RATE
     place = np.searchsorted(whole["t"].to_numpy(), part["t"].to_numpy())
     for name in part.column_names:
         wanted, got = part[name].to_numpy(), whole[name].to_numpy()[place]

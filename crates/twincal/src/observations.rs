@@ -444,6 +444,7 @@ mod tests {
         };
         let len = time.len();
         observations.set_temperatures(&Recording {
+            unfolded: false,
             name: "run".into(),
             time: time.to_vec(),
             joints: vec![Channels {

@@ -97,6 +97,7 @@ fn log(dof: usize, sd: f64) -> Recording {
         })
         .collect();
     Recording {
+        unfolded: false,
         name: "encoder".into(),
         time,
         joints,

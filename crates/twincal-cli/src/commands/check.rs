@@ -52,7 +52,7 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
         &flags.logs,
         &twin.robot,
         &settings.log,
-        Long::InChapters,
+        Long::with_filter(!twin.pipeline.is_off()),
         &progress,
     )?;
     progress.step("predicting the logs");

@@ -1,6 +1,7 @@
 //! Logs beside their model before anything is fitted: what `inspect` and `doctor` share.
 
 use std::collections::BTreeMap;
+use twincal::calibrate::LookedAt;
 use twincal::incidents::{Incident, motion};
 use twincal::lag::{LogLag, estimate_lag, lag_findings};
 use twincal::robot::Robot;
@@ -13,6 +14,8 @@ use twincal::{Error, Finding, Severity};
 pub(super) struct Checkup {
     /// Logs that could be filtered, long ones in part; incidents are masked.
     pub(super) trajectories: Vec<Trajectory>,
+    /// Which of the logs each of them is.
+    places: Vec<usize>,
     /// Why others could not.
     pub(super) refused: Vec<Error>,
     /// By log.
@@ -25,17 +28,33 @@ pub(super) struct Checkup {
     pub(super) findings: Vec<Finding>,
 }
 
+impl Checkup {
+    /// The logs that could be filtered, for [`twincal::calibrate::outlook`].
+    pub(super) fn looked_at<'a>(&'a mut self, logs: &'a [Log<'a>]) -> Vec<LookedAt<'a>> {
+        let seen = self.trajectories.iter_mut().zip(&self.places);
+        seen.map(|(trajectory, &place)| LookedAt {
+            incidents: self
+                .incidents
+                .get(logs[place].name())
+                .map_or(&[], |all| all),
+            log: &logs[place],
+            trajectory,
+        })
+        .collect()
+    }
+}
+
 /// Filters the logs, looks for incidents and lags, and compares with the model.
 ///
 /// # Errors
-/// Positions in degrees, and chapters that cannot be read.
+/// Positions in degrees. What is wrong with single logs stands in [`Checkup::refused`].
 pub(super) fn checkup(
     robot: &Robot,
     logs: &[Log<'_>],
     pipeline: &Pipeline,
 ) -> twincal::Result<Checkup> {
     let mut checkup = Checkup::default();
-    for log in logs {
+    for (place, log) in logs.iter().enumerate() {
         let (trajectory, happened, more) = match motion(robot, pipeline, log) {
             Ok(seen) => seen,
             Err(error) => {
@@ -54,6 +73,7 @@ pub(super) fn checkup(
             checkup.agreement.insert(name, agreement);
         }
         checkup.trajectories.push(trajectory);
+        checkup.places.push(place);
     }
     let found = look(robot, pipeline, &checkup.trajectories)?;
     checkup.joints = found.joints;

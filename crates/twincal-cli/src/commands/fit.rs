@@ -9,7 +9,6 @@ use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::path::PathBuf;
-use twincal::signal::Auto;
 use twincal_io::artifact::{Claim, Maker, Replace};
 
 pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
@@ -45,11 +44,7 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     let progress = Progress::new();
     progress.step(&format!("reading {}", model.to_string_lossy()));
     let robot = RobotInput::read(model, &settings)?;
-    // Without a filter every sample is a row, and all are in memory whatever the reader does.
-    let long = match settings.calibration.signal.cutoff_hz {
-        Auto::Value(0.0) => Long::InMemory,
-        _ => Long::InChapters,
-    };
+    let long = Long::of_settings(&settings);
     let read =
         |paths: &[PathBuf]| LogInput::read(paths, &robot.robot, &settings.log, long, &progress);
     let (logs, heldout) = (read(given)?, read(&settings.log.heldout)?);

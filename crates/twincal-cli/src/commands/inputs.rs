@@ -6,7 +6,7 @@ use crate::progress::Progress;
 use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::robot::Robot;
-use twincal::signal::Log;
+use twincal::signal::{Auto, Log};
 use twincal_io::artifact::{MODEL_MJCF, MODEL_URDF, sha256, sha256_of_file};
 use twincal_io::config::{LogSettings, Settings};
 use twincal_io::log::{LogOptions, files_of, open_log, parse_log, read_log};
@@ -70,6 +70,20 @@ pub(super) enum Long {
 }
 
 impl Long {
+    /// Without a filter every sample is a row, and all are in memory whatever the reader does.
+    pub(super) fn with_filter(filter: bool) -> Self {
+        if filter {
+            Self::InChapters
+        } else {
+            Self::InMemory
+        }
+    }
+
+    /// As a fit with these settings reads them.
+    pub(super) fn of_settings(settings: &Settings) -> Self {
+        Self::with_filter(settings.calibration.signal.cutoff_hz != Auto::Value(0.0))
+    }
+
     fn read(
         self,
         path: &Path,

@@ -1,7 +1,7 @@
 //! `twincal inspect`: what a model and logs hold, before anything is fitted.
 
 use self::library::{BaseRow, ComponentRow, base_row, component_rows};
-use super::checkup::checkup;
+use super::checkup::{Checkup, checkup};
 use super::inputs::{LogInput, Long, RobotInput};
 use super::summary::{Notes, findings, paragraph, significant};
 use super::table::{print_table, table};
@@ -16,7 +16,7 @@ use twincal::calibrate::{Outlook, outlook};
 use twincal::excitation::Unseen;
 use twincal::robot::{JointKind, Mimic, Robot};
 use twincal::signal::{
-    LogOverview, Pipeline, SignalSettings, Trajectory, choose_and_prepare, describe, hardly_driven,
+    LogOverview, Pipeline, SignalSettings, choose_and_prepare, describe, hardly_driven,
 };
 
 pub(super) mod library;
@@ -85,7 +85,7 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
         logs,
         &robot.robot,
         &settings.log,
-        Long::InChapters,
+        Long::of_settings(&settings),
         &progress,
     )?;
     drop(progress);
@@ -98,15 +98,14 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
         found.extend(more);
     }
     found.extend(hardly_driven(&robot.robot, &logs.logs[..])?);
-    let (mut aligned, more) = compare(&robot.robot, &logs, &settings.calibration.signal)?;
+    let (mut compared, more) = compare(&robot.robot, &logs, &settings.calibration.signal)?;
     for finding in more {
         if !found.contains(&finding) {
             found.push(finding);
         }
     }
-    let aligned = aligned
-        .as_mut()
-        .map(|(pipeline, all)| (&*pipeline, &mut all[..]));
+    let aligned =
+        (compared.as_mut()).map(|(pipeline, checkup)| (&*pipeline, checkup.looked_at(&logs.logs)));
     let outlook = outlook(&robot.robot, &settings.calibration.library, aligned)?;
     found.extend(outlook.findings.iter().cloned());
     require_strict(settings.log.strict, &found)?;
@@ -129,12 +128,13 @@ fn compare(
     let Ok((pipeline, _, _)) = choose_and_prepare(robot, &logs.logs, signal) else {
         return Ok((None, Vec::new()));
     };
-    let found = checkup(robot, &logs.logs, &pipeline).map_err(|e| logs.as_given(e))?;
-    Ok((Some((pipeline, found.trajectories)), found.findings))
+    let mut found = checkup(robot, &logs.logs, &pipeline).map_err(|e| logs.as_given(e))?;
+    let findings = std::mem::take(&mut found.findings);
+    Ok((Some((pipeline, found)), findings))
 }
 
 /// The logs as a fit would filter them.
-type Aligned = (Pipeline, Vec<Trajectory>);
+type Aligned = (Pipeline, Checkup);
 
 fn inspection(
     robot: &Robot,

@@ -11,7 +11,7 @@ use serde::Serialize;
 use std::io::{self, BufWriter, Write};
 use std::ops::Range;
 use twincal::rows::{RowBlock, RowSignal, visit_rows};
-use twincal::signal::{Log, Recording, missing_torque};
+use twincal::signal::{Log, LongLog, Recording, missing_torque};
 use twincal::term::Library;
 use twincal::twin::{Predictor, TorqueSignal, Twin};
 use twincal::{Finding, Result, Severity};
@@ -64,7 +64,7 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
         &flags.logs,
         &twin.robot,
         &settings.log,
-        Long::InChapters,
+        Long::with_filter(!twin.pipeline.is_off()),
         &progress,
     )?;
     progress.step("predicting the logs");
@@ -217,10 +217,8 @@ impl Prediction {
             Log::Long(long) => {
                 findings.push(long.say(false));
                 let pipeline = &model.twin.pipeline;
-                long.visit_motion(pipeline, &mut findings, |part, said| {
-                    if written.is_err() {
-                        return Ok(());
-                    }
+                let before = self.rows;
+                let visited = long.visit_motion(pipeline, &mut findings, |part, said| {
                     let joints = part.chapter.joints.iter();
                     let stretch = Stretch {
                         motion: &part.motion,
@@ -228,8 +226,21 @@ impl Prediction {
                         measured: joints.map(|joint| joint.tau.as_deref()).collect(),
                     };
                     written = self.write_stretch(model, &stretch, table, said)?;
-                    Ok(())
-                })?;
+                    // Nobody reads on: the other chapters need not be read either.
+                    written
+                        .as_ref()
+                        .copied()
+                        .map_err(|_| twincal::Error::Refused {
+                            problem: "the output is closed".into(),
+                            remedy: String::new(),
+                        })
+                });
+                if written.is_err() {
+                    return Ok(written);
+                }
+                visited?;
+                let samples: usize = long.samples().iter().sum();
+                findings.push(unpredicted(&long, samples as u64 - (self.rows - before)));
             }
         }
         self.findings.append(&mut findings);
@@ -312,6 +323,15 @@ impl Prediction {
         self.extrapolating += outside.iter().filter(|outside| **outside).count() as u64;
         table.push(&values)
     }
+}
+
+/// What filters take of the ends of a long log's stretches, with what could not be used.
+fn unpredicted(long: &LongLog, rows: u64) -> Finding {
+    let message = format!(
+        "{rows} rows have no prediction: the motion filter needs some samples at either end of each stretch without a cut, and what else is \
+         told here was left out"
+    );
+    Finding::new(Severity::Note, "borders", &long.name, message, rows)
 }
 
 fn columns(twin: &Twin) -> Vec<(String, ColumnKind)> {

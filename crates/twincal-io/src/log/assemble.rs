@@ -167,6 +167,7 @@ impl Make {
             })
             .collect();
         let mut recording = Recording {
+            unfolded: false,
             name: self.name.clone(),
             time,
             joints,

@@ -26,7 +26,7 @@ mod weigh;
 #[cfg(test)]
 mod testing;
 
-pub use outlook::{Outlook, outlook};
+pub use outlook::{LookedAt, Outlook, outlook};
 pub use result::{
     Alike, Along, Calibration, Compact, CompactTerm, ComponentSummary, Curve, Draws, Group, Halves,
     LikelihoodUsed, LogSummary, ParameterSummary, PriorUsed, Repeat, SweepPoint, TermSummary,

@@ -3,9 +3,10 @@
 use crate::error::{Finding, Result};
 use crate::excitation::{Excitation, STATES, States, excitation};
 use crate::gram::{Gram, JointAccumulator};
+use crate::incidents::{Incident, leave_out};
 use crate::robot::Robot;
 use crate::rows::{RowSignal, count_rows, visit_rows};
-use crate::signal::{Payload, Pipeline, Trajectory};
+use crate::signal::{Log, Payload, Pipeline, Raw, Trajectory, prepare, ready};
 use crate::term::{Library, LibrarySettings};
 
 /// v_s where neither settings nor logs say one, rad/s: the names of the candidates do not depend on it.
@@ -22,6 +23,17 @@ pub struct Outlook {
     pub findings: Vec<Finding>,
 }
 
+/// A log whose rows are to be looked at.
+#[derive(Debug)]
+pub struct LookedAt<'a> {
+    /// The log itself: one in chapters is visited again.
+    pub log: &'a Log<'a>,
+    /// Its motion, or that of some of its chapters.
+    pub trajectory: &'a mut Trajectory,
+    /// What is left out of it.
+    pub incidents: &'a [Incident],
+}
+
 /// The candidates for `robot`, and what some logs, as aligned by `pipeline`, can show of them. The rows are streamed:
 /// memory does not grow with the logs.
 ///
@@ -30,7 +42,7 @@ pub struct Outlook {
 pub fn outlook(
     robot: &Robot,
     settings: &LibrarySettings,
-    logs: Option<(&Pipeline, &mut [Trajectory])>,
+    logs: Option<(&Pipeline, Vec<LookedAt<'_>>)>,
 ) -> Result<Outlook> {
     let velocity = match &logs {
         Some((pipeline, _)) => pipeline.coulomb_velocity,
@@ -43,12 +55,15 @@ pub fn outlook(
     };
     let (library, findings) = Library::propose(robot, &settings)?;
     let excitation = match logs {
-        Some((pipeline, trajectories)) if !trajectories.is_empty() => {
-            let unknown = trajectories.iter().any(|t| t.payload == Payload::Unknown);
-            for trajectory in trajectories.iter_mut() {
-                trajectory.payload_acts = !unknown || trajectory.payload == Payload::Unknown;
+        Some((pipeline, mut logs)) if !logs.is_empty() => {
+            let unknown = logs.iter().any(|at| at.log.payload() == Payload::Unknown);
+            for LookedAt {
+                log, trajectory, ..
+            } in &mut logs
+            {
+                trajectory.payload_acts = !unknown || log.payload() == Payload::Unknown;
             }
-            let (gram, rows) = statistics(robot, &library, pipeline, trajectories)?;
+            let (gram, rows) = statistics(robot, &library, pipeline, &logs)?;
             Some(excitation(robot, &library, &gram, &rows))
         }
         _ => None,
@@ -65,13 +80,19 @@ fn statistics(
     robot: &Robot,
     library: &Library,
     pipeline: &Pipeline,
-    trajectories: &[Trajectory],
+    logs: &[LookedAt<'_>],
 ) -> Result<(Gram, States)> {
     let dof = robot.dof();
-    let counts = trajectories.iter();
-    let count: usize = counts
-        .map(|trajectory| count_rows(pipeline, trajectory, RowSignal::Filtered))
-        .sum();
+    let mut count = 0;
+    for LookedAt {
+        log, trajectory, ..
+    } in logs
+    {
+        count += match log {
+            Log::Whole(_) => count_rows(pipeline, trajectory, RowSignal::Filtered),
+            Log::Long(_) => ready(robot, log, pipeline)?.rows_at_most(pipeline),
+        };
+    }
     let step = (count / STATES).max(1);
     let mut accumulators: Vec<JointAccumulator> = (0..dof)
         .map(|joint| {
@@ -82,7 +103,7 @@ fn statistics(
     let mut kept = vec![[(); 3].map(|()| Vec::new()); dof];
     let mut still = vec![Vec::new(); dof];
     let mut row = 0;
-    for trajectory in trajectories {
+    let mut look = |trajectory: &Trajectory| {
         visit_rows(
             robot,
             library,
@@ -114,7 +135,24 @@ fn statistics(
                 }
                 Ok(())
             },
-        )?;
+        )
+    };
+    for LookedAt {
+        log,
+        trajectory,
+        incidents,
+    } in logs
+    {
+        match log {
+            Log::Whole(_) => look(trajectory)?,
+            Log::Long(long) => long.visit(&mut Vec::new(), |_, chapter, _| {
+                let (mut part, _) =
+                    prepare(robot, chapter, pipeline)?.align(pipeline, Raw::None)?;
+                part.payload_acts = trajectory.payload_acts;
+                leave_out(pipeline, &mut part, incidents);
+                look(&part)
+            })?,
+        }
     }
     let channel = |k: usize| -> Vec<f64> {
         let of_joints = kept.iter().flat_map(|joint| joint[k].iter());

@@ -13,6 +13,13 @@ pub use aligned::{Aligned, Line};
 pub use log_exp::{exp, ln};
 pub use trig::{sin_cos, sin_cos_fused};
 
+/// Whether `f64::mul_add` is one instruction in code that is compiled for these vectors; else it may be a slow call.
+#[must_use]
+pub const fn fuses<S: pulp::Simd>() -> bool {
+    // All of pulp's vectors of these processors have it, and one number at a time may not.
+    cfg!(any(target_arch = "x86_64", target_arch = "aarch64")) && S::F64_LANES > 1
+}
+
 /// Samples per lane group.
 pub const LANES: usize = 8;
 

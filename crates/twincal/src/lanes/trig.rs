@@ -1,6 +1,6 @@
 //! Sine and cosine of eight samples at once.
 
-use super::{LANES, Lane};
+use super::{LANES, Lane, fuses};
 
 /// Largest |x| of the vector path; larger and non-finite samples take the standard library's road, one by one.
 const VECTOR_LIMIT: f64 = 1.0e6;
@@ -57,9 +57,7 @@ pub fn sin_cos(x: &Lane) -> (Lane, Lane) {
 /// but not the bytes of the other; without such vectors the same as [`sin_cos`].
 #[inline(always)]
 pub fn sin_cos_fused<S: pulp::Simd>(_simd: S, x: &Lane) -> (Lane, Lane) {
-    // All of pulp's vectors of these processors have it, and one number at a time may not.
-    let fuses = cfg!(any(target_arch = "x86_64", target_arch = "aarch64")) && S::F64_LANES > 1;
-    if fuses {
+    if fuses::<S>() {
         on_lanes(x, reduced_fused)
     } else {
         on_lanes(x, reduced)

@@ -122,6 +122,7 @@ impl<'a> PreparedLog<'a> {
         });
         PreparedLog {
             log: Cow::Owned(Recording {
+                unfolded: self.log.unfolded,
                 name: self.log.name.clone(),
                 time: Vec::new(),
                 joints: channels.collect(),

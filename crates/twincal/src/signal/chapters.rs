@@ -59,7 +59,7 @@ impl LongLog {
     ) -> Result<()> {
         self.walk(true, findings, |_, place, said| {
             visit(&place.motion(pipeline), said)?;
-            // No row is lost at the ends of a chapter, whatever filters say of it alone.
+            // What filters trim of a part says nothing of the log: most of it is another chapter's.
             said.retain(|finding| finding.code != "borders");
             Ok(())
         })
@@ -172,13 +172,7 @@ impl LongLog {
 impl<'a> Place<'a> {
     fn motion(&self, pipeline: &Pipeline) -> ChapterMotion<'a> {
         let chapter = self.chapter;
-        let interval = median_step(&chapter.time).unwrap_or(f64::INFINITY);
-        let seconds = if pipeline.is_off() {
-            0.0
-        } else {
-            pipeline.motion_half_length() + NEAREST * interval.max(pipeline.motion_interval)
-        };
-        let reach = Reach { seconds, interval };
+        let reach = Reach::of(chapter, pipeline);
         let lead = self
             .before
             .map(|before| (before, reach.back(before, chapter)));
@@ -204,54 +198,85 @@ impl<'a> Place<'a> {
 /// How far a chapter looks into its neighbours.
 struct Reach {
     seconds: f64,
-    /// Median step, s.
-    interval: f64,
+    /// Longest step without a cut, s.
+    longest: f64,
+    /// Rows without motion are usual (a table that joins topics of different rates), and cut nothing.
+    sparse: bool,
 }
 
 impl Reach {
+    fn of(chapter: &Recording, pipeline: &Pipeline) -> Self {
+        let rows: Vec<usize> = (0..chapter.time.len())
+            .filter(|&row| finite(chapter, row))
+            .collect();
+        let stamps: Vec<f64> = rows.iter().map(|&row| chapter.time[row]).collect();
+        let interval = median_step(&stamps).unwrap_or(0.0);
+        let seconds = if pipeline.is_off() {
+            0.0
+        } else {
+            pipeline.motion_half_length() + NEAREST * interval.max(pipeline.motion_interval)
+        };
+        let beside = rows.windows(2).filter(|pair| pair[1] == pair[0] + 1);
+        Self {
+            seconds,
+            longest: GAP * interval,
+            sparse: 2 * beside.count() < rows.len(),
+        }
+    }
+
     /// Rows at the end of `before` that go on in `chapter` without a cut.
     fn back(&self, before: &Recording, chapter: &Recording) -> Range<usize> {
         let len = before.time.len();
-        let Some(&edge) = chapter.time.first() else {
-            return len..len;
-        };
-        let mut later = edge;
-        let mut first = len;
-        while first > 0 && finite(before, first - 1) {
-            let stamp = before.time[first - 1];
-            if !self.follows(stamp, later) || edge - stamp > self.seconds {
-                break;
-            }
-            (first, later) = (first - 1, stamp);
-        }
-        first..len
+        let own = (0..chapter.time.len()).map(|row| (chapter, row));
+        let theirs = (0..len).rev().map(|row| (before, row));
+        len - self.taken(own, theirs, -1.0)..len
     }
 
     /// Rows at the beginning of `after` that go on from `chapter` without a cut.
     fn on(&self, chapter: &Recording, after: &Recording) -> Range<usize> {
-        let Some(&edge) = chapter.time.last() else {
-            return 0..0;
-        };
-        let mut earlier = edge;
-        let mut end = 0;
-        while end < after.time.len() && finite(after, end) {
-            let stamp = after.time[end];
-            if !self.follows(earlier, stamp) || stamp - edge > self.seconds {
-                break;
-            }
-            (end, earlier) = (end + 1, stamp);
-        }
-        0..end
+        let own = (0..chapter.time.len()).rev().map(|row| (chapter, row));
+        let theirs = (0..after.time.len()).map(|row| (after, row));
+        0..self.taken(own, theirs, 1.0)
     }
 
-    /// Whether the clock is not cut between two stamps.
-    fn follows(&self, earlier: f64, later: f64) -> bool {
-        let step = later - earlier;
-        step >= 0.0 && step <= GAP * self.interval
+    /// How many of the rows behind a border are taken, in the direction of time: the chapter's own rows come from the border inwards,
+    /// the others outwards.
+    fn taken<'r>(
+        &self,
+        mut own: impl Iterator<Item = (&'r Recording, usize)>,
+        theirs: impl Iterator<Item = (&'r Recording, usize)>,
+        direction: f64,
+    ) -> usize {
+        let edge = if self.sparse {
+            own.find(|(recording, row)| finite(recording, *row))
+        } else {
+            own.next()
+                .filter(|(recording, row)| finite(recording, *row))
+        };
+        let Some((recording, row)) = edge else {
+            return 0;
+        };
+        let edge = recording.time[row];
+        let (mut last, mut taken) = (edge, 0);
+        for (seen, (recording, row)) in theirs.enumerate() {
+            if !finite(recording, row) {
+                if self.sparse {
+                    continue;
+                }
+                break;
+            }
+            let stamp = recording.time[row];
+            let step = direction * (stamp - last);
+            if !(0.0..=self.longest).contains(&step) || (stamp - edge).abs() > self.seconds {
+                break;
+            }
+            (last, taken) = (stamp, seen + 1);
+        }
+        taken
     }
 }
 
-/// Whether the motion of a row is.
+/// Whether the motion of a row is, and its stamp.
 fn finite(recording: &Recording, row: usize) -> bool {
     let of_joint = |joint: &Channels| {
         let channels = [Some(&joint.q), joint.qd.as_ref(), joint.qdd.as_ref()];
@@ -260,7 +285,7 @@ fn finite(recording: &Recording, row: usize) -> bool {
             .flatten()
             .all(|values| values[row].is_finite())
     };
-    recording.joints.iter().all(of_joint)
+    recording.time[row].is_finite() && recording.joints.iter().all(of_joint)
 }
 
 /// The motion of some rows, one behind the other.
@@ -281,6 +306,7 @@ fn joined(parts: &[(&Recording, Range<usize>)]) -> Recording {
         temperature: None,
     };
     Recording {
+        unfolded: first.unfolded,
         name: first.name.clone(),
         time: join(&|log| Some(&log.time)).unwrap_or_default(),
         joints: (0..first.joints.len()).map(joint).collect(),

@@ -98,8 +98,9 @@ pub(crate) fn choose<'a>(
 fn needs_a_filter(long: &LongLog) -> Error {
     Error::Log {
         log: long.name.clone(),
-        problem: "is read in chapters, which only a filter can do without".into(),
-        remedy: "set [signal] cutoff_hz to \"auto\" or a number, or read it whole".into(),
+        problem: "is in chapters, which are made for a filter".into(),
+        remedy: "set [signal] cutoff_hz to \"auto\" or a number above 0, or hold the log in memory"
+            .into(),
     }
 }
 

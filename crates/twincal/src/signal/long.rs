@@ -105,6 +105,7 @@ impl LongLog {
         recording.name.clone_from(&self.name);
         recording.payload = self.payload;
         self.folding.unfold(chapter, &mut recording);
+        recording.unfolded = true;
         Ok(recording)
     }
 

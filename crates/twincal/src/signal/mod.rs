@@ -120,6 +120,8 @@ pub enum Payload {
 /// A log as read: joints already matched to the robot's q1…qn, values untouched (NaN included).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
+    /// Whether angles are unfolded already, or known not to be folded, by what the whole log shows: they are left as they are then.
+    pub unfolded: bool,
     /// Name as given by the user.
     pub name: String,
     /// Time stamps as logged, s.

@@ -298,7 +298,7 @@ fn unfold(
         rows += run.rows.len();
     }
     let one = |(joint, facts): (usize, &JointFacts)| {
-        if !matches!(facts.kind, JointKind::Revolute | JointKind::Continuous) {
+        if log.unfolded || !matches!(facts.kind, JointKind::Revolute | JointKind::Continuous) {
             return None;
         }
         let mut q: Vec<f64> = runs

@@ -67,6 +67,7 @@ fn recording(
         })
         .collect();
     Recording {
+        unfolded: false,
         name: "run".into(),
         time,
         joints,

@@ -55,7 +55,7 @@ struct Folded {
 }
 
 impl Folding {
-    /// Looks at all positions, by the rule of [`unwrap_angle`]; a jump right where two chapters meet alone is none.
+    /// Looks at all positions, by the rule of [`unwrap_angle`], whatever other channels lack there; a jump right where two chapters meet alone is none.
     ///
     /// # Errors
     /// Those of [`ReadChapter::read`].

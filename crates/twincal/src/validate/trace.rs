@@ -24,7 +24,7 @@ pub struct TraceRows<'a> {
 }
 
 impl Trace {
-    /// An empty trace of `joint` in `log`, which keeps every `step`-th of `rows` rows, `step` the smallest that leaves at most [`MAX_POINTS`].
+    /// An empty trace of `joint` in `log`, which keeps every `step`-th row, `step` the smallest that leaves at most [`MAX_POINTS`] of `rows` rows.
     #[must_use]
     pub fn new(log: impl Into<String>, joint: impl Into<String>, rows: usize) -> Self {
         Self {

@@ -105,7 +105,8 @@ pub(super) fn examine(
     all.lock_what_is_not_logged(model, paths, &mut settings)?;
     all.map_columns(paths, &settings);
     let robot = &all.robot.robot;
-    let read = LogInput::read(paths, robot, &settings.log, Long::InChapters, progress);
+    let long = Long::of_settings(&settings);
+    let read = LogInput::read(paths, robot, &settings.log, long, progress);
     all.findings.append(&mut all.robot.findings);
     let mut logs = match read {
         Ok(logs) => logs,
@@ -270,7 +271,7 @@ impl Examination {
         };
         self.findings.extend(more);
         self.findings.append(&mut checkup.findings);
-        let aligned = Some((&pipeline, &mut checkup.trajectories[..]));
+        let aligned = Some((&pipeline, checkup.looked_at(logs)));
         match outlook(robot, &settings.calibration.library, aligned) {
             Ok(outlook) => {
                 self.findings.extend(outlook.findings.iter().cloned());

@@ -1,20 +1,17 @@
 //! A log in chapters says what the same log in memory says: the truth, the same incidents, and what is wrong with single chapters.
 
-#[path = "../examples/two_link.rs"]
+#[path = "../../examples/two_link.rs"]
 #[allow(dead_code, reason = "its `main`, log and study are not needed here")]
 mod two_link;
+mod motion;
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex};
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::posterior::random::Random;
-use twincal::robot::{Robot, Workspace, inverse_dynamics};
-use twincal::rows::{RowSignal, visit_rows};
-use twincal::signal::{
-    Channels, Log, LongLog, Payload, Pipeline, ReadChapter, Recording, Shelf, Trajectory, align,
-    describe,
-};
-use twincal::term::{Family, Library, LibrarySettings};
+use twincal::robot::{Workspace, inverse_dynamics};
+use twincal::signal::{Channels, Log, LongLog, Payload, ReadChapter, Recording, Shelf};
+use twincal::term::Family;
 
 const RATE: f64 = 200.0;
 const SAMPLES: usize = 48_000;
@@ -60,6 +57,7 @@ fn recording() -> Recording {
         temperature: None,
     });
     Recording {
+        unfolded: false,
         name: "run".into(),
         time,
         joints: joints.to_vec(),
@@ -92,6 +90,7 @@ impl ReadChapter for Cut {
             temperature: None,
         };
         Ok(Recording {
+            unfolded: false,
             name: String::new(),
             time: part(&self.recording.time),
             joints: self.recording.joints.iter().map(joint).collect(),
@@ -290,205 +289,6 @@ fn many_chapters_lose_no_raw_rows() {
     // White noise of 0.1 N·m: what the filter takes out is nearly all of it.
     for noise in &long.twin.noise {
         assert!((noise.out_of_band - 0.1).abs() < 0.02, "{noise:?}");
-    }
-}
-
-/// Two minutes of position and velocity at `stamps`, both exact.
-fn swinging(time: Vec<f64>) -> Recording {
-    let joint = |f: f64| Channels {
-        q: time.iter().map(|t| (TAU * f * t).sin()).collect(),
-        qd: Some(time.iter().map(|t| TAU * f * (TAU * f * t).cos()).collect()),
-        qdd: None,
-        tau: Some(vec![f64::NAN; time.len()]),
-        temperature: None,
-    };
-    Recording {
-        name: "run".into(),
-        joints: vec![joint(0.31), joint(0.47)],
-        payload: Payload::None,
-        time,
-    }
-}
-
-/// Every row of motion of the whole log is there once, and the same: where chapters meet, where the clock is uneven, and where the log
-/// is cut beside or at the end of a chapter.
-#[test]
-fn motion_is_that_of_the_whole_log_where_chapters_meet() {
-    let robot = two_link::arm(2.0).expect("an arm");
-    let even = |i: usize| i as f64 / RATE;
-    let uneven = |i: usize| even(i) + 2e-4 * (i as f64 * 1.7).sin();
-    // A grid of its own starts anew in every piece, so that its last sample may stand elsewhere.
-    for (stamp, thinned, slack) in [
-        (&even as &dyn Fn(usize) -> f64, 0.0, 0),
-        (&uneven, 0.0, 4),
-        (&even, 0.02, 4 * 4),
-    ] {
-        let mut recording = swinging((0..SAMPLES).map(stamp).collect());
-        let [edge, second] = [SAMPLES / CHAPTERS, 2 * SAMPLES / CHAPTERS];
-        // A gap just before chapters meet, NaN just behind, and a gap right where they do.
-        recording.time[edge - 40..]
-            .iter_mut()
-            .for_each(|t| *t += 0.7);
-        recording.joints[0].q[second + 30] = f64::NAN;
-        let third = 3 * SAMPLES / CHAPTERS;
-        recording.time[third..].iter_mut().for_each(|t| *t += 0.3);
-        let pipeline = Pipeline {
-            cutoff_hz: 5.0,
-            motion_cutoff_hz: 20.0,
-            rate_hz: 12.5,
-            motion_interval: thinned,
-            standstill_velocity: vec![0.02; 2],
-            ..Pipeline::off(2)
-        };
-        let mut wanted = vec![None; SAMPLES];
-        let mut motion = recording.clone();
-        motion.take_torque();
-        let (whole, _) = align(&robot, &motion, &pipeline).expect("motion");
-        rows(&robot, &pipeline, &whole, |row, values| {
-            wanted[row] = Some(values)
-        });
-        let Log::Long(long) = in_chapters(recording) else {
-            unreachable!("it is long");
-        };
-        let mut got = vec![None; SAMPLES];
-        let (mut first, mut findings) = (0, Vec::new());
-        long.visit_motion(&pipeline, &mut findings, |part, said| {
-            assert_eq!(part.own.len(), part.chapter.time.len());
-            assert_eq!(part.motion.time[part.own.clone()], part.chapter.time);
-            let (trajectory, more) = align(&robot, &part.motion, &pipeline)?;
-            said.extend(more);
-            rows(&robot, &pipeline, &trajectory, |row, values| {
-                if part.own.contains(&row) {
-                    let row = first + row - part.own.start;
-                    assert!(
-                        got[row].replace(values).is_none(),
-                        "row {row} is there twice"
-                    );
-                }
-            });
-            first += part.own.len();
-            Ok(())
-        })
-        .expect("chapters");
-        let missing = (0..SAMPLES).filter(|&row| wanted[row].is_some() != got[row].is_some());
-        let missing: Vec<usize> = missing.collect();
-        assert!(missing.len() <= slack, "{thinned}: {missing:?}");
-        assert!(got.iter().flatten().count() > SAMPLES - 2000);
-        for (row, (wanted, got)) in wanted.iter().zip(&got).enumerate() {
-            for (wanted, got) in wanted.iter().zip(got).flat_map(|(a, b)| a.iter().zip(b)) {
-                assert!(
-                    (wanted - got).abs() < 1e-6,
-                    "row {row}: {got}, not {wanted}"
-                );
-            }
-        }
-        // What was borrowed is not told: one row is NaN, in one chapter.
-        let lost: Vec<u64> = (findings.iter())
-            .filter(|f| f.code == "not_finite_rows")
-            .map(|f| f.count)
-            .collect();
-        assert_eq!(lost, [1]);
-        assert!(
-            findings
-                .iter()
-                .all(|f| f.code != "short_segments" && f.code != "borders")
-        );
-    }
-}
-
-/// Position, velocity and acceleration of both joints at every input row that the filter reaches.
-fn rows(
-    robot: &Robot,
-    pipeline: &Pipeline,
-    trajectory: &Trajectory,
-    mut take: impl FnMut(usize, Vec<f64>) + Send,
-) {
-    let settings = LibrarySettings {
-        families: vec![Family::Viscous],
-        ..LibrarySettings::default()
-    };
-    let (library, _) = Library::propose(robot, &settings).expect("a library");
-    visit_rows(
-        robot,
-        &library,
-        pipeline,
-        trajectory,
-        RowSignal::Raw,
-        &mut |block| {
-            for (i, &row) in block.input_rows.iter().enumerate() {
-                let motion = [block.q, block.qd, block.qdd];
-                let values = motion.map(|channel| [channel[i], channel[block.len + i]]);
-                take(row, values.concat());
-            }
-            Ok(())
-        },
-    )
-    .expect("rows");
-}
-
-/// An angle that turns on through several chapters, folded into ± π: unfolded as that of the whole log, and told once.
-#[test]
-fn angles_are_unfolded_as_those_of_the_whole_log() {
-    let mut recording = swinging((0..SAMPLES).map(|i| i as f64 / RATE).collect());
-    let truth: Vec<f64> = (recording.time.iter())
-        .map(|t| 0.2 * t + 0.5 * (TAU * 0.3 * t).sin())
-        .collect();
-    recording.joints[1].q = (truth.iter())
-        .map(|q| (q + PI).rem_euclid(TAU) - PI)
-        .collect();
-    recording.joints[1].q[100] = f64::NAN;
-    let jumps = recording.joints[1].q.windows(2);
-    let jumps = jumps.filter(|q| (q[1] - q[0]).abs() > PI).count();
-    assert!(jumps > 5);
-    let Log::Long(long) = in_chapters(recording.clone()) else {
-        unreachable!("it is long");
-    };
-    let whole = long.whole().expect("chapters");
-    assert_eq!(whole.joints[0].q, recording.joints[0].q);
-    for (row, (got, wanted)) in whole.joints[1].q.iter().zip(&truth).enumerate() {
-        assert!((got - wanted).abs() < 1e-9 || row == 100, "row {row}");
-    }
-    let mut findings = Vec::new();
-    long.visit(&mut findings, |_, _, _| Ok(()))
-        .expect("chapters");
-    assert_eq!(findings.len(), 1);
-    assert_eq!(
-        (findings[0].code.as_str(), findings[0].count),
-        ("wrapped_angle", jumps as u64)
-    );
-    // A joint that leaves one turn was not folded, whatever jumps it has.
-    recording.joints[1].q[200] = 9.0;
-    let Log::Long(long) = in_chapters(recording.clone()) else {
-        unreachable!("it is long");
-    };
-    assert_eq!(
-        long.whole().expect("chapters").joints[1].q[101..],
-        recording.joints[1].q[101..]
-    );
-}
-
-/// What is told of chapters is told of the log: one stretch, the mean and the range of all of it.
-#[test]
-fn a_long_log_is_described_as_a_whole_one() {
-    let robot = two_link::arm(2.0).expect("an arm");
-    let mut recording = recording();
-    recording.time[SAMPLES / 3..]
-        .iter_mut()
-        .for_each(|t| *t += 5.0);
-    let (whole, _) = describe(&robot, &Log::from(&recording)).expect("a log");
-    let (long, _) = describe(&robot, &in_chapters(recording.clone())).expect("a log");
-    assert_eq!((whole.segments, whole.samples), (2, SAMPLES as u64));
-    assert_eq!((long.segments, long.samples), (2, SAMPLES as u64));
-    assert!((long.duration - whole.duration).abs() < 1e-6 && long.resampled == whole.resampled);
-    let close = |a: f64, b: f64| assert!((a - b).abs() <= 1e-12 * a.abs(), "{a}, {b}");
-    for ((a, b), channels) in whole.joints.iter().zip(&long.joints).zip(&recording.joints) {
-        assert_eq!(a.q_range, b.q_range);
-        close(a.q_sd, b.q_sd);
-        close(a.qd_rms, b.qd_rms);
-        close(a.tau_sd.expect("torque"), b.tau_sd.expect("torque"));
-        // Against the definition.
-        let square: f64 = channels.tau.iter().flatten().map(|t| t * t).sum();
-        close((square / SAMPLES as f64).sqrt(), b.tau_rms.expect("torque"));
     }
 }
 
