@@ -18,8 +18,9 @@ pub(super) struct Geometry {
     pub(super) places: Vec<u32>,
     /// μ at those places.
     pub(super) mean: Vec<f64>,
-    /// Upper triangular R, packed by rows.
-    pub(super) root: Vec<f64>,
+    /// μ and upper triangular R by columns: of [`ROWS`] rows at a time, first of all with μ before them, those from its first
+    /// row on. What is below the diagonal is 0.
+    pub(super) root: Vec<[f64; ROWS]>,
     /// A⁻¹ at those places, to compare models.
     covariance: Vec<f64>,
 }
@@ -131,9 +132,9 @@ impl Geometry {
             .flat_map(|a| inverse_columns.iter().map(|b| dot(a, b)))
             .collect();
         Self {
+            root: by_columns(&mean, &triangular(&mut inverse_columns)),
             places,
             mean,
-            root: triangular(&mut inverse_columns),
             covariance,
         }
     }
@@ -149,6 +150,30 @@ impl Geometry {
             })
         })
     }
+}
+
+/// Rows of μ and R that are multiplied side by side: their sums fit into registers and do not wait for each other.
+pub(super) const ROWS: usize = 8;
+
+/// μ and R (packed by rows) as [`Geometry::root`] holds them.
+fn by_columns(mean: &[f64], packed: &[f64]) -> Vec<[f64; ROWS]> {
+    let size = mean.len();
+    // Row 0 is μ, row i + 1 is row i of R.
+    let entry = |row: usize, column: usize| match row.checked_sub(1) {
+        None => mean[column],
+        Some(i) if i <= column => packed[i * size - i * i.saturating_sub(1) / 2 - i + column],
+        Some(_) => 0.0,
+    };
+    let mut root = Vec::new();
+    for first in (0..=size).step_by(ROWS) {
+        for column in first.saturating_sub(1)..size {
+            root.push(std::array::from_fn(|k| {
+                let row = first + k;
+                if row <= size { entry(row, column) } else { 0.0 }
+            }));
+        }
+    }
+    root
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

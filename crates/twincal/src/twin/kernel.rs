@@ -1,7 +1,7 @@
 //! Eight rows of one joint at a time: moments and quantiles of their mixtures of Student-t.
 
-use super::components::Components;
-use crate::lanes::{LANES, Lane};
+use super::components::{Components, ROWS};
+use crate::lanes::{LANES, Lane, fuses};
 use crate::posterior::mixture::Level;
 use crate::posterior::student::StudentT;
 
@@ -22,6 +22,8 @@ pub(super) struct Constants<'a> {
 /// Scratch memory for one thread.
 #[derive(Default)]
 pub(super) struct Scratch {
+    /// The columns of one geometry.
+    own: Vec<Lane>,
     /// Location and q of each geometry.
     locations: Vec<Lane>,
     spreads: Vec<Lane>,
@@ -62,6 +64,17 @@ impl pulp::WithSimd for Group<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _simd: S) -> Bands {
+        if fuses::<S>() {
+            self.bands::<true>()
+        } else {
+            self.bands::<false>()
+        }
+    }
+}
+
+impl Group<'_> {
+    #[inline(always)]
+    fn bands<const FUSED: bool>(self) -> Bands {
         let Group {
             constants,
             scratch,
@@ -70,7 +83,7 @@ impl pulp::WithSimd for Group<'_> {
             spread,
             band,
         } = self;
-        locate(constants, scratch, x, spread);
+        locate::<FUSED>(constants, scratch, x, spread);
         let epistemic = epistemic(constants, scratch);
         let [mut low, mut high] = [
             quantile(constants, scratch, constants.levels[0]),
@@ -111,28 +124,35 @@ impl pulp::WithSimd for Group<'_> {
 
 /// Location `xᵀμ` and `q = |R x|²` of each geometry, scale of each component.
 #[inline(always)]
-fn locate(constants: &Constants<'_>, scratch: &mut Scratch, x: &[Lane], noise: &Lane) {
+fn locate<const FUSED: bool>(
+    constants: &Constants<'_>,
+    scratch: &mut Scratch,
+    x: &[Lane],
+    noise: &Lane,
+) {
     scratch.locations.clear();
     scratch.spreads.clear();
     scratch.scales.clear();
     scratch.inverses.clear();
     for geometry in &constants.joint.geometries {
+        scratch.own.clear();
+        (scratch.own).extend(geometry.places.iter().map(|&place| x[place as usize]));
         let (mut location, mut spread) = ([0.0; LANES], [0.0; LANES]);
-        let mut entry = 0;
-        for (i, (&place, &mean)) in geometry.places.iter().zip(&geometry.mean).enumerate() {
-            let column = &x[place as usize];
-            for lane in 0..LANES {
-                location[lane] += mean * column[lane];
-            }
-            let count = geometry.places.len() - i;
-            let along = product(
-                &geometry.root[entry..entry + count],
-                &geometry.places[i..],
-                x,
-            );
-            entry += count;
-            for lane in 0..LANES {
-                spread[lane] += along[lane] * along[lane];
+        let mut root = &geometry.root[..];
+        for first in (0..=scratch.own.len()).step_by(ROWS) {
+            let own = &scratch.own[first.saturating_sub(1)..];
+            let (block, rest) = root.split_at(own.len());
+            root = rest;
+            let products = multiply::<FUSED>(block, own);
+            for (row, product) in products.iter().enumerate() {
+                if first + row == 0 {
+                    location = *product;
+                    continue;
+                }
+                for lane in 0..LANES {
+                    spread[lane] =
+                        multiply_add::<FUSED>(product[lane], product[lane], spread[lane]);
+                }
             }
         }
         scratch.locations.push(location);
@@ -153,27 +173,24 @@ fn locate(constants: &Constants<'_>, scratch: &mut Scratch, x: &[Lane], noise: &
     }
 }
 
-/// `Σ_k r_k x_k` over the places of a row of R: four sums side by side, since each waits for its last addition.
+/// `Σ_k r_k x_k` of several rows side by side, so that no sum waits for itself.
 #[inline(always)]
-fn product(root: &[f64], places: &[u32], x: &[Lane]) -> Lane {
-    let mut sums = [[0.0; LANES]; 4];
-    let (root_fours, root_rest) = root.as_chunks::<4>();
-    let (place_fours, place_rest) = places.as_chunks::<4>();
-    for (root, places) in root_fours.iter().zip(place_fours) {
-        for k in 0..4 {
-            let column = &x[places[k] as usize];
+fn multiply<const FUSED: bool>(rows: &[[f64; ROWS]], x: &[Lane]) -> [Lane; ROWS] {
+    let mut sums = [[0.0; LANES]; ROWS];
+    for (entries, x) in rows.iter().zip(x) {
+        for (sum, &entry) in sums.iter_mut().zip(entries) {
             for lane in 0..LANES {
-                sums[k][lane] += root[k] * column[lane];
+                sum[lane] = multiply_add::<FUSED>(entry, x[lane], sum[lane]);
             }
         }
     }
-    for (root, place) in root_rest.iter().zip(place_rest) {
-        let column = &x[*place as usize];
-        for lane in 0..LANES {
-            sums[0][lane] += root * column[lane];
-        }
-    }
-    std::array::from_fn(|lane| (sums[0][lane] + sums[1][lane]) + (sums[2][lane] + sums[3][lane]))
+    sums
+}
+
+/// a b + c, fused where that is one instruction.
+#[inline(always)]
+fn multiply_add<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
+    if FUSED { a.mul_add(b, c) } else { a * b + c }
 }
 
 /// Var[xᵀβ | y] = E[φ q] + Var over components of xᵀμ.
