@@ -28,7 +28,7 @@ def test_the_comparison_sees_the_rows_that_the_program_sees(tmp_path, monkeypatc
     monkeypatch.setattr(planar, "RATE", 100.0)
     monkeypatch.setattr(planar, "motion", carried_motion)
     data = planar.Data(PROBLEMS["white"], 1, tmp_path)
-    options = argparse.Namespace(twincal=program("twincal"), quick=True)
+    options = argparse.Namespace(twincal=program("twincal"), quick=True, settings="")
     run = selection.measure(data, 1, options, tmp_path)
     score = run["scores"]["twincal|filtered"]
     # SymPy's columns and SciPy's filter with the program's coefficients give the program's own held-out error. Two sets of
