@@ -1,6 +1,6 @@
 //! `twincal check`: scores of a twin on new logs against its gates.
 
-use super::inputs::{LogInput, Long};
+use super::inputs::LogInput;
 use super::summary::{Notes, findings, paragraph, percent, scores, significant};
 use super::{code_of, print_json, require_strict, settings, start_threads};
 use crate::args::Check;
@@ -48,13 +48,7 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     progress.step(&format!("reading {}", flags.twin.to_string_lossy()));
     let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, false)?;
     let twin = &stored.calibration.twin;
-    let mut logs = LogInput::read(
-        &flags.logs,
-        &twin.robot,
-        &settings.log,
-        Long::with_filter(!twin.pipeline.is_off()),
-        &progress,
-    )?;
+    let mut logs = LogInput::for_twin(&flags.logs, twin, &settings.log, &progress)?;
     progress.step("predicting the logs");
     let mut found = std::mem::take(&mut logs.findings);
     let validation = score(twin, &logs, &mut found).map_err(|error| logs.as_given(error))?;

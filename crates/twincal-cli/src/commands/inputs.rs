@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::robot::Robot;
 use twincal::signal::{Auto, Log};
+use twincal::twin::Twin;
 use twincal_io::artifact::{MODEL_MJCF, MODEL_URDF, sha256, sha256_of_file};
 use twincal_io::config::{LogSettings, Settings};
 use twincal_io::log::{LogOptions, files_of, open_log, parse_log, read_log};
@@ -71,7 +72,7 @@ pub(super) enum Long {
 
 impl Long {
     /// Without a filter every sample is a row, and all are in memory whatever the reader does.
-    pub(super) fn with_filter(filter: bool) -> Self {
+    fn with_filter(filter: bool) -> Self {
         if filter {
             Self::InChapters
         } else {
@@ -136,6 +137,17 @@ impl LogInput {
             });
         }
         Ok(input)
+    }
+
+    /// Reads logs as a twin sees them.
+    pub(super) fn for_twin(
+        paths: &[PathBuf],
+        twin: &Twin,
+        settings: &LogSettings,
+        progress: &Progress,
+    ) -> Outcome<Self> {
+        let long = Long::with_filter(!twin.pipeline.is_off());
+        Self::read(paths, &twin.robot, settings, long, progress)
     }
 
     fn new(given: Vec<PathBuf>) -> Self {

@@ -1,6 +1,6 @@
 //! `twincal predict`: torque with intervals, one row per input row.
 
-use super::inputs::{LogInput, Long, refuse_input_as_output};
+use super::inputs::{LogInput, refuse_input_as_output};
 use super::summary::{Notes, paragraph};
 use super::{code_of, print_json, require_strict, settings, start_threads};
 use crate::args::Predict;
@@ -60,13 +60,7 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
     progress.step(&format!("reading {}", flags.twin.to_string_lossy()));
     let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, false)?;
     let twin = &stored.calibration.twin;
-    let mut logs = LogInput::read(
-        &flags.logs,
-        &twin.robot,
-        &settings.log,
-        Long::with_filter(!twin.pipeline.is_off()),
-        &progress,
-    )?;
+    let mut logs = LogInput::for_twin(&flags.logs, twin, &settings.log, &progress)?;
     progress.step("predicting the logs");
     let mut prediction = Prediction {
         findings: std::mem::take(&mut logs.findings),

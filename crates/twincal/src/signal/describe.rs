@@ -78,7 +78,7 @@ struct Sums {
     intervals: Vec<f64>,
     segments: u64,
     resampled: bool,
-    /// Last stamp so far, s.
+    /// Last stamp of the chapter before, s, if a stretch that was counted reaches it.
     end: Option<f64>,
     joints: Vec<JointSums>,
 }
@@ -120,12 +120,18 @@ impl Sums {
             .map(|p| p.time.len() as f64 * p.interval)
             .sum::<f64>();
         self.segments += pieces.len() as u64;
-        // A chapter is no cut of the log.
-        let step = (log.time.first().zip(self.end)).map(|(start, end)| start - end);
-        if step.is_some_and(|step| (0.0..=GAP * interval).contains(&step)) && !pieces.is_empty() {
-            self.segments = self.segments.saturating_sub(1).max(1);
+        // A chapter is no cut of the log: what goes on in it was counted in the one before.
+        let starts = pieces
+            .first()
+            .filter(|piece| piece.rows.first() == Some(&0));
+        if let (Some(piece), Some(end)) = (starts, self.end) {
+            let step = log.time[piece.rows[0]] - end;
+            self.segments -= u64::from((0.0..=GAP * interval).contains(&step));
         }
-        self.end = log.time.last().copied();
+        let ends = pieces
+            .last()
+            .filter(|piece| piece.rows.last() == Some(&(log.time.len() - 1)));
+        self.end = ends.and_then(|_| log.time.last().copied());
         self.intervals.push(interval);
         self.resampled |= pieces.iter().any(Piece::resampled);
         let joints = self.joints.par_iter_mut().zip(&log.joints).enumerate();

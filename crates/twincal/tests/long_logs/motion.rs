@@ -292,4 +292,10 @@ fn a_long_log_is_described_as_a_whole_one() {
         let square: f64 = channels.tau.iter().flatten().map(|t| t * t).sum();
         close((square / SAMPLES as f64).sqrt(), b.tau_rms.expect("torque"));
     }
+    // A cut five rows before chapters meet: those rows are too few to be a stretch of their chapter, and what follows is one of the log.
+    recording.time[3 * SAMPLES / CHAPTERS - 5..]
+        .iter_mut()
+        .for_each(|t| *t += 5.0);
+    let (long, _) = describe(&robot, &in_chapters(recording)).expect("a log");
+    assert_eq!(long.segments, 3);
 }
