@@ -30,15 +30,15 @@ uint32 nanosec
 
 
 def record(target, joints, rows):
-    """One message per row (seconds, positions, velocities, efforts), on /joint_states."""
+    """One message per row (seconds, positions, velocities, efforts, and a topic where it is not /joint_states)."""
     with open(target, "wb") as out:
         writer = Writer(out)
         schema = writer.register_msgdef("sensor_msgs/msg/JointState", DEFINITION)
-        for number, (t, position, velocity, effort) in enumerate(rows):
+        for number, (t, position, velocity, effort, *topic) in enumerate(rows):
             stamp = START * 10**9 + round(t * 1e9)
             header = {"stamp": {"sec": stamp // 10**9, "nanosec": stamp % 10**9}, "frame_id": ""}
             message = {"header": header, "name": joints, "position": position, "velocity": velocity, "effort": effort}
-            writer.write_message("/joint_states", schema, message, stamp, stamp, number)
+            writer.write_message(*(topic or ["/joint_states"]), schema, message, stamp, stamp, number)
         writer.finish()
 
 

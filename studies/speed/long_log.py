@@ -1,10 +1,11 @@
 """How long a fit of a long log takes, and how much memory: from Parquet or MCAP to result.json and report.
 
-    python studies/speed/long_log.py [--robot panda] [--minutes 10] [--threads 2] [--repeat 3] [--families payload,tensor,…] [--mcap]
+    python studies/speed/long_log.py [--robot panda] [--minutes 10] [--threads 2] [--repeat 3] [--families payload,tensor,…] [--mcap [--apart]]
 
 The arm is that of studies/industrial_arms with its defects, logged at 1 kHz as joint positions, velocities and torques. Every repeat
 is one run of `twincal fit` in a new process, with default settings or with the candidate families named; printed are the median wall time and the largest memory.
-The time of `simulate` is not counted.
+`--apart`: motion and torque on
+topics of their own, torque 0.3 ms later. The time of `simulate` is not counted.
 """
 
 import argparse
@@ -67,8 +68,8 @@ def log(name, minutes, seed=1):
     return columns
 
 
-def write(name, minutes, file):
-    """The log as a file: columns, or one JointState message per row in chunks packed by zstd."""
+def write(name, minutes, file, apart):
+    """The log as a file: columns, or one JointState message per row in chunks packed by zstd; two on topics of their own if `apart`."""
     columns = log(name, minutes)
     if file.suffix == ".parquet":
         pq.write_table(pa.table(columns), file)
@@ -77,7 +78,11 @@ def write(name, minutes, file):
 
     joints = list(arms.load(name).names)[1:]
     channels = [np.stack([columns[f"{short}{j + 1}"] for j in range(len(joints))], axis=1).tolist() for short in ("q", "qd", "tau")]
-    record(file, joints, zip(columns["t"].tolist(), *channels))
+    rows = zip(columns["t"].tolist(), *channels)
+    if apart:
+        parts = lambda t, q, qd, tau: ((t, q, qd, [], "/motion"), (t + 3e-4, [], [], tau, "/torque"))  # noqa: E731
+        rows = (part for row in rows for part in parts(*row))
+    record(file, joints, rows)
 
 
 def measured(command):
@@ -100,18 +105,22 @@ def main():
     arguments.add_argument("--folder", type=Path, help="keep the log here and use it again")
     arguments.add_argument("--families", help="[library] families, with commas between [default: all that are on by default]")
     arguments.add_argument("--mcap", action="store_true", help="as MCAP instead of Parquet")
+    arguments.add_argument("--apart", action="store_true", help="with --mcap: motion and torque on topics of their own")
     given = arguments.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
         folder = given.folder or Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
-        file = folder / f"{given.robot}-{given.minutes:g}.{'mcap' if given.mcap else 'parquet'}"
+        ending = ("apart.mcap" if given.apart else "mcap") if given.mcap else "parquet"
+        file = folder / f"{given.robot}-{given.minutes:g}.{ending}"
         if not file.exists():
             # In a process of its own: a child's largest memory counts what its parent had when it was started.
-            maker = multiprocessing.get_context("spawn").Process(target=write, args=(given.robot, given.minutes, file))
+            maker = multiprocessing.get_context("spawn").Process(target=write, args=(given.robot, given.minutes, file, given.apart))
             maker.start()
             maker.join()
         locked = ", ".join(f'"{joint}" = 0.0' for joint in arms.ROBOTS[given.robot].locked)
         config = f"[model]\nlocked = {{ {locked} }}\n"
+        if given.apart:
+            config += '[log]\ntopic = ["/motion", "/torque"]\n'
         if given.families:
             config += f"[library]\nfamilies = {json.dumps(given.families.split(','))}\n"
         (folder / "twincal.toml").write_text(config)

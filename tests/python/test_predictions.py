@@ -3,6 +3,8 @@
 import csv
 import math
 
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 import pytest
 from conftest import ASSETS, fit, twincal
 from mcap.reader import make_reader
@@ -54,3 +56,16 @@ def test_mcap_is_the_csv(predicted):
                 cell = float(row[f"{joint}.{TOPICS[topic]}"])
                 assert effort == cell or math.isnan(effort) and math.isnan(cell)
     assert set(counts.values()) == {len(rows)}, counts
+
+
+def test_time_that_mcap_cannot_hold_is_refused(predicted, tmp_path):
+    table = pq.read_table(ASSETS / "heldout1.parquet")
+    early = pc.subtract(table["t"], 5.0)
+    pq.write_table(table.set_column(table.column_names.index("t"), "t", early), tmp_path / "early.parquet")
+    arguments = ["predict", tmp_path / "early.parquet", "--twin", predicted / "out", "-o"]
+    refused = twincal(*arguments, tmp_path / "out.mcap", expect=2)
+    assert "cannot stand in an MCAP file" in refused.stderr and "write .parquet or .csv" in refused.stderr
+    assert not (tmp_path / "out.mcap").exists()
+    twincal(*arguments, tmp_path / "out.csv", expect=None)
+    with open(tmp_path / "out.csv", newline="") as file:
+        assert float(next(csv.DictReader(file))["t"]) < 0

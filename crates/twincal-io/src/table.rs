@@ -11,6 +11,7 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 use std::io::{self, Write};
+use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -155,6 +156,15 @@ impl<W: Write + Send> TableWriter<W> {
             columns: columns.to_vec(),
             sink,
         })
+    }
+
+    /// Times that the format can hold, s.
+    pub fn times(&self) -> RangeInclusive<f64> {
+        match &self.sink {
+            Sink::Csv { .. } | Sink::Parquet { .. } => f64::NEG_INFINITY..=f64::INFINITY,
+            // Log time has no sign, `header.stamp` has 31 bits of seconds.
+            Sink::Mcap(_) => 0.0..=f64::from(i32::MAX),
+        }
     }
 
     /// Adds rows: one block per column, all of one length, in the order of the columns.

@@ -249,6 +249,19 @@ impl Prediction {
         findings: &mut Vec<Finding>,
     ) -> Result<io::Result<()>> {
         let twin = model.twin;
+        let (first, last) = table.times().into_inner();
+        let motion = stretch.motion;
+        let mut own = motion.time[stretch.own.clone()].iter();
+        // Rows without time are not predicted.
+        if let Some(time) = own.find(|time| **time < first || **time > last) {
+            return Err(twincal::Error::Log {
+                log: motion.name.clone(),
+                problem: format!(
+                    "time {time} s cannot stand in an MCAP file, whose stamps count from 0 to {last} s"
+                ),
+                remedy: "write .parquet or .csv, or let the log's time begin at 0".into(),
+            });
+        }
         let (trajectory, more) = twin.align(stretch.motion)?;
         findings.extend(more);
         let mut written = Ok(());

@@ -1,8 +1,9 @@
 //! From the numbers of a table to a recording: time from the file or the rate, channels per joint; of a long table chapter by chapter.
 
-use super::cells::{Cells, Chapter, Spilled};
+use super::cells::{Cells, Chapter, Spilled, unreadable};
 use super::columns::Selection;
 use super::scratch::TemporaryShelf;
+use super::stamps;
 use super::torque::to_joint_torque;
 use super::{LogOptions, Preset, Request};
 use crate::error::{Error, Place, Result};
@@ -42,6 +43,7 @@ pub(crate) fn assemble(
         robot: request.robot.clone(),
         options: request.options.clone(),
         scales: std::mem::take(&mut cells.scales),
+        origin: cells.origin,
         selection,
         rows,
     };
@@ -79,6 +81,8 @@ struct Make {
     options: LogOptions,
     /// See [`Cells::scales`].
     scales: Vec<f64>,
+    /// See [`Cells::origin`].
+    origin: Option<i64>,
     selection: Selection,
     /// Of the whole log.
     rows: usize,
@@ -95,17 +99,8 @@ struct OnDisk {
 impl OnDisk {
     fn recording(&self, chapter: usize, findings: &mut Vec<Finding>) -> Result<Recording> {
         let chapter = &self.chapters[chapter];
-        let columns = (self.spilled.read(chapter)).map_err(|e| self.unreadable(&e))?;
+        let columns = (self.spilled.read(chapter)).map_err(|e| unreadable(&self.make.name, &e))?;
         self.make.recording(columns, chapter.first, findings)
-    }
-
-    fn unreadable(&self, error: &std::io::Error) -> Error {
-        Error::system(
-            &self.make.name,
-            "read its numbers back from a temporary file",
-            error,
-            "look at the disk that holds temporary files (TMPDIR)",
-        )
     }
 
     /// The error as the core knows it.
@@ -132,7 +127,7 @@ impl ReadChapter for OnDisk {
             return Ok(Vec::new());
         };
         let read = self.spilled.read_column(&self.chapters[chapter], column);
-        let mut q = read.map_err(|e| self.of_core(self.unreadable(&e)))?;
+        let mut q = read.map_err(|e| self.of_core(unreadable(&self.make.name, &e)))?;
         self.make.scale(column, &mut q);
         Ok(q)
     }
@@ -215,6 +210,10 @@ impl Make {
             return Ok(rows.map(|row| row as f64 / rate).collect());
         }
         let mut time = stamps.unwrap_or_default();
+        if let Some(origin) = self.origin {
+            time.iter_mut()
+                .for_each(|time| *time = stamps::seconds(stamps::at(origin, *time)));
+        }
         if let Some(unit) = options.columns.time_unit.filter(|unit| unit.ticks() != 1.0) {
             time.iter_mut().for_each(|time| *time /= unit.ticks());
             let message = format!(

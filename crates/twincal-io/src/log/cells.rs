@@ -19,6 +19,8 @@ const BYTES: usize = size_of::<f64>();
 pub(crate) struct Cells {
     /// Rows in memory: all of them, or the last ones of a long table.
     pub(crate) columns: Vec<Vec<f64>>,
+    /// Where the time in the first column counts from in ns; none: it is what the file says.
+    pub(crate) origin: Option<i64>,
     /// What the numbers of each column are divided by; empty: by 1.
     pub(crate) scales: Vec<f64>,
     /// Rows that could not be read and were dropped when told to be lenient.
@@ -124,11 +126,25 @@ fn no_room(name: &str, error: &io::Error) -> Error {
     )
 }
 
+/// What cannot be read back.
+pub(crate) fn unreadable(name: &str, error: &io::Error) -> Error {
+    Error::system(
+        name,
+        "read its numbers back from a temporary file",
+        error,
+        "look at the disk that holds temporary files (TMPDIR)",
+    )
+}
+
 impl Cells {
-    /// Whether so many numbers are many.
+    /// Whether a table is long.
     pub(crate) fn is_long(rows: usize, columns: usize) -> bool {
-        let bytes = rows.saturating_mul(columns).saturating_mul(BYTES);
-        bytes >= LONG && rows >= 2 * chapter_rows(columns)
+        Self::are_many(rows.saturating_mul(columns)) && rows >= 2 * chapter_rows(columns)
+    }
+
+    /// Whether so many numbers are many.
+    pub(crate) fn are_many(numbers: usize) -> bool {
+        numbers.saturating_mul(BYTES) >= LONG
     }
 
     /// No rows yet; `may_spill`: a long table may be left on disk.

@@ -9,7 +9,7 @@
 //! | Parquet | `parquet.rs`, checked first by `pages.rs`; `shared_file.rs` for several threads |
 //! | Arrow IPC | `arrow/` |
 //! | NPZ | `npz.rs` |
-//! | MCAP, rosbag2 | `bag/` |
+//! | MCAP, rosbag2 | `bag/`, `stamps.rs` |
 //! | what the logged torque is | `torque.rs` |
 
 mod arrow;
@@ -25,6 +25,7 @@ mod parquet;
 mod preset;
 mod scratch;
 mod shared_file;
+mod stamps;
 mod torque;
 
 pub(crate) use assemble::assemble;
@@ -82,7 +83,7 @@ pub fn read_log(
 }
 
 /// The same, but a log that is long (128 MiB of numbers) is left in a temporary file and comes in chapters: memory does not grow with
-/// it. Bags whose joints come in several messages are always read whole.
+/// it.
 ///
 /// # Errors
 /// Those of [`read_log`], and [`Error::System`] without room for the temporary file.

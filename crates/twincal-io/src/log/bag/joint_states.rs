@@ -9,14 +9,14 @@ mod topics;
 
 use super::joint_state::{Encoding, decode};
 use super::mapping::{Mapping, Schema};
-use super::merge::{IN_TABLES, LISTS as PART_LISTS, Part, in_table, merge};
+use super::merge::merge;
+use super::part::{IN_TABLES, LISTS as PART_LISTS, Part};
 use super::path::is_source;
 use crate::error::{Error, Place, Result};
 use crate::log::columns::{refuse_model_torque, say as say_columns};
-use crate::log::{Channel, LogOptions, Request, Selection, TorqueSource, assemble};
+use crate::log::{Cells, Channel, LogOptions, Request, Selection, TorqueSource, assemble};
 use crate::memory;
 use std::borrow::Cow;
-use std::collections::BTreeSet;
 use std::rc::Rc;
 use topics::CONVERT;
 use twincal::robot::Robot;
@@ -297,8 +297,10 @@ impl<'a> JointStates<'a> {
         if self.rows.is_multiple_of(LOOK) {
             // Growing vectors hold up to three times their content while they move.
             if self.chapters {
+                let numbers = self.parts.iter().map(|part| part.len() * part.width());
+                let many = Cells::are_many(numbers.sum());
                 for part in &mut self.parts {
-                    part.settle(self.file, LATE_MESSAGES)?;
+                    part.settle(self.file, LATE_MESSAGES, many)?;
                 }
             }
             let bytes: u64 = self.parts.iter().map(Part::bytes).sum();
@@ -397,8 +399,7 @@ impl<'a> JointStates<'a> {
         Ok(Some(layouts.len() - 1))
     }
 
-    /// The log, with all that was assumed; `None` where parts have to be brought together of which one has left memory: it must be read
-    /// again without chapters.
+    /// The log, with all that was assumed.
     ///
     /// # Errors
     /// [`Error::Content`] if no topic or more than one can be read, joints of the model are missing, effort is missing or the parts do
@@ -406,7 +407,7 @@ impl<'a> JointStates<'a> {
     pub(super) fn finish(
         mut self,
         mut findings: Vec<Finding>,
-    ) -> Result<Option<(Log<'static>, Vec<Finding>)>> {
+    ) -> Result<(Log<'static>, Vec<Finding>)> {
         self.check_topics()?;
         if self.rows == 0 {
             let problem = match (&self.first_dropped, self.dropped) {
@@ -422,42 +423,15 @@ impl<'a> JointStates<'a> {
         if let Some(mapping) = &self.mapping {
             mapping.say(self.file, &mut findings)?;
         }
-        let used: BTreeSet<usize> = parts.iter().flatten().flatten().copied().collect();
-        let long = used.iter().find(|part| self.parts[**part].is_long());
-        let (mut cells, there) = match (long, used.len()) {
-            (None, _) => {
-                let (time, columns) = merge(
-                    self.file,
-                    &mut self.parts,
-                    &parts,
-                    |part| self.topics[self.part_topics[part]].name.as_str(),
-                    self.robot,
-                    &mut findings,
-                )?;
-                in_table(time, columns)
-            }
-            (Some(&part), 1) => {
-                let part = &mut self.parts[part];
-                let there: Vec<[bool; PART_LISTS]> = (parts.iter().enumerate())
-                    .map(|(joint, lists)| {
-                        std::array::from_fn(|list| {
-                            lists[list].is_some() && part.column(joint, list).is_some()
-                        })
-                    })
-                    .collect();
-                match part.table() {
-                    Some(cells)
-                        if cells.columns.len()
-                            == 1 + there.as_flattened().iter().filter(|there| **there).count() =>
-                    {
-                        (cells, there)
-                    }
-                    // Lists that nobody asks for are among them.
-                    _ => return Ok(None),
-                }
-            }
-            _ => return Ok(None),
-        };
+        let mut cells = merge(
+            self.file,
+            &mut self.parts,
+            &parts,
+            |part| self.topics[self.part_topics[part]].name.as_str(),
+            self.robot,
+            self.chapters,
+            &mut findings,
+        )?;
         cells.dropped = self.dropped;
         cells.first_dropped = self.first_dropped.take();
         let mut index = 0;
@@ -465,8 +439,8 @@ impl<'a> JointStates<'a> {
             index += usize::from(there);
             there.then_some(Channel { index, name })
         };
-        let joints: Vec<[Option<Channel>; 4]> = (there.into_iter().zip(&parts).enumerate())
-            .map(|(joint, (there, parts))| {
+        let joints: Vec<[Option<Channel>; 4]> = (parts.iter().enumerate())
+            .map(|(joint, parts)| {
                 let named = |list: usize| {
                     if let Some(words) = self.mapping.as_ref().and_then(|m| m.words(joint, list)) {
                         return words;
@@ -475,7 +449,7 @@ impl<'a> JointStates<'a> {
                     let topic = part.map_or("", |part| &self.topics[self.part_topics[part]].name);
                     format!("{topic} {}[{}]", CHANNELS[list], self.wanted[joint])
                 };
-                IN_TABLES.map(|list| channel(there[list], named(list)))
+                IN_TABLES.map(|list| channel(parts[list].is_some(), named(list)))
             })
             .collect();
         let selection = Selection {
@@ -510,7 +484,7 @@ impl<'a> JointStates<'a> {
             chapters: self.chapters,
         };
         let log = assemble(request, cells, selection, &mut findings)?;
-        Ok(Some((log, findings)))
+        Ok((log, findings))
     }
 
     fn say(&self, findings: &mut Vec<Finding>) {

@@ -7,7 +7,7 @@ mod read;
 
 use super::definition::Definition;
 use super::joint_state::Encoding;
-use super::merge::{LISTS, Part};
+use super::part::{LISTS, Part};
 use super::path::{Source, Step, Wanted, check, is_source};
 use crate::config::{ChannelNames, TimeUnit};
 use crate::error::{Error, Place, Result};

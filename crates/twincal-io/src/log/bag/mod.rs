@@ -6,6 +6,7 @@
 //! | containers | `mcap.rs`, `sqlite.rs`, unpacked by `unpack.rs` |
 //! | one message | `joint_state.rs` |
 //! | topics, joints, order in time | `joint_states.rs` |
+//! | rows of a topic in memory and on disk | `part.rs` |
 //! | messages with some of the joints | `merge.rs` |
 //! | what `[columns]` says of topics | `path.rs`, `mapping.rs` |
 //! | messages of any type | `definition.rs`, `decode.rs`; `value.rs` finds what a path means |
@@ -19,6 +20,7 @@ mod joint_states;
 mod mapping;
 mod mcap;
 mod merge;
+mod part;
 mod path;
 mod sqlite;
 mod suggest;
@@ -39,46 +41,22 @@ const BUFFER: usize = 1 << 18;
 
 /// Reads an MCAP file.
 pub(super) fn read_mcap(source: &mut (impl Read + Seek), request: Request<'_>) -> Result<ReadLog> {
-    let mut once = |request: Request<'_>| {
-        let mut states = JointStates::new(request)?;
-        let findings = mcap::read(source, request.name, &mut states)?;
-        states.finish(findings)
-    };
-    whole_if_it_must(request, &mut once)
+    let mut states = JointStates::new(request)?;
+    let findings = mcap::read(source, request.name, &mut states)?;
+    states.finish(findings)
 }
 
 /// A log with what was found in it.
 type ReadLog = (Log<'static>, Vec<Finding>);
 
-/// Reads in chapters if that is wanted, and again as a whole where messages have to be brought together.
-fn whole_if_it_must(
-    request: Request<'_>,
-    read: &mut dyn FnMut(Request<'_>) -> Result<Option<ReadLog>>,
-) -> Result<ReadLog> {
-    if let Some(read) = read(request)? {
-        return Ok(read);
-    }
-    let whole = Request {
-        chapters: false,
-        ..request
-    };
-    read(whole)?.ok_or_else(|| Error::Internal {
-        what: request.name.to_owned(),
-        problem: "a log in memory was told to be read again".into(),
-    })
-}
-
 /// Reads a bag: one file, packed or not, or a folder.
 pub(super) fn read(path: &Path, request: Request<'_>) -> Result<ReadLog> {
-    let (files, findings) = files(path)?;
-    let mut once = |request: Request<'_>| {
-        let (mut states, mut findings) = (JointStates::new(request)?, findings.clone());
-        for file in &files {
-            findings.extend(read_file(file, &mut states)?);
-        }
-        states.finish(findings)
-    };
-    whole_if_it_must(request, &mut once)
+    let (files, mut findings) = files(path)?;
+    let mut states = JointStates::new(request)?;
+    for file in &files {
+        findings.extend(read_file(file, &mut states)?);
+    }
+    states.finish(findings)
 }
 
 /// The files that a log consists of: itself, or the files of a folder.

@@ -11,10 +11,10 @@ impl JointStates<'_> {
         let order = |part: usize| {
             let topic = &self.topics[self.part_topics[part]].name;
             let place = self.options.topics.iter().position(|asked| asked == topic);
-            (place, usize::MAX - self.parts[part].rows(), part)
+            (place, usize::MAX - self.parts[part].len(), part)
         };
         let mut by_preference: Vec<usize> = (0..self.parts.len())
-            .filter(|&part| self.parts[part].rows() > 0 && !self.parts[part].mapped)
+            .filter(|&part| self.parts[part].len() > 0 && !self.parts[part].mapped)
             .collect();
         by_preference.sort_by_key(|&part| order(part));
         let joints = self.wanted.len();

@@ -102,7 +102,7 @@ impl JointStates<'_> {
     /// Topics whose messages never came.
     pub(super) fn refuse_silent_topics(&self) -> Result<()> {
         for (part, topic) in self.parts.iter().zip(&self.part_topics) {
-            if part.mapped && part.stamps.is_empty() {
+            if part.mapped && part.len() == 0 {
                 let why = match &self.first_dropped {
                     Some(first) => format!("; dropped were {}, the first: {first}", self.dropped),
                     None => String::new(),
