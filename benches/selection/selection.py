@@ -139,6 +139,7 @@ def measure(data, seed, options, folder):
     return {
         "problem": data.problem.name,
         "seed": seed,
+        "settings": options.settings,
         "cutoff_hz": signal["cutoff_hz"],
         "own_rmse": said["validation"]["rmse_calibrated"],
         "rows": {kind: list(x.shape) for kind, (x, _) in sets.items()},
@@ -155,7 +156,7 @@ def main():
     parser.add_argument("--first", type=int, default=1, help="first seed")
     parser.add_argument("--only", nargs="*", default=[], help="names of problems")
     parser.add_argument("--work", type=Path, default=ROOT / "target" / "selection", help="folder of runs and motions")
-    parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="folder of selection.svg")
+    parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="folder of selection.svg; what is not the whole comparison is drawn in --work")
     parser.add_argument("--fresh", action="store_true", help="forget earlier runs")
     parser.add_argument("--quick", action="store_true", help="only twincal as it comes")
     parser.add_argument("--settings", default="", help="TOML for twincal beside the library, with --quick and a --work of its own")
@@ -169,7 +170,10 @@ def main():
     for seed in range(options.first, options.first if options.table else options.seeds + 1):
         for name, problem in problems.items():
             path = options.work / "runs" / f"{name}.jsonl"
-            if path.exists() and any(json.loads(line)["seed"] == seed for line in path.read_text().splitlines()):
+            runs = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+            if any(run.get("settings", "") != options.settings for run in runs):
+                sys.exit(f"{path} holds runs with other --settings: give these a --work of their own")
+            if any(run["seed"] == seed for run in runs):
                 continue
             print(f"seed {seed}, {name}", file=sys.stderr, flush=True)
             with tempfile.TemporaryDirectory() as folder:
@@ -178,7 +182,8 @@ def main():
                 file.write(json.dumps(run) + "\n")
     import table  # matplotlib takes a second
 
-    table.show(problems, options.work / "runs", options.docs / "selection.svg")
+    whole = not (options.only or options.quick)
+    table.show(problems, options.work / "runs", (options.docs if whole else options.work) / "selection.svg")
 
 
 if __name__ == "__main__":
