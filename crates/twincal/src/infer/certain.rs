@@ -304,6 +304,34 @@ mod tests {
         assert!(acting > 0 && distant > 0, "{acting} {distant}");
     }
 
+    /// One column that may not be negative and whose posterior has its mean at −1.5 sd: the mass that is left, 0.0668 (1000 rows: the t
+    /// distribution is normal to 0.2 %), counts twice, as the slab is half a normal distribution.
+    #[test]
+    fn a_bound_takes_its_share_of_the_weight() {
+        let mean = -1.5 * (1.0_f64 / 1000.0).sqrt();
+        let mut problem = Problem {
+            gram: vec![1.0],
+            xy: vec![mean],
+            yy: mean * mean + 1.0,
+            n: 1000.0,
+            log_constant: 0.0,
+            prior: Prior::single(
+                vec![1e6],
+                vec![0],
+                crate::prior::Inclusion::Probability(0.5),
+                (0.01, 1e-6),
+            ),
+            names: vec!["b".into()],
+        };
+        let weight = |problem: &Problem| {
+            weight_of(&Standard::new(problem).unwrap(), problem, &[true]).unwrap()
+        };
+        let free = weight(&problem);
+        problem.prior.lower = vec![0.0];
+        let lost = weight(&problem) - free;
+        assert!((lost - (2.0 * 0.0668_f64).ln()).abs() < 0.01, "{lost}");
+    }
+
     /// Two columns that are settled to be out and explain the torque together only: y = b + 2.5 u + e of columns b, w + u/10 and
     /// w − u/10. Neither can leave alone (500 ln 7 > ln [`SETTLED`]), so that the general road measures by a model e^400 too light and
     /// leaves b open. By the settled structure b is certain; the posterior is that of b alone either way.
