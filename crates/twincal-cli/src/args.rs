@@ -69,7 +69,7 @@ Examples:
   twincal check today.csv --twin twincal-out --config gates.toml --json
 ")]
     Check(Check),
-    /// Torque with 95 % intervals for every row of the logs.
+    /// Torque with 95 % intervals, row by row.
     #[command(before_help = "\
 Examples:
   twincal predict job.csv --twin twincal-out -o torque.csv

@@ -361,7 +361,16 @@ fn what_fit_refuses_is_told_and_looked_through_all_the_same() {
         ..GOOD
     });
     let diagnosis = doctor(&milliseconds, 2);
-    assert!(first_mend(&diagnosis).1.contains("divide by 1000"));
+    assert!(first_mend(&diagnosis).1.contains("time_unit = \"ms\""));
+    let config = diagnosis["config"].as_str().unwrap();
+    assert!(config.contains("\n[columns]\ntime_unit = \"ms\"\n") && !config.contains("refuses"));
+    let toml = milliseconds.path().join("ms.toml");
+    fs::write(toml, format!("{config}\n[library]\ngeneric = false\n")).unwrap();
+    let done = run(
+        milliseconds.path(),
+        ["fit", "--config", "ms.toml", "-o", "ms"],
+    );
+    assert!(matches!(done.code, Some(0 | 3)), "{}", done.err);
     assert!(
         diagnosis["converted"][0]
             .as_str()
@@ -431,6 +440,20 @@ fn init_writes_a_config_that_fit_reads_and_never_over_another() {
     fs::write(folder.path().join("run.csv"), "t,a\n0,1\n").unwrap();
     init(&["-o", "other.toml"]).expect(2).says(&["run.csv"]);
     assert!(!folder.path().join("other.toml").exists());
+    // logs that the config holds out stay held out
+    let held = "[model]\nfile = \"arm.urdf\"\n[[log]]\nfile = \"run.csv\"\n[[log]]\nfile = \"other.csv\"\nheldout = true\n";
+    fs::write(folder.path().join("held.toml"), held).unwrap();
+    fs::write(folder.path().join("run.csv"), log(GOOD)).unwrap();
+    let done = run(
+        folder.path(),
+        ["init", "--config", "held.toml", "-o", "new.toml"],
+    );
+    assert!(matches!(done.code, Some(0 | 3)), "{}", done.err);
+    let proposed = fs::read_to_string(folder.path().join("new.toml")).unwrap();
+    assert!(
+        proposed.contains("file = \"other.csv\"\nheldout = true"),
+        "{proposed}"
+    );
     // paths stand as seen from the config
     fs::write(folder.path().join("run.csv"), log(GOOD)).unwrap();
     fs::create_dir(folder.path().join("sub")).unwrap();

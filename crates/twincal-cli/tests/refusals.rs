@@ -153,7 +153,7 @@ fn case_13_stamps_in_milliseconds() {
     fs::write(folder.path().join("run.csv"), text).unwrap();
     run(folder.path(), ["fit", "run.csv", "--model", "arm.urdf"])
         .expect(2)
-        .says(&["run.csv", "milliseconds", "divide by 1000"]);
+        .says(&["run.csv", "milliseconds", "time_unit = \"ms\""]);
 }
 
 #[test]

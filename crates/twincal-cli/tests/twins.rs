@@ -68,6 +68,58 @@ fn a_gate_that_the_config_does_not_give_stays_as_the_twin_has_it() {
     assert_eq!(check(coverage, 1), gates(true, false));
 }
 
+/// Torque of motors, fifty times smaller than at the joints: `check` and `predict` take it as the fit did, and say so.
+#[test]
+fn new_logs_are_read_as_those_of_the_fit_were() {
+    let motors = csv(400, &|_, mut row| {
+        for cell in &mut row[7..9] {
+            *cell = (number(cell) / 50.0).to_string();
+        }
+        row
+    });
+    let torque = "[log]\ntorque = \"motor\"\ngear_ratio = { shoulder = 50.0, elbow = 50.0 }\n";
+    let (folder, done) = fitted_with(&motors, &format!("{}{torque}", common::QUICK));
+    done.expect(0);
+    fs::write(
+        folder.path().join("gates.toml"),
+        "[check]\ncoverage = [0.5, 1.0]\n",
+    )
+    .unwrap();
+    fs::write(
+        folder.path().join("joint.toml"),
+        "[log]\ntorque = \"joint\"\n",
+    )
+    .unwrap();
+    let checked = |config: &[&str], code: i32| -> Value {
+        let line = ["check", "run.csv", "--twin", "out", "--json"];
+        let done = run(folder.path(), line.iter().chain(config)).expect(code);
+        serde_json::from_str(&done.out).unwrap()
+    };
+    let said = |checked: &Value| {
+        let findings = checked["findings"].as_array().unwrap().iter();
+        let mut said = findings.filter(|finding| finding["code"] == "read_as_fitted");
+        said.next()
+            .map(|finding| finding["message"].as_str().unwrap().to_owned())
+    };
+    for config in [&[][..], &["--config", "gates.toml"]] {
+        let words = said(&checked(config, 0)).unwrap();
+        assert!(words.contains("[log] torque, [log] gear_ratio"), "{words}");
+    }
+    assert_eq!(said(&checked(&["--config", "joint.toml"], 1)), None);
+    let predicted = run(folder.path(), ["predict", "run.csv", "--twin", "out"]).expect(0);
+    let lines: Vec<Vec<&str>> = predicted
+        .out
+        .lines()
+        .map(|l| l.split(',').collect())
+        .collect();
+    let column = lines[0]
+        .iter()
+        .position(|name| *name == "shoulder.tau_meas")
+        .unwrap();
+    let row = motors.lines().nth(1).unwrap().split(',').nth(7).unwrap();
+    assert!((number(lines[1][column]) - 50.0 * number(row)).abs() < 1e-9);
+}
+
 #[test]
 fn rows_without_measured_torque_are_predicted_all_the_same() {
     let (folder, done) = fitted_with(&csv(1000, &|_, row| row), FILTERED);

@@ -41,14 +41,14 @@ struct Gate {
 }
 
 pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
-    let config = settings::of_logs(&flags.log, terminal)?;
+    let config = settings::beside_twin(&flags.log)?;
     let settings = config.settings()?;
     start_threads(settings.threads)?;
     let progress = Progress::new();
     progress.step(&format!("reading {}", flags.twin.to_string_lossy()));
     let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, false)?;
     let twin = &stored.calibration.twin;
-    let mut logs = LogInput::for_twin(&flags.logs, twin, &settings.log, &progress)?;
+    let mut logs = LogInput::for_twin(&flags.logs, &stored, settings.log.clone(), &progress)?;
     progress.step("predicting the logs");
     let mut found = std::mem::take(&mut logs.findings);
     let validation = score(twin, &logs, &mut found).map_err(|error| logs.as_given(error))?;

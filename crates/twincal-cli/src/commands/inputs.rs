@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::robot::Robot;
 use twincal::signal::{Auto, Log};
-use twincal::twin::Twin;
 use twincal_io::artifact::{MODEL_MJCF, MODEL_URDF, sha256, sha256_of_file};
 use twincal_io::config::{LogSettings, Settings};
 use twincal_io::log::{LogOptions, files_of, open_log, parse_log, read_log};
 use twincal_io::model::{Model, ModelFormat, read_model};
 use twincal_io::report::FileHash;
+use twincal_io::twin_json::StoredTwin;
 use twincal_io::{Error, memory};
 
 /// Doubles per sample and joint that alignment and filtering hold at once beside the recordings themselves: pieces on even clocks (4),
@@ -139,15 +139,23 @@ impl LogInput {
         Ok(input)
     }
 
-    /// Reads logs as a twin sees them.
+    /// Reads logs as a twin sees them, and as the logs of its fit were read where the config says nothing of it.
     pub(super) fn for_twin(
         paths: &[PathBuf],
-        twin: &Twin,
-        settings: &LogSettings,
+        stored: &StoredTwin,
+        mut settings: LogSettings,
         progress: &Progress,
     ) -> Outcome<Self> {
+        let said = if settings.says_how() {
+            None
+        } else {
+            stored.read_as_fitted(&mut settings)?
+        };
+        let twin = &stored.calibration.twin;
         let long = Long::with_filter(!twin.pipeline.is_off());
-        Self::read(paths, &twin.robot, settings, long, progress)
+        let mut input = Self::read(paths, &twin.robot, &settings, long, progress)?;
+        input.findings.splice(0..0, said);
+        Ok(input)
     }
 
     fn new(given: Vec<PathBuf>) -> Self {

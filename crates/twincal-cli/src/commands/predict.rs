@@ -11,7 +11,7 @@ use serde::Serialize;
 use std::io::{self, BufWriter, Write};
 use std::ops::Range;
 use twincal::rows::{RowBlock, RowSignal, visit_rows};
-use twincal::signal::{Log, LongLog, Recording, missing_torque};
+use twincal::signal::{Log, Recording, missing_torque};
 use twincal::term::Library;
 use twincal::twin::{Predictor, TorqueSignal, Twin};
 use twincal::{Finding, Result, Severity};
@@ -35,7 +35,7 @@ struct Predicted {
 }
 
 pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
-    let config = settings::of_logs(&flags.log, terminal)?;
+    let config = settings::beside_twin(&flags.log)?;
     let settings = config.settings()?;
     if settings.json && flags.output.is_none() {
         return Err(Failure::usage(
@@ -60,7 +60,7 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
     progress.step(&format!("reading {}", flags.twin.to_string_lossy()));
     let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, false)?;
     let twin = &stored.calibration.twin;
-    let mut logs = LogInput::for_twin(&flags.logs, twin, &settings.log, &progress)?;
+    let mut logs = LogInput::for_twin(&flags.logs, &stored, settings.log.clone(), &progress)?;
     progress.step("predicting the logs");
     let mut prediction = Prediction {
         findings: std::mem::take(&mut logs.findings),
@@ -113,7 +113,12 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
     } else if let Some(output) = output {
         paragraph(
             &format!(
-                "{rows} of {input_rows} rows predicted, {extrapolating} of them extrapolating"
+                "{rows} of {input_rows} rows predicted{}, {extrapolating} of them extrapolating",
+                if rows < input_rows {
+                    " (the motion filter takes some at either end of each stretch)"
+                } else {
+                    ""
+                }
             ),
             terminal,
         );
@@ -197,6 +202,7 @@ impl Prediction {
     ) -> Result<io::Result<()>> {
         let mut findings = Vec::new();
         let mut written = Ok(());
+        let (name, samples, before) = (log.name().to_owned(), log.samples(), self.rows);
         match log {
             Log::Whole(recording) => {
                 let mut motion = recording.into_owned();
@@ -211,7 +217,6 @@ impl Prediction {
             Log::Long(long) => {
                 findings.push(long.say(false));
                 let pipeline = &model.twin.pipeline;
-                let before = self.rows;
                 let visited = long.visit_motion(pipeline, &mut findings, |part, said| {
                     let joints = part.chapter.joints.iter();
                     let stretch = Stretch {
@@ -233,9 +238,13 @@ impl Prediction {
                     return Ok(written);
                 }
                 visited?;
-                let samples: usize = long.samples().iter().sum();
-                findings.push(unpredicted(&long, samples as u64 - (self.rows - before)));
             }
+        }
+        if written.is_ok() {
+            // What is told of borders counts the rows of a fit, which has one filter more.
+            findings.retain(|finding| finding.code != "borders");
+            let missing = samples - (self.rows - before);
+            findings.extend((missing > 0).then(|| unpredicted(&name, missing)));
         }
         self.findings.append(&mut findings);
         Ok(written)
@@ -332,13 +341,13 @@ impl Prediction {
     }
 }
 
-/// What filters take of the ends of a long log's stretches, with what could not be used.
-fn unpredicted(long: &LongLog, rows: u64) -> Finding {
+/// What filters take of the ends of a log's stretches, with what could not be used.
+fn unpredicted(log: &str, rows: u64) -> Finding {
     let message = format!(
         "{rows} rows have no prediction: the motion filter needs some samples at either end of each stretch without a cut, and what else is \
          told here was left out"
     );
-    Finding::new(Severity::Note, "borders", &long.name, message, rows)
+    Finding::new(Severity::Note, "borders", log, message, rows)
 }
 
 fn columns(twin: &Twin) -> Vec<(String, ColumnKind)> {

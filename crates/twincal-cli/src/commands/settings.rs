@@ -10,18 +10,21 @@ use twincal_io::config::{self, Config};
 /// Name of a config that is found but not asked for.
 const USUAL: &str = "twincal.toml";
 
-/// The config of the flags that every command with logs has.
-pub(super) fn of_logs(flags: &LogFlags, terminal: &mut Terminal) -> Outcome<Config> {
+/// The config of the flags that every command with logs has; a usual one that is not read is told.
+fn of_logs(flags: &LogFlags, terminal: &mut Terminal) -> Outcome<Config> {
+    if flags.config.is_none() && Path::new(USUAL).exists() {
+        terminal.note(&format!(
+            "note: ./{USUAL} is not read; give --config {USUAL} to use it"
+        ));
+    }
+    beside_twin(flags)
+}
+
+/// The config of a command with a twin, which has its own settings.
+pub(super) fn beside_twin(flags: &LogFlags) -> Outcome<Config> {
     let mut config = match &flags.config {
         Some(path) => Config::read(path)?,
-        None => {
-            if Path::new(USUAL).exists() {
-                terminal.note(&format!(
-                    "note: ./{USUAL} is not read; give --config {USUAL} to use it"
-                ));
-            }
-            Config::default()
-        }
+        None => Config::default(),
     };
     let file = &mut config.file;
     over(&mut file.log.rate_hz, flags.rate);

@@ -73,6 +73,13 @@ impl LogSettings {
         }
     }
 
+    /// Whether anything is said of how logs are to be understood.
+    pub fn says_how(&self) -> bool {
+        self.form != LogForm::default()
+            || self.columns != super::ColumnsTable::default()
+            || !self.entries.is_empty()
+    }
+
     /// The logs that the config itself names, to be fitted.
     pub fn named(&self) -> Vec<PathBuf> {
         let fitted = self.entries.iter().filter(|entry| !entry.heldout);

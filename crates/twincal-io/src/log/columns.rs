@@ -188,6 +188,33 @@ pub fn match_columns(
     robot: &Robot,
     options: &LogOptions,
 ) -> Result<Selection> {
+    let preset = options.preset.is_none().then(|| preset::recognised(header));
+    matched(file, header, robot, options).map_err(|error| match (error, preset.flatten()) {
+        (
+            Error::Content {
+                place,
+                problem,
+                remedy,
+            },
+            Some(preset),
+        ) => {
+            let name = preset.name();
+            let remedy = format!(
+                "the columns are those of a recorder: say [log] preset = \"{name}\"; else {remedy}"
+            );
+            Error::content(place, problem, remedy)
+        }
+        (error, _) => error,
+    })
+}
+
+/// See [`match_columns`].
+fn matched(
+    file: &str,
+    header: &[String],
+    robot: &Robot,
+    options: &LogOptions,
+) -> Result<Selection> {
     let mut names = header.to_vec();
     let options = &*preset::fill_in(&mut names, robot, options);
     let header = Header::new(file, &names)?;

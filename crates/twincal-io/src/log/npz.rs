@@ -149,7 +149,19 @@ pub(super) fn read(
         request.options,
     )?;
     let request = Request { options, ..request };
-    let selection = request.select(&columns)?;
+    let selection = request.select(&columns).map_err(|error| {
+        let wide = |array: &&Array| matches!(array.header.shape[..], [few, many] if few < many && many > MAX_JOINTS);
+        match arrays.iter().find(wide) {
+            Some(Array { key, header, .. }) => refuse(
+                format!(
+                    "array `{key}` is {} × {}: samples come first, then joints",
+                    header.shape[0], header.shape[1]
+                ),
+                "save it transposed: `array.T`",
+            ),
+            None => error,
+        }
+    })?;
     let wanted = selection.file_columns();
     let uses = |array: &&Array| {
         let range = array.first..array.first + array.width;

@@ -65,6 +65,20 @@ impl Preset {
     }
 }
 
+/// The recorder whose names of positions and torques stand in a header: what to say of a table whose own names say too little.
+pub(super) fn recognised(header: &[String]) -> Option<Preset> {
+    let has = |patterns: &[(&str, &str)]| {
+        let mut names = patterns
+            .iter()
+            .map(|(before, behind)| format!("{before}0{behind}"));
+        names.any(|name| header.contains(&name))
+    };
+    [Preset::UrRtde, Preset::Franka].into_iter().find(|preset| {
+        let [q, _, tau, _] = preset.names();
+        has(q) && has(tau)
+    })
+}
+
 /// The options with the preset's columns filled in where `[columns]` is silent. libfranka repeats names of the state in the command:
 /// the second gets a number.
 pub(super) fn fill_in<'a>(

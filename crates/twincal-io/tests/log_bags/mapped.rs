@@ -2,7 +2,9 @@
 
 use super::logs::motion;
 use super::write::{Bag, Message};
-use super::{START, contains, fixture, is_the_motion, read_bytes_with, read_with, refused, says};
+use super::{
+    START, contains, fixture, is_the_motion, read, read_bytes_with, read_with, refused, says,
+};
 use mcap::{Compression, WriteOptions, Writer};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -495,4 +497,20 @@ fn joint_states_and_mapped_topics_go_together() {
     );
     options.topics = vec!["/joint_states".into()];
     is_the_motion(&read_bytes_with(&bytes, &options).unwrap().0, 100, 1.0);
+}
+
+#[test]
+fn a_torque_that_may_be_on_another_topic_is_proposed() {
+    contains(
+        &refused(read(&fixture("mapped.mcap"))),
+        &["lists of numbers", "columns = {"],
+    );
+    let options = LogOptions {
+        topics: vec!["/torques".into()],
+        ..LogOptions::default()
+    };
+    contains(
+        &refused(read_with(&fixture("mapped.mcap"), &options)),
+        &["30 messages) cannot be read: its messages are no joint states"],
+    );
 }

@@ -302,6 +302,39 @@ fn a_list_of_topics_takes_each_channel_from_the_first_that_has_it() {
     says(&findings, "parts_merged");
 }
 
+/// What a user has to type stands in the message.
+#[test]
+fn topics_that_are_left_aside_are_named_in_the_remedy() {
+    let mut states = Bag::new(None);
+    for message in both() {
+        let (mut motion, mut effort) = (message.clone(), message);
+        motion.lists[2].clear();
+        effort.lists[0].clear();
+        effort.lists[1].clear();
+        states
+            .message("/motion", &motion)
+            .message("/effort", &effort);
+    }
+    let bytes = states.finish();
+    contains(
+        &refused(read_bytes(&bytes)),
+        &["more than one topic", "topic = [\"/motion\", \"/effort\"]"],
+    );
+    contains(
+        &refused(read_bytes_with(&bytes, &topics(&["/effort"]))),
+        &["position[] of joint", "if `/motion` has them"],
+    );
+    // A file that is cut off in its first chunk has no topic for that reason.
+    contains(
+        &refused(read_bytes(&bytes[..600])),
+        &[
+            "not one message of it can be read",
+            "cut off at byte",
+            "mcap recover",
+        ],
+    );
+}
+
 #[test]
 fn joints_that_are_missing_or_named_otherwise() {
     let messages: Vec<Message> = (0..200)

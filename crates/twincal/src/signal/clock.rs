@@ -233,20 +233,20 @@ fn median_interval(
         return Ok(interval);
     }
     let guess = [
-        ("milliseconds", 1e-3),
-        ("microseconds", 1e-6),
-        ("nanoseconds", 1e-9),
+        ("milliseconds", "ms", 1e-3),
+        ("microseconds", "us", 1e-6),
+        ("nanoseconds", "ns", 1e-9),
     ]
     .into_iter()
-    .find(|(_, unit)| (10.0..=1e5).contains(&(1.0 / (interval * unit))));
+    .find(|(_, _, unit)| (10.0..=1e5).contains(&(1.0 / (interval * unit))));
     let (problem, remedy) = match guess {
-        Some((unit, size)) => (
+        Some((unit, short, size)) => (
             format!(
                 "the median time step is {interval} s; the stamps look like {unit} ({} Hz)",
                 (1e3 / (interval * size)).round() / 1e3
             ),
             format!(
-                "convert the time column to seconds (divide by {:.0}), or give --rate HZ",
+                "say [columns] time_unit = \"{short}\", divide the time column by {:.0}, or give the right --rate HZ",
                 1.0 / size
             ),
         ),

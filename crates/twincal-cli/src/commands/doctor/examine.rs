@@ -15,7 +15,7 @@ use twincal::signal::{
     Log, LogOverview, Pipeline, Steps, choose_and_prepare, constant_torque, describe,
     hardly_driven, steps,
 };
-use twincal_io::config::Settings;
+use twincal_io::config::{Settings, TimeUnit};
 use twincal_io::log::{
     LogOptions, Preset, TorqueSource, joints_without_column, match_columns, read_header,
 };
@@ -27,6 +27,9 @@ pub(super) struct Refusal {
     pub(super) remedy: String,
     /// Exit code of `fit`.
     pub(super) exit_code: u8,
+    /// The unit of the log's time with which `fit` would go on.
+    #[serde(skip)]
+    pub(super) time_unit: Option<TimeUnit>,
 }
 
 impl From<Failure> for Refusal {
@@ -37,6 +40,7 @@ impl From<Failure> for Refusal {
             problem,
             remedy: remedy.unwrap_or_default(),
             exit_code,
+            time_unit: None,
         }
     }
 }
@@ -169,6 +173,7 @@ impl Examination {
                 entries.join(", ")
             ),
             exit_code: crate::failure::INPUT,
+            time_unit: None,
         });
         Ok(())
     }
@@ -213,6 +218,13 @@ impl Examination {
         }
     }
 
+    /// The unit of time that would make `fit` take all of `logs`.
+    pub(super) fn time_unit(&self, logs: usize) -> Option<TimeUnit> {
+        let units: Vec<TimeUnit> = self.refusals.iter().filter_map(|r| r.time_unit).collect();
+        let first = *units.first()?;
+        (units.len() == logs && units.iter().all(|unit| *unit == first)).then_some(first)
+    }
+
     /// Overviews, filters, comparison and outlook, as far as each of them goes.
     fn look(&mut self, logs: &mut LogInput, settings: &Settings) {
         let robot = &self.robot.robot;
@@ -228,11 +240,13 @@ impl Examination {
                 if matches!(error, twincal::Error::Refused { .. }) {
                     continue;
                 }
-                if let Some((mended, words)) = converted(robot, log, &error, settings) {
-                    self.converted.push(words);
-                    *log = mended;
+                let mut refusal = Refusal::from(Failure::from(error.clone()));
+                if let Some(mended) = converted(robot, log, &error, settings) {
+                    self.converted.push(mended.words);
+                    refusal.time_unit = mended.time;
+                    *log = mended.log;
                 }
-                self.refusals.push(Failure::from(error).into());
+                self.refusals.push(refusal);
             }
             (logs.logs).retain(|log| describe(robot, log).is_ok());
             together = filtered(robot, &logs.logs, settings);

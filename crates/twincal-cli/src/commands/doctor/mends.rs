@@ -20,7 +20,7 @@ pub(super) struct Mend {
 }
 
 /// Findings in the order in which they matter, with what mends them.
-const ORDER: [(&str, &str); 26] = [
+const ORDER: [(&str, &str); 30] = [
     (
         "joint_order",
         "map the columns in [columns.q], [columns.qd], [columns.tau] of twincal.toml",
@@ -49,6 +49,19 @@ const ORDER: [(&str, &str); 26] = [
     (
         "velocity_mismatch",
         "twincal.toml: [signal] velocity = \"position\"",
+    ),
+    (
+        "truncated",
+        "`mcap recover` makes a whole file of it, or copy it again",
+    ),
+    ("damaged_chunks", "copy the file again; --strict refuses it"),
+    (
+        "parts_merged",
+        "publish joints and channels that belong together in one message",
+    ),
+    (
+        "log_time",
+        "fill in header.stamp where the message is made, or name another time: [columns] time",
     ),
     (
         "not_finite_rows",
@@ -189,7 +202,7 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
         (_, Some(place)) => ORDER[place].1.into(),
         (_, None) => "read the message; the report of `twincal fit` repeats it".into(),
     };
-    // What is degraded comes before what is only doubtful.
+    // Of the same place in the order, what is degraded comes before what is only doubtful.
     let rank = if finding.severity == Severity::Degraded {
         1
     } else {

@@ -53,6 +53,9 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
         );
         (lag, words)
     });
+    let time_unit = examination.time_unit(logs.len());
+    let mut columns = settings.log.columns.clone();
+    columns.time_unit = columns.time_unit.or(time_unit);
     let mut locked = settings.locked.clone();
     locked.extend(examination.locked.clone());
     let beside = asked.given.iter().map(|file| {
@@ -62,7 +65,9 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
     let remarks = examination
         .refusals
         .iter()
-        .filter(|_| examination.locked.is_empty())
+        .filter(|refusal| {
+            examination.locked.is_empty() && (time_unit.is_none() || refusal.time_unit.is_none())
+        })
         .map(|refusal| {
             format!(
                 "fit refuses these logs: {}; {}",
@@ -78,6 +83,8 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
         )
         .chain(beside)
         .collect();
+    let heldout = asked.config.file.log.entries.iter();
+    let heldout = heldout.filter(|entry| entry.heldout == Some(true));
     let shown = |path: &Path| path.to_string_lossy().into_owned();
     let names: Vec<String> = logs.iter().map(|log| shown(log)).collect();
     Proposal {
@@ -91,8 +98,12 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
                 file: seen_from(log),
                 ..entry(&asked.config, log)
             })
+            .chain(heldout.map(|entry| LogEntry {
+                file: seen_from(&entry.file),
+                ..entry.clone()
+            }))
             .collect(),
-        columns: settings.log.columns.clone(),
+        columns,
         cutoff_hz,
         cutoff_comment,
         lag,

@@ -4,7 +4,7 @@ use super::examine::filtered;
 use std::sync::Arc;
 use twincal::robot::{JointKind, Robot};
 use twincal::signal::{Log, LongLog, ReadChapter, Recording, describe};
-use twincal_io::config::Settings;
+use twincal_io::config::{Settings, TimeUnit};
 
 /// Radians per degree.
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
@@ -76,33 +76,45 @@ impl ReadChapter for InUnits {
     }
 }
 
-/// The log in units with which it comes further, and what was converted.
+/// A log in units with which it comes further.
+pub(super) struct Converted {
+    pub(super) log: Log<'static>,
+    /// What was converted, in words.
+    pub(super) words: String,
+    /// The unit of its time where that is no second.
+    pub(super) time: Option<TimeUnit>,
+}
+
+/// The log in units with which it comes further.
 pub(super) fn converted(
     robot: &Robot,
     log: &Log<'static>,
     error: &twincal::Error,
     settings: &Settings,
-) -> Option<(Log<'static>, String)> {
+) -> Option<Converted> {
     let twincal::Error::Log { problem, .. } = error else {
         return None;
     };
     let as_logged = vec![[1.0; 2]; robot.dof()];
     if problem.contains("look like") && problem.contains("time step") {
         for (unit, time) in [
-            ("milliseconds", 1e-3),
-            ("microseconds", 1e-6),
-            ("nanoseconds", 1e-9),
+            ("milliseconds", TimeUnit::Ms),
+            ("microseconds", TimeUnit::Us),
+            ("nanoseconds", TimeUnit::Ns),
         ] {
             if problem.contains(unit) {
                 let units = Units {
-                    time,
+                    time: time.ticks().recip(),
                     joints: as_logged,
                 };
                 let changed = units.of(robot, log)?;
                 let words = format!("{}: time was taken as {unit}", log.name());
-                return describe(robot, &changed)
-                    .is_ok()
-                    .then_some((changed, words));
+                describe(robot, &changed).ok()?;
+                return Some(Converted {
+                    log: changed,
+                    words,
+                    time: Some(time),
+                });
             }
         }
         return None;
@@ -126,7 +138,11 @@ pub(super) fn converted(
         let changed = units.of(robot, log)?;
         if filtered(robot, std::slice::from_ref(&changed), settings).is_ok() {
             let words = format!("{}: {what} were taken as degrees", log.name());
-            return Some((changed, words));
+            return Some(Converted {
+                log: changed,
+                words,
+                time: None,
+            });
         }
     }
     None

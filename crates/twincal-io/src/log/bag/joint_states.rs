@@ -141,7 +141,7 @@ impl<'a> JointStates<'a> {
     /// Makes a topic known; `schema` says what its messages are, `None` if it is missing.
     ///
     /// # Errors
-    /// [`Error::Content`] if the config asks for it and it cannot be read.
+    /// [`Error::Content`] if the config maps it and it cannot be read.
     pub(super) fn topic(
         &mut self,
         name: &str,
@@ -179,16 +179,6 @@ impl<'a> JointStates<'a> {
             layouts: Vec::new(),
             last: 0,
         };
-        if asked && topic.read_as.is_none() {
-            let problem = match &topic.kind {
-                None => format!(
-                    "topic {}: its schema is missing from the file",
-                    topic.words()
-                ),
-                Some(_) => format!("topic {} cannot be read", topic.words()),
-            };
-            return Err(self.refuse(problem, CONVERT));
-        }
         self.topics.push(topic);
         Ok(TopicId(self.topics.len() - 1))
     }
@@ -408,6 +398,7 @@ impl<'a> JointStates<'a> {
         mut self,
         mut findings: Vec<Finding>,
     ) -> Result<(Log<'static>, Vec<Finding>)> {
+        self.refuse_what_is_damaged(&findings)?;
         self.check_topics()?;
         if self.rows == 0 {
             let problem = match (&self.first_dropped, self.dropped) {

@@ -19,6 +19,8 @@ use twincal::{Finding, Severity};
 const GAP: f64 = 5.0;
 /// Least share of the slowest part's rows that the others have to cover.
 const COVERED: f64 = 0.5;
+/// Share of rows without a partner that is no more than what lies at the log's ends.
+const EDGES: f64 = 0.01;
 /// Rows between two looks at the memory that they take.
 const LOOK: usize = 1 << 12;
 
@@ -196,8 +198,13 @@ pub(super) fn merge<'t>(
             "check the publishers' clocks, or fix joints that do not move with [model] locked",
         ));
     }
+    let severity = if (lost as f64) > EDGES * rows as f64 {
+        Severity::Warning
+    } else {
+        Severity::Note
+    };
     findings.push(Finding::new(
-        Severity::Warning,
+        severity,
         "parts_merged",
         file,
         format!(

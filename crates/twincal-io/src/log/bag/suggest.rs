@@ -105,6 +105,17 @@ impl Lists {
             .find_map(|word| paths().find(|path| last(path) == *word))
     }
 
+    /// The path of a list that may be the torque: one that is called so, or the only one.
+    pub(super) fn torque(&self, topic: &str) -> Option<String> {
+        let only = || match self.found.as_slice() {
+            [(path, _)] => Some(path.as_str()),
+            _ => None,
+        };
+        let slash = if topic.starts_with('/') { "" } else { "/" };
+        let path = self.called(&TORQUES).or_else(only)?;
+        Some(format!("tau = \"{slash}{topic}:{path}[*]\""))
+    }
+
     /// A line for the top of twincal.toml that maps `topic`.
     pub(super) fn line(&self, topic: &str) -> Option<String> {
         let (first, _) = self.found.first()?;

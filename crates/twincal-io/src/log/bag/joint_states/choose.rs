@@ -67,7 +67,10 @@ impl JointStates<'_> {
                     self.read_topics(),
                     missing.join("`, `")
                 ),
-                "record positions too",
+                self.unread().map_or_else(
+                    || "record positions too".to_owned(),
+                    |topics| format!("if {topics} has them, name it too: [log] topic = [\"…\", \"…\"]; else record positions too"),
+                ),
             ));
         }
         let shown: Vec<&str> = self.foreign.iter().take(16).map(String::as_str).collect();
@@ -87,6 +90,15 @@ impl JointStates<'_> {
                 did_you_mean(missing[0], shown.iter().copied())
             ),
         ))
+    }
+
+    /// Topics of joint states that were left aside.
+    fn unread(&self) -> Option<String> {
+        let names: Vec<String> = (self.topics.iter())
+            .filter(|topic| topic.read_as.is_none() && topic.is_joint_state())
+            .map(|topic| format!("`{}`", topic.name))
+            .collect();
+        (!names.is_empty()).then(|| names.join(" or "))
     }
 
     fn refuse_missing_effort(&self, chosen: &[[Option<usize>; PART_LISTS]]) -> Result<()> {
@@ -111,12 +123,13 @@ impl JointStates<'_> {
                 "map it with [columns] tau, name a topic of joint states in [log] topic, or say [log] torque = \"none\" for a log that is only to be predicted",
             ));
         }
+        let elsewhere = self.torque_elsewhere();
         Err(self.refuse(
             format!(
                 "topic {}: effort[]{whose} is empty in all messages",
                 self.read_topics()
             ),
-            "record a topic with effort, name it too in [log] topic = [\"…\", \"…\"], or say [log] torque = \"none\" for a log that is only to be predicted",
+            elsewhere.map_or_else(String::new, |words| words + "; else ") + "record a topic with effort, name it too in [log] topic = [\"…\", \"…\"], or say [log] torque = \"none\" for a log that is only to be predicted",
         ))
     }
 }

@@ -1,6 +1,6 @@
 //! Messages of mapped topics, and advice where a log has no joint states.
 
-use super::{JointStates, LATE_MESSAGES, LATE_NS, TopicId};
+use super::{JointStates, KINDS, LATE_MESSAGES, LATE_NS, TopicId};
 use crate::error::Result;
 use crate::log::bag::definition::Definition;
 use crate::log::bag::joint_state::Encoding;
@@ -122,35 +122,11 @@ impl JointStates<'_> {
     /// Lists of numbers that topics have, and the line that maps one.
     pub(super) fn suggestions(&self) -> (String, String) {
         let (mut shown, mut line) = (Vec::new(), None);
-        let joints = self.robot.dof();
-        for topic in self
-            .topics
-            .iter()
-            .filter(|topic| topic.messages > 0)
-            .take(LOOKED_AT)
-        {
-            let Some(schema) = &topic.schema else {
-                continue;
-            };
-            let (language, encoding) = match topic.encoding.as_str() {
-                "cdr" => ("ros2msg", Encoding::Cdr),
-                "ros1" => ("ros1msg", Encoding::Ros1),
-                _ => continue,
-            };
-            if schema.language != language && !schema.text.is_empty() {
-                continue;
-            }
-            let Ok(definition) = Definition::parse(&schema.kind, &schema.text, encoding) else {
-                continue;
-            };
-            let lists = Lists::of(&definition, joints);
-            if lists.is_empty() {
-                continue;
-            }
+        for (topic, lists) in self.lists() {
             if shown.len() < SHOWN {
-                shown.push(format!("`{}` has {}", topic.name, lists.words()));
+                shown.push(format!("`{topic}` has {}", lists.words()));
             }
-            line = line.or_else(|| lists.line(&topic.name));
+            line = line.or_else(|| lists.line(topic));
         }
         match line {
             Some(line) => (
@@ -159,5 +135,36 @@ impl JointStates<'_> {
             ),
             None => (String::new(), super::CONVERT.to_owned()),
         }
+    }
+
+    /// What maps the torque where a topic beside the joint states may hold it.
+    pub(super) fn torque_elsewhere(&self) -> Option<String> {
+        let line = self
+            .lists()
+            .find_map(|(topic, lists)| lists.torque(topic))?;
+        Some(format!(
+            "if this is the torque, say it with [columns] {line}"
+        ))
+    }
+
+    /// Topics with messages of other types, and their lists of numbers.
+    fn lists(&self) -> impl Iterator<Item = (&str, Lists)> {
+        let with_messages = self.topics.iter().filter(|topic| topic.messages > 0);
+        with_messages.take(LOOKED_AT).filter_map(|topic| {
+            let schema = topic.schema.as_ref()?;
+            let (language, encoding) = match topic.encoding.as_str() {
+                "cdr" => ("ros2msg", Encoding::Cdr),
+                "ros1" => ("ros1msg", Encoding::Ros1),
+                _ => return None,
+            };
+            if KINDS.contains(&schema.kind.as_str())
+                || schema.language != language && !schema.text.is_empty()
+            {
+                return None;
+            }
+            let definition = Definition::parse(&schema.kind, &schema.text, encoding).ok()?;
+            let lists = Lists::of(&definition, self.robot.dof());
+            (!lists.is_empty()).then_some((topic.name.as_str(), lists))
+        })
     }
 }

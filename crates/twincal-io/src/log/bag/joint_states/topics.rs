@@ -4,11 +4,25 @@ use super::{JointStates, KINDS, Topic};
 use crate::error::Result;
 use std::fmt::Write as _;
 use twincal::robot::did_you_mean;
+use twincal::{Finding, Severity};
 
 /// What helps where a topic cannot be read.
 pub(super) const CONVERT: &str = "map other types with [columns] (docs/logs.md), record or convert it to sensor_msgs/msg/JointState in CDR, or export the joint states to CSV, Parquet, Arrow or NPZ";
 
 impl JointStates<'_> {
+    /// A file without any message that is damaged has none for that reason.
+    pub(super) fn refuse_what_is_damaged(&self, findings: &[Finding]) -> Result<()> {
+        let mut degraded = findings.iter();
+        let damage = degraded.find(|finding| finding.severity == Severity::Degraded);
+        match damage.filter(|_| self.topics.iter().all(|topic| topic.messages == 0)) {
+            None => Ok(()),
+            Some(damage) => Err(self.refuse(
+                format!("not one message of it can be read: {}", damage.message),
+                "record or copy it again",
+            )),
+        }
+    }
+
     pub(super) fn check_topics(&self) -> Result<()> {
         if let Some(mapping) = &self.mapping {
             let names = self.topics.iter().map(|topic| topic.name.as_str());
@@ -18,7 +32,18 @@ impl JointStates<'_> {
             }
         }
         for asked in &self.options.topics {
-            if !self.topics.iter().any(|topic| topic.name == *asked) {
+            let found = self.topics.iter().find(|topic| topic.name == *asked);
+            if let Some(topic) = found.filter(|topic| topic.read_as.is_none()) {
+                let (problem, remedy) = match &topic.kind {
+                    None => ("its schema is missing from the file", CONVERT.to_owned()),
+                    Some(_) => ("its messages are no joint states", self.suggestions().1),
+                };
+                return Err(self.refuse(
+                    format!("topic {} cannot be read: {problem}", topic.words()),
+                    remedy,
+                ));
+            }
+            if found.is_none() {
                 let names = self.topics.iter().map(|topic| topic.name.as_str());
                 return Err(self.refuse(
                     format!(
@@ -31,9 +56,17 @@ impl JointStates<'_> {
         }
         if self.ambiguous {
             let list = self.list(|topic| topic.read_as.is_some() && topic.messages > 0);
+            let names: Vec<String> = (self.topics.iter())
+                .filter(|topic| topic.read_as.is_some() && topic.messages > 0)
+                .map(|topic| format!("{:?}", topic.name))
+                .collect();
             return Err(self.refuse(
                 format!("has joint states on more than one topic: {list}"),
-                "say which with [log] topic = \"…\"; a list of topics takes each joint's channel from the first that has it",
+                format!(
+                    "say which with [log] topic = {}; if they complete each other, say topic = [{}], and each joint's channel comes from the first that has it",
+                    names.first().map_or("", String::as_str),
+                    names.join(", ")
+                ),
             ));
         }
         if !self.topics.iter().any(|topic| topic.read_as.is_some()) {
@@ -81,6 +114,13 @@ impl JointStates<'_> {
 }
 
 impl Topic {
+    /// Whether its messages are joint states.
+    pub(super) fn is_joint_state(&self) -> bool {
+        self.kind
+            .as_deref()
+            .is_some_and(|kind| KINDS.contains(&kind))
+    }
+
     pub(super) fn words(&self) -> String {
         let kind = self.kind.as_deref().unwrap_or("no schema");
         format!(
