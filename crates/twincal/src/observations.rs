@@ -8,7 +8,7 @@ mod products;
 pub(crate) use room::Room;
 
 use crate::error::Result;
-use crate::gram::{Gram, JointAccumulator};
+use crate::gram::{Gram, JointAccumulator, Workspace};
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, slices, visit_slices};
 use crate::signal::{Numbers, Pipeline, Recording, Trajectory};
@@ -310,6 +310,7 @@ impl Part<'_> {
         let (all, rows) = (self.observations, &self.observations.joints[joint]);
         let columns: Vec<u32> = rows.columns.iter().map(|&c| c as u32).collect();
         let mut accumulator = JointAccumulator::new(columns);
+        let mut workspace = Workspace::default();
         let keep: Vec<bool> = rows.standstill.iter().map(|still| !still).collect();
         for range in self.runs_between_starts() {
             let start = range.start;
@@ -321,7 +322,8 @@ impl Part<'_> {
                     columns.x
                 };
                 if rows.weight.is_empty() {
-                    accumulator.push_block(x, columns.stride, &rows.y[range], keep, first);
+                    let y = &rows.y[range];
+                    accumulator.push_block(x, columns.stride, y, keep, first, &mut workspace);
                     return;
                 }
                 let roots = rows.weight[range.clone()].iter().map(|u| u.sqrt());
@@ -333,7 +335,8 @@ impl Part<'_> {
                 let x: Vec<f64> = (0..rows.columns.len())
                     .flat_map(|i| scaled(columns.of(i, 0, count)))
                     .collect();
-                accumulator.push_block(&x, count, &scaled(&rows.y[range]), keep, first);
+                let y = scaled(&rows.y[range]);
+                accumulator.push_block(&x, count, &y, keep, first, &mut workspace);
             });
         }
         accumulator.finish()

@@ -2,7 +2,7 @@
 
 use crate::error::{Finding, Result};
 use crate::excitation::{Excitation, STATES, States, excitation};
-use crate::gram::{Gram, JointAccumulator};
+use crate::gram::{Gram, JointAccumulator, Workspace};
 use crate::incidents::{Incident, leave_out};
 use crate::robot::Robot;
 use crate::rows::{RowSignal, count_rows, visit_rows};
@@ -100,6 +100,7 @@ fn statistics(
             JointAccumulator::new(columns.map(|&column| column as u32).collect())
         })
         .collect();
+    let mut workspace = Workspace::default();
     let mut kept = vec![[(); 3].map(|()| Vec::new()); dof];
     let mut still = vec![Vec::new(); dof];
     let mut row = 0;
@@ -122,6 +123,7 @@ fn statistics(
                         &nothing,
                         &keep,
                         block.first,
+                        &mut workspace,
                     );
                     for &k in &wanted {
                         let at = joint * block.len + k;

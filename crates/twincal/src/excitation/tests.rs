@@ -2,7 +2,7 @@
 //! and with gravity in its plane MX1R, MY1.
 
 use super::*;
-use crate::gram::JointAccumulator;
+use crate::gram::{JointAccumulator, Workspace};
 use crate::robot::{Inertia, JointDescription, JointKind, LinkDescription, RobotDescription};
 use crate::term::{Family, LibrarySettings};
 use rand::{RngExt, SeedableRng};
@@ -77,7 +77,8 @@ fn seen(robot: &Robot, families: &[Family], states: &States) -> Excitation {
         let mut accumulator = JointAccumulator::new(columns.map(|&c| c as u32).collect());
         let still = &states.still[joint * len..(joint + 1) * len];
         let keep: Vec<bool> = still.iter().map(|still| !still).collect();
-        accumulator.push_block(x, len, &vec![0.0; len], &keep, true);
+        let (y, mut workspace) = (vec![0.0; len], Workspace::default());
+        accumulator.push_block(x, len, &y, &keep, true, &mut workspace);
         accumulator.finish()
     });
     let gram = Gram {

@@ -1,9 +1,8 @@
-//! From rows to statistics: samples are gathered into small column-contiguous buffers and multiplied there.
+//! From rows to statistics: whole blocks are multiplied where they are, single rows wait until they are a block.
 
-use super::buffer::{BLOCK, Buffer};
+use super::block::{BLOCK, Block, Columns, Rows, Workspace};
 use super::products::Products;
 use super::{JointGram, Symmetric};
-use crate::lanes::LANES;
 use pulp::{Simd, WithSimd};
 
 /// What a part of a log must know of the part before it: the last row of a run that is still open.
@@ -19,14 +18,15 @@ pub struct OpenRun {
 #[derive(Debug)]
 pub struct JointAccumulator {
     gram: JointGram,
-    arch: pulp::Arch,
-    /// Rows and their first differences.
-    rows: Buffer,
-    steps: Buffer,
-    /// Rows waiting in the buffers.
+    /// Decides the order of sums, and with it their last bits.
+    pub(super) arch: pulp::Arch,
+    /// Rows that are not a block yet.
+    held: Columns,
     waiting: usize,
     /// Those of them that start a run.
     starts: Vec<usize>,
+    /// The row before the first of them.
+    before: Vec<f64>,
     s0: Products,
     d: Products,
     run: OpenRun,
@@ -44,10 +44,10 @@ impl JointAccumulator {
         Self {
             gram: JointGram::empty(columns),
             arch: pulp::Arch::new(),
-            rows: Buffer::new(width),
-            steps: Buffer::new(width),
+            held: Columns::default(),
             waiting: 0,
             starts: Vec::new(),
+            before: vec![0.0; width],
             s0: Products::new(width),
             d: Products::new(width),
             run,
@@ -62,10 +62,19 @@ impl JointAccumulator {
     /// | `y` | rows | residual torque, N·m |
     /// | `keep` | rows | false: the row is left out and ends the run (standstill) |
     /// | `first` | | true: the first row starts a new segment |
+    /// | `workspace` | | working memory, the same for all joints |
     ///
     /// # Panics
     /// If the lengths do not fit together.
-    pub fn push_block(&mut self, x: &[f64], stride: usize, y: &[f64], keep: &[bool], first: bool) {
+    pub fn push_block(
+        &mut self,
+        x: &[f64],
+        stride: usize,
+        y: &[f64],
+        keep: &[bool],
+        first: bool,
+        workspace: &mut Workspace,
+    ) {
         let (width, len) = (self.gram.columns.len(), y.len());
         assert_eq!(keep.len(), len, "one flag per row");
         assert!(
@@ -82,82 +91,78 @@ impl JointAccumulator {
                 row += 1;
                 continue;
             }
-            let kept = keep[row..].iter().take_while(|&&k| k).count();
-            let count = kept.min(BLOCK - self.waiting);
-            self.push_run(x, stride, y, row, count);
+            let most = keep[row..].len().min(BLOCK - self.waiting);
+            let count = keep[row..][..most].iter().take_while(|&&k| k).count();
+            let rows = Rows {
+                x: x.get(row..).unwrap_or_default(),
+                stride,
+                y: &y[row..row + count],
+            };
+            self.push_run(rows, workspace);
             row += count;
         }
     }
 
-    /// `count` rows of one run that fit into the buffers.
-    fn push_run(&mut self, x: &[f64], stride: usize, y: &[f64], row: usize, count: usize) {
-        let width = self.gram.columns.len();
-        let starts = self.run.last_row.is_none();
-        let last = self
-            .run
-            .last_row
-            .get_or_insert_with(|| vec![0.0; width + 1]);
-        for i in 0..=width {
-            let column = if i < width {
-                &x[i * stride + row..][..count]
-            } else {
-                &y[row..row + count]
-            };
-            if self.waiting == 0 {
-                *self.rows.before_mut(i) = last[i];
-            }
-            self.rows.column_mut(i)[self.waiting..][..count].copy_from_slice(column);
-            if starts {
-                last[i] = column[0];
-            }
-        }
-        if starts {
-            self.starts.push(self.waiting);
+    /// Rows of one run that are a block together with those that wait, or fewer.
+    fn push_run(&mut self, rows: Rows<'_>, workspace: &mut Workspace) {
+        let (width, count) = (self.before.len(), rows.y.len());
+        let row = |k: usize| (0..width).map(move |i| rows.column(i, width)[k]);
+        if self.run.last_row.is_none() {
+            let start: Vec<f64> = row(0).collect();
             self.gram.starts += 1.0;
-            self.gram.first.add_outer(last);
+            self.gram.first.add_outer(&start);
+            self.starts.push(self.waiting);
+            self.run.last_row = Some(start);
         }
-        for i in 0..=width {
-            last[i] = if i < width {
-                x[i * stride + row + count - 1]
-            } else {
-                y[row + count - 1]
-            };
+        let last = self.run.last_row.get_or_insert_default();
+        if self.waiting == 0 {
+            self.before.copy_from_slice(last);
         }
+        last.clear();
+        last.extend(row(count - 1));
         self.gram.n += count as f64;
+        if count == BLOCK {
+            self.multiply(Some(rows), count, workspace);
+            return;
+        }
+        let held = self.held.at_least(width);
+        for (i, column) in held.iter_mut().enumerate() {
+            column[self.waiting..][..count].copy_from_slice(rows.column(i, width));
+        }
         self.waiting += count;
         if self.waiting == BLOCK {
-            self.flush();
+            self.flush(workspace);
         }
     }
 
-    fn flush(&mut self) {
-        if self.waiting == 0 {
-            return;
+    /// Multiplies the rows that wait.
+    fn flush(&mut self, workspace: &mut Workspace) {
+        if self.waiting > 0 {
+            self.multiply(None, self.waiting, workspace);
+            self.waiting = 0;
         }
-        // Whole vectors: what is missing of the last one counts as zero.
-        let samples = self.waiting.next_multiple_of(LANES);
-        let width = self.gram.columns.len() + 1;
-        for i in 0..width {
-            self.rows.column_mut(i)[self.waiting..samples].fill(0.0);
+    }
+
+    /// Multiplies a block of these rows, or of those that wait.
+    fn multiply(&mut self, from: Option<Rows<'_>>, samples: usize, workspace: &mut Workspace) {
+        let width = self.before.len();
+        let [mut rows, steps] = workspace.columns(width);
+        if from.is_none() {
+            rows = self.held.at_least(width);
         }
-        self.arch.dispatch(Differences {
-            rows: &self.rows,
-            steps: &mut self.steps,
-            width,
-            samples: self.waiting,
-        });
-        for i in 0..width {
-            let steps = self.steps.column_mut(i);
-            steps[self.waiting..samples].fill(0.0);
-            // The first row of a run has no predecessor: its difference is none, not its distance from another run.
-            for &start in &self.starts {
-                steps[start] = 0.0;
-            }
-        }
-        self.s0.add(self.arch, &self.rows, samples);
-        self.d.add(self.arch, &self.steps, samples);
+        self.arch.dispatch(WithTiles(Multiply {
+            block: Block {
+                from,
+                rows,
+                steps,
+                samples,
+                before: &self.before,
+                starts: &self.starts,
+            },
+            s0: &mut self.s0,
+            d: &mut self.d,
+        }));
         self.starts.clear();
-        self.waiting = 0;
     }
 
     fn end_run(&mut self) {
@@ -175,39 +180,70 @@ impl JointAccumulator {
     /// The statistics so far, and what the next part needs so that the sum of both is that of the uncut log: a run that
     /// is still open is counted as started here and as ended in the part that ends it.
     pub fn cut(mut self) -> (JointGram, OpenRun) {
-        self.flush();
-        let size = self.gram.columns.len() + 1;
-        self.gram.s0 = Symmetric {
-            size,
-            values: self.s0.into_matrix(),
-        };
-        self.gram.d = Symmetric {
-            size,
-            values: self.d.into_matrix(),
-        };
+        self.flush(&mut Workspace::default());
+        let size = self.before.len();
+        let [s0, d] =
+            [&self.s0, &self.d].map(|sums| self.arch.dispatch(WithTiles(Matrix { sums })));
+        self.gram.s0 = Symmetric { size, values: s0 };
+        self.gram.d = Symmetric { size, values: d };
         (self.gram, self.run)
     }
 }
 
-/// Writes the first differences of all columns.
-struct Differences<'a> {
-    rows: &'a Buffer,
-    steps: &'a mut Buffer,
-    width: usize,
-    samples: usize,
+/// Work that depends on the size of tiles.
+trait Tiled {
+    type Output;
+
+    /// `T`: columns of a tile.
+    fn run<S: Simd, const T: usize>(self, s: S) -> Self::Output;
 }
 
-impl WithSimd for Differences<'_> {
+/// Work with tiles of the size that is best for the instruction set.
+struct WithTiles<W>(W);
+
+impl<W: Tiled> WithSimd for WithTiles<W> {
+    type Output = W::Output;
+
+    /// The sums of a tile and the factors of a step fit into the registers: 25 + 6 of 32, or 9 + 6 of 16. One number at a time, a
+    /// tile of 16 sums is what compilers put into vectors of their own.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, s: S) -> W::Output {
+        if S::REGISTER_COUNT >= 32 {
+            self.0.run::<S, 5>(s)
+        } else if S::IS_SCALAR {
+            self.0.run::<S, 4>(s)
+        } else {
+            self.0.run::<S, 3>(s)
+        }
+    }
+}
+
+/// Adds the products of a block of rows and of their differences.
+struct Multiply<'a> {
+    block: Block<'a>,
+    s0: &'a mut Products,
+    d: &'a mut Products,
+}
+
+impl Tiled for Multiply<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        for i in 0..self.width {
-            let rows = &self.rows.with_before(i)[..=self.samples];
-            let steps = &mut self.steps.column_mut(i)[..self.samples];
-            for (k, step) in steps.iter_mut().enumerate() {
-                *step = rows[k + 1] - rows[k];
-            }
-        }
+    fn run<S: Simd, const T: usize>(self, s: S) {
+        self.block.add_to::<S, T>(s, self.s0, self.d);
+    }
+}
+
+/// Sums as a matrix.
+struct Matrix<'a> {
+    sums: &'a Products,
+}
+
+impl Tiled for Matrix<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn run<S: Simd, const T: usize>(self, s: S) -> Vec<f64> {
+        self.sums.matrix::<S, T>(s)
     }
 }

@@ -1,10 +1,11 @@
 //! Sufficient statistics: the narrow waist (method section 4). Left of it cost grows with the log, right of it not.
 
 mod accumulate;
-mod buffer;
+mod block;
 mod products;
 
 pub use accumulate::{JointAccumulator, OpenRun};
+pub use block::Workspace;
 
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;

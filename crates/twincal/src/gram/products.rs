@@ -1,18 +1,19 @@
 //! Inner products of all pairs of columns: square register tiles on the CPU's widest vectors.
 
-use super::buffer::{BLOCK, Buffer};
-use crate::lanes::LANES;
-use pulp::{Simd, WithSimd};
+use super::block::{BLOCK, Column};
+use crate::lanes::Aligned;
+use pulp::Simd;
+use std::ops::Range;
 
-/// Rows of tiles that share what was loaded of a column of tiles: their columns stay in the first-level cache.
-const GROUP: usize = 4;
+/// Columns that stay in the first-level cache while all columns before them come by.
+pub(super) const GROUP: usize = 12;
 
 /// Running sums of `Σ_t x_i(t) x_j(t)` over all pairs of columns.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub(super) struct Products {
     width: usize,
-    /// Row-major; what stands above the diagonal stays zero.
-    sums: Vec<f64>,
+    /// Tile after tile on and below the diagonal, each as [`keep`] leaves it; empty before the first block.
+    sums: Aligned,
 }
 
 impl Products {
@@ -20,144 +21,187 @@ impl Products {
     pub(super) fn new(width: usize) -> Self {
         Self {
             width,
-            sums: vec![0.0; width * width],
+            sums: Aligned::default(),
         }
     }
 
-    /// Adds the products of the first `samples` of a buffer, a multiple of [`LANES`].
-    pub(super) fn add(&mut self, arch: pulp::Arch, buffer: &Buffer, samples: usize) {
-        debug_assert!(samples <= BLOCK && samples.is_multiple_of(LANES));
-        arch.dispatch(Kernel {
-            width: self.width,
-            sums: &mut self.sums,
-            buffer,
-            samples,
-        });
+    /// Adds the products of some columns, from the first one of a tile on, with themselves and all columns before them, over
+    /// the first `vectors` vectors of samples. Columns that are left behind the last whole tile have narrower ones.
+    #[inline(always)]
+    pub(super) fn add<S: Simd, const T: usize>(
+        &mut self,
+        s: S,
+        columns: &[Column],
+        own: Range<usize>,
+        vectors: usize,
+    ) {
+        let size = size::<S, T>();
+        if self.sums.is_empty() {
+            self.sums = Aligned::zeros(above(self.width.div_ceil(T)) * size);
+        }
+        let own = own.start / T..own.end.div_ceil(T);
+        for column in 0..own.end {
+            for row in own.start.max(column)..own.end {
+                let sums = &mut self.sums[(above(row) + column) * size..][..size];
+                let (left, right) = (&columns[row * T..], &columns[column * T..]);
+                match self.width - row * T {
+                    1 => block::<S, 1, T>(s, left, right, row == column, vectors, sums),
+                    2 => block::<S, 2, T>(s, left, right, row == column, vectors, sums),
+                    3 if T > 3 => block::<S, 3, T>(s, left, right, row == column, vectors, sums),
+                    4 if T > 4 => block::<S, 4, T>(s, left, right, row == column, vectors, sums),
+                    _ => block::<S, T, T>(s, left, right, row == column, vectors, sums),
+                }
+            }
+        }
     }
 
     /// The full symmetric matrix, row-major.
-    pub(super) fn into_matrix(mut self) -> Vec<f64> {
-        for i in 0..self.width {
-            for j in 0..i {
-                self.sums[j * self.width + i] = self.sums[i * self.width + j];
+    #[inline(always)]
+    pub(super) fn matrix<S: Simd, const T: usize>(&self, s: S) -> Vec<f64> {
+        let (width, size) = (self.width, size::<S, T>());
+        let mut matrix = vec![0.0; width * width];
+        if self.sums.is_empty() {
+            return matrix;
+        }
+        let owners = owners(s);
+        for i in 0..width {
+            for j in 0..=i {
+                let tile = &self.sums[(above(i / T) + j / T) * size..][..size];
+                let sum = i % T * T + j % T;
+                let lanes = &tile[sum / fold::<S>() * S::F64_LANES..][..S::F64_LANES];
+                let own = lanes.iter().zip(&owners);
+                let own = own.filter(|(_, owner)| **owner == sum % fold::<S>());
+                let total = own.map(|(lane, _)| lane).sum();
+                matrix[i * width + j] = total;
+                matrix[j * width + i] = total;
             }
         }
-        self.sums
+        matrix
     }
 }
 
-struct Kernel<'a> {
-    width: usize,
-    sums: &'a mut [f64],
-    buffer: &'a Buffer,
-    samples: usize,
+/// Tiles in the rows of tiles above one.
+#[inline(always)]
+fn above(row: usize) -> usize {
+    row * (row + 1) / 2
 }
 
-impl WithSimd for Kernel<'_> {
-    type Output = ();
-
-    /// The sums and factors of a tile fit into the registers: 16 + 8 of 32, or 9 + 6 of 16. Nine independent sums hide the latency of
-    /// a multiply-add on two units.
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        if S::REGISTER_COUNT >= 32 {
-            self.tiles::<S, 4>(simd);
-        } else {
-            self.tiles::<S, 3>(simd);
-        }
+/// Products of `R` columns with the `T` of a whole tile, or on the diagonal with themselves.
+#[inline(always)]
+fn block<S: Simd, const R: usize, const T: usize>(
+    s: S,
+    left: &[Column],
+    right: &[Column],
+    diagonal: bool,
+    vectors: usize,
+    sums: &mut [f64],
+) {
+    let Some(left) = left.first_chunk::<R>() else {
+        return;
+    };
+    if diagonal {
+        keep(s, triangle::<S, R, T>(s, left, vectors), sums);
+    } else if let Some(right) = right.first_chunk::<T>() {
+        keep(s, rectangle::<S, R, T>(s, left, right, vectors), sums);
     }
 }
 
-impl Kernel<'_> {
-    /// All tiles of `T` times `T` columns on and below the diagonal, then the columns that are left at the end.
-    #[inline(always)]
-    fn tiles<S: Simd, const T: usize>(mut self, simd: S) {
-        let whole = self.width / T;
-        for first in (0..whole).step_by(GROUP) {
-            let last = whole.min(first + GROUP);
-            for column in 0..last {
-                for row in first.max(column)..last {
-                    if row == column {
-                        self.diagonal::<S, T>(simd, row * T);
-                    } else {
-                        self.tile::<S, T, T>(simd, row * T, column * T);
-                    }
-                }
+/// All products of `R` columns with `T` others.
+#[inline(always)]
+fn rectangle<S: Simd, const R: usize, const T: usize>(
+    s: S,
+    left: &[Column; R],
+    right: &[Column; T],
+    vectors: usize,
+) -> [[S::f64s; T]; R] {
+    let mut sum = [[s.splat_f64s(0.0); T]; R];
+    // Said once more, so that no index is checked in the loop.
+    for k in 0..vectors.min(BLOCK / S::F64_LANES) {
+        let b = vectors_at::<S, T>(right, k);
+        let a = vectors_at::<S, R>(left, k);
+        for i in 0..R {
+            for j in 0..T {
+                sum[i][j] = s.mul_add_e_f64s(a[i], b[j], sum[i][j]);
             }
         }
-        match self.width - whole * T {
-            1 => self.edge::<S, 1, T>(simd, whole),
-            2 => self.edge::<S, 2, T>(simd, whole),
-            3 => self.edge::<S, 3, T>(simd, whole),
-            _ => {}
-        }
     }
+    sum
+}
 
-    /// The last `R` columns, behind `whole` tiles.
-    #[inline(always)]
-    fn edge<S: Simd, const R: usize, const T: usize>(&mut self, simd: S, whole: usize) {
-        for column in 0..whole {
-            self.tile::<S, R, T>(simd, whole * T, column * T);
+/// The products of `R` columns among themselves.
+#[inline(always)]
+fn triangle<S: Simd, const R: usize, const T: usize>(
+    s: S,
+    columns: &[Column; R],
+    vectors: usize,
+) -> [[S::f64s; T]; R] {
+    let mut sum = [[s.splat_f64s(0.0); T]; R];
+    for k in 0..vectors.min(BLOCK / S::F64_LANES) {
+        let a = vectors_at::<S, R>(columns, k);
+        for i in 0..R {
+            for j in 0..=i {
+                sum[i][j] = s.mul_add_e_f64s(a[i], a[j], sum[i][j]);
+            }
         }
-        self.diagonal::<S, R>(simd, whole * T);
     }
+    sum
+}
 
-    /// All products of `R` columns from `row` on with `C` columns from `column` on.
-    #[inline(always)]
-    fn tile<S: Simd, const R: usize, const C: usize>(
-        &mut self,
-        simd: S,
-        row: usize,
-        column: usize,
-    ) {
-        let (left, right) = (self.columns::<S, R>(row), self.columns::<S, C>(column));
-        let mut sum = [[simd.splat_f64s(0.0); C]; R];
-        // Said once more, so that no index is checked in the loop.
-        let samples = right[0].len();
-        let (left, right) = (left.map(|c| &c[..samples]), right.map(|c| &c[..samples]));
-        for s in 0..samples {
-            let a = left.map(|column| column[s]);
-            let b = right.map(|column| column[s]);
-            for i in 0..R {
-                for j in 0..C {
-                    sum[i][j] = simd.mul_add_e_f64s(a[i], b[j], sum[i][j]);
-                }
-            }
-        }
-        for (i, sum) in sum.into_iter().enumerate() {
-            let totals = &mut self.sums[(row + i) * self.width + column..][..C];
-            for (total, lanes) in totals.iter_mut().zip(sum) {
-                *total += simd.reduce_sum_f64s(lanes);
-            }
-        }
-    }
+/// The k-th vector of each column.
+#[inline(always)]
+fn vectors_at<S: Simd, const N: usize>(columns: &[Column; N], k: usize) -> [S::f64s; N] {
+    let samples = k * S::F64_LANES..(k + 1) * S::F64_LANES;
+    std::array::from_fn(|i| S::as_simd_f64s(&columns[i][samples.clone()]).0[0])
+}
 
-    /// The products of `T` columns from `at` on among themselves.
-    #[inline(always)]
-    fn diagonal<S: Simd, const T: usize>(&mut self, simd: S, at: usize) {
-        let columns = self.columns::<S, T>(at);
-        let mut sum = [[simd.splat_f64s(0.0); T]; T];
-        let samples = columns[0].len();
-        let columns = columns.map(|c| &c[..samples]);
-        for s in 0..samples {
-            let a = columns.map(|column| column[s]);
-            for i in 0..T {
-                for j in 0..=i {
-                    sum[i][j] = simd.mul_add_e_f64s(a[i], a[j], sum[i][j]);
-                }
-            }
-        }
-        for (i, sum) in sum.into_iter().enumerate() {
-            let totals = &mut self.sums[(at + i) * self.width + at..][..=i];
-            for (total, lanes) in totals.iter_mut().zip(sum) {
-                *total += simd.reduce_sum_f64s(lanes);
-            }
-        }
-    }
+/// How many sums share a vector in memory. Lanes are added up in part only: all the way down would take several times as long,
+/// and not at all would take four times the memory, more than the caches have.
+const fn fold<S: Simd>() -> usize {
+    if S::F64_LANES.is_multiple_of(4) { 4 } else { 1 }
+}
 
-    /// `T` columns from `first` on as vectors.
-    #[inline(always)]
-    fn columns<S: Simd, const T: usize>(&self, first: usize) -> [&[S::f64s]; T] {
-        std::array::from_fn(|i| S::as_simd_f64s(&self.buffer.column(first + i)[..self.samples]).0)
+/// Length of a tile's sums in memory.
+const fn size<S: Simd, const T: usize>() -> usize {
+    (T * T).div_ceil(fold::<S>()) * S::F64_LANES
+}
+
+/// Adds a tile's sums to those in memory.
+#[inline(always)]
+fn keep<S: Simd, const R: usize, const T: usize>(s: S, sum: [[S::f64s; T]; R], kept: &mut [f64]) {
+    let (kept, sum) = (S::as_mut_simd_f64s(kept).0, sum.as_flattened());
+    if fold::<S>() == 1 {
+        for (kept, sum) in kept.iter_mut().zip(sum) {
+            *kept = s.add_f64s(*kept, *sum);
+        }
+        return;
     }
+    let (fours, rest) = sum.as_chunks::<4>();
+    for (kept, four) in kept.iter_mut().zip(fours) {
+        *kept = s.add_f64s(*kept, folded(s, *four));
+    }
+    if !rest.is_empty() {
+        let mut four = [s.splat_f64s(0.0); 4];
+        four[..rest.len()].copy_from_slice(rest);
+        let kept = &mut kept[fours.len()];
+        *kept = s.add_f64s(*kept, folded(s, four));
+    }
+}
+
+/// Sums of four neighbouring lanes each, in the order of [`owners`].
+#[inline(always)]
+fn folded<S: Simd>(s: S, four: [S::f64s; 4]) -> S::f64s {
+    let [a, b, c, d] = s.deinterleave_shfl_f64s(four);
+    s.add_f64s(s.add_f64s(a, b), s.add_f64s(c, d))
+}
+
+/// Which of the sums that share a vector each of its lanes belongs to: the order is that of the instruction set.
+#[inline(always)]
+fn owners<S: Simd>(s: S) -> Vec<usize> {
+    if fold::<S>() == 1 {
+        return vec![0; S::F64_LANES];
+    }
+    let quarters = [0.0, 0.25, 0.5, 0.75].map(|x| s.splat_f64s(x));
+    let owners = [folded(s, quarters)];
+    let lanes: &[f64] = pulp::bytemuck::cast_slice(&owners);
+    lanes.iter().map(|owner| *owner as usize).collect()
 }

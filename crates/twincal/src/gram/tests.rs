@@ -60,6 +60,7 @@ impl Log {
         cuts.push(to);
         cuts.sort_unstable();
         cuts.dedup();
+        let mut workspace = Workspace::default();
         for pair in cuts.windows(2) {
             let x = if self.columns == 0 {
                 &[][..]
@@ -68,7 +69,8 @@ impl Log {
             };
             let rows = pair[0]..pair[1];
             let first = self.starts.contains(&pair[0]);
-            accumulator.push_block(x, self.rows, &self.y[rows.clone()], &self.keep[rows], first);
+            let (y, keep) = (&self.y[rows.clone()], &self.keep[rows]);
+            accumulator.push_block(x, self.rows, y, keep, first, &mut workspace);
         }
     }
 
@@ -180,6 +182,33 @@ fn statistics_equal_their_definition() {
             }
         }
     }
+}
+
+/// Tiles of all sizes, and sums whose lanes are many, few or one.
+#[test]
+fn instruction_sets_agree() {
+    let mut others = vec![pulp::Arch::Scalar];
+    #[cfg(target_arch = "x86_64")]
+    others.extend(pulp::x86::V3::try_new().map(pulp::Arch::V3));
+    for arch in others {
+        for columns in 0..14 {
+            let log = Log::new(columns as u64 + 1, columns, 600, true);
+            let mut accumulator = JointAccumulator::new((0..columns as u32).collect());
+            accumulator.arch = arch;
+            log.push(&mut accumulator, 0, 600, 37);
+            let (a, b) = (accumulator.finish(), plain(&log));
+            assert!(close(&a.s0, &b.s0, 600.0), "{columns} columns, {arch:?}");
+            assert!(close(&a.d, &b.d, 600.0), "{columns} columns, {arch:?}");
+        }
+    }
+}
+
+/// Blocks that are multiplied where they are have the bytes of those that waited.
+#[test]
+fn whole_blocks_equal_single_rows() {
+    let log = Log::new(11, 7, 1000, false);
+    assert_eq!(log.gram(1000), log.gram(1));
+    assert_eq!(log.gram(256), log.gram(100));
 }
 
 /// `xᵀ C⁻¹ x` with the dense stationary covariance of several runs; the determinant too.

@@ -9,6 +9,7 @@ use crate::robot::{
     BLOCK, BlockWorkspace, Motion, Regressor, RegressorBlock, Robot, STRIDE, gravity_regressor,
     nominal_torque, position_derivative,
 };
+use pulp::{Simd, WithSimd};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -263,6 +264,13 @@ impl ModelColumns {
             let block = &mut blocks.regressor;
             self.regressor
                 .evaluate(robot, motion, samples.clone(), block);
+            pulp::Arch::new().dispatch(Combine {
+                outputs: &self.outputs,
+                block,
+                out,
+                len: motion.len,
+                samples: samples.clone(),
+            });
         }
         if any(|column| matches!(column, ModelColumn::Gravity { .. })) {
             let (workspace, gravity) = (&mut blocks.workspace, &mut blocks.gravity);
@@ -275,13 +283,10 @@ impl ModelColumns {
                 let (workspace, change) = (&mut blocks.workspace, &mut blocks.derivative);
                 position_derivative(robot, workspace, joint, motion, samples.clone(), change);
             }
-            for (slot, &(joint, row)) in slots.iter().enumerate() {
+            for &(joint, row) in slots {
                 let cells = row * motion.len + samples.start..row * motion.len + samples.end;
                 let cells = &mut out[joint][cells];
                 match column {
-                    ModelColumn::Inertia { .. } => {
-                        combine(&blocks.regressor, &output.entries[slot], cells);
-                    }
                     ModelColumn::Gravity { axis } => {
                         let start = (joint * 3 + axis) * STRIDE;
                         cells.copy_from_slice(&blocks.gravity[start..start + count]);
@@ -290,26 +295,72 @@ impl ModelColumns {
                         let start = joint * STRIDE;
                         cells.copy_from_slice(&blocks.derivative[start..start + count]);
                     }
-                    ModelColumn::Nominal { .. } | ModelColumn::LoadFriction { .. } => {}
+                    // From the regressor above, and from the nominal torque.
+                    ModelColumn::Inertia { .. }
+                    | ModelColumn::Nominal { .. }
+                    | ModelColumn::LoadFriction { .. } => {}
                 }
             }
         }
     }
 }
 
-/// Σ weight · entry.
-fn combine(block: &RegressorBlock, entries: &[(usize, usize, f64)], cells: &mut [f64]) {
-    if let [(pair, k, 1.0)] = entries {
-        let len = cells.len();
-        cells.copy_from_slice(&block.column(*pair, *k)[..len]);
-        return;
-    }
-    cells.fill(0.0);
-    for &(pair, k, weight) in entries {
-        for (cell, value) in cells.iter_mut().zip(block.column(pair, k)) {
-            *cell += weight * value;
+/// Vectors of a column that are summed side by side in registers.
+const SIDE_BY_SIDE: usize = 4;
+
+/// Writes the inertial columns of a block of samples: Σ weight · entry.
+struct Combine<'a> {
+    outputs: &'a [Output],
+    block: &'a RegressorBlock,
+    out: &'a mut [Vec<f64>],
+    /// Of the motion, of which these are the samples of the block.
+    len: usize,
+    samples: Range<usize>,
+}
+
+impl WithSimd for Combine<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, s: S) {
+        for output in self.outputs {
+            for (entries, &(joint, row)) in output.entries.iter().zip(&output.slots) {
+                let first = row * self.len;
+                let cells = first + self.samples.start..first + self.samples.end;
+                let cells = &mut self.out[joint][cells];
+                let step = SIDE_BY_SIDE * S::F64_LANES;
+                for (i, cells) in cells.chunks_mut(step).enumerate() {
+                    let sum = combined(s, self.block, entries, i * SIDE_BY_SIDE);
+                    let (whole, rest) = S::as_mut_simd_f64s(cells);
+                    for (cells, sum) in whole.iter_mut().zip(sum) {
+                        *cells = sum;
+                    }
+                    if !rest.is_empty() {
+                        s.partial_store_f64s(rest, sum[whole.len()]);
+                    }
+                }
+            }
         }
     }
+}
+
+/// Σ weight · entry for vectors from `first` on.
+#[inline(always)]
+fn combined<S: Simd>(
+    s: S,
+    block: &RegressorBlock,
+    entries: &[(usize, usize, f64)],
+    first: usize,
+) -> [S::f64s; SIDE_BY_SIDE] {
+    let mut sum = [s.splat_f64s(0.0); SIDE_BY_SIDE];
+    for &(pair, k, weight) in entries {
+        let values = S::as_simd_f64s(block.column(pair, k)).0;
+        let (values, weight) = (&values[first..][..SIDE_BY_SIDE], s.splat_f64s(weight));
+        for (sum, value) in sum.iter_mut().zip(values) {
+            *sum = s.add_f64s(*sum, s.mul_f64s(weight, *value));
+        }
+    }
+    sum
 }
 
 /// tanh(rate / v_s), or the sign for v_s = 0.

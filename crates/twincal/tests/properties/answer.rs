@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use twincal::gram::{Gram, JointAccumulator, JointGram};
+use twincal::gram::{Gram, JointAccumulator, JointGram, Workspace};
 use twincal::infer::{Choice, InferenceSettings, infer};
 use twincal::likelihood::{Columns, PlugIn, assemble};
 use twincal::posterior::summary::summarise;
@@ -53,6 +53,7 @@ impl Data {
             &pick(&self.y[joint]),
             &vec![true; rows.len()],
             true,
+            &mut Workspace::default(),
         );
         sums.finish()
     }
@@ -117,7 +118,9 @@ proptest! {
     fn statistics_of_parts_add_up_to_those_of_the_whole(data in data(), at in any::<prop::sample::Index>()) {
         let cut = at.index(data.rows);
         let part = |rows: std::ops::Range<usize>, sums: &mut JointAccumulator| {
-            sums.push_block(&data.x[0][rows.start..], data.rows, &data.y[0][rows.clone()], &vec![true; rows.len()], rows.start == 0);
+            let (x, y) = (&data.x[0][rows.start..], &data.y[0][rows.clone()]);
+            let (keep, first) = (vec![true; rows.len()], rows.start == 0);
+            sums.push_block(x, data.rows, y, &keep, first, &mut Workspace::default());
         };
         let mut first = JointAccumulator::new((0..data.columns as u32).collect());
         part(0..cut, &mut first);
