@@ -110,7 +110,7 @@ pub(crate) struct LogFlags {
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
     /// Sampling rate in Hz that replaces missing or wrong time stamps.
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub(crate) rate: Option<f64>,
     /// Drop and count rows that cannot be read instead of refusing the file.
     #[arg(long)]

@@ -129,8 +129,12 @@ fn read(
     chapters: bool,
 ) -> Result<(Log<'static>, Vec<Finding>)> {
     let name = path.display().to_string();
-    let system =
-        |e: &std::io::Error| Error::system(&name, "read", e, "check the path and its permissions");
+    let remedy = if name.contains(['*', '?']) {
+        "no file is called so: a pattern that matches nothing comes as it was typed"
+    } else {
+        "check the path and its permissions"
+    };
+    let system = |e: &std::io::Error| Error::system(&name, "read", e, remedy);
     let request = Request {
         name: &name,
         robot,

@@ -141,6 +141,7 @@ fn topics_at_other_rates_and_clocks_are_brought_together_and_it_is_said() {
             "`/torques` (std_msgs/msg/Float64MultiArray)",
             "neither header.stamp nor stamp",
             "jitters",
+            "the stamps of the others are 2.000 ms before that clock",
         ],
     );
     contains(

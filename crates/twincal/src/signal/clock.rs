@@ -246,7 +246,7 @@ fn median_interval(
                 (1e3 / (interval * size)).round() / 1e3
             ),
             format!(
-                "say [columns] time_unit = \"{short}\", divide the time column by {:.0}, or give the right --rate HZ",
+                "say [columns] time_unit = \"{short}\", divide by {:.0} where the log is made, or give the right --rate HZ",
                 1.0 / size
             ),
         ),

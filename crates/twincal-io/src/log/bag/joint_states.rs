@@ -412,7 +412,8 @@ impl<'a> JointStates<'a> {
         let parts = self.choose()?;
         self.say(&mut findings);
         if let Some(mapping) = &self.mapping {
-            mapping.say(self.file, &mut findings)?;
+            let lag = (self.states > 0).then(|| self.lag / self.states as f64);
+            mapping.say(self.file, lag, &mut findings)?;
         }
         let mut cells = merge(
             self.file,

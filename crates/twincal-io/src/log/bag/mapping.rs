@@ -21,6 +21,8 @@ pub(super) use read::Problem;
 
 /// The word for the recorder's clock.
 const LOG_TIME: &str = "log_time";
+/// Clocks that differ by less count as one, ns.
+const TOGETHER_NS: f64 = 1e6;
 /// The channels of `[columns]` as lists of a part: position, velocity, effort, acceleration.
 const KEYS: [&str; LISTS] = ["q", "qd", "tau", "qdd"];
 
@@ -336,9 +338,27 @@ impl Mapping {
 
     /// What was assumed of the mapped topics.
     ///
+    /// `states`: how much later the recorder's clock is than the stamps of joint states, ns on average, where there are any.
+    ///
     /// # Errors
     /// [`Error::Content`] for stamps that nobody filled in.
-    pub(super) fn say(&self, file: &str, findings: &mut Vec<Finding>) -> Result<()> {
+    pub(super) fn say(
+        &self,
+        file: &str,
+        states: Option<f64>,
+        findings: &mut Vec<Finding>,
+    ) -> Result<()> {
+        let stamped = self.topics.iter().filter_map(|topic| topic.found.as_ref());
+        let stamped = stamped.filter(|found| matches!(found.time, Some(Time::Path(..))));
+        let lags = stamped.map(|found| found.lag / found.messages.max(1) as f64);
+        let beside = match lags.chain(states).fold(0.0, f64::max) {
+            lag if lag > TOGETHER_NS => format!(
+                "; the stamps of the others are {:.3} ms before that clock on average, so that this topic may be late by as much beside them: [columns] time = \"log_time\" \
+                 takes that clock for all mapped topics",
+                lag / 1e6
+            ),
+            _ => String::new(),
+        };
         for topic in &self.topics {
             let Some(found) = topic.found.as_ref().filter(|found| found.messages > 0) else {
                 continue;
@@ -375,7 +395,7 @@ impl Mapping {
                     Severity::Warning,
                     LOG_TIME,
                     format!(
-                        "messages on topic `{name}` ({kind}) have neither header.stamp nor stamp: time is the recorder's log time, which jitters with the network and the recorder's load; if another field holds the time, say [columns] time = \"{}:field\"{}",
+                        "messages on topic `{name}` ({kind}) have neither header.stamp nor stamp: time is the recorder's log time, which jitters with the network and the recorder's load{beside}; if another field holds the time, say [columns] time = \"{}:field\"{}",
                         topic.asked, found.stamp_words
                     ),
                 ),
