@@ -139,13 +139,18 @@ def measure(data, seed, options, folder):
     return {
         "problem": data.problem.name,
         "seed": seed,
-        "settings": options.settings,
+        "settings": asked(options),
         "cutoff_hz": signal["cutoff_hz"],
         "own_rmse": said["validation"]["rmse_calibrated"],
         "rows": {kind: list(x.shape) for kind, (x, _) in sets.items()},
         "condition": float(np.linalg.cond(sized)),
         "scores": scores,
     }
+
+
+def asked(options):
+    """What runs in one folder have in common."""
+    return ("quick " if options.quick else "") + options.settings
 
 
 def main():
@@ -158,7 +163,7 @@ def main():
     parser.add_argument("--work", type=Path, default=ROOT / "target" / "selection", help="folder of runs and motions")
     parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="folder of selection.svg; what is not the whole comparison is drawn in --work")
     parser.add_argument("--fresh", action="store_true", help="forget earlier runs")
-    parser.add_argument("--quick", action="store_true", help="only twincal as it comes")
+    parser.add_argument("--quick", action="store_true", help="only twincal as it comes, with a --work of its own")
     parser.add_argument("--settings", default="", help="TOML for twincal beside the library, with --quick and a --work of its own")
     parser.add_argument("--table", action="store_true", help="only table and figure, of the runs there are")
     options = parser.parse_args()
@@ -167,12 +172,15 @@ def main():
         shutil.rmtree(options.work / "runs", ignore_errors=True)
     for folder in ("runs", "motions"):
         (options.work / folder).mkdir(parents=True, exist_ok=True)
+    for name in problems:
+        path = options.work / "runs" / f"{name}.jsonl"
+        runs = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+        if any(run.get("settings", "") != asked(options) for run in runs):
+            sys.exit(f"{path} holds runs with other --settings, or with --quick: give these a --work of their own")
     for seed in range(options.first, options.first if options.table else options.seeds + 1):
         for name, problem in problems.items():
             path = options.work / "runs" / f"{name}.jsonl"
             runs = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-            if any(run.get("settings", "") != options.settings for run in runs):
-                sys.exit(f"{path} holds runs with other --settings: give these a --work of their own")
             if any(run["seed"] == seed for run in runs):
                 continue
             print(f"seed {seed}, {name}", file=sys.stderr, flush=True)
@@ -182,7 +190,7 @@ def main():
                 file.write(json.dumps(run) + "\n")
     import table  # matplotlib takes a second
 
-    whole = not (options.only or options.quick)
+    whole = not (options.only or options.quick or options.settings) and (options.first, options.seeds) == (1, 30)
     table.show(problems, options.work / "runs", (options.docs if whole else options.work) / "selection.svg")
 
 

@@ -97,15 +97,36 @@ fn new_logs_are_read_as_those_of_the_fit_were() {
     };
     let said = |checked: &Value| {
         let findings = checked["findings"].as_array().unwrap().iter();
-        let mut said = findings.filter(|finding| finding["code"] == "read_as_fitted");
+        let mut said = findings.filter(|finding| finding["code"] == "torque_as_fitted");
         said.next()
             .map(|finding| finding["message"].as_str().unwrap().to_owned())
     };
     for config in [&[][..], &["--config", "gates.toml"]] {
         let words = said(&checked(config, 0)).unwrap();
-        assert!(words.contains("[log] torque, [log] gear_ratio"), "{words}");
+        assert!(
+            words.contains("torque of the motors, with the gear ratios"),
+            "{words}"
+        );
     }
     assert_eq!(said(&checked(&["--config", "joint.toml"], 1)), None);
+    // what else the fit was told is named where a log cannot be read without it
+    fs::write(
+        folder.path().join("other.csv"),
+        motors.replacen("q1", "angle", 1),
+    )
+    .unwrap();
+    let columns = format!(
+        "{}{torque}[columns]\nq = {{ shoulder = \"angle\" }}\n",
+        common::QUICK
+    );
+    fs::write(folder.path().join("columns.toml"), columns).unwrap();
+    let line = "fit other.csv --model arm.urdf --config columns.toml -o named";
+    run(folder.path(), line.split(' ')).expect(0);
+    run(folder.path(), ["check", "other.csv", "--twin", "named"])
+        .expect(2)
+        .says(&["the logs of the fit were read with [columns]", "--config"]);
+    let line = "check other.csv --twin named --config columns.toml";
+    run(folder.path(), line.split(' ')).expect(0);
     let predicted = run(folder.path(), ["predict", "run.csv", "--twin", "out"]).expect(0);
     let lines: Vec<Vec<&str>> = predicted
         .out

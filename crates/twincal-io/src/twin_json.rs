@@ -1,22 +1,21 @@
 //! `twin.json`: everything that `check`, `predict` and `report` need of a calibration.
 
 use crate::artifact::{Artifact, Claim, Maker, REPORT, RESULT, RUN_LOG, TWIN};
-use crate::config::{ColumnsTable, Config, Gates, LogSettings};
+use crate::config::{Gates, ReadAs};
 use crate::error::{Error, Place, Result};
 use crate::report::ReportContext;
 use crate::result_json::result_json;
 use serde::{Deserialize, Serialize};
 use twincal::calibrate::Calibration;
-use twincal::{Finding, Severity};
-
-/// Code of what is said of logs that are read as those of the fit.
-const READ_AS_FITTED: &str = "read_as_fitted";
 
 /// A calibration as it lies in an artefact.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StoredTwin {
     /// Gates of `check` as they were set when it was fitted.
     pub gates: Gates,
+    /// How its logs were understood; `None` in twins of earlier versions.
+    #[serde(default)]
+    pub read_as: Option<ReadAs>,
     /// What the report says of the run.
     pub context: ReportContext,
     /// The result.
@@ -43,44 +42,6 @@ impl StoredTwin {
                 "fit again with this version of twincal",
             )
         })
-    }
-
-    /// Has logs read as those of the fit were: recorder, topics and torque of `[log]`, or of all `[[log]]` entries alike, and `[columns]`. Says so
-    /// where that is more than the defaults.
-    ///
-    /// # Errors
-    /// [`Error::Content`] if the settings in the twin cannot be read.
-    pub fn read_as_fitted(&self, log: &mut LogSettings) -> Result<Option<Finding>> {
-        let fitted = Config::parse(TWIN, &self.context.settings)?.settings()?.log;
-        let mut forms = fitted.entries.iter().map(|entry| &entry.form);
-        let form = forms.next().unwrap_or(&fitted.form);
-        if forms.any(|other| other != form) {
-            let message = "the logs of the fit were not all read alike ([[log]] with other topics, presets or torques): these are read as their names and types \
-                 say; tell it with --config";
-            return Ok(Some(Finding::new(
-                Severity::Warning,
-                READ_AS_FITTED,
-                TWIN,
-                message,
-                0,
-            )));
-        }
-        let mut keys: Vec<String> = form
-            .keys()
-            .iter()
-            .map(|key| format!("[log] {key}"))
-            .collect();
-        if fitted.columns != ColumnsTable::default() {
-            keys.push("[columns]".into());
-        }
-        log.form = form.clone();
-        log.columns = fitted.columns;
-        let message = format!(
-            "logs are read as those of the fit were: {}; [log] and [columns] of a --config say otherwise",
-            keys.join(", ")
-        );
-        let finding = || Finding::new(Severity::Note, READ_AS_FITTED, TWIN, message, 0);
-        Ok((!keys.is_empty()).then(finding))
     }
 
     /// The text of `result.json`.

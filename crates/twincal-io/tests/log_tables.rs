@@ -238,6 +238,20 @@ fn other_number_types_are_read() {
     assert_eq!(recording.joints[1].q, [0.5, -1.25, 2.0, 8.0]);
 }
 
+/// Also where other arrays are wide.
+#[test]
+fn an_array_with_a_row_per_joint_is_told_to_be_transposed() {
+    let entries = [
+        ("t", doubles("(4,)", &[0.0, 0.1, 0.2, 0.3])),
+        ("lidar", doubles("(2, 9)", &[0.0; 18])),
+        ("q", doubles("(2, 4)", &[0.0; 8])),
+    ];
+    contains(
+        &refused(read_entries(&entries, CompressionMethod::Stored)),
+        &["array `q` is 2 × 4: samples come first", "array.T"],
+    );
+}
+
 #[test]
 fn case_49_pickled_objects_are_never_read() {
     contains(

@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use twincal::calibrate::{Calibration, CalibrationSettings, Stage, Stopped, calibrate};
 use twincal_io::artifact::{Claim, Maker, REPORT};
-use twincal_io::config::{Config, Settings};
+use twincal_io::config::{Config, ReadAs, Settings};
 use twincal_io::memory;
 use twincal_io::report::ReportContext;
 use twincal_io::twin_json::StoredTwin;
@@ -52,6 +52,7 @@ impl Job<'_> {
         let code = code_of(&calibration.findings);
         let stored = StoredTwin {
             gates: self.settings.gates,
+            read_as: Some(ReadAs::of(&self.settings.log, self.logs.given())),
             context: self.context(),
             calibration,
         };

@@ -8,7 +8,7 @@ use twincal::Finding;
 use twincal::robot::Robot;
 use twincal::signal::{Auto, Log};
 use twincal_io::artifact::{MODEL_MJCF, MODEL_URDF, sha256, sha256_of_file};
-use twincal_io::config::{LogSettings, Settings};
+use twincal_io::config::{LogSettings, ReadAs, Settings};
 use twincal_io::log::{LogOptions, files_of, open_log, parse_log, read_log};
 use twincal_io::model::{Model, ModelFormat, read_model};
 use twincal_io::report::FileHash;
@@ -139,23 +139,37 @@ impl LogInput {
         Ok(input)
     }
 
-    /// Reads logs as a twin sees them, and as the logs of its fit were read where the config says nothing of it.
+    /// Reads logs as a twin sees them, their torque as that of its fit where the config says nothing of it.
     pub(super) fn for_twin(
         paths: &[PathBuf],
         stored: &StoredTwin,
         mut settings: LogSettings,
         progress: &Progress,
     ) -> Outcome<Self> {
-        let said = if settings.says_how() {
-            None
-        } else {
-            stored.read_as_fitted(&mut settings)?
-        };
+        let read_as = stored.read_as.as_ref();
+        let said = read_as.and_then(|read_as| read_as.fill_in(&mut settings));
         let twin = &stored.calibration.twin;
         let long = Long::with_filter(!twin.pipeline.is_off());
-        let mut input = Self::read(paths, &twin.robot, &settings, long, progress)?;
+        let read = Self::read(paths, &twin.robot, &settings, long, progress);
+        let mut input =
+            read.map_err(|failure| match (failure, read_as.and_then(ReadAs::hint)) {
+                (
+                    Failure::Error(Error::Content {
+                        place,
+                        problem,
+                        remedy,
+                    }),
+                    Some(hint),
+                ) => Error::content(place, problem, format!("{remedy}; {hint}")).into(),
+                (failure, _) => failure,
+            })?;
         input.findings.splice(0..0, said);
         Ok(input)
+    }
+
+    /// The logs as they were given.
+    pub(super) fn given(&self) -> &[PathBuf] {
+        &self.given
     }
 
     fn new(given: Vec<PathBuf>) -> Self {

@@ -9,7 +9,7 @@ use crate::progress::Progress;
 use crate::terminal::Terminal;
 use serde::Serialize;
 use std::io::{self, BufWriter, Write};
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use twincal::rows::{RowBlock, RowSignal, visit_rows};
 use twincal::signal::{Log, Recording, missing_torque};
 use twincal::term::Library;
@@ -258,19 +258,6 @@ impl Prediction {
         findings: &mut Vec<Finding>,
     ) -> Result<io::Result<()>> {
         let twin = model.twin;
-        let (first, last) = table.times().into_inner();
-        let motion = stretch.motion;
-        let mut own = motion.time[stretch.own.clone()].iter();
-        // Rows without time are not predicted.
-        if let Some(time) = own.find(|time| **time < first || **time > last) {
-            return Err(twincal::Error::Log {
-                log: motion.name.clone(),
-                problem: format!(
-                    "time {time} s cannot stand in an MCAP file, whose stamps count from 0 to {last} s"
-                ),
-                remedy: "write .parquet or .csv, or let the log's time begin at 0".into(),
-            });
-        }
         let (trajectory, more) = twin.align(stretch.motion)?;
         findings.extend(more);
         let mut written = Ok(());
@@ -291,6 +278,9 @@ impl Prediction {
                 let end = block
                     .input_rows
                     .partition_point(|&row| row < stretch.own.end);
+                let rows = &block.input_rows[first..end];
+                let times = rows.iter().map(|&row| stretch.motion.time[row]);
+                refuse_times(&stretch.motion.name, times, &table.times())?;
                 if first < end {
                     written = self.write_rows(model, stretch, (block, first..end), table);
                 }
@@ -338,6 +328,25 @@ impl Prediction {
         self.rows += rows.len() as u64;
         self.extrapolating += outside.iter().filter(|outside| **outside).count() as u64;
         table.push(&values)
+    }
+}
+
+/// Times of rows that the table cannot hold.
+fn refuse_times(
+    log: &str,
+    mut times: impl Iterator<Item = f64>,
+    range: &RangeInclusive<f64>,
+) -> Result<()> {
+    match times.find(|time| !range.contains(time)) {
+        None => Ok(()),
+        Some(time) => Err(twincal::Error::Log {
+            log: log.to_owned(),
+            problem: format!(
+                "time {time} s cannot stand in an MCAP file, whose stamps count from 0 to {} s",
+                range.end()
+            ),
+            remedy: "write .parquet or .csv, or let the log's time begin at 0".into(),
+        }),
     }
 }
 

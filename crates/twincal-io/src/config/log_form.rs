@@ -49,21 +49,6 @@ impl LogForm {
         }
     }
 
-    /// The keys that are said.
-    pub(crate) fn keys(&self) -> Vec<&'static str> {
-        let torque = &self.torque;
-        let said = [
-            ("preset", self.preset.is_some()),
-            ("topic", !self.topics.is_empty()),
-            ("torque", torque.source.is_some()),
-            ("gear_ratio", !torque.gear_ratio.is_empty()),
-            ("drive_constant", !torque.drive_constant.is_empty()),
-            ("accept_model_torque", torque.accept_model_torque),
-        ];
-        let said = said.into_iter().filter(|(_, said)| *said);
-        said.map(|(key, _)| key).collect()
-    }
-
     pub(super) fn of_table(table: &LogTable) -> Self {
         let numbers = [&table.gear_ratio, &table.drive_constant];
         let topic = table.topic.as_ref();

@@ -9,6 +9,7 @@ mod file;
 mod log_form;
 mod log_forms;
 mod proposal;
+mod read_as;
 mod settings;
 mod unknown_keys;
 
@@ -21,6 +22,7 @@ pub use file::{
 };
 pub use log_form::LogForm;
 pub use proposal::Proposal;
+pub use read_as::ReadAs;
 pub use settings::{Gates, LogSettings, OneLog, Settings};
 
 use crate::error::{Error, Place, Result};
@@ -130,7 +132,7 @@ impl Config {
                 prune(&mut table);
                 table.to_string()
             }
-            // Only paths can fail to be written, and there are none left.
+            // Only paths and seeds beyond TOML's numbers can fail to be written: none of the first is left, settings refuse the others.
             Err(_) => String::new(),
         }
     }

@@ -73,13 +73,6 @@ impl LogSettings {
         }
     }
 
-    /// Whether anything is said of how logs are to be understood.
-    pub fn says_how(&self) -> bool {
-        self.form != LogForm::default()
-            || self.columns != super::ColumnsTable::default()
-            || !self.entries.is_empty()
-    }
-
     /// The logs that the config itself names, to be fitted.
     pub fn named(&self) -> Vec<PathBuf> {
         let fitted = self.entries.iter().filter(|entry| !entry.heldout);
@@ -546,9 +539,19 @@ impl Config {
                     10_000_000,
                 )?
                 .unwrap_or(5000),
-            seed: table.seed.unwrap_or(1),
+            seed: self.seed(table.seed)?,
             allow_disagreement: self.allows(Allow::DisagreeingChains),
         })
+    }
+
+    /// Whole numbers of TOML, in which the report repeats the settings, go no further.
+    fn seed(&self, seed: Option<u64>) -> Result<u64> {
+        let seed = seed.unwrap_or(1);
+        if i64::try_from(seed).is_ok() {
+            return Ok(seed);
+        }
+        let remedy = format!("give a whole number from 0 to {}", i64::MAX);
+        Err(self.out_of_range("inference.seed", format!("{seed} is out of range"), &remedy))
     }
 
     pub(super) fn number(

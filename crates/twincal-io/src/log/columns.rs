@@ -41,6 +41,12 @@ const UNITS: [&str; 8] = ["s", "sec", "secs", "seconds", "ms", "us", "ns", "µs"
 /// Words in names of columns that hold what the controller computed: UR's and Franka's.
 const MODEL_TORQUE: [&str; 3] = ["target_moment", "target_torque", "tau_j_d"];
 
+/// Whether a name is the word for a channel.
+pub(super) fn is_channel(name: &str) -> bool {
+    let lower = name.to_lowercase();
+    WORDS.iter().any(|words| words.contains(&lower.as_str()))
+}
+
 /// A column of the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Channel {

@@ -7,6 +7,7 @@
 mod arrays;
 
 use super::cells::{Sink, disk_failure};
+use super::columns::is_channel;
 use super::{Cells, Request, assemble};
 use crate::error::{Error, Place, Result};
 use std::io::{BufReader, Read, Seek};
@@ -149,19 +150,8 @@ pub(super) fn read(
         request.options,
     )?;
     let request = Request { options, ..request };
-    let selection = request.select(&columns).map_err(|error| {
-        let wide = |array: &&Array| matches!(array.header.shape[..], [few, many] if few < many && many > MAX_JOINTS);
-        match arrays.iter().find(wide) {
-            Some(Array { key, header, .. }) => refuse(
-                format!(
-                    "array `{key}` is {} × {}: samples come first, then joints",
-                    header.shape[0], header.shape[1]
-                ),
-                "save it transposed: `array.T`",
-            ),
-            None => error,
-        }
-    })?;
+    refuse_transposed(name, &arrays, request.robot.dof())?;
+    let selection = request.select(&columns)?;
     let wanted = selection.file_columns();
     let uses = |array: &&Array| {
         let range = array.first..array.first + array.width;
@@ -194,6 +184,26 @@ pub(super) fn read(
     let mut findings = Vec::new();
     let log = assemble(request, cells, selection, &mut findings)?;
     Ok((log, findings))
+}
+
+/// An array of a channel that has one row per joint, and as many columns as another array has samples.
+fn refuse_transposed(name: &str, arrays: &[Array], joints: usize) -> Result<()> {
+    let is_time = |samples: usize| arrays.iter().any(|array| array.header.shape == [samples]);
+    for Array { key, header, .. } in arrays {
+        if let [rows, samples] = header.shape[..]
+            && rows == joints
+            && samples != rows
+            && is_time(samples)
+            && is_channel(key)
+        {
+            return Err(Error::content(
+                Place::file(name),
+                format!("array `{key}` is {rows} × {samples}: samples come first, then joints"),
+                "save it transposed: `array.T`",
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// An entry with its key, if it does not claim to grow beyond reason.

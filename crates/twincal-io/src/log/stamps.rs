@@ -7,7 +7,8 @@ pub(crate) fn since(origin: i64, stamp: i64) -> f64 {
 
 /// The stamp so many ns from `origin` on.
 pub(crate) fn at(origin: i64, ns: f64) -> i64 {
-    origin.saturating_add(ns as i64)
+    let stamp = i128::from(origin) + ns as i128;
+    stamp.clamp(i64::MIN.into(), i64::MAX.into()) as i64
 }
 
 /// A stamp in seconds.

@@ -10,13 +10,15 @@
 
 use super::{LogOptions, Preset};
 use crate::error::Result;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use twincal::robot::{Robot, did_you_mean};
 use twincal::signal::Recording;
 use twincal::{Finding, Severity};
 
 /// What the logged torque is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum TorqueSource {
     /// Torque on the joint's side of the gear, N·m or N.
     #[default]
@@ -30,7 +32,7 @@ pub enum TorqueSource {
 }
 
 /// `[log] torque`, `gear_ratio`, `drive_constant`, `accept_model_torque`.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct TorqueOptions {
     /// As stated; `None`: `Current` with the preset `ur-rtde`, else `Joint`.
     pub source: Option<TorqueSource>,

@@ -1,7 +1,7 @@
 //! Topics of any type: what other people's software wrote is read to its numbers by the paths of `[columns]`, and wrong paths are told.
 
 use super::logs::motion;
-use super::write::{Bag, Message};
+use super::write::{Bag, JOINT_STATE, Message, both};
 use super::{
     START, contains, fixture, is_the_motion, read, read_bytes_with, read_with, refused, says,
 };
@@ -500,8 +500,26 @@ fn joint_states_and_mapped_topics_go_together() {
     is_the_motion(&read_bytes_with(&bytes, &options).unwrap().0, 100, 1.0);
 }
 
+/// Joint states without effort beside a list of 36 numbers and one of two that is called torque.
 #[test]
 fn a_torque_that_may_be_on_another_topic_is_proposed() {
+    let mut bag = Bag::new(None);
+    bag.topic("/joint_states", Some(JOINT_STATE), "cdr")
+        .defined("/amcl_pose", "my_msgs/msg/Pose", "float64[36] covariance\n")
+        .defined("/joint_torques", "my_msgs/msg/Numbers", "float64[] data\n");
+    for mut message in both() {
+        message.lists[2].clear();
+        bag.message("/joint_states", &message)
+            .raw("/amcl_pose", message.stamp, &[0, 1, 0, 0])
+            .raw("/joint_torques", message.stamp, &[0, 1, 0, 0]);
+    }
+    contains(
+        &refused(read_bytes_with(&bag.finish(), &LogOptions::default())),
+        &[
+            "effort[] is empty in all messages",
+            "if this is the torque, say it with [columns] tau = \"/joint_torques:data[*]\"; else record",
+        ],
+    );
     contains(
         &refused(read(&fixture("mapped.mcap"))),
         &["lists of numbers", "columns = {"],

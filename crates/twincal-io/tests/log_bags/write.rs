@@ -123,6 +123,17 @@ impl Bag {
         self
     }
 
+    /// Declares a topic of CDR messages with a definition.
+    pub(crate) fn defined(&mut self, topic: &str, kind: &str, definition: &str) -> &mut Self {
+        let text = definition.as_bytes();
+        let schema = self.writer.add_schema(kind, "ros2msg", text).unwrap();
+        let channel = (self.writer)
+            .add_channel(schema, topic, "cdr", &BTreeMap::new())
+            .unwrap();
+        self.channels.insert(topic.to_owned(), channel);
+        self
+    }
+
     pub(crate) fn raw(&mut self, topic: &str, log_time: u64, data: &[u8]) -> &mut Self {
         self.sequence += 1;
         let header = MessageHeader {

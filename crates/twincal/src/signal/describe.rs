@@ -78,7 +78,7 @@ struct Sums {
     intervals: Vec<f64>,
     segments: u64,
     resampled: bool,
-    /// Last stamp of the chapter before, s, if a stretch that was counted reaches it.
+    /// Last stamp of the stretch that goes on to the end of the chapter before, s, if one does.
     end: Option<f64>,
     joints: Vec<JointSums>,
 }
@@ -93,6 +93,12 @@ struct JointSums {
     has_qd: bool,
     has_qdd: bool,
     has_tau: bool,
+}
+
+/// Rows of a log from one sample of a piece to the next: more than one where channels are logged at several rates.
+fn stride(piece: &Piece<'_>) -> usize {
+    let steps = piece.rows.windows(2).map(|pair| pair[1] - pair[0]);
+    steps.min().unwrap_or(1)
 }
 
 impl Sums {
@@ -121,17 +127,19 @@ impl Sums {
             .sum::<f64>();
         self.segments += pieces.len() as u64;
         // A chapter is no cut of the log: what goes on in it was counted in the one before.
-        let starts = pieces
-            .first()
-            .filter(|piece| piece.rows.first() == Some(&0));
+        let stamp = |row: usize| log.time[row];
+        let starts = pieces.first().filter(|piece| piece.rows[0] < stride(piece));
         if let (Some(piece), Some(end)) = (starts, self.end) {
-            let step = log.time[piece.rows[0]] - end;
+            let step = stamp(piece.rows[0]) - end;
             self.segments -= u64::from((0.0..=GAP * interval).contains(&step));
         }
-        let ends = pieces
-            .last()
-            .filter(|piece| piece.rows.last() == Some(&(log.time.len() - 1)));
-        self.end = ends.and_then(|_| log.time.last().copied());
+        let last = log.time.len().saturating_sub(1);
+        let ends = pieces.last().filter(|piece| {
+            let row = piece.rows[piece.rows.len() - 1];
+            // Of several samples with one stamp the first is taken.
+            last - row < stride(piece) || stamp(last) <= stamp(row)
+        });
+        self.end = ends.and_then(|piece| piece.rows.last().map(|&row| stamp(row)));
         self.intervals.push(interval);
         self.resampled |= pieces.iter().any(Piece::resampled);
         let joints = self.joints.par_iter_mut().zip(&log.joints).enumerate();

@@ -218,8 +218,20 @@ impl Examination {
         }
     }
 
-    /// The unit of time that would make `fit` take all of `logs`.
-    pub(super) fn time_unit(&self, logs: usize) -> Option<TimeUnit> {
+    /// The unit of time that would make `fit` take all of `logs`: of tables whose clock nothing else is said of.
+    pub(super) fn time_unit(&self, logs: usize, settings: &Settings) -> Option<TimeUnit> {
+        let log = &settings.log;
+        let rates = log.entries.iter().map(|entry| entry.rate_hz);
+        let presets = log.entries.iter().map(|entry| entry.form.preset);
+        if log.columns.time_unit.is_some()
+            || rates.chain([log.rate_hz]).any(|rate| rate.is_some())
+            || presets
+                .chain([log.form.preset])
+                .any(|preset| preset.is_some())
+            || self.mappings.len() < logs
+        {
+            return None;
+        }
         let units: Vec<TimeUnit> = self.refusals.iter().filter_map(|r| r.time_unit).collect();
         let first = *units.first()?;
         (units.len() == logs && units.iter().all(|unit| *unit == first)).then_some(first)

@@ -53,7 +53,7 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
         );
         (lag, words)
     });
-    let time_unit = examination.time_unit(logs.len());
+    let time_unit = examination.time_unit(logs.len(), settings);
     let mut columns = settings.log.columns.clone();
     columns.time_unit = columns.time_unit.or(time_unit);
     let mut locked = settings.locked.clone();
@@ -83,8 +83,8 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
         )
         .chain(beside)
         .collect();
-    let heldout = asked.config.file.log.entries.iter();
-    let heldout = heldout.filter(|entry| entry.heldout == Some(true));
+    let heldout = settings.log.heldout.iter();
+    let heldout = heldout.filter(|file| !logs.iter().any(|log| same_file(log, file)));
     let shown = |path: &Path| path.to_string_lossy().into_owned();
     let names: Vec<String> = logs.iter().map(|log| shown(log)).collect();
     Proposal {
@@ -98,9 +98,10 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
                 file: seen_from(log),
                 ..entry(&asked.config, log)
             })
-            .chain(heldout.map(|entry| LogEntry {
-                file: seen_from(&entry.file),
-                ..entry.clone()
+            .chain(heldout.map(|file| LogEntry {
+                file: seen_from(file),
+                heldout: Some(true),
+                ..entry(&asked.config, file)
             }))
             .collect(),
         columns,
@@ -112,14 +113,16 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
     }
 }
 
+/// Whether two paths lead to one file.
+fn same_file(one: &Path, other: &Path) -> bool {
+    one == other || matches!((one.canonicalize(), other.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
 /// What the config says of a log: its own entry, else what holds for all.
 fn entry(config: &Config, log: &Path) -> LogEntry {
     let table = &config.file.log;
-    let same = |entry: &&LogEntry| {
-        entry.file == log
-            || matches!((entry.file.canonicalize(), log.canonicalize()), (Ok(a), Ok(b)) if a == b)
-    };
-    let own = table.entries.iter().find(same).cloned();
+    let own = (table.entries.iter()).find(|entry| same_file(&entry.file, log));
+    let own = own.cloned();
     let entry = own.unwrap_or_else(|| LogEntry {
         topic: table.topic.clone(),
         preset: table.preset,

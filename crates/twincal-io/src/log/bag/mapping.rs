@@ -1,6 +1,6 @@
 //! Topics of any type: which numbers in their messages are which channels, as `[columns]` says.
 //!
-//! A mapped topic has one part (see `merge.rs`) with the channels that are taken from it. Its paths are compared with the definition of its
+//! A mapped topic has one part (see `part.rs`) with the channels that are taken from it. Its paths are compared with the definition of its
 //! messages when the topic is declared, and followed in every message.
 
 mod read;

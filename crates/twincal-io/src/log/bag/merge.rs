@@ -7,7 +7,6 @@ use crate::error::{Error, Place, Result};
 use crate::log::Cells;
 use crate::log::cells::unreadable;
 use crate::log::stamps::seconds;
-use crate::memory;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
@@ -149,11 +148,15 @@ pub(super) fn merge<'t>(
     }
     let of_disk = |e: io::Error| unreadable(file, &e);
     let mut used = Vec::new();
-    for part in numbers {
+    for &part in &numbers {
         let rows = parts[part].take_stored(file)?;
-        let step = rows.median_step().map_err(of_disk)?;
+        let step = match numbers.len() {
+            1 => f64::INFINITY,
+            _ => rows.median_step().map_err(of_disk)?,
+        };
         used.push(Used { part, rows, step });
     }
+    parts.iter_mut().for_each(Part::clear);
     let names = robot.joint_names();
     let describe = |Used { part, rows, step }: &Used| {
         let joints: Vec<&str> = parts[*part].joints.iter().map(|&j| names[j]).collect();
@@ -179,9 +182,12 @@ pub(super) fn merge<'t>(
     let slowest = (0..used.len()).min_by_key(|&k| used[k].rows.len());
     let slowest = slowest.unwrap_or(0);
     let rows = used[slowest].rows.len();
-    let mut cells = Cells::new(1 + sources.len(), may_spill);
-    let bytes = cells.bytes_in_memory(rows as f64);
-    memory::require(file, bytes as u64, "read a shorter log")?;
+    let width = 1 + sources.len();
+    let mut cells = if may_spill && Cells::is_long(rows, width) {
+        Cells::new(width, true)
+    } else {
+        Cells::reserve(file, rows, width, false)?
+    };
     let lost = fill(&mut cells, file, &used, slowest, &sources)?;
     if used.len() == 1 {
         return Ok(cells);

@@ -232,6 +232,12 @@ impl Part {
         Some(cells)
     }
 
+    /// Forgets all rows.
+    pub(super) fn clear(&mut self) {
+        self.rows = Rows::default();
+        self.earlier = None;
+    }
+
     /// Takes all rows, to be read block by block.
     ///
     /// # Errors
@@ -260,7 +266,7 @@ impl Part {
 }
 
 impl Earlier {
-    /// For rows like these; time counts from the first of them.
+    /// For rows like these; time counts from the last of them (a first stamp may be one that nobody filled in).
     fn new(file: &str, rows: &Rows) -> Result<Self> {
         let lists = 0..rows.columns.len() / LISTS;
         let columns: Vec<usize> = lists
@@ -268,7 +274,7 @@ impl Earlier {
             .filter(|column| !rows.columns[*column].is_empty())
             .collect();
         let mut cells = Cells::on_disk(file, columns.len() + 1)?;
-        cells.origin = rows.stamps.first().copied();
+        cells.origin = rows.stamps.last().copied();
         Ok(Self { cells, columns })
     }
 

@@ -105,10 +105,16 @@ impl Lists {
             .find_map(|word| paths().find(|path| last(path) == *word))
     }
 
-    /// The path of a list that may be the torque: one that is called so, or the only one.
-    pub(super) fn torque(&self, topic: &str) -> Option<String> {
+    /// The key that maps a list which is called torque, or the only list of a topic that is; `joints`: any only list with so many entries.
+    pub(super) fn torque(&self, topic: &str, joints: Option<usize>) -> Option<String> {
+        let lower = topic.to_lowercase();
+        let mut words = lower.split(['/', '_']);
+        let called_torque = words.any(|word| TORQUES.contains(&word));
         let only = || match self.found.as_slice() {
-            [(path, _)] => Some(path.as_str()),
+            [(path, length)] => {
+                let fits = joints.is_some_and(|n| length.is_none_or(|length| length == n));
+                (called_torque || fits).then_some(path.as_str())
+            }
             _ => None,
         };
         let slash = if topic.starts_with('/') { "" } else { "/" };

@@ -95,7 +95,8 @@ impl JointStates<'_> {
     /// Topics of joint states that were left aside.
     fn unread(&self) -> Option<String> {
         let names: Vec<String> = (self.topics.iter())
-            .filter(|topic| topic.read_as.is_none() && topic.is_joint_state())
+            .filter(|topic| topic.read_as.is_none() && topic.is_joint_state() && topic.messages > 0)
+            .filter(|topic| ["cdr", "ros1"].contains(&topic.encoding.as_str()))
             .map(|topic| format!("`{}`", topic.name))
             .collect();
         (!names.is_empty()).then(|| names.join(" or "))

@@ -139,9 +139,12 @@ impl JointStates<'_> {
 
     /// What maps the torque where a topic beside the joint states may hold it.
     pub(super) fn torque_elsewhere(&self) -> Option<String> {
-        let line = self
-            .lists()
-            .find_map(|(topic, lists)| lists.torque(topic))?;
+        let find = |joints| {
+            let mut lists = self.lists();
+            lists.find_map(|(topic, lists)| lists.torque(topic, joints))
+        };
+        // What is called torque goes first.
+        let line = find(None).or_else(|| find(Some(self.robot.dof())))?;
         Some(format!(
             "if this is the torque, say it with [columns] {line}"
         ))
