@@ -292,6 +292,16 @@ fn a_long_log_is_described_as_a_whole_one() {
         let square: f64 = channels.tau.iter().flatten().map(|t| t * t).sum();
         close((square / SAMPLES as f64).sqrt(), b.tau_rms.expect("torque"));
     }
+    // Torque in every third row is one stretch as well, wherever chapters meet.
+    let mut sparse = recording.clone();
+    for joint in &mut sparse.joints {
+        let tau = joint.tau.iter_mut().flatten().enumerate();
+        tau.filter(|(row, _)| row % 3 != 1)
+            .for_each(|(_, tau)| *tau = f64::NAN);
+    }
+    let (whole, _) = describe(&robot, &Log::from(&sparse)).expect("a log");
+    let (long, _) = describe(&robot, &in_chapters(sparse)).expect("a log");
+    assert_eq!((whole.segments, long.segments), (2, 2));
     // A cut five rows before chapters meet: those rows are too few to be a stretch of their chapter, and what follows is one of the log.
     recording.time[3 * SAMPLES / CHAPTERS - 5..]
         .iter_mut()
