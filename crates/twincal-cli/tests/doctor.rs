@@ -133,7 +133,16 @@ fn with_config(folder: &Path, verb: &str, config: &str, more: &[&str]) -> Run {
 /// The diagnosis as JSON.
 fn doctor(folder: &TempDir, code: i32) -> Value {
     let done = with_config(folder.path(), "doctor", "look.toml", &["--json"]).expect(code);
-    serde_json::from_str(&done.out).unwrap()
+    let diagnosis: Value = serde_json::from_str(&done.out).unwrap();
+    // whatever is wrong, there is something to do
+    for mend in diagnosis["mends"].as_array().unwrap() {
+        let how = mend["how"].as_str().unwrap();
+        assert!(
+            !how.is_empty() && !how.contains("read the message"),
+            "{mend}"
+        );
+    }
+    diagnosis
 }
 
 /// Findings above a note: code, severity, message.

@@ -19,8 +19,11 @@ pub(super) struct Mend {
     rank: usize,
 }
 
+/// What to do about effects of a model that are left aside.
+const NOT_USED: &str = "nothing, if it does not act in these logs; else write its effect into the model in a form that is read";
+
 /// Findings in the order in which they matter, with what mends them.
-const ORDER: [(&str, &str); 30] = [
+const ORDER: [(&str, &str); 46] = [
     (
         "joint_order",
         "map the columns in [columns.q], [columns.qd], [columns.tau] of twincal.toml",
@@ -129,6 +132,52 @@ const ORDER: [(&str, &str); 30] = [
         "implausible_time_step",
         "give time in seconds, or the rate: --rate HZ",
     ),
+    (
+        "missing_torque",
+        "log the torque of every row, or cut the log to where it is there",
+    ),
+    (
+        "constant_torque",
+        "map the measured torque in [columns] tau, or leave this log out",
+    ),
+    (
+        "chapters_left_out",
+        "cut the log to what can be used: the message says where",
+    ),
+    (
+        "late_messages",
+        "nothing: put in order; publish in the order of header.stamp to be sure",
+    ),
+    (
+        "motion_filter_capped",
+        "log faster, or lower [signal] cutoff_hz",
+    ),
+    (
+        "rows_alias",
+        "twincal.toml: leave [signal] rate_hz out, or raise it",
+    ),
+    (
+        "rate_ignored",
+        "twincal.toml: leave out [signal] rate_hz, or cutoff_hz = 0",
+    ),
+    (
+        "locked_beyond_limits",
+        "twincal.toml: correct [model] locked, or the joint's limits in the model",
+    ),
+    (
+        "no_metadata",
+        "copy the bag's metadata.yaml beside its files",
+    ),
+    ("actuator_not_used", NOT_USED),
+    ("equality_not_used", NOT_USED),
+    ("tendon_not_used", NOT_USED),
+    ("gravcomp_not_used", NOT_USED),
+    ("fluid_not_used", NOT_USED),
+    ("flag_not_used", NOT_USED),
+    (
+        "unknown_elements",
+        "nothing, if they do not matter here; else correct their names in the model",
+    ),
 ];
 
 /// All of them, ranked.
@@ -179,7 +228,7 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
             ),
             how: format!("record a log: {}", twincal::excitation::sentence(unseen)),
             wrong: false,
-            rank: 40,
+            rank: ORDER.len() + 3,
         });
     }
     all.sort_by_key(|mend| mend.rank);
