@@ -58,14 +58,23 @@ def test_mcap_is_the_csv(predicted):
     assert set(counts.values()) == {len(rows)}, counts
 
 
-def test_time_that_mcap_cannot_hold_is_refused(predicted, tmp_path):
+def earlier(folder, name, seconds):
+    """The held-out log with its clock set back."""
     table = pq.read_table(ASSETS / "heldout1.parquet")
-    early = pc.subtract(table["t"], 5.0)
-    pq.write_table(table.set_column(table.column_names.index("t"), "t", early), tmp_path / "early.parquet")
-    arguments = ["predict", tmp_path / "early.parquet", "--twin", predicted / "out", "-o"]
-    refused = twincal(*arguments, tmp_path / "out.mcap", expect=2)
+    time = pc.subtract(table["t"], seconds)
+    pq.write_table(table.set_column(table.column_names.index("t"), "t", time), folder / name)
+    return folder / name
+
+
+def test_time_that_mcap_cannot_hold_is_refused(predicted, tmp_path):
+    def predict(log, out, expect):
+        return twincal("predict", log, "--twin", predicted / "out", "-o", tmp_path / out, expect=expect)
+
+    refused = predict(earlier(tmp_path, "early.parquet", 5.0), "out.mcap", 2)
     assert "cannot stand in an MCAP file" in refused.stderr and "write .parquet or .csv" in refused.stderr
     assert not (tmp_path / "out.mcap").exists()
-    twincal(*arguments, tmp_path / "out.csv", expect=None)
+    predict(tmp_path / "early.parquet", "out.csv", None)
     with open(tmp_path / "out.csv", newline="") as file:
         assert float(next(csv.DictReader(file))["t"]) < 0
+    # Rows that filters take are not written: their times do not count.
+    predict(earlier(tmp_path, "border.parquet", 0.05), "border.mcap", None)

@@ -147,7 +147,7 @@ impl LogInput {
         progress: &Progress,
     ) -> Outcome<Self> {
         let read_as = stored.read_as.as_ref();
-        let said = read_as.and_then(|read_as| read_as.fill_in(&mut settings));
+        let said = read_as.and_then(|read_as| read_as.fill_in(&mut settings, paths));
         let twin = &stored.calibration.twin;
         let long = Long::with_filter(!twin.pipeline.is_off());
         let read = Self::read(paths, &twin.robot, &settings, long, progress);

@@ -337,7 +337,7 @@ fn refuse_times(
     mut times: impl Iterator<Item = f64>,
     range: &RangeInclusive<f64>,
 ) -> Result<()> {
-    match times.find(|time| !range.contains(time)) {
+    match times.find(|time| time < range.start() || time > range.end()) {
         None => Ok(()),
         Some(time) => Err(twincal::Error::Log {
             log: log.to_owned(),

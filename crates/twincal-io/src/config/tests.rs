@@ -471,3 +471,18 @@ fn wrong_entries_and_bases_name_key_and_place() {
         assert!(message.contains(words), "{text}\n{message}");
     }
 }
+
+/// A flag may give what TOML has no number for; the report could not repeat it.
+#[test]
+fn seeds_end_where_whole_numbers_of_toml_end() {
+    let mut config = Config::default();
+    config.file.inference.seed = Some(i64::MAX as u64);
+    config.settings().expect("the largest seed");
+    assert!(config.in_force().contains("9223372036854775807"));
+    config.file.inference.seed = Some(i64::MAX as u64 + 1);
+    let error = config.settings().unwrap_err().to_string();
+    assert!(
+        error.contains("9223372036854775808 is out of range"),
+        "{error}"
+    );
+}

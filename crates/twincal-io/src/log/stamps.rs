@@ -15,3 +15,31 @@ pub(crate) fn at(origin: i64, ns: f64) -> i64 {
 pub(crate) fn seconds(stamp: i64) -> f64 {
     stamp as f64 / 1e9
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stamps_within_a_hundred_days_come_back() {
+        let (origin, days) = (1_700_000_000_123_456_789, 100 * 24 * 3600 * 1_000_000_000);
+        for stamp in [
+            origin,
+            origin + 1,
+            origin - 1,
+            origin + days + 1,
+            origin - days - 1,
+        ] {
+            assert_eq!(at(origin, since(origin, stamp)), stamp);
+        }
+        // Far beyond, to the next double, and never around the corner.
+        for stamp in [i64::MAX, i64::MIN] {
+            let back = at(
+                -stamp.signum() * i64::MAX,
+                since(-stamp.signum() * i64::MAX, stamp),
+            );
+            assert!(back.abs_diff(stamp) <= 2048, "{back}");
+        }
+        assert_eq!(seconds(1_500_000_000), 1.5);
+    }
+}
