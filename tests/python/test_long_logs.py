@@ -140,7 +140,11 @@ def test_all_commands_take_long_logs_in_chapters(tmp_path, long_log):
                         ["check", file, "--twin", tmp_path / "out", "--json"],
                         ["inspect", model, file, "--config", config, "--json"],
                         ["doctor", file, "--model", model, "--config", config, "--json"]):  # fmt: skip
-            words, memory[command[0], file.stem] = run(*command)
+            # The least of several runs: holes in the heap differ by 20 MB from run to run where two threads write.
+            words, least = run(*command)
+            for _ in range(2 if command[0] == "predict" else 0):
+                least = min(least, run(*command)[1])
+            memory[command[0], file.stem] = least
             if command[0] in ("inspect", "doctor"):
                 (seen,) = json.loads(words)["logs"]
                 assert (seen["samples"], seen["segments"]) == (pa.parquet.read_metadata(file).num_rows, 1)

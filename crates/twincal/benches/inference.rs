@@ -8,13 +8,14 @@ mod common;
 
 use common::least;
 use std::process::Command;
+use twincal::gram::{JointAccumulator, Workspace};
 use twincal::infer::{Choice, InferenceSettings, approximate, infer, scan};
 use twincal::posterior::{Method, Problem};
 use twincal::prior::{Inclusion, Prior};
 
-/// Columns with pairwise correlation `correlation`, a few of them true with effects of the given size; effects near 0 keep
-/// every model in play.
-fn problem(size: usize, correlation: f64, effect: f64) -> Problem {
+/// Columns with pairwise correlation `correlation`, one after the other, and what a few of them make with effects of the given size,
+/// with white noise; effects near 0 keep every model in play.
+fn rows(size: usize, rows: usize, correlation: f64, effect: f64) -> (Vec<f64>, Vec<f64>) {
     let mut state = 88_172_645_463_325_252u64;
     let mut normal = || -> f64 {
         (0..12)
@@ -27,25 +28,32 @@ fn problem(size: usize, correlation: f64, effect: f64) -> Problem {
             .sum::<f64>()
             - 6.0
     };
-    let rows = 2000;
-    let (mut gram, mut xy, mut yy) = (vec![0.0; size * size], vec![0.0; size], 0.0);
-    for _ in 0..rows {
+    let (mut columns, mut y) = (vec![0.0; size * rows], Vec::with_capacity(rows));
+    for row in 0..rows {
         let common = normal();
         let x: Vec<f64> = (0..size)
             .map(|_| correlation.sqrt() * common + (1.0 - correlation).sqrt() * normal())
             .collect();
-        let y = effect * (x[0] - 0.5 * x[3] + 0.3 * x[5] + 0.2 * x[7]) + normal();
-        for i in 0..size {
-            xy[i] += x[i] * y;
-            (0..size).for_each(|j| gram[i * size + j] += x[i] * x[j]);
-        }
-        yy += y * y;
+        y.push(effect * (x[0] - 0.5 * x[3] + 0.3 * x[5] + 0.2 * x[7]) + normal());
+        (0..size).for_each(|k| columns[k * rows + row] = x[k]);
     }
+    (columns, y)
+}
+
+/// The question that rows ask: their sums, as a fit makes them, and the prior.
+fn question(size: usize, columns: &[f64], y: &[f64]) -> Problem {
+    let mut sums = JointAccumulator::new((0..size as u32).collect());
+    let keep = vec![true; y.len()];
+    sums.push_block(columns, y.len(), y, &keep, true, &mut Workspace::default());
+    let sums = sums.finish();
+    let at = |i: usize, j: usize| sums.s0.at(i, j);
     Problem {
-        gram,
-        xy,
-        yy,
-        n: f64::from(rows),
+        gram: (0..size * size)
+            .map(|cell| at(cell / size, cell % size))
+            .collect(),
+        xy: (0..size).map(|k| at(k, size)).collect(),
+        yy: at(size, size),
+        n: sums.n,
         log_constant: 0.0,
         names: (0..size).map(|k| format!("x{k}")).collect(),
         prior: Prior::single(
@@ -55,6 +63,11 @@ fn problem(size: usize, correlation: f64, effect: f64) -> Problem {
             (1e-3, 1e-3),
         ),
     }
+}
+
+fn problem(size: usize, correlation: f64, effect: f64) -> Problem {
+    let (columns, y) = rows(size, 2000, correlation, effect);
+    question(size, &columns, &y)
 }
 
 /// A seven-joint arm: a payload (10 columns) that the last link's mass moments and tensor nearly repeat, seven links (4 + 6
@@ -222,6 +235,16 @@ fn main() {
             "gibbs/24 columns/4 chains of 5000, judged"
         );
     }
+    let (columns, y) = rows(32, 20_000, 0.5, 1.0);
+    let from_rows = || {
+        let problem = question(32, &columns, &y);
+        infer(&problem, &settings(Choice::Auto, 5000)).expect("an answer")
+    };
+    let (seconds, _) = pool.install(|| least(5, from_rows));
+    println!(
+        "{:<44} {seconds:>10.6} to probabilities and intervals",
+        "20 000 rows of 32 columns, white noise"
+    );
     pool.install(|| components(settings));
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
     match Command::new(format!("{root}/.venv/bin/python"))

@@ -3,7 +3,7 @@
 //! The two posteriors come from different logs and are independent, so that the difference of a parameter is the
 //! difference of independent draws. A component that a twin does not hold is 0 in it.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Finding, Result, Severity};
 use crate::posterior::draws::{CoefficientDraws, draw};
 use crate::term::{Estimate, Family, Library};
 use crate::twin::Twin;
@@ -87,6 +87,27 @@ pub fn compare(before: &Twin, after: &Twin) -> Result<Vec<Change>> {
         .into_iter()
         .filter_map(|name| change(name, &sides))
         .collect())
+}
+
+/// What has to be known before two twins are compared: friction that turns round within another velocity is another column, and its number
+/// is not the same.
+pub fn hindrances(before: &Twin, after: &Twin) -> Vec<Finding> {
+    let [old, new] = [before, after].map(|twin| twin.library.coulomb_velocity);
+    let turns = |twin: &Twin| twin.library.families.iter().any(|f| f.turns_round());
+    if old == new || !turns(before) || !turns(after) {
+        return Vec::new();
+    }
+    let message = format!(
+        "friction turns round within {old} rad/s (m/s) before and {new} after: its numbers differ for that alone; fit both with \
+         [library] coulomb_velocity = {old}"
+    );
+    vec![Finding::new(
+        Severity::Warning,
+        "coulomb_velocity_differs",
+        "",
+        message,
+        0,
+    )]
 }
 
 /// A twin with its library and draws.

@@ -8,7 +8,7 @@ mod two_link;
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::sync::LazyLock;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
-use twincal::compare::{ParameterChange, compare};
+use twincal::compare::{ParameterChange, compare, hindrances};
 use twincal::posterior::random::Random;
 use twincal::posterior::{Model, Posterior};
 use twincal::signal::Auto;
@@ -65,6 +65,26 @@ fn the_load_is_what_changed_and_nothing_else() {
     let back = back.iter().find(|c| c.name == "payload");
     let mass = &back.expect("the payload").parameters[0];
     assert!((mass.difference + 0.6).abs() < 4.5 * mass.sd, "{mass:?}");
+}
+
+/// Only where both have friction that turns round, and each otherwise.
+#[test]
+fn friction_of_two_shapes_is_told() {
+    let (mut before, mut after) = (EMPTY.twin.clone(), LOADED.twin.clone());
+    after.library.coulomb_velocity = 0.08;
+    assert_eq!(hindrances(&before, &after), []);
+    before.library.families.push(Family::Coulomb);
+    assert_eq!(hindrances(&before, &after), []);
+    after.library.families.push(Family::Stribeck);
+    let said = hindrances(&before, &after);
+    assert_eq!(said.len(), 1);
+    assert_eq!(said[0].code, "coulomb_velocity_differs");
+    assert!(
+        said[0]
+            .message
+            .contains("within 0 rad/s (m/s) before and 0.08 after")
+    );
+    assert_eq!(hindrances(&after, &after), []);
 }
 
 /// Mean and covariance factors of two coefficients: `sin(q1 - q2)` and the payload's mass.

@@ -1,13 +1,14 @@
 //! `twincal diff`: what changed between two twins of the same robot.
 
 use super::print_json;
-use super::summary::paragraph;
+use super::summary::{Notes, findings, paragraph};
 use crate::args::Diff;
 use crate::failure::Outcome;
 use crate::terminal::Terminal;
 use serde::Serialize;
 use std::path::Path;
-use twincal::compare::{Change, compare};
+use twincal::Finding;
+use twincal::compare::{Change, compare, hindrances};
 use twincal_io::artifact::Artifact;
 use twincal_io::twin_json::StoredTwin;
 
@@ -18,22 +19,26 @@ struct Difference {
     before: String,
     after: String,
     components: Vec<Change>,
+    findings: Vec<Finding>,
 }
 
 pub(super) fn run(flags: &Diff, terminal: &mut Terminal) -> Outcome<u8> {
     let read = |folder: &Path| StoredTwin::read(&Artifact::open(folder)?, false);
     let (before, after) = (read(&flags.before)?, read(&flags.after)?);
-    let changes = compare(&before.calibration.twin, &after.calibration.twin)?;
+    let (old, new) = (&before.calibration.twin, &after.calibration.twin);
+    let (changes, found) = (compare(old, new)?, hindrances(old, new));
     if flags.json {
         let difference = Difference {
             schema: 1,
             before: flags.before.to_string_lossy().into_owned(),
             after: flags.after.to_string_lossy().into_owned(),
             components: changes,
+            findings: found,
         };
         print_json(terminal, &difference)?;
     } else {
         print(&changes, terminal);
+        findings(&found, Notes::Shown, terminal);
     }
     Ok(0)
 }

@@ -99,29 +99,8 @@ impl Data {
 
     /// Drops the columns that are zero on all fit logs, e.g. of joints that never move; returns their indices.
     pub(super) fn drop_zero_columns(&mut self, library: Library) -> (Library, Vec<usize>) {
-        let mut square = vec![0.0_f64; library.columns().len()];
-        for log in &self.fit {
-            let len = log.observations.len();
-            for joint in &log.observations.joints {
-                joint.visit_columns(len, 0..len, &mut |rows, values| {
-                    let still = &joint.standstill[rows.clone()];
-                    for (i, &column) in joint.columns.iter().enumerate() {
-                        let own = values.of(i, 0, rows.len()).iter().zip(still);
-                        let moving = own.filter(|(_, still)| !**still);
-                        square[column] += moving.map(|(x, _)| x * x).sum::<f64>();
-                    }
-                });
-            }
-        }
-        let lengths = self.fit.iter().map(|log| log.observations.len());
-        let cells = (lengths.sum::<usize>() * library.joints()).max(1) as f64;
-        let typical = library.typical_sizes();
-        let zero: Vec<usize> = (0..square.len())
-            .filter(|&k| {
-                let size = (square[k] / cells).sqrt();
-                size == 0.0 || size <= ZERO * typical[k]
-            })
-            .collect();
+        let fit = self.fit.iter().map(|log| &log.observations);
+        let zero = zero_columns(fit, &library);
         for &column in &zero {
             let name = &library.terms()[library.columns()[column]].name;
             self.findings.push(Finding::new(
@@ -233,6 +212,34 @@ impl Data {
             })
             .collect()
     }
+}
+
+/// Columns of the library that are zero on these rows.
+pub(super) fn zero_columns<'a>(
+    logs: impl Iterator<Item = &'a Observations> + Clone,
+    library: &Library,
+) -> Vec<usize> {
+    let mut square = vec![0.0_f64; library.columns().len()];
+    for observations in logs.clone() {
+        let len = observations.len();
+        for joint in &observations.joints {
+            joint.visit_columns(len, 0..len, &mut |rows, values| {
+                let still = &joint.standstill[rows.clone()];
+                for (i, &column) in joint.columns.iter().enumerate() {
+                    let own = values.of(i, 0, rows.len()).iter().zip(still);
+                    let moving = own.filter(|(_, still)| !**still);
+                    square[column] += moving.map(|(x, _)| x * x).sum::<f64>();
+                }
+            });
+        }
+    }
+    let cells = (logs.map(Observations::len).sum::<usize>() * library.joints()).max(1) as f64;
+    let typical = library.typical_sizes();
+    let is_zero = |k: &usize| {
+        let size = (square[*k] / cells).sqrt();
+        size == 0.0 || size <= ZERO * typical[*k]
+    };
+    (0..square.len()).filter(is_zero).collect()
 }
 
 /// Statistics of the fit logs at other cut-offs than the one they were prepared for; what the fit left out stays left out. `None`

@@ -19,6 +19,7 @@ mod sandwich;
 mod stopped;
 mod summary;
 mod sweep;
+mod turning;
 mod unphysical;
 mod uneven_noise;
 mod unseen;
@@ -181,17 +182,24 @@ fn whole_road(
         let names = robot.joint_names();
         log.any_recording(|recording| recording.require_torque(&names))?;
     }
-    let (pipeline, more, prepared) = choose_and_prepare(robot, logs, &settings.signal)?;
+    let (mut pipeline, more, mut prepared) = choose_and_prepare(robot, logs, &settings.signal)?;
     findings.extend(more);
     let every_log: Vec<Log<'_>> = logs.iter().chain(heldout).map(Log::lent).collect();
     findings.extend(constant_torque(robot, every_log.clone())?);
     findings.extend(hardly_driven(robot, every_log.clone())?);
-    let library_settings = LibrarySettings {
+    let mut library_settings = LibrarySettings {
         coulomb_velocity: pipeline.coulomb_velocity,
         ..settings.library.clone()
     };
-    let (library, more) = Library::propose(robot, &library_settings)?;
+    let (mut library, more) = Library::propose(robot, &library_settings)?;
     findings.extend(more);
+    let turned = turning::turn(robot, &library, (logs, &prepared), &pipeline, settings)?;
+    if let Some(turned) = turned {
+        turned.prepare_again(robot, logs, &pipeline, &mut prepared)?;
+        library_settings.coulomb_velocity = turned.pipeline.coulomb_velocity;
+        (pipeline, library) = (turned.pipeline, turned.library);
+        findings.push(turned.finding);
+    }
 
     // eq. (1)–(4): residual torque and Euler–Lagrange columns, filtered alike
     let others = heldout.iter().map(|log| ready(robot, log, &pipeline));

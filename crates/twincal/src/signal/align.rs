@@ -93,13 +93,40 @@ impl<'a> PreparedLog<'a> {
         &self.log
     }
 
+    /// Interval of the clock at which motion is held, s.
+    pub(super) fn interval(&self) -> f64 {
+        let pieces = self.pieces.pieces.first();
+        pieces.map_or(self.pieces.interval, |piece| piece.interval)
+    }
+
+    /// Samples of each piece.
+    pub(super) fn lengths(&self) -> Vec<usize> {
+        let pieces = self.pieces.pieces.iter();
+        pieces.map(|piece| piece.time.len()).collect()
+    }
+
+    /// Some stretches of it, each a piece of its own: (piece, samples).
+    pub(super) fn cut(&self, stretches: &[(usize, Range<usize>)]) -> PreparedLog<'_> {
+        let piece = |(piece, range): &(usize, Range<usize>)| {
+            let mut part = self.pieces.pieces[*piece].lent();
+            part.keep(range.clone());
+            part
+        };
+        PreparedLog {
+            log: Cow::Borrowed(&self.log),
+            joints: self.joints.clone(),
+            pieces: Prepared {
+                interval: self.pieces.interval,
+                pieces: stretches.iter().map(piece).collect(),
+            },
+            saturated: self.saturated.clone(),
+            findings: Vec::new(),
+        }
+    }
+
     /// Samples of all pieces, on the clock at which motion is held.
     pub fn samples(&self) -> usize {
-        self.pieces
-            .pieces
-            .iter()
-            .map(|piece| piece.time.len())
-            .sum()
+        self.lengths().iter().sum()
     }
 
     /// Rows that a fit with this pipeline keeps at most: filters trim the ends of pieces.

@@ -12,13 +12,13 @@ use std::ops::Range;
 const MARGIN: f64 = 1.0;
 
 /// Where torque is flat, by joint.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Saturated {
     joints: Vec<Flat>,
 }
 
 /// Flat runs of one joint.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Flat {
     joint: usize,
     name: String,

@@ -26,6 +26,7 @@ mod spectrum;
 pub(crate) mod spline;
 mod standstill;
 mod steps;
+mod stretches;
 mod survey;
 mod thin;
 mod torque;
@@ -43,6 +44,7 @@ pub use long::{Log, Logs, LongLog, ReadChapter};
 pub use ready::{LongReady, ReadyLog};
 pub use shelf::{Numbers, Shelf};
 pub use steps::{Steps, steps};
+pub(crate) use stretches::stretches;
 pub use torque::{constant_torque, missing_torque};
 
 use crate::error::{Error, Finding, Result};
@@ -51,10 +53,6 @@ use serde::{Deserialize, Serialize};
 
 /// Rates that differ by less than this share are one: clocks are known no better.
 const SAME_RATE: f64 = 1e-6;
-
-/// Shortest stretch of [`Trajectory::thinned_out`], samples, and most of them in a segment.
-const STRETCH: usize = 2048;
-const MOST_STRETCHES: usize = 8;
 
 fn is_zero(value: &f64) -> bool {
     *value == 0.0
@@ -76,7 +74,8 @@ pub struct SignalSettings {
     pub cutoff_hz: Auto,
     /// Rate of the kept rows, Hz; auto = 2.5 f_c.
     pub rate_hz: Auto,
-    /// v_s of Coulomb friction and of the standstill mask, rad/s or m/s; `None`: 0 with cut-off 0, else 0.02.
+    /// v_s of Coulomb friction and of the standstill mask, rad/s or m/s; `None`: 0 with cut-off 0, else 0.02, of which a calibration
+    /// takes a quarter to four times for friction where training data clearly ask for it.
     pub coulomb_velocity: Option<f64>,
     /// What is put right in every log first.
     pub corrections: Corrections,
@@ -175,7 +174,7 @@ pub struct Pipeline {
     pub motion_interval: f64,
     /// v_s, rad/s or m/s.
     pub coulomb_velocity: f64,
-    /// Standstill threshold per joint: max(v_s, what the encoder resolves), rad/s or m/s.
+    /// Standstill threshold per joint: max(v_s as stated or 0.02, what the encoder resolves), rad/s or m/s.
     pub standstill_velocity: Vec<f64>,
     /// What q̈ is derived from where it is not logged, per joint: the channel that leaves less noise.
     pub derived_from: Vec<DerivedFrom>,
@@ -286,35 +285,6 @@ pub struct Trajectory {
     pub payload: Payload,
     /// False where the payload component does not act: in logs without a payload beside logs with an unknown one.
     pub payload_acts: bool,
-}
-
-impl Trajectory {
-    /// The same with about `samples` of its samples, in stretches that are spread evenly; its filtered rows are none of the log's.
-    pub(crate) fn thinned_out(mut self, samples: usize) -> Self {
-        let all: usize = self.segments.iter().map(|segment| segment.time.len()).sum();
-        if all <= samples {
-            return self;
-        }
-        let (mut seen, mut taken, mut kept) = (0, 0, Vec::new());
-        for segment in &self.segments {
-            let len = segment.time.len();
-            seen += len;
-            let due = (samples * seen / all).saturating_sub(taken).min(len);
-            // Of many short segments some are kept whole.
-            if due < len.min(STRETCH) {
-                continue;
-            }
-            let stretches = (due / STRETCH).clamp(1, MOST_STRETCHES);
-            let (of_each, apart) = (due / stretches, len / stretches);
-            kept.extend((0..stretches).map(|i| {
-                let from = i * apart + (apart - of_each) / 2;
-                segment.cut(self.dof, from..from + of_each)
-            }));
-            taken += stretches * of_each;
-        }
-        self.segments = kept;
-        self
-    }
 }
 
 impl Pipeline {

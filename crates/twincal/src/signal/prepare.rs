@@ -67,6 +67,19 @@ impl<'a> Values<'a> {
             .map(|channel| &**channel)
     }
 
+    /// The same, lent.
+    fn lent(&self) -> Values<'_> {
+        fn lend<'b>(channel: &'b Option<Cow<'_, [f64]>>) -> Option<Cow<'b, [f64]>> {
+            channel.as_deref().map(Cow::Borrowed)
+        }
+        Values {
+            q: Cow::Borrowed(&self.q),
+            qd: lend(&self.qd),
+            qdd: lend(&self.qdd),
+            tau: lend(&self.tau),
+        }
+    }
+
     /// The same without the recording.
     fn into_owned(self) -> Values<'static> {
         let own = |channel: Cow<'a, [f64]>| Cow::Owned(channel.into_owned());
@@ -105,6 +118,17 @@ pub(crate) struct Piece<'a> {
 }
 
 impl Piece<'_> {
+    /// The same, lent.
+    pub(crate) fn lent(&self) -> Piece<'_> {
+        Piece {
+            joints: self.joints.iter().map(Values::lent).collect(),
+            time: self.time.clone(),
+            rows: self.rows.clone(),
+            grid_rows: self.grid_rows.clone(),
+            ..*self
+        }
+    }
+
     /// The same without the recording.
     pub(crate) fn into_owned(self) -> Piece<'static> {
         Piece {
@@ -123,7 +147,7 @@ impl Piece<'_> {
     }
 
     /// Keeps these samples of the grid.
-    fn keep(&mut self, range: std::ops::Range<usize>) {
+    pub(crate) fn keep(&mut self, range: std::ops::Range<usize>) {
         self.time = self.time[range.clone()].to_vec();
         if !self.resampled() {
             self.rows = self.rows[range.clone()].to_vec();

@@ -5,12 +5,12 @@
 //! would fold; its kernel is exact on polynomials up to degree 9. Torque passes the same filter: columns and torque then
 //! meet the same F. How coarse the clock may be: [`coarsest`].
 
-use super::Pipeline;
 use super::decimate::Decimator;
 use super::fir::thinning_kernel;
 #[cfg(test)]
 use super::prepare::Values;
 use super::prepare::{Piece, Prepared};
+use super::{Pipeline, Trajectory};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -31,6 +31,28 @@ const CHUNK: usize = 64;
 pub(crate) fn coarsest(motion_cutoff: f64, coulomb_velocity: f64, acceleration: f64) -> f64 {
     let reversal = coulomb_velocity / (STEPS_PER_REVERSAL * PEAK * acceleration);
     (1.0 / (SAMPLES_PER_PERIOD * motion_cutoff)).min(reversal)
+}
+
+impl Pipeline {
+    /// The same with another v_s, and a clock that is fine enough for it in this motion. Standstill stays what it is.
+    pub(crate) fn turning(&self, coulomb_velocity: f64, motion: &[Trajectory]) -> Self {
+        let (mut sum, mut count) = (vec![0.0; self.standstill_velocity.len()], 0);
+        for segment in motion.iter().flat_map(|trajectory| &trajectory.segments) {
+            let of_joints = segment.qdd.chunks_exact(segment.time.len());
+            for (sum, qdd) in sum.iter_mut().zip(of_joints) {
+                *sum += qdd.iter().map(|a| a * a).sum::<f64>();
+            }
+            count += segment.time.len();
+        }
+        let fastest = sum.into_iter().fold(0.0, f64::max);
+        let acceleration = (fastest / (count as f64).max(1.0)).sqrt();
+        let interval = coarsest(self.motion_cutoff_hz, coulomb_velocity, acceleration);
+        Self {
+            coulomb_velocity,
+            motion_interval: self.motion_interval.min(interval),
+            ..self.clone()
+        }
+    }
 }
 
 /// How many samples of a log become one: the largest number that divides the distance of rows, so that rows stay where they

@@ -104,6 +104,19 @@ impl Family {
         Self::MotorInertia,
     ];
 
+    /// True if its torque depends on v_s, within which friction turns round with the motion.
+    #[must_use]
+    pub fn turns_round(self) -> bool {
+        matches!(
+            self,
+            Self::Coulomb
+                | Self::Asymmetry
+                | Self::Stribeck
+                | Self::LoadFriction
+                | Self::CoupledFriction
+        )
+    }
+
     /// The part of a component's name after the dot, or `payload`.
     #[must_use]
     pub fn word(self) -> &'static str {

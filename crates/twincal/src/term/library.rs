@@ -1,8 +1,9 @@
 //! The library: all candidates of one robot in order, judged, compiled into one tape and one pass over the model.
 
 mod carried;
+mod judged;
 
-use super::aliases::{Motions, channels, judge};
+use super::aliases::{Motions, channels};
 use super::candidate::{Candidate, Joint, Proposal};
 use super::component::{Component, Meaning, Parameter};
 use super::expression::{Graph, Id, Slot, Tape, Variable, bounded_values};
@@ -11,16 +12,12 @@ use super::overlaps;
 use super::parts::{self, Parts, Torque};
 use super::propose::{About, payload_mount, proposals};
 use super::sentence::{Estimate, sentence};
-use super::verdicts::statuses;
 use super::{Family, LibrarySettings, Status, Term, user};
 use crate::error::{Error, Finding, Result};
 use crate::robot::{JointKind, Motion, Robot};
 use std::sync::Arc;
 
 pub use super::model_column::Scratch;
-
-/// A model column's torque on a joint below this share of the largest of its kind is zero by structure.
-const STRUCTURAL_ZERO: f64 = 1e-10;
 
 /// Ordered terms for one robot, ready to be evaluated. Column k of the regression is the k-th term whose status is
 /// [`Status::Candidate`].
@@ -69,25 +66,25 @@ impl Library {
     /// # Source
     /// Paper eq. (2)–(4), method sections 2 and 3.
     pub fn propose(robot: &Robot, settings: &LibrarySettings) -> Result<(Self, Vec<Finding>)> {
-        let names = robot.joint_names();
-        let joint = |(index, name): (usize, &&str)| Joint {
-            index,
-            name: (*name).to_owned(),
-            slides: robot.joint_kind(index) == JointKind::Prismatic,
-        };
-        let joints: Vec<Joint> = names.iter().enumerate().map(joint).collect();
-        let about = About {
-            joints: &joints,
-            parallel: robot.is_planar(),
-            robot: Some(robot),
-        };
-        Self::build(&about, settings)
+        Self::build(&About::robot(robot, &joints(robot)), settings, None)
     }
 
-    /// [`Library::propose`], also for joints without their robot.
+    /// [`Library::propose`] with another v_s than this library of the same robot, all else being equal: what is judged at random motions
+    /// stays as it is, since it does not depend on v_s.
+    ///
+    /// # Errors
+    /// Those of [`Library::propose`].
+    pub(crate) fn turning(&self, robot: &Robot, settings: &LibrarySettings) -> Result<Self> {
+        let joints = joints(robot);
+        let about = About::robot(robot, &joints);
+        Ok(Self::build(&about, settings, Some(self))?.0)
+    }
+
+    /// [`Library::propose`], also for joints without their robot; `like`: what was judged already.
     pub(super) fn build(
         about: &About<'_>,
         settings: &LibrarySettings,
+        like: Option<&Self>,
     ) -> Result<(Self, Vec<Finding>)> {
         let joints = about.joints;
         let mut findings = Vec::new();
@@ -99,20 +96,14 @@ impl Library {
             .robot
             .map(|robot| ModelColumns::new(Arc::new(robot.clone())));
         let home = home(&components, candidates.len());
-        let verdicts = {
-            let sources: Vec<(usize, ModelColumn)> = sources(&candidates);
-            let torques = |motions: &[&Motions]| match &model {
-                Some(model) => torques(model, &sources, motions, joints.len()),
-                None => Vec::new(),
-            };
-            let shares = |k: usize| components[home[k]].terms.len() > 1;
-            judge(&graph, &mut candidates, joints.len(), &shares, &torques)
+        let (statuses, acting) = match like {
+            Some(like) => like.judged(&mut candidates),
+            None => {
+                let shares = |k: usize| components[home[k]].terms.len() > 1;
+                let about = (joints.len(), model.as_ref());
+                judged::judged(&graph, &mut candidates, about, &shares, &mut findings)?
+            }
         };
-        let acting = match &model {
-            Some(model) => acting_joints(model, &candidates, joints.len()),
-            None => vec![Vec::new(); candidates.len()],
-        };
-        let statuses = statuses(&graph, &candidates, &verdicts, &acting, &mut findings)?;
 
         let payload_centre = match about.robot {
             Some(robot) if settings.has(Family::Payload) => payload_mount(robot, settings)?.centre,
@@ -163,9 +154,20 @@ impl Library {
                     .to_owned(),
             });
         }
-        let states = random_motions(joints.len());
-        library.payload_is_one = overlaps::payload_is_one(&library, joints.len(), &states);
-        let names = overlaps::spanning(&library, joints.len(), &states);
+        let names = match like {
+            Some(like) => {
+                library.payload_is_one = like.payload_is_one;
+                let components = like.components.iter();
+                components
+                    .map(|component| component.alias_of.clone())
+                    .collect()
+            }
+            None => {
+                let states = random_motions(joints.len());
+                library.payload_is_one = overlaps::payload_is_one(&library, joints.len(), &states);
+                overlaps::spanning(&library, joints.len(), &states)
+            }
+        };
         for (component, names) in library.components.iter_mut().zip(names) {
             component.alias_of = names;
         }
@@ -481,6 +483,17 @@ fn flattened(proposed: Vec<Proposal>) -> (Vec<Component>, Vec<Candidate>) {
     (components, candidates)
 }
 
+/// The moving joints of a robot.
+fn joints(robot: &Robot) -> Vec<Joint> {
+    let names = robot.joint_names();
+    let joint = |(index, name): (usize, &&str)| Joint {
+        index,
+        name: (*name).to_owned(),
+        slides: robot.joint_kind(index) == JointKind::Prismatic,
+    };
+    names.iter().enumerate().map(joint).collect()
+}
+
 /// Component of each term.
 fn home(components: &[Component], terms: usize) -> Vec<usize> {
     let mut home = vec![0; terms];
@@ -488,73 +501,6 @@ fn home(components: &[Component], terms: usize) -> Vec<usize> {
         component.terms.iter().for_each(|&term| home[term] = index);
     }
     home
-}
-
-/// Candidates that are made from the robot model.
-fn sources(candidates: &[Candidate]) -> Vec<(usize, ModelColumn)> {
-    let with_source = |(k, candidate): (usize, &Candidate)| Some((k, candidate.model.clone()?));
-    candidates
-        .iter()
-        .enumerate()
-        .filter_map(with_source)
-        .collect()
-}
-
-/// Torque of model columns on all joints at some states: `(candidate, torque[state * joints + joint])`.
-fn torques(
-    model: &ModelColumns,
-    sources: &[(usize, ModelColumn)],
-    motions: &[&Motions],
-    joints: usize,
-) -> Vec<(usize, Vec<f64>)> {
-    let len = motions.len();
-    let mut all = model.emptied();
-    for (row, (_, source)) in sources.iter().enumerate() {
-        let slots = (0..joints).map(|joint| (joint, row)).collect();
-        all.push(source.clone(), slots);
-    }
-    let [q, qd, qdd] = channels(motions, joints);
-    let motion = Motion {
-        len,
-        q: &q,
-        qd: &qd,
-        qdd: &qdd,
-    };
-    let mut out = vec![vec![0.0; sources.len() * len]; joints];
-    all.evaluate(motion, &mut out, &mut Scratch::default());
-    sources
-        .iter()
-        .enumerate()
-        .map(|(row, &(k, _))| {
-            let value = |state: usize, joint: usize| out[joint][row * len + state];
-            let torque = (0..len).flat_map(|state| (0..joints).map(move |joint| (state, joint)));
-            (k, torque.map(|(s, j)| value(s, j)).collect())
-        })
-        .collect()
-}
-
-/// Joints on which each model column is not zero by structure, from random states.
-fn acting_joints(model: &ModelColumns, candidates: &[Candidate], joints: usize) -> Vec<Vec<usize>> {
-    let mut acting = vec![Vec::new(); candidates.len()];
-    let sources = sources(candidates);
-    let motions = random_motions(joints);
-    let motions: Vec<&Motions> = motions.iter().collect();
-    let torques = torques(model, &sources, &motions, joints);
-    let size = |torque: &[f64]| torque.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-    let largest = |unit: &str| {
-        let same = torques.iter().filter(|(k, _)| candidates[*k].unit == unit);
-        same.map(|(_, torque)| size(torque)).fold(0.0, f64::max)
-    };
-    for (k, torque) in &torques {
-        let limit = STRUCTURAL_ZERO * largest(&candidates[*k].unit);
-        acting[*k] = (0..joints)
-            .filter(|&joint| {
-                let own = torque.iter().skip(joint).step_by(joints);
-                own.fold(0.0_f64, |m, x| m.max(x.abs())) > limit
-            })
-            .collect();
-    }
-    acting
 }
 
 /// States that have nothing in particular in common: a Weyl sequence with irrational steps.

@@ -36,6 +36,17 @@ pub(super) struct About<'a> {
     pub(super) robot: Option<&'a Robot>,
 }
 
+impl<'a> About<'a> {
+    /// A robot and its moving joints.
+    pub(super) fn robot(robot: &'a Robot, joints: &'a [Joint]) -> Self {
+        Self {
+            joints,
+            parallel: robot.is_planar(),
+            robot: Some(robot),
+        }
+    }
+}
+
 /// All proposals in the order of `terms[]`.
 ///
 /// # Errors

@@ -56,7 +56,7 @@ fn bare(
         parallel,
         robot: None,
     };
-    Library::build(&about, settings)
+    Library::build(&about, settings, None)
 }
 
 fn status_of<'a>(library: &'a Library, name: &str) -> &'a Status {

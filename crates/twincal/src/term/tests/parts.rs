@@ -102,3 +102,51 @@ fn parts_make_up_the_columns() {
     );
     assert!(parts < columns, "{parts} parts for {columns} columns");
 }
+
+/// What was judged once is what would be judged again; only what turns round is another column.
+#[test]
+fn a_library_with_another_velocity_is_the_one_that_would_be_proposed() {
+    let settings = |velocity: f64| LibrarySettings {
+        terms: vec!["sin(q1)".into(), "2*sin(q1)".into()],
+        families: Family::NAMED.to_vec(),
+        generic: Some(true),
+        coulomb_velocity: velocity,
+        ..LibrarySettings::default()
+    };
+    let robot = arm(4.0);
+    let (usual, _) = Library::propose(&robot, &settings(0.02)).unwrap();
+    let (proposed, _) = Library::propose(&robot, &settings(0.08)).unwrap();
+    let turned = usual.turning(&robot, &settings(0.08)).unwrap();
+    assert_eq!(turned.terms(), proposed.terms());
+    assert_eq!(turned.components(), proposed.components());
+    assert_eq!(turned.payload_is_one(), proposed.payload_is_one());
+    assert_eq!(turned.prior_sds(), proposed.prior_sds());
+    let (q, qd, qdd) = (vec![0.3; 8], vec![0.03; 8], vec![1.0; 8]);
+    let motion = Motion {
+        len: 2,
+        q: &q,
+        qd: &qd,
+        qdd: &qdd,
+    };
+    let values = |library: &Library| {
+        let mut out = vec![Vec::new(); 4];
+        library.evaluate(motion, &mut out);
+        out
+    };
+    assert_eq!(values(&turned), values(&proposed));
+    let other: Vec<bool> = usual
+        .columns_of_joint(0)
+        .iter()
+        .zip(
+            values(&usual)[0]
+                .chunks(2)
+                .zip(values(&turned)[0].chunks(2)),
+        )
+        .filter(|(_, (a, b))| a != b)
+        .map(|(&column, _)| usual.terms()[usual.columns()[column]].family.turns_round())
+        .collect();
+    assert!(
+        other.len() >= 3 && other.iter().all(|turns| *turns),
+        "{other:?}"
+    );
+}

@@ -1,0 +1,161 @@
+//! Evenly spread stretches of a log: what is asked of a log's motion but not row by row needs no more.
+
+use super::align::{PreparedLog, Raw};
+use super::ready::{LongReady, ReadyLog};
+use super::{Pipeline, Trajectory};
+use crate::error::Result;
+use std::ops::Range;
+
+/// Shortest stretch, samples, and most of them in a segment.
+const STRETCH: usize = 2048;
+const MOST_STRETCHES: usize = 8;
+/// Shortest stretch whose filtered rows are asked for, in lengths of what one row sees.
+const KERNELS: f64 = 8.0;
+/// Chapters of a long log that are looked at.
+const CHAPTERS: usize = 4;
+
+impl Trajectory {
+    /// The same with about `samples` of its samples, in stretches that are spread evenly; its filtered rows are none of the log's.
+    pub(crate) fn thinned_out(mut self, samples: usize) -> Self {
+        let lengths: Vec<usize> = self.segments.iter().map(|s| s.time.len()).collect();
+        if let Some(stretches) = spread(&lengths, samples, STRETCH) {
+            let cut = |(segment, range): (usize, _)| self.segments[segment].cut(self.dof, range);
+            self.segments = stretches.into_iter().map(cut).collect();
+        }
+        self
+    }
+}
+
+/// Motion of evenly spread stretches of some logs, about `samples` samples together, on the clock at which motion is held. What is
+/// too short for rows is left out: what is wrong with a log is said when all of it is read.
+///
+/// # Errors
+/// Of chapters that cannot be read.
+pub(crate) fn stretches(
+    logs: &[ReadyLog<'_>],
+    samples: usize,
+    pipeline: &Pipeline,
+) -> Result<Vec<Trajectory>> {
+    let lengths: Vec<usize> = logs.iter().map(ReadyLog::length).collect();
+    let all: usize = lengths.iter().sum::<usize>().max(1);
+    let (mut seen, mut taken, mut kept) = (0, 0, Vec::new());
+    for (log, length) in logs.iter().zip(lengths) {
+        seen += length;
+        let due = (samples.min(all) * seen / all).saturating_sub(taken);
+        // Of many short logs some are taken whole.
+        if due < length.min(samples / MOST_STRETCHES) {
+            continue;
+        }
+        let own = log.stretches(due, pipeline)?;
+        taken += due;
+        kept.extend(own);
+    }
+    Ok(kept)
+}
+
+impl ReadyLog<'_> {
+    /// Samples, on the clock at which motion is held or finer.
+    fn length(&self) -> usize {
+        match self {
+            Self::Whole(log) => log.samples(),
+            Self::Long(long) => long.log.samples().iter().sum(),
+        }
+    }
+
+    fn stretches(&self, samples: usize, pipeline: &Pipeline) -> Result<Vec<Trajectory>> {
+        match self {
+            Self::Whole(log) => Ok(log.stretches(samples, pipeline).into_iter().collect()),
+            Self::Long(long) => long.stretches(samples, pipeline),
+        }
+    }
+}
+
+impl LongReady {
+    fn stretches(&self, samples: usize, pipeline: &Pipeline) -> Result<Vec<Trajectory>> {
+        let all = self.log.chapters();
+        let of = all.min(CHAPTERS);
+        let mut kept = Vec::with_capacity(of);
+        for i in 0..of {
+            let chapter = self.log.chapter((2 * i + 1) * all / (2 * of))?;
+            // Chapters that cannot be used are left out, as elsewhere.
+            if let Ok(log) = PreparedLog::new(self.joints.clone(), &chapter, pipeline) {
+                kept.extend(log.stretches(samples / of, pipeline));
+            }
+        }
+        Ok(kept)
+    }
+}
+
+impl PreparedLog<'_> {
+    fn stretches(&self, samples: usize, pipeline: &Pipeline) -> Option<Trajectory> {
+        let shortest = KERNELS * pipeline.kernel_length() / self.interval();
+        let shortest = STRETCH.max(shortest as usize).min(samples);
+        let trajectory = match spread(&self.lengths(), samples, shortest) {
+            None => self.align(pipeline, Raw::None),
+            Some(stretches) => self.cut(&stretches).align(pipeline, Raw::None),
+        };
+        trajectory.ok().map(|(trajectory, _)| trajectory)
+    }
+}
+
+/// Ranges of segments of these lengths, `samples` samples together and none much shorter than `shortest`, evenly spread; `None`: all of them.
+fn spread(
+    lengths: &[usize],
+    samples: usize,
+    shortest: usize,
+) -> Option<Vec<(usize, Range<usize>)>> {
+    let all: usize = lengths.iter().sum();
+    if all <= samples {
+        return None;
+    }
+    let (mut seen, mut taken, mut kept) = (0, 0, Vec::new());
+    for (segment, &len) in lengths.iter().enumerate() {
+        seen += len;
+        let due = (samples * seen / all).saturating_sub(taken).min(len);
+        // Of many short segments some are kept whole.
+        if due < len.min(shortest) {
+            continue;
+        }
+        let stretches = (due / shortest).clamp(1, MOST_STRETCHES);
+        let (of_each, apart) = (due / stretches, len / stretches);
+        kept.extend((0..stretches).map(|i| {
+            let from = i * apart + (apart - of_each) / 2;
+            (segment, from..from + of_each)
+        }));
+        taken += stretches * of_each;
+    }
+    Some(kept)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Enough and not more, in order, inside their segments, none much shorter than asked for.
+    #[test]
+    fn stretches_are_spread_over_segments_of_any_length() {
+        assert_eq!(spread(&[300, 200], 500, 100), None);
+        for lengths in [
+            vec![100_000],
+            vec![50, 90_000, 7, 30_000, 20_000],
+            vec![1000; 200],
+            vec![20; 5000],
+        ] {
+            let (samples, shortest) = (20_000, 2000);
+            let stretches = spread(&lengths, samples, shortest).unwrap();
+            let taken: usize = stretches.iter().map(|(_, range)| range.len()).sum();
+            assert!(taken <= samples && taken > samples / 2, "{taken}");
+            let mut before = (0, 0);
+            for (segment, range) in &stretches {
+                let whole = lengths[*segment];
+                assert!(range.len() >= whole.min(shortest) && range.end <= whole);
+                assert!((*segment, range.start) >= before, "one after the other");
+                before = (*segment, range.end);
+            }
+            // The last stretch lies in the last third of the log.
+            let behind: usize = lengths[..before.0].iter().sum();
+            let all: usize = lengths.iter().sum();
+            assert!(3 * (behind + before.1) > 2 * all);
+        }
+    }
+}
