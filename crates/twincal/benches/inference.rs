@@ -192,18 +192,26 @@ fn main() {
         allow_disagreement: true,
     };
     println!("{:<44} {:>10}", "one core, CPU time", "seconds");
-    for (size, effect) in [(20, 0.05), (24, 0.05), (24, 1.0)] {
-        let problem = problem(size, 0.5, effect);
+    for (size, slab, effect) in [
+        (20, 1e-4, 0.05),
+        (24, 1e-4, 0.05),
+        (24, 100.0, 0.05),
+        (28, 100.0, 0.05),
+        (24, 100.0, 1.0),
+    ] {
+        let mut problem = problem(size, 0.5, effect);
+        // So narrow a slab costs nobody anything: every model counts and is visited.
+        problem.prior.slab.fill(slab);
         let (seconds, _) = pool.install(|| {
             least(7, || {
                 infer(&problem, &settings(Choice::Exact, 0)).expect("exact")
             })
         });
         let each = seconds * 1e9 / (1u64 << size) as f64;
-        let what = if effect < 0.5 {
-            "every model visited"
-        } else {
-            "four strong effects"
+        let what = match (slab < 1.0, effect < 0.5) {
+            (true, _) => "every model visited",
+            (false, true) => "weak effects",
+            (false, false) => "four strong effects",
         };
         println!(
             "{:<44} {seconds:>10.6} {each:>9.3} ns/model",

@@ -34,6 +34,7 @@ pub(super) fn plan<S: Simd>(about: Root<'_>) -> Plan<S::f64s> {
         standard,
         prior,
         certain,
+        least,
     } = about;
     let lane_components = S::F64_LANES.ilog2() as usize;
     let free = standard.blocks.len() - certain;
@@ -154,6 +155,7 @@ pub(super) fn plan<S: Simd>(about: Root<'_>) -> Plan<S::f64s> {
             noise,
             written_out,
             heavy: Threshold::new(),
+            least,
         },
         top,
         padded,

@@ -246,6 +246,10 @@ impl<S: Simd> Below<S> for Deeper<'_, S::f64s> {
         out: &mut [S::f64s],
         heavy: &mut Heaviest,
     ) {
+        if self.m > tree.written_out && tree.is_negligible(simd, node.weight) {
+            out.fill(simd.splat_f64s(0.0));
+            return;
+        }
         descend(simd, tree, self.m, node, out, self.scratch, heavy);
     }
 }

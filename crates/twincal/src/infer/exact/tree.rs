@@ -14,6 +14,9 @@ use pulp::{Simd, WithSimd};
 pub(super) const LOG_REFERENCE: f64 = 600.0;
 /// Subtrees of up to this many components (2^13 models in every lane) are one task.
 const TASK_COMPONENTS: usize = 13;
+/// ln of the share of a single model's weight below which a subtree is not visited: 1e-21. There are fewer than 2^24 of them, so that all
+/// together are below 3e-14 of the sum, mostly far below.
+const NEGLIGIBLE: f64 = -48.0;
 
 /// One column in the tree. `V` is a vector with one model per lane.
 pub(super) struct Level<V> {
@@ -74,6 +77,19 @@ impl<V: Copy> Level<V> {
     }
 }
 
+impl<V: Copy> Tree<V> {
+    /// Whether no model below a node of this weight is worth a visit: whatever they fit, their pivots √(r/v) are at most 1, their misfits
+    /// at least 0, and the prior factors below a node sum to one at most:
+    ///
+    /// ```text
+    /// Σ weight · Π factor · (1 + c)^−a_n ≤ weight of the node · Π factor
+    /// ```
+    #[inline(always)]
+    pub(super) fn is_negligible<S: Simd<f64s = V>>(&self, simd: S, weight: V) -> bool {
+        simd.reduce_max_f64s(weight) < self.least
+    }
+}
+
 /// Everything that is the same in the whole tree.
 pub(super) struct Tree<V> {
     /// By number of columns yet to decide, minus one.
@@ -85,19 +101,25 @@ pub(super) struct Tree<V> {
     /// Last columns whose subtrees are written out.
     pub(super) written_out: usize,
     pub(super) heavy: Threshold,
+    /// Weight of a node below which its subtree is not visited.
+    pub(super) least: f64,
 }
 
 /// Sums over all models ([`Layout`] of K columns; weights times e^[`LOG_REFERENCE`]) and the heaviest of them, as sets
-/// of the components after the first `certain` ones, which every model holds.
+/// of the components after the first `certain` ones, which every model holds. `reference`: ln of the weight of any model; −∞ to visit
+/// every one.
 pub(super) fn sum_all_models(
     standard: &Standard,
     prior: &Prior,
     certain: usize,
+    reference: f64,
 ) -> (Vec<f64>, Heaviest) {
+    let factors: f64 = standard.blocks.iter().map(|b| b.factor.ln()).sum();
     pulp::Arch::new().dispatch(Root {
         standard,
         prior,
         certain,
+        least: (reference + NEGLIGIBLE - factors).exp(),
     })
 }
 
@@ -108,6 +130,8 @@ pub(super) struct Root<'a> {
     pub(super) prior: &'a Prior,
     /// The first components, which every model holds.
     pub(super) certain: usize,
+    /// See [`Tree::least`].
+    pub(super) least: f64,
 }
 
 impl WithSimd for Root<'_> {
@@ -222,6 +246,10 @@ fn branch<S: Simd>(
     m: usize,
     node: Node<S::f64s>,
 ) -> (Vec<S::f64s>, Heaviest) {
+    if tree.is_negligible(simd, node.weight) {
+        let nothing = vec![simd.splat_f64s(0.0); Layout::new(m).len()];
+        return (nothing, Heaviest::new(&tree.heavy));
+    }
     let level = m.checked_sub(1).map(|last| &tree.levels[last]);
     let Some(level) = level.filter(|level| level.left > TASK_COMPONENTS) else {
         let zero = simd.splat_f64s(0.0);
