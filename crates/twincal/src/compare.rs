@@ -91,23 +91,33 @@ pub fn compare(before: &Twin, after: &Twin) -> Result<Vec<Change>> {
 
 /// What has to be known before two twins are compared: friction that turns round within another velocity is another column, and its number
 /// is not the same.
-pub fn hindrances(before: &Twin, after: &Twin) -> Vec<Finding> {
+///
+/// # Errors
+/// [`Error::Setting`] if a twin is damaged.
+pub fn hindrances(before: &Twin, after: &Twin) -> Result<Vec<Finding>> {
     let [old, new] = [before, after].map(|twin| twin.library.coulomb_velocity);
-    let turns = |twin: &Twin| twin.library.families.iter().any(|f| f.turns_round());
-    if old == new || !turns(before) || !turns(after) {
-        return Vec::new();
+    if old == new || !turns_round(before)? || !turns_round(after)? {
+        return Ok(Vec::new());
     }
     let message = format!(
         "friction turns round within {old} rad/s (m/s) before and {new} after: its numbers differ for that alone; fit both with \
          [library] coulomb_velocity = {old}"
     );
-    vec![Finding::new(
+    Ok(vec![Finding::new(
         Severity::Warning,
         "coulomb_velocity_differs",
         "",
         message,
         0,
-    )]
+    )])
+}
+
+/// Whether a twin is likely to hold friction that turns round.
+fn turns_round(twin: &Twin) -> Result<bool> {
+    let library = twin.library()?;
+    let mut columns = library.columns().iter().zip(&twin.posterior.inclusion);
+    Ok(columns
+        .any(|(&term, pip)| *pip > WORTH_COMPARING && library.terms()[term].family.turns_round()))
 }
 
 /// A twin with its library and draws.

@@ -67,24 +67,41 @@ fn the_load_is_what_changed_and_nothing_else() {
     assert!((mass.difference + 0.6).abs() < 4.5 * mass.sd, "{mass:?}");
 }
 
-/// Only where both have friction that turns round, and each otherwise.
+/// Only where both hold friction that turns round, and each otherwise.
 #[test]
 fn friction_of_two_shapes_is_told() {
-    let (mut before, mut after) = (EMPTY.twin.clone(), LOADED.twin.clone());
-    after.library.coulomb_velocity = 0.08;
-    assert_eq!(hindrances(&before, &after), []);
-    before.library.families.push(Family::Coulomb);
-    assert_eq!(hindrances(&before, &after), []);
-    after.library.families.push(Family::Stribeck);
-    let said = hindrances(&before, &after);
+    let twin = |velocity: f64, size: f64| {
+        let arm = two_link::arm(2.0).expect("an arm");
+        let mut log = two_link::log("log", 0.3, &arm, &mut Random::new(13, 0));
+        for joint in &mut log.joints {
+            let rates = joint.qd.clone().expect("a velocity");
+            for (tau, qd) in joint.tau.iter_mut().flatten().zip(rates) {
+                *tau += size * (qd / velocity).tanh();
+            }
+        }
+        let mut settings = CalibrationSettings::default();
+        settings.library.terms = vec!["sin(q1 - q2)".into()];
+        settings.library.families = vec![Family::Coulomb];
+        settings.signal.cutoff_hz = Auto::Value(0.0);
+        settings.signal.coulomb_velocity = Some(velocity);
+        let none: &[twincal::signal::Recording] = &[];
+        calibrate(&arm, &[log], none, &settings, &|_| {})
+            .expect("a calibration")
+            .twin
+    };
+    let [sharp, soft, without] =
+        [(0.02, 1.0), (0.08, 1.0), (0.08, 0.0)].map(|(v, size)| twin(v, size));
+    let told = |a: &Twin, b: &Twin| hindrances(a, b).expect("twins");
+    let said = told(&sharp, &soft);
     assert_eq!(said.len(), 1);
     assert_eq!(said[0].code, "coulomb_velocity_differs");
     assert!(
         said[0]
             .message
-            .contains("within 0 rad/s (m/s) before and 0.08 after")
+            .contains("within 0.02 rad/s (m/s) before and 0.08 after")
     );
-    assert_eq!(hindrances(&after, &after), []);
+    assert_eq!(told(&sharp, &sharp), []);
+    assert_eq!(told(&sharp, &without), [], "no friction, no other number");
 }
 
 /// Mean and covariance factors of two coefficients: `sin(q1 - q2)` and the payload's mass.

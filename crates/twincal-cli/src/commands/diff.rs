@@ -26,7 +26,7 @@ pub(super) fn run(flags: &Diff, terminal: &mut Terminal) -> Outcome<u8> {
     let read = |folder: &Path| StoredTwin::read(&Artifact::open(folder)?, false);
     let (before, after) = (read(&flags.before)?, read(&flags.after)?);
     let (old, new) = (&before.calibration.twin, &after.calibration.twin);
-    let (changes, found) = (compare(old, new)?, hindrances(old, new));
+    let (changes, found) = (compare(old, new)?, hindrances(old, new)?);
     if flags.json {
         let difference = Difference {
             schema: 1,

@@ -193,7 +193,9 @@ fn whole_road(
     };
     let (mut library, more) = Library::propose(robot, &library_settings)?;
     findings.extend(more);
-    let turned = turning::turn(robot, &library, (logs, &prepared), &pipeline, settings)?;
+    let unknown = data::carry_something(every_log.iter().map(Log::payload));
+    let looked_at = (logs, &prepared[..], unknown);
+    let turned = turning::turn(robot, &library, looked_at, &pipeline, settings)?;
     if let Some(turned) = turned {
         turned.prepare_again(robot, logs, &pipeline, &mut prepared)?;
         library_settings.coulomb_velocity = turned.pipeline.coulomb_velocity;
@@ -265,7 +267,7 @@ fn whole_road(
         posterior: fitted.fit.posterior.clone(),
         noise: noise_of(robot, &fitted, &training, &out_of_band, &spreads),
         hull: data.hull(robot),
-        payload_where_unknown: data::carry_something(every_log.iter().map(Log::payload)),
+        payload_where_unknown: unknown,
     };
     let own = held_out::Own {
         twin: &skeleton,

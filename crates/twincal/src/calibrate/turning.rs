@@ -7,11 +7,12 @@
 //! gain(v_s) = Σ_j n_j / (2 τ_j) · ln(s_j²(0.02) / s_j²(v_s))
 //! ```
 //! is what a v_s explains more than the usual one, in nats: s_j² the mean square of joint j's residual over its n_j moving rows, τ_j their
-//! autocorrelation time with the usual v_s. Every v_s has the same coefficients with the same prior, so that none is more flexible than another.
+//! autocorrelation time with the usual v_s. Every v_s has as many coefficients; of what is gained the share K/Σ n_j counts as fitted noise and
+//! is taken off. The stretches are on the clock that is made for the usual v_s, which sees sharper friction a little blurred.
 //! From the usual one the search doubles and halves as long as a step gains [`CLEARLY`], up to four times; it counts
 //! where it takes [`NOTICEABLY`] off the residual.
 
-use super::data::{carry_something, tell_payload_apart, zero_columns};
+use super::data::{tell_payload_apart, zero_columns};
 use super::{CalibrationSettings, columns_of};
 use crate::error::{Finding, Result, Severity};
 use crate::likelihood::{NoiseModel, NoiseSettings};
@@ -31,6 +32,8 @@ const MOST_STEPS: usize = 2;
 const SAMPLES: usize = 1 << 13;
 /// Columns beyond which a fit with all of them is no quick look: the usual v_s stays.
 const MOST_COLUMNS: usize = 500;
+/// Moving rows of all joints per column below which nothing is chosen.
+const ROWS_PER_COLUMN: f64 = 3.0;
 /// What a step has to gain, nats.
 const CLEARLY: f64 = 5.0;
 /// What another v_s has to take off the standard deviation of the residual, as the geometric mean of the joints.
@@ -70,14 +73,15 @@ impl Turned {
     }
 }
 
-/// Another v_s than that of `pipeline` and `library`, if the training logs clearly ask for it.
+/// Another v_s than that of `pipeline` and `library`, if the training logs clearly ask for it; `unknown`: see [`super::data::carry_something`].
+/// Where all components together cannot be fitted nothing is chosen: what is wrong is said by the fit itself.
 ///
 /// # Errors
-/// Those of rows and fit, and of chapters that cannot be read.
+/// Those of candidates and rows, and of chapters that cannot be read.
 pub(super) fn turn(
     robot: &Robot,
     library: &Library,
-    (logs, prepared): (&[Log<'_>], &[ReadyLog<'_>]),
+    (logs, prepared, unknown): (&[Log<'_>], &[ReadyLog<'_>], bool),
     pipeline: &Pipeline,
     settings: &CalibrationSettings,
 ) -> Result<Option<Turned>> {
@@ -87,7 +91,6 @@ pub(super) fn turn(
     if stated || many || pipeline.is_off() || !families.any(|family| family.turns_round()) {
         return Ok(None);
     }
-    let unknown = carry_something(logs.iter().map(Log::payload));
     let mut trajectories = stretches(prepared, SAMPLES, pipeline)?;
     for trajectory in &mut trajectories {
         trajectory.payload_acts = !unknown || trajectory.payload == Payload::Unknown;
@@ -98,9 +101,19 @@ pub(super) fn turn(
         pipeline,
         settings,
         payload_apart: tell_payload_apart(logs),
+        own: 1.0,
     };
     let Some((usual, fit)) = trial.usual(library)? else {
         return Ok(None);
+    };
+    let columns = fit.posterior.mean.len() as f64;
+    let rows: f64 = usual.iter().map(|left| left.rows).sum();
+    if rows < ROWS_PER_COLUMN * columns {
+        return Ok(None);
+    }
+    let trial = Trial {
+        own: 1.0 - columns / rows,
+        ..trial
     };
     let walk = |factor: f64| trial.walk(library, factor, &usual, &fit);
     let (slower, faster) = rayon::join(|| walk(STEPS[0]), || walk(STEPS[1]));
@@ -161,6 +174,8 @@ struct Trial<'a> {
     pipeline: &'a Pipeline,
     settings: &'a CalibrationSettings,
     payload_apart: bool,
+    /// Share of what is explained that is not fitted noise.
+    own: f64,
 }
 
 impl Trial<'_> {
@@ -190,6 +205,7 @@ impl Trial<'_> {
                 break;
             };
             let (gain, share) = compared(usual, &left);
+            let gain = self.own * gain;
             if gain < best.as_ref().map_or(0.0, |best| best.gain) + CLEARLY {
                 break;
             }

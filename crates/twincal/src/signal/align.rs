@@ -107,11 +107,8 @@ impl<'a> PreparedLog<'a> {
 
     /// Some stretches of it, each a piece of its own: (piece, samples).
     pub(super) fn cut(&self, stretches: &[(usize, Range<usize>)]) -> PreparedLog<'_> {
-        let piece = |(piece, range): &(usize, Range<usize>)| {
-            let mut part = self.pieces.pieces[*piece].lent();
-            part.keep(range.clone());
-            part
-        };
+        let piece =
+            |(piece, range): &(usize, Range<usize>)| self.pieces.pieces[*piece].lent(range.clone());
         PreparedLog {
             log: Cow::Borrowed(&self.log),
             joints: self.joints.clone(),

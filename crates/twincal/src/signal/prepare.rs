@@ -67,16 +67,13 @@ impl<'a> Values<'a> {
             .map(|channel| &**channel)
     }
 
-    /// The same, lent.
-    fn lent(&self) -> Values<'_> {
-        fn lend<'b>(channel: &'b Option<Cow<'_, [f64]>>) -> Option<Cow<'b, [f64]>> {
-            channel.as_deref().map(Cow::Borrowed)
-        }
+    /// Some of them, lent.
+    fn lent(&self, range: &std::ops::Range<usize>) -> Values<'_> {
         Values {
-            q: Cow::Borrowed(&self.q),
-            qd: lend(&self.qd),
-            qdd: lend(&self.qdd),
-            tau: lend(&self.tau),
+            q: Cow::Borrowed(&self.q[range.clone()]),
+            qd: self.qd.as_ref().map(|x| Cow::Borrowed(&x[range.clone()])),
+            qdd: self.qdd.as_ref().map(|x| Cow::Borrowed(&x[range.clone()])),
+            tau: self.tau.as_ref().map(|x| Cow::Borrowed(&x[range.clone()])),
         }
     }
 
@@ -118,13 +115,16 @@ pub(crate) struct Piece<'a> {
 }
 
 impl Piece<'_> {
-    /// The same, lent.
-    pub(crate) fn lent(&self) -> Piece<'_> {
+    /// These samples of the grid, lent; without the rows that they come from where the stamps were uneven.
+    pub(crate) fn lent(&self, range: std::ops::Range<usize>) -> Piece<'_> {
+        let grid_rows = self.grid_rows.get(range.clone()).unwrap_or_default();
         Piece {
-            joints: self.joints.iter().map(Values::lent).collect(),
-            time: self.time.clone(),
-            rows: self.rows.clone(),
-            grid_rows: self.grid_rows.clone(),
+            time: self.time[range.clone()].to_vec(),
+            rows: grid_rows.to_vec(),
+            grid_rows: grid_rows.to_vec(),
+            joints: (self.joints.iter())
+                .map(|values| values.lent(&range))
+                .collect(),
             ..*self
         }
     }
@@ -147,7 +147,7 @@ impl Piece<'_> {
     }
 
     /// Keeps these samples of the grid.
-    pub(crate) fn keep(&mut self, range: std::ops::Range<usize>) {
+    fn keep(&mut self, range: std::ops::Range<usize>) {
         self.time = self.time[range.clone()].to_vec();
         if !self.resampled() {
             self.rows = self.rows[range.clone()].to_vec();

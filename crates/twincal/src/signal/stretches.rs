@@ -2,6 +2,7 @@
 
 use super::align::{PreparedLog, Raw};
 use super::ready::{LongReady, ReadyLog};
+use super::thin::factor;
 use super::{Pipeline, Trajectory};
 use crate::error::Result;
 use std::ops::Range;
@@ -9,8 +10,9 @@ use std::ops::Range;
 /// Shortest stretch, samples, and most of them in a segment.
 const STRETCH: usize = 2048;
 const MOST_STRETCHES: usize = 8;
-/// Shortest stretch whose filtered rows are asked for, in lengths of what one row sees.
-const KERNELS: f64 = 8.0;
+/// Shortest stretch whose filtered rows are asked for, in lengths of what one row sees, and the fewest of them.
+const KERNELS: f64 = 6.0;
+const FEWEST: usize = 6;
 /// Chapters of a long log that are looked at.
 const CHAPTERS: usize = 4;
 
@@ -26,8 +28,9 @@ impl Trajectory {
     }
 }
 
-/// Motion of evenly spread stretches of some logs, about `samples` samples together, on the clock at which motion is held. What is
-/// too short for rows is left out: what is wrong with a log is said when all of it is read.
+/// Motion of evenly spread stretches of some logs, on the clock at which motion is held: about `samples` samples together, but at least
+/// [`FEWEST`] stretches that are long enough for rows. What is too short for rows is left out: what is wrong with a log is said when all
+/// of it is read.
 ///
 /// # Errors
 /// Of chapters that cannot be read.
@@ -36,50 +39,77 @@ pub(crate) fn stretches(
     samples: usize,
     pipeline: &Pipeline,
 ) -> Result<Vec<Trajectory>> {
-    let lengths: Vec<usize> = logs.iter().map(ReadyLog::length).collect();
+    let lengths: Vec<usize> = logs.iter().map(|log| log.length(pipeline)).collect();
+    let shortest = logs.iter().map(|log| log.shortest(pipeline));
+    let samples = samples.max(FEWEST * shortest.max().unwrap_or(0));
     let all: usize = lengths.iter().sum::<usize>().max(1);
     let (mut seen, mut taken, mut kept) = (0, 0, Vec::new());
     for (log, length) in logs.iter().zip(lengths) {
         seen += length;
         let due = (samples.min(all) * seen / all).saturating_sub(taken);
         // Of many short logs some are taken whole.
-        if due < length.min(samples / MOST_STRETCHES) {
+        if due < length.min(log.shortest(pipeline)) {
             continue;
         }
-        let own = log.stretches(due, pipeline)?;
+        let due = due.min(length);
         taken += due;
-        kept.extend(own);
+        kept.extend(log.stretches(due, pipeline)?);
     }
     Ok(kept)
 }
 
 impl ReadyLog<'_> {
-    /// Samples, on the clock at which motion is held or finer.
-    fn length(&self) -> usize {
+    /// Interval of the clock at which motion is held, s.
+    fn held_interval(&self, pipeline: &Pipeline) -> f64 {
         match self {
-            Self::Whole(log) => log.samples(),
-            Self::Long(long) => long.log.samples().iter().sum(),
+            Self::Whole(log) => log.interval(),
+            Self::Long(long) => long.interval * factor(pipeline, long.interval) as f64,
         }
     }
 
-    fn stretches(&self, samples: usize, pipeline: &Pipeline) -> Result<Vec<Trajectory>> {
+    /// Samples on that clock.
+    fn length(&self, pipeline: &Pipeline) -> usize {
         match self {
-            Self::Whole(log) => Ok(log.stretches(samples, pipeline).into_iter().collect()),
-            Self::Long(long) => long.stretches(samples, pipeline),
+            Self::Whole(log) => log.samples(),
+            Self::Long(long) => {
+                let samples: usize = long.log.samples().iter().sum();
+                samples / factor(pipeline, long.interval)
+            }
+        }
+    }
+
+    /// Samples of a stretch most of which become rows.
+    fn shortest(&self, pipeline: &Pipeline) -> usize {
+        (KERNELS * pipeline.kernel_length() / self.held_interval(pipeline)).ceil() as usize
+    }
+
+    fn stretches(&self, samples: usize, pipeline: &Pipeline) -> Result<Vec<Trajectory>> {
+        let shortest = self.shortest(pipeline);
+        match self {
+            Self::Whole(log) => Ok(log
+                .stretches(samples, shortest, pipeline)
+                .into_iter()
+                .collect()),
+            Self::Long(long) => long.stretches(samples, shortest, pipeline),
         }
     }
 }
 
 impl LongReady {
-    fn stretches(&self, samples: usize, pipeline: &Pipeline) -> Result<Vec<Trajectory>> {
+    fn stretches(
+        &self,
+        samples: usize,
+        shortest: usize,
+        pipeline: &Pipeline,
+    ) -> Result<Vec<Trajectory>> {
         let all = self.log.chapters();
-        let of = all.min(CHAPTERS);
+        let of = all.min((samples / shortest.max(1)).clamp(1, CHAPTERS));
         let mut kept = Vec::with_capacity(of);
         for i in 0..of {
             let chapter = self.log.chapter((2 * i + 1) * all / (2 * of))?;
             // Chapters that cannot be used are left out, as elsewhere.
             if let Ok(log) = PreparedLog::new(self.joints.clone(), &chapter, pipeline) {
-                kept.extend(log.stretches(samples / of, pipeline));
+                kept.extend(log.stretches(samples / of, shortest, pipeline));
             }
         }
         Ok(kept)
@@ -87,9 +117,12 @@ impl LongReady {
 }
 
 impl PreparedLog<'_> {
-    fn stretches(&self, samples: usize, pipeline: &Pipeline) -> Option<Trajectory> {
-        let shortest = KERNELS * pipeline.kernel_length() / self.interval();
-        let shortest = STRETCH.max(shortest as usize).min(samples);
+    fn stretches(
+        &self,
+        samples: usize,
+        shortest: usize,
+        pipeline: &Pipeline,
+    ) -> Option<Trajectory> {
         let trajectory = match spread(&self.lengths(), samples, shortest) {
             None => self.align(pipeline, Raw::None),
             Some(stretches) => self.cut(&stretches).align(pipeline, Raw::None),

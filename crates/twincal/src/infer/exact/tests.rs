@@ -437,41 +437,6 @@ fn same_with_what_is_near(standard: &Standard, problem: &Problem, certain: &cert
     assert!(off.abs() < 1e-9 * truth.abs().max(1.0), "{off}");
 }
 
-/// Subtrees are left out by a bound that holds: measured by a model that is made out to be e^40 times as heavy as it is, with bounded
-/// columns, too, what is lost is more than nothing and less than so many subtrees can weigh; measured by its own weight, nothing is.
-#[test]
-fn what_is_not_visited_does_not_count() {
-    let mut lost = 0.0_f64;
-    for (seed, bounded) in [(21, false), (22, true), (23, false)] {
-        let mut problem = problem(seed, 14, 3000, 0.5, Inclusion::Probability(0.2));
-        if bounded {
-            (0..14).for_each(|k| problem.prior.lower[k] = [f64::NEG_INFINITY, 0.0][k % 2]);
-        }
-        let standard = Standard::new(&problem).unwrap();
-        let reference = certain::components(&standard, &problem, None).reference;
-        let sums = |reference| tree::sum_all_models(&standard, &problem.prior, 0, reference).0;
-        let (all, most, some) = (
-            sums(f64::NEG_INFINITY),
-            sums(reference),
-            sums(reference + 40.0),
-        );
-        let layout = Layout::new(14);
-        let weight = all[layout.weight()];
-        assert!(
-            weight.ln() - tree::LOG_REFERENCE >= reference - 1e-9,
-            "one of them"
-        );
-        for k in 0..14 {
-            let share = |sums: &[f64]| sums[layout.inclusion(k)] / weight;
-            let off = share(&most) - share(&all);
-            assert!(off.abs() < 1e-15, "{k}: {off}");
-            lost = lost.max((share(&some) - share(&all)).abs());
-        }
-    }
-    // Fewer than 2^8 subtrees in eight lanes, each e^-8 of the reference at most.
-    assert!(lost > 1e-12 && lost < 0.7, "{lost}");
-}
-
 /// Components of several columns, in three families with odds, two of them nearly alike, columns lying apart.
 #[test]
 fn components_equal_multivariate_t_densities() {

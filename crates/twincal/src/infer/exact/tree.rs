@@ -14,9 +14,9 @@ use pulp::{Simd, WithSimd};
 pub(super) const LOG_REFERENCE: f64 = 600.0;
 /// Subtrees of up to this many components (2^13 models in every lane) are one task.
 const TASK_COMPONENTS: usize = 13;
-/// ln of the share of a single model's weight below which a subtree is not visited: 1e-21. There are fewer than 2^24 of them, so that all
-/// together are below 3e-14 of the sum, mostly far below.
-const NEGLIGIBLE: f64 = -48.0;
+/// ln of the share of a single model's weight below which a subtree is not visited. There are fewer than 2^27 of them: together they are
+/// below 1e-14 of the sum, mostly far below.
+const NOT_VISITED: f64 = -51.0;
 
 /// One column in the tree. `V` is a vector with one model per lane.
 pub(super) struct Level<V> {
@@ -119,7 +119,7 @@ pub(super) fn sum_all_models(
         standard,
         prior,
         certain,
-        least: (reference + NEGLIGIBLE - factors).exp(),
+        least: (reference + NOT_VISITED - factors).exp(),
     })
 }
 

@@ -1,0 +1,93 @@
+//! What the tree does not visit does not count.
+
+use super::sums::Layout;
+use super::*;
+use crate::infer::testing::{normal, problem};
+use crate::prior::{Inclusion, Prior};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// Subtrees are left out by a bound that holds: measured by a model that is made out to be e^40 times as heavy as it is, with bounded
+/// columns, too, what is lost is more than nothing and less than so many subtrees can weigh; measured by its own weight, nothing is.
+#[test]
+fn what_is_not_visited_does_not_count() {
+    let mut lost = 0.0_f64;
+    for (seed, bounded) in [(21, false), (22, true), (23, false)] {
+        let mut problem = problem(seed, 14, 3000, 0.5, Inclusion::Probability(0.2));
+        if bounded {
+            (0..14).for_each(|k| problem.prior.lower[k] = [f64::NEG_INFINITY, 0.0][k % 2]);
+        }
+        let standard = Standard::new(&problem).unwrap();
+        let reference = certain::components(&standard, &problem, None).reference;
+        let sums = |reference| tree::sum_all_models(&standard, &problem.prior, 0, reference).0;
+        let (all, most, some) = (
+            sums(f64::NEG_INFINITY),
+            sums(reference),
+            sums(reference + 43.0),
+        );
+        let layout = Layout::new(14);
+        let weight = all[layout.weight()];
+        assert!(
+            weight.ln() - tree::LOG_REFERENCE >= reference - 1e-9,
+            "one of them"
+        );
+        for k in 0..14 {
+            let share = |sums: &[f64]| sums[layout.inclusion(k)] / weight;
+            let off = share(&most) - share(&all);
+            assert!(off.abs() < 1e-15, "{k}: {off}");
+            lost = lost.max((share(&some) - share(&all)).abs());
+        }
+    }
+    // Fewer than 2^8 subtrees in eight lanes, each e^-8 of the reference at most.
+    assert!(lost > 1e-12 && lost < 0.7, "{lost}");
+}
+
+/// Two columns that are nearly alike stand below the lanes and above the last ones, and either explains what both do: without the first the
+/// misfit at the full model's coefficients is enormous, and the other makes it good. Nothing may be concluded from that misfit.
+#[test]
+fn columns_that_stand_for_each_other_are_visited() {
+    let (size, rows) = (12, 3000);
+    let mut rng = ChaCha8Rng::seed_from_u64(31);
+    let (mut gram, mut xy, mut yy) = (vec![0.0; size * size], vec![0.0; size], 0.0);
+    for _ in 0..rows {
+        let mut x: Vec<f64> = (0..size).map(|_| normal(&mut rng)).collect();
+        x[6] = 0.999 * x[4] + 0.01 * x[6];
+        let y = 5.0 * (x[4] + x[6]) + normal(&mut rng);
+        for i in 0..size {
+            xy[i] += x[i] * y;
+            (0..size).for_each(|j| gram[i * size + j] += x[i] * x[j]);
+        }
+        yy += y * y;
+    }
+    let problem = Problem {
+        gram,
+        xy,
+        yy,
+        n: f64::from(rows),
+        log_constant: 0.0,
+        names: (0..size).map(|k| format!("x{k}")).collect(),
+        prior: Prior::single(
+            vec![100.0; size],
+            vec![0; size],
+            Inclusion::Probability(0.2),
+            (1e-3, 1e-3),
+        ),
+    };
+    let standard = Standard::new(&problem).unwrap();
+    let reference = certain::components(&standard, &problem, None).reference;
+    let shares = |reference| {
+        let (sums, _) = tree::sum_all_models(&standard, &problem.prior, 0, reference);
+        let layout = Layout::new(size);
+        (0..size)
+            .map(|k| sums[layout.inclusion(k)] / sums[layout.weight()])
+            .collect::<Vec<f64>>()
+    };
+    let (all, most) = (shares(f64::NEG_INFINITY), shares(reference));
+    for (k, (all, most)) in all.iter().zip(&most).enumerate() {
+        assert!((all - most).abs() < 1e-13, "{k}: {all} {most}");
+    }
+    assert!(
+        all[4] < 0.999 && all[6] < 0.999,
+        "either may be out: {all:?}"
+    );
+}
