@@ -42,6 +42,8 @@ pub(super) struct Certain {
     pub(super) sure: Vec<bool>,
     /// Its bounds, if it has any, act in no model with weight that holds it.
     pub(super) settled: Vec<bool>,
+    /// What the full model misfits without it, c_B; 0 where it was not asked.
+    pub(super) costs: Vec<f64>,
     /// ln of the weight of a model by which it was judged, in the units of [`Standard`]; −∞ where there is none.
     pub(super) reference: f64,
 }
@@ -199,6 +201,7 @@ impl Bounds<'_> {
             let bound = self.factors + outside.ln() - standard.shape * cost.ln_1p();
             certain.sure[block.component] = bound < least;
             certain.settled[block.component] = block.range().all(far);
+            certain.costs[block.component] = *cost;
         }
         // What holds a child holds its parent.
         for child in 0..certain.sure.len() {
@@ -237,24 +240,22 @@ pub(super) fn none(prior: &Prior) -> Certain {
     Certain {
         sure: vec![false; prior.components()],
         settled: vec![false; prior.components()],
+        costs: vec![0.0; prior.components()],
         reference: f64::NEG_INFINITY,
     }
 }
 
 /// Order of the components for the tree: certain ones, then the largest first, those without kin last (the innermost loops ask
-/// nobody); how many are certain.
+/// nobody), among these what data ask for most first (what follows where it is left out soon weighs nothing); how many are certain.
 pub(super) fn order(prior: &Prior, certain: &Certain) -> (Vec<usize>, usize) {
-    let (columns, certain) = (prior.columns(), &certain.sure);
+    let (columns, costs, certain) = (prior.columns(), &certain.costs, &certain.sure);
     let children = prior.children();
     let kin = |c: usize| prior.parent_of(c).is_some() || !children[c].is_empty();
     let mut order: Vec<usize> = (0..certain.len()).collect();
-    order.sort_by_key(|&c| {
-        (
-            !certain[c],
-            std::cmp::Reverse(columns[c].len()),
-            !kin(c),
-            prior.family[c],
-        )
+    let coarse = |c: usize| (!certain[c], std::cmp::Reverse(columns[c].len()), !kin(c));
+    order.sort_by(|&a, &b| {
+        let finer = || costs[b].total_cmp(&costs[a]);
+        coarse(a).cmp(&coarse(b)).then_with(finer)
     });
     (order, certain.iter().filter(|c| **c).count())
 }

@@ -5,13 +5,14 @@
 //! second moments come back up the tree, so the work is O(2^C) in all. The first three components are the lanes, the
 //! next ones the tasks of the thread pool, in an order that depends on the problem only: any number of threads gives the
 //! same bytes. Components that no model worth counting leaves out ([`super::certain`]) are not branched on, and subtrees whose
-//! models together are below e^−51 of a single one are not visited (`tree.rs`): all that is left out is below 1e-14 of the sum.
+//! models together weigh next to nothing are not visited (`ahead.rs`): all that is left out weighs, by a bound, less than 1e-10 of the sum.
 
-mod heaviest;
+mod ahead;
 mod node;
 mod plan;
 mod subtree;
 mod sums;
+mod tally;
 mod tree;
 
 use super::answer::{Averages, LISTED_MASS, LISTED_MODELS, Listed, posterior};
@@ -47,7 +48,7 @@ pub(super) fn sum(problem: &Problem, sure: &Certain) -> Result<Posterior> {
     }
     let standard = Standard::in_order(problem, &order)?;
     let size = standard.size();
-    let (sums, heaviest) = tree::sum_all_models(&standard, &problem.prior, certain, sure.reference);
+    let (sums, tally) = tree::sum_all_models(&standard, &problem.prior, certain, sure.reference);
     let layout = Layout::new(size);
     let weight = sums[layout.weight()];
     let share = |index: usize| sums[index] / weight;
@@ -63,7 +64,7 @@ pub(super) fn sum(problem: &Problem, sure: &Certain) -> Result<Posterior> {
             1.0
         },
     };
-    let found = heaviest
+    let found = tally
         .into_models()
         .into_iter()
         .map(|(own, mask)| {

@@ -1,8 +1,10 @@
 //! One node of the elimination tree, and how its columns are split off and joined again near the root.
 
+use super::ahead::room;
 use super::subtree::{exclude, include, reciprocal};
 use super::sums::{Elimination, Layout, combine, triangle};
-use super::tree::Level;
+use super::tally::Tally;
+use super::tree::{Level, Tree};
 use pulp::{Simd, WithSimd, bytemuck};
 
 /// What is known at a node: `c + 2 hᵀδ + δᵀS δ` over the m columns yet to decide, the weight so far, the
@@ -12,6 +14,10 @@ pub(super) struct Node<V> {
     pub(super) h: Vec<V>,
     pub(super) c: V,
     pub(super) weight: V,
+    /// No model below has a likelihood above this: see [`super::ahead`].
+    pub(super) ceiling: V,
+    /// A column was excluded since the ceiling was found.
+    pub(super) stale: bool,
     pub(super) count: u32,
     pub(super) set: u32,
 }
@@ -23,6 +29,10 @@ pub(super) struct View<'a, V> {
     pub(super) h: &'a [V],
     pub(super) c: V,
     pub(super) weight: V,
+    /// No model below has a likelihood above this: see [`super::ahead`].
+    pub(super) ceiling: V,
+    /// A column was excluded since the ceiling was found.
+    pub(super) stale: bool,
     pub(super) count: u32,
     pub(super) set: u32,
 }
@@ -35,6 +45,8 @@ impl<V: bytemuck::Pod> Node<V> {
             h: vec![zero; m],
             c: zero,
             weight: zero,
+            ceiling: zero,
+            stale: false,
             count: 0,
             set: 0,
         }
@@ -46,6 +58,8 @@ impl<V: bytemuck::Pod> Node<V> {
             h: &self.h,
             c: self.c,
             weight: self.weight,
+            ceiling: self.ceiling,
+            stale: self.stale,
             count: self.count,
             set: self.set,
         }
@@ -116,9 +130,56 @@ impl<S: Simd> WithSimd for Split<'_, S> {
         outside.c = exclude(simd, m, node.view(), level.center, &mut outside.h);
         outside.weight = simd.mul_f64s(node.weight, odds.1);
         outside.s.copy_from_slice(&node.s[m..]);
+        (inside.ceiling, outside.ceiling) = (node.ceiling, node.ceiling);
+        (inside.stale, outside.stale) = (node.stale, true);
         (inside.count, outside.count) = (node.count + level.step, node.count);
         (inside.set, outside.set) = (node.set | level.bit, node.set);
         (inside, outside)
+    }
+}
+
+/// [`Tree::leaves_out`] of a node near the root, whose ceiling is kept.
+pub(super) fn leaves_out<S: Simd>(
+    simd: S,
+    tree: &Tree<S::f64s>,
+    m: usize,
+    node: &mut Node<S::f64s>,
+    tally: &mut Tally,
+) -> bool {
+    simd.vectorize(LeavesOut {
+        simd,
+        tree,
+        m,
+        node,
+        tally,
+    })
+}
+
+struct LeavesOut<'a, S: Simd> {
+    simd: S,
+    tree: &'a Tree<S::f64s>,
+    m: usize,
+    node: &'a mut Node<S::f64s>,
+    tally: &'a mut Tally,
+}
+
+impl<S: Simd> WithSimd for LeavesOut<'_, S> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn with_simd<Same: Simd>(self, _: Same) -> Self::Output {
+        let Self {
+            simd,
+            tree,
+            m,
+            node,
+            tally,
+        } = self;
+        let mut view = node.view();
+        let mut scratch = vec![simd.splat_f64s(0.0); room(m)];
+        let out = tree.leaves_out(simd, m, &mut view, &mut scratch, tally);
+        (node.ceiling, node.stale) = (view.ceiling, view.stale);
+        out
     }
 }
 

@@ -1,10 +1,9 @@
 //! The subtrees of one task: the kernel where all the time goes. Small ones are written out with constant sizes.
 
-use super::heaviest::Heaviest;
 use super::node::View;
 use super::sums::{Elimination, Layout, combine, triangle};
+use super::tally::Tally;
 use super::tree::{LOG_REFERENCE, Tree};
-use crate::lanes::{exp, ln};
 use pulp::{Simd, WithSimd};
 
 /// Largest m whose whole subtree is written out.
@@ -78,7 +77,7 @@ trait Below<S: Simd> {
         tree: &Tree<S::f64s>,
         node: View<'_, S::f64s>,
         out: &mut [S::f64s],
-        heavy: &mut Heaviest,
+        tally: &mut Tally,
     );
 }
 
@@ -105,7 +104,7 @@ fn visit<S: Simd>(
     room: Room<'_, S::f64s>,
     below: &mut impl Below<S>,
     out: &mut [S::f64s],
-    heavy: &mut Heaviest,
+    tally: &mut Tally,
 ) {
     let level = &tree.levels[m - 1];
     let Room {
@@ -126,8 +125,9 @@ fn visit<S: Simd>(
             weight: simd.mul_f64s(node.weight, odds),
             count: node.count + level.step,
             set: node.set | level.bit,
+            ..node
         };
-        below.sum(simd, tree, child, inside, heavy);
+        below.sum(simd, tree, child, inside, tally);
     } else {
         inside.fill(simd.splat_f64s(0.0));
     }
@@ -138,9 +138,10 @@ fn visit<S: Simd>(
             h,
             c,
             weight: simd.mul_f64s(node.weight, exclude_odds),
+            stale: true,
             ..node
         };
-        below.sum(simd, tree, child, outside, heavy);
+        below.sum(simd, tree, child, outside, tally);
     } else {
         outside.fill(simd.splat_f64s(0.0));
     }
@@ -167,7 +168,7 @@ pub(super) fn descend<S: Simd>(
     node: View<'_, S::f64s>,
     out: &mut [S::f64s],
     scratch: &mut [S::f64s],
-    heavy: &mut Heaviest,
+    tally: &mut Tally,
 ) {
     simd.vectorize(Descend {
         simd,
@@ -176,7 +177,7 @@ pub(super) fn descend<S: Simd>(
         node,
         out,
         scratch,
-        heavy,
+        tally,
     });
 }
 
@@ -188,7 +189,7 @@ struct Descend<'a, S: Simd> {
     node: View<'a, S::f64s>,
     out: &'a mut [S::f64s],
     scratch: &'a mut [S::f64s],
-    heavy: &'a mut Heaviest,
+    tally: &'a mut Tally,
 }
 
 impl<S: Simd> WithSimd for Descend<'_, S> {
@@ -203,15 +204,20 @@ impl<S: Simd> WithSimd for Descend<'_, S> {
             node,
             out,
             scratch,
-            heavy,
+            tally,
         } = self;
         if m <= tree.written_out {
             match m {
-                0 => Written::<0>.sum(simd, tree, node, out, heavy),
-                1 => Written::<1>.sum(simd, tree, node, out, heavy),
-                2 => Written::<2>.sum(simd, tree, node, out, heavy),
-                _ => Written::<3>.sum(simd, tree, node, out, heavy),
+                0 => Written::<0>.sum(simd, tree, node, out, tally),
+                1 => Written::<1>.sum(simd, tree, node, out, tally),
+                2 => Written::<2>.sum(simd, tree, node, out, tally),
+                _ => Written::<3>.sum(simd, tree, node, out, tally),
             }
+            return;
+        }
+        let mut node = node;
+        if tree.leaves_out(simd, m, &mut node, scratch, tally) {
+            out.fill(simd.splat_f64s(0.0));
             return;
         }
         let (s, scratch) = scratch.split_at_mut(triangle(m - 1));
@@ -226,7 +232,7 @@ impl<S: Simd> WithSimd for Descend<'_, S> {
         };
         let branches = tree.levels[m - 1].branches(node.set);
         let below = &mut Deeper { m: m - 1, scratch };
-        visit(simd, tree, m, node, branches, room, below, out, heavy);
+        visit(simd, tree, m, node, branches, room, below, out, tally);
     }
 }
 
@@ -244,13 +250,9 @@ impl<S: Simd> Below<S> for Deeper<'_, S::f64s> {
         tree: &Tree<S::f64s>,
         node: View<'_, S::f64s>,
         out: &mut [S::f64s],
-        heavy: &mut Heaviest,
+        tally: &mut Tally,
     ) {
-        if self.m > tree.written_out && tree.is_negligible(simd, node.weight) {
-            out.fill(simd.splat_f64s(0.0));
-            return;
-        }
-        descend(simd, tree, self.m, node, out, self.scratch, heavy);
+        descend(simd, tree, self.m, node, out, self.scratch, tally);
     }
 }
 
@@ -266,18 +268,11 @@ impl<S: Simd> Below<S> for Written<0> {
         tree: &Tree<S::f64s>,
         node: View<'_, S::f64s>,
         out: &mut [S::f64s],
-        heavy: &mut Heaviest,
+        tally: &mut Tally,
     ) {
-        // c ≥ 0 but for rounding.
-        let one = simd.splat_f64s(1.0);
-        let ratio = simd.max_f64s(simd.add_f64s(node.c, one), one);
-        let power = simd.mul_add_e_f64s(
-            simd.splat_f64s(-tree.shape),
-            ln(simd, ratio),
-            simd.splat_f64s(LOG_REFERENCE),
-        );
-        let weight = simd.mul_f64s(node.weight, exp(simd, power));
-        heavy.offer(simd, weight, node.set, &tree.heavy);
+        let (ratio, likelihood) = tree.likelihood(simd, node.c, LOG_REFERENCE);
+        let weight = simd.mul_f64s(node.weight, likelihood);
+        tally.offer(simd, weight, node.set, &tree.heavy);
         out[0] = weight;
         out[1] = simd.mul_f64s(simd.mul_f64s(weight, ratio), simd.splat_f64s(tree.noise));
     }
@@ -294,7 +289,7 @@ macro_rules! written_out {
                 tree: &Tree<S::f64s>,
                 node: View<'_, S::f64s>,
                 out: &mut [S::f64s],
-                heavy: &mut Heaviest,
+                tally: &mut Tally,
             ) {
                 let (Some(s), Some(h)) = (
                     node.s.first_chunk::<{ triangle($m) }>(),
@@ -314,7 +309,7 @@ macro_rules! written_out {
                 };
                 let node = View { s, h, ..node };
                 let below = &mut Written::<{ $m - 1 }>;
-                visit(simd, tree, $m, node, (true, true), room, below, out, heavy);
+                visit(simd, tree, $m, node, (true, true), room, below, out, tally);
             }
         }
     };

@@ -1,10 +1,10 @@
 //! The elimination tree from the root over the lanes and the thread pool's tasks down to the subtrees of one task.
 
-use super::heaviest::{Heaviest, Threshold};
-use super::node::{Node, Odds, from_lanes, join, lanes, split};
+use super::node::{Node, Odds, from_lanes, join, lanes, leaves_out, split};
 use super::plan::{Plan, plan};
 use super::subtree::{descend, scratch_len};
 use super::sums::Layout;
+use super::tally::{Tally, Threshold};
 use crate::infer::standard::Standard;
 use crate::prior::Prior;
 use pulp::{Simd, WithSimd};
@@ -14,9 +14,12 @@ use pulp::{Simd, WithSimd};
 pub(super) const LOG_REFERENCE: f64 = 600.0;
 /// Subtrees of up to this many components (2^13 models in every lane) are one task.
 const TASK_COMPONENTS: usize = 13;
-/// ln of the share of a single model's weight below which a subtree is not visited. There are fewer than 2^27 of them: together they are
-/// below 1e-14 of the sum, mostly far below.
-const NOT_VISITED: f64 = -51.0;
+/// ln of the share of a single model's weight below which a subtree is not visited, at first; where all those subtrees together may weigh
+/// more than [`NOT_VISITED`], what they weigh too much and so much more is taken off it.
+const LIGHT: f64 = -32.0;
+const LIGHTER: f64 = -1.0;
+/// Share of the sum that all models that are not visited may weigh together.
+const NOT_VISITED: f64 = 1e-10;
 
 /// One column in the tree. `V` is a vector with one model per lane.
 pub(super) struct Level<V> {
@@ -77,19 +80,6 @@ impl<V: Copy> Level<V> {
     }
 }
 
-impl<V: Copy> Tree<V> {
-    /// Whether no model below a node of this weight is worth a visit: whatever they fit, their pivots √(r/v) are at most 1, their misfits
-    /// at least 0, and the prior factors below a node sum to one at most:
-    ///
-    /// ```text
-    /// Σ weight · Π factor · (1 + c)^−a_n ≤ weight of the node · Π factor
-    /// ```
-    #[inline(always)]
-    pub(super) fn is_negligible<S: Simd<f64s = V>>(&self, simd: S, weight: V) -> bool {
-        simd.reduce_max_f64s(weight) < self.least
-    }
-}
-
 /// Everything that is the same in the whole tree.
 pub(super) struct Tree<V> {
     /// By number of columns yet to decide, minus one.
@@ -101,26 +91,47 @@ pub(super) struct Tree<V> {
     /// Last columns whose subtrees are written out.
     pub(super) written_out: usize,
     pub(super) heavy: Threshold,
-    /// Weight of a node below which its subtree is not visited.
+    /// A subtree is not visited where its node's weight times its ceiling is below this.
     pub(super) least: f64,
 }
 
 /// Sums over all models ([`Layout`] of K columns; weights times e^[`LOG_REFERENCE`]) and the heaviest of them, as sets
 /// of the components after the first `certain` ones, which every model holds. `reference`: ln of the weight of any model; −∞ to visit
-/// every one.
+/// every one. The tree is walked until what is not visited weighs less than [`NOT_VISITED`] of the sum, mostly once.
 pub(super) fn sum_all_models(
     standard: &Standard,
     prior: &Prior,
     certain: usize,
     reference: f64,
-) -> (Vec<f64>, Heaviest) {
+) -> (Vec<f64>, Tally) {
+    let mut light = LIGHT;
+    loop {
+        let (sums, tally, bound) = sum_but(standard, prior, certain, reference + light);
+        // Not a number where nothing has weight: another walk gains nothing.
+        if bound <= NOT_VISITED || bound.is_nan() {
+            return (sums, tally);
+        }
+        light += LIGHTER - (bound / NOT_VISITED).ln();
+    }
+}
+
+/// The same but for subtrees whose ln weight is below `least`, and the share of the sum that they weigh at most.
+pub(super) fn sum_but(
+    standard: &Standard,
+    prior: &Prior,
+    certain: usize,
+    least: f64,
+) -> (Vec<f64>, Tally, f64) {
     let factors: f64 = standard.blocks.iter().map(|b| b.factor.ln()).sum();
-    pulp::Arch::new().dispatch(Root {
+    let (sums, tally) = pulp::Arch::new().dispatch(Root {
         standard,
         prior,
         certain,
-        least: (reference + NOT_VISITED - factors).exp(),
-    })
+        least: (least - factors).exp(),
+    });
+    let left_out = tally.not_visited().ln() + factors + LOG_REFERENCE;
+    let weight = sums[Layout::new(standard.size()).weight()];
+    (sums, tally, (left_out - weight.ln()).exp())
 }
 
 /// What the tree is about.
@@ -135,7 +146,7 @@ pub(super) struct Root<'a> {
 }
 
 impl WithSimd for Root<'_> {
-    type Output = (Vec<f64>, Heaviest);
+    type Output = (Vec<f64>, Tally);
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
@@ -145,7 +156,7 @@ impl WithSimd for Root<'_> {
 
 /// The certain columns, then the columns of the first components (3 with eight lanes): lane l includes component d where
 /// bit d of l is set.
-fn root<S: Simd>(simd: S, about: Root<'_>) -> (Vec<f64>, Heaviest) {
+fn root<S: Simd>(simd: S, about: Root<'_>) -> (Vec<f64>, Tally) {
     let standard = about.standard;
     let size = standard.size();
     let Plan { tree, top, padded } = plan::<S>(about);
@@ -162,7 +173,7 @@ fn root<S: Simd>(simd: S, about: Root<'_>) -> (Vec<f64>, Heaviest) {
     for (h, offset) in node.h.iter_mut().zip(&standard.offset) {
         *h = simd.splat_f64s(*offset);
     }
-    node.weight = simd.splat_f64s(1.0);
+    (node.weight, node.ceiling) = (simd.splat_f64s(1.0), simd.splat_f64s(1.0));
     let mut above = Vec::new();
     for (d, column) in top.iter().enumerate() {
         let (mut inside, outside) = split(
@@ -189,9 +200,10 @@ fn root<S: Simd>(simd: S, about: Root<'_>) -> (Vec<f64>, Heaviest) {
         select(&mut inside.c, &outside.c);
         select(&mut inside.weight, &outside.weight);
         (inside.count, inside.set) = (0, 0);
+        inside.stale |= outside.stale;
         above.push(std::mem::replace(&mut node, inside));
     }
-    let (mut sums, heavy) = branch(simd, &tree, padded - top.len(), node);
+    let (mut sums, tally) = branch(simd, &tree, padded - top.len(), node);
     for (d, (node, column)) in above.iter().zip(&top).enumerate().rev() {
         let (inside, outside): (Vec<_>, Vec<_>) = sums
             .iter()
@@ -236,7 +248,7 @@ fn root<S: Simd>(simd: S, about: Root<'_>) -> (Vec<f64>, Heaviest) {
             out[own.moment(j, l)] = first(wide.moment(j, l));
         }
     }
-    (out, heavy)
+    (out, tally)
 }
 
 /// Nodes near the root: their two branches may run on two threads.
@@ -244,18 +256,17 @@ fn branch<S: Simd>(
     simd: S,
     tree: &Tree<S::f64s>,
     m: usize,
-    node: Node<S::f64s>,
-) -> (Vec<S::f64s>, Heaviest) {
-    if tree.is_negligible(simd, node.weight) {
-        let nothing = vec![simd.splat_f64s(0.0); Layout::new(m).len()];
-        return (nothing, Heaviest::new(&tree.heavy));
+    mut node: Node<S::f64s>,
+) -> (Vec<S::f64s>, Tally) {
+    let mut tally = Tally::new(&tree.heavy);
+    if leaves_out(simd, tree, m, &mut node, &mut tally) {
+        return (vec![simd.splat_f64s(0.0); Layout::new(m).len()], tally);
     }
     let level = m.checked_sub(1).map(|last| &tree.levels[last]);
     let Some(level) = level.filter(|level| level.left > TASK_COMPONENTS) else {
         let zero = simd.splat_f64s(0.0);
         let mut out = vec![zero; Layout::new(m).len()];
         let mut scratch = vec![zero; scratch_len(m)];
-        let mut heavy = Heaviest::new(&tree.heavy);
         descend(
             simd,
             tree,
@@ -263,9 +274,9 @@ fn branch<S: Simd>(
             node.view(),
             &mut out,
             &mut scratch,
-            &mut heavy,
+            &mut tally,
         );
-        return (out, heavy);
+        return (out, tally);
     };
     let (inside, outside) = split(simd, level, m, &node, level.odds(node.count));
     let nothing = || vec![simd.splat_f64s(0.0); Layout::new(m - 1).len()];
@@ -281,16 +292,13 @@ fn branch<S: Simd>(
             )
         }
         (true, false) => {
-            let (inside, heavy) = branch(simd, tree, m - 1, inside);
-            (join(simd, level, m, &node, &inside, &nothing()), heavy)
+            let (inside, tally) = branch(simd, tree, m - 1, inside);
+            (join(simd, level, m, &node, &inside, &nothing()), tally)
         }
         (false, true) => {
-            let (outside, heavy) = branch(simd, tree, m - 1, outside);
-            (join(simd, level, m, &node, &nothing(), &outside), heavy)
+            let (outside, tally) = branch(simd, tree, m - 1, outside);
+            (join(simd, level, m, &node, &nothing(), &outside), tally)
         }
-        (false, false) => (
-            vec![simd.splat_f64s(0.0); Layout::new(m).len()],
-            Heaviest::new(&tree.heavy),
-        ),
+        (false, false) => (vec![simd.splat_f64s(0.0); Layout::new(m).len()], tally),
     }
 }

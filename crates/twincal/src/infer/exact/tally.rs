@@ -1,4 +1,5 @@
-//! The heaviest models seen so far: a bounded list whose entrance threshold rises.
+//! What a walk through models remembers of them one by one: the heaviest seen so far, a bounded list whose entrance threshold rises, and
+//! a bound of all that were not visited.
 
 use crate::infer::answer::LISTED_MODELS;
 use pulp::{Simd, bytemuck};
@@ -24,16 +25,18 @@ impl Threshold {
 
 /// Models as (weight, set of components), at least the [`LISTED_MODELS`] heaviest of those offered.
 #[derive(Debug)]
-pub(super) struct Heaviest {
+pub(super) struct Tally {
     models: Vec<(f64, u32)>,
     threshold: f64,
+    not_visited: f64,
 }
 
-impl Heaviest {
+impl Tally {
     pub(super) fn new(shared: &Threshold) -> Self {
         Self {
             models: Vec::new(),
             threshold: shared.raise(f64::MIN_POSITIVE),
+            not_visited: 0.0,
         }
     }
 
@@ -50,6 +53,17 @@ impl Heaviest {
         if simd.first_true_m64s(heavy) < S::F64_LANES {
             self.keep(bytemuck::cast_slice(&[weight]), set, shared);
         }
+    }
+
+    /// Models that weigh no more than this together are left out.
+    #[inline(always)]
+    pub(super) fn leave_out(&mut self, weight: f64) {
+        self.not_visited += weight;
+    }
+
+    /// What all models left out weigh at most.
+    pub(super) fn not_visited(&self) -> f64 {
+        self.not_visited
     }
 
     #[cold]
@@ -77,9 +91,10 @@ impl Heaviest {
         }
     }
 
-    /// The union of two lists.
-    pub(super) fn merge(mut self, other: Heaviest) -> Self {
+    /// Both together.
+    pub(super) fn merge(mut self, other: Tally) -> Self {
         self.models.extend(other.models);
+        self.not_visited += other.not_visited;
         self.shrink();
         self
     }
