@@ -2,8 +2,9 @@
 //! `cargo bench -p twincal --bench regressor_to_statistics`.
 //!
 //! Library: inertial parameters of every link, payload, friction, offset and motor inertia of each joint. Statistics: the
-//! Gram of rows and of their first differences, residual torque included. What the Gram needs are `k (k + 1)` operations per
-//! joint and sample for either of the two, k columns with the torque, once of all blocks of a run, which do not fit into the
+//! Gram of rows and of their first differences of all columns, residual torque included. Rows are summed as the parts that columns
+//! are made of, as in a fit, and beside it as the columns themselves. What a Gram needs are `k (k + 1)` operations per joint and
+//! sample for either of the two, k signals with the torque, once of all blocks of a run, which do not fit into the
 //! cache of a core, once of the same block over and over; the machine's peak is measured beside it with
 //! multiply-adds that never leave the registers, in the same instruction set. CPU time, least of many runs.
 
@@ -45,50 +46,105 @@ fn main() {
         ..LibrarySettings::default()
     };
     let (library, _) = Library::propose(&robot, &settings).expect("the settings above are valid");
-    let widths: Vec<usize> = (0..robot.dof())
-        .map(|joint| library.columns_of_joint(joint).len() + 1)
-        .collect();
-    let needed = 2.0 * widths.iter().map(|k| (k * (k + 1)) as f64).sum::<f64>();
-    println!(
-        "Panda, {} columns, of one joint with its torque: {widths:?}; {needed:.0} operations per row",
-        library.columns().len()
-    );
     let peak = peak();
     println!("peak of f64 multiply-adds: {:.1} GFLOP/s", 1e-9 * peak);
     let motion = waves(robot.dof());
-    let blocks = evaluated(&library, &motion);
+    for way in [Way::Parts, Way::Columns] {
+        measured(way, &library, &motion, peak);
+    }
+}
 
+/// What is evaluated and summed.
+#[derive(Debug, Clone, Copy)]
+enum Way {
+    Parts,
+    Columns,
+}
+
+impl Way {
+    /// Signals of a joint.
+    fn signals(self, library: &Library, joint: usize) -> usize {
+        match self {
+            Self::Parts => library.recipes(joint).parts(),
+            Self::Columns => library.columns_of_joint(joint).len(),
+        }
+    }
+
+    fn evaluate(
+        self,
+        library: &Library,
+        block: &Block,
+        out: &mut [Vec<f64>],
+        scratch: &mut Scratch,
+    ) {
+        match self {
+            Self::Parts => library.evaluate_parts(of(block), out, scratch),
+            Self::Columns => library.evaluate_with(of(block), out, scratch),
+        }
+    }
+
+    fn accumulators(self, library: &Library) -> Vec<JointAccumulator> {
+        let columns = |joint| library.columns_of_joint(joint).iter();
+        let accumulator = |joint| {
+            let columns = columns(joint).map(|&k| k as u32).collect();
+            match self {
+                Self::Parts => JointAccumulator::of_parts(columns, library.recipes(joint)),
+                Self::Columns => JointAccumulator::new(columns),
+            }
+        };
+        (0..library.joints()).map(accumulator).collect()
+    }
+}
+
+/// Measures one way and prints what it found.
+fn measured(way: Way, library: &Library, motion: &[Block], peak: f64) {
+    let widths: Vec<usize> = (0..library.joints())
+        .map(|joint| way.signals(library, joint) + 1)
+        .collect();
+    let needed = 2.0 * widths.iter().map(|k| (k * (k + 1)) as f64).sum::<f64>();
+    println!(
+        "\n{way:?}: Panda, {} columns; signals of one joint with its torque: {widths:?}; {needed:.0} operations per row",
+        library.columns().len()
+    );
+    let blocks: Vec<Vec<Vec<f64>>> = (motion.iter())
+        .map(|block| {
+            let mut out = vec![Vec::new(); library.joints()];
+            way.evaluate(library, block, &mut out, &mut Scratch::default());
+            out
+        })
+        .collect();
     let evaluation = run(|| {
-        let (mut out, mut scratch) = (vec![Vec::new(); robot.dof()], Scratch::default());
-        for block in motion.iter() {
-            library.evaluate_with(of(block), black_box(&mut out), &mut scratch);
+        let (mut out, mut scratch) = (vec![Vec::new(); library.joints()], Scratch::default());
+        for block in motion {
+            way.evaluate(library, block, black_box(&mut out), &mut scratch);
         }
     });
     let gram = run(|| {
-        let (mut statistics, mut workspace) = (accumulators(&library), Workspace::default());
+        let (mut statistics, mut workspace) = (way.accumulators(library), Workspace::default());
         for block in &blocks {
             add(&mut statistics, block, &mut workspace);
         }
         finish(statistics)
     });
     let cached = run(|| {
-        let (mut statistics, mut workspace) = (accumulators(&library), Workspace::default());
+        let (mut statistics, mut workspace) = (way.accumulators(library), Workspace::default());
         for _ in &blocks {
             add(&mut statistics, &blocks[0], &mut workspace);
         }
         finish(statistics)
     });
     let both = run(|| {
-        let (mut out, mut scratch) = (vec![Vec::new(); robot.dof()], Scratch::default());
-        let (mut statistics, mut workspace) = (accumulators(&library), Workspace::default());
-        for block in &motion {
-            library.evaluate_with(of(block), &mut out, &mut scratch);
+        let (mut out, mut scratch) = (vec![Vec::new(); library.joints()], Scratch::default());
+        let (mut statistics, mut workspace) = (way.accumulators(library), Workspace::default());
+        for block in motion {
+            way.evaluate(library, block, &mut out, &mut scratch);
             add(&mut statistics, &out, &mut workspace);
         }
         finish(statistics)
     });
     println!(
-        "columns alone             {:>8.3} M samples/s",
+        "{:<25} {:>8.3} M samples/s",
+        "signals alone",
         1e-6 / evaluation
     );
     for (what, gram) in [("alone ", gram), ("cached", cached)] {
@@ -141,24 +197,7 @@ fn of([q, qd, qdd]: &Block) -> Motion<'_> {
     }
 }
 
-/// The columns of every block.
-fn evaluated(library: &Library, motion: &[Block]) -> Vec<Vec<Vec<f64>>> {
-    let columns = |block: &Block| {
-        let mut out = vec![Vec::new(); library.joints()];
-        library.evaluate(of(block), &mut out);
-        out
-    };
-    motion.iter().map(columns).collect()
-}
-
-fn accumulators(library: &Library) -> Vec<JointAccumulator> {
-    let columns = |joint| library.columns_of_joint(joint).iter();
-    (0..library.joints())
-        .map(|joint| JointAccumulator::new(columns(joint).map(|&k| k as u32).collect()))
-        .collect()
-}
-
-/// The torque is the first column: what it says does not matter here.
+/// The torque is the first signal: what it says does not matter here.
 fn add(statistics: &mut [JointAccumulator], columns: &[Vec<f64>], workspace: &mut Workspace) {
     let keep = [true; MAX_BLOCK];
     for (joint, x) in statistics.iter_mut().zip(columns) {

@@ -10,18 +10,23 @@ pub(crate) use room::Room;
 use crate::error::Result;
 use crate::gram::{Gram, JointAccumulator, Workspace};
 use crate::robot::Robot;
-use crate::rows::{RowBlock, RowSignal, slices, visit_slices};
+use crate::rows::{RowBlock, RowSignal, slices, visit_parts};
 use crate::signal::{Numbers, Pipeline, Recording, Trajectory};
-use crate::term::Library;
+use crate::term::{Library, Recipes};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::Arc;
 
-/// Rows of one joint. A column lies contiguous over all rows: `x[i * len + row]`.
+/// Rows of one joint. A column, or part, lies contiguous over all rows: `x[i * len + row]`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct JointObservations {
     /// Regression columns that are structurally non-zero on this joint, ascending.
     pub columns: Vec<usize>,
-    /// Their values, columns × len, N·m per unit of β; empty where they were put away (logs in chapters).
+    /// How they follow from what is in `x`; `None`: they are in `x` themselves.
+    pub recipes: Option<Arc<Recipes>>,
+    /// Their values, or those of the parts that they are made of, columns × len, N·m per unit of β; empty where they were put away
+    /// (logs in chapters).
     pub x: Vec<f64>,
     /// Measured torque, len, N·m.
     pub measured: Numbers,
@@ -77,7 +82,7 @@ const BATCH: usize = 8;
 /// Filters and decimates one trajectory into rows.
 ///
 /// # Errors
-/// Those of [`visit_slices`].
+/// Those of [`visit_parts`].
 pub fn observe(
     robot: &Robot,
     library: &Library,
@@ -98,7 +103,7 @@ pub fn observe(
                     Ok(())
                 };
                 let slice = std::slice::from_ref(slice);
-                visit_slices(
+                visit_parts(
                     robot, library, pipeline, trajectory, signal, slice, &mut keep,
                 )?;
                 Ok(blocks)
@@ -125,18 +130,20 @@ struct BlockJoint {
     measured: Vec<f64>,
     nominal: Vec<f64>,
     standstill: Vec<bool>,
+    recipes: Option<Arc<Recipes>>,
 }
 
 impl Block {
     fn of(block: &RowBlock<'_>) -> Self {
         let joints = block.joints.iter().map(|rows| BlockJoint {
-            x: (0..rows.columns.len())
-                .flat_map(|i| &rows.x[i * rows.stride..i * rows.stride + block.len])
+            x: (rows.x.chunks(rows.stride.max(1)))
+                .flat_map(|signal| &signal[..block.len])
                 .copied()
                 .collect(),
             measured: rows.measured.to_vec(),
             nominal: rows.nominal.to_vec(),
             standstill: rows.standstill.to_vec(),
+            recipes: rows.recipes.cloned(),
         });
         Self {
             first: block.first,
@@ -155,7 +162,7 @@ impl Observations {
         let joint = |joint: usize| {
             let columns = library.columns_of_joint(joint).to_vec();
             JointObservations {
-                x: vec![0.0; columns.len() * len],
+                x: vec![0.0; library.recipes(joint).parts() * len],
                 columns,
                 measured: Vec::with_capacity(len).into(),
                 nominal: Vec::with_capacity(len).into(),
@@ -278,11 +285,17 @@ impl Observations {
             let kept: Vec<usize> = (0..joint.columns.len())
                 .filter(|&i| !dropped.contains(&joint.columns[i]))
                 .collect();
+            let mut signals = Cow::Borrowed(&kept);
+            if let Some(recipes) = &mut joint.recipes {
+                let (rest, needed) = recipes.some(&kept);
+                *recipes = Arc::new(rest);
+                signals = Cow::Owned(needed);
+            }
             match &mut joint.shelved {
-                Some(shelved) => shelved.keep(&kept),
+                Some(shelved) => shelved.keep(&signals),
                 None => {
-                    let column = |i: &usize| joint.x[i * len..(i + 1) * len].iter().copied();
-                    joint.x = kept.iter().flat_map(column).collect();
+                    let signal = |i: &usize| joint.x[i * len..(i + 1) * len].iter().copied();
+                    joint.x = signals.iter().flat_map(signal).collect();
                 }
             }
             joint.columns = kept
@@ -309,18 +322,18 @@ impl Part<'_> {
     fn joint_gram(&self, joint: usize) -> crate::gram::JointGram {
         let (all, rows) = (self.observations, &self.observations.joints[joint]);
         let columns: Vec<u32> = rows.columns.iter().map(|&c| c as u32).collect();
-        let mut accumulator = JointAccumulator::new(columns);
+        let mut accumulator = match &rows.recipes {
+            Some(recipes) => JointAccumulator::of_parts(columns, recipes),
+            None => JointAccumulator::new(columns),
+        };
+        let signals = rows.signals();
         let mut workspace = Workspace::default();
         let keep: Vec<bool> = rows.standstill.iter().map(|still| !still).collect();
         for range in self.runs_between_starts() {
             let start = range.start;
-            rows.visit_columns(all.len(), range, &mut |range, columns| {
+            rows.visit_signals(all.len(), range, &mut |range, columns| {
                 let (keep, first) = (&keep[range.clone()], range.start == start);
-                let x = if rows.columns.is_empty() {
-                    &[]
-                } else {
-                    columns.x
-                };
+                let x = if signals == 0 { &[] } else { columns.x };
                 if rows.weight.is_empty() {
                     let y = &rows.y[range];
                     accumulator.push_block(x, columns.stride, y, keep, first, &mut workspace);
@@ -332,7 +345,7 @@ impl Part<'_> {
                     values.iter().zip(&root).map(|(v, u)| v * u).collect()
                 };
                 let count = range.len();
-                let x: Vec<f64> = (0..rows.columns.len())
+                let x: Vec<f64> = (0..signals)
                     .flat_map(|i| scaled(columns.of(i, 0, count)))
                     .collect();
                 let y = scaled(&rows.y[range]);
@@ -392,9 +405,12 @@ impl Part<'_> {
     pub fn residual(&self, joint: usize, beta: &[f64], range: Range<usize>) -> Vec<f64> {
         let (len, rows) = (self.observations.len(), &self.observations.joints[joint]);
         let mut residual = rows.y[range.clone()].to_vec();
-        let beta: Vec<f64> = rows.columns.iter().map(|&column| beta[column]).collect();
+        let mut beta: Vec<f64> = rows.columns.iter().map(|&column| beta[column]).collect();
+        if let Some(recipes) = &rows.recipes {
+            beta = recipes.of_parts(&beta);
+        }
         let first = range.start;
-        rows.visit_columns(len, range, &mut |piece, columns| {
+        rows.visit_signals(len, range, &mut |piece, columns| {
             let own = &mut residual[piece.start - first..piece.end - first];
             products::subtract(columns, &beta, own);
         });
@@ -405,12 +421,15 @@ impl Part<'_> {
     pub fn quadratic_forms(&self, joint: usize, covariance: &[f64], count: usize) -> Vec<f64> {
         let (len, rows) = (self.observations.len(), &self.observations.joints[joint]);
         let columns = || rows.columns.iter();
-        let own: Vec<f64> = columns()
+        let mut own: Vec<f64> = columns()
             .flat_map(|a| columns().map(move |b| covariance[a * count + b]))
             .collect();
+        if let Some(recipes) = &rows.recipes {
+            own = recipes.to_parts(&own);
+        }
         let mut forms = vec![0.0; self.rows.len()];
         let first = self.rows.start;
-        rows.visit_columns(len, self.rows.clone(), &mut |piece, columns| {
+        rows.visit_signals(len, self.rows.clone(), &mut |piece, columns| {
             let forms = &mut forms[piece.start - first..piece.end - first];
             products::quadratic(columns, &own, forms);
         });
@@ -419,9 +438,16 @@ impl Part<'_> {
 }
 
 impl JointObservations {
+    /// Columns, or parts of which they are made.
+    pub(crate) fn signals(&self) -> usize {
+        let parts = self.recipes.as_ref().map(|recipes| recipes.parts());
+        parts.unwrap_or(self.columns.len())
+    }
+
     /// The next `len` rows, from row `from` on.
     fn add(&mut self, from: usize, len: usize, rows: &BlockJoint) -> Result<()> {
-        let total = self.x.len() / self.columns.len().max(1);
+        self.recipes.clone_from(&rows.recipes);
+        let total = self.x.len() / self.signals().max(1);
         for (i, column) in rows.x.chunks_exact(len.max(1)).enumerate() {
             self.x[i * total + from..][..len].copy_from_slice(column);
         }
@@ -435,45 +461,4 @@ impl JointObservations {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::signal::{Channels, Payload};
-
-    fn temperatures(time: &[f64], logged: &[f64]) -> Vec<f64> {
-        let mut observations = Observations {
-            time: vec![-1.0, 0.0, 0.5, 1.5, 3.0],
-            joints: vec![JointObservations::default()],
-            ..Observations::default()
-        };
-        let len = time.len();
-        observations.set_temperatures(&Recording {
-            unfolded: false,
-            name: "run".into(),
-            time: time.to_vec(),
-            joints: vec![Channels {
-                q: vec![0.0; len],
-                qd: None,
-                qdd: None,
-                tau: None,
-                temperature: Some(logged.to_vec()),
-            }],
-            payload: Payload::None,
-        });
-        observations.joints.remove(0).temperature
-    }
-
-    #[test]
-    fn temperatures_are_linear_between_samples_that_are_numbers() {
-        let found = temperatures(&[0.0, 1.0, 1.2, 2.0], &[30.0, 40.0, f64::NAN, 60.0]);
-        assert_eq!(found, [30.0, 30.0, 35.0, 50.0, 60.0]);
-        assert!(temperatures(&[0.0, 1.0], &[f64::NAN; 2]).is_empty());
-    }
-
-    #[test]
-    fn a_log_whose_stamps_step_back_has_no_temperatures() {
-        assert!(temperatures(&[0.0, 1.0, 0.9, 2.0], &[30.0, 40.0, 41.0, 60.0]).is_empty());
-        // A step between samples without a number binds nobody.
-        let hidden = temperatures(&[0.0, 1.0, 0.9, 2.0], &[30.0, 40.0, f64::NAN, 60.0]);
-        assert_eq!(hidden, [30.0, 30.0, 35.0, 50.0, 60.0]);
-    }
-}
+mod tests;

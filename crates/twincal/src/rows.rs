@@ -14,9 +14,10 @@ mod unfiltered;
 use crate::error::Result;
 use crate::robot::Robot;
 use crate::signal::{Payload, Pipeline, Segment, Trajectory};
-use crate::term::{Library, Scratch};
+use crate::term::{Library, Recipes};
 use evaluate::{OfLibrary, Source};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Which rows [`visit_rows`] gives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,9 +33,11 @@ pub enum RowSignal {
 pub struct JointRows<'a> {
     /// Library columns that are structurally non-zero on this joint, ascending.
     pub columns: &'a [usize],
-    /// Distance between columns in `x`.
+    /// How the columns follow from what is in `x`; `None`: they are in `x` themselves.
+    pub recipes: Option<&'a Arc<Recipes>>,
+    /// Distance between columns, or parts, in `x`.
     pub stride: usize,
-    /// Column `columns[i]` of row r is `x[i * stride + r]`, N·m (N) per unit of β.
+    /// Column `columns[i]` of row r is `x[i * stride + r]`, N·m (N) per unit of β; with `recipes` that is part i.
     pub x: &'a [f64],
     /// Measured torque, one per row; empty if the log has no torque.
     pub measured: &'a [f64],
@@ -69,6 +72,19 @@ pub struct RowBlock<'a> {
 
 /// Most rows in one block.
 pub const MAX_BLOCK: usize = 256;
+
+/// What [`JointRows::x`] holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    Columns,
+    Parts,
+}
+
+impl Form {
+    fn recipes(self, source: &dyn Source, joint: usize) -> Option<&Arc<Recipes>> {
+        (self == Self::Parts).then(|| source.recipes(joint))
+    }
+}
 
 /// Consecutive rows of one segment: what can be computed on its own.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -175,6 +191,50 @@ pub fn visit_slices(
     slices: &[Slice],
     visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
 ) -> Result<()> {
+    let model = (robot, library);
+    visit_loaded(
+        model,
+        pipeline,
+        trajectory,
+        signal,
+        (slices, Form::Columns),
+        visit,
+    )
+}
+
+/// [`visit_slices`] with the parts that columns are made of in the place of columns: for what is summed over rows.
+///
+/// # Errors
+/// As [`visit_rows`].
+pub fn visit_parts(
+    robot: &Robot,
+    library: &Library,
+    pipeline: &Pipeline,
+    trajectory: &Trajectory,
+    signal: RowSignal,
+    slices: &[Slice],
+    visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
+) -> Result<()> {
+    let model = (robot, library);
+    visit_loaded(
+        model,
+        pipeline,
+        trajectory,
+        signal,
+        (slices, Form::Parts),
+        visit,
+    )
+}
+
+/// Slices of a log with what it carries.
+fn visit_loaded(
+    (robot, library): (&Robot, &Library),
+    pipeline: &Pipeline,
+    trajectory: &Trajectory,
+    signal: RowSignal,
+    slices: (&[Slice], Form),
+    visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
+) -> Result<()> {
     // A known payload is part of the robot in this log.
     let loaded = match trajectory.payload {
         Payload::Known { mass, com } => {
@@ -187,34 +247,25 @@ pub fn visit_slices(
         Some((library, robot)) => (library, robot),
         None => (library, robot),
     };
-    let mut source = OfLibrary {
-        robot,
-        library,
-        absent: if trajectory.payload_acts {
-            Vec::new()
-        } else {
-            library.payload_entries()
-        },
-        scratch: Scratch::default(),
-    };
+    let mut source = OfLibrary::new(robot, library, trajectory.payload_acts);
     visit_source(&mut source, pipeline, trajectory, signal, slices, visit)
 }
 
-/// [`visit_slices`] for any way to evaluate columns.
+/// Slices of a log for any way to evaluate columns.
 fn visit_source(
     source: &mut dyn Source,
     pipeline: &Pipeline,
     trajectory: &Trajectory,
     signal: RowSignal,
-    slices: &[Slice],
+    (slices, form): (&[Slice], Form),
     visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
 ) -> Result<()> {
     for slice in slices {
         let (segment, dof) = (&trajectory.segments[slice.segment], trajectory.dof);
         if signal == RowSignal::Raw || pipeline.is_off() {
-            unfiltered::visit(source, slice, segment, dof, visit)?;
+            unfiltered::visit(source, (slice, form), segment, dof, visit)?;
         } else {
-            filtered::visit(source, pipeline, slice, segment, dof, None, visit)?;
+            filtered::visit(source, pipeline, (slice, form), segment, dof, None, visit)?;
         }
     }
     Ok(())

@@ -39,7 +39,7 @@ pub(super) fn require(
     let all = || fit.iter().chain(heldout);
     let samples: usize = all().map(ReadyLog::samples).sum();
     let numbers: usize = (0..library.joints())
-        .map(|joint| library.columns_of_joint(joint).len() + BESIDE)
+        .map(|joint| library.recipes(joint).parts() + BESIDE)
         .sum();
     // Rows that are put away leave torques, weights and what is summed over them.
     let of_rows = |log: &ReadyLog<'_>| {

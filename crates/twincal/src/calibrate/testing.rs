@@ -53,6 +53,7 @@ impl Regression {
             qdd: vec![vec![0.0; rows].into()],
             joints: vec![JointObservations {
                 columns: (0..beta.len()).collect(),
+                recipes: None,
                 x,
                 measured: y.clone().into(),
                 nominal: vec![0.0; rows].into(),

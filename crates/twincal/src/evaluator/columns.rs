@@ -1,9 +1,8 @@
 //! Columns of a library as steps.
 
 use super::dynamics::{self, Load, Moving, Screw};
-use super::regrouped::regrouped;
 use super::trace::{Id, Step, Trace};
-use crate::robot::Robot;
+use crate::robot::{Robot, regrouped};
 use crate::term::{Function, Graph, GraphId, Library, ModelColumn, Node, Variable};
 use std::collections::HashMap;
 

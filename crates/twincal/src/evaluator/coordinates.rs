@@ -4,10 +4,9 @@
 //! parameters, which torque can tell apart, nothing cancels and what counts can be told one by one.
 
 use super::columns::Columns;
-use super::regrouped::regrouped;
 use super::states::{STATES, States};
 use super::trace::{Id, Trace, values};
-use crate::robot::Robot;
+use crate::robot::{Robot, regrouped};
 use crate::term::{Library, ModelColumn};
 
 /// Shares below this of a parameter's largest are rounding.

@@ -2,7 +2,7 @@
 
 use super::trace::{Id, Step, Trace};
 use crate::robot::Robot;
-use crate::robot::spatial::Matrix;
+use crate::robot::spatial::{Matrix, clean};
 use crate::term::Function;
 
 type Vector = [Id; 3];
@@ -23,14 +23,6 @@ pub(super) struct Moving {
     products: Vector,
     /// ω_y² − ω_z², ω_z² − ω_x², ω_x² − ω_y².
     differences: Vector,
-}
-
-/// Half a turn leaves 6e-17 where 0 is meant.
-const ROUNDING: f64 = 3e-16;
-
-/// A rotation without the rounding of its zeros.
-pub(super) fn clean(matrix: &Matrix) -> Matrix {
-    matrix.map(|row| row.map(|v| if v.abs() < ROUNDING { 0.0 } else { v }))
 }
 
 /// M v.

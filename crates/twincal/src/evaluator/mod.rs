@@ -8,7 +8,6 @@ mod columns;
 mod coordinates;
 mod dynamics;
 mod interval;
-mod regrouped;
 mod states;
 mod trace;
 #[cfg(test)]
@@ -20,12 +19,11 @@ pub(crate) use states::{States, rms};
 pub use trace::Step;
 
 use crate::error::{Error, Result};
-use crate::robot::Robot;
+use crate::robot::{Robot, regrouped};
 use crate::term::{Library, ModelColumn};
 use crate::twin::Twin;
 use columns::{Columns, direction, nominal_parameters, parameters};
 use interval::Interval;
-use regrouped::regrouped;
 use trace::{Id, Trace};
 
 /// Coefficients whose torque stays below this in every state of the training range are left out, N·m.

@@ -3,10 +3,9 @@
 use super::columns::{Columns, parameters};
 use super::coordinates::{Coordinate, Coordinates};
 use super::dynamics;
-use super::regrouped::regrouped;
 use super::testing::tree;
 use super::trace::{Step, Trace, values};
-use crate::robot::{Motion, nominal_torque};
+use crate::robot::{Motion, nominal_torque, regrouped};
 use crate::term::{Family, Function, Library, LibrarySettings};
 
 fn value(t: &Trace, id: u32, q: &[f64]) -> f64 {

@@ -3,12 +3,13 @@
 use super::block::{BLOCK, Block, Columns, Rows, Workspace};
 use super::products::Products;
 use super::{JointGram, Symmetric};
+use crate::term::Recipes;
 use pulp::{Simd, WithSimd};
 
 /// What a part of a log must know of the part before it: the last row of a run that is still open.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OpenRun {
-    /// `[columns, y]` of the last row; `None` between runs.
+    /// `[columns, y]`, or `[parts, y]`, of the last row; `None` between runs.
     last_row: Option<Vec<f64>>,
 }
 
@@ -18,6 +19,8 @@ pub struct OpenRun {
 #[derive(Debug)]
 pub struct JointAccumulator {
     gram: JointGram,
+    /// How columns and y follow from what is added up, if that is not themselves.
+    recipes: Option<Recipes>,
     /// Decides the order of sums, and with it their last bits.
     pub(super) arch: pulp::Arch,
     /// Rows that are not a block yet.
@@ -38,11 +41,26 @@ impl JointAccumulator {
         Self::resume(columns, OpenRun::default())
     }
 
+    /// For the given library columns, between runs, where parts are added up: what columns are made of, see [`Recipes`]. A
+    /// 7-joint arm has three times fewer products of parts than of columns.
+    ///
+    /// # Panics
+    /// If the recipes are not those of so many columns.
+    pub fn of_parts(columns: Vec<u32>, recipes: &Recipes) -> Self {
+        assert_eq!(columns.len(), recipes.columns(), "a recipe per column");
+        Self::with(columns, Some(recipes.and_one()), OpenRun::default())
+    }
+
     /// Goes on where [`JointAccumulator::cut`] stopped.
     pub fn resume(columns: Vec<u32>, run: OpenRun) -> Self {
-        let width = columns.len() + 1;
+        Self::with(columns, None, run)
+    }
+
+    fn with(columns: Vec<u32>, recipes: Option<Recipes>, run: OpenRun) -> Self {
+        let width = recipes.as_ref().map_or(columns.len() + 1, Recipes::parts);
         Self {
             gram: JointGram::empty(columns),
+            recipes,
             arch: pulp::Arch::new(),
             held: Columns::default(),
             waiting: 0,
@@ -58,7 +76,7 @@ impl JointAccumulator {
     ///
     /// | value | shape | meaning |
     /// |---|---|---|
-    /// | `x` | columns × `stride` | row r of column i is `x[i * stride + r]`, N·m per unit of β |
+    /// | `x` | columns (or parts) × `stride` | row r of column i is `x[i * stride + r]`, N·m per unit of β |
     /// | `y` | rows | residual torque, N·m |
     /// | `keep` | rows | false: the row is left out and ends the run (standstill) |
     /// | `first` | | true: the first row starts a new segment |
@@ -75,7 +93,7 @@ impl JointAccumulator {
         first: bool,
         workspace: &mut Workspace,
     ) {
-        let (width, len) = (self.gram.columns.len(), y.len());
+        let (width, len) = (self.before.len() - 1, y.len());
         assert_eq!(keep.len(), len, "one flag per row");
         assert!(
             width == 0 || len == 0 || x.len() >= (width - 1) * stride + len,
@@ -110,7 +128,10 @@ impl JointAccumulator {
         if self.run.last_row.is_none() {
             let start: Vec<f64> = row(0).collect();
             self.gram.starts += 1.0;
-            self.gram.first.add_outer(&start);
+            let columns = self.columns_of(&start);
+            self.gram
+                .first
+                .add_outer(columns.as_deref().unwrap_or(&start));
             self.starts.push(self.waiting);
             self.run.last_row = Some(start);
         }
@@ -167,8 +188,16 @@ impl JointAccumulator {
 
     fn end_run(&mut self) {
         if let Some(last) = self.run.last_row.take() {
-            self.gram.last.add_outer(&last);
+            let columns = self.columns_of(&last);
+            self.gram
+                .last
+                .add_outer(columns.as_deref().unwrap_or(&last));
         }
+    }
+
+    /// Columns and y of a row of parts and y.
+    fn columns_of(&self, row: &[f64]) -> Option<Vec<f64>> {
+        self.recipes.as_ref().map(|recipes| recipes.row(row))
     }
 
     /// The statistics of all rows; an open run ends here.
@@ -181,9 +210,14 @@ impl JointAccumulator {
     /// is still open is counted as started here and as ended in the part that ends it.
     pub fn cut(mut self) -> (JointGram, OpenRun) {
         self.flush(&mut Workspace::default());
-        let size = self.before.len();
-        let [s0, d] =
-            [&self.s0, &self.d].map(|sums| self.arch.dispatch(WithTiles(Matrix { sums })));
+        let size = self.gram.columns.len() + 1;
+        let [s0, d] = [&self.s0, &self.d].map(|sums| {
+            let matrix = self.arch.dispatch(WithTiles(Matrix { sums }));
+            match &self.recipes {
+                Some(recipes) => recipes.to_columns(&matrix),
+                None => matrix,
+            }
+        });
         self.gram.s0 = Symmetric { size, values: s0 };
         self.gram.d = Symmetric { size, values: d };
         (self.gram, self.run)

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::linear_algebra::Cholesky;
+use crate::term::Recipes;
 use proptest::prelude::*;
 
 /// Numbers in (−1, 1) that look random, from a seed.
@@ -309,6 +310,52 @@ proptest! {
             for j in 0..7 {
                 prop_assert_eq!(b.s0.at(i, j), a.s0.at(order[i], order[j]));
                 prop_assert_eq!(b.d.at(i, j), a.d.at(order[i], order[j]));
+            }
+        }
+    }
+}
+
+/// Sums over parts, followed by the recipes, are the sums over columns: masked rows, several runs, blocks of any size; a column that
+/// is nothing, one that is a part, one that stands for another.
+#[test]
+fn statistics_of_parts_are_those_of_columns() {
+    let recipes = Recipes::new(
+        4,
+        vec![
+            vec![(2, 1.0)],
+            vec![(0, 0.5), (1, -2.0), (3, 7.0)],
+            vec![],
+            vec![(0, 0.5), (1, -2.0), (3, 7.0)],
+            vec![(1, 1e3)],
+            vec![(0, 1.0), (1, 1.0), (2, 1.0), (3, 1.0)],
+        ],
+    );
+    for (seed, rows, step) in [(3, 900, 900), (4, 333, 17), (5, 1, 1), (6, 0, 1)] {
+        let parts = Log::new(seed, 4, rows, true);
+        let mut columns = parts.clone();
+        columns.columns = 6;
+        recipes.combine(&parts.x, rows, rows, &mut columns.x);
+        let mut of_parts = JointAccumulator::of_parts((0..6).collect(), &recipes);
+        parts.push(&mut of_parts, 0, rows, step);
+        let mut of_columns = JointAccumulator::new((0..6).collect());
+        columns.push(&mut of_columns, 0, rows, step);
+        let (of_parts, expected) = (of_parts.finish(), of_columns.finish());
+        assert_eq!(of_parts.columns, expected.columns);
+        assert_eq!((of_parts.n, of_parts.starts), (expected.n, expected.starts));
+        for (got, expected) in [
+            (&of_parts.s0, &expected.s0),
+            (&of_parts.d, &expected.d),
+            (&of_parts.first, &expected.first),
+            (&of_parts.last, &expected.last),
+        ] {
+            assert_eq!(got.size, 7);
+            for i in 0..7 {
+                for j in 0..7 {
+                    let scale = (expected.at(i, i) * expected.at(j, j)).sqrt();
+                    let off = (got.at(i, j) - expected.at(i, j)).abs();
+                    assert!(off <= 1e-13 * scale, "seed {seed}, {i}, {j}: {off:e}");
+                    assert_eq!(got.at(i, j).to_bits(), got.at(j, i).to_bits());
+                }
             }
         }
     }

@@ -37,7 +37,7 @@ impl Observations {
         // The columns of all joints at these rows, which are together.
         let mut held = vec![(Vec::new(), self.len()); self.joints.len()];
         for (joint, held) in self.joints.iter().zip(&mut held) {
-            if joint.shelved.is_some() {
+            if joint.shelved.is_some() || joint.recipes.is_some() {
                 joint.visit_columns(self.len(), rows.clone(), &mut |_, columns| {
                     *held = (columns.x.to_vec(), columns.stride);
                 });
@@ -51,10 +51,12 @@ impl Observations {
         let joints = self.joints.iter().zip(&held).zip(&torques);
         let joints = joints.map(|((joint, (held, stride)), [measured, nominal])| JointRows {
             columns: &joint.columns,
+            recipes: None,
             stride: *stride,
-            x: match &joint.shelved {
-                Some(_) => held,
-                None => joint.x.get(rows.start..).unwrap_or_default(),
+            x: if joint.shelved.is_some() || joint.recipes.is_some() {
+                held
+            } else {
+                joint.x.get(rows.start..).unwrap_or_default()
             },
             measured,
             nominal,

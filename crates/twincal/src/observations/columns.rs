@@ -107,6 +107,31 @@ impl JointObservations {
         range: Range<usize>,
         visit: &mut dyn FnMut(Range<usize>, Columns<'_>),
     ) {
+        let Some(recipes) = &self.recipes else {
+            return self.visit_signals(len, range, visit);
+        };
+        let mut made = Vec::new();
+        self.visit_signals(len, range, &mut |rows, parts| {
+            for from in rows.clone().step_by(MAX_BLOCK) {
+                let to = rows.end.min(from + MAX_BLOCK);
+                let x = parts.x.get(from - rows.start..).unwrap_or_default();
+                recipes.combine(x, parts.stride, to - from, &mut made);
+                let columns = Columns {
+                    x: &made,
+                    stride: to - from,
+                };
+                visit(from..to, columns);
+            }
+        });
+    }
+
+    /// Visits what the columns of some of the `len` rows are made of, in order: which rows, and their signals.
+    pub(crate) fn visit_signals(
+        &self,
+        len: usize,
+        range: Range<usize>,
+        visit: &mut dyn FnMut(Range<usize>, Columns<'_>),
+    ) {
         if range.is_empty() {
             return;
         }

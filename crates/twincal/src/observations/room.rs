@@ -59,11 +59,12 @@ impl Room {
             .resize(part.joints.len(), JointObservations::default());
         for (to, mut part) in self.rows.joints.iter_mut().zip(part.joints) {
             if let Some(shelf) = &self.shelf {
-                let columns = part.columns.len();
-                let new = || Shelved::new(shelf.clone(), columns);
+                let signals = part.signals();
+                let new = || Shelved::new(shelf.clone(), signals);
                 let x = std::mem::take(&mut part.x);
                 to.shelved.get_or_insert_with(new).append(&x, len)?;
                 to.columns.clone_from(&part.columns);
+                to.recipes.clone_from(&part.recipes);
             } else {
                 to.append_columns(&part, from, len, most);
             }
@@ -79,7 +80,7 @@ impl Room {
     /// Takes more room than was asked for first.
     fn widen(&mut self, most: usize) {
         for joint in self.rows.joints.iter_mut().filter(|j| j.shelved.is_none()) {
-            let mut x = vec![0.0; joint.columns.len() * most];
+            let mut x = vec![0.0; joint.signals() * most];
             for (to, from) in x
                 .chunks_exact_mut(most)
                 .zip(joint.x.chunks_exact(self.most))
@@ -95,11 +96,11 @@ impl Room {
     pub(crate) fn into_rows(mut self) -> Observations {
         let len = self.rows.len();
         for joint in self.rows.joints.iter_mut().filter(|j| j.shelved.is_none()) {
-            for column in 0..joint.columns.len() {
+            for column in 0..joint.signals() {
                 let from = column * self.most;
                 joint.x.copy_within(from..from + len, column * len);
             }
-            joint.x.truncate(joint.columns.len() * len);
+            joint.x.truncate(joint.signals() * len);
             joint.x.shrink_to_fit();
         }
         self.rows
@@ -110,8 +111,9 @@ impl JointObservations {
     /// Puts the columns of `len` rows behind the `from` that there are, with room for `most`.
     fn append_columns(&mut self, part: &Self, from: usize, len: usize, most: usize) {
         if self.x.is_empty() {
-            self.x = vec![0.0; part.columns.len() * most];
+            self.x = vec![0.0; part.signals() * most];
             self.columns.clone_from(&part.columns);
+            self.recipes.clone_from(&part.recipes);
         }
         for (to, values) in (self.x.chunks_exact_mut(most)).zip(part.x.chunks_exact(len.max(1))) {
             to[from..from + len].copy_from_slice(values);

@@ -22,6 +22,7 @@ fn log() -> Observations {
         qd: vec![vec![1.0; ROWS].into()],
         qdd: vec![vec![0.0; ROWS].into()],
         joints: vec![JointObservations {
+            recipes: None,
             columns: vec![0],
             x,
             measured: y.clone().into(),

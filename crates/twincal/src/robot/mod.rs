@@ -13,6 +13,7 @@ mod coordinates;
 mod bodies;
 mod parameters;
 mod carry;
+mod regrouped;
 mod lane_vectors;
 mod recursion;
 mod dynamics;
@@ -49,6 +50,7 @@ pub use regressor::{Pair, Regressor, RegressorBlock};
 use crate::error::{Error, Finding, Result, Severity};
 pub(crate) use bodies::Body;
 use bodies::Home;
+pub(crate) use regrouped::regrouped;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

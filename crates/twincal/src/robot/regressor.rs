@@ -116,6 +116,18 @@ impl Regressor {
         regressor
     }
 
+    /// The same with some of the columns only, by pair and parameter: the others are no longer computed, nor present.
+    #[must_use]
+    pub fn only(&self, wanted: &dyn Fn(usize, usize) -> bool) -> Self {
+        let mut rest = self.clone();
+        for (index, pair) in rest.pairs.iter_mut().enumerate() {
+            for (k, present) in pair.present.iter_mut().enumerate() {
+                *present &= wanted(index, k);
+            }
+        }
+        rest
+    }
+
     /// Pairs (coordinate, body), by body, parents first.
     pub fn pairs(&self) -> &[Pair] {
         &self.pairs

@@ -55,6 +55,14 @@ pub fn multiply(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| dot(a[i], bt[j])))
 }
 
+/// Half a turn leaves 6e-17 where 0 is meant.
+const ROUNDING: f64 = 3e-16;
+
+/// A rotation without the rounding of its zeros.
+pub(crate) fn clean(matrix: &Matrix) -> Matrix {
+    matrix.map(|row| row.map(|v| if v.abs() < ROUNDING { 0.0 } else { v }))
+}
+
 /// R M Rᵀ: a tensor given in the inner frame, seen from the outer frame.
 pub fn rotate_tensor(r: &Matrix, m: &Matrix) -> Matrix {
     let full = multiply(&multiply(r, m), &transpose(r));

@@ -1,7 +1,8 @@
 //! Columns and nominal torque of a stretch of samples.
 
 use crate::robot::{Motion, Robot, nominal_torque};
-use crate::term::{Library, Scratch};
+use crate::term::{Library, Recipes, Scratch};
+use std::sync::Arc;
 
 /// Where nominal torque and columns come from.
 ///
@@ -9,23 +10,51 @@ use crate::term::{Library, Scratch};
 pub(super) trait Source {
     /// Structurally non-zero columns of a joint.
     fn columns(&self, joint: usize) -> &[usize];
-    /// How many parts a joint has.
-    fn parts(&self, joint: usize) -> usize;
+    /// How the columns of a joint follow from its parts.
+    fn recipes(&self, joint: usize) -> &Arc<Recipes>;
     /// `nominal[joint * len + sample]`, `out[joint][i * len + sample]`.
     fn evaluate(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]);
     /// `nominal[joint * len + sample]`, `out[joint][part * len + sample]`.
     fn evaluate_parts(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]);
-    /// `parts[part * stride + row]` to `out[i * rows + row]`.
-    fn combine(&self, joint: usize, parts: &[f64], stride: usize, rows: usize, out: &mut Vec<f64>);
 }
 
 /// The columns of a library on a robot.
 pub(super) struct OfLibrary<'a> {
-    pub(super) robot: &'a Robot,
-    pub(super) library: &'a Library,
+    robot: &'a Robot,
+    library: &'a Library,
     /// `(joint, row)` of columns that do not act in this log.
-    pub(super) absent: Vec<(usize, usize)>,
-    pub(super) scratch: Scratch,
+    absent: Vec<(usize, usize)>,
+    /// Of every joint, in which those columns are 0.
+    recipes: Vec<Arc<Recipes>>,
+    scratch: Scratch,
+}
+
+impl<'a> OfLibrary<'a> {
+    /// In a log where the payload acts, or does not.
+    pub(super) fn new(robot: &'a Robot, library: &'a Library, payload_acts: bool) -> Self {
+        let absent = if payload_acts {
+            Vec::new()
+        } else {
+            library.payload_entries()
+        };
+        let recipes = |joint: usize| {
+            let rows = absent.iter().filter(|entry| entry.0 == joint);
+            let rows: Vec<usize> = rows.map(|entry| entry.1).collect();
+            let all = library.recipes(joint);
+            if rows.is_empty() {
+                all.clone()
+            } else {
+                Arc::new(all.without(&rows))
+            }
+        };
+        Self {
+            robot,
+            library,
+            recipes: (0..library.joints()).map(recipes).collect(),
+            absent,
+            scratch: Scratch::default(),
+        }
+    }
 }
 
 impl Source for OfLibrary<'_> {
@@ -33,8 +62,8 @@ impl Source for OfLibrary<'_> {
         self.library.columns_of_joint(joint)
     }
 
-    fn parts(&self, joint: usize) -> usize {
-        self.library.parts_of_joint(joint)
+    fn recipes(&self, joint: usize) -> &Arc<Recipes> {
+        &self.recipes[joint]
     }
 
     fn evaluate(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]) {
@@ -48,13 +77,6 @@ impl Source for OfLibrary<'_> {
     fn evaluate_parts(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]) {
         nominal_torque(self.robot, motion, nominal);
         self.library.evaluate_parts(motion, out, &mut self.scratch);
-    }
-
-    fn combine(&self, joint: usize, parts: &[f64], stride: usize, rows: usize, out: &mut Vec<f64>) {
-        self.library.combine_parts(joint, parts, stride, rows, out);
-        for &(_, row) in self.absent.iter().filter(|absent| absent.0 == joint) {
-            out[row * rows..(row + 1) * rows].fill(0.0);
-        }
     }
 }
 

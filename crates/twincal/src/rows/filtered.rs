@@ -1,7 +1,7 @@
 //! Rows of the regression: F over torque and the columns' parts, only where a row is kept.
 
 use super::evaluate::{Source, Stretch};
-use super::{JointRows, MAX_BLOCK, RowBlock, Slice};
+use super::{Form, JointRows, MAX_BLOCK, RowBlock, Slice};
 use crate::error::Result;
 use crate::robot::BLOCK;
 use crate::signal::decimate::Decimator;
@@ -56,7 +56,7 @@ impl Plan {
 pub(super) fn visit(
     source: &mut dyn Source,
     pipeline: &Pipeline,
-    slice: &Slice,
+    (slice, form): (&Slice, Form),
     segment: &Segment,
     dof: usize,
     batch: Option<usize>,
@@ -67,7 +67,7 @@ pub(super) fn visit(
     let mut next = slice.rows.start;
     while next < slice.rows.end {
         let end = slice.rows.end.min(next + batch);
-        let rows = Rows::new(source, &plan, segment, dof, next..end);
+        let rows = Rows::new(source, (&plan, form), segment, dof, next..end);
         let mut from = 0;
         while from < rows.len() {
             let to = rows.len().min(from + MAX_BLOCK);
@@ -90,7 +90,8 @@ struct Rows {
     qd: Vec<f64>,
     qdd: Vec<f64>,
     standstill: Vec<bool>,
-    /// Columns of each joint, `i * len + row`.
+    form: Form,
+    /// Columns or parts of each joint, `i * len + row`.
     x: Vec<Vec<f64>>,
     nominal: Vec<Vec<f64>>,
     /// Empty if the log has no torque.
@@ -100,7 +101,7 @@ struct Rows {
 impl Rows {
     fn new(
         source: &mut dyn Source,
-        plan: &Plan,
+        (plan, form): (&Plan, Form),
         segment: &Segment,
         dof: usize,
         range: Range<usize>,
@@ -124,6 +125,7 @@ impl Rows {
                 .chunks_exact(total)
                 .flat_map(|joint| centres().map(|i| joint[i]))
                 .collect(),
+            form,
             x: vec![Vec::new(); dof],
             nominal: Vec::with_capacity(dof),
             measured: Vec::new(),
@@ -145,7 +147,7 @@ impl Rows {
         let mut signals = 0;
         for joint in 0..dof {
             firsts.push(signals);
-            signals += source.parts(joint) + 2;
+            signals += source.recipes(joint).parts() + 2;
         }
         let mut decimator = Decimator::new(&plan.kernel, plan.step, len, signals);
         let begin = self.range.start * plan.step;
@@ -158,7 +160,7 @@ impl Rows {
             stretch.evaluate_parts(source);
             let mut at_hand: Vec<(usize, &[f64])> = Vec::with_capacity(3 * dof);
             for (joint, &first) in firsts.iter().enumerate() {
-                let parts = source.parts(joint);
+                let parts = source.recipes(joint).parts();
                 let own = joint * count..(joint + 1) * count;
                 at_hand.push((first, &stretch.values[joint]));
                 at_hand.push((first + parts, &stretch.nominal[own]));
@@ -171,9 +173,16 @@ impl Rows {
             from += count;
         }
         for (joint, &first) in firsts.iter().enumerate() {
-            let parts = source.parts(joint);
-            let sums = decimator.sums(first, parts);
-            source.combine(joint, sums, decimator.stride(), len, &mut self.x[joint]);
+            let recipes = source.recipes(joint);
+            let parts = recipes.parts();
+            let (sums, stride) = (decimator.sums(first, parts), decimator.stride());
+            match self.form {
+                Form::Columns => recipes.combine(sums, stride, len, &mut self.x[joint]),
+                Form::Parts => {
+                    let rows = sums.chunks_exact(stride).map(|part| &part[..len]);
+                    self.x[joint] = rows.flatten().copied().collect();
+                }
+            }
             let row = |signal: usize| decimator.sums(signal, 1)[..len].to_vec();
             self.nominal.push(row(first + parts));
             if has_tau {
@@ -200,6 +209,7 @@ impl Rows {
         let joints = (0..dof)
             .map(|joint| JointRows {
                 columns: source.columns(joint),
+                recipes: self.form.recipes(source, joint),
                 stride: len,
                 x: self.x[joint].get(rows.start..).unwrap_or(&[]),
                 measured: self.measured.get(joint).map_or(&[], |m| &m[rows.clone()]),

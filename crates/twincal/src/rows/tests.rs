@@ -19,7 +19,9 @@ fn column(column: usize, q: f64, qd: f64, qdd: f64) -> f64 {
     }
 }
 
-struct StandIn;
+struct StandIn {
+    recipes: Vec<Arc<Recipes>>,
+}
 
 /// What a part of a joint is: its columns in order, but the last one of joint 1 with the one before added.
 fn part(joint: usize, part: usize, state: [f64; 3]) -> f64 {
@@ -32,6 +34,21 @@ fn part(joint: usize, part: usize, state: [f64; 3]) -> f64 {
 }
 
 impl StandIn {
+    fn new() -> Self {
+        let recipe = |joint: usize, column: usize| match (joint, column) {
+            (1, 1) => vec![(1, 1.0), (0, -1.0)],
+            _ => vec![(column, 1.0)],
+        };
+        let recipes = |joint: usize| {
+            let count = COLUMNS[joint].len();
+            let columns = (0..count).map(|column| recipe(joint, column));
+            Arc::new(Recipes::new(count, columns.collect()))
+        };
+        Self {
+            recipes: (0..2).map(recipes).collect(),
+        }
+    }
+
     fn fill(
         motion: Motion<'_>,
         nominal: &mut [f64],
@@ -57,8 +74,8 @@ impl Source for StandIn {
         COLUMNS[joint]
     }
 
-    fn parts(&self, joint: usize) -> usize {
-        COLUMNS[joint].len()
+    fn recipes(&self, joint: usize) -> &Arc<Recipes> {
+        &self.recipes[joint]
     }
 
     fn evaluate(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]) {
@@ -68,20 +85,6 @@ impl Source for StandIn {
 
     fn evaluate_parts(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]) {
         Self::fill(motion, nominal, out, part);
-    }
-
-    fn combine(&self, joint: usize, parts: &[f64], stride: usize, rows: usize, out: &mut Vec<f64>) {
-        out.clear();
-        for c in 0..COLUMNS[joint].len() {
-            for row in 0..rows {
-                let part = |part: usize| parts[part * stride + row];
-                out.push(if (joint, c) == (1, 1) {
-                    part(1) - part(0)
-                } else {
-                    part(c)
-                });
-            }
-        }
     }
 }
 
@@ -183,9 +186,9 @@ fn collect_slices(
     };
     match chunk {
         Some(chunk) => filtered::visit(
-            &mut StandIn,
+            &mut StandIn::new(),
             pipeline,
-            &slices[0],
+            (&slices[0], Form::Columns),
             &trajectory.segments[0],
             2,
             Some(chunk),
@@ -194,17 +197,65 @@ fn collect_slices(
         .unwrap(),
         None => {
             visit_source(
-                &mut StandIn,
+                &mut StandIn::new(),
                 pipeline,
                 trajectory,
                 signal,
-                slices,
+                (slices, Form::Columns),
                 &mut gather,
             )
             .unwrap();
         }
     }
     rows
+}
+
+/// Rows of parts, followed by their recipes, are the rows of columns: filtered to the bit, as there they are made so.
+#[test]
+fn rows_of_parts_make_rows_of_columns() {
+    let (trajectory, pipeline) = (trajectory(3000, 0.002), pipeline(5.0));
+    for signal in [RowSignal::Filtered, RowSignal::Raw] {
+        let all = slices(
+            &pipeline,
+            &trajectory,
+            signal,
+            f64::NEG_INFINITY,
+            usize::MAX,
+        );
+        let columns_in = |form: Form| {
+            let mut columns = vec![Vec::new(); 2];
+            let mut gather = |block: &RowBlock<'_>| {
+                for (all, rows) in columns.iter_mut().zip(&block.joints) {
+                    let mut made = Vec::new();
+                    match rows.recipes {
+                        Some(recipes) => recipes.combine(rows.x, rows.stride, block.len, &mut made),
+                        None => (rows.x.chunks(rows.stride))
+                            .for_each(|column| made.extend_from_slice(&column[..block.len])),
+                    }
+                    all.push(made);
+                }
+                Ok(())
+            };
+            let mut source = StandIn::new();
+            let slices = (&all[..], form);
+            visit_source(
+                &mut source,
+                &pipeline,
+                &trajectory,
+                signal,
+                slices,
+                &mut gather,
+            )
+            .unwrap();
+            columns.concat().concat()
+        };
+        let (columns, parts) = (columns_in(Form::Columns), columns_in(Form::Parts));
+        assert!(columns.len() > 5 * 30);
+        assert_eq!(columns.len(), parts.len());
+        for (a, b) in columns.iter().zip(&parts) {
+            assert!(a == b || signal == RowSignal::Raw && (a - b).abs() < 1e-14);
+        }
+    }
 }
 
 #[test]
@@ -381,14 +432,17 @@ fn an_error_of_the_visitor_ends_the_visit() {
     };
     assert!(
         visit_source(
-            &mut StandIn,
+            &mut StandIn::new(),
             &pipeline(5.0),
             &trajectory(3000, 0.001),
             RowSignal::Raw,
-            &[Slice {
-                segment: 0,
-                rows: 0..3000
-            }],
+            (
+                &[Slice {
+                    segment: 0,
+                    rows: 0..3000
+                }],
+                Form::Columns
+            ),
             &mut stop
         )
         .is_err()

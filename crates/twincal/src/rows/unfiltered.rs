@@ -1,7 +1,7 @@
 //! Rows as logged: for the pipeline off, for raw validation and for predictions.
 
 use super::evaluate::{Source, Stretch};
-use super::{JointRows, MAX_BLOCK, RowBlock, Slice};
+use super::{Form, JointRows, MAX_BLOCK, RowBlock, Slice};
 use crate::error::Result;
 use crate::signal::Segment;
 use crate::signal::interpolate::Place;
@@ -49,7 +49,7 @@ impl AtStamps {
 /// Visits logged samples of a segment.
 pub(super) fn visit(
     source: &mut dyn Source,
-    slice: &Slice,
+    (slice, form): (&Slice, Form),
     segment: &Segment,
     dof: usize,
     visit: &mut dyn FnMut(&RowBlock<'_>) -> Result<()>,
@@ -81,10 +81,14 @@ pub(super) fn visit(
                 .copied()
                 .collect()
         };
-        stretch.evaluate(source);
+        match form {
+            Form::Columns => stretch.evaluate(source),
+            Form::Parts => stretch.evaluate_parts(source),
+        }
         let joints = (0..dof)
             .map(|joint| JointRows {
                 columns: source.columns(joint),
+                recipes: form.recipes(source, joint),
                 stride: len,
                 x: &stretch.values[joint],
                 measured: if tau.is_empty() {

@@ -11,6 +11,7 @@ use super::model_column::{ModelColumn, ModelColumns};
 use super::overlaps;
 use super::parts::{self, Parts, Torque};
 use super::propose::{About, payload_mount, proposals};
+use super::recipes::Recipes;
 use super::sentence::{Estimate, sentence};
 use super::{Family, LibrarySettings, Status, Term, user};
 use crate::error::{Error, Finding, Result};
@@ -390,34 +391,18 @@ impl Library {
         );
     }
 
-    /// How many signals the columns of a joint are combinations of, see [`Library::evaluate_parts`].
-    pub fn parts_of_joint(&self, joint: usize) -> usize {
-        self.parts.count(joint)
+    /// How the columns of a joint follow from the signals of [`Library::evaluate_parts`].
+    pub fn recipes(&self, joint: usize) -> &Arc<Recipes> {
+        self.parts.recipes(joint)
     }
 
-    /// Evaluates the fewest signals whose fixed linear combinations are all columns: `out[j][part * motion.len + sample]`,
-    /// each vector resized. What is linear (a filter) is cheaper before [`Library::combine_parts`] than after.
+    /// Evaluates few signals whose fixed linear combinations are all columns: `out[j][part * motion.len + sample]`, each
+    /// vector resized. What is linear (a filter) or quadratic (sums of products) is cheaper before [`Recipes`] are followed than after.
     ///
     /// # Panics
     /// As [`Library::evaluate`].
     pub fn evaluate_parts(&self, motion: Motion<'_>, out: &mut [Vec<f64>], scratch: &mut Scratch) {
         self.parts.evaluate(motion, out, scratch);
-    }
-
-    /// The columns of a joint from its parts: `parts[part * stride + row]` to `out[i * rows + row]` for the i-th entry of
-    /// `columns_of_joint(joint)`; `out` is resized.
-    ///
-    /// # Panics
-    /// If `parts` is too short.
-    pub fn combine_parts(
-        &self,
-        joint: usize,
-        parts: &[f64],
-        stride: usize,
-        rows: usize,
-        out: &mut Vec<f64>,
-    ) {
-        self.parts.combine(joint, parts, stride, rows, out);
     }
 
     /// φ(q, q̇) of a term (index into [`Library::terms`]) at one state, J per unit of β; `None` where the term

@@ -10,6 +10,7 @@ use crate::robot::{
     nominal_torque, position_derivative,
 };
 use pulp::{Simd, WithSimd};
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -155,6 +156,22 @@ impl ModelColumns {
             all.push(output.column.clone(), output.slots.clone());
         }
         all
+    }
+
+    /// The same where the regressor computes nothing that no column asks for.
+    pub(super) fn trimmed(mut self) -> Self {
+        let asked: BTreeSet<(usize, usize)> = (self.outputs.iter())
+            .flat_map(|output| output.entries.iter().flatten())
+            .map(|&(pair, k, _)| (pair, k))
+            .collect();
+        let rest = self.regressor.only(&|pair, k| asked.contains(&(pair, k)));
+        self.regressor = Arc::new(rest);
+        self
+    }
+
+    /// The robot.
+    pub(super) fn robot(&self) -> &Robot {
+        &self.robot
     }
 
     /// Whether parameter `k` of a body can act on a joint.

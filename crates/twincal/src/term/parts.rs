@@ -1,23 +1,19 @@
-//! Fewer signals than columns: what has to be filtered at the log's rate.
+//! Fewer signals than columns: what is evaluated and filtered at the log's rate, kept, and summed.
 //!
-//! Every inertial column is a fixed combination of entries of the joint-torque regressor, and a filter is linear: the
-//! entries are filtered, and columns are combined where a row is kept. A 7-joint arm has 245 entries and, with payload,
-//! mass moments and tensors, 350 inertial columns on its joints; at 1 kHz and 12.5 rows per second combining afterwards
-//! is 80 times cheaper.
+//! Every inertial column is a fixed combination of entries of the joint-torque regressor, and these depend on each other:
+//! what lies on the axis of a joint moves alike on either side of it (regrouped parameters, Khalil and Dombre). A 7-joint arm
+//! has 350 inertial columns on its joints with payload, mass moments and tensors; they are combinations of 253 entries, and
+//! of 185 that are independent. Where few links have columns their own entries may be fewer: each joint has what is less.
 
 use super::expression::{Graph, Id, Slot, Tape};
 use super::model_column::{ModelColumn, ModelColumns, Scratch};
-use crate::robot::Motion;
+use super::recipes::Recipes;
+use crate::robot::{Motion, Robot, regrouped};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-/// How a column follows from the parts of its joint.
-#[derive(Debug, Clone, PartialEq)]
-enum Recipe {
-    /// It is one.
-    Part(usize),
-    /// Σ weight · part.
-    Sum(Vec<(usize, f64)>),
-}
+/// Shares below this of a column's largest are rounding.
+const ROUNDING: f64 = 1e-14;
 
 /// The parts of all columns of a library, ready to be evaluated.
 #[derive(Debug, Clone, Default)]
@@ -25,9 +21,7 @@ pub(super) struct Parts {
     tape: Tape,
     model: Option<ModelColumns>,
     /// Per joint.
-    counts: Vec<usize>,
-    /// Per joint, per column of that joint.
-    recipes: Vec<Vec<Recipe>>,
+    recipes: Vec<Arc<Recipes>>,
 }
 
 /// The torque of a column, and on which joints.
@@ -38,6 +32,53 @@ pub(super) enum Torque<'a> {
     Model(&'a ModelColumn, &'a [usize]),
 }
 
+/// An entry of the regressor on a joint: body, parameter.
+type Entry = (usize, usize);
+/// Σ weight · entry.
+type Sum = Vec<(Entry, f64)>;
+
+/// What is known of a joint before its inertial columns are.
+#[derive(Debug, Clone, Default)]
+struct Joint {
+    parts: usize,
+    /// Per column; empty where it is inertial.
+    columns: Vec<Vec<(usize, f64)>>,
+    /// Inertial columns: which, and their entries, as they stand and regrouped.
+    inertial: Vec<(usize, [Sum; 2])>,
+}
+
+impl Joint {
+    /// A part that is a column.
+    fn column(&mut self) -> usize {
+        self.columns.push(vec![(self.parts, 1.0)]);
+        self.parts += 1;
+        self.parts - 1
+    }
+
+    /// Makes the inertial columns of the fewest entries; which these are, with their parts.
+    fn settle(&mut self) -> BTreeMap<Entry, usize> {
+        let entries = |way: usize| {
+            let of_columns = self.inertial.iter().flat_map(move |(_, ways)| &ways[way]);
+            let numbered = of_columns.map(|(entry, _)| (*entry, 0));
+            numbered.collect::<BTreeMap<Entry, usize>>()
+        };
+        let [own, regrouped] = [entries(0), entries(1)];
+        let way = usize::from(regrouped.len() < own.len());
+        let mut chosen = if way == 0 { own } else { regrouped };
+        for part in chosen.values_mut() {
+            *part = self.parts;
+            self.parts += 1;
+        }
+        for (column, ways) in &self.inertial {
+            let weights = ways[way]
+                .iter()
+                .map(|(entry, weight)| (chosen[entry], *weight));
+            self.columns[*column] = weights.collect();
+        }
+        chosen
+    }
+}
+
 impl Parts {
     /// The parts of columns in order; `model` knows the robot.
     pub(super) fn new<'a>(
@@ -46,60 +87,60 @@ impl Parts {
         joints: usize,
         columns: impl Iterator<Item = Torque<'a>>,
     ) -> Self {
-        let mut parts = Self {
-            tape: Tape::default(),
-            model: model.map(ModelColumns::emptied),
-            counts: vec![0; joints],
-            recipes: vec![Vec::new(); joints],
-        };
+        let mut made = model.map(ModelColumns::emptied);
+        let mut all = vec![Joint::default(); joints];
         let mut outputs = Vec::new();
-        // (joint, body, parameter) → part
-        let mut entries: BTreeMap<(usize, usize, usize), usize> = BTreeMap::new();
         for column in columns {
-            match column {
-                Torque::Expression(image) => {
+            match (column, model) {
+                (Torque::Expression(image), _) => {
                     for &(joint, torque) in image {
-                        let row = parts.next(joint);
+                        let row = all[joint].column();
                         outputs.push((torque, Slot { table: joint, row }));
-                        parts.recipes[joint].push(Recipe::Part(row));
                     }
                 }
-                Torque::Model(&ModelColumn::Inertia { body, weights }, on) => {
+                (Torque::Model(&ModelColumn::Inertia { body, weights }, on), Some(model)) => {
+                    let ways = ways(model.robot(), body, &weights);
                     for &joint in on {
-                        let used = (0..10).filter(|&k| {
-                            weights[k] != 0.0
-                                && parts
-                                    .model
-                                    .as_ref()
-                                    .is_some_and(|model| model.acts(joint, body, k))
-                        });
-                        let sum: Vec<(usize, f64)> = used
-                            .collect::<Vec<_>>()
-                            .into_iter()
-                            .map(|k| {
-                                let part = entries
-                                    .entry((joint, body, k))
-                                    .or_insert_with(|| parts.entry(joint, body, k));
-                                (*part, weights[k])
-                            })
-                            .collect();
-                        parts.recipes[joint].push(Recipe::Sum(sum));
+                        let acting = |way: &Sum| {
+                            let own = way
+                                .iter()
+                                .filter(|((body, k), _)| model.acts(joint, *body, *k));
+                            own.copied().collect()
+                        };
+                        let own = &mut all[joint];
+                        own.inertial
+                            .push((own.columns.len(), [acting(&ways[0]), acting(&ways[1])]));
+                        own.columns.push(Vec::new());
                     }
                 }
-                Torque::Model(other, on) => {
-                    let slots: Vec<(usize, usize)> =
-                        on.iter().map(|&joint| (joint, parts.next(joint))).collect();
-                    for &(joint, row) in &slots {
-                        parts.recipes[joint].push(Recipe::Part(row));
-                    }
-                    if let Some(model) = &mut parts.model {
-                        model.push(other.clone(), slots);
+                (Torque::Model(other, on), _) => {
+                    let slots = on
+                        .iter()
+                        .map(|&joint| (joint, all[joint].column()))
+                        .collect();
+                    if let Some(made) = &mut made {
+                        made.push(other.clone(), slots);
                     }
                 }
             }
         }
-        parts.tape = Tape::new(graph, &outputs);
-        parts
+        for (joint, own) in all.iter_mut().enumerate() {
+            let entries = own.settle();
+            for ((body, k), part) in entries {
+                let weights = std::array::from_fn(|i| f64::from(u8::from(i == k)));
+                if let Some(made) = &mut made {
+                    made.push(ModelColumn::Inertia { body, weights }, vec![(joint, part)]);
+                }
+            }
+        }
+        Self {
+            tape: Tape::new(graph, &outputs),
+            model: made.map(ModelColumns::trimmed),
+            recipes: all
+                .into_iter()
+                .map(|joint| Arc::new(Recipes::new(joint.parts, joint.columns)))
+                .collect(),
+        }
     }
 
     /// The same parts of a robot with other inertias.
@@ -109,35 +150,19 @@ impl Parts {
                 .model
                 .as_ref()
                 .zip(model)
-                .map(|(own, model)| own.of(model)),
+                .map(|(own, model)| own.of(model).trimmed()),
             ..self.clone()
         }
     }
 
-    /// A new part of a joint.
-    fn next(&mut self, joint: usize) -> usize {
-        self.counts[joint] += 1;
-        self.counts[joint] - 1
-    }
-
-    /// A new part: what parameter `k` of `body` adds to the torque of `joint`.
-    fn entry(&mut self, joint: usize, body: usize, k: usize) -> usize {
-        let part = self.next(joint);
-        let weights = std::array::from_fn(|i| f64::from(u8::from(i == k)));
-        if let Some(model) = &mut self.model {
-            model.push(ModelColumn::Inertia { body, weights }, vec![(joint, part)]);
-        }
-        part
-    }
-
-    /// Parts of a joint.
-    pub(super) fn count(&self, joint: usize) -> usize {
-        self.counts[joint]
+    /// How the columns of a joint follow from its parts.
+    pub(super) fn recipes(&self, joint: usize) -> &Arc<Recipes> {
+        &self.recipes[joint]
     }
 
     /// Writes every part: `out[joint][part * len + sample]`.
     pub(super) fn evaluate(&self, motion: Motion<'_>, out: &mut [Vec<f64>], scratch: &mut Scratch) {
-        let counts = self.counts.iter().copied();
+        let counts = self.recipes.iter().map(|recipes| recipes.parts());
         evaluate(
             counts,
             &self.tape,
@@ -147,35 +172,24 @@ impl Parts {
             scratch,
         );
     }
+}
 
-    /// Columns of a joint from its filtered parts: `parts[part * stride + row]` to `out[column * rows + row]`.
-    pub(super) fn combine(
-        &self,
-        joint: usize,
-        parts: &[f64],
-        stride: usize,
-        rows: usize,
-        out: &mut Vec<f64>,
-    ) {
-        let recipes = &self.recipes[joint];
-        out.resize(recipes.len() * rows, 0.0);
-        for (recipe, cells) in recipes.iter().zip(out.chunks_exact_mut(rows.max(1))) {
-            match recipe {
-                Recipe::Part(part) => {
-                    cells.copy_from_slice(&parts[part * stride..part * stride + rows]);
-                }
-                Recipe::Sum(sum) => {
-                    cells.fill(0.0);
-                    for &(part, weight) in sum {
-                        let part = &parts[part * stride..part * stride + rows];
-                        for (cell, value) in cells.iter_mut().zip(part) {
-                            *cell += weight * value;
-                        }
-                    }
-                }
-            }
-        }
-    }
+/// An inertial column's entries: those of its own body, and regrouped ones.
+fn ways(robot: &Robot, body: usize, weights: &[f64; 10]) -> [Sum; 2] {
+    let mut parameters = vec![[0.0; 10]; robot.bodies().len()];
+    parameters[body] = *weights;
+    let entries = |parameters: &[[f64; 10]]| {
+        let all = parameters.iter().enumerate();
+        let all = all.flat_map(|(body, own)| (0..10).map(move |k| ((body, k), own[k])));
+        let largest = parameters
+            .iter()
+            .flatten()
+            .fold(0.0_f64, |m, x| m.max(x.abs()));
+        all.filter(|(_, weight)| weight.abs() > ROUNDING * largest)
+            .collect()
+    };
+    let own = entries(&parameters);
+    [own, entries(&regrouped(robot, parameters))]
 }
 
 /// Writes what a tape and a model make of a motion, `counts` signals on each joint: `out[joint][signal * len + sample]`.

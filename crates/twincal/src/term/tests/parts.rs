@@ -2,7 +2,7 @@
 
 use super::super::{Family, Library, LibrarySettings, Scratch};
 use crate::robot::{
-    Inertia, JointDescription, JointKind, LinkDescription, Motion, Robot, RobotDescription,
+    Inertia, JointDescription, JointKind, LinkDescription, Mimic, Motion, Robot, RobotDescription,
 };
 use std::collections::BTreeMap;
 
@@ -63,8 +63,9 @@ fn compare(library: &Library, joints: usize) {
     library.evaluate_parts(motion, &mut parts, &mut Scratch::default());
     let mut combined = Vec::new();
     for joint in 0..joints {
-        assert_eq!(parts[joint].len(), library.parts_of_joint(joint) * len);
-        library.combine_parts(joint, &parts[joint], len, len, &mut combined);
+        assert_eq!(parts[joint].len(), library.recipes(joint).parts() * len);
+        let recipes = library.recipes(joint);
+        recipes.combine(&parts[joint], len, len, &mut combined);
         assert_eq!(combined.len(), whole[joint].len());
         for (i, &column) in library.columns_of_joint(joint).iter().enumerate() {
             let expected = &whole[joint][i * len..(i + 1) * len];
@@ -97,10 +98,87 @@ fn parts_make_up_the_columns() {
     // the point of it: fewer signals than columns
     let count = |of: &dyn Fn(usize) -> usize| (0..4).map(of).sum::<usize>();
     let (parts, columns) = (
-        count(&|joint| library.parts_of_joint(joint)),
+        count(&|joint| library.recipes(joint).parts()),
         count(&|joint| library.columns_of_joint(joint).len()),
     );
     assert!(parts < columns, "{parts} parts for {columns} columns");
+}
+
+/// A joint that follows another one turns what hangs on both: what is handed from body to body on the way stays right.
+#[test]
+fn parts_make_up_the_columns_where_a_joint_follows_another() {
+    let mut description = arm(4.0).description().clone();
+    description.joints[3].mimic = Some(Mimic {
+        joint: "joint1".into(),
+        multiplier: -0.7,
+        offset: 0.2,
+    });
+    let robot = Robot::new(description, &BTreeMap::new()).unwrap().0;
+    let settings = LibrarySettings {
+        families: vec![Family::Payload, Family::MassMoments, Family::Tensor],
+        generic: Some(false),
+        ..LibrarySettings::default()
+    };
+    let (library, _) = Library::propose(&robot, &settings).unwrap();
+    compare(&library, 3);
+}
+
+/// How many of a joint's columns are independent: what is left of each at random states outside the span of those before.
+fn rank(library: &Library, joint: usize, joints: usize) -> usize {
+    let len = 150;
+    let wave = |a: f64| -> Vec<f64> {
+        let at = |i: usize| a * (i as f64 + 0.5) * (1.0 + 0.003 * i as f64);
+        (0..joints * len).map(|i| 2.0 * at(i).sin()).collect()
+    };
+    let (q, qd, qdd) = (wave(0.37), wave(0.53), wave(0.71));
+    let motion = Motion {
+        len,
+        q: &q,
+        qd: &qd,
+        qdd: &qdd,
+    };
+    let mut out = vec![Vec::new(); joints];
+    library.evaluate(motion, &mut out);
+    let product = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+    let mut directions: Vec<Vec<f64>> = Vec::new();
+    for column in out[joint].chunks_exact(len) {
+        let size = product(column, column).sqrt();
+        let mut rest: Vec<f64> = column.iter().map(|x| x / size).collect();
+        for _ in 0..2 {
+            for direction in &directions {
+                let part = product(&rest, direction);
+                rest.iter_mut()
+                    .zip(direction)
+                    .for_each(|(r, d)| *r -= part * d);
+            }
+        }
+        let left = product(&rest, &rest).sqrt();
+        if left > 1e-9 {
+            directions.push(rest.iter().map(|x| x / left).collect());
+        }
+    }
+    directions.len()
+}
+
+/// A single body's ten columns are its own ten entries; those of all bodies are regrouped to as few as there are directions.
+#[test]
+fn a_joint_has_what_is_less() {
+    let library = |families: &[Family]| {
+        let settings = LibrarySettings {
+            families: families.to_vec(),
+            generic: Some(false),
+            ..LibrarySettings::default()
+        };
+        let (library, _) = Library::propose(&arm(4.0), &settings).unwrap();
+        compare(&library, 4);
+        library
+    };
+    let payload = library(&[Family::Payload]);
+    let of = |library: &Library| (library.recipes(0).parts(), library.recipes(0).columns());
+    assert_eq!(of(&payload), (10, 10));
+    let all = library(&[Family::MassMoments, Family::Tensor]);
+    assert_eq!(of(&all).0, rank(&all, 0, 4), "{:?}", of(&all));
+    assert!(of(&all).0 < of(&all).1, "{:?}", of(&all));
 }
 
 /// What was judged once is what would be judged again; only what turns round is another column.

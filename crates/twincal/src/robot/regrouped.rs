@@ -4,12 +4,12 @@
 //! the body or to its parent; so does the tensor of a sliding body. What is handed to the parent needs no steps of its own
 //! (Khalil and Dombre, "Modeling, Identification and Control of Robots", chapter 9: regrouped parameters).
 
-use super::dynamics::clean;
-use crate::robot::{Placement, Robot, to_body_frame};
+use super::spatial::clean;
+use super::{Placement, Robot, to_body_frame};
 
 /// The same torque on every joint: bodies hand to their parents what moves alike there, the outermost first; what the base gets
 /// is dropped.
-pub(super) fn regrouped(robot: &Robot, mut parameters: Vec<[f64; 10]>) -> Vec<[f64; 10]> {
+pub(crate) fn regrouped(robot: &Robot, mut parameters: Vec<[f64; 10]>) -> Vec<[f64; 10]> {
     for (index, body) in robot.layout().iter().enumerate().rev() {
         let own = &mut parameters[index];
         let mut given = [0.0; 10];
