@@ -35,8 +35,12 @@ pub struct PriorSettings {
 }
 
 /// What is in only with what, unless the user says otherwise: the Stribeck effect and asymmetry are changes of Coulomb friction,
-/// which no nominal model here contains.
-pub const HEREDITY: [(&str, &str); 2] = [("asymmetry", "coulomb"), ("stribeck", "coulomb")];
+/// which no nominal model here contains, quadratic friction is one of viscous friction.
+pub const HEREDITY: [(&str, &str); 3] = [
+    ("asymmetry", "coulomb"),
+    ("stribeck", "coulomb"),
+    ("quadratic_friction", "viscous"),
+];
 
 /// Factor on prior odds that settles a component: what the data say weighs nothing beside it (e^690).
 pub const SETTLED: f64 = 1e300;

@@ -276,6 +276,8 @@ pub enum FamilyWord {
     Asymmetry,
     /// `<joint>.stribeck`: friction that falls from breakaway to sliding.
     Stribeck,
+    /// `<joint>.quadratic_friction`: friction that is not in proportion to the speed.
+    QuadraticFriction,
     /// `<joint>.load_friction`: friction that grows with the load.
     LoadFriction,
     /// `<a>+<b>.coupled_friction`: friction of a motor that turns with two joints.
@@ -304,6 +306,7 @@ impl From<FamilyWord> for Family {
             FamilyWord::Potential => Self::Potential,
             FamilyWord::Asymmetry => Self::Asymmetry,
             FamilyWord::Stribeck => Self::Stribeck,
+            FamilyWord::QuadraticFriction => Self::QuadraticFriction,
             FamilyWord::LoadFriction => Self::LoadFriction,
             FamilyWord::CoupledFriction => Self::CoupledFriction,
             FamilyWord::Gain => Self::Gain,
@@ -387,7 +390,7 @@ pub struct PriorTable {
     /// Components that are in, whatever the data say, such as ["elbow.viscous"].
     pub forced: Option<Vec<String>>,
     /// Heredity: what is in only where something else is, such as { stribeck = "coulomb", "sin(2*q2)" = "sin(q2)" }; families joint by
-    /// joint, or components by name. Default: { asymmetry = "coulomb", stribeck = "coulomb" }; {} binds nothing.
+    /// joint, or components by name. Default: { asymmetry = "coulomb", stribeck = "coulomb", quadratic_friction = "viscous" }; {} binds nothing.
     pub heredity: Option<BTreeMap<String, String>>,
 }
 

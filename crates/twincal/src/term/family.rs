@@ -38,6 +38,8 @@ pub enum Family {
     Asymmetry,
     /// Friction that falls from breakaway to sliding.
     Stribeck,
+    /// Friction that is not in proportion to the speed.
+    QuadraticFriction,
     /// Friction that grows with the load.
     LoadFriction,
     /// Friction of a motor that turns with the sum or difference of two joints.
@@ -52,7 +54,7 @@ pub enum Family {
 
 impl Family {
     /// All families that `[library] families` can name, in the order of `terms[]`.
-    pub const NAMED: [Self; 18] = [
+    pub const NAMED: [Self; 19] = [
         Self::Viscous,
         Self::Coulomb,
         Self::Offset,
@@ -66,6 +68,7 @@ impl Family {
         Self::Potential,
         Self::Asymmetry,
         Self::Stribeck,
+        Self::QuadraticFriction,
         Self::LoadFriction,
         Self::CoupledFriction,
         Self::Gain,
@@ -79,7 +82,7 @@ impl Family {
     /// What twincal proposes unasked for an arm with geared drives: all but `mass_scale` (a special case of
     /// `mass_moments` and `tensor`), `ripple` (it asks for a gear ratio), and `gain` and `encoder_zero`, which can imitate
     /// almost anything: on real logs they took what springs and counterbalances are.
-    pub const DEFAULT: [Self; 14] = [
+    pub const DEFAULT: [Self; 15] = [
         Self::Viscous,
         Self::Coulomb,
         Self::Offset,
@@ -92,6 +95,7 @@ impl Family {
         Self::Potential,
         Self::Asymmetry,
         Self::Stribeck,
+        Self::QuadraticFriction,
         Self::LoadFriction,
         Self::CoupledFriction,
     ];
@@ -137,6 +141,7 @@ impl Family {
             Self::Potential => "potential",
             Self::Asymmetry => "asymmetry",
             Self::Stribeck => "stribeck",
+            Self::QuadraticFriction => "quadratic_friction",
             Self::LoadFriction => "load_friction",
             Self::CoupledFriction => "coupled_friction",
             Self::Gain => "gain",
@@ -174,6 +179,7 @@ impl Family {
                 | Self::Coulomb
                 | Self::Asymmetry
                 | Self::Stribeck
+                | Self::QuadraticFriction
                 | Self::LoadFriction
                 | Self::CoupledFriction
         )

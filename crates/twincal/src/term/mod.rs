@@ -27,6 +27,7 @@ mod spring;
 mod potential;
 mod asymmetry;
 mod stribeck;
+mod quadratic_friction;
 mod load_friction;
 mod coupled_friction;
 mod gain;

@@ -7,7 +7,7 @@ use super::payload::Mount;
 use super::{
     Family, LibrarySettings, asymmetry, base_tilt, coulomb, coupled_friction, encoder_zero, gain,
     generic, load_friction, mass_moments, mass_scale, motor_inertia, offset, payload, potential,
-    ripple, spring, stribeck, tensor, user, viscous,
+    quadratic_friction, ripple, spring, stribeck, tensor, user, viscous,
 };
 use crate::error::{Error, Finding, Result, Severity};
 use crate::robot::spatial::{apply, transpose};
@@ -118,6 +118,9 @@ pub(super) fn proposals(
     });
     per_joint(Family::Stribeck, &mut |joint| {
         Some(stribeck::candidate(graph, joint, velocity).into())
+    });
+    per_joint(Family::QuadraticFriction, &mut |joint| {
+        Some(quadratic_friction::candidate(graph, joint).into())
     });
     if about.robot.is_some() {
         per_joint(Family::LoadFriction, &mut |joint| {

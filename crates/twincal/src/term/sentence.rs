@@ -120,6 +120,7 @@ fn hint(family: Family, parameters: &[Estimate]) -> &'static str {
             " (negative: the model has too much friction there)"
         }
         Family::Stribeck if negative => " (negative: friction grows with speed here)",
+        Family::QuadraticFriction if negative => " (negative: friction grows less than the speed)",
         Family::Payload if negative => " (negative: the model carries too much)",
         _ => "",
     }

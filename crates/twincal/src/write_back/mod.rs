@@ -376,6 +376,7 @@ fn reason(family: Family, format: &str) -> String {
         Family::Potential => "potentials of a joint",
         Family::Asymmetry => "friction that depends on direction",
         Family::Stribeck => "friction that changes with speed",
+        Family::QuadraticFriction => "friction that is not in proportion to the speed",
         Family::LoadFriction => "friction that grows with the load",
         Family::CoupledFriction => "friction of coupled motors",
         Family::Gain => "torque gains",

@@ -184,6 +184,7 @@ pub(in crate::report) fn family_name(family: Family) -> &'static str {
         Family::Potential => "conservative torque of one joint",
         Family::Asymmetry => "direction-dependent friction",
         Family::Stribeck => "Stribeck friction",
+        Family::QuadraticFriction => "quadratic friction",
         Family::LoadFriction => "load-dependent friction",
         Family::CoupledFriction => "friction of coupled motors",
         Family::Gain => "torque gain",

@@ -127,6 +127,32 @@ fn built_in_columns_are_what_they_say() {
     }
 }
 
+/// q̇ |q̇| in both directions, whatever v_s is, and its units on a hinge and a slider.
+#[test]
+fn quadratic_friction_is_the_square_of_the_speed_against_the_motion() {
+    let mut settings = only(&[]);
+    settings.families = vec![Family::QuadraticFriction];
+    settings.coulomb_velocity = 0.5;
+    let (library, _) = bare(&joints(&[false, true]), false, &settings).unwrap();
+    let qd = [0.3, -2.0, 0.0, -0.3, 4.0, 1e-3];
+    let mut out = [Vec::new(), Vec::new()];
+    let zeros = [0.0; 6];
+    let motion = Motion {
+        len: 3,
+        q: &zeros,
+        qd: &qd,
+        qdd: &zeros,
+    };
+    library.evaluate(motion, &mut out);
+    for (got, v) in out.concat().iter().zip(qd) {
+        assert!((got - v * v.abs()).abs() < 1e-15, "{got} at {v}");
+    }
+    let units: Vec<&str> = library.terms().iter().map(|term| &*term.unit).collect();
+    assert_eq!(units, ["N·m·s²/rad²", "N·s²/m²"]);
+    assert_eq!(library.lagrangian(0, &[0.0; 2], &[1.0; 2]), None);
+    assert!(!Family::QuadraticFriction.turns_round() && Family::QuadraticFriction.is_friction());
+}
+
 #[test]
 fn any_batch_length_gives_the_same_bytes() {
     let (library, _) = planar(

@@ -1,0 +1,96 @@
+//! Friction that grows less than the speed is told by that name, where it is and nowhere else.
+
+#[path = "../examples/two_link.rs"]
+#[allow(dead_code, reason = "its `main` prints, which a test does not need")]
+mod two_link;
+
+use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
+use twincal::posterior::random::Random;
+use twincal::robot::{Workspace, inverse_dynamics};
+use twincal::signal::{Channels, Payload, Recording};
+
+/// Coulomb (N·m), viscous (N·m·s/rad), quadratic (N·m·s²/rad²) friction of shoulder and elbow.
+const FRICTION: [[f64; 3]; 2] = [[1.0, 0.8, -0.15], [0.6, 0.5, 0.0]];
+const NOISE: f64 = 0.05;
+
+/// 40 s at 200 Hz, up to 3 rad/s.
+fn log(seed: u64) -> Recording {
+    let arm = two_link::arm(2.0).expect("an arm");
+    let (mut noise, mut workspace, mut tau) =
+        (Random::new(seed, 0), Workspace::new(&arm), [0.0; 2]);
+    let mut channels = [[(); 4]; 2].map(|joint| joint.map(|()| Vec::new()));
+    let time: Vec<f64> = (0..8000).map(|i| 0.005 * f64::from(i)).collect();
+    for t in &time {
+        let waves = [[1.3, 3.1, 0.2], [1.7, 2.6, 1.1]];
+        let sum = |of: &dyn Fn(f64, f64) -> f64| {
+            waves.map(|[a, b, phase]| of(a, a * t + phase) + 0.6 * of(b, b * t))
+        };
+        let q = sum(&|_, x: f64| x.sin());
+        let qd = sum(&|w, x: f64| w * x.cos());
+        let qdd = sum(&|w, x: f64| -w * w * x.sin());
+        inverse_dynamics(&arm, &mut workspace, &q, &qd, &qdd, &mut tau);
+        for (j, joint) in channels.iter_mut().enumerate() {
+            let ([coulomb, viscous, quadratic], v) = (FRICTION[j], qd[j]);
+            let friction = coulomb * (v / 0.02).tanh() + viscous * v + quadratic * v * v.abs();
+            let torque = tau[j] + friction + NOISE * noise.normal();
+            for (all, value) in joint.iter_mut().zip([q[j], v, qdd[j], torque]) {
+                all.push(value);
+            }
+        }
+    }
+    let joints = channels.map(|[q, qd, qdd, tau]| Channels {
+        q,
+        qd: Some(qd),
+        qdd: Some(qdd),
+        tau: Some(tau),
+        temperature: None,
+    });
+    Recording {
+        unfolded: false,
+        name: "log".into(),
+        time,
+        joints: joints.to_vec(),
+        payload: Payload::None,
+    }
+}
+
+fn fitted(change: impl Fn(&mut CalibrationSettings)) -> Calibration {
+    let mut settings = CalibrationSettings::default();
+    change(&mut settings);
+    let arm = two_link::arm(2.0).expect("an arm");
+    calibrate(&arm, &[log(11)], &[], &settings, &|_| {}).expect("a calibration")
+}
+
+fn pip(result: &Calibration, name: &str) -> f64 {
+    let component = result.components.iter().find(|c| c.name == name);
+    component.and_then(|c| c.pip).unwrap_or(f64::NAN)
+}
+
+/// All default candidates compete. Four standard errors: one false alarm in 16 000.
+#[test]
+fn friction_that_flattens_is_found_where_it_is() {
+    let result = fitted(|_| {});
+    assert!(pip(&result, "shoulder.quadratic_friction") > 0.99);
+    assert!(pip(&result, "elbow.quadratic_friction") < 0.5);
+    // What it is a change of is in with it.
+    assert!(pip(&result, "shoulder.viscous") > 0.99);
+    let mut terms = result.terms.iter();
+    let found = terms.find(|term| term.term.name == "shoulder.quadratic_friction");
+    let term = found.expect("a term");
+    assert_eq!(term.term.unit, "N·m·s²/rad²");
+    let (mean, sd) = (term.mean.expect("a mean"), term.sd.expect("a spread"));
+    let off = mean - FRICTION[0][2];
+    assert!(off.abs() < 4.0 * sd && sd < 0.02, "{mean} ± {sd}");
+    assert!(
+        term.words.contains("quadratic friction on shoulder"),
+        "{}",
+        term.words
+    );
+    let mut all = result.components.iter();
+    let said = all.find(|c| c.name == "shoulder.quadratic_friction");
+    let words = &said.expect("a component").words;
+    assert!(
+        words.ends_with("(negative: friction grows less than the speed)"),
+        "{words}"
+    );
+}
