@@ -13,6 +13,7 @@ mod outlook;
 mod prior_conflict;
 mod reader;
 mod repeat;
+mod ripples;
 mod result;
 mod room;
 mod sandwich;
@@ -240,8 +241,19 @@ fn whole_road(
     findings.extend(findings_of_fit(robot, &fitted, settings, &training));
     let mean = &fitted.fit.posterior.mean;
     let robust = settings.noise.robust;
+    let asked: Vec<String> = library_settings.ripple.keys().cloned().collect();
     let (tails, (drifts, uneven)) = rayon::join(
-        || heavy_tails::findings(robot, &training, mean, robust),
+        || {
+            let mut tails = heavy_tails::findings(robot, &training, mean, robust);
+            tails.extend(ripples::findings(
+                robot,
+                &training,
+                &fitted.fit,
+                &asked,
+                &pipeline,
+            ));
+            tails
+        },
         || {
             let uneven = uneven_noise::findings(robot, &fitted.fit, &training, settings.noise);
             (drift::findings(robot, &training, mean), uneven)
