@@ -4,7 +4,9 @@ No randomness: the data are fixed, the seed is the default. Limits of the held-o
 The number that is missed (docs/real_robots.md) has the limit that is reached.
 """
 
+import json
 import math
+import re
 import sys
 
 import pytest
@@ -14,7 +16,7 @@ sys.path.insert(0, str(ROOT / "studies" / "real_robots"))
 import real_robots as real  # noqa: E402
 
 pytestmark = pytest.mark.skipif(not (SHARED / "ur10").is_dir(), reason="../shared/data is not there")
-REACHED = {("staubli_tx40", 5): 0.70}
+REACHED = {("staubli_tx40", 5): 0.67}
 # Within which velocity friction turns round, rad/s: their training residuals prefer it by 14 nats and more (the TX40's by 1 % of it, too little to leave 0.02).
 TURNING = {"ur10": 0.08, "staubli_tx40": 0.02, "kuka_kr300": 0.01}
 
@@ -41,22 +43,28 @@ def test_held_out_torque_and_known_effects(split, tmp_path):
         assert max(pips + [components["joint2.spring"]["pip"], components["joint2.potential"]["pip"]]) > 0.99
 
 
-def test_gear_ripple_is_told_with_the_line_that_asks_for_it(tmp_path):
-    """The TX40's fourth joint has one at 30.7 periods per turn, no other joint of these robots; asked for, it is found and takes 40 % off
-    the error on the last 30 %."""
-    tx40, folder = next(s for s in real.SPLITS if s.folder == "staubli_tx40"), SHARED / "staubli_tx40"
+
+def test_gear_ripple_becomes_a_candidate_where_the_log_shows_it(tmp_path):
+    """The TX40's fourth joint has one at 30.7 periods per turn, no other joint of these robots. It takes 40 % off that joint's error on the last
+    30 %. Where families were chosen it is told with the line that asks for it."""
+    chosen = ["viscous", "coulomb", "offset", "motor_inertia", "payload", "mass_moments", "tensor", "tilt", "spring", "potential",
+              "quadratic_friction", "load_friction", "coupled_friction"]  # fmt: skip
+    families = f"families = {json.dumps(chosen)}"
     errors = []
-    for line in ("", "ripple = { joint_4 = 30.7 }\n"):
-        config = f"[signal]\ncutoff_hz = {tx40.cutoff_hz}\n[library]\n{line}"
+    for lines in ("", families):
+        tx40, folder = next(s for s in real.SPLITS if s.folder == "staubli_tx40"), SHARED / "staubli_tx40"
+        config = f"[signal]\ncutoff_hz = {tx40.cutoff_hz}\n[library]\n{lines}\n"
         result = fit(tmp_path, [folder / "run0.parquet"], config, model=folder / tx40.model)
-        told = [f["message"] for f in result["findings"] if f["code"] == "ripple_seen"]
-        assert len(told) == (0 if line else 1)
-        assert line or 'ripple = { "joint_4" = 30.7 }' in told[0]
+        said = [f for f in result["findings"] if f["code"].startswith("ripple_")]
+        assert [f["code"] for f in said] == ["ripple_seen" if lines else "ripple_added"]
+        periods = re.search(r'\[library\] ripple = { "joint_4" = ([0-9.]+) }', said[0]["message"])
+        assert abs(float(periods.group(1)) - 30.7) < 0.15
+        found = [c["pip"] for c in result["components"] if c["name"] == "joint_4.ripple"]
+        assert not found if lines else found[0] > 0.99
         errors.append(real.scores(result, tx40.rows)[3][0])
-    assert next(c for c in result["components"] if c["name"] == "joint_4.ripple")["pip"] > 0.99
-    assert errors[1] < 0.7 * errors[0]
-    for split in (s for s in real.SPLITS if not s.absolute and s.folder != "staubli_tx40"):
+    assert errors[0] < 0.7 * errors[1]
+    for split in (s for s in real.SPLITS if s.folder != "staubli_tx40"):
         folder = SHARED / split.folder
         config = f"[signal]\ncutoff_hz = {split.cutoff_hz}\n"
         result = fit(tmp_path, [folder / name for name in split.fit], config, model=folder / split.model)
-        assert not [f for f in result["findings"] if f["code"] == "ripple_seen"]
+        assert not [f for f in result["findings"] if f["code"].startswith("ripple_")], split.name

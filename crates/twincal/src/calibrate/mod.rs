@@ -24,6 +24,7 @@ mod turning;
 mod unphysical;
 mod uneven_noise;
 mod unseen;
+mod unsettled;
 mod weigh;
 #[cfg(test)]
 mod testing;
@@ -36,20 +37,14 @@ pub use result::{
 };
 pub use stopped::Stopped;
 
-use crate::error::{Error, Finding, Result, Severity};
-use crate::infer::{
-    Choice, Given, InferenceSettings, R_HAT_LIMIT, infer, sample, sampled_likelihood,
-};
+use crate::error::{Error, Finding, Result};
+use crate::infer::{Choice, Given, InferenceSettings, infer, sample, sampled_likelihood};
 use crate::lag::{LogLag, estimate_lag, lag_findings};
 use crate::likelihood::{
     Columns, JointNoise, NoiseInterval, NoiseModel, NoiseSettings, NoiseUncertainty, Spread,
 };
 use crate::observations::Part;
-use crate::plug_in::{
-    Fit, FitSettings, LeftOut, Moving, fit, fit_tempered, moving_rows, residual_correlation_time,
-    start,
-};
-use crate::posterior::Method;
+use crate::plug_in::{Fit, FitSettings, LeftOut, Moving, fit, fit_tempered, moving_rows, start};
 use crate::posterior::draws::Drawer;
 use crate::prior::PriorSettings;
 use crate::robot::Robot;
@@ -62,6 +57,7 @@ use crate::term::{Family, Library, LibrarySettings};
 use crate::twin::Twin;
 use data::Data;
 use heredity::Named;
+use ripples::Seen;
 
 /// Everything a calibration can be told; each field but the last is a table of `twincal.toml`.
 #[derive(Debug, Clone, PartialEq)]
@@ -168,7 +164,8 @@ pub fn calibrate<'a>(
     calibration.map_err(|error| Stopped { error, findings })
 }
 
-/// [`calibrate`]; `findings` holds what was found where it ends early.
+/// [`calibrate`]; `findings` holds what was found where it ends early. Where nobody chose families and the fit shows gear ripple, that
+/// becomes a candidate, and all is done once more.
 fn whole_road(
     robot: &Robot,
     recordings: (Logs<'_>, Logs<'_>),
@@ -176,7 +173,41 @@ fn whole_road(
     progress: &dyn Fn(Stage),
     findings: &mut Vec<Finding>,
 ) -> Result<Calibration> {
-    let (logs, heldout) = (&recordings.0.0[..], &recordings.1.0[..]);
+    let (mut recordings, mut settings) = (Some(recordings), settings.clone());
+    let mut added = Vec::new();
+    loop {
+        findings.clone_from(&added);
+        match road(robot, &mut recordings, &settings, progress, findings)? {
+            Road::End(calibration) => return Ok(*calibration),
+            Road::Again(ripples) => {
+                added.extend(ripples.iter().map(Seen::added));
+                let orders = ripples.into_iter().map(|seen| (seen.joint, seen.periods));
+                settings.library.ripple.extend(orders);
+            }
+        }
+    }
+}
+
+/// Where a road leads.
+enum Road {
+    /// To its end.
+    End(Box<Calibration>),
+    /// Back, with gear ripple among the candidates that was none of them.
+    Again(Vec<Seen>),
+}
+
+/// From logs to a calibration; `recordings` are gone as soon as nobody needs them.
+fn road(
+    robot: &Robot,
+    recordings: &mut Option<(Logs<'_>, Logs<'_>)>,
+    settings: &CalibrationSettings,
+    progress: &dyn Fn(Stage),
+    findings: &mut Vec<Finding>,
+) -> Result<Road> {
+    let (logs, heldout) = match recordings {
+        Some((logs, heldout)) => (&logs.0[..], &heldout.0[..]),
+        None => Default::default(),
+    };
     // the same filters for every log, and candidates for this robot
     progress(Stage::Rows);
     for log in logs.iter().chain(heldout) {
@@ -235,25 +266,19 @@ fn whole_road(
         || plan.fits(&columns, settings),
     );
     let (mut fitted, fits_of_folds) = (fitted?, fits_of_folds?);
+    let seen = ripples::seen(robot, &training, &fitted.fit, &library_settings, &pipeline);
+    if !seen.is_empty() && settings.library.families == Family::DEFAULT {
+        return Ok(Road::Again(seen));
+    }
+    findings.extend(seen.iter().map(Seen::told));
     if fitted.sampled.is_empty() {
         fitted.fit.posterior = infer(&fitted.fit.problem, &settings.inference)?;
     }
-    findings.extend(findings_of_fit(robot, &fitted, settings, &training));
+    findings.extend(unsettled::findings(robot, &fitted, settings, &training));
     let mean = &fitted.fit.posterior.mean;
     let robust = settings.noise.robust;
-    let asked: Vec<String> = library_settings.ripple.keys().cloned().collect();
     let (tails, (drifts, uneven)) = rayon::join(
-        || {
-            let mut tails = heavy_tails::findings(robot, &training, mean, robust);
-            tails.extend(ripples::findings(
-                robot,
-                &training,
-                &fitted.fit,
-                &asked,
-                &pipeline,
-            ));
-            tails
-        },
+        || heavy_tails::findings(robot, &training, mean, robust),
         || {
             let uneven = uneven_noise::findings(robot, &fitted.fit, &training, settings.noise);
             (drift::findings(robot, &training, mean), uneven)
@@ -291,7 +316,7 @@ fn whole_road(
     // What follows reads the smoothed logs at other cut-offs and nothing of the recordings.
     drop((trajectories, others, every_log));
     let prepared: Vec<ReadyLog<'static>> = prepared.into_iter().map(ReadyLog::detached).collect();
-    drop(recordings);
+    *recordings = None;
 
     progress(Stage::Sensitivity);
     let gap = (skeleton.pipeline.kernel_length() * skeleton.pipeline.rate_hz).ceil() as usize;
@@ -359,7 +384,7 @@ fn whole_road(
     );
     calibration.curves = curves;
     calibration.findings.extend(unphysical);
-    Ok(calibration)
+    Ok(Road::End(Box::new(calibration)))
 }
 
 /// A fit together with what left-out training data said of it.
@@ -534,61 +559,6 @@ fn noise_of(
             }
         })
         .collect()
-}
-
-/// What the fit itself must say: residual correlation that the likelihood ignores, an iteration that did not settle.
-fn findings_of_fit(
-    robot: &Robot,
-    fitted: &Fitted,
-    settings: &CalibrationSettings,
-    training: &[Part<'_>],
-) -> Vec<Finding> {
-    let mut findings = Vec::new();
-    if let Method::Gibbs { chains, r_hat, .. } = fitted.fit.posterior.method
-        && r_hat > R_HAT_LIMIT
-    {
-        findings.push(Finding::new(
-            Severity::Warning,
-            "chains_disagree",
-            "",
-            format!(
-                "the {chains} chains disagree (R-hat {r_hat:.3}, limit {R_HAT_LIMIT}) and were accepted as allowed: \
-                 probabilities and coefficients may change with the seed; raise inference.draws"
-            ),
-            chains as u64,
-        ));
-    }
-    if !fitted.fit.converged {
-        findings.push(Finding::new(
-            Severity::Warning,
-            "plug_ins_not_settled",
-            "",
-            format!(
-                "noise weights or slab scale still moved after {} rounds; probabilities near 0.5 may change in the second digit",
-                fitted.fit.rounds
-            ),
-            fitted.fit.rounds as u64,
-        ));
-    }
-    if settings.noise.model == NoiseModel::Iid {
-        for (joint, name) in robot.joint_names().into_iter().enumerate() {
-            let time = residual_correlation_time(training, joint, &fitted.fit.posterior.mean);
-            if time > 2.0 {
-                findings.push(Finding::new(
-                    Severity::Warning,
-                    "residual_correlated",
-                    name,
-                    format!(
-                        "joint `{name}`: the residual stays alike for {time:.1} rows, which noise.model = \"iid\" ignores: \
-                         sds are about {:.1} times too small; use \"tempered\"",
-                        time.sqrt()
-                    ),
-                    0,
-                ));
-            }
-        }
-    }
-    findings
 }
 
 /// The data cannot answer: fewer rows than the question needs (exit code 4).
