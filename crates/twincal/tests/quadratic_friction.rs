@@ -8,6 +8,7 @@ use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::posterior::random::Random;
 use twincal::robot::{Workspace, inverse_dynamics};
 use twincal::signal::{Channels, Payload, Recording};
+use twincal::write_back::{Holds, Writer};
 
 /// Coulomb (N·m), viscous (N·m·s/rad), quadratic (N·m·s²/rad²) friction of shoulder and elbow.
 const FRICTION: [[f64; 3]; 2] = [[1.0, 0.8, -0.15], [0.6, 0.5, 0.0]];
@@ -92,5 +93,68 @@ fn friction_that_flattens_is_found_where_it_is() {
     assert!(
         words.ends_with("(negative: friction grows less than the speed)"),
         "{words}"
+    );
+}
+
+/// A file holds the viscous and dry friction nearest to all friction of the joint. Truth: least squares of v|v| on v and tanh(v/0.02)
+/// over speeds spread evenly between the least and the largest of the log, by Cramer's rule.
+#[test]
+fn what_a_file_can_say_of_it_goes_there_and_the_rest_stays_beside() {
+    let result = fitted(|_| {});
+    let change = Writer::new(&result, Holds::URDF).expect("a writer");
+    let change = change.mean().expect("a change");
+    let qd = log(11).joints[0].qd.clone().expect("speeds");
+    let (least, most) = qd
+        .iter()
+        .fold((0.0_f64, 0.0_f64), |(a, b), v| (a.min(*v), b.max(*v)));
+    let [mut vv, mut vs, mut ss, mut vq, mut sq] = [0.0; 5];
+    for i in 0..100_000 {
+        let v = least + (most - least) * (f64::from(i) + 0.5) / 1e5;
+        let (s, q) = ((v / 0.02).tanh(), v * v.abs());
+        vv += v * v;
+        vs += v * s;
+        ss += s * s;
+        vq += v * q;
+        sq += s * q;
+    }
+    let det = vv * ss - vs * vs;
+    let (viscous, dry) = ((vq * ss - sq * vs) / det, (sq * vv - vq * vs) / det);
+    let mean = |name: &str| {
+        let mut columns = result.terms.iter();
+        let term = columns.find(|term| term.term.name == name);
+        term.and_then(|term| term.mean).expect("a mean")
+    };
+    let quadratic = mean("shoulder.quadratic_friction");
+    let mut joints = change.joints.iter();
+    let joint = joints.find(|j| j.joint == "shoulder").expect("a change");
+    let of_damping = joint.damping.expect("viscous") - mean("shoulder.viscous");
+    let of_friction = joint.friction.expect("dry") - mean("shoulder.coulomb");
+    // The states of the comparison are few; they share the speeds evenly to a few percent.
+    assert!(
+        (of_damping / (viscous * quadratic) - 1.0).abs() < 0.1,
+        "{of_damping}"
+    );
+    assert!(
+        (of_friction / (dry * quadratic) - 1.0).abs() < 0.15,
+        "{of_friction}"
+    );
+    // With what stays beside, the sum is the twin.
+    let mut residual = change.residual.iter();
+    let rest = residual.find(|r| r.component == "shoulder.quadratic_friction");
+    let rest = rest.expect("a residual");
+    let beside = |name: &str| {
+        let own = rest
+            .coefficients
+            .iter()
+            .filter(|(column, _)| column == name);
+        own.map(|(_, value)| value).sum::<f64>()
+    };
+    assert!((beside("shoulder.quadratic_friction") - quadratic).abs() < 1e-15);
+    assert!((beside("shoulder.viscous") + of_damping).abs() < 1e-12);
+    assert!((beside("shoulder.coulomb") + of_friction).abs() < 1e-12);
+    assert!(
+        rest.reason.ends_with("has the friction nearest to it"),
+        "{}",
+        rest.reason
     );
 }

@@ -4,6 +4,7 @@
 //! coefficients, so what is written is the posterior mean of exactly those columns; the rest is the residual.
 
 mod joints;
+mod linear_part;
 mod links;
 mod metric;
 mod pseudo_inertia;
@@ -21,6 +22,7 @@ use crate::error::Result;
 use crate::evaluator::{States, rms};
 use crate::robot::{Robot, RobotDescription};
 use crate::term::{Family, Library, ModelColumn};
+use linear_part::Share;
 use serde::Serialize;
 
 /// What a model format can hold beside inertias, viscous and dry friction.
@@ -71,7 +73,7 @@ pub struct Residual {
     pub reason: String,
     /// RMS of its model-averaged torque over states within the training range, per joint, N·m (N).
     pub torque: Vec<f64>,
-    /// `(name of the column, E[β | y])`.
+    /// `(name of the column, E[β | y])`; of friction that a file can stand for in part, minus that part as well.
     pub coefficients: Vec<(String, f64)>,
 }
 
@@ -179,9 +181,11 @@ impl<'a> Writer<'a> {
         let held: Vec<Option<Place>> = (held.into_iter().enumerate())
             .map(|(column, place)| place.filter(|_| whole[self.component(column)]))
             .collect();
-        let gravity = gravity(robot, &held, beta);
-        let (links, projection) = links::changes(self, &held, beta, gravity)?;
-        let joints = joints::changes(robot, &held, beta, self.holds);
+        let shares = self.shares(chosen, &held);
+        let file = linear_part::written(beta, &shares);
+        let gravity = gravity(robot, &held, &file);
+        let (links, projection) = links::changes(self, &held, &file, gravity)?;
+        let joints = joints::changes(robot, &held, &file, self.holds);
         let mut change = WriteBack {
             links,
             joints,
@@ -199,14 +203,14 @@ impl<'a> Writer<'a> {
                 robots,
                 &change.joints,
                 &held,
-                beta,
+                &file,
             ))
         };
         let rest = difference(&change)?;
         change.gravity = lost::fitted_gravity(&self.states, robot, &change, &rest)?;
         change.lost = rms(&difference(&change)?);
         change.correction = self.states.rms(beta);
-        self.tell(&mut change, &whole, chosen, beta, &held);
+        self.tell(&mut change, (&whole, chosen), beta, &held, &shares);
         Ok(change)
     }
 
@@ -247,10 +251,10 @@ impl<'a> Writer<'a> {
     fn tell(
         &self,
         change: &mut WriteBack,
-        whole: &[bool],
-        chosen: &[bool],
+        (whole, chosen): (&[bool], &[bool]),
         beta: &[f64],
         held: &[Option<Place>],
+        shares: &[Share],
     ) {
         let robot = &self.calibration.twin.robot;
         for (index, component) in self.calibration.components.iter().enumerate() {
@@ -283,23 +287,29 @@ impl<'a> Writer<'a> {
                 });
                 continue;
             }
+            let beside = linear_part::beside(&own, beta, shares);
             let mut alone = vec![0.0; beta.len()];
-            own.iter().for_each(|&column| alone[column] = beta[column]);
+            beside
+                .iter()
+                .for_each(|&(column, value)| alone[column] += value);
             change.residual.push(Residual {
                 component: component.name.clone(),
                 words: component.words.clone(),
                 pip,
-                reason: if chosen[index] {
+                reason: if beside.len() > own.len() {
+                    let what = reason(component.family, self.holds.format);
+                    format!("{what}, and has the friction nearest to it")
+                } else if chosen[index] {
                     reason(component.family, self.holds.format)
                 } else {
                     "its probability is below 0.5, or these data do not see it".into()
                 },
                 torque: self.states.rms(&alone),
-                coefficients: own
+                coefficients: beside
                     .iter()
-                    .map(|&column| {
+                    .map(|&(column, value)| {
                         let term = self.library.columns()[column];
-                        (self.library.terms()[term].name.clone(), beta[column])
+                        (self.library.terms()[term].name.clone(), value)
                     })
                     .collect(),
             });
