@@ -39,10 +39,10 @@ def test_first_two_runs_held_out(tmp_path):
     found = {c["name"]: c["parameters"][0] for c in result["components"] if c["verdict"] == "found"}
     assert sorted(found) == ["Joint1.coulomb", "Joint2.coulomb", "Link1.tensor", "Link2.tensor"]
     for name, (median, sd) in {"Joint1.coulomb": (0.278, 0.039), "Joint2.coulomb": (0.151, 0.026),
-                               "Link1.tensor": (-0.0193, 0.0026), "Link2.tensor": (-0.0390, 0.0013)}.items():  # fmt: skip
+                               "Link1.tensor": (-0.0193, 0.0026), "Link2.tensor": (-0.0391, 0.0013)}.items():  # fmt: skip
         assert found[name]["median"] == pytest.approx(median, abs=0.1 * sd), name
     pips = {c["name"]: c["pip"] for c in result["components"]}
-    said = {"Link1.tensor": 0.967, "Link2.tensor": 0.979, "payload": 0.034}
+    said = {"Link1.tensor": 0.966, "Link2.tensor": 0.978, "payload": 0.034}
     assert {name: pips[name] for name in said} == pytest.approx(said, abs=0.01)
     assert [shoulder, elbow] == pytest.approx([0.101, 0.0613], rel=0.01)
 
@@ -62,7 +62,7 @@ def test_last_two_runs_held_out(tmp_path):
 def test_leave_one_run_out(tmp_path):
     result = calibrate(tmp_path, runs(*range(8)))
     assert result["validation"]["split"] == "leave_one_log_out"
-    assert result["validation"]["coverage95"] == pytest.approx(0.951, abs=0.005)
+    assert result["validation"]["coverage95"] == pytest.approx(0.949, abs=0.005)
 
 
 # ---- the converter of the tutorial, on a miniature of the makers' folder

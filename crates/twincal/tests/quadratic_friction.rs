@@ -152,9 +152,8 @@ fn what_a_file_can_say_of_it_goes_there_and_the_rest_stays_beside() {
     assert!((beside("shoulder.quadratic_friction") - quadratic).abs() < 1e-15);
     assert!((beside("shoulder.viscous") + of_damping).abs() < 1e-12);
     assert!((beside("shoulder.coulomb") + of_friction).abs() < 1e-12);
-    assert!(
-        rest.reason.ends_with("has the friction nearest to it"),
-        "{}",
-        rest.reason
+    let said = format!(
+        "added to the file as nearest to it: shoulder.viscous {of_damping:+.3}, shoulder.coulomb {of_friction:+.3}"
     );
+    assert!(rest.reason.ends_with(&said), "{}", rest.reason);
 }

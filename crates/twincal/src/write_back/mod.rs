@@ -257,6 +257,11 @@ impl<'a> Writer<'a> {
         shares: &[Share],
     ) {
         let robot = &self.calibration.twin.robot;
+        let name = |column: usize| {
+            self.library.terms()[self.library.columns()[column]]
+                .name
+                .clone()
+        };
         for (index, component) in self.calibration.components.iter().enumerate() {
             let own: Vec<usize> = (0..beta.len())
                 .filter(|&column| self.component(column) == index)
@@ -298,7 +303,13 @@ impl<'a> Writer<'a> {
                 pip,
                 reason: if beside.len() > own.len() {
                     let what = reason(component.family, self.holds.format);
-                    format!("{what}, and has the friction nearest to it")
+                    let shares: Vec<String> = (beside[own.len()..].iter())
+                        .map(|(column, value)| format!("{} {:+.3}", name(*column), -value))
+                        .collect();
+                    format!(
+                        "{what}; added to the file as nearest to it: {}",
+                        shares.join(", ")
+                    )
                 } else if chosen[index] {
                     reason(component.family, self.holds.format)
                 } else {
@@ -307,10 +318,7 @@ impl<'a> Writer<'a> {
                 torque: self.states.rms(&alone),
                 coefficients: beside
                     .iter()
-                    .map(|&(column, value)| {
-                        let term = self.library.columns()[column];
-                        (self.library.terms()[term].name.clone(), value)
-                    })
+                    .map(|&(column, value)| (name(column), value))
                     .collect(),
             });
         }
