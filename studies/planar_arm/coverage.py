@@ -17,6 +17,7 @@ import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import repeat
 from math import exp, sqrt
 from pathlib import Path
 
@@ -118,9 +119,10 @@ def measure(seed, index):
     return out
 
 
-def seed_of_all(seed, known):
+def seed_of_all(seed, known, only):
     """The worlds of one seed that are not known yet: their motions are the same."""
-    return [measure(seed, i) for i, world in enumerate(WORLDS) if (seed, world.name) not in known]
+    asked = [i for i, world in enumerate(WORLDS) if not only or world.name in only]
+    return [measure(seed, i) for i in asked if (seed, WORLDS[i].name) not in known]
 
 
 def pooled(values):
@@ -156,6 +158,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=200)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--only", action="append", choices=[world.name for world in WORLDS], help="this world (repeatable)")
     parser.add_argument("-o", "--output", type=Path, default=Path("target/coverage"), help="runs that are done are kept here")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
@@ -163,7 +166,7 @@ def main():
     runs = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []
     known = {(run["seed"], run["world"]) for run in runs}
     with ProcessPoolExecutor(options.jobs) as pool, kept.open("a") as file:
-        for more in pool.map(seed_of_all, range(1, options.seeds + 1), [known] * options.seeds):
+        for more in pool.map(seed_of_all, range(1, options.seeds + 1), repeat(known), repeat(options.only)):
             runs += more
             file.writelines(json.dumps(run) + "\n" for run in more)
             file.flush()

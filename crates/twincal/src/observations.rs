@@ -51,6 +51,8 @@ pub struct JointObservations {
 pub struct Observations {
     /// Name of the log.
     pub log: String,
+    /// Cut-off of the filter that made the rows, cycles per row; 0 without a filter.
+    pub cutoff: f64,
     /// Row times, s.
     pub time: Vec<f64>,
     /// First row of each segment, ascending, starting with 0.
@@ -93,6 +95,9 @@ pub fn observe(
     let slices = slices(pipeline, trajectory, signal, f64::NEG_INFINITY, SLICE);
     let len = slices.iter().map(|slice| slice.rows.len()).sum();
     let mut out = Observations::empty(library, trajectory, len);
+    if let (Some(segment), false) = (trajectory.segments.first(), pipeline.is_off()) {
+        out.cutoff = pipeline.cutoff_hz / pipeline.kept_rate(segment.interval);
+    }
     for batch in slices.chunks(BATCH) {
         let blocks: Vec<Vec<Block>> = batch
             .par_iter()
@@ -173,6 +178,7 @@ impl Observations {
         };
         Self {
             log: trajectory.name.clone(),
+            cutoff: 0.0,
             time: Vec::with_capacity(len),
             starts: Vec::new(),
             q: room(),

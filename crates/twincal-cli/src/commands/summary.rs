@@ -271,6 +271,15 @@ pub(super) enum Notes {
     In(&'static str),
 }
 
+impl Notes {
+    fn place(self) -> Option<&'static str> {
+        match self {
+            Self::Shown => None,
+            Self::In(place) => Some(place),
+        }
+    }
+}
+
 /// The serious ones first, each with its word.
 const ORDER: [(Severity, &str); 3] = [
     (Severity::Degraded, "degraded"),
@@ -295,7 +304,7 @@ pub(super) fn findings(findings: &[Finding], notes: Notes, terminal: &mut Termin
             }
             continue;
         }
-        for line in lines(findings, severity, word) {
+        for line in lines(findings, severity, word, notes.place()) {
             if severity == Severity::Note {
                 terminal.say(&line);
             } else {
@@ -311,20 +320,26 @@ pub(super) fn findings(findings: &[Finding], notes: Notes, terminal: &mut Termin
 pub(super) fn before_the_error(findings: &[Finding], terminal: &mut Terminal) {
     for (severity, word) in ORDER {
         if severity > Severity::Note {
-            for line in lines(findings, severity, word) {
+            for line in lines(findings, severity, word, None) {
                 terminal.note(line.strip_prefix("  ").unwrap_or(&line));
             }
         }
     }
 }
 
-/// The findings of one severity as indented lines of at most 80 columns.
-fn lines(findings: &[Finding], severity: Severity, word: &str) -> Vec<String> {
+/// Findings of one kind up to which each is told in full.
+const ALIKE: usize = 3;
+/// How many are told in full where there are more, and a place has the others.
+const TOLD: usize = 2;
+
+/// The findings of one severity as indented lines of at most 80 columns. Of many of one kind the first are told, the others
+/// named where `place` has them.
+fn lines(findings: &[Finding], severity: Severity, word: &str, place: Option<&str>) -> Vec<String> {
     let of_severity: Vec<_> = findings
         .iter()
         .filter(|finding| finding.severity == severity)
         .collect();
-    let mut lines = Vec::new();
+    let mut texts: Vec<(&str, &str, String)> = Vec::new();
     for (number, finding) in of_severity.iter().enumerate() {
         let same =
             |other: &&&Finding| (&other.code, &other.message) == (&finding.code, &finding.message);
@@ -336,13 +351,35 @@ fn lines(findings: &[Finding], severity: Severity, word: &str) -> Vec<String> {
             .filter(same)
             .map(|finding| finding.subject.as_str())
             .collect();
-        let text = format!(
-            "{word}: {}{}",
-            about(&subjects, &finding.message),
-            finding.message
-        );
-        for (line, text) in wrapped(&text, 76).iter().enumerate() {
+        let text = format!("{}{}", about(&subjects, &finding.message), finding.message);
+        texts.push((&finding.code, &finding.subject, text));
+    }
+    let mut lines = Vec::new();
+    let mut say = |text: &str| {
+        for (line, text) in wrapped(&format!("{word}: {text}"), 76).iter().enumerate() {
             lines.push(format!("{}{text}", if line == 0 { "  " } else { "    " }));
+        }
+    };
+    for (number, (code, _, text)) in texts.iter().enumerate() {
+        let kind = || {
+            texts
+                .iter()
+                .enumerate()
+                .filter(|(_, other)| other.0 == *code)
+        };
+        let before = kind().filter(|(other, _)| *other < number).count();
+        let many = kind().count() > ALIKE;
+        match place {
+            Some(place) if many && before == TOLD => {
+                let others: Vec<&str> = kind().skip(TOLD).map(|(_, other)| other.1).collect();
+                say(&format!(
+                    "{} more like these two in {place}: {}",
+                    others.len(),
+                    others.join(", ")
+                ));
+            }
+            Some(_) if many && before > TOLD => {}
+            _ => say(text),
         }
     }
     lines
@@ -353,6 +390,15 @@ fn about(subjects: &[&str], message: &str) -> String {
     match subjects {
         [] => String::new(),
         [only] if only.is_empty() || message.contains(only) => String::new(),
+        // A message that begins with the same list of names, perhaps cut short.
+        [only]
+            if only
+                .split(", ")
+                .next()
+                .is_some_and(|name| message.starts_with(name)) =>
+        {
+            String::new()
+        }
         [first, second, _, ..] => format!("{first}, {second} and {} more: ", subjects.len() - 2),
         few => format!("{}: ", few.join(", ")),
     }
@@ -459,6 +505,36 @@ mod tests {
             (pip(Some(1.0)), pip(Some(0.0)), pip(Some(0.5))),
             (">0.999".into(), "<0.001".into(), "0.500".into())
         );
+    }
+
+    #[test]
+    fn of_many_of_one_kind_the_first_are_told_and_the_others_named() {
+        let of = |count: usize| -> Vec<Finding> {
+            let finding = |i| {
+                let words = format!("`term{i}` moves by {i} sd");
+                Finding::new(
+                    Severity::Warning,
+                    "depends_on_cutoff",
+                    format!("term{i}"),
+                    words,
+                    0,
+                )
+            };
+            (0..count).map(finding).collect()
+        };
+        let told = |count, place| lines(&of(count), Severity::Warning, "warning", place);
+        assert_eq!(told(3, Some("the report")).len(), 3);
+        assert_eq!(told(5, None).len(), 5);
+        assert_eq!(
+            told(5, Some("the report"))[1..],
+            [
+                "  warning: `term1` moves by 1 sd",
+                "  warning: 3 more like these two in the report: term2, term3, term4"
+            ]
+        );
+        let group = "a, b and 4 more say the same";
+        assert_eq!(about(&["a, b, c, d, e, f"], group), "");
+        assert_eq!(about(&["run1.csv"], group), "run1.csv: ");
     }
 
     #[test]

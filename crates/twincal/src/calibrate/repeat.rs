@@ -105,9 +105,9 @@ pub(super) fn repeat(
     Ok(out)
 }
 
-/// One finding per component with a number that does not repeat.
+/// One finding per component with a number that does not repeat, those furthest apart first.
 pub(super) fn findings(repeats: &[Repeat], kind: Halves) -> Vec<Finding> {
-    let mut findings: Vec<Finding> = Vec::new();
+    let mut findings: Vec<(f64, Finding)> = Vec::new();
     let size = |repeat: &Repeat| repeat.z.unwrap_or(0.0).abs();
     for group in repeats.chunk_by(|a, b| a.component == b.component) {
         let Some(worst) = group.iter().max_by(|a, b| size(a).total_cmp(&size(b))) else {
@@ -117,7 +117,7 @@ pub(super) fn findings(repeats: &[Repeat], kind: Halves) -> Vec<Finding> {
             continue;
         }
         let (one, other) = kind.words();
-        findings.push(Finding::new(
+        let finding = Finding::new(
             Severity::Warning,
             "does_not_repeat",
             worst.component.clone(),
@@ -130,9 +130,11 @@ pub(super) fn findings(repeats: &[Repeat], kind: Halves) -> Vec<Finding> {
                 size(worst)
             ),
             group.iter().filter(|repeat| size(repeat) >= APART).count() as u64,
-        ));
+        );
+        findings.push((size(worst), finding));
     }
-    findings
+    findings.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+    findings.into_iter().map(|(_, finding)| finding).collect()
 }
 
 #[cfg(test)]

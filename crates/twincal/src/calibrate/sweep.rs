@@ -79,7 +79,7 @@ pub(super) fn scaled(pipeline: &Pipeline, factor: f64) -> Pipeline {
     }
 }
 
-/// Selected terms whose estimate moves by more than its sd over the sweep.
+/// Selected terms whose estimate moves by more than its sd over the sweep, those that move most of their sd first.
 pub(super) fn findings(
     sweep: &[SweepPoint],
     library: &Library,
@@ -99,21 +99,22 @@ pub(super) fn findings(
             .filter(|p| (p.mean[k] - posterior.mean[k]).abs() > posterior.sd[k]);
         if let Some(point) = largest {
             let name = &library.terms()[index].name;
-            findings.push(Finding::new(
+            let moved =
+                (point.mean[k] - posterior.mean[k]).abs() / posterior.sd[k].max(f64::MIN_POSITIVE);
+            let finding = Finding::new(
                 Severity::Warning,
                 "depends_on_cutoff",
                 name.clone(),
                 format!(
-                    "`{name}` moves by {:.1} sd (from {:.4} to {:.4}) when the cut-off becomes {:.3} Hz: \
+                    "`{name}` moves by {moved:.1} sd (from {:.4} to {:.4}) when the cut-off becomes {:.3} Hz: \
                      do not read its interval as the whole uncertainty",
-                    (point.mean[k] - posterior.mean[k]).abs() / posterior.sd[k].max(f64::MIN_POSITIVE),
-                    posterior.mean[k],
-                    point.mean[k],
-                    point.cutoff_hz
+                    posterior.mean[k], point.mean[k], point.cutoff_hz
                 ),
                 0,
-            ));
+            );
+            findings.push((moved, finding));
         }
     }
-    findings
+    findings.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+    findings.into_iter().map(|(_, finding)| finding).collect()
 }

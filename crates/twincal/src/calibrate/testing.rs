@@ -46,6 +46,7 @@ impl Regression {
             .collect();
         Observations {
             log: "log".into(),
+            cutoff: 0.0,
             time: (0..rows).map(|row| 0.01 * row as f64).collect(),
             starts: vec![0],
             q: vec![vec![0.0; rows].into()],

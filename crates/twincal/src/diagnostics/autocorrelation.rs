@@ -18,9 +18,15 @@ pub fn integrated_autocorrelation_time(runs: &[&[f64]]) -> f64 {
         return 1.0;
     }
     let longest = runs.iter().map(|run| run.len()).max().unwrap_or(0);
+    initial_positive_sequence(longest, |lag| product(lag) / zero).max(1.0)
+}
+
+/// `−1 + 2 Σ (r_{2i} + r_{2i+1})` over the pairs of autocorrelations that are positive from the first on, each at most as large as the
+/// one before (Geyer 1992); lags below `longest`.
+pub(crate) fn initial_positive_sequence(longest: usize, correlation: impl Fn(usize) -> f64) -> f64 {
     let (mut sum, mut pair_before, mut lag) = (-1.0, f64::INFINITY, 0);
     while lag + 1 < longest {
-        let pair = ((product(lag) + product(lag + 1)) / zero).min(pair_before);
+        let pair = (correlation(lag) + correlation(lag + 1)).min(pair_before);
         if pair <= 0.0 {
             break;
         }
@@ -28,7 +34,7 @@ pub fn integrated_autocorrelation_time(runs: &[&[f64]]) -> f64 {
         pair_before = pair;
         lag += 2;
     }
-    sum.max(1.0)
+    sum
 }
 
 /// `Σ_t x_t x_{t+lag}`, four sums at a time.

@@ -9,6 +9,7 @@
 mod autocorrelation;
 mod ranks;
 
+pub(crate) use autocorrelation::initial_positive_sequence;
 pub use autocorrelation::integrated_autocorrelation_time;
 pub use ranks::NormalScores;
 

@@ -34,6 +34,7 @@ impl Room {
         let (from, len) = (self.rows.len(), part.len());
         let all = &mut self.rows;
         all.log = part.log;
+        all.cutoff = all.cutoff.max(part.cutoff);
         all.starts
             .extend(part.starts.iter().map(|start| start + from));
         all.time.extend(part.time);
@@ -167,6 +168,7 @@ mod tests {
             .to_vec();
         Observations {
             log: "run".into(),
+            cutoff: 0.4,
             time: value(0).collect(),
             starts: vec![0, len / 2],
             q: motion.clone(),

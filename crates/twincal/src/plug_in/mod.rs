@@ -5,6 +5,7 @@
 //! enumeration and Gibbs sampling share one target.
 
 mod autoregression;
+mod memory;
 mod tempering;
 
 pub use tempering::{LeftOut, fit_tempered};
@@ -246,7 +247,9 @@ pub fn residual_correlation_time(training: &[Part<'_>], joint: usize, beta: &[f6
         return 1.0; // rounding has no memory that means anything
     }
     let runs: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
-    integrated_autocorrelation_time(&runs).max(1.0)
+    let cutoffs = training.iter().map(|part| part.observations.cutoff);
+    let cutoff = cutoffs.fold(0.0, f64::max);
+    memory::behind_filter(integrated_autocorrelation_time(&runs), cutoff)
 }
 
 /// `w_j ∝ 1/s_j²` with n_j-weighted geometric mean 1. A joint without rows or without residual weighs like the mean.

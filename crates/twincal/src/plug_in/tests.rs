@@ -16,6 +16,7 @@ fn log() -> Observations {
     let y: Vec<f64> = x.iter().map(|x| 1000.0 * x + random.normal()).collect();
     Observations {
         log: "log".into(),
+        cutoff: 0.0,
         time: (0..ROWS).map(|row| 0.01 * row as f64).collect(),
         starts: vec![0],
         q: vec![vec![0.0; ROWS].into()],

@@ -62,6 +62,19 @@ pub(crate) fn column_kernel(cutoff_hz: f64, interval: f64) -> Vec<f64> {
     taps
 }
 
+/// Amplitudes that the column filter passes at `frequencies`, in the unit of its cut-off; sampled finely, so that nothing folds.
+pub(crate) fn filter_gains(cutoff: f64, frequencies: &[f64]) -> Vec<f64> {
+    let interval = 1.0 / (20.0 * cutoff);
+    let taps = column_kernel(cutoff, interval);
+    let half = taps.len() / 2;
+    let gain = |frequency: &f64| {
+        let turn = 2.0 * PI * frequency * interval;
+        let sides = (1..=half).map(|k| 2.0 * taps[half + k] * (turn * k as f64).cos());
+        taps[half] + sides.sum::<f64>()
+    };
+    frequencies.iter().map(gain).collect()
+}
+
 /// The motion filter and its derivatives, all `2 half + 1` long: `out_i = Σ_k kernel[half + k] · x_{i+k}`.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct MotionKernels {
