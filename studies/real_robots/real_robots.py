@@ -55,7 +55,8 @@ class Split:
 SPLITS = [
     Split("ur10", "ur10", "model.urdf", ["run0.parquet"], [], 10, "all", [0.10, 0.09, 0.06, 0.10, 0.18, 0.19]),
     Split("staubli_tx40", "staubli_tx40", "model.urdf", ["run0.parquet"], [], 40, "moving",
-          [0.10, 0.10, 0.14, 0.17, 0.66, 0.30], found=["joint_5+joint_6.coupled_friction"], absent=["-joint_6.coupled_friction", "-joint_5.coupled_friction", "joint_4+joint_5.coupled_friction"]),
+          [0.10, 0.10, 0.14, 0.17, 0.66, 0.30], found=["joint_5+joint_6.coupled_friction"],
+          absent=[f"{pair}.coupled_{kind}" for pair in ("-joint_6", "-joint_5", "joint_4+joint_5") for kind in ("friction", "inertia")]),
     Split("kuka_kr300 0 to 1", "kuka_kr300", "model.urdf", ["run0.parquet"], ["run1.parquet"], 5, "moving",
           [0.13, 0.30, 0.18, 0.25, 0.23, 0.23]),
     Split("kuka_kr300 1 to 0", "kuka_kr300", "model.urdf", ["run1.parquet"], ["run0.parquet"], 5, "moving", [math.inf] * 6),

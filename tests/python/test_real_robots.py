@@ -16,7 +16,6 @@ sys.path.insert(0, str(ROOT / "studies" / "real_robots"))
 import real_robots as real  # noqa: E402
 
 pytestmark = pytest.mark.skipif(not (SHARED / "ur10").is_dir(), reason="../shared/data is not there")
-REACHED = {("staubli_tx40", 5): 0.67}
 # Within which velocity friction turns round, rad/s: their training residuals prefer it by 14 nats and more (the TX40's by 1 % of it, too little to leave 0.02).
 TURNING = {"ur10": 0.08, "staubli_tx40": 0.02, "kuka_kr300": 0.01}
 
@@ -28,7 +27,6 @@ def test_held_out_torque_and_known_effects(split, tmp_path):
     config = f"[signal]\ncutoff_hz = {split.cutoff_hz}\n"
     result = fit(tmp_path, [folder / name for name in split.fit], config, *arguments, model=folder / split.model)
     for joint, ((rmse, nominal, sd, _), limit) in enumerate(zip(real.scores(result, split.rows), split.limits), 1):
-        limit = REACHED.get((split.name, joint), limit)
         assert rmse / sd <= (limit if math.isfinite(limit) else nominal / sd), f"joint {joint}"
     assert result["signal"]["coulomb_velocity"] == TURNING[split.folder]
     components = {c["name"]: c for c in result["components"]}

@@ -282,6 +282,8 @@ pub enum FamilyWord {
     LoadFriction,
     /// `<a>+<b>.coupled_friction`: friction of a motor that turns with two joints.
     CoupledFriction,
+    /// `<a>+<b>.coupled_inertia`: rotor inertia of a motor that turns with two joints.
+    CoupledInertia,
     /// `<joint>.gain`: torque scaled by a factor (drive constant).
     Gain,
     /// `<joint>.encoder_zero`: zero position of an encoder.
@@ -309,6 +311,7 @@ impl From<FamilyWord> for Family {
             FamilyWord::QuadraticFriction => Self::QuadraticFriction,
             FamilyWord::LoadFriction => Self::LoadFriction,
             FamilyWord::CoupledFriction => Self::CoupledFriction,
+            FamilyWord::CoupledInertia => Self::CoupledInertia,
             FamilyWord::Gain => Self::Gain,
             FamilyWord::EncoderZero => Self::EncoderZero,
             FamilyWord::Ripple => Self::Ripple,
@@ -390,7 +393,7 @@ pub struct PriorTable {
     /// Components that are in, whatever the data say, such as ["elbow.viscous"].
     pub forced: Option<Vec<String>>,
     /// Heredity: what is in only where something else is, such as { stribeck = "coulomb", "sin(2*q2)" = "sin(q2)" }; families joint by
-    /// joint, or components by name. Default: { asymmetry = "coulomb", stribeck = "coulomb", quadratic_friction = "viscous" }; {} binds nothing.
+    /// joint, or components by name. Default: { asymmetry = "coulomb", stribeck = "coulomb", quadratic_friction = "viscous", coupled_inertia = "coupled_friction" }; {} binds nothing.
     pub heredity: Option<BTreeMap<String, String>>,
 }
 

@@ -53,8 +53,9 @@ struct State {
 
 /// Judges all candidates, and removes the image entries that are zero at every state.
 ///
-/// `shares(k)` says that candidate k belongs to a component of several columns. Such columns, and those of the robot model,
-/// are one story and stay; built-in generic terms that they span are aliases.
+/// `shares(k)` says that candidate k belongs to a component of several columns. Such columns, those of the robot model and those of
+/// [`Family::is_story_of_its_own`](super::Family::is_story_of_its_own) are one story and stay; built-in generic terms that they span
+/// are aliases.
 pub(super) fn judge(
     graph: &Graph,
     candidates: &mut [Candidate],
@@ -127,7 +128,8 @@ pub(super) fn judge(
     let (order, columns): (Vec<usize>, Vec<Vec<f64>>) = columns.into_iter().unzip();
     for (position, combination) in dependent(columns) {
         let k = order[position];
-        if shares(k) || candidates[k].model.is_some() {
+        let candidate = &candidates[k];
+        if shares(k) || candidate.model.is_some() || candidate.family.is_story_of_its_own() {
             continue;
         }
         let combination = combination

@@ -44,6 +44,8 @@ pub enum Family {
     LoadFriction,
     /// Friction of a motor that turns with the sum or difference of two joints.
     CoupledFriction,
+    /// Rotor inertia of a motor that turns with the sum or difference of two joints.
+    CoupledInertia,
     /// Drive constant: torque scaled by a factor.
     Gain,
     /// Zero position of a joint encoder.
@@ -54,7 +56,7 @@ pub enum Family {
 
 impl Family {
     /// All families that `[library] families` can name, in the order of `terms[]`.
-    pub const NAMED: [Self; 19] = [
+    pub const NAMED: [Self; 20] = [
         Self::Viscous,
         Self::Coulomb,
         Self::Offset,
@@ -71,6 +73,7 @@ impl Family {
         Self::QuadraticFriction,
         Self::LoadFriction,
         Self::CoupledFriction,
+        Self::CoupledInertia,
         Self::Gain,
         Self::EncoderZero,
         Self::Ripple,
@@ -82,7 +85,7 @@ impl Family {
     /// What twincal proposes unasked for an arm with geared drives: all but `mass_scale` (a special case of
     /// `mass_moments` and `tensor`), `ripple` (it asks for a gear ratio), and `gain` and `encoder_zero`, which can imitate
     /// almost anything: on real logs they took what springs and counterbalances are.
-    pub const DEFAULT: [Self; 15] = [
+    pub const DEFAULT: [Self; 16] = [
         Self::Viscous,
         Self::Coulomb,
         Self::Offset,
@@ -98,6 +101,7 @@ impl Family {
         Self::QuadraticFriction,
         Self::LoadFriction,
         Self::CoupledFriction,
+        Self::CoupledInertia,
     ];
 
     /// What is proposed beside the user's own expressions: friction, offset and motor inertia of every joint.
@@ -144,6 +148,7 @@ impl Family {
             Self::QuadraticFriction => "quadratic_friction",
             Self::LoadFriction => "load_friction",
             Self::CoupledFriction => "coupled_friction",
+            Self::CoupledInertia => "coupled_inertia",
             Self::Gain => "gain",
             Self::EncoderZero => "encoder_zero",
             Self::Ripple => "ripple",
@@ -183,6 +188,12 @@ impl Family {
                 | Self::LoadFriction
                 | Self::CoupledFriction
         )
+    }
+
+    /// True if it is another story than the columns that span it. The rotors of a sum and of a difference of two joints and those of
+    /// both joints are three directions, but each of the four is what a gear train can be.
+    pub(super) fn is_story_of_its_own(self) -> bool {
+        self == Self::CoupledInertia
     }
 
     /// Who stays when two have the same torque: the smaller.

@@ -325,7 +325,7 @@ impl Library {
         match family {
             Family::Viscous => joint(".viscous").map_or(0.0, |joint| -joint.damping),
             Family::MotorInertia => joint(".motor_inertia").map_or(0.0, |joint| -joint.armature),
-            Family::Coulomb | Family::CoupledFriction => 0.0,
+            Family::Coulomb | Family::CoupledFriction | Family::CoupledInertia => 0.0,
             _ => f64::NEG_INFINITY,
         }
     }

@@ -30,6 +30,7 @@ mod stribeck;
 mod quadratic_friction;
 mod load_friction;
 mod coupled_friction;
+mod coupled_inertia;
 mod gain;
 mod encoder_zero;
 mod ripple;

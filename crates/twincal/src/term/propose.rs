@@ -5,9 +5,9 @@ use super::expression::Graph;
 use super::model_column::LinkFrame;
 use super::payload::Mount;
 use super::{
-    Family, LibrarySettings, asymmetry, base_tilt, coulomb, coupled_friction, encoder_zero, gain,
-    generic, load_friction, mass_moments, mass_scale, motor_inertia, offset, payload, potential,
-    quadratic_friction, ripple, spring, stribeck, tensor, user, viscous,
+    Family, LibrarySettings, asymmetry, base_tilt, coulomb, coupled_friction, coupled_inertia,
+    encoder_zero, gain, generic, load_friction, mass_moments, mass_scale, motor_inertia, offset,
+    payload, potential, quadratic_friction, ripple, spring, stribeck, tensor, user, viscous,
 };
 use crate::error::{Error, Finding, Result, Severity};
 use crate::robot::spatial::{apply, transpose};
@@ -127,14 +127,19 @@ pub(super) fn proposals(
             Some(load_friction::candidate(joint, velocity).into())
         });
     }
-    if settings.has(Family::CoupledFriction) {
-        for (a, b) in coupled_friction::pairs(joints) {
-            for sign in [1.0, -1.0] {
-                let (a, b) = (&joints[a], &joints[b]);
-                all.push(coupled_friction::proposal(graph, a, b, sign, velocity));
+    let mut per_pair = |family: Family, make: &mut dyn FnMut(&Joint, &Joint, f64) -> Proposal| {
+        if settings.has(family) {
+            for (a, b) in coupled_friction::pairs(joints) {
+                all.extend([1.0, -1.0].map(|sign| make(&joints[a], &joints[b], sign)));
             }
         }
-    }
+    };
+    per_pair(Family::CoupledFriction, &mut |a, b, sign| {
+        coupled_friction::proposal(graph, a, b, sign, velocity)
+    });
+    per_pair(Family::CoupledInertia, &mut |a, b, sign| {
+        coupled_inertia::candidate(graph, a, b, sign).into()
+    });
     let mut per_joint = |family: Family, make: &mut dyn FnMut(&Joint) -> Option<Proposal>| {
         if settings.has(family) {
             all.extend(joints.iter().filter_map(make));

@@ -397,6 +397,7 @@ fn reason(family: Family, format: &str) -> String {
         Family::QuadraticFriction => "friction that is not in proportion to the speed",
         Family::LoadFriction => "friction that grows with the load",
         Family::CoupledFriction => "friction of coupled motors",
+        Family::CoupledInertia => "inertia of coupled motors",
         Family::Gain => "torque gains",
         Family::EncoderZero => "encoder zeros",
         Family::Ripple => "gear ripple",

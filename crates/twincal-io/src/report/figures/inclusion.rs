@@ -187,6 +187,7 @@ pub(in crate::report) fn family_name(family: Family) -> &'static str {
         Family::QuadraticFriction => "quadratic friction",
         Family::LoadFriction => "load-dependent friction",
         Family::CoupledFriction => "friction of coupled motors",
+        Family::CoupledInertia => "inertia of coupled motors",
         Family::Gain => "torque gain",
         Family::EncoderZero => "encoder zero",
         Family::Ripple => "gear ripple",

@@ -153,6 +153,51 @@ fn quadratic_friction_is_the_square_of_the_speed_against_the_motion() {
     assert!(!Family::QuadraticFriction.turns_round() && Family::QuadraticFriction.is_friction());
 }
 
+/// Kinetic energy ½ (q̇₂ ± q̇₃)² of a rotor: its acceleration on both joints, on the second with the sign.
+#[test]
+fn a_coupled_rotor_is_accelerated_by_both_joints() {
+    let mut settings = only(&[]);
+    settings.families = vec![Family::CoupledInertia];
+    let (library, _) = bare(&joints(&[false; 6]), false, &settings).unwrap();
+    let pairs = [(3, 4, 1.0), (3, 4, -1.0), (4, 5, 1.0), (4, 5, -1.0)];
+    let names: Vec<String> = pairs
+        .iter()
+        .map(|(a, b, sign)| {
+            let mark = if *sign > 0.0 { '+' } else { '-' };
+            format!("joint{}{mark}joint{}.coupled_inertia", a + 1, b + 1)
+        })
+        .collect();
+    let terms = library.terms();
+    assert!(terms.iter().map(|term| &term.name).eq(&names));
+    assert!(terms.iter().all(|term| term.unit == "kg·m²"));
+    let qd = [0.1, 0.2, -0.3, 0.7, -1.1, 1.9];
+    let qdd = [5.0, -6.0, 7.0, 0.25, -3.0, 2.0];
+    let mut out = [const { Vec::new() }; 6];
+    let motion = Motion {
+        len: 1,
+        q: &[0.4; 6],
+        qd: &qd,
+        qdd: &qdd,
+    };
+    library.evaluate(motion, &mut out);
+    for (column, (a, b, sign)) in pairs.into_iter().enumerate() {
+        let turned = qdd[a] + sign * qdd[b];
+        for (joint, torque) in out.iter().enumerate() {
+            let place = library
+                .columns_of_joint(joint)
+                .iter()
+                .position(|c| *c == column);
+            let expected = [(a, turned), (b, sign * turned)].into_iter();
+            let expected = expected.into_iter().find(|(of, _)| *of == joint);
+            let got = place.map(|place| (joint, torque[place]));
+            assert_eq!(got, expected, "{} on joint {joint}", names[column]);
+        }
+        let speed = qd[a] + sign * qd[b];
+        let energy = library.lagrangian(column, &[0.4; 6], &qd).unwrap();
+        assert!((energy - 0.5 * speed * speed).abs() < 1e-15);
+    }
+}
+
 #[test]
 fn any_batch_length_gives_the_same_bytes() {
     let (library, _) = planar(
