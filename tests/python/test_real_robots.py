@@ -35,7 +35,11 @@ def test_held_out_torque_and_known_effects(split, tmp_path):
     for name, component in components.items():
         if component["verdict"] == "found":
             assert not name.endswith(tuple(split.absent) or "\0"), name
+    # Moving rows within the training motion and beyond are all of them; the KR300's runs are different motions.
+    parts = [result["validation"][part]["joints"] for part in ("moving", "within", "beyond")]
+    assert all(moving["rows"] == within["rows"] + beyond["rows"] for moving, within, beyond in zip(*parts))
     if split.folder == "kuka_kr300":
+        assert min(joint["rows"] for joint in parts[1]) > 0 < min(joint["rows"] for joint in parts[2])
         # the hydraulic counterbalance: a conservative effect of axis 2 alone
         pips = [g["pip"] for g in result["groups"] if {"joint2.spring", "joint2.potential"} <= set(g["members"])]
         assert max(pips + [components["joint2.spring"]["pip"], components["joint2.potential"]["pip"]]) > 0.99

@@ -150,6 +150,8 @@ struct ValidationRow<'a> {
     reliability: Vec<ReliabilityRow<'a>>,
     conformal: Option<&'a Conformal>,
     moving: ScoresRow<'a>,
+    within: ScoresRow<'a>,
+    beyond: ScoresRow<'a>,
     raw: ScoresRow<'a>,
 }
 
@@ -356,6 +358,8 @@ impl<'a> ValidationRow<'a> {
                 .collect(),
             conformal: validation.conformal.as_ref(),
             moving: ScoresRow::of(&validation.moving),
+            within: ScoresRow::of(&validation.within),
+            beyond: ScoresRow::of(&validation.beyond),
             raw: ScoresRow::of(&validation.raw),
         }
     }

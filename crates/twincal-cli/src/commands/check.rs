@@ -25,6 +25,8 @@ struct Checked {
     #[serde(flatten)]
     filtered: Scores,
     moving: Scores,
+    within: Scores,
+    beyond: Scores,
     raw: Scores,
     findings: Vec<Finding>,
 }
@@ -67,6 +69,8 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
         let Validation {
             filtered,
             moving,
+            within,
+            beyond,
             raw,
             ..
         } = validation;
@@ -77,6 +81,8 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
             signal: "filtered",
             filtered,
             moving,
+            within,
+            beyond,
             raw,
             findings: found,
         };

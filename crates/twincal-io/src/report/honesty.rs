@@ -1,6 +1,6 @@
 //! Can the numbers be believed: intervals joint by joint, a guarantee, what repeats, what the compact twin costs.
 
-use super::tables::Table;
+use super::tables::{Table, with_unit};
 use super::text::{count, number, percent, probability};
 use super::verdict::plus_minus;
 use super::view::{Joint, pooled_unit};
@@ -44,6 +44,36 @@ pub(super) fn reliability(validation: &Validation) -> Table {
             pit.distance,
             pit.chance,
         );
+    }
+    table
+}
+
+/// Moving rows that the training data speak of, beside those beyond; no rows where every motion was seen before.
+pub(super) fn beyond(validation: &Validation, joints: &[Joint<'_>]) -> Table {
+    let mut table = Table::new([
+        "joint",
+        "rows within",
+        "95 % coverage",
+        "RMSE",
+        "rows beyond",
+        "95 % coverage there",
+        "RMSE there",
+    ]);
+    let pairs = validation
+        .within
+        .joints
+        .iter()
+        .zip(&validation.beyond.joints);
+    for (within, beyond) in pairs.filter(|(_, beyond)| beyond.rows > 0) {
+        let joint = joints.iter().find(|joint| joint.name == within.joint);
+        let unit = joint.map_or("", |joint| joint.units.torque);
+        let mut row = vec![within.joint.clone()];
+        for scores in [within, beyond] {
+            row.push(count(scores.rows));
+            row.push(percent(scores.coverage95));
+            row.push(with_unit(scores.rmse_calibrated, unit));
+        }
+        table.rows.push(row);
     }
     table
 }

@@ -51,6 +51,7 @@ struct Page<'a> {
     sensitive: String,
     scores: Table,
     moving: Table,
+    beyond: Table,
     raw: Table,
     noise: Table,
     /// What the data leave open, a sentence each.
@@ -147,6 +148,7 @@ fn gather<'a>(
         sensitive: text::list(&sensitive.collect::<Vec<_>>()),
         scores: tables::scores(&validation.filtered, joints),
         moving: tables::scores(&validation.moving, joints),
+        beyond: honesty::beyond(validation, joints),
         raw: tables::scores(&validation.raw, joints),
         noise: tables::noise(joints),
         open: ambiguity::sentences(calibration, joints),

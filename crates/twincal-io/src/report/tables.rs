@@ -331,7 +331,7 @@ pub(super) fn pipeline(calibration: &Calibration) -> Vec<String> {
     ]
 }
 
-fn with_unit(x: f64, unit: &str) -> String {
+pub(super) fn with_unit(x: f64, unit: &str) -> String {
     if x.is_finite() {
         format!("{}\u{a0}{unit}", number(x, 3))
     } else {

@@ -204,6 +204,7 @@ fn limits(calibration: &Calibration, joints: &[Joint<'_>], worse: &[String]) -> 
         "the error left is more than half of the torque's standard deviation",
     );
     out.append(&mut out_of_shape);
+    out.extend(beyond(calibration));
     if calibration.validation.split == Split::LastThirty {
         out.push(
             "It was tested on later parts of the same motions only; another motion was not tried."
@@ -234,6 +235,30 @@ fn limits(calibration: &Calibration, joints: &[Joint<'_>], worse: &[String]) -> 
     }
     out.push("Outside the motion listed under “What the data cannot tell” it extrapolates.".into());
     out
+}
+
+/// Joints whose intervals are too narrow where their motion was not seen before.
+fn beyond(calibration: &Calibration) -> impl Iterator<Item = String> {
+    let validation = &calibration.validation;
+    let pairs = validation
+        .within
+        .joints
+        .iter()
+        .zip(&validation.beyond.joints);
+    let narrow = pairs.filter(|(_, beyond)| beyond.rows > 0 && beyond.coverage95 < COVERAGE.0);
+    narrow.map(|(within, beyond)| {
+        let seen = match within.rows {
+            0 => String::new(),
+            _ => format!(", within it {}", percent(within.coverage95)),
+        };
+        format!(
+            "Joint {}: beyond the training motion ({} of {} moving rows) its 95 % intervals hold {}{seen}.",
+            beyond.joint,
+            beyond.rows,
+            within.rows + beyond.rows,
+            percent(beyond.coverage95)
+        )
+    })
 }
 
 /// R̂ and effective sample size as Vehtari et al. (2021) ask for.
@@ -394,6 +419,24 @@ mod tests {
             little.limits.iter().any(|l| l.contains("a little wider")),
             "{little:?}"
         );
+    }
+
+    #[test]
+    fn what_is_too_narrow_beyond_the_training_motion_is_said_of_it() {
+        let beyond = |c: &mut Calibration, coverage95: f64| {
+            c.validation.beyond = c.validation.within.clone();
+            for (joint, rows) in c.validation.beyond.joints.iter_mut().zip([0, 34]) {
+                (joint.rows, joint.coverage95) = (rows, coverage95);
+            }
+            c.validation.within.joints[1].rows = 46;
+            c.validation.within.joints[1].coverage95 = 0.93;
+        };
+        let said = "Joint elbow: beyond the training motion (34 of 80 moving rows) its 95 % intervals hold 24.0\u{202f}%, within it 93.0\u{202f}%.";
+        let limits = judged(|c| beyond(c, 0.24)).limits;
+        assert!(limits.iter().any(|limit| limit == said), "{limits:?}");
+        assert_eq!(limits.iter().filter(|l| l.contains("beyond")).count(), 1);
+        let limits = judged(|c| beyond(c, 0.94)).limits;
+        assert!(!limits.iter().any(|l| l.contains("beyond")), "{limits:?}");
     }
 
     #[test]

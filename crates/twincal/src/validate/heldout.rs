@@ -21,6 +21,9 @@ pub struct HeldOut {
     names: Vec<String>,
     filtered: ScoreKeeper,
     moving: ScoreKeeper,
+    /// Moving rows that the training data speak of, and those beyond, see [`Validation::beyond`].
+    within: ScoreKeeper,
+    beyond: ScoreKeeper,
     raw: ScoreKeeper,
     /// Per joint.
     pit: Vec<PitKeeper>,
@@ -67,6 +70,8 @@ impl HeldOut {
             names,
             filtered: keeper.clone(),
             moving: keeper.clone(),
+            within: keeper.clone(),
+            beyond: keeper.clone(),
             raw: keeper,
             conformal: ConformalKeeper::default(),
             rivals: RivalKeeper::default(),
@@ -227,6 +232,13 @@ impl HeldOut {
             self.moving
                 .push_where(joint, measured, torque, |row| !standstill[row]);
             self.pit[joint].push(&torque.pit, predictors.twin.memory(joint));
+            let outside = &torque.extrapolating;
+            self.within.push_where(joint, measured, torque, |row| {
+                !standstill[row] && !outside[row]
+            });
+            self.beyond.push_where(joint, measured, torque, |row| {
+                !standstill[row] && outside[row]
+            });
             if let Some(compact) = &compact {
                 self.rivals
                     .push(measured, torque, &compact[joint], |row| !standstill[row]);
@@ -265,6 +277,8 @@ impl HeldOut {
             split,
             filtered: self.filtered.scores(),
             moving: self.moving.scores(),
+            within: self.within.scores(),
+            beyond: self.beyond.scores(),
             raw: self.raw.scores(),
             coverage_levels: pooled.levels(),
             pit: pooled.pit(),
@@ -290,6 +304,8 @@ impl AddAssign for HeldOut {
     fn add_assign(&mut self, other: Self) {
         self.filtered += &other.filtered;
         self.moving += &other.moving;
+        self.within += &other.within;
+        self.beyond += &other.beyond;
         self.raw += &other.raw;
         for (own, more) in self.pit.iter_mut().zip(&other.pit) {
             *own += more;

@@ -76,6 +76,13 @@ pub struct Scores {
     pub joints: Vec<JointScore>,
 }
 
+impl Default for Scores {
+    /// No rows of no joint.
+    fn default() -> Self {
+        ScoreKeeper::new([""; 0]).scores()
+    }
+}
+
 /// How training and held-out data were separated.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -128,6 +135,14 @@ pub struct Validation {
     pub filtered: Scores,
     /// Rows of moving joints only.
     pub moving: Scores,
+    /// Of these, rows that the training data speak of.
+    #[serde(default)]
+    pub within: Scores,
+    /// Rows beyond them: the joint's position, velocity or acceleration leaves its training range, or what is not known of the torque is
+    /// more than its noise ([`JointTorque::extrapolating`](crate::twin::JointTorque::extrapolating)). Intervals know what the candidates
+    /// could be there, not what no candidate describes.
+    #[serde(default)]
+    pub beyond: Scores,
     /// Unfiltered torque.
     pub raw: Scores,
     /// Coverage at 50, 80, 90 and 95 % of the filtered rows, pooled.
