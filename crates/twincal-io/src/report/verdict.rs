@@ -237,7 +237,7 @@ fn limits(calibration: &Calibration, joints: &[Joint<'_>], worse: &[String]) -> 
     out
 }
 
-/// Joints whose intervals are too narrow where their motion was not seen before.
+/// Joints whose intervals are too narrow where their motion was not seen before, and less so where it was.
 fn beyond(calibration: &Calibration) -> impl Iterator<Item = String> {
     let validation = &calibration.validation;
     let pairs = validation
@@ -245,7 +245,10 @@ fn beyond(calibration: &Calibration) -> impl Iterator<Item = String> {
         .joints
         .iter()
         .zip(&validation.beyond.joints);
-    let narrow = pairs.filter(|(_, beyond)| beyond.rows > 0 && beyond.coverage95 < COVERAGE.0);
+    let narrow = pairs.filter(|(within, beyond)| {
+        let better_within = within.rows == 0 || within.coverage95 > beyond.coverage95;
+        beyond.rows > 0 && beyond.coverage95 < COVERAGE.0 && better_within
+    });
     narrow.map(|(within, beyond)| {
         let seen = match within.rows {
             0 => String::new(),
@@ -435,6 +438,12 @@ mod tests {
         let limits = judged(|c| beyond(c, 0.24)).limits;
         assert!(limits.iter().any(|limit| limit == said), "{limits:?}");
         assert_eq!(limits.iter().filter(|l| l.contains("beyond")).count(), 1);
+        // Nothing of it where the motion does not explain it.
+        let limits = judged(|c| {
+            beyond(c, 0.24);
+            c.validation.within.joints[1].coverage95 = 0.2;
+        });
+        assert!(!limits.limits.iter().any(|l| l.contains("beyond")));
         let limits = judged(|c| beyond(c, 0.94)).limits;
         assert!(!limits.iter().any(|l| l.contains("beyond")), "{limits:?}");
     }
