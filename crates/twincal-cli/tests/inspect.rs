@@ -154,6 +154,31 @@ fn an_elbow_that_stands_still_is_asked_to_move() {
     assert!(report.contains("Move `elbow` more"));
 }
 
+/// Tools are mounted on the arm, not on a finger of the gripper that the model holds still.
+#[test]
+fn a_payload_is_looked_for_where_no_locked_joint_leads() {
+    let folder = folder();
+    let gripper = r#"<link name="tool0"/>
+      <joint name="flange" type="fixed"><parent link="fore"/><child link="tool0"/><origin xyz="0.3 0 0"/></joint>
+      <link name="finger"/>
+      <joint name="knuckle" type="prismatic"><parent link="fore"/><child link="finger"/><axis xyz="1 0 0"/>
+        <limit lower="0" upper="0.1" effort="1" velocity="1"/></joint>
+      <link name="tip"/>
+      <joint name="pad" type="fixed"><parent link="finger"/><child link="tip"/></joint>
+      </robot>"#;
+    let model = ARM.replace("</robot>", gripper);
+    fs::write(folder.path().join("arm.urdf"), model).unwrap();
+    fs::write(
+        folder.path().join("twincal.toml"),
+        "[model]\nlocked = { knuckle = 0.0 }\n",
+    )
+    .unwrap();
+    let inspection = inspect(folder.path(), &["--config", "twincal.toml"]);
+    let components = inspection["components"].as_array().unwrap();
+    let payload = components.iter().find(|c| c["name"] == "payload").unwrap();
+    assert!(payload.to_string().contains("tool0"), "{payload}");
+}
+
 #[test]
 fn case_73_joints_that_mimic_are_no_coordinates() {
     let folder = folder();
