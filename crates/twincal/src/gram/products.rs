@@ -20,21 +20,19 @@ impl Products {
         }
     }
 
-    /// Adds to the sums of a tile: `R` columns from the `row * T`-th on, with the `T` from `column * T` on.
+    /// Adds to the sums of a tile of `R` columns with `C` others.
     #[inline(always)]
-    pub(super) fn add<S: Simd, const R: usize, const T: usize>(
+    pub(super) fn add<S: Simd, const R: usize, const C: usize, const T: usize>(
         &mut self,
         s: S,
-        row: usize,
-        column: usize,
-        sum: [[S::f64s; T]; R],
+        tile: Tile,
+        sum: [[S::f64s; C]; R],
     ) {
         let size = size::<S, T>();
         if self.sums.is_empty() {
             self.sums = Aligned::zeros(above(self.width.div_ceil(T)) * size);
         }
-        let kept = &mut self.sums[(above(row) + column) * size..][..size];
-        keep(s, sum, kept);
+        keep(s, sum, &mut self.sums[tile.number() * size..][..size]);
     }
 
     /// The full symmetric matrix, row-major.
@@ -48,8 +46,14 @@ impl Products {
         let owners = owners(s);
         for i in 0..width {
             for j in 0..=i {
-                let tile = &self.sums[(above(i / T) + j / T) * size..][..size];
-                let sum = i % T * T + j % T;
+                let [(row, i_own), (column, j_own)] = [i, j].map(|k| place::<T>(k, width));
+                let tile = &self.sums[Tile { row, column }.number() * size..][..size];
+                let columns = if column == 0 {
+                    first_tile::<T>(width)
+                } else {
+                    T
+                };
+                let sum = i_own * columns + j_own;
                 let lanes = &tile[sum / fold::<S>() * S::F64_LANES..][..S::F64_LANES];
                 let own = lanes.iter().zip(&owners);
                 let own = own.filter(|(_, owner)| **owner == sum % fold::<S>());
@@ -59,6 +63,36 @@ impl Products {
             }
         }
         matrix
+    }
+}
+
+/// A tile on or below the diagonal, counted in tiles.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tile {
+    pub(super) row: usize,
+    pub(super) column: usize,
+}
+
+impl Tile {
+    #[inline(always)]
+    fn number(self) -> usize {
+        above(self.row) + self.column
+    }
+}
+
+/// Columns of the first tile out of `width`: what whole tiles leave.
+#[inline(always)]
+pub(super) const fn first_tile<const T: usize>(width: usize) -> usize {
+    width - (width.div_ceil(T) - 1) * T
+}
+
+/// The tile of a column out of `width`, and its place there.
+#[inline(always)]
+fn place<const T: usize>(column: usize, width: usize) -> (usize, usize) {
+    let first = first_tile::<T>(width);
+    match column.checked_sub(first) {
+        None => (0, column),
+        Some(behind) => (behind / T + 1, behind % T),
     }
 }
 
@@ -81,7 +115,7 @@ const fn size<S: Simd, const T: usize>() -> usize {
 
 /// Adds a tile's sums to those in memory.
 #[inline(always)]
-fn keep<S: Simd, const R: usize, const T: usize>(s: S, sum: [[S::f64s; T]; R], kept: &mut [f64]) {
+fn keep<S: Simd, const R: usize, const C: usize>(s: S, sum: [[S::f64s; C]; R], kept: &mut [f64]) {
     let (kept, sum) = (S::as_mut_simd_f64s(kept).0, sum.as_flattened());
     if fold::<S>() == 1 {
         for (kept, sum) in kept.iter_mut().zip(sum) {

@@ -93,12 +93,12 @@ pub(super) fn rectangle<S: Simd, const R: usize, const T: usize>(
 
 /// The products of `R` columns among themselves.
 #[inline(always)]
-pub(super) fn triangle<S: Simd, const R: usize, const T: usize>(
+pub(super) fn triangle<S: Simd, const R: usize>(
     s: S,
     columns: [&Column; R],
     vectors: usize,
-) -> [[S::f64s; T]; R] {
-    let mut sum = [[s.splat_f64s(0.0); T]; R];
+) -> [[S::f64s; R]; R] {
+    let mut sum = [[s.splat_f64s(0.0); R]; R];
     for k in 0..vectors.min(BLOCK / S::F64_LANES) {
         add_triangle(s, Samples(columns).at(s, k), &mut sum);
     }
@@ -108,14 +108,14 @@ pub(super) fn triangle<S: Simd, const R: usize, const T: usize>(
 /// The products of `R` columns among themselves; their differences are written along the way, since a loop of its own would wait
 /// for the columns a second time (5 % of all).
 #[inline(always)]
-pub(super) fn triangle_and_steps<S: Simd, const R: usize, const T: usize>(
+pub(super) fn triangle_and_steps<S: Simd, const R: usize>(
     s: S,
     columns: [&Column; R],
     before: &[f64; R],
     steps: &mut [Column; R],
     vectors: usize,
-) -> [[S::f64s; T]; R] {
-    let mut sum = [[s.splat_f64s(0.0); T]; R];
+) -> [[S::f64s; R]; R] {
+    let mut sum = [[s.splat_f64s(0.0); R]; R];
     for i in 0..R {
         let mut last = before[i];
         for k in 0..LANES {
@@ -141,11 +141,7 @@ pub(super) fn triangle_and_steps<S: Simd, const R: usize, const T: usize>(
 }
 
 #[inline(always)]
-fn add_triangle<S: Simd, const R: usize, const T: usize>(
-    s: S,
-    a: [S::f64s; R],
-    sum: &mut [[S::f64s; T]; R],
-) {
+fn add_triangle<S: Simd, const R: usize>(s: S, a: [S::f64s; R], sum: &mut [[S::f64s; R]; R]) {
     for i in 0..R {
         for j in 0..=i {
             sum[i][j] = s.mul_add_e_f64s(a[i], a[j], sum[i][j]);
