@@ -1,6 +1,6 @@
 //! From rows to statistics: whole blocks are multiplied where they are, single rows wait until they are a block.
 
-use super::block::{BLOCK, Block, Columns, Rows, Workspace};
+use super::block::{BLOCK, Block, Columns, Differences, Rows, Workspace};
 use super::products::Products;
 use super::{JointGram, Symmetric};
 use crate::term::Recipes;
@@ -24,14 +24,14 @@ pub struct JointAccumulator {
     /// Decides the order of sums, and with it their last bits.
     pub(super) arch: pulp::Arch,
     /// Rows that are not a block yet.
-    held: Columns,
+    held: Columns<BLOCK>,
     waiting: usize,
     /// Those of them that start a run.
     starts: Vec<usize>,
     /// The row before the first of them.
     before: Vec<f64>,
-    s0: Products,
-    d: Products,
+    /// Of rows and of their differences.
+    sums: [Products; 2],
     run: OpenRun,
 }
 
@@ -66,8 +66,7 @@ impl JointAccumulator {
             waiting: 0,
             starts: Vec::new(),
             before: vec![0.0; width],
-            s0: Products::new(width),
-            d: Products::new(width),
+            sums: [(); 2].map(|()| Products::new(width)),
             run,
         }
     }
@@ -146,7 +145,7 @@ impl JointAccumulator {
             self.multiply(Some(rows), count, workspace);
             return;
         }
-        let held = self.held.at_least(width);
+        let held = self.held.first(width);
         for (i, column) in held.iter_mut().enumerate() {
             column[self.waiting..][..count].copy_from_slice(rows.column(i, width));
         }
@@ -167,21 +166,24 @@ impl JointAccumulator {
     /// Multiplies a block of these rows, or of those that wait.
     fn multiply(&mut self, from: Option<Rows<'_>>, samples: usize, workspace: &mut Workspace) {
         let width = self.before.len();
-        let [mut rows, steps] = workspace.columns(width);
-        if from.is_none() {
-            rows = self.held.at_least(width);
-        }
+        let rows = match from {
+            Some(rows) if rows.collide() => rows.copied(workspace.rows.first(width)),
+            Some(rows) => rows,
+            None => {
+                let held = self.held.first(width);
+                (held.iter_mut()).for_each(|column| column[samples..].fill(0.0));
+                Rows::of(held)
+            }
+        };
         self.arch.dispatch(WithTiles(Multiply {
             block: Block {
-                from,
                 rows,
-                steps,
                 samples,
                 before: &self.before,
                 starts: &self.starts,
             },
-            s0: &mut self.s0,
-            d: &mut self.d,
+            sums: &mut self.sums,
+            steps: &mut workspace.steps,
         }));
         self.starts.clear();
     }
@@ -211,7 +213,7 @@ impl JointAccumulator {
     pub fn cut(mut self) -> (JointGram, OpenRun) {
         self.flush(&mut Workspace::default());
         let size = self.gram.columns.len() + 1;
-        let [s0, d] = [&self.s0, &self.d].map(|sums| {
+        let [s0, d] = self.sums.each_ref().map(|sums| {
             let matrix = self.arch.dispatch(WithTiles(Matrix { sums }));
             match &self.recipes {
                 Some(recipes) => recipes.to_columns(&matrix),
@@ -255,8 +257,8 @@ impl<W: Tiled> WithSimd for WithTiles<W> {
 /// Adds the products of a block of rows and of their differences.
 struct Multiply<'a> {
     block: Block<'a>,
-    s0: &'a mut Products,
-    d: &'a mut Products,
+    sums: &'a mut [Products; 2],
+    steps: &'a mut Differences,
 }
 
 impl Tiled for Multiply<'_> {
@@ -264,7 +266,7 @@ impl Tiled for Multiply<'_> {
 
     #[inline(always)]
     fn run<S: Simd, const T: usize>(self, s: S) {
-        self.block.add_to::<S, T>(s, self.s0, self.d);
+        self.block.add_to::<S, T>(s, self.sums, self.steps);
     }
 }
 

@@ -3,6 +3,7 @@
 mod accumulate;
 mod block;
 mod products;
+mod tiles;
 
 pub use accumulate::{JointAccumulator, OpenRun};
 pub use block::Workspace;

@@ -1,12 +1,7 @@
-//! Inner products of all pairs of columns: square register tiles on the CPU's widest vectors.
+//! Running sums of the inner products of all pairs of columns, as tiles leave them.
 
-use super::block::{BLOCK, Column};
 use crate::lanes::Aligned;
 use pulp::Simd;
-use std::ops::Range;
-
-/// Columns that stay in the first-level cache while all columns before them come by.
-pub(super) const GROUP: usize = 12;
 
 /// Running sums of `Σ_t x_i(t) x_j(t)` over all pairs of columns.
 #[derive(Debug)]
@@ -25,34 +20,19 @@ impl Products {
         }
     }
 
-    /// Adds the products of some columns, from the first one of a tile on, with themselves and all columns before them, over
-    /// the first `vectors` vectors of samples. Columns that are left behind the last whole tile have narrower ones.
+    /// Adds to the sums of a tile of `R` columns with `C` others.
     #[inline(always)]
-    pub(super) fn add<S: Simd, const T: usize>(
+    pub(super) fn add<S: Simd, const R: usize, const C: usize, const T: usize>(
         &mut self,
         s: S,
-        columns: &[Column],
-        own: Range<usize>,
-        vectors: usize,
+        tile: Tile,
+        sum: [[S::f64s; C]; R],
     ) {
         let size = size::<S, T>();
         if self.sums.is_empty() {
             self.sums = Aligned::zeros(above(self.width.div_ceil(T)) * size);
         }
-        let own = own.start / T..own.end.div_ceil(T);
-        for column in 0..own.end {
-            for row in own.start.max(column)..own.end {
-                let sums = &mut self.sums[(above(row) + column) * size..][..size];
-                let (left, right) = (&columns[row * T..], &columns[column * T..]);
-                match self.width - row * T {
-                    1 => block::<S, 1, T>(s, left, right, row == column, vectors, sums),
-                    2 => block::<S, 2, T>(s, left, right, row == column, vectors, sums),
-                    3 if T > 3 => block::<S, 3, T>(s, left, right, row == column, vectors, sums),
-                    4 if T > 4 => block::<S, 4, T>(s, left, right, row == column, vectors, sums),
-                    _ => block::<S, T, T>(s, left, right, row == column, vectors, sums),
-                }
-            }
-        }
+        keep(s, sum, &mut self.sums[tile.number() * size..][..size]);
     }
 
     /// The full symmetric matrix, row-major.
@@ -66,8 +46,14 @@ impl Products {
         let owners = owners(s);
         for i in 0..width {
             for j in 0..=i {
-                let tile = &self.sums[(above(i / T) + j / T) * size..][..size];
-                let sum = i % T * T + j % T;
+                let [(row, i_own), (column, j_own)] = [i, j].map(|k| place::<T>(k, width));
+                let tile = &self.sums[Tile { row, column }.number() * size..][..size];
+                let columns = if column == 0 {
+                    first_tile::<T>(width)
+                } else {
+                    T
+                };
+                let sum = i_own * columns + j_own;
                 let lanes = &tile[sum / fold::<S>() * S::F64_LANES..][..S::F64_LANES];
                 let own = lanes.iter().zip(&owners);
                 let own = own.filter(|(_, owner)| **owner == sum % fold::<S>());
@@ -80,78 +66,40 @@ impl Products {
     }
 }
 
+/// A tile on or below the diagonal, counted in tiles.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tile {
+    pub(super) row: usize,
+    pub(super) column: usize,
+}
+
+impl Tile {
+    #[inline(always)]
+    fn number(self) -> usize {
+        above(self.row) + self.column
+    }
+}
+
+/// Columns of the first tile out of `width`: what whole tiles leave.
+#[inline(always)]
+pub(super) const fn first_tile<const T: usize>(width: usize) -> usize {
+    width - (width.div_ceil(T) - 1) * T
+}
+
+/// The tile of a column out of `width`, and its place there.
+#[inline(always)]
+fn place<const T: usize>(column: usize, width: usize) -> (usize, usize) {
+    let first = first_tile::<T>(width);
+    match column.checked_sub(first) {
+        None => (0, column),
+        Some(behind) => (behind / T + 1, behind % T),
+    }
+}
+
 /// Tiles in the rows of tiles above one.
 #[inline(always)]
 fn above(row: usize) -> usize {
     row * (row + 1) / 2
-}
-
-/// Products of `R` columns with the `T` of a whole tile, or on the diagonal with themselves.
-#[inline(always)]
-fn block<S: Simd, const R: usize, const T: usize>(
-    s: S,
-    left: &[Column],
-    right: &[Column],
-    diagonal: bool,
-    vectors: usize,
-    sums: &mut [f64],
-) {
-    let Some(left) = left.first_chunk::<R>() else {
-        return;
-    };
-    if diagonal {
-        keep(s, triangle::<S, R, T>(s, left, vectors), sums);
-    } else if let Some(right) = right.first_chunk::<T>() {
-        keep(s, rectangle::<S, R, T>(s, left, right, vectors), sums);
-    }
-}
-
-/// All products of `R` columns with `T` others.
-#[inline(always)]
-fn rectangle<S: Simd, const R: usize, const T: usize>(
-    s: S,
-    left: &[Column; R],
-    right: &[Column; T],
-    vectors: usize,
-) -> [[S::f64s; T]; R] {
-    let mut sum = [[s.splat_f64s(0.0); T]; R];
-    // Said once more, so that no index is checked in the loop.
-    for k in 0..vectors.min(BLOCK / S::F64_LANES) {
-        let b = vectors_at::<S, T>(right, k);
-        let a = vectors_at::<S, R>(left, k);
-        for i in 0..R {
-            for j in 0..T {
-                sum[i][j] = s.mul_add_e_f64s(a[i], b[j], sum[i][j]);
-            }
-        }
-    }
-    sum
-}
-
-/// The products of `R` columns among themselves.
-#[inline(always)]
-fn triangle<S: Simd, const R: usize, const T: usize>(
-    s: S,
-    columns: &[Column; R],
-    vectors: usize,
-) -> [[S::f64s; T]; R] {
-    let mut sum = [[s.splat_f64s(0.0); T]; R];
-    for k in 0..vectors.min(BLOCK / S::F64_LANES) {
-        let a = vectors_at::<S, R>(columns, k);
-        for i in 0..R {
-            for j in 0..=i {
-                sum[i][j] = s.mul_add_e_f64s(a[i], a[j], sum[i][j]);
-            }
-        }
-    }
-    sum
-}
-
-/// The k-th vector of each column.
-#[inline(always)]
-fn vectors_at<S: Simd, const N: usize>(columns: &[Column; N], k: usize) -> [S::f64s; N] {
-    let samples = k * S::F64_LANES..(k + 1) * S::F64_LANES;
-    std::array::from_fn(|i| S::as_simd_f64s(&columns[i][samples.clone()]).0[0])
 }
 
 /// How many sums share a vector in memory. Lanes are added up in part only: all the way down would take several times as long,
@@ -167,7 +115,7 @@ const fn size<S: Simd, const T: usize>() -> usize {
 
 /// Adds a tile's sums to those in memory.
 #[inline(always)]
-fn keep<S: Simd, const R: usize, const T: usize>(s: S, sum: [[S::f64s; T]; R], kept: &mut [f64]) {
+fn keep<S: Simd, const R: usize, const C: usize>(s: S, sum: [[S::f64s; C]; R], kept: &mut [f64]) {
     let (kept, sum) = (S::as_mut_simd_f64s(kept).0, sum.as_flattened());
     if fold::<S>() == 1 {
         for (kept, sum) in kept.iter_mut().zip(sum) {

@@ -212,6 +212,19 @@ fn whole_blocks_equal_single_rows() {
     assert_eq!(log.gram(256), log.gram(100));
 }
 
+/// Columns in the same places of a page are copied before they are multiplied; others are read where they are.
+#[test]
+fn distance_between_columns_does_not_matter() {
+    let log = Log::new(13, 7, 1024, false);
+    let distance = 1030;
+    let apart = |column: &[f64]| [column, &vec![f64::NAN; distance - log.rows]].concat();
+    let x: Vec<f64> = log.x.chunks(log.rows).flat_map(apart).collect();
+    let mut accumulator = JointAccumulator::new((0..7).collect());
+    let mut workspace = Workspace::default();
+    accumulator.push_block(&x, distance, &log.y, &log.keep, true, &mut workspace);
+    assert_eq!(accumulator.finish(), log.gram(log.rows));
+}
+
 /// `xᵀ C⁻¹ x` with the dense stationary covariance of several runs; the determinant too.
 #[test]
 fn stationary_form_equals_the_dense_covariance() {
