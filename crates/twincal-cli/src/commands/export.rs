@@ -34,7 +34,8 @@ const CARRIED: &str = "With the payload of the logs that carried something unkno
 struct Exported<'a> {
     schema: u64,
     output: String,
-    joints: Vec<&'a str>,
+    /// Names of q1…qn; `joints` of the change are those that change.
+    joint_names: Vec<&'a str>,
     #[serde(flatten)]
     change: &'a WriteBack,
 }
@@ -240,7 +241,7 @@ fn one(flags: &Export, kind: Kind, terminal: &mut Terminal) -> Outcome<u8> {
         let exported = Exported {
             schema: 1,
             output: shown(flags),
-            joints: stored.calibration.twin.robot.joint_names(),
+            joint_names: stored.calibration.twin.robot.joint_names(),
             change: &change,
         };
         print_json(terminal, &exported)?;
@@ -361,7 +362,12 @@ fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
         let Written {
             words, place, pip, ..
         } = written;
-        let text = if *pip >= 0.5 {
+        let text = if let Some(value) = written.in_file {
+            format!(
+                "{words} ({place}; in the file {}, nearest to that and the joint's quadratic friction)",
+                short(value)
+            )
+        } else if *pip >= 0.5 {
             format!("{words} ({place})")
         } else {
             // The file holds the model average.

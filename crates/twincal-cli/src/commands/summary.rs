@@ -20,6 +20,12 @@ const HELD: f64 = 0.5;
 
 /// Prints the whole summary.
 pub(super) fn print(calibration: &Calibration, terminal: &mut Terminal) {
+    let doubts = || calibration.findings.iter().filter(|f| f.doubts_the_log());
+    if doubts().next().is_some() {
+        terminal.heading("Log and model do not seem to speak of the same robot");
+        doubts().for_each(|finding| paragraph(&finding.message, terminal));
+        terminal.say("");
+    }
     effects(calibration, terminal);
     components(calibration, terminal);
     validation(calibration, terminal);
@@ -97,6 +103,7 @@ fn components(calibration: &Calibration, terminal: &mut Terminal) {
     } else if !dropped.is_empty() {
         let reason = |term: &&TermSummary| match &term.term.status {
             Status::AliasOf(other) => format!("{} = {other}", term.term.name),
+            Status::NullLagrangian => format!("{} (no torque in any motion)", term.term.name),
             status => format!(
                 "{} ({})",
                 term.term.name,

@@ -10,7 +10,7 @@ use twincal::robot::{Inertia, principal_axes};
 use twincal::write_back::{JointChange, LinkChange, WriteBack};
 
 /// Numbers of a file that differ by less than this share of their like stay as they are written.
-const SAME: f64 = 1e-12;
+const SAME: f64 = 1e-10;
 /// Attributes that turn an `<inertial>`.
 const WAYS: [&str; 5] = ["quat", "axisangle", "xyaxes", "zaxis", "euler"];
 

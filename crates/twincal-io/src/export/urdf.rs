@@ -9,7 +9,7 @@ use twincal::robot::spatial::{IDENTITY, Matrix, roll_pitch_yaw, rotate_tensor, t
 use twincal::write_back::{JointChange, LinkChange, WriteBack};
 
 /// Numbers of a file that differ by less than this share of their like stay as they are written.
-const SAME: f64 = 1e-12;
+const SAME: f64 = 1e-10;
 /// Entries of a tensor, in the order in which URDFs list them.
 const ENTRIES: [(&str, usize, usize); 6] = [
     ("ixx", 0, 0),

@@ -9,6 +9,8 @@ use twincal::validate::Validation;
 
 /// Sd between two halves from which a number is said not to repeat, and from which it is said to waver.
 const APART: (f64, f64) = (3.0, 2.0);
+/// Probability that a half must give an effect for it to count as found there.
+const HELD: f64 = 0.5;
 
 /// Coverage at four levels and shape of the predictions per joint; no rows without held-out rows.
 pub(super) fn reliability(validation: &Validation) -> Table {
@@ -122,6 +124,9 @@ pub(super) fn repeats(calibration: &Calibration) -> Table {
             None => ("–".into(), "not seen in both halves"),
             Some(z) if z.abs() >= APART.0 => (number(z.abs(), 2), "does not repeat"),
             Some(z) if z.abs() >= APART.1 => (number(z.abs(), 2), "wavers"),
+            Some(z) if repeat.first_pip.max(repeat.second_pip) < HELD => {
+                (number(z.abs(), 2), "found in neither half alone")
+            }
             Some(z) => (number(z.abs(), 2), "repeats"),
         };
         table.rows.push(vec![

@@ -1,8 +1,9 @@
 //! Have the predicted distributions the right shape: what the PIT of held-out rows says, joint by joint, in words.
 
 use super::text::{list, number};
+use super::verdict::{too_narrow, too_wide};
 use twincal::calibrate::Calibration;
-use twincal::validate::{Pit, Reliability};
+use twincal::validate::{JointScore, Pit, Reliability, Scores};
 
 /// Distance of the PIT from uniform beyond which, if chance does not explain it, intervals are more than a little off: the
 /// 50 % interval then holds less than 40 % or more than 60 %.
@@ -58,6 +59,16 @@ impl Shape {
         }
     }
 
+    /// True where the 95 % interval of some joint says the opposite: in the middle of a distribution and at its ends errors may differ.
+    pub(super) fn contradicts(self, scores: &Scores) -> bool {
+        let any = |of: fn(&JointScore) -> bool| scores.joints.iter().any(of);
+        match self {
+            Self::Wide => any(too_narrow),
+            Self::Narrow => any(too_wide),
+            Self::Above | Self::Below => false,
+        }
+    }
+
     /// What is said of joints, and of one; `slightly` where intervals are still of use.
     fn words(self, slightly: bool) -> &'static str {
         match (self, slightly) {
@@ -95,15 +106,27 @@ pub(super) fn sentences(calibration: &Calibration) -> Vec<String> {
     let validation = &calibration.validation;
     let mut out = Vec::new();
     let numbers = |pit: &Pit| {
-        format!(
-            "PIT off uniform by {}, by chance below {}",
-            number(pit.distance, 2),
-            number(pit.chance, 2)
-        )
+        let both = |digits| [pit.distance, pit.chance].map(|x| number(x, digits));
+        let [off, chance] = match both(2) {
+            [off, chance] if off == chance => both(3),
+            different => different,
+        };
+        format!("PIT off uniform by {off}, by chance below {chance}")
+    };
+    // What its 95 % interval says of a joint stands elsewhere; the middle of the distribution does not contradict it.
+    let scores = &validation.filtered.joints;
+    let said = |joint: &str, shape: Shape| {
+        let mut own = scores.iter().filter(|score| score.joint == joint);
+        own.any(|score| match shape {
+            Shape::Wide => too_narrow(score),
+            Shape::Narrow => too_wide(score),
+            Shape::Above | Shape::Below => false,
+        })
     };
     for (shape, slightly) in Shape::ALL.into_iter().flat_map(|s| [(s, false), (s, true)]) {
         let own: Vec<&Reliability> = (validation.reliability.iter())
             .filter(|j| Shape::of(&j.pit) == Some(shape) && (j.pit.distance <= OFF) == slightly)
+            .filter(|j| !said(&j.joint, shape))
             .collect();
         let Some(worst) = (own.iter()).max_by(|a, b| a.pit.distance.total_cmp(&b.pit.distance))
         else {

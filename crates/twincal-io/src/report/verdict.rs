@@ -2,15 +2,17 @@
 
 use super::shape;
 use super::text::{list, number, percent, with_sd};
-use super::view::{Joint, independent_rows, pooled_unit, standard_deviation};
+use super::view::{Joint, independent_rows, memory, pooled_unit, standard_deviation};
 use serde::Serialize;
-use twincal::Severity;
 use twincal::calibrate::Calibration;
 use twincal::posterior::Method;
-use twincal::validate::{JointScore, Split};
+use twincal::validate::{JointScore, Split, Validation};
+use twincal::{Finding, Severity};
 
 /// A 95 % interval is honest if it holds this share of the held-out rows (the range that `check` accepts).
 const COVERAGE: (f64, f64) = (0.90, 0.99);
+/// What an interval promises to hold.
+const LEVEL: f64 = 0.95;
 /// Ratio of errors from which calibration counts as an improvement.
 const BETTER: f64 = 0.95;
 /// Ratio of errors from which it counts as harm.
@@ -72,10 +74,15 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         .iter()
         .any(|f| f.severity == Severity::Degraded)
         || !converged(calibration);
-    let (grade, headline) = if independent_rows(calibration, joints) < FEW {
+    let (grade, headline) = if calibration.findings.iter().any(Finding::doubts_the_log) {
+        (
+            Grade::Bad,
+            "Not yet: log and model do not seem to speak of the same robot.",
+        )
+    } else if independent_rows(calibration, joints) < FEW {
         (
             Grade::Care,
-            "Hard to say: there are too few held-out rows to judge this twin by.",
+            "Hard to say: the held-out rows count as too few independent ones to judge this twin by.",
         )
     } else if ratio > WORSE {
         (
@@ -102,7 +109,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
             Grade::Care,
             "Yes; its intervals are wider than they need to be.",
         )
-    } else if let Some(shape) = off.all {
+    } else if let Some(shape) = off.all.filter(|shape| !shape.contradicts(scores)) {
         (Grade::Care, shape.headline())
     } else if worse.is_empty() && !serious && !off.single {
         (
@@ -150,6 +157,16 @@ fn grounds(calibration: &Calibration, joints: &[Joint<'_>], found: usize) -> Vec
     ]
 }
 
+/// Fewer held-out rows in the 95 % interval than an honest one has.
+pub(super) fn too_narrow(joint: &JointScore) -> bool {
+    joint.rows > 0 && joint.coverage95 < COVERAGE.0
+}
+
+/// More of them.
+pub(super) fn too_wide(joint: &JointScore) -> bool {
+    joint.rows > 0 && joint.coverage95 > COVERAGE.1
+}
+
 fn effects_found(found: usize) -> String {
     match found {
         0 => "No missing effect is more likely than not.".into(),
@@ -160,7 +177,8 @@ fn effects_found(found: usize) -> String {
 
 fn limits(calibration: &Calibration, joints: &[Joint<'_>], worse: &[String]) -> Vec<String> {
     let scores = &calibration.validation.filtered;
-    let mut out = Vec::new();
+    let doubts = calibration.findings.iter().filter(|f| f.doubts_the_log());
+    let mut out: Vec<String> = doubts.map(|f| f.message.clone()).collect();
     let mut say = |joints: &[String], one: &str, many: &str| {
         if !joints.is_empty() {
             out.push(format!(
@@ -176,13 +194,13 @@ fn limits(calibration: &Calibration, joints: &[Joint<'_>], worse: &[String]) -> 
         "its torque got worse by calibration",
         "their torque got worse by calibration",
     );
-    let narrow = names(scores.joints.iter().filter(|j| j.coverage95 < COVERAGE.0));
+    let narrow = names(scores.joints.iter().filter(|j| too_narrow(j)));
     say(
         &narrow,
         "its intervals are too narrow",
         "their intervals are too narrow",
     );
-    let wide = names(scores.joints.iter().filter(|j| j.coverage95 > COVERAGE.1));
+    let wide = names(scores.joints.iter().filter(|j| too_wide(j)));
     say(
         &wide,
         "its intervals are wider than they need to be",
@@ -204,7 +222,7 @@ fn limits(calibration: &Calibration, joints: &[Joint<'_>], worse: &[String]) -> 
         "the error left is more than half of the torque's standard deviation",
     );
     out.append(&mut out_of_shape);
-    out.extend(beyond(calibration));
+    out.extend(beyond(calibration, joints));
     if calibration.validation.split == Split::LastThirty {
         out.push(
             "It was tested on later parts of the same motions only; another motion was not tried."
@@ -237,18 +255,20 @@ fn limits(calibration: &Calibration, joints: &[Joint<'_>], worse: &[String]) -> 
     out
 }
 
-/// Joints whose intervals are too narrow where their motion was not seen before, and less so where it was.
-fn beyond(calibration: &Calibration) -> impl Iterator<Item = String> {
-    let validation = &calibration.validation;
-    let pairs = validation
-        .within
+/// Joints whose intervals are too narrow where their motion was not seen before, and less so where it was: by more than two standard
+/// errors of as many independent rows.
+fn beyond(calibration: &Calibration, joints: &[Joint<'_>]) -> impl Iterator<Item = String> {
+    let Validation { within, beyond, .. } = &calibration.validation;
+    let narrow = within
         .joints
         .iter()
-        .zip(&validation.beyond.joints);
-    let narrow = pairs.filter(|(within, beyond)| {
-        let better_within = within.rows == 0 || within.coverage95 > beyond.coverage95;
-        beyond.rows > 0 && beyond.coverage95 < COVERAGE.0 && better_within
-    });
+        .zip(&beyond.joints)
+        .filter(|(within, beyond)| {
+            let independent = beyond.rows as f64 / memory(joints, &beyond.joint);
+            let chance = 2.0 * (LEVEL * (1.0 - LEVEL) / independent).sqrt();
+            let better_within = within.rows == 0 || within.coverage95 > beyond.coverage95;
+            better_within && too_narrow(beyond) && beyond.coverage95 < LEVEL - chance
+        });
     narrow.map(|(within, beyond)| {
         let seen = match within.rows {
             0 => String::new(),
@@ -442,6 +462,12 @@ mod tests {
         let limits = judged(|c| {
             beyond(c, 0.24);
             c.validation.within.joints[1].coverage95 = 0.2;
+        });
+        assert!(!limits.limits.iter().any(|l| l.contains("beyond")));
+        // Nor of a handful of rows.
+        let limits = judged(|c| {
+            beyond(c, 0.8);
+            c.validation.beyond.joints[1].rows = 5;
         });
         assert!(!limits.limits.iter().any(|l| l.contains("beyond")));
         let limits = judged(|c| beyond(c, 0.94)).limits;

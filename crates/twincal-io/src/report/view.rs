@@ -115,22 +115,19 @@ pub(super) fn standard_deviation(values: impl Iterator<Item = f64> + Clone) -> f
 
 /// Held-out rows divided by each joint's residual memory: how many independent ones they are worth.
 pub(super) fn independent_rows(calibration: &Calibration, joints: &[Joint<'_>]) -> f64 {
-    let scores = &calibration.validation.filtered.joints;
+    let scores = calibration.validation.filtered.joints.iter();
     scores
-        .iter()
-        .map(|score| {
-            let memory = joints
-                .iter()
-                .find(|j| j.name == score.joint)
-                .map_or(1.0, |j| j.noise.autocorrelation_time);
-            score.rows as f64
-                / if memory.is_finite() {
-                    memory.max(1.0)
-                } else {
-                    1.0
-                }
-        })
+        .map(|score| score.rows as f64 / memory(joints, &score.joint))
         .sum()
+}
+
+/// Rows that count as one independent row of a joint, at least 1.
+pub(super) fn memory(joints: &[Joint<'_>], name: &str) -> f64 {
+    let mut own = joints.iter().filter(|joint| joint.name == name);
+    let time = own
+        .next()
+        .map_or(1.0, |joint| joint.noise.autocorrelation_time);
+    if time.is_finite() { time.max(1.0) } else { 1.0 }
 }
 
 #[cfg(test)]

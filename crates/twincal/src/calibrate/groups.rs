@@ -290,9 +290,9 @@ fn words(names: &[&str], pip: f64, alike: Alike, settled: bool) -> String {
     let which = match (settled, alike) {
         (true, _) => format!("the prior alone prefers `{}`", names[0]),
         (false, Alike::EveryMotion) => "which one is open".to_owned(),
-        (false, Alike::TheseLogs) => "another motion would tell which".to_owned(),
+        (false, Alike::TheseLogs) => "another motion would tell more".to_owned(),
     };
-    format!("{list} {same}: any of them is in with probability {pip}; {which}")
+    format!("{list} {same}: at least one of them is in with probability {pip}; {which}")
 }
 
 #[cfg(test)]
@@ -304,12 +304,12 @@ mod tests {
         let names = ["payload", "fore.tensor"];
         assert_eq!(
             words(&names, 0.9999, Alike::EveryMotion, true),
-            "payload and fore.tensor can explain the same torque in every motion of this robot: any of them is in with \
+            "payload and fore.tensor can explain the same torque in every motion of this robot: at least one of them is in with \
              probability > 0.999; the prior alone prefers `payload`"
         );
         let open = words(&names, 0.98, Alike::TheseLogs, false);
         assert!(
-            open.ends_with("0.980; another motion would tell which"),
+            open.ends_with("0.980; another motion would tell more"),
             "{open}"
         );
     }

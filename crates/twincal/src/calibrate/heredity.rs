@@ -136,6 +136,34 @@ mod tests {
         parents(&components, given.as_deref())
     }
 
+    /// Unless anything else is said, on one joint and on a pair of joints.
+    #[test]
+    fn what_is_a_change_of_another_needs_it() {
+        let names = [
+            ("elbow.viscous", Family::Viscous, None),
+            (
+                "elbow.quadratic_friction",
+                Family::QuadraticFriction,
+                Some(0),
+            ),
+            ("wrist.quadratic_friction", Family::QuadraticFriction, None),
+            (
+                "elbow+wrist.coupled_inertia",
+                Family::CoupledInertia,
+                Some(5),
+            ),
+            ("elbow-wrist.coupled_inertia", Family::CoupledInertia, None),
+            (
+                "elbow+wrist.coupled_friction",
+                Family::CoupledFriction,
+                None,
+            ),
+        ];
+        let components = names.map(|(name, family, _)| Named { name, family });
+        let expected = names.map(|(_, _, parent)| parent);
+        assert_eq!(parents(&components, None).unwrap(), expected);
+    }
+
     #[test]
     fn families_bind_joint_by_joint_and_names_go_before() {
         let none = vec![None; 7];

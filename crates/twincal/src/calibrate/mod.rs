@@ -20,6 +20,7 @@ mod sandwich;
 mod stopped;
 mod summary;
 mod sweep;
+mod tilt_beside_mass;
 mod turning;
 mod unphysical;
 mod uneven_noise;
@@ -384,6 +385,8 @@ fn road(
     );
     calibration.curves = curves;
     calibration.findings.extend(unphysical);
+    let tilt = tilt_beside_mass::finding(robot, &library, &calibration);
+    calibration.findings.extend(tilt);
     Ok(Road::End(Box::new(calibration)))
 }
 

@@ -1,7 +1,7 @@
 //! Memory of noise behind the row filter: what Geyer's sum leaves out.
 //!
 //! The low-pass F gives white noise autocorrelations with negative lobes (0.34, −0.13, … at the default 2.5 rows per cut-off), and Geyer's
-//! initial positive sequence ends before the first of them: its sum G is 1.7 rows where the time τ is 1.4, and intervals
+//! initial positive sequence ends before the first of them: its sum G is 1.60 rows where the time τ is 1.35, and intervals
 //! become a tenth too wide. Of AR(1) noise with the time constant T behind F both are known,
 //!
 //! ```text

@@ -129,7 +129,9 @@ pub(super) fn judge(
     for (position, combination) in dependent(columns) {
         let k = order[position];
         let candidate = &candidates[k];
-        if shares(k) || candidate.model.is_some() || candidate.family.is_story_of_its_own() {
+        // The same as one other column it is no story of its own.
+        let story = candidate.family.is_story_of_its_own() && combination.len() > 1;
+        if shares(k) || candidate.model.is_some() || story {
             continue;
         }
         let combination = combination

@@ -138,7 +138,7 @@ pub struct Validation {
     /// Of these, rows that the training data speak of.
     #[serde(default)]
     pub within: Scores,
-    /// Rows beyond them: the joint's position, velocity or acceleration leaves its training range, or what is not known of the torque is
+    /// Rows beyond them: the joint's own position, velocity or acceleration leaves its training range by more than 5 % of it, or what is not known of the torque is
     /// more than its noise ([`JointTorque::extrapolating`](crate::twin::JointTorque::extrapolating)). Intervals know what the candidates
     /// could be there, not what no candidate describes.
     #[serde(default)]

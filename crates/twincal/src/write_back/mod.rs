@@ -17,7 +17,7 @@ pub use joints::JointChange;
 pub use links::LinkChange;
 pub use projection::Projection;
 
-use crate::calibrate::Calibration;
+use crate::calibrate::{Calibration, Verdict};
 use crate::error::Result;
 use crate::evaluator::{States, rms};
 use crate::robot::{Robot, RobotDescription};
@@ -58,6 +58,9 @@ pub struct Written {
     pub pip: f64,
     /// Link or joint that changes; `gravity`.
     pub place: String,
+    /// What the file holds of a joint's friction where it stands for more than this component (quadratic friction, which no file
+    /// holds): viscous, N·m·s/rad, or dry, N·m (for a slider N·s/m, N).
+    pub in_file: Option<f64>,
 }
 
 /// A component that the file cannot hold, or that is too uncertain to be written.
@@ -128,7 +131,7 @@ impl<'a> Writer<'a> {
     }
 
     /// The model average: every component with a probability of 0.5 or more that the data see, with E[β | y]. Where
-    /// several components cannot be told apart but one of them must be there, all of them that count.
+    /// several components cannot be told apart but one of them must be there, all of them that count and are seen.
     ///
     /// # Errors
     /// [`crate::Error::Refused`] where no physical inertia can be found.
@@ -157,7 +160,8 @@ impl<'a> Writer<'a> {
         let mut chosen: Vec<bool> = components.iter().map(|c| c.selected).collect();
         for group in self.calibration.groups.iter().filter(|g| g.pip >= 0.5) {
             for (component, chosen) in components.iter().zip(&mut chosen) {
-                let counts = component.pip.unwrap_or(0.0) >= SHARE_OF_GROUP;
+                let seen = component.verdict != Some(Verdict::NotSeen);
+                let counts = seen && component.pip.unwrap_or(0.0) >= SHARE_OF_GROUP;
                 *chosen |= counts && group.members.contains(&component.name);
             }
         }
@@ -210,7 +214,7 @@ impl<'a> Writer<'a> {
         change.gravity = lost::fitted_gravity(&self.states, robot, &change, &rest)?;
         change.lost = rms(&difference(&change)?);
         change.correction = self.states.rms(beta);
-        self.tell(&mut change, (&whole, chosen), beta, &held, &shares);
+        self.tell(&mut change, (&whole, chosen), (beta, &file), &held, &shares);
         Ok(change)
     }
 
@@ -252,7 +256,7 @@ impl<'a> Writer<'a> {
         &self,
         change: &mut WriteBack,
         (whole, chosen): (&[bool], &[bool]),
-        beta: &[f64],
+        (beta, file): (&[f64], &[f64]),
         held: &[Option<Place>],
         shares: &[Share],
     ) {
@@ -271,10 +275,12 @@ impl<'a> Writer<'a> {
             };
             if whole[index] {
                 let place = own.iter().find_map(|&column| held[column].as_ref());
+                let differs = own.iter().find(|&&column| file[column] != beta[column]);
                 change.written.push(Written {
                     component: component.name.clone(),
                     words: component.words.clone(),
                     pip,
+                    in_file: differs.map(|&column| file[column]),
                     place: match place {
                         Some(Place::Inertia { body, .. }) => {
                             let link = links::home(self, *body, component.family);
