@@ -164,7 +164,7 @@ fn what_a_file_can_say_of_it_goes_there_and_the_rest_stays_beside() {
 
 /// Friction that bends so much that the viscous friction of the best fit is negative: a file has none of it, and the dry friction that is
 /// nearest then. 0.3 N·m·s/rad of the viscous friction are the model's own. Truth: least squares of what is left on tanh(v/0.02), over
-/// speeds spread evenly between the least and the largest of the log.
+/// speeds spread evenly between the least and the largest of the log. The friction is negative within the motion, which is told.
 #[test]
 fn a_file_without_negative_friction_and_its_residual_are_the_twin() {
     const DAMPING: f64 = 0.3;
@@ -224,4 +224,9 @@ fn a_file_without_negative_friction_and_its_residual_are_the_twin() {
         let (_, beside) = beside.expect("a coefficient");
         assert!((file + beside - twin).abs() < 1e-12, "{name}: {beside}");
     }
+    let told: Vec<&str> = (result.findings.iter())
+        .filter(|finding| finding.code == "friction_turns_negative")
+        .map(|finding| finding.subject.as_str())
+        .collect();
+    assert_eq!(told, ["shoulder"]);
 }

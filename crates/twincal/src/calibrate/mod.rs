@@ -9,6 +9,7 @@ mod groups;
 mod heavy_tails;
 mod held_out;
 mod heredity;
+mod negative_friction;
 mod outlook;
 mod prior_conflict;
 mod reader;
@@ -383,7 +384,11 @@ fn road(
         || unphysical::findings(robot, &library, &calibration, &drawer, seed),
     );
     calibration.curves = curves;
-    calibration.findings.extend(unphysical);
+    let negative =
+        negative_friction::findings(&calibration.twin, &library, &calibration.components);
+    calibration
+        .findings
+        .extend(unphysical.into_iter().chain(negative));
     Ok(Road::End(Box::new(calibration)))
 }
 
