@@ -10,7 +10,7 @@ pub(crate) use room::Room;
 use crate::error::Result;
 use crate::gram::{Gram, JointAccumulator, Workspace};
 use crate::robot::Robot;
-use crate::rows::{RowBlock, RowSignal, slices, visit_parts};
+use crate::rows::{RowBlock, RowSignal, recipes_of_log, slices, visit_parts};
 use crate::signal::{Numbers, Pipeline, Recording, Trajectory};
 use crate::term::{Library, Recipes};
 use rayon::prelude::*;
@@ -135,7 +135,6 @@ struct BlockJoint {
     measured: Vec<f64>,
     nominal: Vec<f64>,
     standstill: Vec<bool>,
-    recipes: Option<Arc<Recipes>>,
 }
 
 impl Block {
@@ -148,7 +147,6 @@ impl Block {
             measured: rows.measured.to_vec(),
             nominal: rows.nominal.to_vec(),
             standstill: rows.standstill.to_vec(),
-            recipes: rows.recipes.cloned(),
         });
         Self {
             first: block.first,
@@ -160,15 +158,18 @@ impl Block {
 }
 
 impl Observations {
-    /// Without rows yet, but with room for `len`.
+    /// Without rows yet, but with room for `len`. How columns follow from parts is said whether rows come or not: rows of other parts of the
+    /// log are put behind these.
     fn empty(library: &Library, trajectory: &Trajectory, len: usize) -> Self {
         let dof = trajectory.dof;
         let room = || (0..dof).map(|_| Vec::with_capacity(len).into()).collect();
-        let joint = |joint: usize| {
+        let recipes = recipes_of_log(library, trajectory.payload_acts);
+        let joint = |(joint, recipes): (usize, Arc<Recipes>)| {
             let columns = library.columns_of_joint(joint).to_vec();
             JointObservations {
-                x: vec![0.0; library.recipes(joint).parts() * len],
+                x: vec![0.0; recipes.parts() * len],
                 columns,
+                recipes: Some(recipes),
                 measured: Vec::with_capacity(len).into(),
                 nominal: Vec::with_capacity(len).into(),
                 y: Vec::with_capacity(len),
@@ -184,7 +185,7 @@ impl Observations {
             q: room(),
             qd: room(),
             qdd: room(),
-            joints: (0..dof).map(joint).collect(),
+            joints: recipes.into_iter().enumerate().map(joint).collect(),
         }
     }
 
@@ -452,7 +453,6 @@ impl JointObservations {
 
     /// The next `len` rows, from row `from` on.
     fn add(&mut self, from: usize, len: usize, rows: &BlockJoint) -> Result<()> {
-        self.recipes.clone_from(&rows.recipes);
         let total = self.x.len() / self.signals().max(1);
         for (i, column) in rows.x.chunks_exact(len.max(1)).enumerate() {
             self.x[i * total + from..][..len].copy_from_slice(column);

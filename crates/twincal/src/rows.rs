@@ -11,6 +11,8 @@ mod evaluate;
 mod filtered;
 mod unfiltered;
 
+pub(crate) use evaluate::recipes_of_log;
+
 use crate::error::Result;
 use crate::robot::Robot;
 use crate::signal::{Payload, Pipeline, Segment, Trajectory};

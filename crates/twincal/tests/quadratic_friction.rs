@@ -6,8 +6,9 @@ mod two_link;
 
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::posterior::random::Random;
-use twincal::robot::{Workspace, inverse_dynamics};
+use twincal::robot::{Robot, Workspace, inverse_dynamics};
 use twincal::signal::{Channels, Payload, Recording};
+use twincal::term::Family;
 use twincal::write_back::{Holds, Writer};
 
 /// Coulomb (N·m), viscous (N·m·s/rad), quadratic (N·m·s²/rad²) friction of shoulder and elbow.
@@ -16,9 +17,12 @@ const NOISE: f64 = 0.05;
 
 /// 40 s at 200 Hz, up to 3 rad/s.
 fn log(seed: u64) -> Recording {
-    let arm = two_link::arm(2.0).expect("an arm");
-    let (mut noise, mut workspace, mut tau) =
-        (Random::new(seed, 0), Workspace::new(&arm), [0.0; 2]);
+    log_of(&two_link::arm(2.0).expect("an arm"), FRICTION, seed)
+}
+
+/// The same of an arm with other friction.
+fn log_of(arm: &Robot, friction: [[f64; 3]; 2], seed: u64) -> Recording {
+    let (mut noise, mut workspace, mut tau) = (Random::new(seed, 0), Workspace::new(arm), [0.0; 2]);
     let mut channels = [[(); 4]; 2].map(|joint| joint.map(|()| Vec::new()));
     let time: Vec<f64> = (0..8000).map(|i| 0.005 * f64::from(i)).collect();
     for t in &time {
@@ -29,9 +33,9 @@ fn log(seed: u64) -> Recording {
         let q = sum(&|_, x: f64| x.sin());
         let qd = sum(&|w, x: f64| w * x.cos());
         let qdd = sum(&|w, x: f64| -w * w * x.sin());
-        inverse_dynamics(&arm, &mut workspace, &q, &qd, &qdd, &mut tau);
+        inverse_dynamics(arm, &mut workspace, &q, &qd, &qdd, &mut tau);
         for (j, joint) in channels.iter_mut().enumerate() {
-            let ([coulomb, viscous, quadratic], v) = (FRICTION[j], qd[j]);
+            let ([coulomb, viscous, quadratic], v) = (friction[j], qd[j]);
             let friction = coulomb * (v / 0.02).tanh() + viscous * v + quadratic * v * v.abs();
             let torque = tau[j] + friction + NOISE * noise.normal();
             for (all, value) in joint.iter_mut().zip([q[j], v, qdd[j], torque]) {
@@ -156,4 +160,73 @@ fn what_a_file_can_say_of_it_goes_there_and_the_rest_stays_beside() {
         "added to the file as nearest to it: shoulder.viscous {of_damping:+.3}, shoulder.coulomb {of_friction:+.3}"
     );
     assert!(rest.reason.ends_with(&said), "{}", rest.reason);
+}
+
+/// Friction that bends so much that the viscous friction of the best fit is negative: a file has none of it, and the dry friction that is
+/// nearest then. 0.3 N·m·s/rad of the viscous friction are the model's own. Truth: least squares of what is left on tanh(v/0.02), over
+/// speeds spread evenly between the least and the largest of the log. The friction is negative within the motion, which is told.
+#[test]
+fn a_file_without_negative_friction_and_its_residual_are_the_twin() {
+    const DAMPING: f64 = 0.3;
+    let arm = two_link::arm(2.0).expect("an arm");
+    let mut description = arm.description().clone();
+    description.joints[0].damping = DAMPING;
+    let (arm, _) = Robot::new(description, &Default::default()).expect("an arm");
+    let log = log_of(&arm, [[1.0, 4.0 - DAMPING, -2.0], [0.6, 0.5, 0.0]], 12);
+    let mut settings = CalibrationSettings::default();
+    settings.library.families = vec![
+        Family::Viscous,
+        Family::Coulomb,
+        Family::QuadraticFriction,
+        Family::Offset,
+    ];
+    let result = calibrate(&arm, std::slice::from_ref(&log), &[], &settings, &|_| {});
+    let result = result.expect("a calibration");
+    let mean = |name: &str| {
+        let mut columns = result.terms.iter();
+        let term = columns.find(|term| term.term.name == name);
+        term.and_then(|term| term.mean).expect("a mean")
+    };
+    let [dry, viscous, quadratic] =
+        ["coulomb", "viscous", "quadratic_friction"].map(|what| mean(&format!("shoulder.{what}")));
+    assert!((quadratic + 2.0).abs() < 0.1, "{quadratic}");
+    let [_, _, least, most, ..] = result.twin.hull[0];
+    let [mut along, mut size] = [0.0; 2];
+    for i in 0..100_000 {
+        let v = least + (most - least) * (f64::from(i) + 0.5) / 1e5;
+        let shape = (v / 0.02).tanh();
+        along += shape * (dry * shape + (viscous + DAMPING) * v + quadratic * v * v.abs());
+        size += shape * shape;
+    }
+    let change = Writer::new(&result, Holds::URDF).expect("a writer");
+    let change = change.mean().expect("a change");
+    let mut joints = change.joints.iter();
+    let joint = joints.find(|j| j.joint == "shoulder").expect("a change");
+    assert_eq!(joint.damping, Some(-DAMPING));
+    // The states of the comparison are few; they share the speeds evenly to a few percent.
+    let friction = joint.friction.expect("dry");
+    assert!(
+        (friction / (along / size) - 1.0).abs() < 0.1,
+        "{friction}, not {}",
+        along / size
+    );
+    // Nothing is lost: file and residual are the twin.
+    assert!(change.lost[0] < 1e-9, "{:?}", change.lost);
+    let mut residual = change.residual.iter();
+    let rest = residual.find(|r| r.component == "shoulder.quadratic_friction");
+    let rest = rest.expect("a residual");
+    for (name, file, twin) in [
+        ("shoulder.viscous", -DAMPING, viscous),
+        ("shoulder.coulomb", friction, dry),
+    ] {
+        let mut beside = rest.coefficients.iter();
+        let beside = beside.find(|(column, _)| column == name);
+        let (_, beside) = beside.expect("a coefficient");
+        assert!((file + beside - twin).abs() < 1e-12, "{name}: {beside}");
+    }
+    let told: Vec<&str> = (result.findings.iter())
+        .filter(|finding| finding.code == "friction_turns_negative")
+        .map(|finding| finding.subject.as_str())
+        .collect();
+    assert_eq!(told, ["shoulder"]);
 }

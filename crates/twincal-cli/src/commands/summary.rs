@@ -346,20 +346,21 @@ fn lines(findings: &[Finding], severity: Severity, word: &str, place: Option<&st
         .iter()
         .filter(|finding| finding.severity == severity)
         .collect();
-    let mut texts: Vec<(&str, &str, String)> = Vec::new();
+    // Code, how many say so, whom they name, what they say.
+    let mut texts: Vec<(&str, usize, Vec<&str>, String)> = Vec::new();
     for (number, finding) in of_severity.iter().enumerate() {
         let same =
             |other: &&&Finding| (&other.code, &other.message) == (&finding.code, &finding.message);
         if of_severity[..number].iter().any(|other| same(&other)) {
             continue;
         }
-        let subjects: Vec<_> = of_severity
-            .iter()
-            .filter(same)
+        let alike = || of_severity.iter().filter(same);
+        let subjects: Vec<_> = alike()
             .map(|finding| finding.subject.as_str())
+            .filter(|subject| !subject.is_empty())
             .collect();
         let text = format!("{}{}", about(&subjects, &finding.message), finding.message);
-        texts.push((&finding.code, &finding.subject, text));
+        texts.push((&finding.code, alike().count(), subjects, text));
     }
     let mut lines = Vec::new();
     let mut say = |text: &str| {
@@ -367,7 +368,7 @@ fn lines(findings: &[Finding], severity: Severity, word: &str, place: Option<&st
             lines.push(format!("{}{text}", if line == 0 { "  " } else { "    " }));
         }
     };
-    for (number, (code, _, text)) in texts.iter().enumerate() {
+    for (number, (code, _, _, text)) in texts.iter().enumerate() {
         let kind = || {
             texts
                 .iter()
@@ -378,11 +379,13 @@ fn lines(findings: &[Finding], severity: Severity, word: &str, place: Option<&st
         let many = kind().count() > ALIKE;
         match place {
             Some(place) if many && before == TOLD => {
-                let others: Vec<&str> = kind().skip(TOLD).map(|(_, other)| other.1).collect();
+                let others = || kind().skip(TOLD).map(|(_, other)| other);
+                let count: usize = others().map(|other| other.1).sum();
+                let names: Vec<&str> = others().flat_map(|other| other.2.clone()).collect();
+                let colon = if names.is_empty() { "" } else { ": " };
+                let names = names.join(", ");
                 say(&format!(
-                    "{} more like these two in {place}: {}",
-                    others.len(),
-                    others.join(", ")
+                    "{count} more like these two in {place}{colon}{names}"
                 ));
             }
             Some(_) if many && before > TOLD => {}
@@ -539,6 +542,28 @@ mod tests {
                 "  warning: 3 more like these two in the report: term2, term3, term4"
             ]
         );
+        // Messages that several findings share: all of their subjects are named, and what has no name counts.
+        let finding = |subject: &str, words: &str| {
+            Finding::new(Severity::Warning, "no_torque", subject, words, 0)
+        };
+        let mut shared = vec![
+            finding("a", "one"),
+            finding("b", "two"),
+            finding("", "three"),
+        ];
+        shared.extend(["c", "d", "e"].map(|joint| finding(joint, "four")));
+        let told = |all: &[Finding]| lines(all, Severity::Warning, "warning", Some("the report"));
+        assert_eq!(
+            told(&shared)[2..],
+            ["  warning: 4 more like these two in the report: c, d, e"]
+        );
+        let nameless = ["one", "two", "three", "four"].map(|words| finding("", words));
+        assert_eq!(
+            told(&nameless)[2..],
+            ["  warning: 2 more like these two in the report"]
+        );
+        let same = ["", "a", "b"].map(|joint| finding(joint, "same"));
+        assert_eq!(told(&same), ["  warning: a, b: same"]);
         let group = "a, b and 4 more say the same";
         assert_eq!(about(&["a, b, c, d, e, f"], group), "");
         assert_eq!(about(&["run1.csv"], group), "run1.csv: ");

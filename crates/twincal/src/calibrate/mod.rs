@@ -9,6 +9,7 @@ mod groups;
 mod heavy_tails;
 mod held_out;
 mod heredity;
+mod negative_friction;
 mod outlook;
 mod prior_conflict;
 mod reader;
@@ -384,9 +385,11 @@ fn road(
         || unphysical::findings(robot, &library, &calibration, &drawer, seed),
     );
     calibration.curves = curves;
-    calibration.findings.extend(unphysical);
+    let components = &calibration.components;
+    let negative = negative_friction::findings(&calibration.twin, &library, components);
     let tilt = tilt_beside_mass::finding(robot, &library, &calibration);
-    calibration.findings.extend(tilt);
+    let more = unphysical.into_iter().chain(negative).chain(tilt);
+    calibration.findings.extend(more);
     Ok(Road::End(Box::new(calibration)))
 }
 

@@ -11,6 +11,8 @@ use pulp::{Simd, WithSimd};
 pub struct OpenRun {
     /// `[columns, y]`, or `[parts, y]`, of the last row; `None` between runs.
     last_row: Option<Vec<f64>>,
+    /// How columns and y follow from parts and y, where these were added up.
+    recipes: Option<Recipes>,
 }
 
 /// Adds up the statistics of one joint from blocks of rows of any size.
@@ -51,9 +53,15 @@ impl JointAccumulator {
         Self::with(columns, Some(recipes.and_one()), OpenRun::default())
     }
 
-    /// Goes on where [`JointAccumulator::cut`] stopped.
+    /// Goes on where [`JointAccumulator::cut`] stopped, in columns or parts as there.
+    ///
+    /// # Panics
+    /// If parts were added up there, and those of another number of columns.
     pub fn resume(columns: Vec<u32>, run: OpenRun) -> Self {
-        Self::with(columns, None, run)
+        let recipes = run.recipes.clone();
+        let fits = |own: &Recipes| own.columns() == columns.len() + 1;
+        assert!(recipes.as_ref().is_none_or(fits), "a recipe per column");
+        Self::with(columns, recipes, run)
     }
 
     fn with(columns: Vec<u32>, recipes: Option<Recipes>, run: OpenRun) -> Self {
@@ -222,6 +230,7 @@ impl JointAccumulator {
         });
         self.gram.s0 = Symmetric { size, values: s0 };
         self.gram.d = Symmetric { size, values: d };
+        self.run.recipes = self.recipes;
         (self.gram, self.run)
     }
 }

@@ -309,6 +309,28 @@ proptest! {
         }
     }
 
+    /// Nor does it where parts are added up, inside a run or between runs: the second accumulator knows what the first one added.
+    #[test]
+    fn cutting_parts_changes_nothing(seed in 1u64..1 << 40, rows in 2usize..700, at in 0.0f64..1.0, masked: bool) {
+        let log = Log::new(seed, 3, rows, masked);
+        let at = (at * rows as f64) as usize;
+        let recipes = Recipes::new(3, vec![vec![(0, 1.0), (2, -2.0)], vec![(1, 0.5)], vec![(1, 1.0), (2, 1.0)], vec![(0, 3.0)]]);
+        let columns = vec![0, 1, 2, 3];
+        let mut whole = JointAccumulator::of_parts(columns.clone(), &recipes);
+        log.push(&mut whole, 0, rows, rows);
+        let whole = whole.finish();
+        let mut head = JointAccumulator::of_parts(columns.clone(), &recipes);
+        log.push(&mut head, 0, at, rows);
+        let (mut total, run) = head.cut();
+        let mut tail = JointAccumulator::resume(columns, run);
+        log.push(&mut tail, at, rows, rows);
+        total += &tail.finish();
+        prop_assert_eq!((total.n, total.starts), (whole.n, whole.starts));
+        for (a, b) in [(&total.s0, &whole.s0), (&total.d, &whole.d), (&total.first, &whole.first), (&total.last, &whole.last)] {
+            prop_assert!(close(a, b, 20.0 * rows as f64));
+        }
+    }
+
     /// Permuting columns permutes the statistics, bit by bit.
     #[test]
     fn permuting_columns_permutes(seed in 1u64..1 << 40, rows in 1usize..700) {

@@ -147,7 +147,13 @@ impl JointObservations {
 
 #[cfg(test)]
 mod tests {
+    use super::super::observe;
     use super::*;
+    use crate::robot::{
+        Inertia, JointDescription, JointKind, LinkDescription, Robot, RobotDescription,
+    };
+    use crate::signal::{Corrections, DerivedFrom, Payload, Pipeline, Segment, Trajectory};
+    use crate::term::{Family, Library, LibrarySettings, Recipes};
 
     fn part(first: usize, len: usize) -> Observations {
         let value = |column: usize| (0..len).map(move |row| (100 * column + first + row) as f64);
@@ -163,6 +169,14 @@ mod tests {
             columns,
             ..JointObservations::default()
         };
+        let of_parts = JointObservations {
+            x: [1, 3, 4].into_iter().flat_map(value).collect(),
+            recipes: Some(Arc::new(Recipes::new(
+                3,
+                vec![vec![(0, 1.0), (2, -1.0)], vec![(1, 2.0)]],
+            ))),
+            ..joint(vec![1, 4])
+        };
         let motion: Vec<Numbers> = [1, 2]
             .map(|c| value(c).collect::<Vec<f64>>().into())
             .to_vec();
@@ -170,11 +184,11 @@ mod tests {
             log: "run".into(),
             cutoff: 0.4,
             time: value(0).collect(),
-            starts: vec![0, len / 2],
+            starts: (0..2).map(|i| i * len / 2).filter(|_| len > 0).collect(),
             q: motion.clone(),
             qd: motion.clone(),
             qdd: motion,
-            joints: vec![joint(vec![0, 2, 5]), joint(Vec::new())],
+            joints: vec![joint(vec![0, 2, 5]), joint(Vec::new()), of_parts],
         }
     }
 
@@ -184,7 +198,7 @@ mod tests {
         whole.starts = vec![0, 5, 10, 15, 20, 23];
         for most in [0, 7, 26, 1000] {
             let mut room = Room::new(most, None);
-            for (first, len) in [(0, 10), (10, 10), (20, 6)] {
+            for (first, len) in [(0, 0), (0, 10), (10, 10), (20, 0), (20, 6), (26, 0)] {
                 room.append(part(first, len)).unwrap();
             }
             assert_eq!(room.into_rows(), whole, "room for {most}");
@@ -249,6 +263,121 @@ mod tests {
                 .to_vec();
             assert_eq!(of(&shelf), expected, "{range:?}");
             assert_eq!(of(&memory), expected, "{range:?}");
+        }
+    }
+
+    /// A hanging arm of two links and candidates whose columns are more than the parts that they are made of.
+    fn arm() -> (Robot, Library) {
+        let (com, tensor) = (
+            [0.5, 0.1, 0.0],
+            [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]],
+        );
+        let link = |(name, mass): (&str, f64)| LinkDescription {
+            name: name.into(),
+            inertia: (mass > 0.0).then_some(Inertia { mass, com, tensor }),
+        };
+        let joint = |(name, from, to)| JointDescription::new(name, JointKind::Revolute, from, to);
+        let mut description = RobotDescription {
+            name: "arm".into(),
+            gravity: [0.0, -9.81, 0.0],
+            links: [("base", 0.0), ("upper", 3.0), ("fore", 2.0)]
+                .map(link)
+                .to_vec(),
+            joints: [("shoulder", "base", "upper"), ("elbow", "upper", "fore")]
+                .map(joint)
+                .to_vec(),
+            allow_unphysical: false,
+        };
+        description.joints[1].placement.translation = com;
+        let (robot, _) = Robot::new(description, &Default::default()).unwrap();
+        let settings = LibrarySettings {
+            families: vec![Family::Payload, Family::MassMoments, Family::Viscous],
+            generic: Some(false),
+            ..LibrarySettings::default()
+        };
+        let library = Library::propose(&robot, &settings).unwrap().0;
+        (robot, library)
+    }
+
+    /// `samples` at 100 Hz from `from` s on.
+    fn motion(from: f64, samples: usize, payload_acts: bool) -> Trajectory {
+        let time: Vec<f64> = (0..samples).map(|i| from + 0.01 * i as f64).collect();
+        let wave = |f: fn(f64, f64) -> f64| -> Vec<f64> {
+            let joint = |j: usize| time.iter().map(move |t| f(*t, 1.0 + j as f64));
+            (0..2).flat_map(joint).collect()
+        };
+        let segment = Segment {
+            q: wave(|t, a| (a * t).sin()),
+            qd: wave(|t, a| a * (a * t).cos()),
+            qdd: wave(|t, a| -a * a * (a * t).sin()),
+            tau: wave(|t, a| a + t.cos()),
+            standstill: vec![false; 2 * samples],
+            input_rows: (0..samples).collect(),
+            logged: None,
+            interval: 0.01,
+            logged_interval: 0.01,
+            time,
+        };
+        Trajectory {
+            name: "run".into(),
+            dof: 2,
+            segments: vec![segment],
+            payload: Payload::None,
+            payload_acts,
+        }
+    }
+
+    /// A chapter that is shorter than the filter has no rows: first, in the middle, at the end, in memory and on a shelf, whether the
+    /// payload acts or not.
+    #[test]
+    fn a_part_without_rows_changes_nothing_wherever_it_stands() {
+        let (robot, library) = arm();
+        let pipeline = Pipeline {
+            cutoff_hz: 5.0,
+            motion_cutoff_hz: 20.0,
+            rate_hz: 12.5,
+            motion_interval: 0.0,
+            coulomb_velocity: 0.02,
+            standstill_velocity: vec![0.02; 2],
+            derived_from: vec![DerivedFrom::Position; 2],
+            corrections: Corrections::default(),
+        };
+        for (acts, most) in [(true, 0), (true, 1000), (false, 1000)] {
+            let rows = |from: f64, samples: usize| {
+                observe(&robot, &library, &pipeline, &motion(from, samples, acts)).unwrap()
+            };
+            let parts = [rows(0.0, 700), rows(7.0, 900)];
+            let empty = rows(16.0, 50);
+            assert!(empty.is_empty() && parts.iter().all(|part| part.len() > 50));
+            for joint in &parts[0].joints {
+                assert_ne!(joint.signals(), joint.columns.len(), "no parts to speak of");
+            }
+            let filled = |at: Option<usize>, shelf: Option<Arc<dyn Shelf>>| {
+                let mut room = Room::new(most, shelf);
+                for i in 0..=parts.len() {
+                    if at == Some(i) {
+                        room.append(empty.clone()).unwrap();
+                    }
+                    if let Some(part) = parts.get(i) {
+                        room.append(part.clone()).unwrap();
+                    }
+                }
+                room.into_rows()
+            };
+            let shelf = || Some(Arc::new(Attic::default()) as Arc<dyn Shelf>);
+            let (memory, away) = (filled(None, None), filled(None, shelf()));
+            let beta: Vec<f64> = (1..=library.columns().len()).map(|k| k as f64).collect();
+            for at in 0..=parts.len() {
+                assert_eq!(filled(Some(at), None), memory, "part {at}");
+                let found = filled(Some(at), shelf());
+                for (joint, wanted) in away.joints.iter().enumerate() {
+                    assert_eq!(found.joints[joint].recipes, wanted.recipes, "part {at}");
+                    let residual =
+                        |rows: &Observations| rows.whole().residual(joint, &beta, 0..rows.len());
+                    assert_eq!(residual(&found), residual(&memory), "part {at}");
+                }
+                assert_eq!(found.whole().gram(), away.whole().gram(), "part {at}");
+            }
         }
     }
 }

@@ -18,6 +18,35 @@ pub(super) trait Source {
     fn evaluate_parts(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]);
 }
 
+/// `(joint, row)` of the columns that do not act in a log where the payload acts, or does not.
+fn absent(library: &Library, payload_acts: bool) -> Vec<(usize, usize)> {
+    if payload_acts {
+        Vec::new()
+    } else {
+        library.payload_entries()
+    }
+}
+
+/// Recipes of every joint, in which `absent` columns are 0.
+fn recipes(library: &Library, absent: &[(usize, usize)]) -> Vec<Arc<Recipes>> {
+    let of_joint = |joint: usize| {
+        let rows = absent.iter().filter(|entry| entry.0 == joint);
+        let rows: Vec<usize> = rows.map(|entry| entry.1).collect();
+        let all = library.recipes(joint);
+        if rows.is_empty() {
+            all.clone()
+        } else {
+            Arc::new(all.without(&rows))
+        }
+    };
+    (0..library.joints()).map(of_joint).collect()
+}
+
+/// How columns follow from parts in a log where the payload acts, or does not; per joint, whether the log has rows or not.
+pub(crate) fn recipes_of_log(library: &Library, payload_acts: bool) -> Vec<Arc<Recipes>> {
+    recipes(library, &absent(library, payload_acts))
+}
+
 /// The columns of a library on a robot.
 pub(super) struct OfLibrary<'a> {
     robot: &'a Robot,
@@ -32,25 +61,11 @@ pub(super) struct OfLibrary<'a> {
 impl<'a> OfLibrary<'a> {
     /// In a log where the payload acts, or does not.
     pub(super) fn new(robot: &'a Robot, library: &'a Library, payload_acts: bool) -> Self {
-        let absent = if payload_acts {
-            Vec::new()
-        } else {
-            library.payload_entries()
-        };
-        let recipes = |joint: usize| {
-            let rows = absent.iter().filter(|entry| entry.0 == joint);
-            let rows: Vec<usize> = rows.map(|entry| entry.1).collect();
-            let all = library.recipes(joint);
-            if rows.is_empty() {
-                all.clone()
-            } else {
-                Arc::new(all.without(&rows))
-            }
-        };
+        let absent = absent(library, payload_acts);
         Self {
             robot,
             library,
-            recipes: (0..library.joints()).map(recipes).collect(),
+            recipes: recipes(library, &absent),
             absent,
             scratch: Scratch::default(),
         }

@@ -95,7 +95,11 @@ impl Recipes {
             }
         }
         let mut out = vec![0.0; columns * columns];
-        for (recipe, out) in self.columns.iter().zip(out.chunks_exact_mut(columns)) {
+        for (recipe, out) in self
+            .columns
+            .iter()
+            .zip(out.chunks_exact_mut(columns.max(1)))
+        {
             for &(part, weight) in recipe {
                 add(out, weight, &half[part * columns..][..columns]);
             }
@@ -257,6 +261,15 @@ mod tests {
                 assert!((down[p * parts + q] - expected).abs() < 1e-14, "{p}, {q}");
             }
         }
+    }
+
+    /// A joint without columns has no sums of them, whatever its parts.
+    #[test]
+    fn no_columns_are_made_of_any_parts() {
+        let none = Recipes::new(2, Vec::new());
+        assert!(none.to_columns(&[1.0; 4]).is_empty());
+        assert_eq!(none.to_parts(&[]), [0.0; 4]);
+        assert_eq!(none.of_parts(&[]), [0.0; 2]);
     }
 
     /// Columns that are left out take along the parts that nobody else needs; a column without torque stays, at zero.

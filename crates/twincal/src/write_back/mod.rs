@@ -185,7 +185,7 @@ impl<'a> Writer<'a> {
         let held: Vec<Option<Place>> = (held.into_iter().enumerate())
             .map(|(column, place)| place.filter(|_| whole[self.component(column)]))
             .collect();
-        let shares = self.shares(chosen, &held);
+        let shares = self.shares(chosen, &held, beta);
         let file = linear_part::written(beta, &shares);
         let gravity = gravity(robot, &held, &file);
         let (links, projection) = links::changes(self, &held, &file, gravity)?;
