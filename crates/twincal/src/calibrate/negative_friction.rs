@@ -140,13 +140,13 @@ mod tests {
         assert!((speed - 5.27).abs() < 0.01, "{speed}");
     }
 
-    /// A joint that the model lets turn at 6.28 rad/s and that was logged up to 1.75 is told, with every number; one with a lower limit is
+    /// A joint that the model lets turn at 6.2 rad/s and that was logged up to 1.75 is told, with every number; one with a lower limit is
     /// not, and one without a limit only where it was logged at more than half of that speed.
     #[test]
     fn it_is_told_where_the_joint_can_be_so_fast() {
         let found = friction(0.962, 2.2425, -0.4598);
         let said = |limit, logged| told("hip", false, found, (limit, logged));
-        let finding = said(Some(6.28), 1.75).unwrap();
+        let finding = said(Some(6.2), 1.75).unwrap();
         assert_eq!(
             (finding.code.as_str(), finding.subject.as_str()),
             ("friction_turns_negative", "hip")
@@ -154,7 +154,7 @@ mod tests {
         assert_eq!(finding.severity, Severity::Warning);
         assert_eq!(
             finding.message,
-            "friction of joint `hip` (0.962 +2.243 v -0.460 v²) is negative above 5.27 rad/s, below the model's velocity limit of 6.28 rad/s \
+            "friction of joint `hip` (0.962 +2.243 v -0.460 v²) is negative above 5.27 rad/s, below the model's velocity limit of 6.20 rad/s \
              (logged: up to 1.75): there the twin would drive the joint; log faster motion, or leave the family quadratic_friction out \
              of [library] families"
         );
