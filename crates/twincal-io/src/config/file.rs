@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use twincal::calibrate::UnaskedRipple;
 use twincal::term::Family;
 
 /// Settings of twincal. Every key is optional; a flag on the command line overrides its key.
@@ -222,8 +223,8 @@ pub struct LibraryTable {
     pub payload_frame: Option<String>,
     /// Total viscous friction, Coulomb friction and motor inertia of a joint are at least 0; default true.
     pub nonnegative: Option<bool>,
-    /// Gear ripple: periods per turn of a joint (the gear ratio), by joint name.
-    pub ripple: BTreeMap<String, f64>,
+    /// Gear ripple: periods per turn of a joint (the gear ratio), by joint name; {} for none, not even where the logs show it.
+    pub ripple: Option<BTreeMap<String, f64>>,
     /// Friction per joint; default ["viscous", "coulomb"]; [] for none.
     pub friction: Option<Vec<Friction>>,
     /// A constant torque offset per joint; default true.
@@ -234,6 +235,17 @@ pub struct LibraryTable {
     /// from 0.005 to 0.08, 0.02 where they have no clear preference.
     #[schemars(extend("minimum" = 0))]
     pub coulomb_velocity: Option<f64>,
+}
+
+impl LibraryTable {
+    /// `ripple = {}` is none; where `families` stands, be it the usual ones, nothing is added to them.
+    pub(super) fn unasked_ripple(&self) -> UnaskedRipple {
+        match (&self.ripple, &self.families) {
+            (Some(stated), _) if stated.is_empty() => UnaskedRipple::Ignored,
+            (_, Some(_)) => UnaskedRipple::Told,
+            (_, None) => UnaskedRipple::Candidate,
+        }
+    }
 }
 
 /// A kind of joint friction.

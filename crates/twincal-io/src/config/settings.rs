@@ -287,6 +287,7 @@ impl Config {
             prior: self.prior()?,
             noise: self.noise(),
             inference: self.inference()?,
+            unasked_ripple: self.file.library.unasked_ripple(),
             most_bytes: None,
         })
     }
@@ -313,7 +314,7 @@ impl Config {
                 velocity_from_position: table.velocity == Some(VelocityWord::Position),
             },
             every_sample: !self.file.library.terms.is_empty()
-                || !self.file.library.ripple.is_empty(),
+                || self.file.library.ripple.iter().flatten().count() > 0,
         })
     }
 
@@ -352,7 +353,7 @@ impl Config {
         } else {
             0.02
         };
-        for (joint, &periods) in &table.ripple {
+        for (joint, &periods) in table.ripple.iter().flatten() {
             self.number(
                 &format!("library.ripple.{joint}"),
                 periods,
@@ -367,7 +368,7 @@ impl Config {
             coulomb_velocity: signal.coulomb_velocity.unwrap_or(default_velocity),
             payload_frame: table.payload_frame.clone(),
             nonnegative: table.nonnegative.unwrap_or(true),
-            ripple: table.ripple.clone(),
+            ripple: table.ripple.clone().unwrap_or_default(),
         })
     }
 

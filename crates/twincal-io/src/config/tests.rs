@@ -1,6 +1,7 @@
 //! What `twincal.toml` accepts, and how it refuses the rest.
 
 use super::*;
+use twincal::calibrate::UnaskedRipple;
 use twincal::prior::Inclusion;
 use twincal::signal::{Auto, Payload};
 use twincal::term::Family;
@@ -31,6 +32,30 @@ fn empty_config_gives_the_documented_defaults() {
     );
     assert_eq!(settings.output, PathBuf::from("twincal-out"));
     assert_eq!(settings, Config::default().settings().unwrap());
+}
+
+#[test]
+fn gear_ripple_is_added_only_where_neither_families_nor_ripple_forbid_it() {
+    let of = |library: &str| {
+        let text = format!("[library]\n{library}\n");
+        let settings = Config::parse("x", &text).unwrap().settings().unwrap();
+        settings.calibration
+    };
+    let usual: Vec<_> = Family::DEFAULT.map(|f| format!("{:?}", f.word())).into();
+    let usual = format!("families = [{}]", usual.join(", "));
+    assert_eq!(of(&usual).library.families, Family::DEFAULT);
+    for (library, becomes) in [
+        ("", UnaskedRipple::Candidate),
+        ("ripple = { elbow = 30 }", UnaskedRipple::Candidate),
+        (&usual, UnaskedRipple::Told),
+        ("ripple = {}", UnaskedRipple::Ignored),
+    ] {
+        let settings = of(library);
+        assert_eq!(settings.unasked_ripple, becomes, "{library}");
+        let stated = library.contains("30");
+        assert_eq!(settings.library.ripple.len(), usize::from(stated));
+        assert_eq!(settings.signal.every_sample, stated);
+    }
 }
 
 /// The example of the contract, word for word.

@@ -37,6 +37,7 @@ pub use result::{
     LikelihoodUsed, LogSummary, ParameterSummary, PriorUsed, Repeat, SweepPoint, TermSummary,
     Verdict,
 };
+pub use ripples::UnaskedRipple;
 pub use stopped::Stopped;
 
 use crate::error::{Error, Finding, Result};
@@ -61,7 +62,7 @@ use data::Data;
 use heredity::Named;
 use ripples::Seen;
 
-/// Everything a calibration can be told; each field but the last is a table of `twincal.toml`.
+/// Everything a calibration can be told; each field but the last two is a table of `twincal.toml`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationSettings {
     /// `[library]`.
@@ -74,6 +75,8 @@ pub struct CalibrationSettings {
     pub noise: NoiseSettings,
     /// `[inference]`.
     pub inference: InferenceSettings,
+    /// What becomes of gear ripple that nobody asked for: what `[library]` families and ripple say beside `library`.
+    pub unasked_ripple: UnaskedRipple,
     /// Bytes that are free for what is made of the recordings (no key of `twincal.toml`); `None`: any number.
     pub most_bytes: Option<u64>,
 }
@@ -117,6 +120,7 @@ impl Default for CalibrationSettings {
                 seed: 1,
                 allow_disagreement: false,
             },
+            unasked_ripple: UnaskedRipple::Candidate,
             most_bytes: None,
         }
     }
@@ -185,6 +189,7 @@ fn whole_road(
                 added.extend(ripples.iter().map(Seen::added));
                 let orders = ripples.into_iter().map(|seen| (seen.joint, seen.periods));
                 settings.library.ripple.extend(orders);
+                settings.signal.every_sample = true;
             }
         }
     }
@@ -268,8 +273,12 @@ fn road(
         || plan.fits(&columns, settings),
     );
     let (mut fitted, fits_of_folds) = (fitted?, fits_of_folds?);
-    let seen = ripples::seen(robot, &training, &fitted.fit, &library_settings, &pipeline);
-    if !seen.is_empty() && settings.library.families == Family::DEFAULT {
+    let seen = match settings.unasked_ripple {
+        UnaskedRipple::Ignored => Vec::new(),
+        _ => ripples::seen(robot, &training, &fitted.fit, &library_settings, &pipeline),
+    };
+    let usual = settings.library.families == Family::DEFAULT;
+    if !seen.is_empty() && usual && settings.unasked_ripple == UnaskedRipple::Candidate {
         return Ok(Road::Again(seen));
     }
     findings.extend(seen.iter().map(Seen::told));
