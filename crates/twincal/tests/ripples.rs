@@ -119,7 +119,7 @@ fn fitted(log: Recording, cutoff_hz: f64, unasked_ripple: UnaskedRipple) -> Cali
     };
     settings.library.generic = Some(false);
     settings.signal.cutoff_hz = Auto::Value(cutoff_hz);
-    calibrate(&arm(), vec![log], Vec::new(), &settings, &|_| {}).expect("a calibration")
+    calibrate(&arm(), &[log], &[], &settings, &|_| {}).expect("a calibration")
 }
 
 /// Code and message of what is said of ripple.
@@ -171,7 +171,7 @@ fn the_ripple_of_a_gear_is_found_on_repeated_motion_and_on_any_other() {
         assert!((periods - TEETH).abs() < 0.1, "{}", said_of_it[0].1);
         let mut components = result.components.iter();
         let found = components.find(|component| component.name == "turn.ripple");
-        assert!(found.is_some_and(|ripple| ripple.pip > 0.99));
+        assert!(found.is_some_and(|ripple| ripple.pip > Some(0.99)));
 
         let told = fitted(log.clone(), 20.0, UnaskedRipple::Told);
         assert!(matches!(said(&told)[..], [("ripple_seen", _)]));
