@@ -216,7 +216,8 @@ fn a_twin_from_json_predicts_the_same_bytes_and_scores_like_the_calibration() {
             assert_eq!(bits(a), bits(b));
         }
     }
-    assert_eq!(one, other);
+    // As text: scores of no rows (none is beyond the training motion) are NaN.
+    assert!(format!("{one:?}") == format!("{other:?}"), "scores differ");
     let wanted = &result.validation.filtered;
     assert!((one.filtered.rmse_calibrated / wanted.rmse_calibrated - 1.0).abs() < 1e-12);
     assert_eq!(one.filtered.coverage95, wanted.coverage95);
