@@ -3,7 +3,7 @@
 //! What limits the work is not the multiply-adds but what comes into the first-level cache beside them: on a Zen 5 a line every
 //! second cycle from the second level, while a tile of five by five wants ten lines in 12.5. So rows are read where they are,
 //! differences of five columns are all that is ever written, and columns that come by are used for both sums. (A copy of the rows and
-//! one of their differences, as it was before: 67 % of the peak for the parts of a Panda instead of 76 %.)
+//! one of their differences, as it was before: 65 % of the peak for the parts of a Panda from the cache, 72 % now.)
 
 use super::products::{Products, Tile, first_tile};
 use super::tiles::{Samples, Steps, rectangle, triangle, triangle_and_steps};
@@ -123,7 +123,7 @@ pub(super) struct Block<'a> {
 impl Block<'_> {
     /// Adds all products to those of rows and those of differences, `T` columns with themselves and with all columns before
     /// them. What whole tiles leave is the first tile and comes by all others: to let all others come by a few columns at the end
-    /// would load each three times for few products (2 % of the time of all).
+    /// would load each three times for few products.
     #[inline(always)]
     pub(super) fn add_to<S: Simd, const T: usize>(
         &self,

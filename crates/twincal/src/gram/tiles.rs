@@ -106,7 +106,7 @@ pub(super) fn triangle<S: Simd, const R: usize>(
 }
 
 /// The products of `R` columns among themselves; their differences are written along the way, since a loop of its own would wait
-/// for the columns a second time (5 % of all).
+/// for the columns a second time.
 #[inline(always)]
 pub(super) fn triangle_and_steps<S: Simd, const R: usize>(
     s: S,
