@@ -473,3 +473,114 @@ fn init_writes_a_config_that_fit_reads_and_never_over_another() {
     );
     assert!(matches!(done.code, Some(0 | 3)), "{}", done.err);
 }
+
+/// What `init` writes for a log, behind it the candidates of the other tests.
+fn proposed(folder: &TempDir) -> String {
+    let path = folder.path();
+    let done = run(
+        path,
+        [
+            "init",
+            "run.csv",
+            "--model",
+            "arm.urdf",
+            "-o",
+            "first.toml",
+            "--config",
+            "look.toml",
+        ],
+    );
+    assert!(matches!(done.code, Some(0 | 3)), "{}", done.err);
+    let text = fs::read_to_string(path.join("first.toml")).unwrap();
+    let look = LOOK.replace("[model]\n", "");
+    let model = format!("[model]\n{}", look.lines().next().unwrap());
+    let library: Vec<&str> = look.lines().skip(1).collect();
+    fs::write(
+        path.join("first.toml"),
+        format!(
+            "{}\n{}\n",
+            text.replacen("[model]", &model, 1),
+            library.join("\n")
+        ),
+    )
+    .unwrap();
+    text
+}
+
+/// With the config that `init` writes, a log in other units, signs or order gives what the good log gives.
+#[test]
+fn init_mends_units_signs_and_order_and_the_twin_reads_new_logs_likewise() {
+    let good = fitted(&folder(GOOD), "look.toml", 0);
+    let rmse = |result: &Value, joint: usize| {
+        result["validation"]["joints"][joint]["rmse_calibrated"]
+            .as_f64()
+            .unwrap()
+    };
+    let degrees: fn(&mut [f64; 7]) = |row| row[1..5].iter_mut().for_each(|v| *v *= 360.0 / TAU);
+    let turned: fn(&mut [f64; 7]) = |row| {
+        row[6] *= -1.0;
+        [1, 3, 5].into_iter().for_each(|k| row[k] *= -1.0);
+    };
+    let exchanged: fn(&mut [f64; 7]) = |row| {
+        row.swap(1, 2);
+        row.swap(3, 4);
+        row.swap(5, 6);
+    };
+    for (change, line) in [
+        (
+            degrees,
+            "[columns.factor]\nq = 0.017453292519943295\nqd = 0.0174",
+        ),
+        (turned, "tau = { elbow = -1.0, shoulder = -1.0 }"),
+        (
+            exchanged,
+            "[columns.tau]\nelbow = \"tau1\"\nshoulder = \"tau2\"",
+        ),
+    ] {
+        let folder = folder(Fault { change, ..GOOD });
+        let text = proposed(&folder);
+        assert!(text.contains(line), "{line}: {text}");
+        for left in ["fit refuses", "nothing was changed"] {
+            assert!(!text.contains(left), "{text}");
+        }
+        let result = fitted(&folder, "first.toml", 0);
+        for joint in 0..2 {
+            let (own, other) = (rmse(&result, joint), rmse(&good, joint));
+            assert!(
+                (own / other - 1.0).abs() < 1e-6,
+                "{line}: {own} and {other}"
+            );
+        }
+        // the twin takes new logs as those of its fit
+        let check = ["check", "--twin", "out-first.toml", "run.csv", "--json"];
+        let check = run(folder.path(), check);
+        if line.contains("factor") {
+            assert!(
+                check.out.contains("factor_as_fitted"),
+                "{}{}",
+                check.out,
+                check.err
+            );
+        }
+    }
+}
+
+/// Too few rows for the candidates, which only the filters' choice decides.
+#[test]
+fn what_only_a_fit_can_tell_is_told_as_well() {
+    let folder = folder(GOOD);
+    let short: Vec<String> = log(GOOD).lines().take(3500).map(str::to_owned).collect();
+    fs::write(folder.path().join("run.csv"), short.join("\n")).unwrap();
+    let slow = "[model]\ngravity = [0.0, -9.81, 0.0]\n[signal]\ncutoff_hz = 2.0\n";
+    fs::write(folder.path().join("slow.toml"), slow).unwrap();
+    let fit = with_config(folder.path(), "fit", "slow.toml", &["-o", "out"]).expect(4);
+    let done = with_config(folder.path(), "doctor", "slow.toml", &["--json"]).expect(4);
+    let diagnosis: Value = serde_json::from_str(&done.out).unwrap();
+    let (problem, how) = first_mend(&diagnosis);
+    assert!(diagnosis["verdict"].as_str().unwrap().contains("refuse"));
+    assert!(
+        fit.err.contains(problem) && fit.err.contains(how),
+        "{}{problem}{how}",
+        fit.err
+    );
+}

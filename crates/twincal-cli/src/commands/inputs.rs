@@ -147,7 +147,8 @@ impl LogInput {
         progress: &Progress,
     ) -> Outcome<Self> {
         let read_as = stored.read_as.as_ref();
-        let said = read_as.and_then(|read_as| read_as.fill_in(&mut settings, paths));
+        let factors = read_as.and_then(|read_as| read_as.fill_in_factors(&mut settings));
+        let torque = read_as.and_then(|read_as| read_as.fill_in(&mut settings, paths));
         let twin = &stored.calibration.twin;
         let long = Long::with_filter(!twin.pipeline.is_off());
         let read = Self::read(paths, &twin.robot, &settings, long, progress);
@@ -163,7 +164,9 @@ impl LogInput {
                 ) => Error::content(place, problem, format!("{remedy}; {hint}")).into(),
                 (failure, _) => failure,
             })?;
-        input.findings.splice(0..0, said);
+        input
+            .findings
+            .splice(0..0, factors.into_iter().chain(torque));
         Ok(input)
     }
 

@@ -1,5 +1,6 @@
 //! `[columns]`: which column or field of a log is which channel of which joint.
 
+use super::FactorTable;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -120,4 +121,7 @@ pub struct ColumnsTable {
     pub tau: ChannelNames,
     /// Temperature column of each joint's drive, °C or K; of tables, not of a bag's topics.
     pub temperature: ChannelNames,
+    /// What logged numbers are multiplied with to have the model's units and signs: { tau = { elbow = -1.0 } }.
+    #[serde(skip_serializing_if = "FactorTable::is_empty")]
+    pub factor: FactorTable,
 }

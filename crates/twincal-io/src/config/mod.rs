@@ -5,6 +5,7 @@
 //! [`Config::file`] before that: a flag overrides its key.
 
 mod channel_names;
+mod factors;
 mod file;
 mod log_form;
 mod log_forms;
@@ -14,6 +15,7 @@ mod settings;
 mod unknown_keys;
 
 pub use channel_names::{ChannelNames, ColumnsTable, TimeUnit};
+pub use factors::{Factor, FactorTable};
 pub use file::{
     Allow, AutoWord, BaseTable, CheckTable, ConfigFile, FamilyWord, Friction, InclusionTable,
     InferenceTable, LagKey, LibraryTable, LogEntry, LogTable, MethodWord, ModelTable, NoisePrior,
@@ -21,7 +23,7 @@ pub use file::{
     SignalTable, Slab, Topics, TorqueWord, UncertaintyWord, UnknownWord, VelocityWord,
 };
 pub use log_form::LogForm;
-pub use proposal::Proposal;
+pub use proposal::{Proposal, key};
 pub use read_as::ReadAs;
 pub use settings::{Gates, LogSettings, OneLog, Settings};
 

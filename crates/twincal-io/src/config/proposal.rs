@@ -1,6 +1,6 @@
 //! A `twincal.toml` to begin with: only the keys that a model and its logs ask for, each with the numbers behind it.
 
-use super::{ChannelNames, ColumnsTable, LogEntry};
+use super::{ChannelNames, ColumnsTable, Factor, LogEntry};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -22,8 +22,10 @@ pub struct Proposal {
     pub allow_unphysical: bool,
     /// Logs with what is known of each.
     pub logs: Vec<LogEntry>,
-    /// Columns that were mapped by hand.
+    /// Columns that were mapped by hand, or must be; factors that logged numbers need.
     pub columns: ColumnsTable,
+    /// Why they need them.
+    pub factor_comment: String,
     /// Cut-off: "auto" (`None`) or Hz, and a comment on it.
     pub cutoff_hz: Option<f64>,
     /// Why.
@@ -124,6 +126,22 @@ impl Proposal {
                 let _ = writeln!(text, "{} = {}", key(joint), string(column));
             }
         }
+        if !self.columns.factor.is_empty() {
+            text.push('\n');
+            comment(text, &self.factor_comment);
+            text.push_str("[columns.factor]\n");
+        }
+        for (name, factor) in self.columns.factor.channels() {
+            let value = match factor {
+                Factor::All(number) => format!("{number:?}"),
+                Factor::ByJoint(factors) if factors.is_empty() => continue,
+                Factor::ByJoint(factors) => {
+                    let own = factors.iter().map(|(j, x)| format!("{} = {x:?}", key(j)));
+                    format!("{{ {} }}", own.collect::<Vec<_>>().join(", "))
+                }
+            };
+            let _ = writeln!(text, "{name} = {value}");
+        }
     }
 }
 
@@ -160,7 +178,7 @@ fn path(value: &Path) -> String {
 }
 
 /// A name as a key.
-fn key(name: &str) -> String {
+pub fn key(name: &str) -> String {
     let bare = |b: u8| b.is_ascii_alphanumeric() || b == b'_' || b == b'-';
     if !name.is_empty() && name.bytes().all(bare) {
         name.into()
@@ -180,7 +198,7 @@ fn key(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Config, LagKey, TimeUnit, TorqueWord, VelocityWord};
+    use super::super::{Config, FactorTable, LagKey, TimeUnit, TorqueWord, VelocityWord};
     use super::*;
 
     #[test]
@@ -209,8 +227,14 @@ mod tests {
                 time_unit: Some(TimeUnit::Us),
                 q: ChannelNames::from_iter([(odd.into(), "angle\n1".into())]),
                 tau: ChannelNames::All("/arm \"1\":effort[*]".into()),
+                factor: FactorTable {
+                    q: Factor::All(0.017_453_292_519_943_295),
+                    tau: Factor::ByJoint([(odd.into(), -1.0), ("b".into(), 0.001)].into()),
+                    ..FactorTable::default()
+                },
                 ..ColumnsTable::default()
             },
+            factor_comment: "Positions are in degrees.".into(),
             cutoff_hz: None,
             cutoff_comment: "gives 5 Hz. ".repeat(20),
             lag: Some((0.008, "8 ms".into())),

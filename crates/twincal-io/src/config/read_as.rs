@@ -1,6 +1,6 @@
 //! How the logs of a fit were understood: kept in the twin, for the logs that come after them.
 
-use super::{ColumnsTable, LogSettings};
+use super::{ColumnsTable, FactorTable, LogSettings};
 use crate::log::{Preset, TorqueOptions, TorqueSource};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -11,6 +11,9 @@ use twincal::{Finding, Severity};
 pub struct ReadAs {
     /// What the torque of all of them was taken as; `None` where they differ.
     torque: Option<TorqueOptions>,
+    /// What logged numbers were multiplied with.
+    #[serde(default, skip_serializing_if = "FactorTable::is_empty")]
+    factor: FactorTable,
     /// Other keys that said how to read any of them.
     keys: Vec<String>,
 }
@@ -38,8 +41,20 @@ impl ReadAs {
         let alike = torques.windows(2).all(|pair| pair[0] == pair[1]);
         Self {
             torque: torques.into_iter().next().filter(|_| alike),
+            factor: settings.columns.factor.clone(),
             keys,
         }
+    }
+
+    /// Has the numbers of new logs multiplied as those of the fit where the settings say nothing of it; this is told as well.
+    pub fn fill_in_factors(&self, settings: &mut LogSettings) -> Option<Finding> {
+        if self.factor.is_empty() || settings.columns != ColumnsTable::default() {
+            return None;
+        }
+        settings.columns.factor = self.factor.clone();
+        let message = "the log's numbers are multiplied with the [columns] factor that the logs of the fit had; [columns] of a --config says otherwise";
+        let code = "factor_as_fitted";
+        Some(Finding::new(Severity::Warning, code, "", message, 0))
     }
 
     /// Has the torque of new logs taken as in the fit where the settings say nothing of it, for all or in a log's own entry. The answer is

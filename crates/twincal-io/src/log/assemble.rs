@@ -2,6 +2,7 @@
 
 use super::cells::{Cells, Chapter, Spilled, unreadable};
 use super::columns::Selection;
+use super::factors;
 use super::scratch::TemporaryShelf;
 use super::stamps;
 use super::torque::to_joint_torque;
@@ -27,6 +28,7 @@ pub(crate) fn assemble(
     findings: &mut Vec<Finding>,
 ) -> Result<Log<'static>> {
     let (name, rows) = (request.name, cells.rows());
+    factors::check(request.robot, request.options)?;
     findings.extend(selection.findings.iter().cloned());
     if rows == 0 {
         return Err(Error::content(
@@ -129,6 +131,8 @@ impl ReadChapter for OnDisk {
         let read = self.spilled.read_column(&self.chapters[chapter], column);
         let mut q = read.map_err(|e| self.of_core(unreadable(&self.make.name, &e)))?;
         self.make.scale(column, &mut q);
+        let names = self.make.robot.joint_names();
+        factors::apply_to_positions(&mut q, names[joint], &self.make.options);
         Ok(q)
     }
 }
@@ -168,6 +172,7 @@ impl Make {
             joints,
             payload: self.options.payload,
         };
+        factors::apply(&mut recording, &self.robot, &self.options, findings);
         to_joint_torque(&mut recording, &self.robot, &self.options, findings)?;
         Ok(recording)
     }

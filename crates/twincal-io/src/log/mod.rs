@@ -10,6 +10,7 @@
 //! | Arrow IPC | `arrow/` |
 //! | NPZ | `npz.rs` |
 //! | MCAP, rosbag2 | `bag/`, `stamps.rs` |
+//! | other units and signs | `factors.rs` |
 //! | what the logged torque is | `torque.rs` |
 
 mod arrow;
@@ -18,6 +19,7 @@ mod bag;
 mod cells;
 mod columns;
 mod csv;
+mod factors;
 mod header;
 mod npz;
 mod pages;

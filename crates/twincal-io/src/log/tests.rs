@@ -8,6 +8,7 @@ mod logs;
 mod write;
 
 use super::*;
+use crate::config::Factor;
 use crate::table::{ColumnKind, TableFormat, TableWriter, Values};
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
@@ -121,6 +122,57 @@ fn csv_comes_in_chapters() {
     let row = long.samples()[..late].iter().sum::<usize>() + 7;
     // One row was dropped before.
     assert!((tau[7] - 50.0 * value(6, row + 1)).abs() < 1e-6);
+}
+
+/// Factors in every chapter, in positions that are read alone, and never in silence; what makes no sense is refused by its key.
+#[test]
+fn numbers_are_multiplied_as_told() {
+    let mut options = LogOptions::default();
+    let factor = &mut options.columns.factor;
+    factor.q = Factor::All(0.5);
+    factor.tau = Factor::ByJoint([("elbow".to_owned(), -2.0)].into());
+    let text = csv();
+    let long = compare(text.as_bytes(), "csv", &options);
+    let late = long.chapters() - 1;
+    let row = long.samples()[..late].iter().sum::<usize>() + 3;
+    let chapter = long.chapter(late).unwrap();
+    let [shoulder, elbow] = &chapter.joints[..] else {
+        panic!("two joints");
+    };
+    let is = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-8, "{found}");
+    is(shoulder.q[3], 0.5 * value(1, row));
+    is(elbow.q[3], 0.5 * value(4, row));
+    is(shoulder.tau.as_ref().unwrap()[3], value(3, row));
+    is(elbow.tau.as_ref().unwrap()[3], -2.0 * value(6, row));
+    is(elbow.qd.as_ref().unwrap()[3], value(5, row));
+    let alone = long.source().positions(late, 1).unwrap();
+    let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+    assert!(alone.len() == elbow.q.len() && alone.iter().zip(&elbow.q).all(same));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.csv");
+    std::fs::write(
+        &path,
+        &text[..5000 - text[..5000].lines().last().unwrap().len()],
+    )
+    .unwrap();
+    let (_, said) = read_log(&path, &robot(), &options).unwrap();
+    let told = said.iter().find(|finding| finding.code == "column_factor");
+    assert_eq!(
+        told.unwrap().message,
+        "logged numbers are multiplied, as told: q of shoulder 0.5, q of elbow 0.5, tau of elbow -2"
+    );
+    for (joint, number, words) in [
+        ("elbow", 0.0, "is 0"),
+        ("elbow", f64::INFINITY, "is inf"),
+        ("elbw", 2.0, "`elbw`"),
+    ] {
+        options.columns.factor.qd = Factor::ByJoint([(joint.to_owned(), number)].into());
+        let error = read_log(&path, &robot(), &options).unwrap_err().to_string();
+        assert!(
+            error.contains("columns.factor.qd") && error.contains(words),
+            "{error}"
+        );
+    }
 }
 
 fn parquet() -> Vec<u8> {

@@ -138,7 +138,9 @@ fn refuse_degrees(robot: &Robot, log: &str, sample: &Sample) -> Result<()> {
         problem: format!(
             "positions look like degrees: they reach {largest:.1}, and as degrees the model explains the torque"
         ),
-        remedy: "export positions, velocities and accelerations in radians (× π/180)".into(),
+        remedy: "export positions, velocities and accelerations in radians: × π/180, as with [columns] factor = \
+                 { q = 0.017453292519943295, qd = 0.017453292519943295 }"
+            .into(),
     })
 }
 
@@ -227,7 +229,7 @@ fn signs_and_order(
             *name,
             format!(
                 "joint `{name}`: {turned}: model and friction explain {} of its torque as logged, {} turned; nothing was \
-                 changed: turn the columns, or the axis in the model",
+                 changed: turn the columns with [columns] factor, or the axis in the model",
                 share(&before[joint]),
                 share(&after[joint])
             ),

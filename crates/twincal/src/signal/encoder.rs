@@ -75,7 +75,7 @@ pub(crate) fn velocity_resolution(
             format!(
                 "joint `{}`: the encoder steps by {step:.3e}: quantisation alone leaves a noise of {velocity:.2e} in velocity and \
                  {acceleration:.2e} in acceleration derived from position (SI units, after the motion filter), and velocities below \
-                 {stepping:.3e} per s cannot be told from standstill; log the encoder's full resolution, or lower [signal] cutoff_hz",
+                 {stepping:.3e} per s cannot be told from standstill; log the encoder's full resolution",
                 facts.name
             ),
             0,

@@ -32,11 +32,11 @@ pub(crate) fn refuse_degrees(joints: &[JointFacts], log: &Recording) -> Result<(
 
 /// The same for one joint.
 fn refuse_joint(facts: &JointFacts, channels: &Channels, log: &Recording) -> Result<()> {
-    let error = |problem: String, remedy: &str| {
+    let error = |problem: String, remedy: &str, channels: &str| {
         Err(Error::Log {
             log: log.name.clone(),
             problem,
-            remedy: format!("{remedy} (× π/180)"),
+            remedy: format!("{remedy}: × π/180, as with [columns] factor = {{ {channels} }}"),
         })
     };
     if facts.kind == JointKind::Prismatic {
@@ -51,6 +51,7 @@ fn refuse_joint(facts: &JointFacts, channels: &Channels, log: &Recording) -> Res
                     facts.name
                 ),
                 "export velocities in rad/s",
+                "qd = 0.017453292519943295",
             );
         }
         if near(1.0 / DEGREES) {
@@ -61,6 +62,7 @@ fn refuse_joint(facts: &JointFacts, channels: &Channels, log: &Recording) -> Res
                     1.0 / ratio
                 ),
                 "export positions in rad",
+                "q = 0.017453292519943295",
             );
         }
     }
@@ -76,6 +78,7 @@ fn refuse_joint(facts: &JointFacts, channels: &Channels, log: &Recording) -> Res
                 facts.name
             ),
             "export positions, velocities and accelerations in radians",
+            "q = 0.017453292519943295, qd = 0.017453292519943295",
         );
     }
     Ok(())

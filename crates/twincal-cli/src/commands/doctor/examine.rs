@@ -9,16 +9,17 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use twincal::Finding;
-use twincal::calibrate::{Outlook, outlook};
+use twincal::calibrate::{CalibrationSettings, Outlook, calibrate, outlook};
 use twincal::robot::Robot;
 use twincal::signal::{
-    Log, LogOverview, Pipeline, Steps, choose_and_prepare, constant_torque, describe,
+    Auto, Log, LogOverview, Pipeline, Steps, choose_and_prepare, constant_torque, describe,
     hardly_driven, steps,
 };
 use twincal_io::config::{Settings, TimeUnit};
 use twincal_io::log::{
     LogOptions, Preset, TorqueSource, joints_without_column, match_columns, read_header,
 };
+use twincal_io::memory;
 
 /// Why `fit` would stop.
 #[derive(Debug, Clone, Serialize)]
@@ -30,6 +31,9 @@ pub(super) struct Refusal {
     /// The unit of the log's time with which `fit` would go on.
     #[serde(skip)]
     pub(super) time_unit: Option<TimeUnit>,
+    /// What its positions, and its velocities and accelerations, are multiplied with for `fit` to go on.
+    #[serde(skip)]
+    pub(super) degrees: Option<[f64; 2]>,
 }
 
 impl From<Failure> for Refusal {
@@ -41,6 +45,7 @@ impl From<Failure> for Refusal {
             remedy: remedy.unwrap_or_default(),
             exit_code,
             time_unit: None,
+            degrees: None,
         }
     }
 }
@@ -56,7 +61,7 @@ pub(super) struct Mapping {
     pub(super) unused: Vec<String>,
 }
 
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub(super) struct JointColumns {
     pub(super) joint: String,
     pub(super) position: Option<String>,
@@ -78,6 +83,8 @@ pub(super) struct Examination {
     pub(super) overviews: Vec<LogOverview>,
     pub(super) steps: Vec<Vec<Steps>>,
     pub(super) pipeline: Option<Pipeline>,
+    /// Where a coarse encoder does less harm and a fit would go on, Hz.
+    pub(super) lower_cutoff: Option<f64>,
     pub(super) checkup: Checkup,
     pub(super) outlook: Option<Outlook>,
     pub(super) findings: Vec<Finding>,
@@ -102,6 +109,7 @@ pub(super) fn examine(
         overviews: Vec::new(),
         steps: Vec::new(),
         pipeline: None,
+        lower_cutoff: None,
         checkup: Checkup::default(),
         outlook: None,
         findings: Vec::new(),
@@ -122,6 +130,10 @@ pub(super) fn examine(
     all.findings.append(&mut logs.findings);
     progress.step("comparing logs and model");
     all.look(&mut logs, &settings);
+    if all.refusals.is_empty() {
+        progress.step("trying the fit");
+        all.try_fit(&logs, &settings.calibration);
+    }
     let mut said: Vec<Finding> = Vec::with_capacity(all.findings.len());
     for finding in std::mem::take(&mut all.findings) {
         if !said.contains(&finding) {
@@ -174,6 +186,7 @@ impl Examination {
             ),
             exit_code: crate::failure::INPUT,
             time_unit: None,
+            degrees: None,
         });
         Ok(())
     }
@@ -237,6 +250,13 @@ impl Examination {
         (units.len() == logs && units.iter().all(|unit| *unit == first)).then_some(first)
     }
 
+    /// What makes radians of the numbers of all of `logs`.
+    pub(super) fn degrees(&self, logs: usize) -> Option<[f64; 2]> {
+        let factors: Vec<[f64; 2]> = self.refusals.iter().filter_map(|r| r.degrees).collect();
+        let first = *factors.first()?;
+        (factors.len() == logs && factors.iter().all(|own| *own == first)).then_some(first)
+    }
+
     /// Overviews, filters, comparison and outlook, as far as each of them goes.
     fn look(&mut self, logs: &mut LogInput, settings: &Settings) {
         let robot = &self.robot.robot;
@@ -256,6 +276,7 @@ impl Examination {
                 if let Some(mended) = converted(robot, log, &error, settings) {
                     self.converted.push(mended.words);
                     refusal.time_unit = mended.time;
+                    refusal.degrees = mended.degrees;
                     *log = mended.log;
                 }
                 self.refusals.push(refusal);
@@ -314,6 +335,48 @@ impl Examination {
             rate_hz: pipeline.common_rate(kept),
             ..pipeline
         });
+    }
+
+    /// Fits: what only a fit can tell (rows that count as too few) is a reason to stop as well. A lower cut-off is advised if
+    /// a fit would go on there.
+    fn try_fit(&mut self, logs: &LogInput, settings: &CalibrationSettings) {
+        let robot = &self.robot.robot;
+        let fit = |settings: &CalibrationSettings| {
+            let settings = CalibrationSettings {
+                most_bytes: memory::spare(),
+                ..settings.clone()
+            };
+            let logs: Vec<Log<'_>> = logs.logs.iter().map(Log::lent).collect();
+            calibrate(robot, logs, Vec::<Log<'_>>::new(), &settings, &|_| ())
+        };
+        match fit(settings) {
+            Err(stopped) => {
+                let error = logs.as_given(stopped.error);
+                self.refusals.push(Failure::from(error).into());
+            }
+            Ok(_) => {
+                let mut lower = settings.clone();
+                self.lower_cutoff = self.slower().filter(|&hz| {
+                    lower.signal.cutoff_hz = Auto::Value(hz);
+                    fit(&lower).is_ok()
+                });
+            }
+        }
+    }
+
+    /// A cut-off at which a tenth of each joint's velocity can be told from standstill: an encoder of step s resolves `16 f_c s`.
+    fn slower(&self) -> Option<f64> {
+        if !(self.findings.iter()).any(|finding| finding.code == "quantised_encoder") {
+            return None;
+        }
+        let now = self.pipeline.as_ref()?.cutoff_hz;
+        let logs = self.overviews.iter().zip(&self.steps);
+        let joints = logs.flat_map(|(log, steps)| log.joints.iter().zip(steps));
+        let wanted = joints
+            .filter_map(|(joint, steps)| Some(0.1 * joint.qd_rms / (16.0 * steps.position?)))
+            .fold(f64::INFINITY, f64::min);
+        let hz = (wanted * 10.0).floor() / 10.0;
+        (hz >= 0.5 && hz < now).then_some(hz)
     }
 }
 

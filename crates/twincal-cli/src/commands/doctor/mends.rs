@@ -1,8 +1,10 @@
 //! What to mend, the most important first, each with a number and a line to type or to write.
 
+use super::columns::sign_line;
 use super::examine::Examination;
 use serde::Serialize;
 use std::fmt::Write as _;
+use twincal::self_check::JointCheck;
 use twincal::{Finding, Severity};
 
 /// One thing to mend.
@@ -26,15 +28,12 @@ const NOT_USED: &str = "nothing, if it does not act in these logs; else write it
 const ORDER: [(&str, &str); 46] = [
     (
         "joint_order",
-        "map the columns in [columns.q], [columns.qd], [columns.tau] of twincal.toml",
+        "map the columns in [columns.q], [columns.qd], [columns.tau] of twincal.toml; twincal init writes them",
     ),
-    (
-        "sign_flip",
-        "turn the sign of the columns where the log is made, or the joint's <axis> in the model",
-    ),
+    ("sign_flip", "twincal.toml: [columns.factor]"),
     (
         "torque_scale",
-        "convert the torque columns to N·m at the joint where the log is made",
+        "say what the torque is ([log] torque, gear_ratio, drive_constant), or give [columns.factor] tau",
     ),
     (
         "unphysical_inertia",
@@ -106,7 +105,7 @@ const ORDER: [(&str, &str); 46] = [
     ),
     (
         "quantised_encoder",
-        "log the full resolution of the encoder, or lower [signal] cutoff_hz",
+        "log the full resolution of the encoder",
     ),
     (
         "joint_not_excited",
@@ -242,7 +241,14 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
             Some(lag) => format!("twincal.toml: [signal] lag = {lag:?}"),
             None => "one [signal] lag cannot mend logs that differ: fit them apart".into(),
         },
-        ("quantised_encoder", _) => match slower(examination) {
+        ("sign_flip", _) => match of_joint(examination, &finding.subject) {
+            Some(check) => format!(
+                "twincal.toml: {} (twincal init writes it), or turn the axis in the model",
+                sign_line(check)
+            ),
+            None => "turn the sign of the columns where the log is made".into(),
+        },
+        ("quantised_encoder", _) => match examination.lower_cutoff {
             Some(hz) => format!(
                 "twincal.toml: [signal] cutoff_hz = {hz:?}, or log the encoder's full resolution"
             ),
@@ -269,6 +275,11 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
     }
 }
 
+fn of_joint<'a>(examination: &'a Examination, joint: &str) -> Option<&'a JointCheck> {
+    let mut joints = examination.checkup.joints.iter();
+    joints.find(|check| check.joint == joint)
+}
+
 /// The lag to write into the config, s to a tenth of a millisecond: the mean of the logs that clearly have one, if they agree.
 pub(super) fn lag(examination: &Examination) -> Option<f64> {
     let logs = examination.checkup.lags.values();
@@ -283,16 +294,4 @@ pub(super) fn lag(examination: &Examination) -> Option<f64> {
         .iter()
         .all(|(lag, interval)| (lag - mean).abs() <= *interval);
     agree.then_some((mean * 1e4).round() / 1e4)
-}
-
-/// A cut-off at which a tenth of each joint's velocity can be told from standstill: an encoder of step s resolves `16 f_c s`.
-fn slower(examination: &Examination) -> Option<f64> {
-    let now = examination.pipeline.as_ref()?.cutoff_hz;
-    let logs = examination.overviews.iter().zip(&examination.steps);
-    let joints = logs.flat_map(|(log, steps)| log.joints.iter().zip(steps));
-    let wanted = joints
-        .filter_map(|(joint, steps)| Some(0.1 * joint.qd_rms / (16.0 * steps.position?)))
-        .fold(f64::INFINITY, f64::min);
-    let hz = (wanted * 10.0).floor() / 10.0;
-    (hz >= 0.5 && hz < now).then_some(hz)
 }

@@ -1,6 +1,7 @@
 //! `twincal doctor`: what is wrong with logs or model, what to mend first, and a config to begin with; `twincal init`
 //! writes that config.
 
+mod columns;
 mod examine;
 mod mends;
 mod print;

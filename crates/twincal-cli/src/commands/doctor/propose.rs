@@ -1,7 +1,8 @@
 //! The config that logs and model ask for.
 
 use super::Asked;
-use super::examine::Examination;
+use super::columns::{DEGREES, TICKS, columns};
+use super::examine::{Examination, Refusal};
 use super::mends::lag;
 use std::path::{Path, PathBuf};
 use twincal_io::config::{Config, LogEntry, Proposal};
@@ -53,9 +54,12 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
         );
         (lag, words)
     });
-    let time_unit = examination.time_unit(logs.len(), settings);
-    let mut columns = settings.log.columns.clone();
-    columns.time_unit = columns.time_unit.or(time_unit);
+    let columns = columns(examination, logs.len(), settings);
+    let is_mended = |code: &str| columns.mended.contains(&code);
+    let mends_refusal = |refusal: &Refusal| {
+        (is_mended(TICKS) && refusal.time_unit.is_some())
+            || (is_mended(DEGREES) && refusal.degrees.is_some())
+    };
     let mut locked = settings.locked.clone();
     locked.extend(examination.locked.clone());
     let beside = asked.given.iter().map(|file| {
@@ -65,9 +69,7 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
     let remarks = examination
         .refusals
         .iter()
-        .filter(|refusal| {
-            examination.locked.is_empty() && (time_unit.is_none() || refusal.time_unit.is_none())
-        })
+        .filter(|refusal| examination.locked.is_empty() && !mends_refusal(refusal))
         .map(|refusal| {
             format!(
                 "fit refuses these logs: {}; {}",
@@ -79,6 +81,7 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
                 .findings
                 .iter()
                 .filter(|f| ["sign_flip", "joint_order", "torque_scale"].contains(&f.code.as_str()))
+                .filter(|f| !is_mended(&f.code))
                 .map(|finding| finding.message.clone()),
         )
         .chain(beside)
@@ -104,7 +107,8 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
                 ..entry(&asked.config, file)
             }))
             .collect(),
-        columns,
+        columns: columns.table,
+        factor_comment: columns.why,
         cutoff_hz,
         cutoff_comment,
         lag,

@@ -83,6 +83,8 @@ pub(super) struct Converted {
     pub(super) words: String,
     /// The unit of its time where that is no second.
     pub(super) time: Option<TimeUnit>,
+    /// What makes radians of its positions, and of its velocities and accelerations.
+    pub(super) degrees: Option<[f64; 2]>,
 }
 
 /// The log in units with which it comes further.
@@ -114,6 +116,7 @@ pub(super) fn converted(
                     log: changed,
                     words,
                     time: Some(time),
+                    degrees: None,
                 });
             }
         }
@@ -142,6 +145,7 @@ pub(super) fn converted(
                 log: changed,
                 words,
                 time: None,
+                degrees: Some(factors),
             });
         }
     }

@@ -1,0 +1,143 @@
+//! What `[columns]` has to say of logs whose numbers have other units, signs or another order than the model.
+
+use super::examine::{Examination, Mapping};
+use std::collections::BTreeMap;
+use twincal::robot::JointKind;
+use twincal::self_check::JointCheck;
+use twincal_io::config::{ChannelNames, ColumnsTable, Factor, Settings, key};
+
+/// `[columns]` of a proposed config.
+pub(super) struct Columns {
+    pub(super) table: ColumnsTable,
+    /// Why numbers need factors.
+    pub(super) why: String,
+    /// Codes of findings, and of refusals, that the table mends.
+    pub(super) mended: Vec<&'static str>,
+}
+
+/// Refusals in [`Columns::mended`]: for degrees, and for ticks of a clock.
+pub(super) const DEGREES: &str = "degrees";
+pub(super) const TICKS: &str = "ticks";
+
+/// What was said of columns, with what the logs ask for beside it.
+pub(super) fn columns(examination: &Examination, logs: usize, settings: &Settings) -> Columns {
+    let mut all = Columns {
+        table: settings.log.columns.clone(),
+        why: String::new(),
+        mended: Vec::new(),
+    };
+    if let Some(unit) = examination.time_unit(logs, settings) {
+        all.table.time_unit = Some(unit);
+        all.mended.push(TICKS);
+    }
+    let mut whys = Vec::new();
+    if let Some([position, rates]) = examination.degrees(logs) {
+        let factor = &mut all.table.factor;
+        let channels = [
+            (&mut factor.q, position),
+            (&mut factor.qd, rates),
+            (&mut factor.qdd, rates),
+        ];
+        for (factor, number) in channels.into_iter().filter(|(_, number)| *number != 1.0) {
+            *factor = turning(examination, number);
+        }
+        whys.push("Positions or velocities are logged in degrees.".to_owned());
+        all.mended.push(DEGREES);
+    }
+    let joints = &examination.checkup.joints;
+    for check in joints.iter().filter(|check| is_turned(check)) {
+        let factor = &mut all.table.factor;
+        let motion = [&mut factor.q, &mut factor.qd, &mut factor.qdd];
+        for factor in motion.into_iter().filter(|_| check.motion.1 < 0.0) {
+            multiply(factor, examination, &check.joint);
+        }
+        if check.torque.1 < 0.0 {
+            multiply(&mut factor.tau, examination, &check.joint);
+        }
+        whys.push(format!("{} is turned round.", check.joint));
+        all.mended.push("sign_flip");
+    }
+    all.why = whys.join(" ");
+    if joints.iter().any(is_moved) && reorder(examination, &mut all.table) {
+        all.mended.push("joint_order");
+    }
+    all
+}
+
+/// The line that turns the signs of a joint.
+pub(super) fn sign_line(check: &JointCheck) -> String {
+    let turned = format!("{{ {} = -1.0 }}", key(&check.joint));
+    let channels = [
+        ("q", check.motion.1),
+        ("qd", check.motion.1),
+        ("tau", check.torque.1),
+    ];
+    let channels = channels.iter().filter(|(_, sign)| *sign < 0.0);
+    let lines: Vec<String> = channels
+        .map(|(channel, _)| format!("{channel} = {turned}"))
+        .collect();
+    format!("[columns.factor] {}", lines.join(", "))
+}
+
+fn is_turned(check: &JointCheck) -> bool {
+    check.motion.1 < 0.0 || check.torque.1 < 0.0
+}
+
+fn is_moved(check: &JointCheck) -> bool {
+    check.motion.0 != check.joint || check.torque.0 != check.joint
+}
+
+/// A factor of every joint that turns.
+fn turning(examination: &Examination, number: f64) -> Factor {
+    let robot = &examination.robot.robot;
+    let turns = |joint: &usize| robot.joint_kind(*joint) != JointKind::Prismatic;
+    let names = robot.joint_names();
+    let turning: Vec<usize> = (0..robot.dof()).filter(turns).collect();
+    if turning.len() == robot.dof() {
+        return Factor::All(number);
+    }
+    let named = turning
+        .iter()
+        .map(|&joint| (names[joint].to_owned(), number));
+    Factor::ByJoint(named.collect())
+}
+
+/// Turns the sign of one joint.
+fn multiply(factor: &mut Factor, examination: &Examination, joint: &str) {
+    let names = examination.robot.robot.joint_names();
+    let said = names
+        .iter()
+        .filter_map(|name| Some(((*name).to_owned(), factor.of_joint(name)?)));
+    let mut by_joint: BTreeMap<String, f64> = said.collect();
+    *by_joint.entry(joint.to_owned()).or_insert(1.0) *= -1.0;
+    *factor = Factor::ByJoint(by_joint);
+}
+
+/// Maps the columns of exchanged joints; false where the columns are not those of one table.
+fn reorder(examination: &Examination, table: &mut ColumnsTable) -> bool {
+    let mut mappings = examination.mappings.iter().map(|(_, mapping)| mapping);
+    let Some(first) = mappings.next() else {
+        return false;
+    };
+    if mappings.any(|other| other.joints != first.joints) {
+        return false;
+    }
+    let checks = &examination.checkup.joints;
+    let of = |from: fn(&JointCheck) -> &str,
+              column: fn(&super::examine::JointColumns) -> Option<&String>| {
+        let named = checks.iter().filter_map(|check| {
+            let own = joint_of(first, from(check))?;
+            Some((check.joint.clone(), column(own)?.clone()))
+        });
+        named.collect::<ChannelNames>()
+    };
+    table.q = of(|check| &check.motion.0, |joint| joint.position.as_ref());
+    table.qd = of(|check| &check.motion.0, |joint| joint.velocity.as_ref());
+    table.qdd = of(|check| &check.motion.0, |joint| joint.acceleration.as_ref());
+    table.tau = of(|check| &check.torque.0, |joint| joint.torque.as_ref());
+    true
+}
+
+fn joint_of<'a>(mapping: &'a Mapping, name: &str) -> Option<&'a super::examine::JointColumns> {
+    mapping.joints.iter().find(|joint| joint.joint == name)
+}
