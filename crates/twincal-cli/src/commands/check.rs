@@ -133,6 +133,11 @@ fn judge(scores: &Scores, stored: &Scores, gates: &Gates) -> Vec<Gate> {
             ),
         });
         let [low, high] = gates.coverage;
+        let cautious = if joint.coverage95 > high {
+            ": wider than these rows need; where that does no harm, say [check] coverage with 1 at the top"
+        } else {
+            ""
+        };
         judged.push(Gate {
             joint: name.clone(),
             gate: "coverage",
@@ -140,7 +145,7 @@ fn judge(scores: &Scores, stored: &Scores, gates: &Gates) -> Vec<Gate> {
             value: joint.coverage95,
             limit: [Some(low), Some(high)],
             words: format!(
-                "joint `{name}`: the 95 % interval holds {} of the rows, the gate is {} to {}",
+                "joint `{name}`: the 95 % interval holds {} of the rows, the gate is {} to {}{cautious}",
                 percent(joint.coverage95),
                 percent(low),
                 percent(high)

@@ -1,7 +1,7 @@
 //! `twincal diff`: what changed between two twins of the same robot.
 
 use super::print_json;
-use super::summary::{Notes, findings, paragraph};
+use super::summary::{Notes, findings, paragraph, pip};
 use crate::args::Diff;
 use crate::failure::Outcome;
 use crate::terminal::Terminal;
@@ -50,11 +50,37 @@ fn print(changes: &[Change], terminal: &mut Terminal) {
         terminal.say("  nothing that these logs can tell");
     }
     for change in changed {
-        paragraph(&change.words, terminal);
+        paragraph(&format!("{} ({})", change.words, pips(change)), terminal);
+    }
+    let (turned, same): (Vec<_>, Vec<_>) = same.into_iter().partition(|change| turned(change));
+    if !turned.is_empty() {
+        let named = turned
+            .iter()
+            .map(|change| format!("{}: {}", change.name, pips(change)));
+        let named: Vec<String> = named.collect();
+        let text = format!(
+            "in one of the two only, though no number clearly differs: {}",
+            named.join("; ")
+        );
+        paragraph(&text, terminal);
     }
     if !same.is_empty() {
         let names: Vec<&str> = same.iter().map(|change| change.name.as_str()).collect();
         paragraph(&format!("as before: {}", names.join(", ")), terminal);
     }
     terminal.say("");
+}
+
+/// "PIP 0.032 → >0.999".
+fn pips(change: &Change) -> String {
+    let [before, after] = change
+        .pip
+        .map(|p| p.map_or_else(|| "–".into(), |p| pip(Some(p))));
+    format!("PIP {before} → {after}")
+}
+
+/// Whether the component is in on one side alone.
+fn turned(change: &Change) -> bool {
+    let [before, after] = change.pip.map(|pip| pip.is_some_and(|pip| pip > 0.5));
+    before != after
 }

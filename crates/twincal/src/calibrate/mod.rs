@@ -397,8 +397,10 @@ fn road(
     let components = &calibration.components;
     let negative = negative_friction::findings(&calibration.twin, &library, components);
     let tilt = tilt_beside_mass::finding(robot, &library, &calibration);
-    let more = unphysical.into_iter().chain(negative).chain(tilt);
-    calibration.findings.extend(more);
+    unphysical::tell(&mut calibration, unphysical);
+    calibration
+        .findings
+        .extend(negative.into_iter().chain(tilt));
     Ok(Road::End(Box::new(calibration)))
 }
 

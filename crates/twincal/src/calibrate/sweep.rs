@@ -106,9 +106,9 @@ pub(super) fn findings(
                 "depends_on_cutoff",
                 name.clone(),
                 format!(
-                    "`{name}` moves by {moved:.1} sd (from {:.4} to {:.4}) when the cut-off becomes {:.3} Hz: \
-                     do not read its interval as the whole uncertainty",
-                    posterior.mean[k], point.mean[k], point.cutoff_hz
+                    "`{name}` moves by {moved:.1} sd when the cut-off becomes {:.3} Hz (mean over all models, in or out: from {:.4} \
+                     to {:.4}): do not read its interval as the whole uncertainty",
+                    point.cutoff_hz, posterior.mean[k], point.mean[k]
                 ),
                 0,
             );

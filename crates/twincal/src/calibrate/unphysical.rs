@@ -14,8 +14,17 @@ const STREAM: u64 = (1 << 32) + 2;
 const CONTRADICTS: f64 = 0.01;
 /// Share below which it is worth telling.
 const WORTH_TELLING: f64 = 0.5;
+/// Behind the words of a component that contradicts every rigid body.
+const NO_BODY: &str = "; no rigid body has such an inertia";
 /// Rounding in the triangle inequality, as a share of the largest moment.
 const ROUNDING: f64 = 1e-9;
+
+/// A found inertia that is none.
+pub(super) struct Unphysical {
+    finding: Finding,
+    /// Found components that contradict every rigid body.
+    components: Vec<usize>,
+}
 
 /// One finding for each body with a found inertial component of which fewer than half of the posterior draws are those of a
 /// rigid body: positive mass and a positive semidefinite pseudo-inertia, which is that the principal moments about the
@@ -30,7 +39,7 @@ pub(super) fn findings(
     calibration: &Calibration,
     drawer: &Drawer<'_>,
     seed: u64,
-) -> Vec<Finding> {
+) -> Vec<Unphysical> {
     let found = |column: usize| {
         let term = &library.terms()[library.columns()[column]];
         calibration.components[term.component].selected
@@ -49,7 +58,7 @@ pub(super) fn findings(
     let hidden = base_parameters(robot).unidentifiable;
     let draws = drawer.draw(DRAWS, seed, STREAM);
     let count = draws.models.len();
-    let mut findings = Vec::new();
+    let mut all = Vec::new();
     for (body, name) in robot.bodies().into_iter().enumerate() {
         let across = ["Ixx", "Iyy"].map(|moment| hidden.contains(&format!("{name}.{moment}")));
         let whole = !across.contains(&true);
@@ -69,10 +78,34 @@ pub(super) fn findings(
         });
         let share = consistent.count() as f64 / count.max(1) as f64;
         if share < WORTH_TELLING {
-            findings.push(finding(name, share));
+            let of_column = |(column, _): &(usize, [f64; 10])| {
+                library.terms()[library.columns()[*column]].component
+            };
+            let all_of_body = columns[body].iter().filter(|_| share < CONTRADICTS);
+            let mut components: Vec<usize> = all_of_body.map(of_column).collect();
+            components.dedup();
+            components.retain(|component| calibration.components[*component].selected);
+            all.push(Unphysical {
+                finding: finding(name, share),
+                components,
+            });
         }
     }
-    findings
+    all
+}
+
+/// Says it, and at once where the numbers stand.
+pub(super) fn tell(calibration: &mut Calibration, unphysical: Vec<Unphysical>) {
+    for Unphysical {
+        finding,
+        components,
+    } in unphysical
+    {
+        for component in components {
+            calibration.components[component].words.push_str(NO_BODY);
+        }
+        calibration.findings.push(finding);
+    }
 }
 
 fn finding(link: &str, share: f64) -> Finding {

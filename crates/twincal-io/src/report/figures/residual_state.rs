@@ -10,6 +10,8 @@ use twincal::validate::Trace;
 /// Points drawn per series; the binned means use all rows.
 const POINTS: usize = 350;
 const BINS: usize = 20;
+/// Fewest rows of a bin.
+const LEAST: usize = 5;
 
 /// One row: state, residual before, residual after.
 type Sample = (f64, f64, f64);
@@ -52,6 +54,7 @@ fn samples(joint: &Joint<'_>, state: impl Fn(&Trace) -> &Vec<f64>) -> Vec<Sample
             }
         }
     }
+    out.sort_by(|a, b| a.0.total_cmp(&b.0));
     out
 }
 
@@ -73,8 +76,8 @@ fn draw(joint: &Joint<'_>, samples: &[Sample], quantity: &str, unit: &str) -> Im
     panel.dots(&mut svg, "pn", drawn().map(|s| (s.0, s.1)));
     panel.dots(&mut svg, "pc", drawn().map(|s| (s.0, s.2)));
     svg.line("a", panel.at(x.domain.0, 0.0), panel.at(x.domain.1, 0.0));
-    panel.line(&mut svg, "n", means(samples, x.domain, |s| s.1));
-    panel.line(&mut svg, "c", means(samples, x.domain, |s| s.2));
+    panel.line(&mut svg, "n", means(samples, |s| s.1));
+    panel.line(&mut svg, "c", means(samples, |s| s.2));
     let label = format!(
         "Scatter plot of the residual torque of joint {} against its {quantity}, before and after calibration.",
         joint.name
@@ -85,25 +88,17 @@ fn draw(joint: &Joint<'_>, samples: &[Sample], quantity: &str, unit: &str) -> Im
     )
 }
 
-/// Mean per bin over `domain`, at the bin's centre; a bin with fewer than five rows breaks the line.
-fn means(
-    samples: &[Sample],
-    domain: (f64, f64),
-    value: impl Fn(&Sample) -> f64,
-) -> Vec<(f64, f64)> {
-    let mut bins = [(0usize, 0.0); BINS];
-    let width = (domain.1 - domain.0) / BINS as f64;
-    for sample in samples {
-        let bin = (((sample.0 - domain.0) / width) as usize).min(BINS - 1);
-        bins[bin] = (bins[bin].0 + 1, bins[bin].1 + value(sample));
-    }
-    bins.iter()
-        .enumerate()
-        .map(|(i, &(n, sum))| {
-            (
-                domain.0 + width * (i as f64 + 0.5),
-                if n < 5 { f64::NAN } else { sum / n as f64 },
-            )
+/// Means of state and value over bins with equally many rows each: where few rows are, the bins are wide and the line goes on. Rows
+/// are in the order of their state.
+fn means(samples: &[Sample], value: impl Fn(&Sample) -> f64) -> Vec<(f64, f64)> {
+    let bins = BINS.min(samples.len() / LEAST);
+    let cut = |bin: usize| bin * samples.len() / bins;
+    (0..bins)
+        .map(|bin| {
+            let own = &samples[cut(bin)..cut(bin + 1)];
+            let mean =
+                |of: &dyn Fn(&Sample) -> f64| own.iter().map(of).sum::<f64>() / own.len() as f64;
+            (mean(&|sample| sample.0), mean(&|sample| value(sample)))
         })
         .collect()
 }
@@ -117,12 +112,23 @@ mod tests {
         let samples: Vec<Sample> = (0..1000)
             .map(|i| (f64::from(i) / 1000.0, if i < 500 { -2.0 } else { 3.0 }, 0.0))
             .collect();
-        let means = means(&samples, (0.0, 1.0), |s| s.1);
+        let means = means(&samples, |s| s.1);
         assert_eq!(means.len(), BINS);
         assert!(
             means[..10].iter().all(|m| m.1 == -2.0) && means[10..].iter().all(|m| m.1 == 3.0),
             "{means:?}"
         );
-        assert!((means[0].0 - 0.025).abs() < 1e-12);
+        assert!((means[0].0 - 0.0245).abs() < 1e-12);
+    }
+
+    /// Two far rows are no bin of their own, and no rows no line.
+    #[test]
+    fn few_rows_leave_no_gap_in_the_line() {
+        let mut samples: Vec<Sample> = (0..23).map(|i| (f64::from(i), 1.0, 0.0)).collect();
+        samples.extend([(100.0, 1.0, 0.0), (101.0, 1.0, 0.0)]);
+        let line = means(&samples, |s| s.1);
+        assert_eq!(line.len(), 5);
+        assert!(line.iter().all(|point| point.1 == 1.0) && line[4].0 > 22.0);
+        assert!(means(&samples[..4], |s| s.1).is_empty());
     }
 }
