@@ -1,4 +1,4 @@
-//! A wider band where nobody states one: where noise is an autoregression, and nowhere else.
+//! A wider band where that is asked for: where noise is an autoregression, and nowhere else.
 
 #[path = "../examples/two_link.rs"]
 #[allow(dead_code, reason = "its `main` prints, which a test does not need")]
@@ -63,6 +63,7 @@ fn log(memory: f64, stribeck: f64, seed: u64) -> Recording {
 
 fn fitted(log: Recording, change: impl Fn(&mut CalibrationSettings)) -> Calibration {
     let mut settings = CalibrationSettings::default();
+    settings.may_widen = true;
     settings.library.generic = Some(false);
     settings.library.families = vec![Family::Payload, Family::Viscous];
     change(&mut settings);

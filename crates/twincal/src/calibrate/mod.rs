@@ -82,8 +82,7 @@ pub struct CalibrationSettings {
     pub inference: InferenceSettings,
     /// What becomes of gear ripple that nobody asked for: what `[library]` families and ripple say beside `library`.
     pub unasked_ripple: UnaskedRipple,
-    /// Nobody chose a likelihood (no key of `twincal.toml`): where nobody chose a cut-off either and the noise allows it, the fit goes on in
-    /// a wider band with `ar1`.
+    /// `[signal] wider_band`: where nobody chose cut-off or likelihood and the noise allows it, the fit goes on in a wider band with `ar1`.
     pub may_widen: bool,
     /// Bytes that are free for what is made of the recordings (no key of `twincal.toml`); `None`: any number.
     pub most_bytes: Option<u64>,
@@ -129,7 +128,7 @@ impl Default for CalibrationSettings {
                 allow_disagreement: false,
             },
             unasked_ripple: UnaskedRipple::Candidate,
-            may_widen: true,
+            may_widen: false,
             most_bytes: None,
         }
     }
@@ -198,8 +197,8 @@ fn road(
         log.any_recording(|recording| recording.require_torque(&names))?;
     }
     let chosen = choose_and_prepare(robot, logs, &settings.signal)?;
-    findings.extend(chosen.findings);
     let (mut pipeline, mut prepared, wider_hz) = (chosen.pipeline, chosen.logs, chosen.wider_hz);
+    findings.extend(chosen.findings);
     let every_log: Vec<Log<'_>> = logs.iter().chain(heldout).map(Log::lent).collect();
     findings.extend(constant_torque(robot, every_log.clone())?);
     findings.extend(hardly_driven(robot, every_log.clone())?);

@@ -1,4 +1,4 @@
-//! More of the log where its noise allows it: a wider band, fitted with `ar1`, where nobody chose band or likelihood.
+//! More of the log where its noise allows it: a wider band, fitted with `ar1`, where that is asked for.
 //!
 //! Noise with a memory is largest where the motion is. Where it is an autoregression of first order it falls above as 1/f², and what lies
 //! there tells effects apart that look alike below. But what a model lacks (friction that turns round sharply, flexible joints) and what encoders add to
@@ -132,7 +132,7 @@ pub(super) fn not_wider(error: &Error) -> Finding {
         "",
         format!(
             "what is left is an autoregression, but a fit in a wider band with \"ar1\" ends early ({error}): fitted in the usual one; \
-             [noise] model = \"tempered\" does not try"
+             without [signal] wider_band it is not tried"
         ),
         0,
     )
@@ -154,7 +154,7 @@ fn finding(told: &[(&str, Judged)], pipeline: &Pipeline, cutoff_hz: f64) -> Opti
         format!(
             "below {cutoff_hz} Hz what is left is noise of one memory on every joint, {:.3} s at most (joint `{}`): cumulated periodogram \
              within {:.2} of white (limit {CUMULATED:.2}), variances over speeds {:.1} (limit {VARIANCES:.1}). Fitted up to there as \
-             such noise instead of below {narrow} Hz; [noise] model = \"tempered\" or [signal] cutoff_hz = {narrow} does not",
+             such noise instead of below {narrow} Hz",
             longest.1.time / cutoff_hz,
             longest.0,
             largest(|judged| judged.cumulated),
