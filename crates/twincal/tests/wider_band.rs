@@ -1,10 +1,10 @@
-//! A wider band where that is asked for: where noise is an autoregression, and nowhere else.
+//! A wider band where noise is an autoregression, and nowhere else.
 
 #[path = "../examples/two_link.rs"]
 #[allow(dead_code, reason = "its `main` prints, which a test does not need")]
 mod two_link;
 
-use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
+use twincal::calibrate::{Calibration, CalibrationSettings, Stopped, calibrate};
 use twincal::likelihood::NoiseModel;
 use twincal::posterior::random::Random;
 use twincal::robot::{Workspace, inverse_dynamics};
@@ -62,13 +62,19 @@ fn log(memory: f64, stribeck: f64, seed: u64) -> Recording {
 }
 
 fn fitted(log: Recording, change: impl Fn(&mut CalibrationSettings)) -> Calibration {
+    tried(log, change).expect("a calibration")
+}
+
+fn tried(
+    log: Recording,
+    change: impl Fn(&mut CalibrationSettings),
+) -> Result<Calibration, Stopped> {
     let mut settings = CalibrationSettings::default();
-    settings.may_widen = true;
     settings.library.generic = Some(false);
     settings.library.families = vec![Family::Payload, Family::Viscous];
     change(&mut settings);
     let arm = two_link::arm(2.0).expect("an arm");
-    calibrate(&arm, &[log][..], &[], &settings, &|_| {}).expect("a calibration")
+    calibrate(&arm, &[log][..], &[], &settings, &|_| {})
 }
 
 /// Cut-off, likelihood, and whether a wider band is told.
@@ -130,6 +136,44 @@ fn nothing_changes_where_noise_is_none_or_somebody_chose() {
     assert!(usual(&cutoff));
     let encoder = fitted(positions(log(0.1, 0.0, 1)), |_| {});
     assert_eq!(used(&encoder).1, NoiseModel::Tempered);
+}
+
+/// Rows of the wider band that do not fit into memory end that fit, not the calibration: it is the usual one, and says so.
+#[test]
+fn where_the_wider_band_ends_early_the_usual_one_is_fitted() {
+    let memory = || log(0.1, 0.0, 1);
+    let refused = |change: &dyn Fn(&mut CalibrationSettings)| -> f64 {
+        let stopped = tried(memory(), |settings| {
+            settings.most_bytes = Some(1000);
+            change(settings);
+        });
+        let text = stopped.expect_err("no room").error.to_string();
+        let after = text.split("needs about ").nth(1).expect("what it needs");
+        let number = after.split(' ').next().expect("a number");
+        1e6 * number.parse::<f64>().expect("megabytes")
+    };
+    let narrow = refused(&|_| {});
+    let wide = refused(&|settings| {
+        settings.signal.cutoff_hz = Auto::Value(20.0);
+        settings.noise.model = NoiseModel::Ar1;
+    });
+    assert!(wide > narrow + 3e5, "{narrow} and {wide} bytes");
+    let between = Some((0.5 * (narrow + wide)) as u64);
+    let result = fitted(memory(), |settings| settings.most_bytes = between);
+    let usual = fitted(memory(), |settings| settings.may_widen = false);
+    assert_eq!(used(&result), (5.0, NoiseModel::Tempered, false));
+    assert_eq!(result.twin.posterior, usual.twin.posterior);
+    let (said, others): (Vec<_>, Vec<_>) =
+        (result.findings.into_iter()).partition(|found| found.code == "not_wider");
+    assert_eq!(others, usual.findings);
+    assert!(
+        said.len() == 1 && said[0].message.contains("MB are free"),
+        "{said:?}"
+    );
+    let room = fitted(memory(), |settings| {
+        settings.most_bytes = Some(2 * wide as u64);
+    });
+    assert_eq!(used(&room), (20.0, NoiseModel::Ar1, true));
 }
 
 /// The same with positions alone, from an encoder with 1e-4 rad of noise.

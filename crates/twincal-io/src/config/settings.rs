@@ -288,23 +288,14 @@ impl Config {
             noise: self.noise(),
             inference: self.inference()?,
             unasked_ripple: self.file.library.unasked_ripple(),
-            may_widen: self.may_widen()?,
+            may_widen: self.may_widen(),
             most_bytes: None,
         })
     }
 
     /// Whether the fit may go on in a wider band, which it chooses together with the likelihood.
-    fn may_widen(&self) -> Result<bool> {
-        let asked = self.file.signal.wider_band == Some(true);
-        let chosen = self.file.signal.cutoff_hz.is_some() || self.file.noise.model.is_some();
-        if asked && chosen {
-            let problem =
-                "the wider band is a choice of cut-off and likelihood, and one of them is stated"
-                    .into();
-            let remedy = "leave signal.cutoff_hz and noise.model out, or this key";
-            return Err(self.out_of_range("signal.wider_band", problem, remedy));
-        }
-        Ok(asked)
+    fn may_widen(&self) -> bool {
+        self.file.signal.wider_band.unwrap_or(true) && self.file.noise.model.is_none()
     }
 
     fn signal(&self) -> Result<SignalSettings> {

@@ -82,7 +82,8 @@ pub struct CalibrationSettings {
     pub inference: InferenceSettings,
     /// What becomes of gear ripple that nobody asked for: what `[library]` families and ripple say beside `library`.
     pub unasked_ripple: UnaskedRipple,
-    /// `[signal] wider_band`: where nobody chose cut-off or likelihood and the noise allows it, the fit goes on in a wider band with `ar1`.
+    /// `[signal] wider_band` with no `[noise] model`: where nobody chose a cut-off either and the noise allows it, the fit goes on in a wider
+    /// band with `ar1`.
     pub may_widen: bool,
     /// Bytes that are free for what is made of the recordings (no key of `twincal.toml`); `None`: any number.
     pub most_bytes: Option<u64>,
@@ -128,7 +129,7 @@ impl Default for CalibrationSettings {
                 allow_disagreement: false,
             },
             unasked_ripple: UnaskedRipple::Candidate,
-            may_widen: false,
+            may_widen: true,
             most_bytes: None,
         }
     }

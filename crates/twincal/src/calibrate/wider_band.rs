@@ -7,7 +7,9 @@
 //! 1. the residual of the fit has a memory of more than [`MEMORY`] rows on some joint: else nothing is to be gained,
 //! 2. accelerations are known as well there ([`crate::signal::Chosen::wider_hz`]),
 //! 3. the residual that the fit leaves in the wider band is such an autoregression on every joint that moves, and as large at reversals as
-//!    elsewhere ([`super::whiteness`]); a few stretches of the training logs say so.
+//!    elsewhere ([`super::whiteness`]); a few stretches of the training logs say so,
+//! 4. its time T is such that on some joint it falls from within the band of the fit on: `2π f_c T ≥ 1`. White noise may have a long memory
+//!    by chance on one of many joints, but not that.
 //!
 //! The motion of the stretches is that of the fit, whose own filter ends at four times the cut-off: what it lacks stays in the residual.
 
@@ -20,6 +22,7 @@ use crate::plug_in::Fit;
 use crate::robot::Robot;
 use crate::signal::{Auto, Payload, Pipeline, ReadyLog, stretches};
 use crate::term::Library;
+use std::f64::consts::TAU;
 
 /// Autocorrelation time of a residual with a memory, rows; that of white noise behind the filter is 1.35.
 const MEMORY: f64 = 2.0;
@@ -86,6 +89,11 @@ pub(super) fn wider(
             Some(judged) => told.push((name, judged)),
             None => return Ok(None),
         }
+    }
+    let periods = told.iter().map(|(_, judged)| judged.time);
+    let time = periods.fold(0.0, f64::max) / cutoff_hz;
+    if TAU * pipeline.cutoff_hz * time < 1.0 {
+        return Ok(None);
     }
     Ok(finding(&told, pipeline, cutoff_hz).map(|finding| Wider { cutoff_hz, finding }))
 }
