@@ -125,9 +125,10 @@ fn compare(
     logs: &LogInput,
     signal: &SignalSettings,
 ) -> Outcome<(Option<Aligned>, Vec<Finding>)> {
-    let Ok((pipeline, _, _)) = choose_and_prepare(robot, &logs.logs, signal) else {
+    let Ok(chosen) = choose_and_prepare(robot, &logs.logs, signal) else {
         return Ok((None, Vec::new()));
     };
+    let pipeline = chosen.pipeline;
     let mut found = checkup(robot, &logs.logs, &pipeline).map_err(|e| logs.as_given(e))?;
     let findings = std::mem::take(&mut found.findings);
     Ok((Some((pipeline, found)), findings))

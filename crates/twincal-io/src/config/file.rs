@@ -363,6 +363,10 @@ pub struct SignalTable {
     /// { joint = seconds }; negative where torque comes first. 0 says that there is none: without this key a lag of more than one
     /// sample counts as degraded data.
     pub lag: Option<LagKey>,
+    /// Default true: where what is left of the torque is noise of one memory (an AR(1)) on every joint, the fit goes on up to four
+    /// times the automatic cut-off with `noise.model = "ar1"`; a note says so. false: never. Nor does it where `cutoff_hz`, `rate_hz` or
+    /// `noise.model` is stated, rows are weighed (`noise.robust`, `varies_with_…`) or the noise is sampled.
+    pub wider_band: Option<bool>,
     /// Default "logged". "position": logged velocities are not used but derived from position.
     pub velocity: Option<VelocityWord>,
 }

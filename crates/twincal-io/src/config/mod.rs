@@ -6,6 +6,7 @@
 
 mod channel_names;
 mod factors;
+mod families;
 mod file;
 mod log_form;
 mod log_forms;

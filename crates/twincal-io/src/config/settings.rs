@@ -1,8 +1,8 @@
 //! From keys to settings: defaults filled in, ranges checked.
 
 use super::{
-    Allow, Config, Friction, LagKey, LogForm, MethodWord, NoisePrior, NoiseWord, NumberOrAuto,
-    PayloadKey, Slab, UncertaintyWord, VelocityWord,
+    Allow, Config, LagKey, LogForm, MethodWord, NoisePrior, NoiseWord, NumberOrAuto, PayloadKey,
+    Slab, UncertaintyWord, VelocityWord,
 };
 use crate::error::Result;
 use crate::log::LogOptions;
@@ -288,8 +288,14 @@ impl Config {
             noise: self.noise(),
             inference: self.inference()?,
             unasked_ripple: self.file.library.unasked_ripple(),
+            may_widen: self.may_widen(),
             most_bytes: None,
         })
+    }
+
+    /// Whether the fit may go on in a wider band, which it chooses together with the likelihood.
+    fn may_widen(&self) -> bool {
+        self.file.signal.wider_band.unwrap_or(true) && self.file.noise.model.is_none()
     }
 
     fn signal(&self) -> Result<SignalSettings> {
@@ -364,52 +370,12 @@ impl Config {
         Ok(LibrarySettings {
             terms: table.terms.clone(),
             generic: table.generic,
-            families: self.families(),
+            families: table.families(),
             coulomb_velocity: signal.coulomb_velocity.unwrap_or(default_velocity),
             payload_frame: table.payload_frame.clone(),
             nonnegative: table.nonnegative.unwrap_or(true),
             ripple: table.ripple.clone().unwrap_or_default(),
         })
-    }
-
-    /// `families`, or what is proposed unasked: everything an industrial arm may have; with own `terms`, or where the
-    /// generic family is asked for, these compete with friction, offset and motor inertia alone. The keys `friction`, `offset`
-    /// and `motor_inertia` switch their own families.
-    fn families(&self) -> Vec<Family> {
-        let table = &self.file.library;
-        let own = !table.terms.is_empty() || table.generic == Some(true);
-        let mut families: Vec<Family> = match &table.families {
-            Some(given) => given.iter().map(|&word| word.into()).collect(),
-            None if own => Family::JOINT.to_vec(),
-            None => Family::DEFAULT.to_vec(),
-        };
-        let friction = table.friction.as_ref();
-        let switches = [
-            (
-                Family::Viscous,
-                friction.map(|f| f.contains(&Friction::Viscous)),
-            ),
-            (
-                Family::Coulomb,
-                friction.map(|f| f.contains(&Friction::Coulomb)),
-            ),
-            (Family::Offset, table.offset),
-            (Family::MotorInertia, table.motor_inertia),
-        ];
-        for (family, switch) in switches {
-            match switch {
-                Some(true) => families.push(family),
-                Some(false) => families.retain(|&f| f != family),
-                None => {}
-            }
-        }
-        // With all friction switched off by its old key, none of the finer kinds is meant either.
-        if friction.is_some_and(Vec::is_empty) && table.families.is_none() {
-            families.retain(|family| !family.is_friction());
-        }
-        families.sort_unstable();
-        families.dedup();
-        families
     }
 
     fn prior(&self) -> Result<PriorSettings> {

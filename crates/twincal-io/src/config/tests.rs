@@ -128,6 +128,24 @@ fn zero_cutoff_makes_coulomb_the_sign_function() {
     );
 }
 
+/// Unless somebody says no, or states the likelihood; a stated cut-off rules it out where it is used, and is no contradiction.
+#[test]
+fn the_wider_band_is_the_default() {
+    for (text, widens) in [
+        ("", true),
+        ("[signal]\nwider_band = true\ncutoff_hz = 5", true),
+        ("[signal]\nwider_band = false", false),
+        (
+            "[signal]\nwider_band = true\n[noise]\nmodel = \"tempered\"",
+            false,
+        ),
+        ("[noise]\nmodel = \"ar1\"", false),
+    ] {
+        let settings = Config::parse("x", text).unwrap().settings().unwrap();
+        assert_eq!(settings.calibration.may_widen, widens, "{text}");
+    }
+}
+
 #[test]
 fn prior_of_families_and_forced_components() {
     let text = "[prior]\nforced = [\"elbow.viscous\"]\nfamilies = { spring = 0.5, user = 2 }\n";

@@ -1,5 +1,6 @@
 //! The whole road, from a robot and its logs to a calibrated twin, in one function that reads like the paper.
 
+mod again;
 mod compact;
 mod components;
 mod curves;
@@ -28,6 +29,8 @@ mod uneven_noise;
 mod unseen;
 mod unsettled;
 mod weigh;
+mod whiteness;
+mod wider_band;
 #[cfg(test)]
 mod testing;
 
@@ -58,9 +61,11 @@ use crate::signal::{
 };
 use crate::term::{Family, Library, LibrarySettings};
 use crate::twin::Twin;
+use again::{Road, whole_road};
 use data::Data;
 use heredity::Named;
 use ripples::Seen;
+use wider_band::wider;
 
 /// Everything a calibration can be told; each field but the last two is a table of `twincal.toml`.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,6 +82,9 @@ pub struct CalibrationSettings {
     pub inference: InferenceSettings,
     /// What becomes of gear ripple that nobody asked for: what `[library]` families and ripple say beside `library`.
     pub unasked_ripple: UnaskedRipple,
+    /// `[signal] wider_band` with no `[noise] model`: where nobody chose a cut-off either and the noise allows it, the fit goes on in a wider
+    /// band with `ar1`.
+    pub may_widen: bool,
     /// Bytes that are free for what is made of the recordings (no key of `twincal.toml`); `None`: any number.
     pub most_bytes: Option<u64>,
 }
@@ -121,6 +129,7 @@ impl Default for CalibrationSettings {
                 allow_disagreement: false,
             },
             unasked_ripple: UnaskedRipple::Candidate,
+            may_widen: true,
             most_bytes: None,
         }
     }
@@ -170,39 +179,6 @@ pub fn calibrate<'a>(
     calibration.map_err(|error| Stopped { error, findings })
 }
 
-/// [`calibrate`]; `findings` holds what was found where it ends early. Where nobody chose families and the fit shows gear ripple, that
-/// becomes a candidate, and all is done once more.
-fn whole_road(
-    robot: &Robot,
-    recordings: (Logs<'_>, Logs<'_>),
-    settings: &CalibrationSettings,
-    progress: &dyn Fn(Stage),
-    findings: &mut Vec<Finding>,
-) -> Result<Calibration> {
-    let (mut recordings, mut settings) = (Some(recordings), settings.clone());
-    let mut added = Vec::new();
-    loop {
-        findings.clone_from(&added);
-        match road(robot, &mut recordings, &settings, progress, findings)? {
-            Road::End(calibration) => return Ok(*calibration),
-            Road::Again(ripples) => {
-                added.extend(ripples.iter().map(Seen::added));
-                let orders = ripples.into_iter().map(|seen| (seen.joint, seen.periods));
-                settings.library.ripple.extend(orders);
-                settings.signal.every_sample = true;
-            }
-        }
-    }
-}
-
-/// Where a road leads.
-enum Road {
-    /// To its end.
-    End(Box<Calibration>),
-    /// Back, with gear ripple among the candidates that was none of them.
-    Again(Vec<Seen>),
-}
-
 /// From logs to a calibration; `recordings` are gone as soon as nobody needs them.
 fn road(
     robot: &Robot,
@@ -221,8 +197,9 @@ fn road(
         let names = robot.joint_names();
         log.any_recording(|recording| recording.require_torque(&names))?;
     }
-    let (mut pipeline, more, mut prepared) = choose_and_prepare(robot, logs, &settings.signal)?;
-    findings.extend(more);
+    let chosen = choose_and_prepare(robot, logs, &settings.signal)?;
+    let (mut pipeline, mut prepared, wider_hz) = (chosen.pipeline, chosen.logs, chosen.wider_hz);
+    findings.extend(chosen.findings);
     let every_log: Vec<Log<'_>> = logs.iter().chain(heldout).map(Log::lent).collect();
     findings.extend(constant_torque(robot, every_log.clone())?);
     findings.extend(hardly_driven(robot, every_log.clone())?);
@@ -280,6 +257,10 @@ fn road(
     let usual = settings.library.families == Family::DEFAULT;
     if !seen.is_empty() && usual && settings.unasked_ripple == UnaskedRipple::Candidate {
         return Ok(Road::Again(seen));
+    }
+    let (ready, band) = ((&prepared[..], unknown), (&pipeline, wider_hz));
+    if let Some(wider) = wider(robot, &library, ready, band, &fitted.fit, settings)? {
+        return Ok(Road::Wider(wider));
     }
     findings.extend(seen.iter().map(Seen::told));
     if fitted.sampled.is_empty() {

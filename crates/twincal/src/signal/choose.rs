@@ -2,7 +2,7 @@
 
 use super::align::PreparedLog;
 use super::clock::even_interval;
-use super::cutoff::{JointSpectra, automatic, derived_from, motion_band, rms_acceleration};
+use super::cutoff::{JointSpectra, automatic, derived_from, motion_band, rms_acceleration, wider};
 use super::encoder::{Encoder, velocity_resolution};
 use super::fir::{column_half_seconds, column_kernel, motion_half_seconds, noise_gain};
 use super::prepare::{JointFacts, prepare};
@@ -31,12 +31,25 @@ fn setting(key: &str, problem: String, remedy: &str) -> Error {
     }
 }
 
+/// What [`super::choose_and_prepare`] gives.
+#[derive(Debug)]
+pub struct Chosen<'a> {
+    /// For every log.
+    pub pipeline: Pipeline,
+    /// Four times the cut-off where nobody stated one, accelerations are known as well there and the logs are fast enough, Hz.
+    pub wider_hz: Option<f64>,
+    /// What was found on the way.
+    pub findings: Vec<Finding>,
+    /// The logs, ready for the pipeline.
+    pub logs: Vec<ReadyLog<'a>>,
+}
+
 /// See [`super::choose_and_prepare`].
 pub(crate) fn choose<'a>(
     joints: &[JointFacts],
     logs: &'a [Log<'_>],
     settings: &SignalSettings,
-) -> Result<(Pipeline, Vec<Finding>, Vec<ReadyLog<'a>>)> {
+) -> Result<Chosen<'a>> {
     check_settings(settings)?;
     if logs.is_empty() {
         return Err(Error::Refused {
@@ -68,9 +81,10 @@ pub(crate) fn choose<'a>(
             }
         }
     }
-    let (pipeline, findings) = if is_off {
+    let (pipeline, wider_hz, findings) = if is_off {
         let recordings: Vec<&Recording> = candidates.whole.iter().map(|whole| whole.0).collect();
-        off(joints, &recordings, settings)?
+        let (pipeline, findings) = off(joints, &recordings, settings)?;
+        (pipeline, None, findings)
     } else {
         on(joints, logs[0].name(), &candidates, settings)?
     };
@@ -91,8 +105,13 @@ pub(crate) fn choose<'a>(
             })
         }),
     };
-    let ready = logs.iter().filter_map(ready).collect();
-    Ok((pipeline, findings, ready))
+    let logs = logs.iter().filter_map(ready).collect();
+    Ok(Chosen {
+        pipeline,
+        wider_hz,
+        findings,
+        logs,
+    })
 }
 
 fn needs_a_filter(long: &LongLog) -> Error {
@@ -246,13 +265,13 @@ pub(crate) fn require_derivatives(joints: &[JointFacts], log: &Recording) -> Res
     Ok(())
 }
 
-/// Pipeline on.
+/// Pipeline on; and a wider cut-off, see [`Chosen::wider_hz`].
 fn on(
     joints: &[JointFacts],
     first_log: &str,
     candidates: &Candidates<'_>,
     settings: &SignalSettings,
-) -> Result<(Pipeline, Vec<Finding>)> {
+) -> Result<(Pipeline, Option<f64>, Vec<Finding>)> {
     let coulomb_velocity = settings.coulomb_velocity.unwrap_or(COULOMB_VELOCITY);
     let whole = candidates.whole.iter();
     let surveys: Vec<Survey> = whole
@@ -295,9 +314,12 @@ fn on(
     if moving.is_empty() {
         moving = (0..joints.len()).map(of_joint).collect();
     }
-    let cutoff = match settings.cutoff_hz {
-        Auto::Value(value) => value,
-        Auto::Auto => automatic(&moving, longest, lowest_rate),
+    let (cutoff, wider_hz) = match settings.cutoff_hz {
+        Auto::Value(value) => (value, None),
+        Auto::Auto => {
+            let cutoff = automatic(&moving, longest, lowest_rate);
+            (cutoff, wider(&moving, cutoff, lowest_rate))
+        }
     };
     let (rate, mut findings) = limits(first_log, cutoff, longest, lowest_rate, settings)?;
     let motion_cutoff = (4.0 * cutoff).min(MOTION_LIMIT * lowest_rate);
@@ -377,7 +399,7 @@ fn on(
         ),
         0,
     ));
-    Ok((pipeline, findings))
+    Ok((pipeline, wider_hz, findings))
 }
 
 /// Rate of kept rows, after checking that the filters fit the logs.

@@ -9,6 +9,8 @@
 //!    standard deviation r/√n, so the rule is `r √n ≤ 0.3` with n = 2.5 f_c T rows and r² = noise power of q̈ below f_c over power of q̈.
 //! 4. Raised so that the kernels' ends take at most a third of the longest segment; at most 0.11 of the log's rate, so that the
 //!    motion filter at 4 f_c fits below 0.45 of it.
+//!
+//! [`wider`] is four times that where rules 3 and 4 hold there, too.
 
 use super::DerivedFrom;
 use super::prepare::Prepared;
@@ -24,6 +26,10 @@ const CLEARLY: f64 = 10.0;
 const SHARE: f64 = 0.99;
 /// r √n that is allowed.
 const ALLOWED_BIAS: f64 = 0.3;
+/// Highest f_c as a share of the log's rate.
+const HIGHEST: f64 = 0.11;
+/// A wider band than the automatic one, in f_c.
+const WIDER: f64 = 4.0;
 
 /// Spectra of one joint in one log.
 #[derive(Debug, Clone, PartialEq)]
@@ -160,18 +166,28 @@ pub(crate) fn automatic(moving: &[Vec<&JointSpectra>], longest: f64, lowest_rate
     let band = bands.iter().copied().fold(0.0, f64::max);
     let mut cutoff = (2.0 * band).max(USUAL_CUTOFF);
     let least = (1.5 * band).max(0.5);
-    let biased = |cutoff: f64| {
-        moving.iter().zip(&bands).any(|(logs, &band)| {
-            let rows = 2.5 * cutoff * logs.iter().map(|l| l.duration).sum::<f64>();
-            (noise_ratio(logs, cutoff, band) * rows).sqrt() > ALLOWED_BIAS
-        })
-    };
-    while cutoff > least && biased(cutoff) {
+    while cutoff > least && biased(moving, &bands, cutoff) {
         cutoff *= 0.95;
     }
     // 2 · (2.44 + 3.02/4) / f_c of borders in at most a third of the segment.
-    let cutoff = cutoff.max(19.2 / longest).min(0.11 * lowest_rate);
+    let cutoff = cutoff.max(19.2 / longest).min(HIGHEST * lowest_rate);
     // Two digits are enough and make the same choice for logs that differ in the last bit.
     let digits = 10.0_f64.powf(1.0 - cutoff.log10().floor());
     (cutoff * digits).round() / digits
+}
+
+/// Rule 3: whether the noise in q̈ below `cutoff` would bias the coefficients of some joint.
+fn biased(moving: &[Vec<&JointSpectra>], bands: &[f64], cutoff: f64) -> bool {
+    moving.iter().zip(bands).any(|(logs, &band)| {
+        let rows = 2.5 * cutoff * logs.iter().map(|l| l.duration).sum::<f64>();
+        (noise_ratio(logs, cutoff, band) * rows).sqrt() > ALLOWED_BIAS
+    })
+}
+
+/// Four times the automatic cut-off, where accelerations are known as well there and the logs are fast enough for it.
+pub(crate) fn wider(moving: &[Vec<&JointSpectra>], cutoff: f64, lowest_rate: f64) -> Option<f64> {
+    let wider = WIDER * cutoff;
+    let fast = wider <= HIGHEST * lowest_rate;
+    let bands = || -> Vec<f64> { moving.iter().map(|logs| motion_band(logs).0).collect() };
+    (fast && !biased(moving, &bands(), wider)).then_some(wider)
 }

@@ -36,6 +36,7 @@ mod unwrap;
 pub use agreement::{Agreement, velocity_agreement};
 pub use align::{PreparedLog, Raw};
 pub use chapters::ChapterMotion;
+pub use choose::Chosen;
 pub(crate) use clock::median_step;
 pub use correct::{Corrections, Lag};
 pub use describe::{JointOverview, LogOverview, describe, hardly_driven};
@@ -393,8 +394,8 @@ pub fn choose_pipeline(
     settings: &SignalSettings,
 ) -> Result<(Pipeline, Vec<Finding>)> {
     let logs = Logs::from(logs);
-    let (pipeline, findings, _) = choose_and_prepare(robot, &logs.0, settings)?;
-    Ok((pipeline, findings))
+    let chosen = choose_and_prepare(robot, &logs.0, settings)?;
+    Ok((chosen.pipeline, chosen.findings))
 }
 
 /// [`choose_pipeline`] and [`ready`] in one: logs in memory are cut and unfolded once.
@@ -405,7 +406,7 @@ pub fn choose_and_prepare<'a>(
     robot: &Robot,
     logs: &'a [Log<'_>],
     settings: &SignalSettings,
-) -> Result<(Pipeline, Vec<Finding>, Vec<ReadyLog<'a>>)> {
+) -> Result<Chosen<'a>> {
     choose::choose(&prepare::joint_facts(robot), logs, settings)
 }
 

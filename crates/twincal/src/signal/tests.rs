@@ -95,7 +95,8 @@ fn pipeline(log: &Recording) -> Pipeline {
 
 fn chosen(log: &Recording, settings: &SignalSettings) -> Result<(Pipeline, Vec<Finding>)> {
     let logs = Logs::from(std::slice::from_ref(log));
-    let (pipeline, findings, _) = choose::choose(&joints(), &logs.0, settings)?;
+    let chosen = choose::choose(&joints(), &logs.0, settings)?;
+    let (pipeline, findings) = (chosen.pipeline, chosen.findings);
     Ok((pipeline, findings))
 }
 

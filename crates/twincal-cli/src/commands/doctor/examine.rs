@@ -12,7 +12,7 @@ use twincal::Finding;
 use twincal::calibrate::{CalibrationSettings, Outlook, calibrate, outlook};
 use twincal::robot::Robot;
 use twincal::signal::{
-    Auto, Log, LogOverview, Pipeline, Steps, choose_and_prepare, constant_torque, describe,
+    Auto, Chosen, Log, LogOverview, Pipeline, Steps, choose_and_prepare, constant_torque, describe,
     hardly_driven, steps,
 };
 use twincal_io::config::{Settings, TimeUnit};
@@ -404,7 +404,9 @@ pub(super) fn filtered(
         describe(robot, log)?;
     }
     let signal = &settings.calibration.signal;
-    let (pipeline, findings, _) = choose_and_prepare(robot, logs, signal)?;
+    let Chosen {
+        pipeline, findings, ..
+    } = choose_and_prepare(robot, logs, signal)?;
     let mut checkup = checkup(robot, logs, &pipeline)?;
     match checkup.refused.pop() {
         Some(error) => Err(error),
