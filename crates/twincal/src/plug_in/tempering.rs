@@ -141,6 +141,8 @@ pub fn fit_tempered(
     } else {
         interval_factors(&predicted, &fitted.plug_in)
     };
+    // With so few rows that even c = 1 predicts nothing there is no score to tell.
+    let scores = scores.into_iter().filter(|s| s.1.is_finite()).collect();
     Ok((
         fitted,
         LeftOut {
