@@ -539,18 +539,19 @@ fn noise_of(
         .enumerate()
         .map(|(j, name)| {
             let (n, rho) = (moving_rows(training, j), plug_in.rho[j]);
+            let left = plug_in.variance.get(j).copied().unwrap_or(1.0);
             JointNoise {
                 joint: name.to_owned(),
-                sigma: (posterior.noise / (plug_in.weight[j] * (1.0 - rho * rho))).sqrt(),
+                sigma: (left * posterior.noise / (plug_in.weight[j] * (1.0 - rho * rho))).sqrt(),
                 rho,
                 weight: plug_in.weight[j],
                 n,
-                n_eff: n * plug_in.temper(j) * (1.0 - rho) / (1.0 + rho),
+                n_eff: n * plug_in.counted(j) * (1.0 - rho) / (1.0 + rho),
                 autocorrelation_time: plug_in.autocorrelation_time[j],
                 interval_factor: fitted
                     .left_out
                     .as_ref()
-                    .map_or(1.0, |l| l.interval_factor[j]),
+                    .map_or_else(|| left.sqrt(), |l| l.interval_factor[j]),
                 out_of_band: out_of_band[j],
                 spread: spreads[j].clone(),
                 sampled: fitted.sampled.get(j).copied(),

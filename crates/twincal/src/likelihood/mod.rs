@@ -74,7 +74,7 @@ impl NoiseSettings {
 pub struct JointNoise {
     /// Joint name.
     pub joint: String,
-    /// √E[φ/(w_j(1−ρ_j²)) | y], N·m or N; the root mean square over the training rows where it changes with speed or load.
+    /// √E[φ/(w_j(1−ρ_j²)) | y], with ar1 what the row filter leaves of it, N·m or N; the root mean square over the training rows where it changes with speed or load.
     pub sigma: f64,
     /// AR(1) coefficient; 0 unless `ar1`.
     pub rho: f64,
@@ -82,11 +82,11 @@ pub struct JointNoise {
     pub weight: f64,
     /// Rows.
     pub n: f64,
-    /// Rows after tempering: n/(c·τ_j); with ar1 n(1−ρ)/(1+ρ).
+    /// Rows after tempering: n/(c·τ_j); with ar1 p n(1−ρ)/(1+ρ), p the share of frequencies that the row filter passes.
     pub n_eff: f64,
     /// Integrated autocorrelation time τ_j of the residual, rows; with `noise.robust` times what weighing rows costs (≥ 1).
     pub autocorrelation_time: f64,
-    /// Factor on the noise part of intervals from left-out blocks; 1 unless `tempered`.
+    /// Factor on the noise part of intervals: with `tempered` from left-out blocks, with `ar1` what the row filter leaves, else 1.
     pub interval_factor: f64,
     /// sd of the torque outside the filter's band, measured on the training residual, N·m; 0 with the filter off.
     pub out_of_band: f64,
@@ -117,10 +117,20 @@ pub struct PlugIn {
     pub autocorrelation_time: Vec<f64>,
     /// c; 1 unless `tempered`.
     pub tempering: f64,
+    /// What one row counts where an autoregression knows of the row filter: the share of frequencies that passes; 1 unless `ar1`.
+    #[serde(default = "one")]
+    pub passed: f64,
+    /// Variance of the rows over φ/(w_j(1−ρ_j²)), likewise; 1 (or empty) unless `ar1`.
+    #[serde(default)]
+    pub variance: Vec<f64>,
     /// v of each family, in the order of [`Columns::families`].
     pub scaled_variance: Vec<f64>,
     /// φ that turns the prior sd of a physical coefficient into its slab variance; 0 until a first fit has told it.
     pub noise: f64,
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 /// The columns of a regression, as the likelihood needs them.
@@ -175,6 +185,8 @@ impl PlugIn {
             rho: vec![0.0; joints],
             autocorrelation_time: vec![1.0; joints],
             tempering: 1.0,
+            passed: 1.0,
+            variance: vec![1.0; joints],
             scaled_variance: vec![v; families],
             noise: 0.0,
         }
@@ -185,9 +197,15 @@ impl PlugIn {
         self.weight[joint] * self.temper(joint)
     }
 
-    /// What the row count of a joint is multiplied with: 1 / (c τ_j).
+    /// What one row of a joint's statistics counts: 1 / (c τ_j).
     pub fn temper(&self, joint: usize) -> f64 {
         1.0 / (self.tempering * self.autocorrelation_time[joint])
+    }
+
+    /// What the row count of a joint is multiplied with: with `ar1` the filter leaves fewer independent rows than there are, and φ is the
+    /// level of their innovations where it passes.
+    pub fn counted(&self, joint: usize) -> f64 {
+        self.passed * self.temper(joint)
     }
 }
 
@@ -213,9 +231,9 @@ pub fn mean_squares(grams: &Gram, columns: usize, weight: &[f64]) -> Vec<f64> {
 /// The weighted regression and its prior: all that inference sees.
 ///
 /// ```text
-/// G = Σ_j w_j/(c τ_j) G_j(ρ_j)    n = Σ_j n_j/(c τ_j)    v_k = v_family / r_k, or sd_k² / φ
+/// G = Σ_j w_j/(c τ_j) G_j(ρ_j)    n = Σ_j p n_j/(c τ_j)    v_k = v_family / r_k, or sd_k² / φ
 /// ```
-/// with r_k of [`Columns::references`]. A prior sd that physics says gives way to a scale that the user gives.
+/// with r_k of [`Columns::references`] and p of [`PlugIn::passed`]. A prior sd that physics says gives way to a scale that the user gives.
 ///
 /// # Errors
 /// [`crate::Error::Setting`] if the prior's numbers are impossible for K columns.
@@ -229,7 +247,7 @@ pub fn assemble(
     let (mut gram, mut xy, mut yy) = (vec![0.0; count * count], vec![0.0; count], 0.0);
     let (mut n, mut log_constant) = (0.0, 0.0);
     for (j, joint) in grams.joints.iter().enumerate() {
-        let (factor, temper) = (plug_in.factor(j), plug_in.temper(j));
+        let (factor, temper) = (plug_in.factor(j), plug_in.counted(j));
         let rho = plug_in.rho[j];
         let statistics = joint.stationary(rho);
         let (size, values) = (statistics.size, &statistics.values);

@@ -6,6 +6,7 @@
 
 mod autoregression;
 mod memory;
+mod passband;
 mod tempering;
 
 pub use tempering::{LeftOut, fit_tempered};
@@ -14,11 +15,14 @@ use crate::diagnostics::integrated_autocorrelation_time;
 use crate::error::Result;
 use crate::gram::Gram;
 use crate::infer::approximate;
-use crate::likelihood::{Columns, NoiseModel, NoiseSettings, PlugIn, assemble, mean_squares};
+use crate::likelihood::{
+    Columns, NoiseModel, NoiseSettings, NoiseUncertainty, PlugIn, assemble, mean_squares,
+};
 use crate::observations::Part;
 use crate::posterior::{Posterior, Problem};
 use crate::prior::PriorSettings;
 use crate::signal::Auto;
+use passband::Passband;
 
 /// Rounds of the fixed-point iteration at most.
 const ROUNDS: usize = 20;
@@ -130,6 +134,10 @@ fn fit_gram(
     } else {
         TOLERANCE
     };
+    let passband = passband(training, settings.noise);
+    if let Some(passband) = &passband {
+        plug_in.passed = passband.share();
+    }
     let mut rounds = 0;
     loop {
         rounds += 1;
@@ -137,7 +145,8 @@ fn fit_gram(
         let posterior = approximate(&problem, known.as_ref())?;
         let mut next = plug_in.clone();
         if moving == Moving::All {
-            move_noise(&mut next, training, gram, settings.noise, &posterior);
+            let told = (settings.noise, passband.as_ref());
+            move_noise(&mut next, training, gram, told, &posterior);
         }
         if settings.prior.scaled_variance == Auto::Auto {
             next.scaled_variance = slab_scales(gram, columns, &plug_in, &problem, &posterior);
@@ -191,13 +200,22 @@ pub fn moving_rows(parts: &[Part<'_>], joint: usize) -> f64 {
     parts.iter().map(moving).sum()
 }
 
+/// The filter that an autoregression of rows has to be told of. Where noise is drawn, it is one of the rows as they are.
+fn passband(training: &[Part<'_>], noise: NoiseSettings) -> Option<Passband> {
+    if noise.model != NoiseModel::Ar1 || noise.uncertainty != NoiseUncertainty::PlugIn {
+        return None;
+    }
+    let cutoffs = training.iter().map(|part| part.observations.cutoff);
+    Passband::new(cutoffs.fold(0.0, f64::max))
+}
+
 /// Weights and autoregression that the residual at the model average asks for; one ρ for all joints where they share one
 /// variance, so that they share σ too.
 fn move_noise(
     plug_in: &mut PlugIn,
     training: &[Part<'_>],
     gram: &Gram,
-    noise: NoiseSettings,
+    (noise, passband): (NoiseSettings, Option<&Passband>),
     posterior: &Posterior,
 ) {
     let residual: Vec<Vec<Vec<f64>>> = (0..gram.joints.len())
@@ -214,6 +232,11 @@ fn move_noise(
             let all = residual.concat();
             vec![autoregression::coefficient(&slices(&all)); residual.len()]
         };
+        if let Some(passband) = passband {
+            let found = plug_in.rho.iter().map(|rho| passband.autoregression(*rho));
+            (plug_in.rho, plug_in.variance) =
+                found.map(|found| (found.rho, found.variance)).unzip();
+        }
     }
     if noise.per_joint {
         let variance: Vec<f64> = residual
