@@ -12,6 +12,8 @@ const HEX: f64 = 3.6;
 /// Shades of the hexagons, light to dark.
 const SHADES: [&str; 5] = ["h1", "h2", "h3", "h4", "h5"];
 const BARS: usize = 18;
+/// What is drawn of long tails; of a normal distribution everything.
+const FAR: f64 = 4.0;
 /// Space between cells, px.
 const GAP: f64 = 8.0;
 /// Size of a label, px.
@@ -32,7 +34,7 @@ pub(in crate::report) fn figure(draws: &Draws, terms: &[TermSummary]) -> Option<
         title: "Posterior distributions".into(),
         read: "On the diagonal each coefficient on its own, below it every pair (the stronger the colour, the more probable), above it their \
                correlation: a slanted cloud means that the data know a combination of the two better than each of them. \
-               Draws in which the coefficient is not in (exactly 0) and the outermost 1 % of the others are not drawn."
+               Draws in which the coefficient is not in (exactly 0), the outermost 1 % of the others and what is four times ± away from their median are not drawn."
             .into(),
         legend: Vec::new(),
         images: vec![Image::fixed(draw(&variables, &label))],
@@ -212,14 +214,22 @@ fn is_in(value: f64) -> bool {
     value.is_finite() && value != 0.0
 }
 
-/// The ends of the middle 99 % of the draws of models that hold the term.
+/// The ends of the middle 99 % of the draws of models that hold the term, at most [`FAR`] times half their central 68.3 % interval
+/// from their median: where some models leave it open and others do not, tails are long.
 fn bulk(values: &[f64]) -> [f64; 2] {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| is_in(*v)).collect();
     sorted.sort_by(f64::total_cmp);
+    let Some(last) = sorted.len().checked_sub(1) else {
+        return [f64::NAN; 2];
+    };
+    let at = |share: f64| sorted[(share * last as f64).round() as usize];
+    let (median, half) = (at(0.5), 0.5 * (at(0.841_345) - at(0.158_655)));
     let cut = sorted.len() / 200;
-    match sorted.get(cut..sorted.len() - cut) {
-        Some([first, .., last]) => [*first, *last],
-        _ => [sorted.first().copied().unwrap_or(f64::NAN); 2],
+    let [low, high] = [sorted[cut], sorted[last - cut]];
+    if half > 0.0 {
+        [low.max(median - FAR * half), high.min(median + FAR * half)]
+    } else {
+        [low, high]
     }
 }
 
@@ -410,6 +420,10 @@ mod tests {
         values[..400].fill(0.0);
         values[400..402].fill(-70.0);
         assert!(bulk(&values)[0] > 5.4, "{:?}", bulk(&values));
+        // A tenth of the draws is anywhere.
+        values[402..460].fill(40.0);
+        let [low, high] = bulk(&values);
+        assert!(low > 4.0 && high < 8.0, "{low} to {high}");
         assert!(bulk(&[f64::NAN])[0].is_nan());
         assert_eq!(bulk(&[2.0]), [2.0; 2]);
     }
