@@ -1,5 +1,6 @@
 //! Friction that grows less than the speed is told by that name, where it is and nowhere else.
 
+mod common;
 #[path = "../examples/two_link.rs"]
 #[allow(dead_code, reason = "its `main` prints, which a test does not need")]
 mod two_link;
@@ -7,7 +8,7 @@ mod two_link;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::posterior::random::Random;
 use twincal::robot::{Robot, Workspace, inverse_dynamics};
-use twincal::signal::{Channels, Payload, Recording};
+use twincal::signal::Recording;
 use twincal::term::Family;
 use twincal::write_back::{Holds, Writer};
 
@@ -43,20 +44,7 @@ fn log_of(arm: &Robot, friction: [[f64; 3]; 2], seed: u64) -> Recording {
             }
         }
     }
-    let joints = channels.map(|[q, qd, qdd, tau]| Channels {
-        q,
-        qd: Some(qd),
-        qdd: Some(qdd),
-        tau: Some(tau),
-        temperature: None,
-    });
-    Recording {
-        unfolded: false,
-        name: "log".into(),
-        time,
-        joints: joints.to_vec(),
-        payload: Payload::None,
-    }
+    common::recording(time, channels)
 }
 
 fn fitted(change: impl Fn(&mut CalibrationSettings)) -> Calibration {

@@ -1,12 +1,14 @@
 //! Gear ripple that nobody asked for, on the motions that robots are identified with: friction that no candidate has is none, a gear's is.
 
+mod common;
+
 use std::f64::consts::TAU;
 use twincal::calibrate::{Calibration, CalibrationSettings, UnaskedRipple, calibrate};
 use twincal::posterior::random::Random;
 use twincal::robot::{
     Inertia, JointDescription, JointKind, LinkDescription, Robot, RobotDescription,
 };
-use twincal::signal::{Auto, Channels, Payload, Recording};
+use twincal::signal::{Auto, Recording};
 
 /// Seconds between samples.
 const STEP: f64 = 0.005;
@@ -96,20 +98,7 @@ fn log(motion: &Motion, friction: Friction, ripple: f64, random: &mut Random) ->
         qdd.push(gain);
         tau.push(0.1 * gain + friction + gear + 0.02 * random.normal());
     }
-    let joint = Channels {
-        q,
-        qd: Some(qd),
-        qdd: Some(qdd),
-        tau: Some(tau),
-        temperature: None,
-    };
-    Recording {
-        unfolded: false,
-        name: "log".into(),
-        time,
-        joints: vec![joint],
-        payload: Payload::None,
-    }
+    common::recording(time, [[q, qd, qdd, tau]])
 }
 
 fn fitted(log: Recording, cutoff_hz: f64, unasked_ripple: UnaskedRipple) -> Calibration {

@@ -1,5 +1,6 @@
 //! v_s of Coulomb friction where nobody states one: as the log says, and the usual one where the log does not care.
 
+mod common;
 #[path = "../examples/two_link.rs"]
 #[allow(dead_code, reason = "its `main` prints, which a test does not need")]
 mod two_link;
@@ -8,7 +9,7 @@ use std::sync::Arc;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::posterior::random::Random;
 use twincal::robot::{Workspace, inverse_dynamics};
-use twincal::signal::{Auto, Channels, Log, LongLog, Payload, ReadChapter, Recording};
+use twincal::signal::{Auto, Log, LongLog, ReadChapter, Recording};
 use twincal::term::Family;
 
 /// v_s where nothing is said, rad/s.
@@ -47,20 +48,7 @@ fn log(v_s: f64, size: f64, (rate, hurry): (f64, f64), seed: u64) -> Recording {
             }
         }
     }
-    let joints = channels.map(|[q, qd, qdd, tau]| Channels {
-        q,
-        qd: Some(qd),
-        qdd: Some(qdd),
-        tau: Some(tau),
-        temperature: None,
-    });
-    Recording {
-        unfolded: false,
-        name: "log".into(),
-        time,
-        joints: joints.to_vec(),
-        payload: Payload::None,
-    }
+    common::recording(time, channels)
 }
 
 fn settings() -> CalibrationSettings {

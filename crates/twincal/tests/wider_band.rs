@@ -1,5 +1,6 @@
 //! A wider band where noise is an autoregression, and nowhere else.
 
+mod common;
 #[path = "../examples/two_link.rs"]
 #[allow(dead_code, reason = "its `main` prints, which a test does not need")]
 mod two_link;
@@ -8,7 +9,7 @@ use twincal::calibrate::{Calibration, CalibrationSettings, Stopped, calibrate};
 use twincal::likelihood::NoiseModel;
 use twincal::posterior::random::Random;
 use twincal::robot::{Workspace, inverse_dynamics};
-use twincal::signal::{Auto, Channels, Payload, Recording};
+use twincal::signal::{Auto, Recording};
 use twincal::term::Family;
 
 /// Hz.
@@ -45,20 +46,7 @@ fn log(memory: f64, stribeck: f64, seed: u64) -> Recording {
             }
         }
     }
-    let joints = channels.map(|[q, qd, qdd, tau]| Channels {
-        q,
-        qd: Some(qd),
-        qdd: Some(qdd),
-        tau: Some(tau),
-        temperature: None,
-    });
-    Recording {
-        unfolded: false,
-        name: "log".into(),
-        time,
-        joints: joints.to_vec(),
-        payload: Payload::None,
-    }
+    common::recording(time, channels)
 }
 
 fn fitted(log: Recording, change: impl Fn(&mut CalibrationSettings)) -> Calibration {
