@@ -517,6 +517,7 @@ fn init_mends_units_signs_and_order_and_the_twin_reads_new_logs_likewise() {
             .unwrap()
     };
     let degrees: fn(&mut [f64; 7]) = |row| row[1..5].iter_mut().for_each(|v| *v *= 360.0 / TAU);
+    let one: fn(&mut [f64; 7]) = |row| [2, 4].into_iter().for_each(|k| row[k] *= 360.0 / TAU);
     let turned: fn(&mut [f64; 7]) = |row| {
         row[6] *= -1.0;
         [1, 3, 5].into_iter().for_each(|k| row[k] *= -1.0);
@@ -530,6 +531,10 @@ fn init_mends_units_signs_and_order_and_the_twin_reads_new_logs_likewise() {
         (
             degrees,
             "[columns.factor]\nq = 0.017453292519943295\nqd = 0.0174",
+        ),
+        (
+            one,
+            "[columns.factor]\nq = { elbow = 0.017453292519943295 }\n",
         ),
         (turned, "tau = { elbow = -1.0, shoulder = -1.0 }"),
         (

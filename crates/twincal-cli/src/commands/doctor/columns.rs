@@ -1,8 +1,8 @@
 //! What `[columns]` has to say of logs whose numbers have other units, signs or another order than the model.
 
 use super::examine::{Examination, Mapping};
+use super::units::Degrees;
 use std::collections::BTreeMap;
-use twincal::robot::JointKind;
 use twincal::self_check::JointCheck;
 use twincal_io::config::{ChannelNames, ColumnsTable, Factor, Settings, key};
 
@@ -31,7 +31,8 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
         all.mended.push(TICKS);
     }
     let mut whys = Vec::new();
-    if let Some([position, rates]) = examination.degrees(logs) {
+    if let Some(Degrees { factors, joints }) = examination.degrees(logs) {
+        let [position, rates] = *factors;
         let factor = &mut all.table.factor;
         let channels = [
             (&mut factor.q, position),
@@ -39,7 +40,7 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
             (&mut factor.qdd, rates),
         ];
         for (factor, number) in channels.into_iter().filter(|(_, number)| *number != 1.0) {
-            *factor = turning(examination, number);
+            *factor = of_joints(examination, joints, number);
         }
         whys.push("Positions or velocities are logged in degrees.".to_owned());
         all.mended.push(DEGREES);
@@ -87,16 +88,13 @@ fn is_moved(check: &JointCheck) -> bool {
     check.motion.0 != check.joint || check.torque.0 != check.joint
 }
 
-/// A factor of every joint that turns.
-fn turning(examination: &Examination, number: f64) -> Factor {
-    let robot = &examination.robot.robot;
-    let turns = |joint: &usize| robot.joint_kind(*joint) != JointKind::Prismatic;
-    let names = robot.joint_names();
-    let turning: Vec<usize> = (0..robot.dof()).filter(turns).collect();
-    if turning.len() == robot.dof() {
+/// A factor of some joints.
+fn of_joints(examination: &Examination, joints: &[usize], number: f64) -> Factor {
+    let names = examination.robot.robot.joint_names();
+    if joints.len() == names.len() {
         return Factor::All(number);
     }
-    let named = turning
+    let named = joints
         .iter()
         .map(|&joint| (names[joint].to_owned(), number));
     Factor::ByJoint(named.collect())

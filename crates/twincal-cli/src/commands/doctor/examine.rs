@@ -2,7 +2,7 @@
 
 use super::super::checkup::{Checkup, checkup};
 use super::super::inputs::{LogInput, Long, RobotInput};
-use super::units::converted;
+use super::units::{Degrees, converted};
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use serde::Serialize;
@@ -31,9 +31,9 @@ pub(super) struct Refusal {
     /// The unit of the log's time with which `fit` would go on.
     #[serde(skip)]
     pub(super) time_unit: Option<TimeUnit>,
-    /// What its positions, and its velocities and accelerations, are multiplied with for `fit` to go on.
+    /// What makes radians of the log, for `fit` to go on.
     #[serde(skip)]
-    pub(super) degrees: Option<[f64; 2]>,
+    pub(super) degrees: Option<Degrees>,
 }
 
 impl From<Failure> for Refusal {
@@ -90,12 +90,22 @@ pub(super) struct Examination {
     pub(super) findings: Vec<Finding>,
 }
 
+/// Whether the fit is tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Trial {
+    /// As far as log and model go together; it takes as long as the fit.
+    Fit,
+    /// No.
+    None,
+}
+
 /// Reads and looks; what `fit` would refuse becomes a [`Refusal`], and as much as possible is said all the same.
 pub(super) fn examine(
     model: &Path,
     paths: &[PathBuf],
     settings: &Settings,
     progress: &Progress,
+    trial: Trial,
 ) -> Outcome<Examination> {
     progress.step(&format!("reading {}", model.to_string_lossy()));
     let mut settings = settings.clone();
@@ -130,7 +140,7 @@ pub(super) fn examine(
     all.findings.append(&mut logs.findings);
     progress.step("comparing logs and model");
     all.look(&mut logs, &settings);
-    if all.refusals.is_empty() {
+    if trial == Trial::Fit && all.refusals.is_empty() && !all.log_or_model_is_wrong() {
         progress.step("trying the fit");
         all.try_fit(&logs, &settings.calibration);
     }
@@ -251,10 +261,12 @@ impl Examination {
     }
 
     /// What makes radians of the numbers of all of `logs`.
-    pub(super) fn degrees(&self, logs: usize) -> Option<[f64; 2]> {
-        let factors: Vec<[f64; 2]> = self.refusals.iter().filter_map(|r| r.degrees).collect();
-        let first = *factors.first()?;
-        (factors.len() == logs && factors.iter().all(|own| *own == first)).then_some(first)
+    pub(super) fn degrees(&self, logs: usize) -> Option<&Degrees> {
+        let all: Vec<&Degrees> = (self.refusals.iter())
+            .filter_map(|refusal| refusal.degrees.as_ref())
+            .collect();
+        let first = *all.first()?;
+        (all.len() == logs && all.iter().all(|own| *own == first)).then_some(first)
     }
 
     /// Overviews, filters, comparison and outlook, as far as each of them goes.
@@ -335,6 +347,13 @@ impl Examination {
             rate_hz: pipeline.common_rate(kept),
             ..pipeline
         });
+    }
+
+    /// Whether something has to be mended before a fit says anything.
+    fn log_or_model_is_wrong(&self) -> bool {
+        let wrong = ["sign_flip", "joint_order", "torque_scale"];
+        let mut findings = self.findings.iter();
+        findings.any(|finding| wrong.contains(&finding.code.as_str()))
     }
 
     /// Fits: what only a fit can tell (rows that count as too few) is a reason to stop as well. A lower cut-off is advised if

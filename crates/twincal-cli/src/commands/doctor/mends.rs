@@ -6,6 +6,7 @@ use serde::Serialize;
 use std::fmt::Write as _;
 use twincal::self_check::JointCheck;
 use twincal::{Finding, Severity};
+use twincal_io::config::key;
 
 /// One thing to mend.
 #[derive(Debug, Clone, Serialize)]
@@ -248,6 +249,18 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
             ),
             None => "turn the sign of the columns where the log is made".into(),
         },
+        ("torque_scale", Some(place)) => {
+            let check = of_joint(examination, &finding.subject);
+            match check.and_then(|check| check.gain.filter(|gain| *gain > 0.0)) {
+                Some(gain) => format!(
+                    "{}; here about {{ {} = {:.2e} }}",
+                    ORDER[place].1,
+                    key(&finding.subject),
+                    1.0 / gain
+                ),
+                None => ORDER[place].1.into(),
+            }
+        }
         ("quantised_encoder", _) => match examination.lower_cutoff {
             Some(hz) => format!(
                 "twincal.toml: [signal] cutoff_hz = {hz:?}, or log the encoder's full resolution"

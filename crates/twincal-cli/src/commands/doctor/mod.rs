@@ -14,7 +14,7 @@ use crate::args;
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
-use examine::{Examination, Mapping, Refusal, examine};
+use examine::{Examination, Mapping, Refusal, Trial, examine};
 use mends::{Mend, mends};
 use propose::propose;
 use serde::Serialize;
@@ -110,7 +110,13 @@ pub(super) fn run(flags: &args::Doctor, terminal: &mut Terminal) -> Outcome<u8> 
     let asked = Asked::of(flags, "doctor", terminal)?;
     start_threads(asked.settings.threads)?;
     let progress = Progress::new();
-    let examination = examine(&asked.model, &asked.logs, &asked.settings, &progress)?;
+    let examination = examine(
+        &asked.model,
+        &asked.logs,
+        &asked.settings,
+        &progress,
+        Trial::Fit,
+    )?;
     drop(progress);
     let diagnosis = diagnosis(examination, &asked);
     if asked.settings.json {
@@ -128,7 +134,13 @@ pub(super) fn init(flags: &args::Init, terminal: &mut Terminal) -> Outcome<u8> {
     let mut output = OutputFile::create(&target, flags.force)?;
     start_threads(asked.settings.threads)?;
     let progress = Progress::new();
-    let examination = examine(&asked.model, &asked.logs, &asked.settings, &progress)?;
+    let examination = examine(
+        &asked.model,
+        &asked.logs,
+        &asked.settings,
+        &progress,
+        Trial::None,
+    )?;
     drop(progress);
     let nothing_read = examination.overviews.is_empty();
     if let Some(refusal) = examination.refusals.last().filter(|_| nothing_read) {

@@ -83,8 +83,17 @@ pub(super) struct Converted {
     pub(super) words: String,
     /// The unit of its time where that is no second.
     pub(super) time: Option<TimeUnit>,
-    /// What makes radians of its positions, and of its velocities and accelerations.
-    pub(super) degrees: Option<[f64; 2]>,
+    /// What makes radians of it.
+    pub(super) degrees: Option<Degrees>,
+}
+
+/// What makes radians of a log.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Degrees {
+    /// Factor of positions, and of velocities and accelerations.
+    pub(super) factors: [f64; 2],
+    /// Its joints that are in degrees, ascending.
+    pub(super) joints: Vec<usize>,
 }
 
 /// The log in units with which it comes further.
@@ -125,29 +134,96 @@ pub(super) fn converted(
     if !problem.contains("degrees") {
         return None;
     }
+    let turning = |joint: &usize| robot.joint_kind(*joint) != JointKind::Prismatic;
+    let turning: Vec<usize> = (0..robot.dof()).filter(turning).collect();
     for (what, factors) in [
         ("positions, velocities and accelerations", [DEGREE, DEGREE]),
         ("velocities", [1.0, DEGREE]),
         ("positions", [DEGREE, 1.0]),
     ] {
-        let of_joint = |joint| match robot.joint_kind(joint) {
-            JointKind::Prismatic => [1.0; 2],
-            _ => factors,
+        let all = in_degrees(robot, log, settings, factors, turning.clone());
+        let some = named(robot, problem)
+            .and_then(|joint| in_degrees(robot, log, settings, factors, vec![joint]));
+        // All of them, if the model does not explain clearly more of the torque with those alone that show it.
+        let better = |some: &InDegrees| {
+            all.as_ref()
+                .is_none_or(|all| some.explained > 1.05 * all.explained)
+        };
+        let Some(found) = some.filter(better).or(all) else {
+            continue;
+        };
+        let names = robot.joint_names();
+        let own: Vec<&str> = found.joints.iter().map(|&joint| names[joint]).collect();
+        let of = if found.joints == turning {
+            String::new()
+        } else {
+            format!(" of {}", own.join(", "))
+        };
+        return Some(Converted {
+            words: format!("{}: {what}{of} were taken as degrees", log.name()),
+            log: found.log,
+            time: None,
+            degrees: Some(Degrees {
+                factors,
+                joints: found.joints,
+            }),
+        });
+    }
+    None
+}
+
+/// A log with some joints taken as in degrees.
+struct InDegrees {
+    log: Log<'static>,
+    joints: Vec<usize>,
+    /// Shares of torque that model and friction explain then, all joints together.
+    explained: f64,
+}
+
+/// Takes these joints as in degrees, and those that are named next, until the log comes further.
+fn in_degrees(
+    robot: &Robot,
+    log: &Log<'static>,
+    settings: &Settings,
+    factors: [f64; 2],
+    mut joints: Vec<usize>,
+) -> Option<InDegrees> {
+    loop {
+        let of_joint = |joint| {
+            if joints.contains(&joint) {
+                factors
+            } else {
+                [1.0; 2]
+            }
         };
         let units = Units {
             time: 1.0,
             joints: (0..robot.dof()).map(of_joint).collect(),
         };
         let changed = units.of(robot, log)?;
-        if filtered(robot, std::slice::from_ref(&changed), settings).is_ok() {
-            let words = format!("{}: {what} were taken as degrees", log.name());
-            return Some(Converted {
-                log: changed,
-                words,
-                time: None,
-                degrees: Some(factors),
-            });
+        match filtered(robot, std::slice::from_ref(&changed), settings) {
+            Ok((_, _, checkup)) => {
+                joints.sort_unstable();
+                let explained = checkup.joints.iter().filter_map(|joint| joint.explained);
+                return Some(InDegrees {
+                    explained: explained.sum(),
+                    log: changed,
+                    joints,
+                });
+            }
+            Err(twincal::Error::Log { problem, .. }) if problem.contains("degrees") => {
+                let next = named(robot, &problem).filter(|joint| !joints.contains(joint))?;
+                joints.push(next);
+            }
+            Err(_) => return None,
         }
     }
-    None
+}
+
+/// The joint that a problem names.
+fn named(robot: &Robot, problem: &str) -> Option<usize> {
+    let names = robot.joint_names();
+    names
+        .iter()
+        .position(|name| problem.contains(&format!("`{name}`")))
 }
