@@ -73,9 +73,7 @@ fn print(changes: &[Change], terminal: &mut Terminal) {
 
 /// "PIP 0.032 → >0.999".
 fn pips(change: &Change) -> String {
-    let [before, after] = change
-        .pip
-        .map(|p| p.map_or_else(|| "–".into(), |p| pip(Some(p))));
+    let [before, after] = change.pip.map(pip);
     format!("PIP {before} → {after}")
 }
 

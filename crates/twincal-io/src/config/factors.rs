@@ -40,7 +40,10 @@ impl Factor {
 
 /// `[columns] factor`
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(default)]
+#[serde(
+    default,
+    expecting = "expected factors by channel such as { tau = { elbow = -1.0 } }"
+)]
 #[schemars(deny_unknown_fields)]
 pub struct FactorTable {
     /// Of positions: one number, or { joint = number }. 0.017453292519943295 makes radians of degrees, -1 turns the sign.

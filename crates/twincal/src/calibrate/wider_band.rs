@@ -1,4 +1,4 @@
-//! More of the log where its noise allows it: a wider band, fitted with `ar1`, where that is asked for.
+//! More of the log where its noise allows it: a wider band, fitted with `ar1`, unless somebody chose band or likelihood.
 //!
 //! Noise with a memory is largest where the motion is. Where it is an autoregression of first order it falls above as 1/f², and what lies
 //! there tells effects apart that look alike below. But what a model lacks (friction that turns round sharply, flexible joints) and what encoders add to
@@ -140,7 +140,7 @@ pub(super) fn not_wider(error: &Error) -> Finding {
         "",
         format!(
             "what is left is an autoregression, but a fit in a wider band with \"ar1\" ends early ({error}): fitted in the usual one; \
-             without [signal] wider_band it is not tried"
+             [signal] wider_band = false does not try it"
         ),
         0,
     )

@@ -162,7 +162,7 @@ mod tests {
     /// T of 5 rows is found again from the taps, and its variance is the taps'.
     #[test]
     fn the_time_constant_behind_the_filter_is_found() {
-        let band = Passband::new(0.4).unwrap();
+        let band = Passband::new(0.4).expect("a filter");
         for time in [0.5, 2.0, 5.0, 30.0] {
             let exact = covariances(time, 2);
             let found = band.time(exact[1] / exact[0]);
@@ -179,7 +179,7 @@ mod tests {
     /// White rows have no memory, whatever the filter gives them; their variance is the share that passes.
     #[test]
     fn white_noise_has_no_memory() {
-        let band = Passband::new(0.4).unwrap();
+        let band = Passband::new(0.4).expect("a filter");
         let white = band.autoregression(0.3);
         assert_eq!(white.rho, 0.0);
         assert!((white.variance - 1.0 / 1.35).abs() < 0.01, "{white:?}");
@@ -189,7 +189,7 @@ mod tests {
     /// Innovations are flat to a quarter below the cut-off where those of the fitted coefficient differ by more than two.
     #[test]
     fn innovations_are_flat() {
-        let band = Passband::new(0.4).unwrap();
+        let band = Passband::new(0.4).expect("a filter");
         let exact = covariances(5.0, 2);
         let fitted = exact[1] / exact[0];
         let found = band.autoregression(fitted);
@@ -204,5 +204,23 @@ mod tests {
             spread(fitted)
         );
         assert!(spread(found.rho) < 1.4, "{found:?}, {}", spread(found.rho));
+    }
+    /// The variance that follows from the level of innovations is that of the taps: their mean square by covariances, over the
+    /// share of frequencies that passes, is the level.
+    #[test]
+    fn level_and_variance_belong_together() {
+        let band = Passband::new(0.4).expect("a filter");
+        for time in [0.5, 2.0, 5.0, 30.0] {
+            let [own, next] = covariances(time, 2)[..] else {
+                panic!("two covariances");
+            };
+            let Autoregression { rho, variance } = band.autoregression(next / own);
+            let innovations = (1.0 + rho * rho) * own - 2.0 * rho * next;
+            let exact = own * (1.0 - rho * rho) / (innovations / band.share());
+            assert!(
+                (variance / exact - 1.0).abs() < 0.02,
+                "{time}: {variance}, {exact}"
+            );
+        }
     }
 }

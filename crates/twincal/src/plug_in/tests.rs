@@ -10,26 +10,26 @@ use crate::term::Family;
 const ROWS: usize = 300;
 
 /// `y = 1000 x + ε`, x and ε standard normal.
-fn log() -> Observations {
+fn log(rows: usize) -> Observations {
     let mut random = Random::new(7, 0);
-    let x: Vec<f64> = (0..ROWS).map(|_| random.normal()).collect();
+    let x: Vec<f64> = (0..rows).map(|_| random.normal()).collect();
     let y: Vec<f64> = x.iter().map(|x| 1000.0 * x + random.normal()).collect();
     Observations {
         log: "log".into(),
         cutoff: 0.0,
-        time: (0..ROWS).map(|row| 0.01 * row as f64).collect(),
+        time: (0..rows).map(|row| 0.01 * row as f64).collect(),
         starts: vec![0],
-        q: vec![vec![0.0; ROWS].into()],
-        qd: vec![vec![1.0; ROWS].into()],
-        qdd: vec![vec![0.0; ROWS].into()],
+        q: vec![vec![0.0; rows].into()],
+        qd: vec![vec![1.0; rows].into()],
+        qdd: vec![vec![0.0; rows].into()],
         joints: vec![JointObservations {
             recipes: None,
             columns: vec![0],
             x,
             measured: y.clone().into(),
-            nominal: vec![0.0; ROWS].into(),
+            nominal: vec![0.0; rows].into(),
             y,
-            standstill: vec![false; ROWS],
+            standstill: vec![false; rows],
             weight: Vec::new(),
             shelved: None,
             temperature: Vec::new(),
@@ -38,18 +38,8 @@ fn log() -> Observations {
     }
 }
 
-/// One column explains all but a millionth of the squares. What is left is noise, and E[φ] = (b0 + RSS/2)/(a0 + n/2 − 1) with b0 a
-/// thousandth of the noise must be RSS/(n − 2): no row more than there is.
-#[test]
-fn the_automatic_prior_adds_no_noise_where_nearly_all_is_explained() {
-    let log = log();
-    let joint = &log.joints[0];
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let beta = dot(&joint.x, &joint.y) / dot(&joint.x, &joint.x);
-    let left: f64 = (joint.x.iter().zip(&joint.y))
-        .map(|(x, y)| (y - beta * x) * (y - beta * x))
-        .sum();
-    let columns = Columns {
+fn columns() -> Columns {
+    Columns {
         names: vec!["x".into()],
         component: vec![0],
         family: vec![0],
@@ -59,24 +49,45 @@ fn the_automatic_prior_adds_no_noise_where_nearly_all_is_explained() {
         forced: Vec::new(),
         parent: Vec::new(),
         second_choice: Vec::new(),
-    };
-    let prior = PriorSettings {
+    }
+}
+
+fn prior() -> PriorSettings {
+    PriorSettings {
         scaled_variance: Auto::Auto,
         inclusion: Some(Inclusion::Probability(0.5)),
         noise: None,
         families: Vec::new(),
         forced: Vec::new(),
         heredity: None,
-    };
+    }
+}
+
+fn noise(model: NoiseModel) -> NoiseSettings {
+    NoiseSettings {
+        model,
+        per_joint: true,
+        robust: false,
+        varies_with_speed: false,
+        varies_with_load: false,
+        uncertainty: NoiseUncertainty::PlugIn,
+    }
+}
+
+/// One column explains all but a millionth of the squares. What is left is noise, and E[φ] = (b0 + RSS/2)/(a0 + n/2 − 1) with b0 a
+/// thousandth of the noise must be RSS/(n − 2): no row more than there is.
+#[test]
+fn the_automatic_prior_adds_no_noise_where_nearly_all_is_explained() {
+    let log = log(ROWS);
+    let joint = &log.joints[0];
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let beta = dot(&joint.x, &joint.y) / dot(&joint.x, &joint.x);
+    let left: f64 = (joint.x.iter().zip(&joint.y))
+        .map(|(x, y)| (y - beta * x) * (y - beta * x))
+        .sum();
+    let (columns, prior) = (columns(), prior());
     let settings = FitSettings {
-        noise: NoiseSettings {
-            model: NoiseModel::Iid,
-            per_joint: true,
-            robust: false,
-            varies_with_speed: false,
-            varies_with_load: false,
-            uncertainty: NoiseUncertainty::PlugIn,
-        },
+        noise: noise(NoiseModel::Iid),
         prior: &prior,
     };
     let parts = [log.whole()];
@@ -90,4 +101,20 @@ fn the_automatic_prior_adds_no_noise_where_nearly_all_is_explained() {
         "{} instead of {exact}",
         fit.posterior.noise
     );
+}
+
+/// What one of two rows leaves out predicts nothing: there is no score then, and none that is no number.
+#[test]
+fn rows_too_few_to_score_leave_no_score() {
+    let (columns, prior) = (columns(), prior());
+    let settings = FitSettings {
+        noise: noise(NoiseModel::Tempered),
+        prior: &prior,
+    };
+    for (rows, scored) in [(2, false), (ROWS, true)] {
+        let log = log(rows);
+        let (_, left_out) = fit_tempered(&[log.whole()], &columns, settings).unwrap();
+        assert!(left_out.scores.iter().all(|(_, score)| score.is_finite()));
+        assert_eq!(!left_out.scores.is_empty(), scored, "{rows}");
+    }
 }

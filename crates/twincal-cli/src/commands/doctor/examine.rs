@@ -140,7 +140,10 @@ pub(super) fn examine(
     all.findings.append(&mut logs.findings);
     progress.step("comparing logs and model");
     all.look(&mut logs, &settings);
-    if trial == Trial::Fit && all.refusals.is_empty() && !all.log_or_model_is_wrong() {
+    if trial == Trial::Fit
+        && all.refusals.is_empty()
+        && !all.findings.iter().any(Finding::doubts_the_log)
+    {
         progress.step("trying the fit");
         all.try_fit(&logs, &settings.calibration);
     }
@@ -347,13 +350,6 @@ impl Examination {
             rate_hz: pipeline.common_rate(kept),
             ..pipeline
         });
-    }
-
-    /// Whether something has to be mended before a fit says anything.
-    fn log_or_model_is_wrong(&self) -> bool {
-        let wrong = ["sign_flip", "joint_order", "torque_scale"];
-        let mut findings = self.findings.iter();
-        findings.any(|finding| wrong.contains(&finding.code.as_str()))
     }
 
     /// Fits: what only a fit can tell (rows that count as too few) is a reason to stop as well. A lower cut-off is advised if

@@ -80,7 +80,7 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
             examination
                 .findings
                 .iter()
-                .filter(|f| ["sign_flip", "joint_order", "torque_scale"].contains(&f.code.as_str()))
+                .filter(|finding| finding.doubts_the_log())
                 .filter(|f| !is_mended(&f.code))
                 .map(|finding| finding.message.clone()),
         )
