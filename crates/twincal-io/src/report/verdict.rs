@@ -6,7 +6,7 @@ use super::view::{Joint, independent_rows, memory, pooled_unit, standard_deviati
 use serde::Serialize;
 use twincal::calibrate::Calibration;
 use twincal::posterior::Method;
-use twincal::validate::{JointScore, Split, Validation};
+use twincal::validate::{JointScore, Split, Validation, WORSE};
 use twincal::{Finding, Severity};
 
 /// A 95 % interval is honest if it holds this share of the held-out rows (the range that `check` accepts).
@@ -15,8 +15,6 @@ const COVERAGE: (f64, f64) = (0.90, 0.99);
 const LEVEL: f64 = 0.95;
 /// Ratio of errors from which calibration counts as an improvement.
 const BETTER: f64 = 0.95;
-/// Ratio of errors from which it counts as harm.
-const WORSE: f64 = 1.02;
 /// Held-out rows, in independent ones, below which nothing is promised.
 const FEW: f64 = 20.0;
 /// Share of the torque's standard deviation from which the remaining error is called large.

@@ -31,6 +31,7 @@ mod unsettled;
 mod weigh;
 mod whiteness;
 mod wider_band;
+mod worse;
 #[cfg(test)]
 mod testing;
 
@@ -304,6 +305,7 @@ fn road(
     };
     let (validation, more) = held_out::validate(own, &library, plan, fits_of_folds, progress)?;
     findings.extend(more);
+    findings.extend(worse::findings(robot, &validation.filtered));
 
     // What follows reads the smoothed logs at other cut-offs and nothing of the recordings.
     drop((trajectories, others, every_log));

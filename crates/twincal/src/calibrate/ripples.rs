@@ -105,9 +105,10 @@ impl Seen {
             kind,
             ripple,
         } = self;
-        let (per, unit) = match kind {
-            JointKind::Prismatic => ("metre", "N"),
-            _ => ("turn", "N·m"),
+        let unit = kind.torque_unit();
+        let per = match kind {
+            JointKind::Prismatic => "metre",
+            _ => "turn",
         };
         Finding::new(
             severity,

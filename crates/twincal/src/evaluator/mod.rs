@@ -105,10 +105,7 @@ impl Evaluator {
             joints: (0..names.len())
                 .map(|joint| EvaluatorJoint {
                     name: names[joint].to_owned(),
-                    unit: match twin.robot.joint_kind(joint) {
-                        crate::robot::JointKind::Prismatic => "N",
-                        _ => "N·m",
-                    },
+                    unit: twin.robot.joint_kind(joint).torque_unit(),
                     limits: twin.limits(joint),
                     noise: interval.noise[joint],
                     base: interval.base[joint],

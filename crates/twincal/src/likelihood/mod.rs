@@ -6,7 +6,7 @@ mod structure;
 pub use spread::{Profile, Spread};
 
 use crate::error::Result;
-use crate::gram::Gram;
+use crate::gram::{Gram, JointGram};
 use crate::posterior::Problem;
 use crate::prior::{Prior, PriorSettings};
 use crate::signal::Auto;
@@ -164,11 +164,24 @@ impl Columns {
 
     /// What a column's prior variance is multiplied with to be v: the mean of rms² over the columns of its component, so
     /// that a direction that the data hardly see stays as narrow as its neighbours. For a column that is a component of
-    /// its own that is its mean square (method section 6).
-    pub fn references(&self, mean_square: &[f64]) -> Vec<f64> {
+    /// its own that is its mean square (method section 6). A shape that is at most 1 counts as if it were 1 on a hundredth of
+    /// its joint's rows at least ([`Family::fades`]).
+    pub fn references(&self, grams: &Gram, weight: &[f64]) -> Vec<f64> {
+        let mut square = mean_squares(grams, self.names.len(), weight);
+        let rows = |(joint, w): (&JointGram, &f64)| joint.n * w;
+        let all: f64 = grams.joints.iter().zip(weight).map(rows).sum();
+        for (joint, w) in grams.joints.iter().zip(weight) {
+            for &column in &joint.columns {
+                let column = column as usize;
+                if self.families[self.family_of(column)].fades() {
+                    let least = LEAST_SHARE * rows((joint, w)) / all.max(f64::MIN_POSITIVE);
+                    square[column] = square[column].max(least);
+                }
+            }
+        }
         let components = self.family.len();
         let (mut sum, mut count) = (vec![0.0; components], vec![0.0; components]);
-        for (&component, square) in self.component.iter().zip(mean_square) {
+        for (&component, square) in self.component.iter().zip(&square) {
             sum[component] += square;
             count[component] += 1.0;
         }
@@ -263,7 +276,6 @@ pub fn assemble(
         log_constant += 0.5 * temper * joint.n * plug_in.weight[j].ln();
         log_constant += 0.5 * temper * joint.starts * (-rho * rho).ln_1p();
     }
-    let mean_square = mean_squares(grams, count, &plug_in.weight);
     let unexplained = scale_of_residual(yy / n.max(f64::MIN_POSITIVE));
     let noise = if plug_in.noise > 0.0 {
         plug_in.noise
@@ -272,7 +284,7 @@ pub fn assemble(
     };
     let learned = settings.scaled_variance == Auto::Auto;
     let slab = columns
-        .references(&mean_square)
+        .references(grams, &plug_in.weight)
         .iter()
         .enumerate()
         .map(|(k, reference)| {
@@ -309,6 +321,11 @@ pub fn assemble(
         names: columns.names.clone(),
     })
 }
+
+/// Share of a joint's rows on which a shape that fades with speed acts, at least, where its slab is made: where the training motion
+/// is too fast for it, its column is as small as 1e-38, and a coefficient that is a priori as large as the residual over
+/// that would be told by rounding, and would drive the prediction of any slower motion.
+const LEAST_SHARE: f64 = 0.01;
 
 /// Largest variance of an automatic slab, in squares of the standard error that the column has alone. A slab that is wider
 /// tells nothing more of the coefficient, and columns that depend on each other lose their last digits against it: on a

@@ -15,9 +15,7 @@ use crate::diagnostics::integrated_autocorrelation_time;
 use crate::error::Result;
 use crate::gram::Gram;
 use crate::infer::approximate;
-use crate::likelihood::{
-    Columns, NoiseModel, NoiseSettings, NoiseUncertainty, PlugIn, assemble, mean_squares,
-};
+use crate::likelihood::{Columns, NoiseModel, NoiseSettings, NoiseUncertainty, PlugIn, assemble};
 use crate::observations::Part;
 use crate::posterior::{Posterior, Problem};
 use crate::prior::PriorSettings;
@@ -309,7 +307,7 @@ fn slab_scales(
     problem: &Problem,
     posterior: &Posterior,
 ) -> Vec<f64> {
-    let reference_of = columns.references(&mean_squares(gram, columns.names.len(), &now.weight));
+    let reference_of = columns.references(gram, &now.weight);
     if !posterior.noise.is_finite() {
         return now.scaled_variance.clone(); // less than two effective rows know no scale
     }

@@ -118,3 +118,40 @@ fn rows_too_few_to_score_leave_no_score() {
         assert_eq!(!left_out.scores.is_empty(), scored, "{rows}");
     }
 }
+
+/// Beside x a column that a motion too fast for it leaves at 1e-38: a coefficient of the size of the residual over that is a
+/// torque of 1e38 where the motion is slow. Of a shape that is at most 1 it is known that it cannot be: the noise has sd 1, and the data
+/// say nothing of it.
+#[test]
+fn a_shape_that_the_motion_hardly_shows_has_a_coefficient_of_usual_size() {
+    let mut log = log(ROWS);
+    log.joints[0].columns.push(1);
+    let faint = (0..ROWS).map(|row| 1e-38 * (row as f64 / 50.0).sin());
+    log.joints[0].x.extend(faint);
+    let second = |families: [Family; 2]| {
+        let columns = Columns {
+            names: vec!["x".into(), "faint".into()],
+            component: vec![0, 1],
+            family: vec![0, 1],
+            families: families.into(),
+            prior_sd: vec![None; 2],
+            lower: vec![f64::NEG_INFINITY; 2],
+            ..columns()
+        };
+        let prior = prior();
+        let settings = FitSettings {
+            noise: noise(NoiseModel::Iid),
+            prior: &prior,
+        };
+        let parts = [log.whole()];
+        let first = start(&parts, &columns, &prior);
+        let fit = fit(&parts, &columns, settings, &first, Moving::All, None).unwrap();
+        assert!(fit.posterior.inclusion[0] > 0.999);
+        [fit.posterior.mean[1].abs(), fit.posterior.sd[1]]
+    };
+    let [mean, sd] = second([Family::User, Family::Stribeck]);
+    // v_0 = mean(y²)/E[φ] is 1e6 here: √v / √LEAST_SHARE = 1e4, in half of the models.
+    assert!(mean < 1e-3 && sd < 1e4, "{mean} ± {sd}");
+    let [mean, sd] = second([Family::User, Family::Generic]);
+    assert!(mean > 1e30 && sd > 1e30, "{mean} ± {sd}");
+}

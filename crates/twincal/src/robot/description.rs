@@ -25,6 +25,17 @@ pub enum JointKind {
     Fixed,
 }
 
+impl JointKind {
+    /// Unit of the joint's generalised force.
+    #[must_use]
+    pub fn torque_unit(self) -> &'static str {
+        match self {
+            Self::Prismatic => "N",
+            Self::Revolute | Self::Continuous | Self::Fixed => "N·m",
+        }
+    }
+}
+
 /// Mass, centre of mass and rotational inertia of a link, as in the model file.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Inertia {

@@ -190,6 +190,13 @@ impl Family {
         )
     }
 
+    /// True if its torque is a number times a shape of at most 1 that vanishes with speed: the number is what a joint does near
+    /// standstill, however little of that the data hold.
+    #[must_use]
+    pub fn fades(self) -> bool {
+        self == Self::Stribeck
+    }
+
     /// True if it is another story than the columns that span it. The rotors of a sum and of a difference of two joints and those of
     /// both joints are three directions, but each of the four is what a gear train can be.
     pub(super) fn is_story_of_its_own(self) -> bool {

@@ -16,6 +16,9 @@ pub use trace::{MAX_POINTS, TraceRows};
 
 use serde::{Deserialize, Deserializer, Serialize};
 
+/// Ratio of the calibrated to the nominal RMSE from which calibration counts as harm.
+pub const WORSE: f64 = 1.02;
+
 /// Scores of one joint. Without rows the numbers are NaN here and `null` in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct JointScore {

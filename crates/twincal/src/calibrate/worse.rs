@@ -1,0 +1,69 @@
+//! A twin that predicts held-out torque worse than the model it started from.
+
+use crate::error::{Finding, Severity};
+use crate::robot::Robot;
+use crate::validate::{Scores, WORSE};
+
+/// One finding on all joints together where they are worse than nominal by more than [`WORSE`], else one per joint that is.
+pub(super) fn findings(robot: &Robot, scores: &Scores) -> Vec<Finding> {
+    let ratio = |[nominal, calibrated]: [f64; 2]| calibrated / nominal;
+    if ratio([scores.rmse_nominal, scores.rmse_calibrated]) > WORSE {
+        let message = format!(
+            "on held-out data the calibrated torque is worse than the model's own: RMSE {:.3} instead of {:.3} over all joints: do not use \
+             this twin; log longer, with motion in all of the range that it is for",
+            scores.rmse_calibrated, scores.rmse_nominal
+        );
+        return vec![finding(String::new(), message)];
+    }
+    let worse = (scores.joints.iter().enumerate())
+        .filter(|(_, score)| ratio([score.rmse_nominal, score.rmse_calibrated]) > WORSE);
+    let told = worse.map(|(joint, score)| {
+        let (name, unit) = (&score.joint, robot.joint_kind(joint).torque_unit());
+        let message = format!(
+            "joint `{name}`: on held-out data the calibrated torque is worse than the model's own: RMSE {:.3} {unit} instead of \
+             {:.3} {unit}; its corrections do not hold beyond the motion of the fit: log it longer, in the motion that the twin is for",
+            score.rmse_calibrated, score.rmse_nominal
+        );
+        finding(name.clone(), message)
+    });
+    told.collect()
+}
+
+fn finding(subject: String, message: String) -> Finding {
+    Finding::new(Severity::Warning, "worse_than_model", subject, message, 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::validate::ScoreKeeper;
+
+    /// Nominal and calibrated RMSE of all joints, and of each.
+    fn told(all: [f64; 2], joints: [[f64; 2]; 3]) -> Vec<Finding> {
+        let robot = crate::evaluator::testing::tree();
+        let mut scores = ScoreKeeper::new(robot.joint_names()).scores();
+        [scores.rmse_nominal, scores.rmse_calibrated] = all;
+        for (score, [nominal, calibrated]) in scores.joints.iter_mut().zip(joints) {
+            (score.rmse_nominal, score.rmse_calibrated) = (nominal, calibrated);
+        }
+        findings(&robot, &scores)
+    }
+
+    #[test]
+    fn what_is_worse_than_nominal_is_told_once() {
+        let none = told([2.0, 1.0], [[2.0, 1.0], [2.0, 2.02], [0.0, 0.0]]);
+        assert_eq!(none, []);
+        // Without held-out rows there is nothing to tell.
+        assert_eq!(told([f64::NAN; 2], [[f64::NAN; 2]; 3]), []);
+        let joints = [[2.0, 1.0], [2.0, 2.5], [1.0, 1.5]];
+        let some = told([5.0, 1.0], joints);
+        assert_eq!(some.len(), 2);
+        assert!(
+            some[0].message.contains("RMSE 2.500 N"),
+            "{}",
+            some[0].message
+        );
+        let all = told([1.0, 1e35], joints);
+        assert_eq!((all.len(), all[0].subject.as_str()), (1, ""));
+    }
+}
