@@ -36,11 +36,38 @@ fn finding(subject: String, message: String) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::{JointDescription, JointKind, LinkDescription, RobotDescription};
     use crate::validate::ScoreKeeper;
+    use std::collections::BTreeMap;
+
+    /// A chain of a hinge, a slider and another hinge.
+    fn chain() -> Robot {
+        use JointKind::{Prismatic, Revolute};
+        let link = |k: usize| format!("link{k}");
+        let kinds = [Revolute, Prismatic, Revolute].into_iter().enumerate();
+        let description = RobotDescription {
+            name: "chain".to_owned(),
+            gravity: [0.0, 0.0, -9.81],
+            joints: kinds
+                .map(|(k, kind)| {
+                    let name = format!("joint{k}");
+                    JointDescription::new(&name, kind, &link(k), &link(k + 1))
+                })
+                .collect(),
+            links: (0..4)
+                .map(|k| LinkDescription {
+                    name: link(k),
+                    inertia: None,
+                })
+                .collect(),
+            allow_unphysical: false,
+        };
+        Robot::new(description, &BTreeMap::new()).unwrap().0
+    }
 
     /// Nominal and calibrated RMSE of all joints, and of each.
     fn told(all: [f64; 2], joints: [[f64; 2]; 3]) -> Vec<Finding> {
-        let robot = crate::evaluator::testing::tree();
+        let robot = chain();
         let mut scores = ScoreKeeper::new(robot.joint_names()).scores();
         [scores.rmse_nominal, scores.rmse_calibrated] = all;
         for (score, [nominal, calibrated]) in scores.joints.iter_mut().zip(joints) {
@@ -57,12 +84,15 @@ mod tests {
         assert_eq!(told([f64::NAN; 2], [[f64::NAN; 2]; 3]), []);
         let joints = [[2.0, 1.0], [2.0, 2.5], [1.0, 1.5]];
         let some = told([5.0, 1.0], joints);
-        assert_eq!(some.len(), 2);
-        assert!(
-            some[0].message.contains("RMSE 2.500 N"),
-            "{}",
-            some[0].message
-        );
+        let subjects: Vec<&str> = some.iter().map(|f| f.subject.as_str()).collect();
+        assert_eq!(subjects, ["joint1", "joint2"]);
+        let units = [
+            "RMSE 2.500 N instead of 2.000 N;",
+            "RMSE 1.500 N·m instead of 1.000 N·m;",
+        ];
+        for (finding, part) in some.iter().zip(units) {
+            assert!(finding.message.contains(part), "{}", finding.message);
+        }
         let all = told([1.0, 1e35], joints);
         assert_eq!((all.len(), all[0].subject.as_str()), (1, ""));
     }

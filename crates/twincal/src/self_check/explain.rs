@@ -17,8 +17,10 @@ const COLUMNS: usize = 4;
 /// of the log and a factor.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Reading {
-    /// Of position, velocity and acceleration.
+    /// Of position, velocity and acceleration; the factor is that of position.
     pub(super) motion: Vec<(usize, f64)>,
+    /// Factor of velocity and acceleration.
+    pub(super) rates: Vec<f64>,
     /// Of torque.
     pub(super) torque: Vec<(usize, f64)>,
 }
@@ -29,6 +31,7 @@ impl Reading {
         let own: Vec<(usize, f64)> = (0..dof).map(|joint| (joint, 1.0)).collect();
         Self {
             motion: own.clone(),
+            rates: vec![1.0; dof],
             torque: own,
         }
     }
@@ -54,10 +57,12 @@ pub(super) struct Explained {
 pub(super) fn explain(robot: &Robot, sample: &Sample, reading: &Reading) -> Vec<Option<Explained>> {
     let (dof, len) = (robot.dof(), sample.len);
     let [q, qd, qdd] = [0, 1, 2].map(|k| -> Vec<f64> {
-        reading
-            .motion
-            .iter()
-            .flat_map(|&(from, factor)| sample.channels[k][from].iter().map(move |v| factor * v))
+        let joints = reading.motion.iter().zip(&reading.rates);
+        joints
+            .flat_map(|(&(from, position), &rates)| {
+                let factor = if k == 0 { position } else { rates };
+                sample.channels[k][from].iter().map(move |v| factor * v)
+            })
             .collect()
     });
     let mut nominal = vec![0.0; dof * len];

@@ -26,6 +26,8 @@ const PREFERENCE: f64 = 0.3;
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Step {
     TurnTorque(usize),
+    TurnPosition(usize),
+    TurnRates(usize),
     TurnMotion(usize),
     TurnBoth(usize),
     SwapTorque(usize, usize),
@@ -50,15 +52,25 @@ impl Step {
         let mut new = reading.clone();
         match self {
             Self::TurnTorque(j) => new.torque[j].1 *= -1.0,
-            Self::TurnMotion(j) => new.motion[j].1 *= -1.0,
+            Self::TurnPosition(j) => new.motion[j].1 *= -1.0,
+            Self::TurnRates(j) => new.rates[j] *= -1.0,
+            Self::TurnMotion(j) => {
+                new.motion[j].1 *= -1.0;
+                new.rates[j] *= -1.0;
+            }
             Self::TurnBoth(j) => {
                 new.motion[j].1 *= -1.0;
+                new.rates[j] *= -1.0;
                 new.torque[j].1 *= -1.0;
             }
             Self::SwapTorque(a, b) => new.torque.swap(a, b),
-            Self::SwapMotion(a, b) => new.motion.swap(a, b),
+            Self::SwapMotion(a, b) => {
+                new.motion.swap(a, b);
+                new.rates.swap(a, b);
+            }
             Self::SwapBoth(a, b) => {
                 new.motion.swap(a, b);
+                new.rates.swap(a, b);
                 new.torque.swap(a, b);
             }
         }
@@ -91,15 +103,16 @@ pub(super) fn overwhelming(before: &[Option<Explained>], after: &[Option<Explain
     mended && gain >= LEAST_GAIN || improved && gain >= GREAT_GAIN
 }
 
-/// Turns signs and exchanges joints, the best step first, while that helps; the log as it stands unless the result is
-/// [`overwhelming`].
+/// Turns signs and exchanges joints, the best step first, while that helps; unless the result is [`overwhelming`], the log as it
+/// stands but for joints whose velocity is minus the change of their position ([`consistent`]).
 pub(super) fn mend(
     robot: &Robot,
     sample: &Sample,
     as_logged: &[Option<Explained>],
 ) -> (Reading, Vec<Option<Explained>>) {
     let dof = robot.dof();
-    let (mut reading, mut current) = (Reading::as_logged(dof), as_logged.to_vec());
+    let first = consistent(robot, sample, as_logged);
+    let (mut reading, mut current) = first.clone();
     for _ in 0..2 * dof {
         if !doubtful(&current) {
             break;
@@ -121,9 +134,43 @@ pub(super) fn mend(
         };
         (reading, current) = (better, explained);
     }
-    if overwhelming(as_logged, &current) {
+    if overwhelming(&first.1, &current) || overwhelming(as_logged, &current) {
         (reading, current)
     } else {
-        (Reading::as_logged(dof), as_logged.to_vec())
+        first
     }
+}
+
+/// Where the velocity of a joint is minus the change of its position, one of the two is turned: the one with which by far more of the
+/// torque is explained than with the other, if there is such a one. What is clearest comes first.
+fn consistent(
+    robot: &Robot,
+    sample: &Sample,
+    as_logged: &[Option<Explained>],
+) -> (Reading, Vec<Option<Explained>>) {
+    let mut now = (Reading::as_logged(robot.dof()), as_logged.to_vec());
+    let opposite = (0..robot.dof()).filter(|&joint| sample.opposite[joint] == Some(true));
+    let mut left: Vec<usize> = opposite.collect();
+    while !left.is_empty() {
+        let mut clearest: Option<(f64, usize, Reading, Vec<Option<Explained>>)> = None;
+        for &joint in &left {
+            let mut tried = [Step::TurnPosition(joint), Step::TurnRates(joint)].map(|step| {
+                let reading = step.apply(&now.0);
+                let explained = explain(robot, sample, &reading);
+                (gain(&now.1, &explained), reading, explained)
+            });
+            tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+            let [(gain, reading, explained), (other, ..)] = tried;
+            let least = clearest.as_ref().map_or(LEAST_STEP, |(most, ..)| *most);
+            if gain - other > least && gain > -PREFERENCE {
+                clearest = Some((gain - other, joint, reading, explained));
+            }
+        }
+        let Some((_, joint, reading, explained)) = clearest else {
+            break;
+        };
+        left.retain(|&other| other != joint);
+        now = (reading, explained);
+    }
+    now
 }

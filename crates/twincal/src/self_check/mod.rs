@@ -15,9 +15,16 @@ use explain::{Explained, Reading, explain};
 use sample::Sample;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
+use std::ops::RangeInclusive;
 
 /// Torque that differs by this factor from the model's is not of the joint's side, or not in N·m.
 const OTHER_UNIT: f64 = 5.0;
+/// N·m per unit of a torque in N·mm.
+const THOUSANDTH: f64 = 1e-3;
+/// |ln| within which a factor may differ from 1000 and still be thousandths: a model's masses are not that wrong.
+const LIKE_A_THOUSAND: f64 = 0.4;
+/// Largest torque over the effort limit where torque is in thousandths of N·m: a drive uses between a fiftieth of its limit and all.
+const THOUSANDTHS: RangeInclusive<f64> = 20.0..=1500.0;
 /// Share of torque that may be left where a factor is believed.
 const CLEAR: f64 = 0.05;
 /// Share that must be left without the model: else friction alone explains the torque, and the factor says nothing.
@@ -55,8 +62,12 @@ pub struct JointCheck {
     pub without_model: Option<f64>,
     /// Factor at the nominal torque; 0 where friction alone explains more.
     pub gain: Option<f64>,
-    /// The joint of the log whose motion explains most as this joint's, and its sign.
+    /// What makes N·m of its torque where that is clearly logged in thousandths of it.
+    pub torque_factor: Option<f64>,
+    /// The joint of the log whose motion explains most as this joint's, and the sign of its position.
     pub motion: (String, f64),
+    /// The sign of its velocity and acceleration.
+    pub rates: f64,
     /// The same of torque.
     pub torque: (String, f64),
 }
@@ -94,7 +105,11 @@ pub fn look<'a>(
     let as_logged = explain(robot, &sample, &Reading::as_logged(robot.dof()));
     let (reading, explained) = mend::mend(robot, &sample, &as_logged);
     let mut findings = signs_and_order(robot, &reading, &as_logged, &explained);
-    findings.extend(scales(robot, &explained));
+    let scales = scales(robot, &sample, &explained);
+    let torque_factor = |name: &str| {
+        let whose = |scale: &&Scale| ["", name].contains(&&*scale.finding.subject);
+        scales.iter().find(whose)?.factor
+    };
     let names = robot.joint_names();
     let joints = names.iter().enumerate().map(|(joint, name)| {
         let named = |(from, sign): (usize, f64)| (names[from].to_owned(), sign);
@@ -104,14 +119,15 @@ pub fn look<'a>(
             explained: own.map(|e| 1.0 - e.left),
             without_model: own.map(|e| 1.0 - e.left_without_model),
             gain: own.map(|e| e.gain),
+            torque_factor: torque_factor(name),
             motion: named(reading.motion[joint]),
+            rates: reading.rates[joint],
             torque: named(reading.torque[joint]),
         }
     });
-    Ok(Look {
-        joints: joints.collect(),
-        findings,
-    })
+    let joints = joints.collect();
+    findings.extend(scales.into_iter().map(|scale| scale.finding));
+    Ok(Look { joints, findings })
 }
 
 /// Angles beyond a turn whose torque only makes sense when they are taken as degrees.
@@ -120,13 +136,13 @@ fn refuse_degrees(robot: &Robot, log: &str, sample: &Sample) -> Result<()> {
     if largest <= TAU {
         return Ok(());
     }
+    let factors = (0..robot.dof()).map(|joint| match robot.joint_kind(joint) {
+        JointKind::Prismatic => 1.0,
+        _ => PI / 180.0,
+    });
     let radians = Reading {
-        motion: (0..robot.dof())
-            .map(|joint| match robot.joint_kind(joint) {
-                JointKind::Prismatic => (joint, 1.0),
-                _ => (joint, PI / 180.0),
-            })
-            .collect(),
+        motion: factors.clone().enumerate().collect(),
+        rates: factors.collect(),
         ..Reading::as_logged(robot.dof())
     };
     let as_logged = explain(robot, sample, &Reading::as_logged(robot.dof()));
@@ -144,46 +160,143 @@ fn refuse_degrees(robot: &Robot, log: &str, sample: &Sample) -> Result<()> {
     })
 }
 
-/// Joints whose torque has the model's shape but another size.
-fn scales(robot: &Robot, explained: &[Option<Explained>]) -> Vec<Finding> {
+/// Joints whose torque has the model's shape but another size, and those whose torque is far beyond what the model says that the
+/// drive can do; one finding where all torque is in thousandths of N·m.
+fn scales(robot: &Robot, sample: &Sample, explained: &[Option<Explained>]) -> Vec<Scale> {
     let names = robot.joint_names();
-    let mut findings = Vec::new();
-    for (name, joint) in names.iter().zip(explained) {
-        let Some(joint) = joint.filter(|joint| {
-            joint.left < CLEAR
-                && joint.left < PART * joint.left_without_model
-                && joint.left_without_model > NEEDED
-                && joint.gain > 0.0
-        }) else {
-            continue;
-        };
-        let problem = if joint.gain < 1.0 / OTHER_UNIT {
-            format!(
-                "torque is {:.3} of the model's: looks like gain {:.1} between this column and N·m at the joint (a current, \
-                 or torque at the motor's side)",
-                joint.gain,
-                1.0 / joint.gain
-            )
-        } else if joint.gain > OTHER_UNIT {
-            format!(
-                "torque is {0:.1} times the model's: looks like gain {0:.1} (N·mm, mA or counts for N·m), unless a payload \
-                 that heavy is missing in the model",
-                joint.gain
-            )
-        } else {
-            continue;
-        };
-        findings.push(Finding::new(
-            Severity::Warning,
-            "torque_scale",
-            *name,
-            format!(
-                "joint `{name}`: {problem}; nothing was scaled: convert the column and fit again"
-            ),
-            0,
-        ));
+    let gains: Vec<Option<f64>> = explained.iter().map(|joint| shaped(*joint)).collect();
+    let told: Vec<(&str, f64)> = (names.iter().zip(&gains))
+        .filter_map(|(name, gain)| Some((*name, (*gain)?)))
+        .collect();
+    if told.len() > 1 && told.iter().all(|(_, gain)| is_thousand(*gain)) {
+        let joints: Vec<&str> = told.iter().map(|(joint, _)| *joint).collect();
+        let problem = format!(
+            "torque is about 1000 times the model's on every joint on which the model tells ({}): looks like N·mm for N·m",
+            joints.join(", ")
+        );
+        return vec![Scale::new(None, problem, Some(THOUSANDTH))];
     }
-    findings
+    let efforts = efforts(robot, sample);
+    if told.is_empty() && all_beyond_effort(&efforts) {
+        let problem =
+            "torque is far beyond the model's effort limit on every joint: looks like N·mm for N·m"
+                .to_owned();
+        return vec![Scale::new(None, problem, Some(THOUSANDTH))];
+    }
+    let mut scales = Vec::new();
+    for (joint, (name, gain)) in names.iter().zip(gains).enumerate() {
+        let (problem, factor) = match gain {
+            Some(gain) if gain < 1.0 / OTHER_UNIT => (
+                format!(
+                    "torque is {gain:.3} of the model's: looks like gain {:.1} between this column and N·m at the joint (a current, \
+                     or torque at the motor's side)",
+                    1.0 / gain
+                ),
+                None,
+            ),
+            Some(gain) if gain > OTHER_UNIT => (
+                format!(
+                    "torque is {gain:.1} times the model's: looks like gain {gain:.1} (N·mm, mA or counts for N·m), unless a payload \
+                     that heavy is missing in the model"
+                ),
+                is_thousand(gain).then_some(THOUSANDTH),
+            ),
+            Some(_) => continue,
+            None => match beyond_effort(&efforts, joint) {
+                Some([largest, limit]) => (
+                    format!(
+                        "torque reaches {largest:.0}, {:.0} times the effort limit of the model ({limit}), where other joints stay within \
+                         theirs: looks like N·mm for N·m",
+                        largest / limit
+                    ),
+                    Some(THOUSANDTH),
+                ),
+                None => continue,
+            },
+        };
+        scales.push(Scale::new(Some(name), problem, factor));
+    }
+    scales
+}
+
+/// Torque of another size than the model's.
+struct Scale {
+    /// Of which joint; of all where its subject is empty.
+    finding: Finding,
+    /// What makes N·m of it where it is a thousandth.
+    factor: Option<f64>,
+}
+
+impl Scale {
+    fn new(joint: Option<&str>, problem: String, factor: Option<f64>) -> Self {
+        let whose = joint.map_or_else(String::new, |name| format!("joint `{name}`: "));
+        let (subject, columns) = match joint {
+            Some(name) => (name, "column"),
+            None => ("", "columns"),
+        };
+        Self {
+            finding: Finding::new(
+                Severity::Warning,
+                "torque_scale",
+                subject,
+                format!(
+                    "{whose}{problem}; nothing was scaled: convert the {columns} and fit again"
+                ),
+                0,
+            ),
+            factor,
+        }
+    }
+}
+
+/// Factor at the nominal torque of a joint whose torque has the model's shape.
+fn shaped(joint: Option<Explained>) -> Option<f64> {
+    let clear = joint.filter(|joint| {
+        joint.left < CLEAR
+            && joint.left < PART * joint.left_without_model
+            && joint.left_without_model > NEEDED
+            && joint.gain > 0.0
+    });
+    clear.map(|joint| joint.gain)
+}
+
+fn is_thousand(gain: f64) -> bool {
+    (gain * THOUSANDTH).ln().abs() <= LIKE_A_THOUSAND
+}
+
+/// Largest torque of each joint and the model's effort limit, where it states one.
+fn efforts(robot: &Robot, sample: &Sample) -> Vec<Option<[f64; 2]>> {
+    let of_joint = |joint: usize| {
+        let limit = robot.joint(joint).limits.effort?;
+        let torque = sample.channels[3][joint].iter();
+        let largest = torque.fold(0.0_f64, |most, tau| most.max(tau.abs()));
+        (limit > 0.0 && largest > 0.0).then_some([largest, limit])
+    };
+    (0..robot.dof()).map(of_joint).collect()
+}
+
+/// Largest torque and limit of a joint that is beyond what its drive can do by the factor that thousandths of N·m are. A model's
+/// limits may be made up: most of the others have to keep theirs.
+fn beyond_effort(efforts: &[Option<[f64; 2]>], joint: usize) -> Option<[f64; 2]> {
+    let others = efforts.iter().enumerate();
+    let others = others.filter_map(|(other, effort)| effort.filter(|_| other != joint));
+    let kept = others.filter(|other| used(*other) <= 1.0).count();
+    let own = efforts[joint]?;
+    (2 * kept > efforts.len() && THOUSANDTHS.contains(&used(own))).then_some(own)
+}
+
+/// True where all joints are, by limits that are of each joint.
+fn all_beyond_effort(efforts: &[Option<[f64; 2]>]) -> bool {
+    let beyond =
+        |effort: &Option<[f64; 2]>| effort.is_some_and(|own| THOUSANDTHS.contains(&used(own)));
+    let limits: Vec<f64> = efforts.iter().flatten().map(|[_, limit]| *limit).collect();
+    let differ = limits.iter().any(|limit| *limit != limits[0]);
+    differ && efforts.iter().all(beyond)
+}
+
+/// Largest torque over the limit.
+fn used([largest, limit]: [f64; 2]) -> f64 {
+    largest / limit
 }
 
 /// What [`mend::mend`] changed, in words.
@@ -215,13 +328,26 @@ fn signs_and_order(
                 moved.push(format!("`{name}` = torque of `{}`", names[torque]));
             }
         }
-        let turned = match (motion_sign < 0.0, torque_sign < 0.0) {
-            (false, false) => continue,
-            (false, true) => "its torque has the opposite sign",
-            (true, false) => "its position and velocity have the opposite sign",
-            (true, true) => {
+        let signs = [motion_sign, reading.rates[joint], torque_sign];
+        let turned = match signs.map(|sign| sign < 0.0) {
+            [false, false, false] => continue,
+            [false, false, true] => "its torque has the opposite sign",
+            [true, true, false] => "its position and velocity have the opposite sign",
+            [true, false, false] => "its position has the opposite sign, its velocity has not",
+            [false, true, false] => "its velocity has the opposite sign, its position has not",
+            [true, false, true] => {
+                "its position and its torque have the opposite sign, its velocity has not"
+            }
+            [false, true, true] => {
+                "its velocity and its torque have the opposite sign, its position has not"
+            }
+            [true, true, true] => {
                 "its axis points the other way (position, velocity and torque have the opposite sign)"
             }
+        };
+        let or_the_axis = match signs {
+            [m, r, t] if m < 0.0 && r < 0.0 && t < 0.0 => ", or the axis in the model",
+            _ => "",
         };
         findings.push(Finding::new(
             Severity::Warning,
@@ -229,7 +355,7 @@ fn signs_and_order(
             *name,
             format!(
                 "joint `{name}`: {turned}: model and friction explain {} of its torque as logged, {} turned; nothing was \
-                 changed: turn the columns with [columns] factor, or the axis in the model",
+                 changed: turn the columns with [columns] factor{or_the_axis}",
                 share(&before[joint]),
                 share(&after[joint])
             ),

@@ -1,7 +1,7 @@
 //! A few hundred smoothed samples of a trajectory: enough to tell gross mistakes, cheap enough to try many readings.
 
 use crate::robot::{JointKind, Robot};
-use crate::signal::{Pipeline, Segment, Trajectory};
+use crate::signal::{Agreement, Pipeline, Segment, Trajectory, velocity_agreement};
 
 /// Samples that are taken of one trajectory at most.
 const MOST: usize = 800;
@@ -17,6 +17,8 @@ pub(super) struct Sample {
     pub(super) channels: [Vec<Vec<f64>>; 4],
     /// Whether the joint moves there: `moves[joint][sample]`.
     pub(super) moves: Vec<Vec<bool>>,
+    /// Whether a joint's velocity is minus the change of its position, in every log in which it moves; `None` where it moves in none.
+    pub(super) opposite: Vec<Option<bool>>,
 }
 
 impl Sample {
@@ -32,6 +34,10 @@ impl Sample {
             len: 0,
             channels: std::array::from_fn(|_| vec![Vec::new(); dof]),
             moves: vec![Vec::new(); dof],
+            opposite: velocity_agreement(trajectory, &pipeline.standstill_velocity)
+                .into_iter()
+                .map(|agreement| agreement.map(Agreement::is_opposite))
+                .collect(),
         };
         for segment in &trajectory.segments {
             sample.append(pipeline, segment, dof, step);
@@ -75,6 +81,12 @@ impl Sample {
             }
             for (to, from) in all.moves.iter_mut().zip(&sample.moves) {
                 to.extend_from_slice(from);
+            }
+            for (to, from) in all.opposite.iter_mut().zip(&sample.opposite) {
+                *to = match (*to, *from) {
+                    (Some(a), Some(b)) => Some(a && b),
+                    (one, other) => one.or(other),
+                };
             }
         }
         all

@@ -2,6 +2,7 @@
 
 use super::testing::{LEN, arm, log};
 use super::*;
+use std::collections::BTreeMap;
 
 fn check(trajectory: &Trajectory) -> Result<Vec<Finding>> {
     let pipeline = Pipeline {
@@ -84,6 +85,64 @@ fn case_19_and_20_torque_of_another_unit_or_side_is_named_with_its_gain() {
     assert!((stated / (11.3 / 1.15) - 1.0).abs() < 0.05, "{message}");
 }
 
+/// Friction explains all of a torque whose model's part is small; a model that says what drives can do still tells thousandths.
+#[test]
+fn case_20_torque_far_beyond_the_models_effort_limit_is_in_another_unit() {
+    let pipeline = Pipeline {
+        cutoff_hz: 5.0,
+        ..Pipeline::off(4)
+    };
+    let limited = |efforts: [f64; 4]| {
+        let mut description = arm(1.0).description().clone();
+        for (joint, effort) in description.joints.iter_mut().zip(efforts) {
+            joint.limits.effort = Some(effort);
+        }
+        Robot::new(description, &BTreeMap::new()).unwrap().0
+    };
+    let of = |robot: &Robot, factor: f64| {
+        let mut log = log(0.0);
+        let s = &mut log.segments[0];
+        for i in 3 * LEN..4 * LEN {
+            s.tau[i] = factor * (1.5 * s.qd[i] + 2.0 * (s.qd[i] / 0.01).tanh());
+        }
+        look(robot, &pipeline, [&log]).unwrap()
+    };
+    let robot = limited([100.0, 100.0, 100.0, 10.0]);
+    assert_eq!(of(&robot, 1.0).findings, []);
+    let seen = of(&robot, 1000.0);
+    assert_eq!(seen.findings.len(), 1, "{:#?}", seen.findings);
+    let said = &seen.findings[0];
+    assert_eq!((&*said.code, &*said.subject), ("torque_scale", "j4"));
+    assert!(said.message.contains("the effort limit of the model (10)"));
+    let factors = seen.joints.iter().map(|joint| joint.torque_factor);
+    assert!(factors.eq([None, None, None, Some(1e-3)]));
+    // All of them: one finding, with a factor for every joint.
+    let mut all = log(0.0);
+    all.segments[0].tau.iter_mut().for_each(|tau| *tau *= 1e3);
+    let seen = look(&robot, &pipeline, [&all]).unwrap();
+    assert_eq!(seen.findings.len(), 1, "{:#?}", seen.findings);
+    assert_eq!(
+        (&*seen.findings[0].code, &*seen.findings[0].subject),
+        ("torque_scale", "")
+    );
+    let factors = seen.joints.iter().map(|joint| joint.torque_factor);
+    assert!(factors.eq([Some(1e-3); 4]));
+    // The same where friction explains all torque, by limits that differ.
+    all.segments[0].tau = (all.segments[0].qd.iter())
+        .map(|qd| 1e3 * (1.5 * qd + 2.0 * (qd / 0.01).tanh()))
+        .collect();
+    let effort = |robot: &Robot| look(robot, &pipeline, [&all]).unwrap().findings;
+    let said = effort(&limited([20.0, 20.0, 20.0, 10.0]));
+    assert!(
+        said.len() == 1 && said[0].message.contains("on every joint"),
+        "{said:#?}"
+    );
+    assert_eq!(effort(&limited([20.0; 4])), []);
+    // Limits that nothing keeps are made up.
+    assert_eq!(of(&limited([1e-3; 4]), 1.0).findings, []);
+    assert_eq!(of(&limited([1.0, 1.0, 1.0, 0.05]), 1.0).findings, []);
+}
+
 #[test]
 fn case_21_a_turned_sign_is_named_with_its_joint() {
     for joint in 0..4 {
@@ -112,6 +171,34 @@ fn case_21_a_turned_sign_is_named_with_its_joint() {
         findings[0].message.contains("its position and velocity"),
         "{findings:#?}"
     );
+    // Position alone, or velocity alone (with the acceleration that comes of it): that they do not fit each other tells that one of them is
+    // turned, torque which.
+    for joint in 0..4 {
+        for (position, words) in [
+            (
+                true,
+                "its position has the opposite sign, its velocity has not",
+            ),
+            (
+                false,
+                "its velocity has the opposite sign, its position has not",
+            ),
+        ] {
+            let mut one = log(0.0);
+            let s = &mut one.segments[0];
+            let channels = match position {
+                true => vec![&mut s.q],
+                false => vec![&mut s.qd, &mut s.qdd],
+            };
+            for values in channels {
+                rows(values, joint).iter_mut().for_each(|v| *v *= -1.0);
+            }
+            let findings = check(&one).unwrap();
+            assert_eq!(findings.len(), 1, "{joint}, {position}: {findings:#?}");
+            assert_eq!(findings[0].subject, format!("j{}", joint + 1));
+            assert!(findings[0].message.contains(words), "{findings:#?}");
+        }
+    }
     // All drives count the other way.
     let mut all = log(0.0);
     all.segments[0].tau.iter_mut().for_each(|t| *t *= -1.0);

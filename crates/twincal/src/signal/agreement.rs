@@ -18,6 +18,14 @@ pub struct Agreement {
     pub slope: f64,
 }
 
+impl Agreement {
+    /// True where the velocity is minus the derivative: R² of −q̇ is `1 − Σ(q̇ + dq/dt)² / Σ(dq/dt)²` = R² − 4 · slope.
+    #[must_use]
+    pub fn is_opposite(self) -> bool {
+        self.r2 - 4.0 * self.slope >= AGREES
+    }
+}
+
 /// Agreement of each joint; `None` for joints that hardly move. Both are the motion filter's, so that the encoder's noise
 /// does not count; where no velocity is logged they agree.
 pub fn velocity_agreement(trajectory: &Trajectory, standstill: &[f64]) -> Vec<Option<Agreement>> {
@@ -46,22 +54,28 @@ pub fn velocity_agreement(trajectory: &Trajectory, standstill: &[f64]) -> Vec<Op
         .collect()
 }
 
+/// Code of the finding on a velocity that is minus the derivative of position.
+const OPPOSITE: &str = "velocity_opposite";
+
 /// A warning for every joint whose velocity does not belong to its position.
 pub(crate) fn findings(names: &[&str], log: &str, agreement: &[Option<Agreement>]) -> Vec<Finding> {
     let wrong = names.iter().zip(agreement);
     wrong
         .filter_map(|(name, agreement)| Some((name, agreement.filter(|a| a.r2 < AGREES)?)))
-        .map(|(name, Agreement { r2, slope })| {
-            Finding::new(
-                Severity::Warning,
-                "velocity_mismatch",
-                log,
-                format!(
-                    "joint `{name}`: the logged velocity is not the change of position (R² {r2:.3}, slope {slope:.3}): scaled, \
-                     late or of another joint; with [signal] velocity = \"position\" it is not used"
-                ),
-                0,
-            )
+        .map(|(name, agreement)| {
+            let Agreement { r2, slope } = agreement;
+            if agreement.is_opposite() {
+                let message = format!(
+                    "joint `{name}` of {log}: the logged velocity is the change of position with the opposite sign (slope {slope:.3}): one \
+                     of the two is turned round; give that one the factor -1 in [columns.factor]: q or qd = {{ {name:?} = -1.0 }}"
+                );
+                return Finding::new(Severity::Warning, OPPOSITE, *name, message, 0);
+            }
+            let message = format!(
+                "joint `{name}`: the logged velocity is not the change of position (R² {r2:.3}, slope {slope:.3}): scaled, \
+                 late or of another joint; with [signal] velocity = \"position\" it is not used"
+            );
+            Finding::new(Severity::Warning, "velocity_mismatch", log, message, 0)
         })
         .collect()
 }
@@ -108,6 +122,9 @@ mod tests {
         };
         near(agreement(|t| 2.0 * (2.0 * t).cos()), 1.0, 1.0);
         near(agreement(|t| 0.5 * 2.0 * (2.0 * t).cos()), 0.75, 0.5);
+        let turned = agreement(|t| -2.0 * (2.0 * t).cos());
+        near(turned, -3.0, -1.0);
+        assert!(turned.is_opposite() && !agreement(|t| -(2.0 * t).cos()).is_opposite());
         let late = agreement(|t| 2.0 * (2.0 * t - 0.5).cos());
         near(late, 1.0 - 2.0 * (1.0 - 0.5_f64.cos()), 0.5_f64.cos());
         assert_eq!(findings(&["a"], "run", &[Some(late)]).len(), 1);

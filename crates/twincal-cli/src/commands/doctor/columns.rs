@@ -3,6 +3,7 @@
 use super::examine::{Examination, Mapping};
 use super::units::Degrees;
 use std::collections::BTreeMap;
+use twincal::Finding;
 use twincal::self_check::JointCheck;
 use twincal_io::config::{ChannelNames, ColumnsTable, Factor, Settings, key};
 
@@ -48,15 +49,40 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
     let joints = &examination.checkup.joints;
     for check in joints.iter().filter(|check| is_turned(check)) {
         let factor = &mut all.table.factor;
-        let motion = [&mut factor.q, &mut factor.qd, &mut factor.qdd];
-        for factor in motion.into_iter().filter(|_| check.motion.1 < 0.0) {
-            multiply(factor, examination, &check.joint);
-        }
-        if check.torque.1 < 0.0 {
-            multiply(&mut factor.tau, examination, &check.joint);
+        let [position, rates, torque] = signs(check);
+        let channels = [
+            (&mut factor.q, position),
+            (&mut factor.qd, rates),
+            (&mut factor.qdd, rates),
+            (&mut factor.tau, torque),
+        ];
+        for (factor, _) in channels.into_iter().filter(|(_, sign)| *sign < 0.0) {
+            multiply(factor, examination, &check.joint, -1.0);
         }
         whys.push(format!("{} is turned round.", check.joint));
         all.mended.push("sign_flip");
+    }
+    let scaled: Vec<&JointCheck> = joints
+        .iter()
+        .filter(|j| j.torque_factor.is_some())
+        .collect();
+    for check in &scaled {
+        let number = check.torque_factor.unwrap_or(1.0);
+        multiply(&mut all.table.factor.tau, examination, &check.joint, number);
+    }
+    if !scaled.is_empty() {
+        let names: Vec<&str> = scaled.iter().map(|check| check.joint.as_str()).collect();
+        let whose = match names.len() == joints.len() {
+            true => "All torque".to_owned(),
+            false => format!("Torque of {}", names.join(", ")),
+        };
+        whys.push(format!("{whose} looks like thousandths of N·m."));
+    }
+    let mut scales = (examination.findings.iter()).filter(|f| f.code == "torque_scale");
+    let has_factor =
+        |f: &Finding| f.subject.is_empty() || scaled.iter().any(|c| c.joint == f.subject);
+    if !scaled.is_empty() && scales.all(has_factor) {
+        all.mended.push("torque_scale");
     }
     all.why = whys.join(" ");
     if joints.iter().any(is_moved) && reorder(examination, &mut all.table) {
@@ -68,20 +94,26 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
 /// The line that turns the signs of a joint.
 pub(super) fn sign_line(check: &JointCheck) -> String {
     let turned = format!("{{ {} = -1.0 }}", key(&check.joint));
-    let channels = [
-        ("q", check.motion.1),
-        ("qd", check.motion.1),
-        ("tau", check.torque.1),
-    ];
-    let channels = channels.iter().filter(|(_, sign)| *sign < 0.0);
+    let channels = ["q", "qd", "tau"].into_iter().zip(signs(check));
     let lines: Vec<String> = channels
+        .filter(|(_, sign)| *sign < 0.0)
         .map(|(channel, _)| format!("{channel} = {turned}"))
         .collect();
     format!("[columns.factor] {}", lines.join(", "))
 }
 
+/// Signs of a joint's position, of its velocity and acceleration, and of its torque.
+fn signs(check: &JointCheck) -> [f64; 3] {
+    [check.motion.1, check.rates, check.torque.1]
+}
+
 fn is_turned(check: &JointCheck) -> bool {
-    check.motion.1 < 0.0 || check.torque.1 < 0.0
+    signs(check).iter().any(|sign| *sign < 0.0)
+}
+
+/// Position, velocity and torque have the opposite sign: the axis of the model may as well be what is turned.
+pub(super) fn is_axis(check: &JointCheck) -> bool {
+    signs(check).iter().all(|sign| *sign < 0.0)
 }
 
 fn is_moved(check: &JointCheck) -> bool {
@@ -100,14 +132,14 @@ fn of_joints(examination: &Examination, joints: &[usize], number: f64) -> Factor
     Factor::ByJoint(named.collect())
 }
 
-/// Turns the sign of one joint.
-fn multiply(factor: &mut Factor, examination: &Examination, joint: &str) {
+/// Another factor on one joint.
+fn multiply(factor: &mut Factor, examination: &Examination, joint: &str, by: f64) {
     let names = examination.robot.robot.joint_names();
     let said = names
         .iter()
         .filter_map(|name| Some(((*name).to_owned(), factor.of_joint(name)?)));
     let mut by_joint: BTreeMap<String, f64> = said.collect();
-    *by_joint.entry(joint.to_owned()).or_insert(1.0) *= -1.0;
+    *by_joint.entry(joint.to_owned()).or_insert(1.0) *= by;
     *factor = Factor::ByJoint(by_joint);
 }
 

@@ -1,6 +1,6 @@
 //! What to mend, the most important first, each with a number and a line to type or to write.
 
-use super::columns::sign_line;
+use super::columns::{is_axis, sign_line};
 use super::examine::Examination;
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -26,7 +26,7 @@ pub(super) struct Mend {
 const NOT_USED: &str = "nothing, if it does not act in these logs; else write its effect into the model in a form that is read";
 
 /// Findings in the order in which they matter, with what mends them.
-const ORDER: [(&str, &str); 46] = [
+const ORDER: [(&str, &str); 47] = [
     (
         "joint_order",
         "map the columns in [columns.q], [columns.qd], [columns.tau] of twincal.toml; twincal init writes them",
@@ -49,6 +49,10 @@ const ORDER: [(&str, &str); 46] = [
         "give the link an <inertial>, or fix the joint with [model] locked",
     ),
     ("torque_lag", "twincal.toml: [signal] lag = …"),
+    (
+        "velocity_opposite",
+        "twincal.toml: [columns.factor] with q or qd of that joint, whichever is turned; the torque does not tell",
+    ),
     (
         "velocity_mismatch",
         "twincal.toml: [signal] velocity = \"position\"",
@@ -193,10 +197,16 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
         })
         .collect();
     let mut said: Vec<(&str, usize)> = Vec::new();
+    let turned = |joint: &str| {
+        let mut all = examination.findings.iter();
+        all.any(|f| f.code == "sign_flip" && f.subject == joint)
+    };
     for finding in examination
         .findings
         .iter()
         .filter(|f| f.severity > Severity::Note)
+        // Which of the two is turned is said there.
+        .filter(|f| f.code != "velocity_opposite" || !turned(&f.subject))
     {
         // One of a kind is enough to know what to do.
         match said.iter_mut().find(|(code, _)| *code == finding.code) {
@@ -243,22 +253,42 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
             None => "one [signal] lag cannot mend logs that differ: fit them apart".into(),
         },
         ("sign_flip", _) => match of_joint(examination, &finding.subject) {
-            Some(check) => format!(
-                "twincal.toml: {} (twincal init writes it), or turn the axis in the model",
-                sign_line(check)
-            ),
+            Some(check) => {
+                let or_the_axis = if is_axis(check) {
+                    ", or turn the axis in the model"
+                } else {
+                    ""
+                };
+                let line = sign_line(check);
+                format!("twincal.toml: {line} (twincal init writes it){or_the_axis}")
+            }
             None => "turn the sign of the columns where the log is made".into(),
         },
         ("torque_scale", Some(place)) => {
-            let check = of_joint(examination, &finding.subject);
-            match check.and_then(|check| check.gain.filter(|gain| *gain > 0.0)) {
-                Some(gain) => format!(
-                    "{}; here about {{ {} = {:.2e} }}",
-                    ORDER[place].1,
-                    key(&finding.subject),
-                    1.0 / gain
-                ),
-                None => ORDER[place].1.into(),
+            let check = match finding.subject.is_empty() {
+                true => examination.checkup.joints.first(),
+                false => of_joint(examination, &finding.subject),
+            };
+            let gain = |check: &JointCheck| check.gain.filter(|gain| *gain > 0.0);
+            let joint = key(&finding.subject);
+            match check.map(|check| (check.torque_factor, gain(check))) {
+                Some((Some(factor), _)) => {
+                    let number = match finding.subject.is_empty() {
+                        true => format!("{factor:?}"),
+                        false => format!("{{ {joint} = {factor:?} }}"),
+                    };
+                    format!(
+                        "twincal.toml: [columns.factor] tau = {number} (twincal init writes it)"
+                    )
+                }
+                Some((None, Some(gain))) => {
+                    let number = 1.0 / gain;
+                    format!(
+                        "{}; here about {{ {joint} = {number:.2e} }}",
+                        ORDER[place].1
+                    )
+                }
+                _ => ORDER[place].1.into(),
             }
         }
         ("quantised_encoder", _) => match examination.lower_cutoff {

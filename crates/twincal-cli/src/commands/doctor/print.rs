@@ -182,8 +182,12 @@ fn joints(diagnosis: &Diagnosis, terminal: &mut Terminal) {
         let sign = |sign: f64| if sign < 0.0 { "−" } else { "" };
         let (motion, torque) = (&joint.motion, &joint.torque);
         let mut better = Vec::new();
-        if (motion.0.as_str(), motion.1) != (joint.joint.as_str(), 1.0) {
-            better.push(format!("motion {}{}", sign(motion.1), clean(&motion.0)));
+        let from = clean(&motion.0);
+        if motion.1 != joint.rates {
+            better.push(format!("position {}{from}", sign(motion.1)));
+            better.push(format!("velocity {}{from}", sign(joint.rates)));
+        } else if (motion.0.as_str(), motion.1) != (joint.joint.as_str(), 1.0) {
+            better.push(format!("motion {}{from}", sign(motion.1)));
         }
         if (torque.0.as_str(), torque.1) != (joint.joint.as_str(), 1.0) {
             better.push(format!("torque {}{}", sign(torque.1), clean(&torque.0)));
