@@ -3,132 +3,12 @@
 
 mod common;
 
-use common::{ARM, Run, run};
+use common::faulty::{Fault, GOOD, LOOK, PERIOD, RATE, SECONDS, fitted, folder, log, with_config};
+use common::run;
 use serde_json::Value;
 use std::f64::consts::TAU;
-use std::fmt::Write as _;
 use std::fs;
-use std::path::Path;
 use tempfile::TempDir;
-
-/// Gravity in the arm's plane, and few candidates: a fit in a moment, with filters.
-const LOOK: &str = "[model]\ngravity = [0.0, -9.81, 0.0]\n[library]\nterms = [\"sin(q2)\"]\ngeneric = false\n\
-                    friction = [\"viscous\"]\noffset = false\nmotor_inertia = false\n";
-/// Samples per second, and s.
-const RATE: f64 = 250.0;
-const SECONDS: f64 = 24.0;
-/// All joints are at rest every so many s.
-const PERIOD: f64 = 4.0;
-
-/// What is wrong with a log.
-#[derive(Clone, Copy)]
-struct Fault {
-    /// Torque is this much late, s.
-    lag: f64,
-    /// From here all joints are held by brakes for two seconds, s.
-    brakes: f64,
-    /// No velocity is logged.
-    bare: bool,
-    /// Changes t, q1, q2, qd1, qd2, tau1, tau2.
-    change: fn(&mut [f64; 7]),
-}
-
-const GOOD: Fault = Fault {
-    lag: 0.0,
-    brakes: f64::INFINITY,
-    bare: false,
-    change: |_| (),
-};
-
-/// Position, velocity and acceleration of both joints at `t` of the motion.
-fn motion(t: f64) -> [[f64; 3]; 2] {
-    let waves: [&[(f64, f64)]; 2] = [&[(0.5, 1.0), (0.25, 3.0)], &[(0.6, 2.0), (0.15, 5.0)]];
-    waves.map(|waves| {
-        let mut sum = [0.0; 3];
-        for (amplitude, multiple) in waves {
-            let w = TAU / PERIOD * multiple;
-            let (sin, cos) = (w * t).sin_cos();
-            sum[0] += amplitude * cos;
-            sum[1] -= amplitude * w * sin;
-            sum[2] -= amplitude * w * w * cos;
-        }
-        sum
-    })
-}
-
-/// Torque of the upright arm in closed form, viscous friction of 0.4 and 0.2 N·m·s/rad, and a potential 0.9 sin(q2).
-fn torque(t: f64) -> [f64; 2] {
-    let [[q1, v1, a1], [q2, v2, a2]] = motion(t);
-    let (far, near, cross) = (0.11 + 0.16 + 0.0325, 0.0325, 0.06);
-    let (s, c) = q2.sin_cos();
-    let fore = 0.15 * 9.81 * (q1 + q2).cos();
-    [
-        (far + 2.0 * cross * c) * a1 + (near + cross * c) * a2 - cross * s * v2 * (2.0 * v1 + v2)
-            + 0.8 * 9.81 * q1.cos()
-            + fore
-            + 0.4 * v1,
-        (near + cross * c) * a1 + near * a2 + cross * s * v1 * v1 + fore + 0.2 * v2 - 0.9 * c,
-    ]
-}
-
-fn log(fault: Fault) -> String {
-    let header = ["t,q1,q2,qd1,qd2,tau1,tau2", "t,q1,q2,tau1,tau2"];
-    let mut text = format!("{}\n", header[usize::from(fault.bare)]);
-    let mut state = 1_u64;
-    let mut noise = || {
-        // Knuth's linear congruential generator; twelve uniforms less six are almost normal, here of sd 0.02 N·m.
-        let mut uniform = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        0.02 * ((0..12).map(|_| uniform()).sum::<f64>() - 6.0)
-    };
-    for row in 0..(RATE * SECONDS) as usize {
-        let t = row as f64 / RATE;
-        let braked = t >= fault.brakes && t < fault.brakes + 2.0;
-        // the motion waits while the brakes are on
-        let at = if t < fault.brakes {
-            t
-        } else {
-            (t - 2.0).max(fault.brakes)
-        };
-        let [[q1, v1, _], [q2, v2, _]] = motion(at);
-        let [tau1, tau2] = torque(at - fault.lag);
-        let on = if braked { 0.0 } else { 1.0 };
-        let mut cells = [
-            t,
-            q1,
-            q2,
-            on * v1,
-            on * v2,
-            on * (tau1 + noise()),
-            on * (tau2 + noise()),
-        ];
-        (fault.change)(&mut cells);
-        let kept = |k: usize| !fault.bare || !(3..5).contains(&k);
-        let cells: Vec<String> = (0..7)
-            .filter(|k| kept(*k))
-            .map(|k| cells[k].to_string())
-            .collect();
-        let _ = writeln!(text, "{}", cells.join(","));
-    }
-    text
-}
-
-fn folder(fault: Fault) -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("arm.urdf"), ARM).unwrap();
-    fs::write(folder.path().join("look.toml"), LOOK).unwrap();
-    fs::write(folder.path().join("run.csv"), log(fault)).unwrap();
-    folder
-}
-
-fn with_config(folder: &Path, verb: &str, config: &str, more: &[&str]) -> Run {
-    let base = [verb, "run.csv", "--model", "arm.urdf", "--config", config];
-    run(folder, base.iter().chain(more))
-}
 
 /// The diagnosis as JSON.
 fn doctor(folder: &TempDir, code: i32) -> Value {
@@ -160,13 +40,6 @@ fn warnings(result: &Value) -> Vec<[String; 3]> {
 fn codes(result: &Value) -> Vec<String> {
     let all = warnings(result).into_iter();
     all.map(|[code, _, _]| code).collect()
-}
-
-/// Fits with a config and gives result.json.
-fn fitted(folder: &TempDir, config: &str, code: i32) -> Value {
-    let output = format!("out-{config}");
-    let done = with_config(folder.path(), "fit", config, &["-o", &output, "--json"]).expect(code);
-    serde_json::from_str(&done.out).unwrap()
 }
 
 fn add(folder: &TempDir, name: &str, lines: &str) {
@@ -289,10 +162,13 @@ fn case_27_a_coarse_encoder_is_named_with_the_noise_it_leaves() {
     assert!(
         said.iter()
             .any(|[code, _, text]| code == "quantised_encoder"
-                && text.contains(&format!("{step:.3e}"))
+                && text.contains("steps by 0.00614:")
                 && text.contains("in acceleration")),
         "{said:?}"
     );
+    // rounding is not taken for fast motion: the band is that of the motion, in which both joints are seen to move
+    let hidden = |[code, ..]: &[String; 3]| code == "joint_not_excited";
+    assert!(!said.iter().any(hidden), "{said:?}");
     let found = diagnosis["logs"][0]["steps"][0]["position"]
         .as_f64()
         .unwrap();
@@ -419,155 +295,6 @@ fn a_joint_that_is_not_logged_is_locked_for_the_look_and_in_the_config() {
     assert_eq!(columns["joints"].as_array().unwrap().len(), 1);
     let config = diagnosis["config"].as_str().unwrap();
     assert!(config.contains("locked = { elbow = 0.0 }"), "{config}");
-}
-
-#[test]
-fn init_writes_a_config_that_fit_reads_and_never_over_another() {
-    let folder = folder(Fault {
-        lag: 0.02,
-        change: |row| row[3] *= 0.5,
-        ..GOOD
-    });
-    let init = |more: &[&str]| {
-        let base = ["init", "run.csv", "--model", "arm.urdf"];
-        run(folder.path(), base.iter().chain(more))
-    };
-    init(&[]).says(&["twincal fit --config twincal.toml"]);
-    let path = folder.path().join("twincal.toml");
-    let written = fs::read_to_string(&path).unwrap();
-    let done = run(
-        folder.path(),
-        ["inspect", "run.csv", "--config", "twincal.toml"],
-    );
-    assert!(matches!(done.code, Some(0 | 3)), "{}", done.err);
-    fs::write(&path, "# mine\n").unwrap();
-    init(&[]).expect(2).says(&["exists already", "--force"]);
-    assert_eq!(fs::read_to_string(&path).unwrap(), "# mine\n");
-    init(&["--force"]);
-    assert_eq!(fs::read_to_string(&path).unwrap(), written);
-    // what cannot be read leaves nothing behind
-    fs::write(folder.path().join("run.csv"), "t,a\n0,1\n").unwrap();
-    init(&["-o", "other.toml"]).expect(2).says(&["run.csv"]);
-    assert!(!folder.path().join("other.toml").exists());
-    // logs that the config holds out stay held out
-    let held = "[model]\nfile = \"arm.urdf\"\n[[log]]\nfile = \"run.csv\"\n[[log]]\nfile = \"other.csv\"\nheldout = true\n";
-    fs::write(folder.path().join("held.toml"), held).unwrap();
-    fs::write(folder.path().join("run.csv"), log(GOOD)).unwrap();
-    let done = run(
-        folder.path(),
-        ["init", "--config", "held.toml", "-o", "new.toml"],
-    );
-    assert!(matches!(done.code, Some(0 | 3)), "{}", done.err);
-    let proposed = fs::read_to_string(folder.path().join("new.toml")).unwrap();
-    assert!(
-        proposed.contains("file = \"other.csv\"\nheldout = true"),
-        "{proposed}"
-    );
-    // paths stand as seen from the config
-    fs::write(folder.path().join("run.csv"), log(GOOD)).unwrap();
-    fs::create_dir(folder.path().join("sub")).unwrap();
-    init(&["-o", "sub/a.toml"]);
-    let done = run(
-        folder.path(),
-        ["inspect", "run.csv", "--config", "sub/a.toml"],
-    );
-    assert!(matches!(done.code, Some(0 | 3)), "{}", done.err);
-}
-
-/// What `init` writes for a log, behind it the candidates of the other tests.
-fn proposed(folder: &TempDir) -> String {
-    let path = folder.path();
-    let done = run(
-        path,
-        [
-            "init",
-            "run.csv",
-            "--model",
-            "arm.urdf",
-            "-o",
-            "first.toml",
-            "--config",
-            "look.toml",
-        ],
-    );
-    assert!(matches!(done.code, Some(0 | 3)), "{}", done.err);
-    let text = fs::read_to_string(path.join("first.toml")).unwrap();
-    let look = LOOK.replace("[model]\n", "");
-    let model = format!("[model]\n{}", look.lines().next().unwrap());
-    let library: Vec<&str> = look.lines().skip(1).collect();
-    fs::write(
-        path.join("first.toml"),
-        format!(
-            "{}\n{}\n",
-            text.replacen("[model]", &model, 1),
-            library.join("\n")
-        ),
-    )
-    .unwrap();
-    text
-}
-
-/// With the config that `init` writes, a log in other units, signs or order gives what the good log gives.
-#[test]
-fn init_mends_units_signs_and_order_and_the_twin_reads_new_logs_likewise() {
-    let good = fitted(&folder(GOOD), "look.toml", 0);
-    let rmse = |result: &Value, joint: usize| {
-        result["validation"]["joints"][joint]["rmse_calibrated"]
-            .as_f64()
-            .unwrap()
-    };
-    let degrees: fn(&mut [f64; 7]) = |row| row[1..5].iter_mut().for_each(|v| *v *= 360.0 / TAU);
-    let one: fn(&mut [f64; 7]) = |row| [2, 4].into_iter().for_each(|k| row[k] *= 360.0 / TAU);
-    let turned: fn(&mut [f64; 7]) = |row| {
-        row[6] *= -1.0;
-        [1, 3, 5].into_iter().for_each(|k| row[k] *= -1.0);
-    };
-    let exchanged: fn(&mut [f64; 7]) = |row| {
-        row.swap(1, 2);
-        row.swap(3, 4);
-        row.swap(5, 6);
-    };
-    for (change, line) in [
-        (
-            degrees,
-            "[columns.factor]\nq = 0.017453292519943295\nqd = 0.0174",
-        ),
-        (
-            one,
-            "[columns.factor]\nq = { elbow = 0.017453292519943295 }\n",
-        ),
-        (turned, "tau = { elbow = -1.0, shoulder = -1.0 }"),
-        (
-            exchanged,
-            "[columns.tau]\nelbow = \"tau1\"\nshoulder = \"tau2\"",
-        ),
-    ] {
-        let folder = folder(Fault { change, ..GOOD });
-        let text = proposed(&folder);
-        assert!(text.contains(line), "{line}: {text}");
-        for left in ["fit refuses", "nothing was changed"] {
-            assert!(!text.contains(left), "{text}");
-        }
-        let result = fitted(&folder, "first.toml", 0);
-        for joint in 0..2 {
-            let (own, other) = (rmse(&result, joint), rmse(&good, joint));
-            assert!(
-                (own / other - 1.0).abs() < 1e-6,
-                "{line}: {own} and {other}"
-            );
-        }
-        // the twin takes new logs as those of its fit
-        let check = ["check", "--twin", "out-first.toml", "run.csv", "--json"];
-        let check = run(folder.path(), check);
-        if line.contains("factor") {
-            assert!(
-                check.out.contains("factor_as_fitted"),
-                "{}{}",
-                check.out,
-                check.err
-            );
-        }
-    }
 }
 
 /// Too few rows for the candidates, which only the filters' choice decides.

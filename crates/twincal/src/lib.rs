@@ -9,6 +9,7 @@
 //! prints nothing.
 
 pub mod error;
+pub mod words;
 pub mod lanes;
 pub mod linear_algebra;
 pub mod diagnostics;

@@ -1,7 +1,7 @@
 //! `twincal check`: scores of a twin on new logs against its gates.
 
 use super::inputs::LogInput;
-use super::summary::{Notes, findings, paragraph, percent, scores, significant};
+use super::summary::{Notes, findings, paragraph, percent, scores};
 use super::{code_of, print_json, require_strict, settings, start_threads};
 use crate::args::Check;
 use crate::failure::{GATE, Outcome};
@@ -10,6 +10,7 @@ use crate::terminal::Terminal;
 use serde::Serialize;
 use twincal::twin::Twin;
 use twincal::validate::{HeldOut, Scores, Split, Validation};
+use twincal::words::significant;
 use twincal::{Finding, Result};
 use twincal_io::artifact::Artifact;
 use twincal_io::config::Gates;

@@ -3,7 +3,7 @@
 use self::library::{BaseRow, ComponentRow, base_row, component_rows};
 use super::checkup::{Checkup, checkup};
 use super::inputs::{LogInput, Long, RobotInput};
-use super::summary::{Notes, findings, paragraph, significant};
+use super::summary::{Notes, findings, paragraph};
 use super::table::{print_table, table};
 use super::{code_of, print_json, require_strict, settings, start_threads};
 use crate::args::Inspect;
@@ -18,6 +18,7 @@ use twincal::robot::{JointKind, Mimic, Robot};
 use twincal::signal::{
     LogOverview, Pipeline, SignalSettings, choose_and_prepare, describe, hardly_driven,
 };
+use twincal::words::significant;
 
 pub(super) mod library;
 

@@ -5,6 +5,7 @@ use crate::terminal::{Terminal, clean};
 use twincal::calibrate::{Calibration, ComponentSummary, TermSummary, Verdict};
 use twincal::term::Status;
 use twincal::validate::{Scores, Split};
+use twincal::words::significant;
 use twincal::{Finding, Severity};
 use twincal_io::result_json::status_word;
 
@@ -470,23 +471,6 @@ fn with_sd(mean: f64, sd: f64) -> (String, String) {
     (format!("{mean:+.places$}"), format!("{sd:.places$}"))
 }
 
-/// A number with this many significant digits.
-pub(super) fn significant(value: f64, digits: i32) -> String {
-    if !value.is_finite() {
-        return "–".into();
-    }
-    let size = value.abs();
-    if size != 0.0 && !(1e-4..1e6).contains(&size) {
-        return format!("{value:.*e}", (digits - 1).max(0) as usize);
-    }
-    let exponent = if size == 0.0 {
-        0
-    } else {
-        size.log10().floor() as i32
-    };
-    format!("{value:.*}", (digits - 1 - exponent).clamp(0, 9) as usize)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -497,20 +481,6 @@ mod tests {
         assert_eq!(with_sd(-12.3456, 3.1), ("-12.3".into(), "3.1".into()));
         assert_eq!(with_sd(0.0, 0.0), ("+0.000e0".into(), "0.0e0".into()));
         assert_eq!(with_sd(1e-7, 2e-8), ("+1.000e-7".into(), "2.0e-8".into()));
-        assert_eq!(
-            (
-                significant(0.13712, 3).as_str(),
-                significant(1234.5, 3).as_str()
-            ),
-            ("0.137", "1234")
-        );
-        assert_eq!(
-            (
-                significant(0.0, 3).as_str(),
-                significant(f64::NAN, 3).as_str()
-            ),
-            ("0.00", "–")
-        );
         assert_eq!(
             (pip(Some(1.0)), pip(Some(0.0)), pip(Some(0.5))),
             (">0.999".into(), "<0.001".into(), "0.500".into())

@@ -5,6 +5,8 @@
     reason = "every test file uses its part; a broken test may panic"
 )]
 
+pub(crate) mod faulty;
+
 use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -138,13 +138,21 @@ impl Data {
                 (columns, culprit) = (count, joint);
             }
         }
-        if rows < ROWS_PER_COLUMN * columns.max(1) {
+        let needed = ROWS_PER_COLUMN * columns.max(1);
+        if rows < needed {
+            let times = (needed as f64 / rows as f64 * 10.0).ceil() / 10.0;
+            let longer = match rows {
+                0 => "log motion".to_owned(),
+                _ => format!("log {times} times as much motion or more"),
+            };
             return Err(refuse(
                 format!(
                     "the logs give {rows} rows, fewer than {ROWS_PER_COLUMN} × the {columns} candidate columns of joint `{}`",
                     names[culprit]
                 ),
-                "log longer, raise signal.cutoff_hz, or ask for fewer candidates ([library])",
+                &format!(
+                    "{longer}, raise a stated signal.cutoff_hz, or ask for fewer candidates ([library])"
+                ),
             ));
         }
         Ok(())

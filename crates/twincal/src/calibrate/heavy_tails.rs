@@ -3,6 +3,7 @@
 use crate::error::{Finding, Severity};
 use crate::observations::Part;
 use crate::robot::Robot;
+use crate::words::significant;
 
 /// A residual beyond this many robust standard deviations is an outlier: 6 in 100 000 of a normal distribution.
 const FAR: f64 = 4.0;
@@ -46,7 +47,7 @@ pub(super) fn findings(
                  contacts, dropped samples or missing physics; {advice}",
                 residual.len(),
                 100.0 * count as f64 / residual.len() as f64,
-                if sd < 1e-2 { format!("{sd:.2e}") } else { format!("{sd:.3}") }
+                significant(sd, 3)
             ),
             count as u64,
         ));

@@ -1,7 +1,7 @@
 //! Held-out truth: what to leave out, fit without it, predict it, score it.
 
 use super::data::{Data, Log, Trajectories};
-use super::summary::LEAST_EFFECTIVE_ROWS;
+use super::independent_rows::LEAST_EFFECTIVE_ROWS;
 use super::{CalibrationSettings, Fitted, Stage, compact, estimate, noise_of};
 use crate::error::{Finding, Result, Severity};
 use crate::likelihood::{Columns, JointNoise};

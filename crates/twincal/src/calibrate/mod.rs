@@ -10,6 +10,8 @@ mod groups;
 mod heavy_tails;
 mod held_out;
 mod heredity;
+mod independent_rows;
+mod lower_band;
 mod negative_friction;
 mod outlook;
 mod prior_conflict;
@@ -51,7 +53,7 @@ use crate::likelihood::{
     Columns, JointNoise, NoiseInterval, NoiseModel, NoiseSettings, NoiseUncertainty, Spread,
 };
 use crate::observations::Part;
-use crate::plug_in::{Fit, FitSettings, LeftOut, Moving, fit, fit_tempered, moving_rows, start};
+use crate::plug_in::{Fit, FitSettings, LeftOut, Moving, fit, fit_tempered, start};
 use crate::posterior::draws::Drawer;
 use crate::prior::PriorSettings;
 use crate::robot::Robot;
@@ -62,9 +64,10 @@ use crate::signal::{
 };
 use crate::term::{Family, Library, LibrarySettings};
 use crate::twin::Twin;
-use again::{Road, whole_road};
+use again::{Goal, Road, whole_road};
 use data::Data;
 use heredity::Named;
+use lower_band::TooFew;
 use ripples::Seen;
 use wider_band::wider;
 
@@ -185,6 +188,7 @@ fn road(
     robot: &Robot,
     recordings: &mut Option<(Logs<'_>, Logs<'_>)>,
     settings: &CalibrationSettings,
+    goal: Goal,
     progress: &dyn Fn(Stage),
     findings: &mut Vec<Finding>,
 ) -> Result<Road> {
@@ -239,18 +243,28 @@ fn road(
     let (library, zero_columns) = data.drop_zero_columns(library);
     let columns = columns_of(robot, &library, settings, data::tell_payload_apart(logs))?;
     findings.append(&mut data.findings);
-    data.require_enough(robot, &columns)?;
+    let cutoff_hz = pipeline.cutoff_hz;
+    let too_few = |error| Ok(Road::TooFew(TooFew { error, cutoff_hz }));
+    if let Err(error) = data.require_enough(robot, &columns) {
+        return too_few(error);
+    }
 
     // eq. (5): sparse regression with everything that is plugged in at its fixed point
     progress(Stage::Inference);
     let spreads = weigh::weigh(robot, &mut data, &columns, settings, findings)?;
     let training = data.training();
+    let count = |fitted: &Fitted| independent_rows::require(robot, &data, &fitted.fit, &training);
+    if goal == Goal::Count {
+        let counted = count(&estimate(&training, &columns, settings)?)?;
+        return Ok(Road::Counted(counted.most));
+    }
     let plan = held_out::plan(&data, &trajectories, &pipeline);
     let (fitted, fits_of_folds) = rayon::join(
         || estimate(&training, &columns, settings),
         || plan.fits(&columns, settings),
     );
     let (mut fitted, fits_of_folds) = (fitted?, fits_of_folds?);
+    let counted = count(&fitted);
     let seen = match settings.unasked_ripple {
         UnaskedRipple::Ignored => Vec::new(),
         _ => ripples::seen(robot, &training, &fitted.fit, &library_settings, &pipeline),
@@ -262,6 +276,10 @@ fn road(
     let (ready, band) = ((&prepared[..], unknown), (&pipeline, wider_hz));
     if let Some(wider) = wider(robot, &library, ready, band, &fitted.fit, settings)? {
         return Ok(Road::Wider(wider));
+    }
+    match counted {
+        Ok(counted) => findings.extend(counted.findings),
+        Err(error) => return too_few(error),
     }
     findings.extend(seen.iter().map(Seen::told));
     if fitted.sampled.is_empty() {
@@ -540,7 +558,8 @@ fn noise_of(
         .into_iter()
         .enumerate()
         .map(|(j, name)| {
-            let (n, rho) = (moving_rows(training, j), plug_in.rho[j]);
+            let [n, n_eff] = independent_rows::of_joint(&fitted.fit, training, j);
+            let rho = plug_in.rho[j];
             let left = plug_in.variance.get(j).copied().unwrap_or(1.0);
             JointNoise {
                 joint: name.to_owned(),
@@ -548,7 +567,7 @@ fn noise_of(
                 rho,
                 weight: plug_in.weight[j],
                 n,
-                n_eff: n * plug_in.counted(j) * (1.0 - rho) / (1.0 + rho),
+                n_eff,
                 autocorrelation_time: plug_in.autocorrelation_time[j],
                 interval_factor: fitted
                     .left_out

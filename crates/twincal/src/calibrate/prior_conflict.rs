@@ -5,6 +5,7 @@ use crate::likelihood::Columns;
 use crate::posterior::{Posterior, Problem};
 use crate::prior::PriorSettings;
 use crate::signal::Auto;
+use crate::words::significant;
 use statrs::function::gamma::{gamma_lr, gamma_ur};
 
 /// Prior predictive sds from which an estimate contradicts its prior: 1 in 16 000 by chance.
@@ -58,9 +59,9 @@ pub(super) fn findings(
                 "prior_conflict",
                 name.clone(),
                 format!(
-                    "`{name}` = {mean:.3e} is {:.1} times as large as its prior expects (sd {prior:.2e}): look whether the model's \
+                    "`{name}` = {} is {:.1} times as large as its prior expects (sd {}): look whether the model's \
                      numbers there are right, or give a wider prior.slab",
-                    z.abs()
+                    significant(mean, 4), z.abs(), significant(prior, 3)
                 ),
                 0,
             ));
@@ -78,10 +79,10 @@ pub(super) fn findings(
                 "prior_conflict",
                 "prior.noise",
                 format!(
-                    "the noise variance is {:.3e} (N·m)², which prior.noise holds for impossible (it expects about {:.3e}): \
+                    "the noise variance is {} (N·m)², which prior.noise holds for impossible (it expects about {}): \
                      leave prior.noise out, or look at the torque's unit",
-                    posterior.noise,
-                    scale / shape
+                    significant(posterior.noise, 4),
+                    significant(scale / shape, 4)
                 ),
                 0,
             ));

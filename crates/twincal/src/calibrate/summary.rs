@@ -8,10 +8,10 @@ use super::result::{
     TermSummary, Verdict,
 };
 use super::result::{Compact, Halves, Repeat};
-use super::{CalibrationSettings, Fitted, prior_conflict, refuse, sandwich};
+use super::{CalibrationSettings, Fitted, prior_conflict, sandwich};
 use crate::error::{Finding, Result, Severity};
 use crate::infer::approximate;
-use crate::likelihood::{Columns, JointNoise, mean_squares};
+use crate::likelihood::{Columns, mean_squares};
 use crate::observations::Part;
 use crate::plug_in::residual_runs;
 use crate::posterior::draws::draw;
@@ -24,8 +24,6 @@ use crate::twin::Twin;
 use crate::validate::Validation;
 use rayon::prelude::*;
 
-/// Effective rows below which nothing is concluded (case 7).
-pub(super) const LEAST_EFFECTIVE_ROWS: f64 = 10.0;
 /// Lags of the residual autocorrelation, rows.
 const LAGS: usize = 20;
 /// Terms in the pair plot at most, and draws of each.
@@ -40,51 +38,6 @@ pub(super) struct SecondOpinion {
     pub(super) compact: Compact,
     pub(super) repeats: Vec<Repeat>,
     pub(super) halves: Option<Halves>,
-}
-
-/// Names the joints whose rows say next to nothing, and refuses a fit in which those of every joint do. A joint that stands
-/// still throughout has no rows, one without a candidate has no columns: neither takes part.
-fn effective_rows(noise: &[JointNoise], data: &Data) -> Result<Vec<Finding>> {
-    let has_columns = |joint: usize| {
-        let mut logs = data.fit.iter();
-        logs.any(|log| !log.observations.joints[joint].columns.is_empty())
-    };
-    let joints = noise.iter().enumerate();
-    let asked = joints.filter(|(joint, noise)| noise.n > 0.0 && has_columns(*joint));
-    let (few, enough): (Vec<&JointNoise>, Vec<&JointNoise>) = asked
-        .map(|(_, noise)| noise)
-        .partition(|noise| noise.n_eff < LEAST_EFFECTIVE_ROWS);
-    if enough.is_empty() && !few.is_empty() {
-        let counts: Vec<String> = (few.iter())
-            .map(|noise| {
-                format!(
-                    "the {} rows of joint `{}` count as {:.1}",
-                    noise.n, noise.joint, noise.n_eff
-                )
-            })
-            .collect();
-        return Err(refuse(
-            format!(
-                "{} independent rows once the residual's autocorrelation is counted, {LEAST_EFFECTIVE_ROWS} are needed",
-                counts.join(", ")
-            ),
-            "log longer and faster motion, or give candidates for what the residual still holds ([library])",
-        ));
-    }
-    let said = |noise: &JointNoise| {
-        Finding::new(
-            Severity::Warning,
-            "few_effective_rows",
-            noise.joint.clone(),
-            format!(
-                "the {} rows of joint `{}` count as {:.1} independent rows, fewer than {LEAST_EFFECTIVE_ROWS}: what is found on \
-                 it alone rests on little; log it longer and in faster motion",
-                noise.n, noise.joint, noise.n_eff
-            ),
-            noise.n as u64,
-        )
-    };
-    Ok(few.into_iter().map(said).collect())
 }
 
 /// Everything a reader gets, from the pieces of [`super::calibrate`].
@@ -105,7 +58,6 @@ pub(super) fn summarise(
     findings: &mut Vec<Finding>,
 ) -> Result<Calibration> {
     let Fitted { fit, left_out, .. } = fitted;
-    findings.extend(effective_rows(&twin.noise, data)?);
     let training: Vec<Part<'_>> = data
         .fit
         .iter()

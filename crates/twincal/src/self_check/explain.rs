@@ -17,9 +17,9 @@ const COLUMNS: usize = 4;
 /// of the log and a factor.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Reading {
-    /// Of position, velocity and acceleration; the factor is that of position.
+    /// Of position, velocity and acceleration; the factor is that of position, and of acceleration where that was derived from it.
     pub(super) motion: Vec<(usize, f64)>,
-    /// Factor of velocity and acceleration.
+    /// Factor of velocity, and of acceleration where that is its change.
     pub(super) rates: Vec<f64>,
     /// Of torque.
     pub(super) torque: Vec<(usize, f64)>,
@@ -60,7 +60,8 @@ pub(super) fn explain(robot: &Robot, sample: &Sample, reading: &Reading) -> Vec<
         let joints = reading.motion.iter().zip(&reading.rates);
         joints
             .flat_map(|(&(from, position), &rates)| {
-                let factor = if k == 0 { position } else { rates };
+                let with_position = k == 0 || k == 2 && sample.follows[from] < 0.0;
+                let factor = if with_position { position } else { rates };
                 sample.channels[k][from].iter().map(move |v| factor * v)
             })
             .collect()

@@ -19,6 +19,8 @@ pub(super) struct Sample {
     pub(super) moves: Vec<Vec<bool>>,
     /// Whether a joint's velocity is minus the change of its position, in every log in which it moves; `None` where it moves in none.
     pub(super) opposite: Vec<Option<bool>>,
+    /// ∫ q̈ dq̇ of each joint: negative where acceleration is that of the position and velocity the opposite of its change.
+    pub(super) follows: Vec<f64>,
 }
 
 impl Sample {
@@ -38,6 +40,7 @@ impl Sample {
                 .into_iter()
                 .map(|agreement| agreement.map(Agreement::is_opposite))
                 .collect(),
+            follows: vec![0.0; dof],
         };
         for segment in &trajectory.segments {
             sample.append(pipeline, segment, dof, step);
@@ -61,6 +64,11 @@ impl Sample {
                 let values = &from[all.clone()];
                 to[joint].extend(centres().map(|i| mean(&values[i - half..=i + half])));
             }
+            let (qd, qdd) = (&segment.qd[all.clone()], &segment.qdd[all.clone()]);
+            let steps = qd.windows(2).zip(qdd.windows(2));
+            self.follows[joint] += steps
+                .map(|(v, a)| 0.5 * (a[0] + a[1]) * (v[1] - v[0]))
+                .sum::<f64>();
             let still = &segment.standstill[all];
             self.moves[joint].extend(centres().map(|i| !still[i]));
         }
@@ -81,6 +89,9 @@ impl Sample {
             }
             for (to, from) in all.moves.iter_mut().zip(&sample.moves) {
                 to.extend_from_slice(from);
+            }
+            for (to, from) in all.follows.iter_mut().zip(&sample.follows) {
+                *to += from;
             }
             for (to, from) in all.opposite.iter_mut().zip(&sample.opposite) {
                 *to = match (*to, *from) {

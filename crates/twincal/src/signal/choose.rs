@@ -304,6 +304,12 @@ fn on(
                 .into(),
         });
     }
+    let steps: Vec<Option<f64>> = (0..joints.len()).map(|j| candidates.step(j)).collect();
+    let with_steps = |log: &&'_ Vec<JointSpectra>| -> Vec<JointSpectra> {
+        let joints = log.iter().zip(&steps);
+        joints.map(|(own, step)| own.quantised(*step)).collect()
+    };
+    let all: Vec<Vec<JointSpectra>> = all.iter().map(with_steps).collect();
     let of_joint =
         |joint: usize| -> Vec<&JointSpectra> { all.iter().map(|log| &log[joint]).collect() };
     // A joint that only trembles must not choose the cut-off.
@@ -365,7 +371,7 @@ fn on(
             let encoder = Encoder {
                 facts,
                 logged,
-                step: candidates.step(joint),
+                step: steps[joint],
             };
             let spectra = of_joint(joint);
             let resolved = velocity_resolution(joint, &encoder, &spectra, &pipeline, &mut said);

@@ -22,6 +22,8 @@ use std::f64::consts::PI;
 const USUAL_CUTOFF: f64 = 5.0;
 /// A bin counts as motion from this multiple of the noise floor.
 const CLEARLY: f64 = 10.0;
+/// Half the width over which the lines of rounding are averaged, Hz.
+const ROUNDING: f64 = 2.0;
 /// Share of the velocity power below f_m.
 const SHARE: f64 = 0.99;
 /// r √n that is allowed.
@@ -44,9 +46,27 @@ pub(crate) struct JointSpectra {
     pub(crate) acceleration_noise: Option<Noise>,
     /// Seconds of data.
     pub(crate) duration: f64,
+    /// Half the width over which a bin is averaged before it counts as motion, Hz: narrow for a line, at least two bins.
+    pub(crate) half_width: f64,
 }
 
 impl JointSpectra {
+    /// With at least the noise of an encoder of this step in position: rounding has the variance `step² / 12`, however little of it lies where the
+    /// floor is measured. In slow or periodic motion it is not white but lines, which are not to be taken for motion.
+    pub(crate) fn quantised(&self, step: Option<f64>) -> Self {
+        let mut all = self.clone();
+        if let Some(step) = step {
+            let floor = step * step / (6.0 * self.position_noise.rate);
+            all.position.floor = self.position.floor.max(floor);
+            all.half_width = ROUNDING;
+            if self.position_noise.floor < floor {
+                all.position_noise.floor = floor;
+                all.position_noise.order = 0;
+            }
+        }
+        all
+    }
+
     /// Noise of what q̈ is made from and how many derivatives are taken of it.
     pub(crate) fn source(&self, derived: DerivedFrom) -> (Noise, i32) {
         match (self.acceleration_noise, self.velocity_noise, derived) {
@@ -76,6 +96,7 @@ pub(crate) fn spectra(prepared: &Prepared<'_>) -> Option<Vec<JointSpectra>> {
                 acceleration_noise: qdd.map(|spectrum| spectrum.noise(2)),
                 position,
                 duration,
+                half_width: 0.0,
             })
         })
         .collect()
@@ -106,8 +127,10 @@ pub(crate) fn motion_band(logs: &[&JointSpectra]) -> (f64, f64) {
     for log in logs {
         let spectrum = &log.position;
         for (i, &density) in spectrum.density.iter().enumerate() {
-            // A running mean over five bins decides, so that single noise peaks do not.
-            let near = &spectrum.density[i.saturating_sub(2)..(i + 3).min(spectrum.density.len())];
+            // A running mean over five bins or more decides, so that single noise peaks do not.
+            let half = 2.max((log.half_width / spectrum.width) as usize);
+            let far = (i + half + 1).min(spectrum.density.len());
+            let near = &spectrum.density[i.saturating_sub(half)..far];
             if near.iter().sum::<f64>() > CLEARLY * spectrum.floor * near.len() as f64 {
                 let omega = 2.0 * PI * spectrum.frequency(i);
                 let power = (density - spectrum.floor).max(0.0) * omega * omega * spectrum.width;

@@ -5,6 +5,7 @@ use super::prepare::{JointFacts, Piece, Values, joint_facts, prepare};
 use super::{Corrections, Log, Logs, Recording};
 use crate::error::{Finding, Result, Severity};
 use crate::robot::Robot;
+use crate::words::significant;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -254,7 +255,8 @@ pub fn hardly_driven<'a>(robot: &Robot, logs: impl Into<Logs<'a>>) -> Result<Vec
                 "joint_not_driven",
                 log.name(),
                 format!(
-                    "joint `{name}` is hardly driven: rms torque {torque:.3e}, {:.1} % of its largest in any log",
+                    "joint `{name}` is hardly driven: rms torque {}, {:.1} % of its largest in any log",
+                    significant(torque, 3),
                     100.0 * torque / largest
                 ),
                 0,

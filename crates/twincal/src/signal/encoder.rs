@@ -6,6 +6,7 @@ use super::prepare::JointFacts;
 use super::spectrum::Noise;
 use super::{DerivedFrom, Pipeline};
 use crate::error::{Finding, Severity};
+use crate::words::significant;
 
 /// What is known of the encoder of a joint before anything is filtered.
 pub(crate) struct Encoder<'a> {
@@ -59,8 +60,8 @@ pub(crate) fn velocity_resolution(
             "derived_acceleration",
             &facts.name,
             format!(
-                "joint `{}`: acceleration is not logged and was derived from {source}, by the motion filter at {:.3} Hz; encoder noise of {position:.2e} leaves a noise of {velocity:.2e} in velocity and {acceleration:.2e} in acceleration (SI units, per sample)",
-                facts.name, pipeline.motion_cutoff_hz
+                "joint `{}`: acceleration is not logged and was derived from {source}, by the motion filter at {:.3} Hz; encoder noise of {} leaves a noise of {} in velocity and {} in acceleration (SI units, per sample)",
+                facts.name, pipeline.motion_cutoff_hz, significant(position, 2), significant(velocity, 2), significant(acceleration, 2)
             ),
             0,
         ));
@@ -73,10 +74,9 @@ pub(crate) fn velocity_resolution(
             "quantised_encoder",
             &facts.name,
             format!(
-                "joint `{}`: the encoder steps by {step:.3e}: quantisation alone leaves a noise of {velocity:.2e} in velocity and \
-                 {acceleration:.2e} in acceleration derived from position (SI units, after the motion filter), and velocities below \
-                 {stepping:.3e} per s cannot be told from standstill; log the encoder's full resolution",
-                facts.name
+                "joint `{}`: the encoder steps by {}: quantisation alone leaves a noise of {} in velocity and {} in acceleration derived from \
+                 position (SI units, after the motion filter), and velocities below {} per s cannot be told from standstill; log the encoder's full resolution",
+                facts.name, significant(step, 3), significant(velocity, 2), significant(acceleration, 2), significant(stepping, 3)
             ),
             0,
         ));

@@ -270,7 +270,10 @@ pub(crate) fn report_short(log: &Recording, short: u64, rows: u64, findings: &mu
             Severity::Warning,
             "short_segments",
             &log.name,
-            format!("{short} segments between cuts ({rows} rows) are shorter than the motion filter and were dropped"),
+            match short {
+                1 => format!("a segment between cuts ({rows} rows) is shorter than the motion filter and was dropped"),
+                _ => format!("{short} segments between cuts ({rows} rows) are shorter than the motion filter and were dropped"),
+            },
             rows,
         ));
     }

@@ -1,6 +1,6 @@
 //! What `[columns]` has to say of logs whose numbers have other units, signs or another order than the model.
 
-use super::examine::{Examination, Mapping};
+use super::examine::{Examination, JointColumns, Mapping};
 use super::units::Degrees;
 use std::collections::BTreeMap;
 use twincal::Finding;
@@ -31,6 +31,16 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
         all.table.time_unit = Some(unit);
         all.mended.push(TICKS);
     }
+    let is_logged = |column: fn(&JointColumns) -> bool| {
+        let mut joints = examination.mappings.iter().flat_map(|(_, m)| &m.joints);
+        examination.mappings.is_empty() || joints.any(column)
+    };
+    let logged = [
+        true,
+        is_logged(|joint| joint.velocity.is_some()),
+        is_logged(|joint| joint.acceleration.is_some()),
+        true,
+    ];
     let mut whys = Vec::new();
     if let Some(Degrees { factors, joints }) = examination.degrees(logs) {
         let [position, rates] = *factors;
@@ -40,8 +50,10 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
             (&mut factor.qd, rates),
             (&mut factor.qdd, rates),
         ];
-        for (factor, number) in channels.into_iter().filter(|(_, number)| *number != 1.0) {
-            *factor = of_joints(examination, joints, number);
+        for ((factor, number), logged) in channels.into_iter().zip(logged) {
+            if logged && number != 1.0 {
+                *factor = of_joints(examination, joints, number);
+            }
         }
         whys.push("Positions or velocities are logged in degrees.".to_owned());
         all.mended.push(DEGREES);
@@ -56,8 +68,10 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
             (&mut factor.qdd, rates),
             (&mut factor.tau, torque),
         ];
-        for (factor, _) in channels.into_iter().filter(|(_, sign)| *sign < 0.0) {
-            multiply(factor, examination, &check.joint, -1.0);
+        for ((factor, sign), logged) in channels.into_iter().zip(logged) {
+            if logged && sign < 0.0 {
+                multiply(factor, examination, &check.joint, -1.0);
+            }
         }
         whys.push(format!("{} is turned round.", check.joint));
         all.mended.push("sign_flip");
@@ -140,7 +154,11 @@ fn multiply(factor: &mut Factor, examination: &Examination, joint: &str, by: f64
         .filter_map(|name| Some(((*name).to_owned(), factor.of_joint(name)?)));
     let mut by_joint: BTreeMap<String, f64> = said.collect();
     *by_joint.entry(joint.to_owned()).or_insert(1.0) *= by;
-    *factor = Factor::ByJoint(by_joint);
+    let all_alike = by_joint.len() == names.len() && by_joint.values().all(|own| *own == by);
+    *factor = match all_alike {
+        true => Factor::All(by),
+        false => Factor::ByJoint(by_joint),
+    };
 }
 
 /// Maps the columns of exchanged joints; false where the columns are not those of one table.
@@ -153,8 +171,7 @@ fn reorder(examination: &Examination, table: &mut ColumnsTable) -> bool {
         return false;
     }
     let checks = &examination.checkup.joints;
-    let of = |from: fn(&JointCheck) -> &str,
-              column: fn(&super::examine::JointColumns) -> Option<&String>| {
+    let of = |from: fn(&JointCheck) -> &str, column: fn(&JointColumns) -> Option<&String>| {
         let named = checks.iter().filter_map(|check| {
             let own = joint_of(first, from(check))?;
             Some((check.joint.clone(), column(own)?.clone()))
@@ -168,6 +185,6 @@ fn reorder(examination: &Examination, table: &mut ColumnsTable) -> bool {
     true
 }
 
-fn joint_of<'a>(mapping: &'a Mapping, name: &str) -> Option<&'a super::examine::JointColumns> {
+fn joint_of<'a>(mapping: &'a Mapping, name: &str) -> Option<&'a JointColumns> {
     mapping.joints.iter().find(|joint| joint.joint == name)
 }

@@ -9,7 +9,9 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use twincal::Finding;
-use twincal::calibrate::{CalibrationSettings, Outlook, calibrate, outlook};
+use twincal::calibrate::{
+    Calibration, CalibrationSettings, ComponentSummary, Outlook, Verdict, calibrate, outlook,
+};
 use twincal::robot::Robot;
 use twincal::signal::{
     Auto, Chosen, Log, LogOverview, Pipeline, Steps, choose_and_prepare, constant_torque, describe,
@@ -83,7 +85,7 @@ pub(super) struct Examination {
     pub(super) overviews: Vec<LogOverview>,
     pub(super) steps: Vec<Vec<Steps>>,
     pub(super) pipeline: Option<Pipeline>,
-    /// Where a coarse encoder does less harm and a fit would go on, Hz.
+    /// Where a coarse encoder does less harm and a fit finds no less, Hz.
     pub(super) lower_cutoff: Option<f64>,
     pub(super) checkup: Checkup,
     pub(super) outlook: Option<Outlook>,
@@ -353,7 +355,7 @@ impl Examination {
     }
 
     /// Fits: what only a fit can tell (rows that count as too few) is a reason to stop as well. A lower cut-off is advised if
-    /// a fit would go on there.
+    /// a fit goes on there and still finds what it does without.
     fn try_fit(&mut self, logs: &LogInput, settings: &CalibrationSettings) {
         let robot = &self.robot.robot;
         let fit = |settings: &CalibrationSettings| {
@@ -369,11 +371,21 @@ impl Examination {
                 let error = logs.as_given(stopped.error);
                 self.refusals.push(Failure::from(error).into());
             }
-            Ok(_) => {
+            Ok(fitted) => {
+                let used = &fitted.twin.pipeline;
+                if let Some(own) = &mut self.pipeline
+                    && own.cutoff_hz != used.cutoff_hz
+                {
+                    own.clone_from(used);
+                    let bands = ["lower_band", "wider_band"];
+                    let found = fitted.findings.iter();
+                    let why = found.filter(|f| bands.contains(&f.code.as_str()));
+                    self.findings.extend(why.cloned());
+                }
                 let mut lower = settings.clone();
                 self.lower_cutoff = self.slower().filter(|&hz| {
                     lower.signal.cutoff_hz = Auto::Value(hz);
-                    fit(&lower).is_ok()
+                    fit(&lower).is_ok_and(|lower| finds_all(&lower, &fitted))
                 });
             }
         }
@@ -393,6 +405,16 @@ impl Examination {
         let hz = (wanted * 10.0).floor() / 10.0;
         (hz >= 0.5 && hz < now).then_some(hz)
     }
+}
+
+/// Whether `lower` still finds what `usual` does: a cut-off below the motion's own band loses effects of acceleration.
+fn finds_all(lower: &Calibration, usual: &Calibration) -> bool {
+    let is_found = |component: &&ComponentSummary| component.verdict == Some(Verdict::Found);
+    let found: Vec<&str> = (lower.components.iter().filter(is_found))
+        .map(|component| component.name.as_str())
+        .collect();
+    let mut usual = usual.components.iter().filter(is_found);
+    usual.all(|component| found.contains(&component.name.as_str()))
 }
 
 /// What `[log] torque` makes of the torque columns.

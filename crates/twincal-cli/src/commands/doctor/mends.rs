@@ -26,7 +26,7 @@ pub(super) struct Mend {
 const NOT_USED: &str = "nothing, if it does not act in these logs; else write its effect into the model in a form that is read";
 
 /// Findings in the order in which they matter, with what mends them.
-const ORDER: [(&str, &str); 47] = [
+const ORDER: [(&str, &str); 48] = [
     (
         "joint_order",
         "map the columns in [columns.q], [columns.qd], [columns.tau] of twincal.toml; twincal init writes them",
@@ -111,6 +111,10 @@ const ORDER: [(&str, &str); 47] = [
     (
         "quantised_encoder",
         "log the full resolution of the encoder",
+    ),
+    (
+        "lower_band",
+        "log the full resolution of the encoder, or longer and faster motion",
     ),
     (
         "joint_not_excited",

@@ -2,12 +2,13 @@
 
 use super::super::inspect::library::{directions, families};
 use super::super::inspect::log_heading;
-use super::super::summary::{indented, paragraph, percent, significant};
+use super::super::summary::{indented, paragraph, percent};
 use super::super::table::{print_table, table};
 use super::examine::Mapping;
 use super::{Diagnosis, LogRow};
 use crate::terminal::{Terminal, clean};
 use twincal::Severity;
+use twincal::words::significant;
 
 /// Mends that come first.
 const FIRST: usize = 3;
