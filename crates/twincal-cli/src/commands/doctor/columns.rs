@@ -5,7 +5,7 @@ use super::units::Degrees;
 use std::collections::BTreeMap;
 use twincal::Finding;
 use twincal::self_check::JointCheck;
-use twincal_io::config::{ChannelNames, ColumnsTable, Factor, Settings, key};
+use twincal_io::config::{ChannelNames, ColumnsTable, PerJoint, Settings, key};
 
 /// `[columns]` of a proposed config.
 pub(super) struct Columns {
@@ -121,26 +121,26 @@ fn is_moved(check: &JointCheck) -> bool {
 }
 
 /// A factor of some joints.
-fn of_joints(examination: &Examination, joints: &[usize], number: f64) -> Factor {
+fn of_joints(examination: &Examination, joints: &[usize], number: f64) -> PerJoint {
     let names = examination.robot.robot.joint_names();
     if joints.len() == names.len() {
-        return Factor::All(number);
+        return PerJoint::All(number);
     }
     let named = joints
         .iter()
         .map(|&joint| (names[joint].to_owned(), number));
-    Factor::ByJoint(named.collect())
+    PerJoint::ByJoint(named.collect())
 }
 
 /// Another factor on one joint.
-fn multiply(factor: &mut Factor, examination: &Examination, joint: &str, by: f64) {
+fn multiply(factor: &mut PerJoint, examination: &Examination, joint: &str, by: f64) {
     let names = examination.robot.robot.joint_names();
     let said = names
         .iter()
         .filter_map(|name| Some(((*name).to_owned(), factor.of_joint(name)?)));
     let mut by_joint: BTreeMap<String, f64> = said.collect();
     *by_joint.entry(joint.to_owned()).or_insert(1.0) *= by;
-    *factor = Factor::ByJoint(by_joint);
+    *factor = PerJoint::ByJoint(by_joint);
 }
 
 /// Maps the columns of exchanged joints; false where the columns are not those of one table.
