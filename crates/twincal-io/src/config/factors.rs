@@ -38,6 +38,16 @@ impl FactorTable {
         ]
     }
 
+    /// Likewise, to be changed.
+    pub(super) fn channels_mut(&mut self) -> [(&'static str, &mut PerJoint); 4] {
+        [
+            ("q", &mut self.q),
+            ("qd", &mut self.qd),
+            ("qdd", &mut self.qdd),
+            ("tau", &mut self.tau),
+        ]
+    }
+
     /// Whether nothing is said.
     pub fn is_empty(&self) -> bool {
         self.channels().iter().all(|(_, factor)| factor.is_empty())

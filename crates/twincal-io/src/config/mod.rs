@@ -8,6 +8,7 @@ mod channel_names;
 mod factors;
 mod families;
 mod file;
+mod kept_columns;
 mod log_form;
 mod log_forms;
 mod per_joint;
@@ -24,6 +25,7 @@ pub use file::{
     NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PresetWord, PriorTable,
     SignalTable, Slab, Topics, TorqueWord, UncertaintyWord, UnknownWord, VelocityWord,
 };
+pub use kept_columns::Attempt;
 pub use log_form::LogForm;
 pub use per_joint::PerJoint;
 pub use proposal::{Proposal, key};

@@ -38,6 +38,24 @@ impl PerJoint {
         matches!(self, Self::ByJoint(numbers) if numbers.is_empty())
     }
 
+    /// These numbers, and those of `other` for the joints of which nothing is said here.
+    #[must_use]
+    pub fn or(&self, other: &Self, joints: &[&str]) -> Self {
+        let number = |joint: &&str| self.of_joint(joint).or(other.of_joint(joint));
+        match (self, other) {
+            (Self::All(_), _) => self.clone(),
+            (own, Self::All(_)) if own.is_empty() => other.clone(),
+            // A joint that does not move in the model stays: the reader names it.
+            (Self::ByJoint(own), _) => {
+                let own = own.iter().map(|(joint, number)| (joint.clone(), *number));
+                let all = joints
+                    .iter()
+                    .filter_map(|joint| Some(((*joint).to_owned(), number(joint)?)));
+                Self::ByJoint(own.chain(all).collect())
+            }
+        }
+    }
+
     /// The numbers as they stand in the config, each with its joint; `None` for all of them.
     pub fn numbers(&self) -> impl Iterator<Item = (Option<&str>, f64)> {
         let (all, own) = match self {
@@ -65,6 +83,12 @@ mod tests {
         let all = PerJoint::All(3.0);
         assert_eq!(all.numbers().collect::<Vec<_>>(), [(None, 3.0)]);
         assert_eq!(all.of_joint("c"), Some(3.0));
+        let joints = ["a", "b", "c"];
+        let mixed = [("a".into(), 1.0), ("b".into(), 2.0), ("c".into(), 3.0)];
+        assert_eq!(some.or(&all, &joints), PerJoint::ByJoint(mixed.into()));
+        assert_eq!(all.or(&some, &joints), all);
+        assert_eq!(PerJoint::default().or(&all, &joints), all);
+        assert_eq!(some.or(&PerJoint::default(), &joints), some);
         assert!(PerJoint::default().is_empty() && !some.is_empty() && !all.is_empty());
     }
 }
