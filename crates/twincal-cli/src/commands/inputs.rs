@@ -62,6 +62,9 @@ pub(super) struct LogInput {
     given: Vec<PathBuf>,
 }
 
+/// A log with what was dropped or assumed, or why it cannot be read.
+type ReadLog = Result<(Log<'static>, Vec<Finding>), Error>;
+
 /// What becomes of long logs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Long {
@@ -120,7 +123,7 @@ impl LogInput {
         paths: &[PathBuf],
         robot: &Robot,
         progress: &Progress,
-        read_one: &(dyn Fn(&Path) -> Result<(Log<'static>, Vec<Finding>), Error> + Sync),
+        read_one: &(dyn Fn(&Path) -> ReadLog + Sync),
     ) -> Outcome<Self> {
         let mut samples = 0;
         let mut input = Self::new(paths.to_vec());
