@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{QUICK, Run, csv, fit, folder, run};
+use common::{QUICK, Run, csv, fit, folder, run, shell};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -112,6 +112,13 @@ fn a_log_of_the_same_recorder_needs_no_config() {
         ],
     )
     .expect(0);
+}
+
+/// What can be read once is read by the first attempt.
+#[test]
+fn a_pipe_is_read_by_the_columns_of_the_fit() {
+    let done = shell(place(), "\"$TWINCAL\" check <(cat run.csv) --twin twin").expect(0);
+    assert!(done.out.contains("passed"), "{}", done.out);
 }
 
 #[test]

@@ -69,11 +69,14 @@ impl<'a> AsFitted<'a> {
         let Some(read_as) = &self.stored.read_as else {
             return long.read(path, robot, &options);
         };
-        // What is wrong with a header is said when the log is read.
-        let header = read_header(path).ok().flatten();
+        // What is wrong with a header is said when the log is read. A pipe can be opened once.
+        let header = if path.is_file() {
+            read_header(path).ok().flatten()
+        } else {
+            None
+        };
         let mut attempts = read_as.attempts(&options, header.as_deref(), &robot.joint_names());
         if !path.is_file() && !path.is_dir() {
-            // A pipe can be read once.
             attempts.truncate(1);
         }
         let (mut refusal, mut kept_names) = (None, false);
