@@ -16,8 +16,51 @@ const STREAMS: (u64, u64) = ((1 << 32) + 2, (1 << 32) + 3);
 const SEED: u64 = 1;
 /// A parameter changed if the probability of a change in the other direction, or of none, is below this.
 const DOUBT: f64 = 0.01;
-/// Probability of a component that makes it worth comparing.
+/// Probability of a component that makes it worth comparing; below it the component is out.
 const WORTH_COMPARING: f64 = 0.2;
+/// Probability from which a component is in; between the two it is undecided, as in the verdicts of a fit.
+const IN: f64 = 0.8;
+
+/// What became of a component, by its probability before and after: out below 0.2, in from 0.8, undecided between.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Became {
+    /// Out before, in after.
+    New,
+    /// In before, out after.
+    Gone,
+    /// Likelier than before, where one of the two is undecided.
+    PerhapsNew,
+    /// Less likely than before, where one of the two is undecided.
+    PerhapsGone,
+    /// In on both sides, or undecided on both, with another number.
+    Changed,
+    /// Nothing that these logs can tell.
+    AsBefore,
+}
+
+impl Became {
+    fn of(pip: [Option<f64>; 2], changed: bool) -> Self {
+        let [before, after] = pip.map(|pip| pip.unwrap_or(0.0));
+        let (out, inside) = (|pip: f64| pip < WORTH_COMPARING, |pip: f64| pip >= IN);
+        let undecided = |pip| !out(pip) && !inside(pip);
+        if out(before) && inside(after) {
+            Self::New
+        } else if inside(before) && out(after) {
+            Self::Gone
+        } else if undecided(before) != undecided(after) {
+            if after > before {
+                Self::PerhapsNew
+            } else {
+                Self::PerhapsGone
+            }
+        } else if changed {
+            Self::Changed
+        } else {
+            Self::AsBefore
+        }
+    }
+}
 
 /// What became of one component.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -26,11 +69,17 @@ pub struct Change {
     pub name: String,
     /// Family.
     pub family: Family,
+    /// Physical story: "payload at tool0".
+    pub story: String,
+    /// New, gone, changed, …
+    pub became: Became,
+    /// False where the numbers of the two are not the same quantity (`coulomb_velocity_differs`).
+    pub comparable: bool,
     /// Inclusion probability before and after; `None` where the twin does not have the component.
     pub pip: [Option<f64>; 2],
     /// True if at least one of its parameters changed with probability above 0.99.
     pub changed: bool,
-    /// "payload at tool0: mass +0.000 → +1.740 kg (+1.740 ± 0.004)".
+    /// "payload at tool0: mass +1.740 ± 0.004 kg": the surest differences.
     pub words: String,
     /// Parameters in their order.
     pub parameters: Vec<ParameterChange>,
@@ -45,6 +94,10 @@ pub struct ParameterChange {
     pub unit: String,
     /// Mean before and after.
     pub mean: [f64; 2],
+    /// The parameter before.
+    pub before: Value,
+    /// The parameter after.
+    pub after: Value,
     /// Mean of the difference, after − before.
     pub difference: f64,
     /// Its sd.
@@ -57,6 +110,82 @@ pub struct ParameterChange {
     pub interval68: [f64; 2],
     /// The larger of P(difference > 0) and P(difference < 0).
     pub certainty: f64,
+}
+
+/// A parameter of one twin, 0 in the models that do not hold its component.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Value {
+    /// Median.
+    pub median: f64,
+    /// Central 68.3 % interval.
+    pub interval68: [f64; 2],
+    /// Central 95 % interval.
+    pub interval95: [f64; 2],
+}
+
+impl Value {
+    /// Of draws.
+    fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let at = |level: f64| quantile(&values, level);
+        Self {
+            median: at(0.5),
+            interval68: ONE_SD.map(at),
+            interval95: [at(0.025), at(0.975)],
+        }
+    }
+}
+
+/// Levels one standard deviation below and above the middle of a normal distribution.
+const ONE_SD: [f64; 2] = [0.158_655, 0.841_345];
+
+/// The value of sorted draws at a level.
+fn quantile(sorted: &[f64], level: f64) -> f64 {
+    sorted[((sorted.len() as f64 - 1.0) * level).round() as usize]
+}
+
+impl ParameterChange {
+    /// Half the central 68.3 % interval of the difference: one sd where it is normal.
+    #[must_use]
+    pub fn spread(&self) -> f64 {
+        0.5 * (self.interval68[1] - self.interval68[0])
+    }
+
+    /// True if the probability of a change in the other direction, or of none, is below 0.01.
+    #[must_use]
+    pub fn changed(&self) -> bool {
+        self.certainty > 1.0 - DOUBT
+    }
+
+    /// Factor and unit in which people read the parameter: parts in per cent, angles in degrees, centres of mass in millimetres.
+    #[must_use]
+    pub fn told_in(&self, family: Family) -> (f64, &str) {
+        match (family, self.unit.as_str()) {
+            (Family::Gain | Family::LoadFriction | Family::MassScale, "1") => (100.0, "%"),
+            (Family::EncoderZero, "rad") => (1f64.to_degrees(), "°"),
+            (Family::EncoderZero | Family::Payload, "m") => (1e3, "mm"),
+            (_, "1") => (1.0, ""),
+            (_, unit) => (1.0, unit),
+        }
+    }
+}
+
+/// The parameters worth telling, the surest first: those that changed, else the two whose difference is clearest; none where most
+/// draws show no difference.
+#[must_use]
+pub fn surest(parameters: &[ParameterChange]) -> Vec<&ParameterChange> {
+    let clearness = |p: &ParameterChange| p.median.abs() / p.spread().max(f64::MIN_POSITIVE);
+    let mut order: Vec<&ParameterChange> = (parameters.iter())
+        .filter(|p| p.median.is_finite() && (p.median != 0.0 || p.spread() != 0.0))
+        .collect();
+    order.sort_by(|a, b| clearness(b).total_cmp(&clearness(a)));
+    let changed = order.iter().filter(|p| p.changed()).count();
+    if changed > 0 {
+        order.retain(|p| p.changed());
+    } else {
+        order.truncate(2);
+    }
+    order
 }
 
 /// Compares `after` with `before`, component by component in the order of `before` and then of what only `after` has.
@@ -76,6 +205,7 @@ pub fn compare(before: &Twin, after: &Twin) -> Result<Vec<Change>> {
             remedy: "give two twins of the same robot".into(),
         });
     }
+    let apart = !hindrances(before, after)?.is_empty();
     let sides = [Side::new(before, STREAMS.0)?, Side::new(after, STREAMS.1)?];
     let mut names: Vec<&str> = sides[0].names().collect();
     names.extend(
@@ -85,7 +215,7 @@ pub fn compare(before: &Twin, after: &Twin) -> Result<Vec<Change>> {
     );
     Ok(names
         .into_iter()
-        .filter_map(|name| change(name, &sides))
+        .filter_map(|name| change(name, &sides, apart))
         .collect())
 }
 
@@ -172,7 +302,8 @@ impl Side {
     }
 }
 
-fn change(name: &str, sides: &[Side; 2]) -> Option<Change> {
+/// What became of a component; `apart` where friction turns round within another velocity.
+fn change(name: &str, sides: &[Side; 2], apart: bool) -> Option<Change> {
     let at = [sides[0].find(name), sides[1].find(name)];
     let pip = [0, 1].map(|side| at[side].and_then(|component| sides[side].pip(component)));
     if pip.iter().all(|pip| pip.unwrap_or(0.0) < WORTH_COMPARING) {
@@ -207,14 +338,17 @@ fn change(name: &str, sides: &[Side; 2]) -> Option<Change> {
             )
         })
         .collect();
-    let changed = parameters.iter().any(|p| p.certainty > 1.0 - DOUBT);
-    let words = words(&library.components()[component].story, &parameters);
+    let changed = parameters.iter().any(ParameterChange::changed);
+    let component = &library.components()[component];
     Some(Change {
         name: name.to_owned(),
-        family: library.components()[component].family,
+        family: component.family,
+        story: component.story.clone(),
+        became: Became::of(pip, changed),
+        comparable: !(apart && component.family.turns_round()),
         pip,
         changed,
-        words,
+        words: words(&component.story, component.family, &parameters),
         parameters,
     })
 }
@@ -231,31 +365,27 @@ fn parameter_change(
     let count = difference.len() as f64;
     let centre = mean(&difference);
     let square: f64 = difference.iter().map(|d| (d - centre) * (d - centre)).sum();
-    let quantile = |level: f64| difference[((count - 1.0) * level).round() as usize];
+    let at = |level: f64| quantile(&difference, level);
     let share =
         |test: fn(f64) -> bool| difference.iter().filter(|d| test(**d)).count() as f64 / count;
     ParameterChange {
         name,
         unit,
         mean: [mean(&before), mean(&after)],
+        before: Value::of(before),
+        after: Value::of(after),
         difference: centre,
         sd: (square / (count - 1.0)).sqrt(),
-        interval95: [quantile(0.025), quantile(0.975)],
-        median: quantile(0.5),
-        interval68: [quantile(0.158_655), quantile(0.841_345)],
+        interval95: [at(0.025), at(0.975)],
+        median: at(0.5),
+        interval68: ONE_SD.map(at),
         certainty: share(|d| d > 0.0).max(share(|d| d < 0.0)),
     }
 }
 
 /// The surest changes of a component in one sentence.
-fn words(story: &str, parameters: &[ParameterChange]) -> String {
-    let spread = |p: &ParameterChange| 0.5 * (p.interval68[1] - p.interval68[0]);
-    let clearness = |p: &ParameterChange| p.median.abs() / spread(p).max(f64::MIN_POSITIVE);
-    let mut order: Vec<&ParameterChange> = parameters
-        .iter()
-        .filter(|p| p.median.is_finite() && (p.median != 0.0 || spread(p) != 0.0))
-        .collect();
-    order.sort_by(|a, b| clearness(b).total_cmp(&clearness(a)));
+fn words(story: &str, family: Family, parameters: &[ParameterChange]) -> String {
+    let mut order = surest(parameters);
     order.truncate(2);
     let told: Vec<String> = order
         .iter()
@@ -265,11 +395,12 @@ fn words(story: &str, parameters: &[ParameterChange]) -> String {
             } else {
                 format!("{} ", p.name.replace('_', " "))
             };
+            let (factor, unit) = p.told_in(family);
             let difference = Estimate {
                 name: p.name.clone(),
-                unit: p.unit.clone(),
-                value: p.median,
-                spread: spread(p),
+                unit: unit.to_owned(),
+                value: factor * p.median,
+                spread: factor * p.spread(),
             };
             format!("{name}{difference}")
         })
@@ -294,9 +425,54 @@ mod tests {
         // The uniform distribution on 1 … 2: median 1.5, central 68.3 % ± 0.3415.
         let unseen = parameter_change("com_x".into(), "m".into(), vec![0.0; 9], vec![0.0; 9]);
         assert_eq!(
-            words("payload", &[unseen.clone(), change]),
+            words("payload", Family::Payload, &[unseen.clone(), change]),
             "payload: mass +1.50 ± 0.34 kg"
         );
-        assert_eq!(words("payload", &[unseen]), "payload: no difference");
+        assert_eq!(
+            words("payload", Family::Payload, &[unseen]),
+            "payload: no difference"
+        );
+    }
+
+    /// By the thresholds of a fit's verdicts.
+    #[test]
+    fn what_became_of_a_component_follows_from_both_probabilities() {
+        for (before, after, changed, became) in [
+            (Some(0.01), Some(0.99), true, Became::New),
+            (None, Some(0.9), false, Became::New),
+            (Some(0.99), None, true, Became::Gone),
+            (Some(0.5), Some(0.99), true, Became::PerhapsNew),
+            (Some(0.01), Some(0.6), false, Became::PerhapsNew),
+            (Some(0.6), Some(0.1), false, Became::PerhapsGone),
+            (Some(0.9), Some(0.7), false, Became::PerhapsGone),
+            (Some(0.9), Some(0.95), true, Became::Changed),
+            (Some(0.5), Some(0.6), true, Became::Changed),
+            (Some(0.5), Some(0.6), false, Became::AsBefore),
+            (Some(1.0), Some(0.8), false, Became::AsBefore),
+        ] {
+            let found = Became::of([before, after], changed);
+            assert_eq!(found, became, "{before:?} → {after:?}");
+        }
+    }
+
+    #[test]
+    fn parts_are_told_in_per_cent_and_centres_of_mass_in_millimetres() {
+        let told = |name: &str, unit: &str, family| {
+            let draws: Vec<f64> = (0..101).map(|i| 0.02 + 1e-5 * f64::from(i)).collect();
+            let change = parameter_change(name.into(), unit.into(), vec![0.0; 101], draws);
+            words("it", family, &[change])
+        };
+        assert_eq!(
+            told("value", "1", Family::LoadFriction),
+            "it: +2.050 ± 0.034 %"
+        );
+        assert_eq!(
+            told("com_x", "m", Family::Payload),
+            "it: com x +20.50 ± 0.34 mm"
+        );
+        assert_eq!(
+            told("value", "rad", Family::EncoderZero),
+            "it: +1.175 ± 0.019 °"
+        );
     }
 }

@@ -1,14 +1,14 @@
 //! `twincal diff`: what changed between two twins of the same robot.
 
 use super::print_json;
-use super::summary::{Notes, findings, paragraph, pip};
+use super::summary::{Notes, findings, indented, paragraph, pip};
 use crate::args::Diff;
 use crate::failure::Outcome;
 use crate::terminal::Terminal;
 use serde::Serialize;
 use std::path::Path;
 use twincal::Finding;
-use twincal::compare::{Change, compare, hindrances};
+use twincal::compare::{Became, Change, ParameterChange, compare, hindrances, surest};
 use twincal_io::artifact::Artifact;
 use twincal_io::twin_json::StoredTwin;
 
@@ -37,48 +37,150 @@ pub(super) fn run(flags: &Diff, terminal: &mut Terminal) -> Outcome<u8> {
         };
         print_json(terminal, &difference)?;
     } else {
-        print(&changes, terminal);
+        let velocities = [old, new].map(|twin| twin.library.coulomb_velocity);
+        print(&changes, velocities, terminal);
         findings(&found, Notes::Shown, terminal);
     }
     Ok(0)
 }
 
-fn print(changes: &[Change], terminal: &mut Terminal) {
-    terminal.heading("What changed (after - before)");
-    let (changed, same): (Vec<_>, Vec<_>) = changes.iter().partition(|change| change.changed);
-    if changed.is_empty() {
+/// What can be compared, then what cannot.
+fn print(changes: &[Change], velocities: [f64; 2], terminal: &mut Terminal) {
+    let (alike, other): (Vec<_>, Vec<_>) = changes.iter().partition(|change| change.comparable);
+    terminal.heading("What changed (before → after)");
+    let same = print_changed(&alike, terminal);
+    if same == alike.len() {
         terminal.say("  nothing that these logs can tell");
     }
-    for change in changed {
-        paragraph(&format!("{} ({})", change.words, pips(change)), terminal);
-    }
-    let (turned, same): (Vec<_>, Vec<_>) = same.into_iter().partition(|change| turned(change));
-    if !turned.is_empty() {
-        let named = turned
-            .iter()
-            .map(|change| format!("{}: {}", change.name, pips(change)));
-        let named: Vec<String> = named.collect();
-        let text = format!(
-            "in one of the two only, though no number clearly differs: {}",
-            named.join("; ")
+    if same > 0 {
+        let components = counted(same, "component");
+        paragraph(
+            &format!("{components} as before (--json has the numbers)"),
+            terminal,
         );
-        paragraph(&text, terminal);
     }
-    if !same.is_empty() {
-        let names: Vec<&str> = same.iter().map(|change| change.name.as_str()).collect();
-        paragraph(&format!("as before: {}", names.join(", ")), terminal);
+    terminal.say("");
+    if other.is_empty() {
+        return;
+    }
+    let [before, after] = velocities;
+    terminal.heading(&format!(
+        "Not the same quantity: friction turns round within {before} → {after} rad/s (m/s)"
+    ));
+    let same = print_changed(&other, terminal);
+    if same > 0 {
+        let components = counted(same, "component");
+        let text = format!("{components} of this kind without a clear difference");
+        paragraph(&text, terminal);
     }
     terminal.say("");
 }
 
-/// "PIP 0.032 → >0.999".
-fn pips(change: &Change) -> String {
-    let [before, after] = change.pip.map(pip);
-    format!("PIP {before} → {after}")
+/// Each component that is not as before; the number of the others.
+fn print_changed(changes: &[&Change], terminal: &mut Terminal) -> usize {
+    // What is open comes last.
+    let order = [
+        Became::New,
+        Became::Gone,
+        Became::Changed,
+        Became::PerhapsNew,
+        Became::PerhapsGone,
+    ];
+    let of = |became: Became| changes.iter().filter(move |change| change.became == became);
+    let (weak, told): (Vec<&&Change>, Vec<_>) = order
+        .into_iter()
+        .flat_map(of)
+        .partition(|change| is_weak(change));
+    for change in told {
+        print_change(change, terminal);
+    }
+    if !weak.is_empty() {
+        let name = |change: &&&Change| format!("{} ({})", change.name, pips(change));
+        let names: Vec<String> = weak.iter().map(name).collect();
+        let text = format!("perhaps, below 0.5 in both: {}", names.join(", "));
+        paragraph(&text, terminal);
+    }
+    of(Became::AsBefore).count()
 }
 
-/// Whether the component is in on one side alone.
-fn turned(change: &Change) -> bool {
-    let [before, after] = change.pip.map(|pip| pip.is_some_and(|pip| pip > 0.5));
-    before != after
+/// Whether a component is likelier out than in on both sides, and its numbers are next to nothing.
+fn is_weak(change: &Change) -> bool {
+    let perhaps = matches!(change.became, Became::PerhapsNew | Became::PerhapsGone);
+    perhaps && !change.changed && change.pip.iter().all(|pip| pip.unwrap_or(0.0) < 0.5)
+}
+
+/// "0.032 → >0.999".
+fn pips(change: &Change) -> String {
+    let [before, after] = change.pip.map(pip);
+    format!("{before} → {after}")
+}
+
+fn print_change(change: &Change, terminal: &mut Terminal) {
+    let mark = match change.became {
+        Became::New => "new",
+        Became::Gone => "gone",
+        Became::PerhapsNew => "perhaps new",
+        Became::PerhapsGone => "perhaps gone",
+        Became::Changed | Became::AsBefore => "changed",
+    };
+    let text = format!("{mark}: {} (PIP {})", change.story, pips(change));
+    paragraph(&text, terminal);
+    let told = surest(&change.parameters);
+    for parameter in &told {
+        indented(&line(change, parameter), ["    ", "      "], terminal);
+    }
+    if told.is_empty() {
+        terminal.say("    most draws of the two twins show no difference");
+    }
+    let differs = |p: &&ParameterChange| p.mean != [0.0; 2];
+    let more = change.parameters.iter().filter(differs).count();
+    let more = more.saturating_sub(told.len());
+    if more > 0 {
+        let numbers = counted(more, "more number");
+        terminal.say(&format!("    {numbers} without a clear difference"));
+    }
+}
+
+/// "mass: 0 → +1.740 kg, difference +1.740 ± 0.004 (95 %: +1.732 to +1.748)".
+fn line(change: &Change, parameter: &ParameterChange) -> String {
+    let (factor, unit) = parameter.told_in(change.family);
+    let name = match parameter.name.as_str() {
+        "value" => String::new(),
+        name => format!("{}: ", name.replace('_', " ")),
+    };
+    let spread = factor * parameter.spread();
+    let [before, after, difference] = [
+        parameter.before.median,
+        parameter.after.median,
+        parameter.median,
+    ]
+    .map(|x| factor * x);
+    let size = [before, after, difference, spread].map(f64::abs);
+    let size = size.into_iter().fold(0.0, f64::max);
+    // The spread gives the digits: two of its own, and what stands beside it to the same place.
+    let plain = spread > 0.0 && (1e-3..1e6).contains(&size);
+    let places = (1.0 - spread.log10().floor()).clamp(0.0, 6.0) as usize;
+    let number = |x: f64| match (x, plain) {
+        (0.0, _) => "0".to_owned(),
+        (x, true) => format!("{x:+.places$}"),
+        (x, false) => format!("{x:+.3e}"),
+    };
+    let spread = number(spread).trim_start_matches('+').to_owned();
+    let [low, high] = parameter.interval95.map(|x| number(factor * x));
+    let unit = match unit {
+        "" | "°" => unit.to_owned(),
+        unit => format!(" {unit}"),
+    };
+    format!(
+        "{name}{} → {}{unit}, difference {} ± {spread} (95 %: {low} to {high})",
+        number(before),
+        number(after),
+        number(difference)
+    )
+}
+
+/// "1 component", "3 components".
+fn counted(count: usize, what: &str) -> String {
+    let end = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{end}")
 }

@@ -1,5 +1,6 @@
 //! Model and logs as the commands need them: read, named, hashed, and small enough for the memory there is.
 
+use super::as_fitted::AsFitted;
 use crate::failure::{Failure, Outcome};
 use crate::names::display_names;
 use crate::progress::Progress;
@@ -8,7 +9,7 @@ use twincal::Finding;
 use twincal::robot::Robot;
 use twincal::signal::{Auto, Log};
 use twincal_io::artifact::{MODEL_MJCF, MODEL_URDF, sha256, sha256_of_file};
-use twincal_io::config::{LogSettings, ReadAs, Settings};
+use twincal_io::config::{LogSettings, Settings};
 use twincal_io::log::{LogOptions, files_of, open_log, parse_log, read_log};
 use twincal_io::model::{Model, ModelFormat, read_model};
 use twincal_io::report::FileHash;
@@ -61,6 +62,9 @@ pub(super) struct LogInput {
     given: Vec<PathBuf>,
 }
 
+/// A log with what was dropped or assumed, or why it cannot be read.
+type ReadLog = Result<(Log<'static>, Vec<Finding>), Error>;
+
 /// What becomes of long logs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Long {
@@ -85,7 +89,7 @@ impl Long {
         Self::with_filter(settings.calibration.signal.cutoff_hz != Auto::Value(0.0))
     }
 
-    fn read(
+    pub(super) fn read(
         self,
         path: &Path,
         robot: &Robot,
@@ -110,11 +114,22 @@ impl LogInput {
         long: Long,
         progress: &Progress,
     ) -> Outcome<Self> {
+        let read = |path: &Path| long.read(path, robot, &settings.options(path));
+        Self::read_each(paths, robot, progress, &read)
+    }
+
+    /// Reads logs, each as `read_one` does.
+    fn read_each(
+        paths: &[PathBuf],
+        robot: &Robot,
+        progress: &Progress,
+        read_one: &(dyn Fn(&Path) -> ReadLog + Sync),
+    ) -> Outcome<Self> {
         let mut samples = 0;
         let mut input = Self::new(paths.to_vec());
         for (path, name) in paths.iter().zip(display_names(paths)) {
             progress.step(&format!("reading {}", path.to_string_lossy()));
-            let read = || long.read(path, robot, &settings.options(path));
+            let read = || read_one(path);
             let (log, checksum) = if path.is_file() || path.is_dir() {
                 let (log, checksum) = rayon::join(read, || sha256_of_log(path));
                 (log?, checksum)
@@ -139,34 +154,19 @@ impl LogInput {
         Ok(input)
     }
 
-    /// Reads logs as a twin sees them, their torque as that of its fit where the config says nothing of it.
+    /// Reads logs as a twin sees them: columns, factors and torque as those of its fit where the config says nothing of them.
     pub(super) fn for_twin(
         paths: &[PathBuf],
         stored: &StoredTwin,
-        mut settings: LogSettings,
+        settings: LogSettings,
         progress: &Progress,
     ) -> Outcome<Self> {
-        let read_as = stored.read_as.as_ref();
-        let factors = read_as.and_then(|read_as| read_as.fill_in_factors(&mut settings));
-        let torque = read_as.and_then(|read_as| read_as.fill_in(&mut settings, paths));
+        let (as_fitted, findings) = AsFitted::new(stored, settings, paths);
         let twin = &stored.calibration.twin;
         let long = Long::with_filter(!twin.pipeline.is_off());
-        let read = Self::read(paths, &twin.robot, &settings, long, progress);
-        let mut input =
-            read.map_err(|failure| match (failure, read_as.and_then(ReadAs::hint)) {
-                (
-                    Failure::Error(Error::Content {
-                        place,
-                        problem,
-                        remedy,
-                    }),
-                    Some(hint),
-                ) => Error::content(place, problem, format!("{remedy}; {hint}")).into(),
-                (failure, _) => failure,
-            })?;
-        input
-            .findings
-            .splice(0..0, factors.into_iter().chain(torque));
+        let read = |path: &Path| as_fitted.read(path, long);
+        let mut input = Self::read_each(paths, &twin.robot, progress, &read)?;
+        input.findings.splice(0..0, findings);
         Ok(input)
     }
 

@@ -1,5 +1,6 @@
 //! The commands, one file each, and what they share.
 
+mod as_fitted;
 mod calibration;
 mod check;
 mod checkup;

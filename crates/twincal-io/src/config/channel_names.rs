@@ -54,6 +54,30 @@ impl FromIterator<(String, String)> for ChannelNames {
     }
 }
 
+impl ColumnsTable {
+    /// The keys that name columns joint by joint.
+    pub fn channels(&self) -> [(&'static str, &ChannelNames); 5] {
+        [
+            ("q", &self.q),
+            ("qd", &self.qd),
+            ("qdd", &self.qdd),
+            ("tau", &self.tau),
+            ("temperature", &self.temperature),
+        ]
+    }
+
+    /// Likewise, to be changed.
+    pub(super) fn channels_mut(&mut self) -> [(&'static str, &mut ChannelNames); 5] {
+        [
+            ("q", &mut self.q),
+            ("qd", &mut self.qd),
+            ("qdd", &mut self.qdd),
+            ("tau", &mut self.tau),
+            ("temperature", &mut self.temperature),
+        ]
+    }
+}
+
 /// Ticks of a clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

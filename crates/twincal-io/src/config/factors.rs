@@ -1,42 +1,9 @@
 //! `[columns] factor`: what logged numbers are multiplied with, where they have another unit or sign than the model.
 
+use super::{Config, PerJoint};
+use crate::error::Result;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-
-/// The factor of one channel.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(
-    untagged,
-    expecting = "expected a number, or numbers by joint such as { elbow = -1.0 }"
-)]
-pub enum Factor {
-    /// Of all joints.
-    All(f64),
-    /// By joint name; 1 for others.
-    ByJoint(BTreeMap<String, f64>),
-}
-
-impl Default for Factor {
-    fn default() -> Self {
-        Self::ByJoint(BTreeMap::new())
-    }
-}
-
-impl Factor {
-    /// That of a joint, if one was said.
-    pub fn of_joint(&self, joint: &str) -> Option<f64> {
-        match self {
-            Self::All(factor) => Some(*factor),
-            Self::ByJoint(factors) => factors.get(joint).copied(),
-        }
-    }
-
-    /// Whether nothing is said.
-    pub fn is_empty(&self) -> bool {
-        matches!(self, Self::ByJoint(factors) if factors.is_empty())
-    }
-}
 
 /// `[columns] factor`
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
@@ -47,22 +14,22 @@ impl Factor {
 #[schemars(deny_unknown_fields)]
 pub struct FactorTable {
     /// Of positions: one number, or { joint = number }. 0.017453292519943295 makes radians of degrees, -1 turns the sign.
-    #[serde(skip_serializing_if = "Factor::is_empty")]
-    pub q: Factor,
+    #[serde(skip_serializing_if = "PerJoint::is_empty")]
+    pub q: PerJoint,
     /// Of velocities.
-    #[serde(skip_serializing_if = "Factor::is_empty")]
-    pub qd: Factor,
+    #[serde(skip_serializing_if = "PerJoint::is_empty")]
+    pub qd: PerJoint,
     /// Of accelerations.
-    #[serde(skip_serializing_if = "Factor::is_empty")]
-    pub qdd: Factor,
+    #[serde(skip_serializing_if = "PerJoint::is_empty")]
+    pub qdd: PerJoint,
     /// Of torques, before gear_ratio and drive_constant.
-    #[serde(skip_serializing_if = "Factor::is_empty")]
-    pub tau: Factor,
+    #[serde(skip_serializing_if = "PerJoint::is_empty")]
+    pub tau: PerJoint,
 }
 
 impl FactorTable {
     /// The channels' keys and factors.
-    pub fn channels(&self) -> [(&'static str, &Factor); 4] {
+    pub fn channels(&self) -> [(&'static str, &PerJoint); 4] {
         [
             ("q", &self.q),
             ("qd", &self.qd),
@@ -71,8 +38,49 @@ impl FactorTable {
         ]
     }
 
+    /// Likewise, to be changed.
+    pub(super) fn channels_mut(&mut self) -> [(&'static str, &mut PerJoint); 4] {
+        [
+            ("q", &mut self.q),
+            ("qd", &mut self.qd),
+            ("qdd", &mut self.qdd),
+            ("tau", &mut self.tau),
+        ]
+    }
+
     /// Whether nothing is said.
     pub fn is_empty(&self) -> bool {
         self.channels().iter().all(|(_, factor)| factor.is_empty())
+    }
+}
+
+impl Config {
+    /// Refuses factors of `[columns] factor` that leave nothing of what was logged.
+    ///
+    /// # Errors
+    /// [`crate::Error::Content`] at the number's place in the file.
+    pub(super) fn check_factors(&self) -> Result<()> {
+        for (channel, factor) in self.file.columns.factor.channels() {
+            for (joint, number) in factor.numbers() {
+                if number.is_finite() && number != 0.0 {
+                    continue;
+                }
+                let (key, whose) = match joint {
+                    Some(joint) => (
+                        format!("columns.factor.{channel}.{joint}"),
+                        format!("joint `{joint}`"),
+                    ),
+                    None => (format!("columns.factor.{channel}"), "all joints".into()),
+                };
+                return Err(self.out_of_range(
+                    &key,
+                    format!(
+                        "the factor of {whose} is {number}, which leaves nothing of what was logged"
+                    ),
+                    "give what a logged number is multiplied with, such as -1.0; without the key it stays as it is logged",
+                ));
+            }
+        }
+        Ok(())
     }
 }

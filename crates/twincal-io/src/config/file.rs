@@ -1,6 +1,6 @@
 //! The keys of `twincal.toml`, as written: the one source of their names, their documentation and the JSON Schema.
 
-use super::ColumnsTable;
+use super::{ColumnsTable, PerJoint};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -362,23 +362,13 @@ pub struct SignalTable {
     /// How much later than the motion torque was logged, s: torque is moved back by it. One number for all joints, or
     /// { joint = seconds }; negative where torque comes first. 0 says that there is none: without this key a lag of more than one
     /// sample counts as degraded data.
-    pub lag: Option<LagKey>,
+    pub lag: Option<PerJoint>,
     /// Default true: where what is left of the torque is noise of one memory (an AR(1)) on every joint, the fit goes on up to four
     /// times the automatic cut-off with `noise.model = "ar1"`; a note says so. false: never. Nor does it where `cutoff_hz`, `rate_hz` or
     /// `noise.model` is stated, rows are weighed (`noise.robust`, `varies_with_…`) or the noise is sampled.
     pub wider_band: Option<bool>,
     /// Default "logged". "position": logged velocities are not used but derived from position.
     pub velocity: Option<VelocityWord>,
-}
-
-/// A lag.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "expected seconds or { joint = seconds }")]
-pub enum LagKey {
-    /// Of all joints, s.
-    All(f64),
-    /// By joint name, s.
-    Joints(BTreeMap<String, f64>),
 }
 
 /// Where velocity comes from.

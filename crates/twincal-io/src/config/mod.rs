@@ -8,22 +8,26 @@ mod channel_names;
 mod factors;
 mod families;
 mod file;
+mod kept_columns;
 mod log_form;
 mod log_forms;
+mod per_joint;
 mod proposal;
 mod read_as;
 mod settings;
 mod unknown_keys;
 
 pub use channel_names::{ChannelNames, ColumnsTable, TimeUnit};
-pub use factors::{Factor, FactorTable};
+pub use factors::FactorTable;
 pub use file::{
     Allow, AutoWord, BaseTable, CheckTable, ConfigFile, FamilyWord, Friction, InclusionTable,
-    InferenceTable, LagKey, LibraryTable, LogEntry, LogTable, MethodWord, ModelTable, NoisePrior,
+    InferenceTable, LibraryTable, LogEntry, LogTable, MethodWord, ModelTable, NoisePrior,
     NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PresetWord, PriorTable,
     SignalTable, Slab, Topics, TorqueWord, UncertaintyWord, UnknownWord, VelocityWord,
 };
+pub use kept_columns::Attempt;
 pub use log_form::LogForm;
+pub use per_joint::PerJoint;
 pub use proposal::{Proposal, key};
 pub use read_as::ReadAs;
 pub use settings::{Gates, LogSettings, OneLog, Settings};
@@ -248,6 +252,10 @@ fn key_of(table: &DeTable<'_>, offset: usize, path: &str) -> Option<String> {
 
 /// Byte offset of the value of a dotted key.
 fn offset_of(table: &DeTable<'_>, key: &str) -> Option<usize> {
+    // A name may have dots of its own.
+    if let Some((_, value)) = table.iter().find(|(name, _)| name.get_ref() == key) {
+        return Some(value.span().start);
+    }
     let (first, rest) = key
         .split_once('.')
         .map_or((key, None), |(first, rest)| (first, Some(rest)));

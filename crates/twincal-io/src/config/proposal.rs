@@ -1,6 +1,6 @@
 //! A `twincal.toml` to begin with: only the keys that a model and its logs ask for, each with the numbers behind it.
 
-use super::{ChannelNames, ColumnsTable, Factor, LogEntry};
+use super::{ChannelNames, ColumnsTable, LogEntry, PerJoint};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -133,9 +133,9 @@ impl Proposal {
         }
         for (name, factor) in self.columns.factor.channels() {
             let value = match factor {
-                Factor::All(number) => format!("{number:?}"),
-                Factor::ByJoint(factors) if factors.is_empty() => continue,
-                Factor::ByJoint(factors) => {
+                PerJoint::All(number) => format!("{number:?}"),
+                PerJoint::ByJoint(factors) if factors.is_empty() => continue,
+                PerJoint::ByJoint(factors) => {
                     let own = factors.iter().map(|(j, x)| format!("{} = {x:?}", key(j)));
                     format!("{{ {} }}", own.collect::<Vec<_>>().join(", "))
                 }
@@ -198,7 +198,7 @@ pub fn key(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Config, FactorTable, LagKey, TimeUnit, TorqueWord, VelocityWord};
+    use super::super::{Config, FactorTable, TimeUnit, TorqueWord, VelocityWord};
     use super::*;
 
     #[test]
@@ -228,8 +228,8 @@ mod tests {
                 q: ChannelNames::from_iter([(odd.into(), "angle\n1".into())]),
                 tau: ChannelNames::All("/arm \"1\":effort[*]".into()),
                 factor: FactorTable {
-                    q: Factor::All(0.017_453_292_519_943_295),
-                    tau: Factor::ByJoint([(odd.into(), -1.0), ("b".into(), 0.001)].into()),
+                    q: PerJoint::All(0.017_453_292_519_943_295),
+                    tau: PerJoint::ByJoint([(odd.into(), -1.0), ("b".into(), 0.001)].into()),
                     ..FactorTable::default()
                 },
                 ..ColumnsTable::default()
@@ -251,7 +251,7 @@ mod tests {
         let file = &config.file;
         assert_eq!(file.model.locked, proposal.locked);
         assert_eq!(file.columns, proposal.columns);
-        assert_eq!(file.signal.lag, Some(LagKey::All(0.008)));
+        assert_eq!(file.signal.lag, Some(PerJoint::All(0.008)));
         assert_eq!(file.signal.velocity, Some(VelocityWord::Position));
         assert_eq!(file.log.entries, proposal.logs);
     }

@@ -13,7 +13,10 @@ pub struct ReadAs {
     torque: Option<TorqueOptions>,
     /// What logged numbers were multiplied with.
     #[serde(default, skip_serializing_if = "FactorTable::is_empty")]
-    factor: FactorTable,
+    pub(super) factor: FactorTable,
+    /// The other keys of `[columns]`; nothing in twins of earlier versions.
+    #[serde(default)]
+    pub(super) columns: ColumnsTable,
     /// Other keys that said how to read any of them.
     keys: Vec<String>,
 }
@@ -29,7 +32,6 @@ impl ReadAs {
                 ("[log] preset", options.preset.is_some()),
                 ("[log] topic", !options.topics.is_empty()),
                 ("[log] rate_hz", options.rate_hz.is_some()),
-                ("[columns]", options.columns != ColumnsTable::default()),
             ];
             for (key, _) in said.into_iter().filter(|(_, said)| *said) {
                 if !keys.iter().any(|known| known == key) {
@@ -42,19 +44,12 @@ impl ReadAs {
         Self {
             torque: torques.into_iter().next().filter(|_| alike),
             factor: settings.columns.factor.clone(),
+            columns: ColumnsTable {
+                factor: FactorTable::default(),
+                ..settings.columns.clone()
+            },
             keys,
         }
-    }
-
-    /// Has the numbers of new logs multiplied as those of the fit where the settings say nothing of it; this is told as well.
-    pub fn fill_in_factors(&self, settings: &mut LogSettings) -> Option<Finding> {
-        if self.factor.is_empty() || settings.columns != ColumnsTable::default() {
-            return None;
-        }
-        settings.columns.factor = self.factor.clone();
-        let message = "the log's numbers are multiplied with the [columns] factor that the logs of the fit had; [columns] of a --config says otherwise";
-        let code = "factor_as_fitted";
-        Some(Finding::new(Severity::Warning, code, "", message, 0))
     }
 
     /// Has the torque of new logs taken as in the fit where the settings say nothing of it, for all or in a log's own entry. The answer is

@@ -1,7 +1,7 @@
 //! From keys to settings: defaults filled in, ranges checked.
 
 use super::{
-    Allow, Config, LagKey, LogForm, MethodWord, NoisePrior, NoiseWord, NumberOrAuto, PayloadKey,
+    Allow, Config, LogForm, MethodWord, NoisePrior, NoiseWord, NumberOrAuto, PayloadKey, PerJoint,
     Slab, UncertaintyWord, VelocityWord,
 };
 use crate::error::Result;
@@ -197,6 +197,7 @@ impl Config {
                 "a positive number of Hz",
             )?;
         }
+        self.check_factors()?;
         let entries = self.entries()?;
         let heldout = table.heldout.clone().unwrap_or_else(|| {
             let heldout = entries.iter().filter(|entry| entry.heldout);
@@ -329,8 +330,8 @@ impl Config {
         let number = |key: &str, lag: f64| self.number(key, lag, |lag| lag.abs() <= 1.0, range);
         Ok(match &self.file.signal.lag {
             None => Lag::Unsaid,
-            Some(LagKey::All(lag)) => Lag::All(number("signal.lag", *lag)?),
-            Some(LagKey::Joints(joints)) => {
+            Some(PerJoint::All(lag)) => Lag::All(number("signal.lag", *lag)?),
+            Some(PerJoint::ByJoint(joints)) => {
                 for (joint, lag) in joints {
                     number(&format!("signal.lag.{joint}"), *lag)?;
                 }

@@ -529,3 +529,34 @@ fn seeds_end_where_whole_numbers_of_toml_end() {
         "{error}"
     );
 }
+
+/// A factor that leaves nothing is refused where it stands, whatever the joint is called.
+#[test]
+fn a_factor_that_leaves_nothing_is_refused_with_place_and_joint() {
+    for (text, place, joint) in [
+        ("[columns.factor]\nq = 0.0\n", "c.toml:2:5", "all joints"),
+        (
+            "[columns.factor]\nq = -1.0\ntau = { a = 2.0, elbow = nan }\n",
+            "c.toml:3:26",
+            "joint `elbow`",
+        ),
+        (
+            "[columns]\nfactor.qd = { \"left.elbow\" = inf }\n",
+            "c.toml:2:30",
+            "joint `left.elbow`",
+        ),
+        (
+            "[columns.factor.qdd]\nelbow = -0.0\n",
+            "c.toml:2:9",
+            "joint `elbow`",
+        ),
+    ] {
+        let config = Config::parse("c.toml", text).unwrap();
+        let error = config.settings().unwrap_err().to_string();
+        for word in [place, joint, "columns.factor.", "such as -1.0"] {
+            assert!(error.contains(word), "{word} is missing in {error}");
+        }
+    }
+    let good = "[columns.factor]\nq = -1.0\ntau = { elbow = 0.001 }\n";
+    Config::parse("c.toml", good).unwrap().settings().unwrap();
+}

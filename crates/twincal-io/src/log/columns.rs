@@ -16,6 +16,7 @@ mod configured;
 use super::{LogOptions, MAX_COLUMNS, preset};
 use crate::error::{Error, Place, Result};
 use configured::by_joint_name;
+pub(crate) use configured::has_columns;
 pub(super) use configured::refuse_unknown_joints;
 use std::collections::BTreeMap;
 use twincal::robot::{Robot, did_you_mean};

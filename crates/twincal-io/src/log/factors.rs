@@ -1,7 +1,7 @@
 //! Logged numbers in the model's units and signs: `[columns] factor`.
 
 use super::LogOptions;
-use crate::config::Factor;
+use crate::config::PerJoint;
 use crate::error::Result;
 use twincal::robot::{Robot, did_you_mean};
 use twincal::signal::Recording;
@@ -20,8 +20,8 @@ pub(super) fn check(robot: &Robot, options: &LogOptions) -> Result<()> {
             remedy,
         };
         let numbers: Vec<f64> = match factor {
-            Factor::All(number) => vec![*number],
-            Factor::ByJoint(factors) => {
+            PerJoint::All(number) => vec![*number],
+            PerJoint::ByJoint(factors) => {
                 if let Some(joint) = factors
                     .keys()
                     .find(|joint| !names.contains(&joint.as_str()))

@@ -32,6 +32,7 @@ mod torque;
 
 pub(crate) use assemble::assemble;
 pub(crate) use cells::Cells;
+pub(crate) use columns::has_columns;
 pub use columns::{Channel, Selection, joints_without_column, match_columns};
 pub use header::read_header;
 pub use preset::Preset;

@@ -8,7 +8,7 @@ mod logs;
 mod write;
 
 use super::*;
-use crate::config::Factor;
+use crate::config::PerJoint;
 use crate::table::{ColumnKind, TableFormat, TableWriter, Values};
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
@@ -129,8 +129,8 @@ fn csv_comes_in_chapters() {
 fn numbers_are_multiplied_as_told() {
     let mut options = LogOptions::default();
     let factor = &mut options.columns.factor;
-    factor.q = Factor::All(0.5);
-    factor.tau = Factor::ByJoint([("elbow".to_owned(), -2.0)].into());
+    factor.q = PerJoint::All(0.5);
+    factor.tau = PerJoint::ByJoint([("elbow".to_owned(), -2.0)].into());
     let text = csv();
     let long = compare(text.as_bytes(), "csv", &options);
     let late = long.chapters() - 1;
@@ -166,7 +166,7 @@ fn numbers_are_multiplied_as_told() {
         ("elbow", f64::INFINITY, "is inf"),
         ("elbw", 2.0, "`elbw`"),
     ] {
-        options.columns.factor.qd = Factor::ByJoint([(joint.to_owned(), number)].into());
+        options.columns.factor.qd = PerJoint::ByJoint([(joint.to_owned(), number)].into());
         let error = read_log(&path, &robot(), &options).unwrap_err().to_string();
         assert!(
             error.contains("columns.factor.qd") && error.contains(words),

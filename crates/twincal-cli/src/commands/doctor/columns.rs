@@ -5,7 +5,7 @@ use super::units::Degrees;
 use std::collections::BTreeMap;
 use twincal::Finding;
 use twincal::self_check::JointCheck;
-use twincal_io::config::{ChannelNames, ColumnsTable, Factor, Settings, key};
+use twincal_io::config::{ChannelNames, ColumnsTable, PerJoint, Settings, key};
 
 /// `[columns]` of a proposed config.
 pub(super) struct Columns {
@@ -135,19 +135,19 @@ fn is_moved(check: &JointCheck) -> bool {
 }
 
 /// A factor of some joints.
-fn of_joints(examination: &Examination, joints: &[usize], number: f64) -> Factor {
+fn of_joints(examination: &Examination, joints: &[usize], number: f64) -> PerJoint {
     let names = examination.robot.robot.joint_names();
     if joints.len() == names.len() {
-        return Factor::All(number);
+        return PerJoint::All(number);
     }
     let named = joints
         .iter()
         .map(|&joint| (names[joint].to_owned(), number));
-    Factor::ByJoint(named.collect())
+    PerJoint::ByJoint(named.collect())
 }
 
 /// Another factor on one joint.
-fn multiply(factor: &mut Factor, examination: &Examination, joint: &str, by: f64) {
+fn multiply(factor: &mut PerJoint, examination: &Examination, joint: &str, by: f64) {
     let names = examination.robot.robot.joint_names();
     let said = names
         .iter()
@@ -156,8 +156,8 @@ fn multiply(factor: &mut Factor, examination: &Examination, joint: &str, by: f64
     *by_joint.entry(joint.to_owned()).or_insert(1.0) *= by;
     let all_alike = by_joint.len() == names.len() && by_joint.values().all(|own| *own == by);
     *factor = match all_alike {
-        true => Factor::All(by),
-        false => Factor::ByJoint(by_joint),
+        true => PerJoint::All(by),
+        false => PerJoint::ByJoint(by_joint),
     };
 }
 

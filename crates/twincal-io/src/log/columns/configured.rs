@@ -38,6 +38,18 @@ pub(in super::super) fn refuse_unknown_joints(
     Ok(())
 }
 
+/// Whether a table has the columns that `[columns]` names for one channel.
+pub(crate) fn has_columns(header: &[String], names: &ChannelNames, joints: &[&str]) -> bool {
+    let has = |column: &str| header.iter().any(|own| own == column);
+    match names {
+        ChannelNames::ByJoint(table) => table.values().all(|column| has(column)),
+        ChannelNames::All(pattern) => [0, 1].into_iter().any(|first| {
+            let mut numbers = first..first + joints.len();
+            numbers.all(|number| has(&pattern.replacen('*', &number.to_string(), 1)))
+        }),
+    }
+}
+
 /// Columns by joint name; one name for all joints has a `*` where numbers from 0 or from 1 stand.
 pub(super) fn by_joint_name<'a>(
     header: &Header<'_>,
