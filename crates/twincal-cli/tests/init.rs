@@ -131,7 +131,7 @@ fn init_mends_units_signs_and_order_and_the_twin_reads_new_logs_likewise() {
         (position, "[columns.factor]\nq = { shoulder = -1.0 }\n"),
         (velocity, "[columns.factor]\nqd = { shoulder = -1.0 }\n"),
         (thousandths, "[columns.factor]\ntau = 0.001\n"),
-        (turned, "tau = { elbow = -1.0, shoulder = -1.0 }"),
+        (turned, "tau = -1.0\n"),
         (
             exchanged,
             "[columns.tau]\nelbow = \"tau1\"\nshoulder = \"tau2\"",

@@ -25,13 +25,13 @@ const IN: f64 = 0.8;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Became {
-    /// Out before, in after.
+    /// Out before, in after, and a number that differs for certain.
     New,
-    /// In before, out after.
+    /// In before, out after, and a number that differs for certain.
     Gone,
-    /// Likelier than before, where one of the two is undecided.
+    /// Likelier than before, where one of the two is undecided or no number differs for certain.
     PerhapsNew,
-    /// Less likely than before, where one of the two is undecided.
+    /// Less likely than before, where one of the two is undecided or no number differs for certain.
     PerhapsGone,
     /// In on both sides, or undecided on both, with another number.
     Changed,
@@ -44,10 +44,14 @@ impl Became {
         let [before, after] = pip.map(|pip| pip.unwrap_or(0.0));
         let (out, inside) = (|pip: f64| pip < WORTH_COMPARING, |pip: f64| pip >= IN);
         let undecided = |pip| !out(pip) && !inside(pip);
-        if out(before) && inside(after) {
+        if out(before) && inside(after) && changed {
             Self::New
-        } else if inside(before) && out(after) {
+        } else if inside(before) && out(after) && changed {
             Self::Gone
+        } else if out(before) && inside(after) {
+            Self::PerhapsNew
+        } else if inside(before) && out(after) {
+            Self::PerhapsGone
         } else if undecided(before) != undecided(after) {
             if after > before {
                 Self::PerhapsNew
@@ -439,7 +443,9 @@ mod tests {
     fn what_became_of_a_component_follows_from_both_probabilities() {
         for (before, after, changed, became) in [
             (Some(0.01), Some(0.99), true, Became::New),
-            (None, Some(0.9), false, Became::New),
+            (None, Some(0.9), true, Became::New),
+            (None, Some(0.9), false, Became::PerhapsNew),
+            (Some(0.99), Some(0.01), false, Became::PerhapsGone),
             (Some(0.99), None, true, Became::Gone),
             (Some(0.5), Some(0.99), true, Became::PerhapsNew),
             (Some(0.01), Some(0.6), false, Became::PerhapsNew),

@@ -141,7 +141,7 @@ impl Job<'_> {
     }
 }
 
-fn stage_words(stage: Stage) -> String {
+pub(super) fn stage_words(stage: Stage) -> String {
     match stage {
         Stage::Rows => "filtering the logs".into(),
         Stage::Inference => "weighing every candidate".into(),

@@ -59,11 +59,7 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     require_strict(settings.log.strict, &found)?;
     // A gate that the config does not give stays as the twin was fitted with.
     let gates = config.gates_over(stored.gates)?;
-    let gates = judge(
-        &validation.filtered,
-        &stored.calibration.validation.filtered,
-        &gates,
-    );
+    let gates = judge(&validation, &stored.calibration.validation, &gates);
     let passed = gates.iter().all(|gate| gate.passed);
     let code = if passed { code_of(&found) } else { GATE };
     if settings.json {
@@ -111,10 +107,17 @@ fn score(twin: &Twin, logs: &LogInput, findings: &mut Vec<Finding>) -> Result<Va
     Ok(scores.finish(Split::HeldoutLogs))
 }
 
-/// Two gates per joint.
-fn judge(scores: &Scores, stored: &Scores, gates: &Gates) -> Vec<Gate> {
+/// Two gates per joint: on rows in which it moves, where there are some here and in the twin's own scores. What holds a joint at rest no
+/// friction tells, and how long it rests is another thing in every log.
+fn judge(scores: &Validation, stored: &Validation, gates: &Gates) -> Vec<Gate> {
     let mut judged = Vec::new();
-    for (joint, stored) in scores.joints.iter().zip(&stored.joints) {
+    let all = scores.filtered.joints.iter().zip(&stored.filtered.joints);
+    let moving = scores.moving.joints.iter().zip(&stored.moving.joints);
+    for (all, moving) in all.zip(moving) {
+        let ((joint, stored), rows) = match moving {
+            (joint, stored) if joint.rows > 0 && stored.rows > 0 => (moving, "moving rows"),
+            _ => (all, "rows"),
+        };
         let limit = gates.rmse_ratio * stored.rmse_calibrated;
         let (rmse, name) = (joint.rmse_calibrated, &joint.joint);
         judged.push(Gate {
@@ -125,7 +128,7 @@ fn judge(scores: &Scores, stored: &Scores, gates: &Gates) -> Vec<Gate> {
             value: rmse,
             limit: [None, Some(limit)],
             words: format!(
-                "joint `{name}`: RMSE {} is {} the gate {} ({} × {} of the twin)",
+                "joint `{name}`: RMSE {} of {rows} is {} the gate {} ({} × {} of the twin)",
                 significant(rmse, 4),
                 if rmse <= limit { "within" } else { "above" },
                 significant(limit, 4),
@@ -146,7 +149,7 @@ fn judge(scores: &Scores, stored: &Scores, gates: &Gates) -> Vec<Gate> {
             value: joint.coverage95,
             limit: [Some(low), Some(high)],
             words: format!(
-                "joint `{name}`: the 95 % interval holds {} of the rows, the gate is {} to {}{cautious}",
+                "joint `{name}`: the 95 % interval holds {} of the {rows}, the gate is {} to {}{cautious}",
                 percent(joint.coverage95),
                 percent(low),
                 percent(high)
@@ -161,7 +164,7 @@ mod tests {
     use super::*;
     use twincal::validate::JointScore;
 
-    fn scores(rmse: f64, coverage: f64) -> Scores {
+    fn scores(rmse: f64, coverage: f64) -> Validation {
         let joint = JointScore {
             joint: "elbow".into(),
             rows: 10,
@@ -175,14 +178,32 @@ mod tests {
             noise_sd: 0.1,
             epistemic_share: 0.01,
         };
-        Scores {
+        let moving = Scores {
             rmse_nominal: 1.0,
             rmse_calibrated: rmse,
             coverage95: coverage,
             interval_score95: 0.5,
             epistemic_share: 0.01,
             joints: vec![joint],
+        };
+        // At rest it is far off, which no gate is for.
+        let mut filtered = moving.clone();
+        filtered.joints[0].rmse_calibrated = 9.0;
+        filtered.joints[0].coverage95 = 0.1;
+        Validation {
+            filtered,
+            moving,
+            ..HeldOut::new(vec!["elbow"]).finish(Split::HeldoutLogs)
         }
+    }
+
+    #[test]
+    fn a_joint_that_does_not_move_is_judged_by_all_of_its_rows() {
+        let mut still = scores(0.1, 0.95);
+        still.moving.joints[0].rows = 0;
+        let gates = Gates::default();
+        let judged = judge(&still, &scores(0.1, 0.95), &gates);
+        assert!(judged.iter().all(|gate| !gate.passed));
     }
 
     #[test]
@@ -204,11 +225,11 @@ mod tests {
         };
         assert_eq!(
             words(0.1199),
-            "joint `elbow`: RMSE 0.1199 is within the gate 0.1200 (1.2 × 0.1000 of the twin)"
+            "joint `elbow`: RMSE 0.1199 of moving rows is within the gate 0.1200 (1.2 × 0.1000 of the twin)"
         );
         assert_eq!(
             words(0.1201),
-            "joint `elbow`: RMSE 0.1201 is above the gate 0.1200 (1.2 × 0.1000 of the twin)"
+            "joint `elbow`: RMSE 0.1201 of moving rows is above the gate 0.1200 (1.2 × 0.1000 of the twin)"
         );
         assert_eq!(passed(0.1199, 0.95), [true, true]);
         assert_eq!(passed(0.1201, 0.95), [false, true]);

@@ -93,7 +93,7 @@ impl Default for Gates {
     fn default() -> Self {
         Self {
             rmse_ratio: 1.2,
-            coverage: [0.90, 0.99],
+            coverage: [0.90, 1.0],
         }
     }
 }

@@ -127,6 +127,9 @@ pub(super) fn repeats(calibration: &Calibration) -> Table {
             Some(z) if repeat.first_pip.max(repeat.second_pip) < HELD => {
                 (number(z.abs(), 2), "found in neither half alone")
             }
+            Some(z) if repeat.first_pip.min(repeat.second_pip) < HELD => {
+                (number(z.abs(), 2), "found in one half alone")
+            }
             Some(z) => (number(z.abs(), 2), "repeats"),
         };
         table.rows.push(vec![

@@ -9,7 +9,7 @@ use twincal::posterior::Method;
 use twincal::validate::{JointScore, Split, Validation, WORSE};
 use twincal::{Finding, Severity};
 
-/// A 95 % interval is honest if it holds this share of the held-out rows (the range that `check` accepts).
+/// A 95 % interval is honest if it holds this share of the held-out rows.
 const COVERAGE: (f64, f64) = (0.90, 0.99);
 /// What an interval promises to hold.
 const LEVEL: f64 = 0.95;
@@ -77,6 +77,11 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
             Grade::Bad,
             "Not yet: log and model do not seem to speak of the same robot.",
         )
+    } else if no_measurement(calibration) {
+        (
+            Grade::Bad,
+            "Not yet: torque that never changes while joints move is no measurement.",
+        )
     } else if independent_rows(calibration, joints) < FEW {
         (
             Grade::Care,
@@ -123,6 +128,12 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         grounds: grounds(calibration, joints, found),
         limits,
     }
+}
+
+/// Whether a log has no torque that changes.
+fn no_measurement(calibration: &Calibration) -> bool {
+    let mut findings = calibration.findings.iter();
+    findings.any(|f| f.code == "constant_torque" && f.severity == Severity::Degraded)
 }
 
 fn grounds(calibration: &Calibration, joints: &[Joint<'_>], found: usize) -> Vec<String> {

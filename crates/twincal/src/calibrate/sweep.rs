@@ -12,6 +12,7 @@ use crate::posterior::Posterior;
 use crate::signal::{Pipeline, ReadyLog};
 use crate::term::Library;
 use crate::twin::Twin;
+use crate::words::significant;
 use rayon::prelude::*;
 
 /// Factors on the cut-off.
@@ -87,7 +88,7 @@ pub(super) fn findings(
 ) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (k, &index) in library.columns().iter().enumerate() {
-        if posterior.inclusion[k] < 0.5 {
+        if posterior.inclusion[k] < 0.5 || posterior.sd[k] == 0.0 {
             continue;
         }
         let largest = sweep
@@ -99,16 +100,17 @@ pub(super) fn findings(
             .filter(|p| (p.mean[k] - posterior.mean[k]).abs() > posterior.sd[k]);
         if let Some(point) = largest {
             let name = &library.terms()[index].name;
-            let moved =
-                (point.mean[k] - posterior.mean[k]).abs() / posterior.sd[k].max(f64::MIN_POSITIVE);
+            let moved = (point.mean[k] - posterior.mean[k]).abs() / posterior.sd[k];
             let finding = Finding::new(
                 Severity::Warning,
                 "depends_on_cutoff",
                 name.clone(),
                 format!(
-                    "`{name}` moves by {moved:.1} sd when the cut-off becomes {:.3} Hz (mean over all models, in or out: from {:.4} \
-                     to {:.4}): do not read its interval as the whole uncertainty",
-                    point.cutoff_hz, posterior.mean[k], point.mean[k]
+                    "`{name}` moves by {moved:.1} sd when the cut-off becomes {} Hz (mean over all models, in or out: from {} to {}): \
+                     do not read its interval as the whole uncertainty",
+                    significant(point.cutoff_hz, 3),
+                    significant(posterior.mean[k], 3),
+                    significant(point.mean[k], 3)
                 ),
                 0,
             );

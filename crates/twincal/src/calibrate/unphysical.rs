@@ -11,7 +11,7 @@ const DRAWS: usize = 1000;
 /// Random stream of those draws.
 const STREAM: u64 = (1 << 32) + 2;
 /// Share of consistent draws below which the found inertia contradicts every rigid body; above, it is uncertain.
-const CONTRADICTS: f64 = 0.01;
+const CONTRADICTS: f64 = 0.05;
 /// Share below which it is worth telling.
 const WORTH_TELLING: f64 = 0.5;
 /// Behind the words of a component that contradicts every rigid body.

@@ -26,6 +26,8 @@ use propagation::propagate;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
+/// Probability of what is not listed below which its moments are not told from the sampler's error.
+const FEW: f64 = 0.01;
 /// A bound this many standard deviations below the mean does not act: its mass is 1 − 6e-16.
 const FAR: f64 = 8.0;
 
@@ -94,27 +96,50 @@ pub(super) fn apply(
     let scale = new / old;
     let total = listed.mass() + scale * (1.0 - all).max(0.0);
     let size = standard.size();
+    // About the mean without bounds: what a sampler's average and its list differ by must not be measured by how far that is from 0.
+    let about = averages.shift.clone();
     let mut sums = Averages {
         inclusion: averages.inclusion.clone(),
         mcse: averages.mcse.clone(),
-        shift: averages.shift.clone(),
+        shift: vec![0.0; size],
         moment: averages.moment.clone(),
         misfit: averages.misfit,
     };
     for d in 0..size {
         sums.inclusion[d] *= scale;
-        sums.shift[d] *= scale;
-        sums.moment[d] *= scale;
+        sums.moment[d] = scale * (sums.moment[d] - about[d] * about[d]);
     }
     sums.misfit *= scale;
+    let mut own = Averages {
+        inclusion: vec![0.0; size],
+        mcse: Vec::new(),
+        shift: vec![0.0; size],
+        moment: vec![0.0; size],
+        misfit: 0.0,
+    };
     for ((model, old), positions) in listed.models.iter().zip(&before).zip(&listed.positions) {
-        count(standard, &mut sums, old, positions, -scale);
-        count(standard, &mut sums, model, positions, 1.0);
+        count(standard, &about, &mut sums, (old, -scale), positions);
+        count(standard, &about, &mut own, (model, 1.0), positions);
     }
+    // What is left is that of models that are not listed. Where they are few it is but what a sampler's averages and its list differ by: rare
+    // models of wide moments, which bounds rule out, would stand in it.
+    let few = 1.0 - all < FEW;
     for d in 0..size {
+        sums.inclusion[d] += own.inclusion[d];
+        let left = if few { 0.0 } else { 1.0 };
+        sums.shift[d] = own.shift[d] + left * sums.shift[d];
+        sums.moment[d] = own.moment[d] + left * sums.moment[d];
+    }
+    sums.misfit += own.misfit;
+    let mass = if few { listed.mass() } else { total };
+    for d in 0..size {
+        let (moved, spread) = (sums.shift[d] / mass, sums.moment[d] / mass);
+        // No less than the spread of the listed models about this mean.
+        let least = own.moment[d] - 2.0 * moved * own.shift[d] + moved * moved * listed.mass();
+        let spread = spread.max(least / mass + moved * moved);
         averages.inclusion[d] = (sums.inclusion[d] / total).clamp(0.0, 1.0);
-        averages.shift[d] = sums.shift[d] / total;
-        averages.moment[d] = sums.moment[d] / total;
+        averages.shift[d] = about[d] + moved;
+        averages.moment[d] = spread + about[d] * (2.0 * moved + about[d]);
     }
     averages.misfit = sums.misfit / total;
     let mut order: Vec<usize> = (0..listed.models.len()).collect();
@@ -198,20 +223,21 @@ pub(super) fn log_weight(problem: &Problem, standard: &Standard, model: &Model) 
     log + prior.log_model(&counts) - standard.shape * standard.misfit(model.scale).ln()
 }
 
-/// Adds `factor · weight` times the moments of a model.
+/// Adds `factor · weight` times the moments of a model; those of coefficients less their center and `about`.
 fn count(
     standard: &Standard,
+    about: &[f64],
     sums: &mut Averages,
-    model: &Model,
+    (model, factor): (&Model, f64),
     positions: &[usize],
-    factor: f64,
 ) {
     let weight = factor * model.weight;
     let noise = standard.noise_factor();
     let noise = if noise.is_finite() { noise } else { 0.0 };
     let misfit = standard.misfit(model.scale);
     sums.misfit += weight * misfit;
-    let mut delta: Vec<f64> = standard.center.iter().map(|x| -x).collect();
+    let origin = standard.center.iter().zip(about);
+    let mut delta: Vec<f64> = origin.map(|(center, about)| -center - about).collect();
     let inverse = Cholesky::from_lower(model.factor.clone(), positions.len()).inverse_diagonal();
     let mut variance = vec![0.0; delta.len()];
     for (i, &d) in positions.iter().enumerate() {

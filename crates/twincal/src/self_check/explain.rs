@@ -49,6 +49,8 @@ pub(super) struct Explained {
     /// False for a joint that is moved by the others: it has far less torque than its motion needs. A drive that only damps it
     /// looks like friction with the wrong sign.
     pub(super) driven: bool,
+    /// Sums of squares of the nominal and of the measured torque about their means.
+    pub(super) sizes: [f64; 2],
 }
 
 /// Least squares of each joint's torque on its nominal torque, velocity, sign of velocity and acceleration, with a free
@@ -130,6 +132,7 @@ fn regress(rows: impl Iterator<Item = [f64; COLUMNS + 1]>) -> Option<Explained> 
         left_without_model: without,
         gain: best.1,
         driven: scale[COLUMNS] > DRIVEN * scale[0],
+        sizes: [products[0][0], total],
     })
 }
 

@@ -11,6 +11,7 @@ mod sample;
 use crate::error::{Error, Finding, Result, Severity};
 use crate::robot::{JointKind, Robot};
 use crate::signal::{Pipeline, Trajectory};
+use crate::words::significant;
 use explain::{Explained, Reading, explain};
 use sample::Sample;
 use serde::{Deserialize, Serialize};
@@ -19,12 +20,18 @@ use std::ops::RangeInclusive;
 
 /// Torque that differs by this factor from the model's is not of the joint's side, or not in N·m.
 const OTHER_UNIT: f64 = 5.0;
+/// Torque of all joints that differs by this factor from the model's is of another unit, side or robot.
+const FAR_OFF: f64 = 30.0;
+/// Share of it that friction must leave where it is too large.
+const NEEDED_OF_ALL: f64 = 0.2;
 /// N·m per unit of a torque in N·mm.
 const THOUSANDTH: f64 = 1e-3;
 /// |ln| within which a factor may differ from 1000 and still be thousandths: a model's masses are not that wrong.
 const LIKE_A_THOUSAND: f64 = 0.4;
 /// Largest torque over the effort limit where torque is in thousandths of N·m: a drive uses between a fiftieth of its limit and all.
 const THOUSANDTHS: RangeInclusive<f64> = 20.0..=1500.0;
+/// Independent samples below which a factor is not told: a second of motion looks like one of its five columns by chance.
+const LEAST_INDEPENDENT: f64 = 90.0;
 /// Share of torque that may be left where a factor is believed.
 const CLEAR: f64 = 0.05;
 /// Share that must be left without the model: else friction alone explains the torque, and the factor says nothing.
@@ -186,6 +193,7 @@ fn scales(robot: &Robot, sample: &Sample, explained: &[Option<Explained>]) -> Ve
     let mut scales = Vec::new();
     for (joint, (name, gain)) in names.iter().zip(gains).enumerate() {
         let (problem, factor) = match gain {
+            Some(gain) if !is_thousand(gain) && sample.independent < LEAST_INDEPENDENT => continue,
             Some(gain) if gain < 1.0 / OTHER_UNIT => (
                 format!(
                     "torque is {gain:.3} of the model's: looks like gain {:.1} between this column and N·m at the joint (a current, \
@@ -216,7 +224,30 @@ fn scales(robot: &Robot, sample: &Sample, explained: &[Option<Explained>]) -> Ve
         };
         scales.push(Scale::new(Some(name), problem, factor));
     }
+    if let Some(times) = far_off(explained).filter(|_| scales.is_empty()) {
+        let size = match times > 1.0 {
+            true => format!("{} times", significant(times, 2)),
+            false => format!("1/{} of", significant(1.0 / times, 2)),
+        };
+        let problem = format!(
+            "torque of all joints together is {size} the model's: looks like another unit or side (N·mm, currents, the motor's side), or \
+             another robot"
+        );
+        scales.push(Scale::new(None, problem, None));
+    }
     scales
+}
+
+/// Size of the measured torque of all joints over that of the model's, where that is further off than [`FAR_OFF`] and no friction explains it: a
+/// slow arm without gravity may well have friction of many times its nominal torque, but no joint needs less than that.
+fn far_off(explained: &[Option<Explained>]) -> Option<f64> {
+    let told = || explained.iter().flatten();
+    let nominal: f64 = told().map(|joint| joint.sizes[0]).sum();
+    let measured: f64 = told().map(|joint| joint.sizes[1]).sum();
+    let left = told().map(|joint| joint.left_without_model * joint.sizes[1]);
+    let times = (measured / nominal).sqrt();
+    let large = times > FAR_OFF && left.sum::<f64>() > NEEDED_OF_ALL * measured;
+    (times.is_finite() && (large || times < 1.0 / FAR_OFF)).then_some(times)
 }
 
 /// Torque of another size than the model's.

@@ -13,6 +13,8 @@ const WINDOW: f64 = 0.5;
 pub(super) struct Sample {
     /// Samples.
     pub(super) len: usize,
+    /// Half periods of the cut-off in the time of the log: how many of the samples are independent at most.
+    pub(super) independent: f64,
     /// Position, velocity, acceleration, torque: `channels[k][joint][sample]`.
     pub(super) channels: [Vec<Vec<f64>>; 4],
     /// Whether the joint moves there: `moves[joint][sample]`.
@@ -34,6 +36,7 @@ impl Sample {
         let step = total.div_ceil(MOST);
         let mut sample = Self {
             len: 0,
+            independent: 0.0,
             channels: std::array::from_fn(|_| vec![Vec::new(); dof]),
             moves: vec![Vec::new(); dof],
             opposite: velocity_agreement(trajectory, &pipeline.standstill_velocity)
@@ -57,6 +60,10 @@ impl Sample {
         };
         let centres = || (half..len.saturating_sub(half)).step_by(step);
         self.len += centres().count();
+        self.independent += match pipeline.is_off() {
+            true => len as f64,
+            false => 2.0 * pipeline.cutoff_hz * segment.interval * len as f64,
+        };
         for joint in 0..dof {
             let all = joint * len..(joint + 1) * len;
             let from = [&segment.q, &segment.qd, &segment.qdd, &segment.tau];
@@ -82,6 +89,7 @@ impl Sample {
         let mut all = first.clone();
         for sample in rest {
             all.len += sample.len;
+            all.independent += sample.independent;
             for (to, from) in all.channels.iter_mut().zip(&sample.channels) {
                 for (to, from) in to.iter_mut().zip(from) {
                     to.extend_from_slice(from);

@@ -1,6 +1,6 @@
 //! Planted mistakes on a simulated arm with friction, noise and a wrong model: each is named, and nothing else.
 
-use super::testing::{LEN, arm, log};
+use super::testing::{INTERVAL, LEN, arm, log};
 use super::*;
 use std::collections::BTreeMap;
 
@@ -83,6 +83,72 @@ fn case_19_and_20_torque_of_another_unit_or_side_is_named_with_its_gain() {
     let after = message.split("looks like gain ").nth(1).unwrap();
     let stated: f64 = after.split(' ').next().unwrap().parse().unwrap();
     assert!((stated / (11.3 / 1.15) - 1.0).abs() < 0.05, "{message}");
+}
+
+/// The first `len` samples of a log.
+fn beginning(mut log: Trajectory, len: usize) -> Trajectory {
+    let segment = &mut log.segments[0];
+    let cut = |values: &[f64]| -> Vec<f64> {
+        let joints = values.chunks(LEN);
+        joints.flat_map(|own| own[..len].to_vec()).collect()
+    };
+    for values in [
+        &mut segment.q,
+        &mut segment.qd,
+        &mut segment.qdd,
+        &mut segment.tau,
+    ] {
+        *values = cut(values);
+    }
+    segment.time.truncate(len);
+    segment.input_rows.truncate(len);
+    segment.standstill.truncate(4 * len);
+    log
+}
+
+/// A few seconds may look like another unit by chance: only thousandths are so far off that they are told.
+#[test]
+fn a_few_seconds_tell_no_factor_but_thousandths() {
+    let of = |gain: f64, seconds: f64| {
+        let mut scaled = log(0.0);
+        rows(&mut scaled.segments[0].tau, 1)
+            .iter_mut()
+            .for_each(|t| *t *= gain);
+        let pipeline = Pipeline {
+            cutoff_hz: 2.6,
+            ..Pipeline::off(4)
+        };
+        let log = beginning(scaled, (seconds / INTERVAL) as usize);
+        let findings = self_check(&arm(1.0), &pipeline, [&log]).unwrap();
+        let told = findings.into_iter().map(|f| (f.code, f.subject));
+        told.collect::<Vec<_>>()
+    };
+    let told = [("torque_scale".to_owned(), "j2".to_owned())];
+    // 104 and 83 half periods of the cut-off.
+    assert_eq!(of(1.0 / 11.3, 20.0), told);
+    assert_eq!(of(1.0 / 11.3, 16.0), []);
+    assert_eq!(of(1000.0, 16.0), told);
+}
+
+/// Torque that the model does not explain at all, of a size that no missing effect has.
+#[test]
+fn case_19_and_20_torque_of_all_joints_of_quite_another_size_is_named_without_its_shape() {
+    let of = |factor: f64, friction: f64| {
+        let mut log = log(0.0);
+        let segment = &mut log.segments[0];
+        for (i, tau) in segment.tau.iter_mut().enumerate() {
+            // Of another motion, and friction.
+            let other = (0.013 * i as f64).sin() + 0.5 * (0.031 * i as f64).cos();
+            *tau = factor * 100.0 * other + friction * segment.qd[i];
+        }
+        said(&log)
+    };
+    let told = [("torque_scale".to_owned(), String::new())];
+    assert_eq!(of(1e-3, 0.0), told);
+    assert_eq!(of(1e3, 0.0), told);
+    assert_eq!(of(1.0, 0.0), []);
+    // A slow arm's friction is many times its nominal torque.
+    assert_eq!(of(0.0, 1e5), []);
 }
 
 /// Friction explains all of a torque whose model's part is small; a model that says what drives can do still tells thousandths.

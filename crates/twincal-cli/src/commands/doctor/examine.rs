@@ -1,5 +1,6 @@
 //! Everything that can be said of logs and a model before a fit, also of logs that `fit` refuses.
 
+use super::super::calibration::stage_words;
 use super::super::checkup::{Checkup, checkup};
 use super::super::inputs::{LogInput, Long, RobotInput};
 use super::units::{Degrees, converted};
@@ -142,12 +143,8 @@ pub(super) fn examine(
     all.findings.append(&mut logs.findings);
     progress.step("comparing logs and model");
     all.look(&mut logs, &settings);
-    if trial == Trial::Fit
-        && all.refusals.is_empty()
-        && !all.findings.iter().any(Finding::doubts_the_log)
-    {
-        progress.step("trying the fit");
-        all.try_fit(&logs, &settings.calibration);
+    if trial == Trial::Fit && all.refusals.is_empty() {
+        all.try_fit(&logs, &settings.calibration, progress);
     }
     let mut said: Vec<Finding> = Vec::with_capacity(all.findings.len());
     for finding in std::mem::take(&mut all.findings) {
@@ -356,17 +353,18 @@ impl Examination {
 
     /// Fits: what only a fit can tell (rows that count as too few) is a reason to stop as well. A lower cut-off is advised if
     /// a fit goes on there and still finds what it does without.
-    fn try_fit(&mut self, logs: &LogInput, settings: &CalibrationSettings) {
+    fn try_fit(&mut self, logs: &LogInput, settings: &CalibrationSettings, progress: &Progress) {
         let robot = &self.robot.robot;
-        let fit = |settings: &CalibrationSettings| {
+        let fit = |settings: &CalibrationSettings, trial: &str| {
+            let told = |stage| progress.step(&format!("{trial}: {}", stage_words(stage)));
             let settings = CalibrationSettings {
                 most_bytes: memory::spare(),
                 ..settings.clone()
             };
             let logs: Vec<Log<'_>> = logs.logs.iter().map(Log::lent).collect();
-            calibrate(robot, logs, Vec::<Log<'_>>::new(), &settings, &|_| ())
+            calibrate(robot, logs, Vec::<Log<'_>>::new(), &settings, &told)
         };
-        match fit(settings) {
+        match fit(settings, "trying the fit") {
             Err(stopped) => {
                 let error = logs.as_given(stopped.error);
                 self.refusals.push(Failure::from(error).into());
@@ -385,7 +383,8 @@ impl Examination {
                 let mut lower = settings.clone();
                 self.lower_cutoff = self.slower().filter(|&hz| {
                     lower.signal.cutoff_hz = Auto::Value(hz);
-                    fit(&lower).is_ok_and(|lower| finds_all(&lower, &fitted))
+                    fit(&lower, "trying a lower cut-off")
+                        .is_ok_and(|lower| finds_all(&lower, &fitted))
                 });
             }
         }

@@ -102,7 +102,9 @@ fn print_log(log: &LogRow, terminal: &mut Terminal) {
         let step = |step: Option<f64>| step.map_or(NOTHING.into(), |step| significant(step, 2));
         let [low, high] = joint.q_range;
         let agreement = log.velocity.get(index).copied().flatten();
-        let lag = log.lag.iter().flat_map(|lag| &lag.joints);
+        // One joint alone says nothing of the log's lag.
+        let told = log.lag.iter().filter(|lag| lag.common.is_some());
+        let lag = told.flat_map(|lag| &lag.joints);
         let lag = lag
             .filter(|lag| lag.joint == joint.joint && lag.speaks)
             .find_map(|lag| Some((lag.lag, lag.sd?)));
@@ -121,13 +123,21 @@ fn print_log(log: &LogRow, terminal: &mut Terminal) {
     print_table(&rows, terminal);
     if let Some(lag) = &log.lag {
         let text = match lag.common {
-            Some([mean, sd]) => format!(
-                "torque is logged {:.2} ± {:.2} ms ({:.2} samples) {} the motion",
-                1e3 * mean.abs(),
-                1e3 * sd,
-                mean.abs() / lag.interval,
-                if mean < 0.0 { "before" } else { "after" }
-            ),
+            Some([mean, sd]) => {
+                let told = format!(
+                    "torque is logged {:.2} ± {:.2} ms ({:.2} samples) {} the motion",
+                    1e3 * mean.abs(),
+                    1e3 * sd,
+                    mean.abs() / lag.interval,
+                    if mean < 0.0 { "before" } else { "after" }
+                );
+                match lag.clear() {
+                    None if mean.abs() > 3.0 * sd => format!(
+                        "{told}: not for certain more than one sample, so that nothing has to be done; [signal] lag = {mean:.4} takes it out"
+                    ),
+                    _ => told,
+                }
+            }
             None => "the lag between motion and torque cannot be told: too few joints whose torque the model explains".into(),
         };
         paragraph(&text, terminal);
