@@ -203,7 +203,9 @@ mod tests {
         still.moving.joints[0].rows = 0;
         let gates = Gates::default();
         let judged = judge(&still, &scores(0.1, 0.95), &gates);
-        assert!(judged.iter().all(|gate| !gate.passed));
+        let values: Vec<f64> = judged.iter().map(|gate| gate.value).collect();
+        assert_eq!(values, [9.0, 0.1]);
+        assert!(judged[1].words.contains("10.0 % of the rows"));
     }
 
     #[test]

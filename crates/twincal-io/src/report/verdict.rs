@@ -6,7 +6,7 @@ use super::view::{Joint, independent_rows, memory, pooled_unit, standard_deviati
 use serde::Serialize;
 use twincal::calibrate::Calibration;
 use twincal::posterior::Method;
-use twincal::validate::{JointScore, Split, Validation, WORSE};
+use twincal::validate::{JointScore, Scores, Split, Validation, WORSE};
 use twincal::{Finding, Severity};
 
 /// A 95 % interval is honest if it holds this share of the held-out rows.
@@ -66,7 +66,8 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     );
     let honest = (COVERAGE.0..=COVERAGE.1).contains(&scores.coverage95);
     let off = shape::off(calibration);
-    let limits = limits(calibration, joints, &worse);
+    let large = large(scores, joints);
+    let limits = limits(calibration, joints, &worse, &large);
     let serious = calibration
         .findings
         .iter()
@@ -101,6 +102,11 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         (
             Grade::Care,
             "Hardly: on held-out data the calibrated torque is no better than the nominal one.",
+        )
+    } else if 2 * large.len() > joints.len() {
+        (
+            Grade::Care,
+            "Better than the model alone, but on most joints the error that is left is large.",
         )
     } else if scores.coverage95 < COVERAGE.0 {
         (
@@ -184,7 +190,23 @@ fn effects_found(found: usize) -> String {
     }
 }
 
-fn limits(calibration: &Calibration, joints: &[Joint<'_>], worse: &[String]) -> Vec<String> {
+/// Joints on which the calibrated torque is off by more than [`LARGE`].
+fn large(scores: &Scores, joints: &[Joint<'_>]) -> Vec<String> {
+    let is_large = |joint: &&Joint<'_>| {
+        let score = scores.joints.iter().find(|s| s.joint == joint.name);
+        let deviation = torque_deviation(joint);
+        score.is_some_and(|s| deviation > 0.0 && s.rmse_calibrated > LARGE * deviation)
+    };
+    let joints = joints.iter().filter(is_large);
+    joints.map(|joint| joint.name.to_owned()).collect()
+}
+
+fn limits(
+    calibration: &Calibration,
+    joints: &[Joint<'_>],
+    worse: &[String],
+    large: &[String],
+) -> Vec<String> {
     let scores = &calibration.validation.filtered;
     let doubts = calibration.findings.iter().filter(|f| f.doubts_the_log());
     let mut out: Vec<String> = doubts.map(|f| f.message.clone()).collect();
@@ -216,17 +238,8 @@ fn limits(calibration: &Calibration, joints: &[Joint<'_>], worse: &[String]) -> 
         "their intervals are wider than they need to be",
     );
     let mut out_of_shape = shape::sentences(calibration);
-    let large: Vec<String> = joints
-        .iter()
-        .filter(|joint| {
-            let score = scores.joints.iter().find(|s| s.joint == joint.name);
-            let deviation = torque_deviation(joint);
-            score.is_some_and(|s| deviation > 0.0 && s.rmse_calibrated > LARGE * deviation)
-        })
-        .map(|j| j.name.to_owned())
-        .collect();
     say(
-        &large,
+        large,
         "the error left is more than half of the torque's standard deviation",
         "the error left is more than half of the torque's standard deviation",
     );

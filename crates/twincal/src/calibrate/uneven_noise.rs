@@ -81,7 +81,7 @@ fn finding(mut found: Vec<(&str, f64)>, cause: &Cause) -> Option<Finding> {
         *name,
         format!(
             "joint `{name}`{others}: what is left is {ratio:.1} times larger {words}; intervals are too wide at \
-             some and too narrow at others: {key} = true"
+             some and too narrow at others; try {key} = true, and keep it where the held-out error does not grow"
         ),
         found.len() as u64,
     ))

@@ -195,7 +195,10 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
         .iter()
         .map(|refusal| Mend {
             problem: refusal.problem.clone(),
-            how: refusal.remedy.clone(),
+            how: match refusal.time_unit.is_some() || refusal.degrees.is_some() {
+                true => format!("{} (twincal init writes it)", refusal.remedy),
+                false => refusal.remedy.clone(),
+            },
             wrong: true,
             rank: 0,
         })

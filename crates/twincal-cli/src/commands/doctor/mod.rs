@@ -171,9 +171,15 @@ pub(super) fn init(flags: &args::Init, terminal: &mut Terminal) -> Outcome<u8> {
         print_json(terminal, &written)?;
     } else {
         terminal.data(&text);
-        terminal.note(&format!(
-            "{shown} is written; next: twincal fit --config {shown}"
-        ));
+        let refused = proposal
+            .remarks
+            .iter()
+            .any(|r| r.starts_with(propose::REFUSES));
+        let next = match refused {
+            true => "fit still refuses these logs: its first lines say why".to_owned(),
+            false => format!("next: twincal fit --config {shown}"),
+        };
+        terminal.note(&format!("{shown} is written; {next}"));
     }
     Ok(code_of(&examination.findings))
 }

@@ -7,6 +7,9 @@ use super::mends::lag;
 use std::path::{Path, PathBuf};
 use twincal_io::config::{Config, LogEntry, Proposal};
 
+/// How a remark begins that says why a fit with the proposed config is refused.
+pub(super) const REFUSES: &str = "fit refuses these logs";
+
 /// What `doctor` prints and `init` writes; paths are seen from `folder`.
 pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -> Proposal {
     let (settings, model, logs) = (&asked.settings, &asked.model, &asked.logs);
@@ -70,12 +73,7 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
         .refusals
         .iter()
         .filter(|refusal| examination.locked.is_empty() && !mends_refusal(refusal))
-        .map(|refusal| {
-            format!(
-                "fit refuses these logs: {}; {}",
-                refusal.problem, refusal.remedy
-            )
-        })
+        .map(|refusal| format!("{REFUSES}: {}; {}", refusal.problem, refusal.remedy))
         .chain(
             examination
                 .findings
