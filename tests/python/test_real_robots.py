@@ -79,3 +79,15 @@ def test_gear_ripple_becomes_a_candidate_where_the_log_shows_it(tmp_path):
         config = f"[signal]\ncutoff_hz = {split.cutoff_hz}\n"
         result = fit(tmp_path, [folder / name for name in split.fit], config, model=folder / split.model)
         assert not [f for f in result["findings"] if f["code"].startswith("ripple_")], split.name
+
+
+def test_a_coarse_encoder_is_fitted_where_its_rows_say_something(tmp_path):
+    """The simple pendulum (2.9 mrad a step): at the automatic cut-off of its four logs slow motion is hidden, and the fit would be refused."""
+    folder = SHARED / "simple_pendulum"
+    result = fit(tmp_path, sorted(folder.glob("run*.csv")), "", model=folder / "model.urdf")
+    told = [f["message"] for f in result["findings"] if f["code"] == "lower_band"]
+    assert len(told) == 1 and "automatic cut-off of 33 Hz" in told[0]
+    assert result["signal"]["cutoff_hz"] == 8.3
+    assert result["noise"][0]["n_eff"] > 30
+    scores = result["validation"]["joints"][0]
+    assert scores["rmse_calibrated"] < 0.85 * scores["rmse_nominal"]

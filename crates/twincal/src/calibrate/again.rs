@@ -65,6 +65,7 @@ pub(super) fn whole_road(
                 continue;
             }
             Ok(Road::TooFew(few)) => few,
+            // Only a road with `Goal::Count` ends there.
             Ok(Road::Counted(_)) => unreachable!("the goal is the end"),
             Err(error) => TooFew::from(error),
         };
