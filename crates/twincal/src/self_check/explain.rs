@@ -10,8 +10,15 @@ const FEWEST: usize = 40;
 const DRY: f64 = 0.02;
 /// Share of the nominal torque's sd that a driven joint has at least.
 const DRIVEN: f64 = 0.7;
-/// Columns of the small regression: nominal torque, velocity, its sign, acceleration.
-const COLUMNS: usize = 4;
+/// Columns of the small regression: nominal torque, velocity, its sign, acceleration; behind them what gravity takes of the nominal
+/// torque with the other sign, which a counterbalance adds.
+const COLUMNS: usize = 5;
+/// The nominal torque among them.
+const NOMINAL: usize = 0;
+/// The counterbalance among them.
+const BALANCE: usize = 4;
+/// Products of the columns and, last, the torque.
+type Products = [[f64; COLUMNS + 1]; COLUMNS + 1];
 
 /// Which channel of the log is which of the model: joint j of the model reads `motion[j]` and `torque[j]`, each a joint
 /// of the log and a factor.
@@ -44,6 +51,8 @@ pub(super) struct Explained {
     pub(super) left: f64,
     /// The same without the nominal torque: friction and motor inertia alone.
     pub(super) left_without_model: f64,
+    /// The same with the nominal torque as it is, its factor one, but for a counterbalance that takes a part of the weight.
+    pub(super) left_as_modelled: f64,
     /// Factor at the nominal torque.
     pub(super) gain: f64,
     /// False for a joint that is moved by the others: it has far less torque than its motion needs. A drive that only damps it
@@ -51,6 +60,8 @@ pub(super) struct Explained {
     pub(super) driven: bool,
     /// Sums of squares of the nominal and of the measured torque about their means.
     pub(super) sizes: [f64; 2],
+    /// That of what gravity takes of the nominal torque.
+    pub(super) gravity: f64,
 }
 
 /// Least squares of each joint's torque on its nominal torque, velocity, sign of velocity and acceleration, with a free
@@ -69,21 +80,29 @@ pub(super) fn explain(robot: &Robot, sample: &Sample, reading: &Reading) -> Vec<
             .collect()
     });
     let mut nominal = vec![0.0; dof * len];
+    let mut gravity = nominal.clone();
+    let still = &vec![0.0; dof * len][..];
     let (q, qd, qdd) = (&q[..], &qd[..], &qdd[..]);
     nominal_torque(robot, Motion { len, q, qd, qdd }, &mut nominal);
+    let at_rest = Motion {
+        len,
+        q,
+        qd: still,
+        qdd: still,
+    };
+    nominal_torque(robot, at_rest, &mut gravity);
     (0..dof)
         .map(|joint| {
             let own = joint * len..(joint + 1) * len;
             let (from, factor) = reading.torque[joint];
             let moves = &sample.moves[reading.motion[joint].0];
-            let rows = nominal[own.clone()]
-                .iter()
-                .zip(&qd[own.clone()])
-                .zip(&qdd[own])
-                .zip(&sample.channels[3][from])
-                .zip(moves)
-                .filter(|(_, moves)| **moves)
-                .map(|((((n, v), a), tau), _)| [*n, *v, (v / DRY).tanh(), *a, factor * tau]);
+            let [nominal, gravity] = [&nominal, &gravity].map(|torque| &torque[own.clone()]);
+            let [qd, qdd] = [qd, qdd].map(|rates| &rates[own.clone()]);
+            let tau = &sample.channels[3][from];
+            let rows = (0..len).filter(|&i| moves[i]).map(|i| {
+                let (v, torque) = (qd[i], factor * tau[i]);
+                [nominal[i], v, (v / DRY).tanh(), qdd[i], -gravity[i], torque]
+            });
             regress(rows)
         })
         .collect()
@@ -93,7 +112,7 @@ pub(super) fn explain(robot: &Robot, sample: &Sample, reading: &Reading) -> Vec<
 fn regress(rows: impl Iterator<Item = [f64; COLUMNS + 1]>) -> Option<Explained> {
     let mut count = 0;
     let mut mean = [0.0; COLUMNS + 1];
-    let mut products = [[0.0; COLUMNS + 1]; COLUMNS + 1];
+    let mut products: Products = [[0.0; COLUMNS + 1]; COLUMNS + 1];
     // Welford's update: no cancellation.
     for row in rows {
         count += 1;
@@ -111,40 +130,61 @@ fn regress(rows: impl Iterator<Item = [f64; COLUMNS + 1]>) -> Option<Explained> 
     if (count as usize) < FEWEST || !(total.is_finite() && total > 0.0) {
         return None;
     }
-    let scale: [f64; COLUMNS + 1] = std::array::from_fn(|i| products[i][i].sqrt());
-    let (mut best, mut without) = ((1.0, 0.0), 1.0_f64);
+    let rest = less_nominal(&products);
+    let (mut best, mut without, mut as_modelled) = ((1.0, 0.0), 1.0_f64, 1.0_f64);
     for subset in 1..1_u32 << COLUMNS {
+        let is_member = |column: usize| subset >> column & 1 == 1;
         let members: Vec<usize> = (0..COLUMNS)
-            .filter(|&i| subset >> i & 1 == 1 && scale[i] > 0.0)
+            .filter(|&column| is_member(column) && products[column][column] > 0.0)
             .collect();
-        let Some((left, gain)) = solve(&products, &scale, &members) else {
-            continue;
-        };
-        if left < best.0 {
-            best = (left, gain);
+        if !is_member(BALANCE)
+            && let Some((left, passive)) = solve(&products, &members)
+        {
+            if left < best.0 {
+                let has_model = members[0] == NOMINAL;
+                best = (left, if has_model { passive[0] } else { 0.0 });
+            }
+            if !is_member(NOMINAL) {
+                without = without.min(left);
+            }
         }
-        if !members.contains(&0) {
-            without = without.min(left);
+        if !is_member(NOMINAL)
+            && let Some((left, passive)) = solve(&rest, &members)
+        {
+            let balanced = members.last() == Some(&BALANCE) && passive[members.len() - 1] > 1.0;
+            if !balanced {
+                as_modelled = as_modelled.min(left);
+            }
         }
     }
     Some(Explained {
         left: best.0,
         left_without_model: without,
+        left_as_modelled: as_modelled * rest[COLUMNS][COLUMNS] / total,
         gain: best.1,
-        driven: scale[COLUMNS] > DRIVEN * scale[0],
-        sizes: [products[0][0], total],
+        driven: total.sqrt() > DRIVEN * products[NOMINAL][NOMINAL].sqrt(),
+        sizes: [products[NOMINAL][NOMINAL], total],
+        gravity: products[BALANCE][BALANCE],
     })
 }
 
-/// Share left and factor at column 0 of the least-squares fit on `members`; `None` where a coefficient is negative or the
-/// columns are alike.
-fn solve(
-    products: &[[f64; COLUMNS + 1]; COLUMNS + 1],
-    scale: &[f64; COLUMNS + 1],
-    members: &[usize],
-) -> Option<(f64, f64)> {
+/// The products with the measured torque less the nominal one.
+fn less_nominal(products: &Products) -> Products {
+    let mut rest = *products;
+    for column in 0..COLUMNS {
+        rest[column][COLUMNS] -= products[column][NOMINAL];
+        rest[COLUMNS][column] = rest[column][COLUMNS];
+    }
+    let both = products[NOMINAL][COLUMNS];
+    rest[COLUMNS][COLUMNS] += products[NOMINAL][NOMINAL] - 2.0 * both;
+    rest
+}
+
+/// Share left and coefficients of the least-squares fit on `members`; `None` where a coefficient is negative or the columns are alike.
+fn solve(products: &Products, members: &[usize]) -> Option<(f64, Vec<f64>)> {
     let n = members.len();
-    let correlation = |i: usize, j: usize| products[i][j] / (scale[i] * scale[j]);
+    let scale = |i: usize| products[i][i].sqrt();
+    let correlation = |i: usize, j: usize| products[i][j] / (scale(i) * scale(j));
     let mut matrix = Vec::with_capacity(n * n);
     for &i in members {
         matrix.extend(members.iter().map(|&j| correlation(i, j)));
@@ -157,11 +197,10 @@ fn solve(
         return None;
     }
     let explained: f64 = solution.iter().zip(&right).map(|(b, r)| b * r).sum();
-    let gain = match members[0] {
-        0 => solution[0] * scale[COLUMNS] / scale[0],
-        _ => 0.0,
-    };
-    Some(((1.0 - explained).max(0.0), gain))
+    for (coefficient, &member) in solution.iter_mut().zip(members) {
+        *coefficient *= scale(COLUMNS) / scale(member);
+    }
+    Some(((1.0 - explained).max(0.0), solution))
 }
 
 #[cfg(test)]
@@ -169,12 +208,12 @@ mod tests {
     use super::*;
 
     /// n, v, sign v, a and torque of a made-up joint.
-    fn rows(torque: impl Fn(f64, f64, f64) -> f64) -> Vec<[f64; 5]> {
+    fn rows(torque: impl Fn(f64, f64, f64) -> f64) -> Vec<[f64; COLUMNS + 1]> {
         (0..200)
             .map(|i| {
                 let t = 0.05 * f64::from(i);
                 let (n, v, a) = ((0.7 * t).cos() * 5.0, (1.3 * t).sin(), (2.9 * t).cos());
-                [n, v, (v / DRY).tanh(), a, torque(n, v, a)]
+                [n, v, (v / DRY).tanh(), a, -0.9 * n, torque(n, v, a)]
             })
             .collect()
     }

@@ -239,14 +239,19 @@ fn scales(robot: &Robot, sample: &Sample, explained: &[Option<Explained>]) -> Ve
 }
 
 /// Size of the measured torque of all joints over that of the model's, where that is further off than [`FAR_OFF`] and no friction explains it: a
-/// slow arm without gravity may well have friction of many times its nominal torque, but no joint needs less than that.
+/// slow arm without gravity may well have friction of many times its nominal torque, but no drive that holds a weight has 30 times it, and no
+/// joint needs less than that.
 fn far_off(explained: &[Option<Explained>]) -> Option<f64> {
     let told = || explained.iter().flatten();
     let nominal: f64 = told().map(|joint| joint.sizes[0]).sum();
     let measured: f64 = told().map(|joint| joint.sizes[1]).sum();
     let left = told().map(|joint| joint.left_without_model * joint.sizes[1]);
     let times = (measured / nominal).sqrt();
-    let large = times > FAR_OFF && left.sum::<f64>() > NEEDED_OF_ALL * measured;
+    let unexplained = left.sum::<f64>() > NEEDED_OF_ALL * measured;
+    let mut holds_a_weight = told().filter(|joint| joint.gravity > 0.5 * joint.sizes[0]);
+    let too_heavy = holds_a_weight.clone().next().is_some()
+        && holds_a_weight.all(|joint| joint.sizes[1] > FAR_OFF.powi(2) * joint.sizes[0]);
+    let large = times > FAR_OFF && (too_heavy || unexplained);
     (times.is_finite() && (large || times < 1.0 / FAR_OFF)).then_some(times)
 }
 
