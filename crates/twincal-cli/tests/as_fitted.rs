@@ -189,7 +189,7 @@ fn a_factor_that_cannot_be_this_logs_is_doubted() {
     for words in [
         "radians.csv: ",
         "joint `elbow`",
-        "1.75e-2",
+        "0.017 of the 1.20",
         "q = { elbow = 1.0 }",
         "--config",
     ] {

@@ -10,7 +10,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use twincal::Severity;
 use twincal::robot::Robot;
-use twincal::signal::{Auto, Recording, SignalSettings, align, choose_pipeline, hardly_driven};
+use twincal::signal::{
+    Auto, DerivedFrom, Recording, SignalSettings, align, choose_pipeline, hardly_driven,
+};
 use twincal_io::log::{LogOptions, read_log};
 use twincal_io::model::{ModelSettings, read_model};
 
@@ -21,7 +23,7 @@ const AUTO: SignalSettings = SignalSettings {
     coulomb_velocity: None,
     corrections: twincal::signal::Corrections {
         lag: twincal::signal::Lag::Unsaid,
-        velocity_from_position: false,
+        velocity: None,
     },
     every_sample: false,
 };
@@ -135,5 +137,64 @@ fn velocity_derived_from_position_is_the_logged_one() {
             "joint {joint}: {}",
             difference / size
         );
+    }
+}
+
+/// White noise of 0.1 rad/s in q̇ of the UR10, of which the motion filter leaves √(2 f_q / rate): its q̇ is taken from q, which has none.
+/// Logged velocities of real robots are kept.
+#[test]
+fn a_noisy_velocity_is_taken_from_position_and_no_other() {
+    let good = [
+        ("ur10", &["run0.parquet"][..]),
+        ("kuka_kr300", &["run0.parquet", "run1.parquet"]),
+        ("double_pendulum", &PENDULUM),
+        ("simple_pendulum", &["run0.csv", "run1.csv", "run5.csv"]),
+    ];
+    for (name, files) in good {
+        let Some((robot, logs)) = load(name, files) else {
+            return;
+        };
+        let (pipeline, said) = choose_pipeline(&robot, &logs, &AUTO).unwrap();
+        assert_eq!(pipeline.velocity_from, [], "{name}: {said:#?}");
+        if name != "ur10" {
+            continue;
+        }
+        let mut noisy = logs.clone();
+        let qd = noisy[0].joints[1].qd.as_mut().unwrap();
+        let mut state = 1_u64;
+        for v in qd {
+            let mut uniform = || {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                (state >> 11) as f64 / (1_u64 << 53) as f64
+            };
+            *v += 0.1
+                * (-2.0 * (1.0 - uniform()).ln()).sqrt()
+                * (std::f64::consts::TAU * uniform()).cos();
+        }
+        let (pipeline, said) = choose_pipeline(&robot, &noisy, &AUTO).unwrap();
+        let mut expected = vec![DerivedFrom::Velocity; 6];
+        expected[1] = DerivedFrom::Position;
+        assert_eq!(pipeline.velocity_from, expected);
+        let said = said.iter().find(|f| f.code == "noisy_velocity").unwrap();
+        let stated = said.message.split("noise of ").nth(1).unwrap();
+        let stated: f64 = stated.split(' ').next().unwrap().parse().unwrap();
+        let left = 0.1 * (2.0 * pipeline.motion_cutoff_hz / 125.0).sqrt();
+        assert!(
+            (stated / left - 1.0).abs() < 0.15,
+            "{stated} instead of {left}"
+        );
+        // The motion is what position says, and what was said is kept to.
+        let (from_noisy, _) = align(&robot, &noisy[0], &pipeline).unwrap();
+        let mut without = logs[0].clone();
+        without.joints[1].qd = None;
+        let (from_position, _) = align(&robot, &without, &pipeline).unwrap();
+        assert_eq!(from_noisy.segments[0].qd, from_position.segments[0].qd);
+        let mut stated = AUTO.clone();
+        stated.corrections.velocity = Some(DerivedFrom::Velocity);
+        let (pipeline, said) = choose_pipeline(&robot, &noisy, &stated).unwrap();
+        assert_eq!(pipeline.velocity_from, []);
+        assert!(said.iter().all(|f| f.code != "noisy_velocity"));
     }
 }

@@ -4,6 +4,7 @@ use super::inputs::Long;
 use std::path::{Path, PathBuf};
 use twincal::robot::Robot;
 use twincal::signal::Log;
+use twincal::words::significant;
 use twincal::{Finding, Severity};
 use twincal_io::Error;
 use twincal_io::config::{FactorTable, LogSettings, key};
@@ -135,11 +136,14 @@ impl<'a> AsFitted<'a> {
                 continue;
             }
             let message = format!(
-                "{}: with the factor {factor} of the fit joint `{joint}` moves over {range:.3e} rad (m), {ratio:.2e} of the {fitted:.3e} that it moved \
-                 over in the fit; without it, {:.2} of that. Where this log is in radians (m) already, say [columns.factor] q = {{ {} = 1.0 }}, \
+                "{}: with the factor {factor} of the fit joint `{joint}` moves over {} rad (m), {} of the {} that it moved \
+                 over in the fit; without it, {} of that. Where this log is in radians (m) already, say [columns.factor] q = {{ {} = 1.0 }}, \
                  and likewise qd and qdd, in a --config",
                 log.name(),
-                ratio / factor.abs(),
+                significant(range, 3),
+                significant(ratio, 2),
+                significant(fitted, 3),
+                significant(ratio / factor.abs(), 2),
                 key(joint)
             );
             doubts.push(Finding::new(

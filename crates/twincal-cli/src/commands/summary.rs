@@ -7,6 +7,7 @@ use twincal::term::Status;
 use twincal::validate::{Scores, Split};
 use twincal::words::significant;
 use twincal::{Finding, Severity};
+use twincal_io::report;
 use twincal_io::result_json::status_word;
 
 /// Dropped columns up to this number are named.
@@ -30,6 +31,7 @@ pub(super) fn print(calibration: &Calibration, terminal: &mut Terminal) {
     effects(calibration, terminal);
     components(calibration, terminal);
     validation(calibration, terminal);
+    verdict(calibration, terminal);
     findings(&calibration.findings, Notes::In("the report"), terminal);
 }
 
@@ -166,6 +168,15 @@ fn validation(calibration: &Calibration, terminal: &mut Terminal) {
     terminal.say("");
 }
 
+/// What the report says first.
+fn verdict(calibration: &Calibration, terminal: &mut Terminal) {
+    let (headline, limits) = report::verdict(calibration);
+    terminal.heading("Can this twin be used?");
+    paragraph(&headline, terminal);
+    limits.iter().for_each(|limit| paragraph(limit, terminal));
+    terminal.say("");
+}
+
 /// How honest the intervals are, what is guaranteed, and what the compact twin costs.
 fn reliability(calibration: &Calibration) -> Vec<String> {
     let validation = &calibration.validation;
@@ -194,10 +205,11 @@ fn reliability(calibration: &Calibration) -> Vec<String> {
     }
     if let (Some(compact), Some([average, own])) = (&calibration.compact, validation.compact) {
         lines.push(format!(
-            "compact twin ({} effects): RMSE {} instead of {} on moving joints, log score {:+.3} nats per row",
+            "compact twin ({} effects): RMSE {} instead of {} on moving joints ({} with rows at standstill), log score {:+.3} nats per row",
             compact.components.len(),
             significant(own.rmse, 3),
             significant(average.rmse, 3),
+            significant(validation.filtered.rmse_calibrated, 3),
             own.log_score - average.log_score
         ));
     }

@@ -367,7 +367,8 @@ pub struct SignalTable {
     /// times the automatic cut-off with `noise.model = "ar1"`; a note says so. false: never. Nor does it where `cutoff_hz`, `rate_hz` or
     /// `noise.model` is stated, rows are weighed (`noise.robust`, `varies_with_…`) or the noise is sampled.
     pub wider_band: Option<bool>,
-    /// Default "logged". "position": logged velocities are not used but derived from position.
+    /// "logged": as logged, where they are; "position": not used but derived from position. Default: as logged, but from position where the
+    /// logged one has by far more noise (finding `noisy_velocity`).
     pub velocity: Option<VelocityWord>,
 }
 

@@ -14,7 +14,7 @@ use twincal::calibrate::CalibrationSettings;
 use twincal::infer::{Choice, InferenceSettings, LEAST_CHAINS, LEAST_DRAWS};
 use twincal::likelihood::{NoiseModel, NoiseSettings, NoiseUncertainty};
 use twincal::prior::{Inclusion, PriorSettings};
-use twincal::signal::{Auto, Corrections, Lag, Payload, SignalSettings};
+use twincal::signal::{Auto, Corrections, DerivedFrom, Lag, Payload, SignalSettings};
 use twincal::term::{Family, LibrarySettings};
 
 /// `[log]` and `[columns]` with defaults.
@@ -318,7 +318,10 @@ impl Config {
             coulomb_velocity: self.coulomb_velocity()?,
             corrections: Corrections {
                 lag: self.lag()?,
-                velocity_from_position: table.velocity == Some(VelocityWord::Position),
+                velocity: table.velocity.map(|word| match word {
+                    VelocityWord::Logged => DerivedFrom::Velocity,
+                    VelocityWord::Position => DerivedFrom::Position,
+                }),
             },
             every_sample: !self.file.library.terms.is_empty()
                 || self.file.library.ripple.iter().flatten().count() > 0,

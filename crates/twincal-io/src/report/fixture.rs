@@ -231,6 +231,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
                 coulomb_velocity: 0.02,
                 standstill_velocity: vec![0.02; names.len()],
                 derived_from: vec![twincal::signal::DerivedFrom::Position; names.len()],
+                velocity_from: Vec::new(),
                 corrections: twincal::signal::Corrections::default(),
             },
             posterior,

@@ -52,6 +52,14 @@ pub struct FileHash {
     pub sha256: String,
 }
 
+/// Whether the calibrated torque can be used, in one sentence, and what errors and intervals of held-out torque say against it, joint by joint:
+/// what stands at the top of the report.
+#[must_use]
+pub fn verdict(calibration: &Calibration) -> (String, Vec<String>) {
+    let verdict = verdict::judge(calibration, &view::joints(calibration));
+    (verdict.headline, verdict.of_torque)
+}
+
 /// The report as HTML.
 ///
 /// # Errors

@@ -113,13 +113,12 @@ pub(super) fn sentences(calibration: &Calibration) -> Vec<String> {
         };
         format!("PIT off uniform by {off}, by chance below {chance}")
     };
-    // What its 95 % interval says of a joint stands elsewhere; the middle of the distribution does not contradict it.
+    // What its 95 % interval says of a joint stands elsewhere; the middle of the distribution neither contradicts nor repeats it.
     let scores = &validation.filtered.joints;
     let said = |joint: &str, shape: Shape| {
         let mut own = scores.iter().filter(|score| score.joint == joint);
         own.any(|score| match shape {
-            Shape::Wide => too_narrow(score),
-            Shape::Narrow => too_wide(score),
+            Shape::Wide | Shape::Narrow => too_narrow(score) || too_wide(score),
             Shape::Above | Shape::Below => false,
         })
     };

@@ -39,6 +39,9 @@ pub(super) struct Verdict {
     pub(super) grounds: Vec<String>,
     /// Where it does not hold.
     pub(super) limits: Vec<String>,
+    /// Those among them that speak of errors and intervals, not of findings.
+    #[serde(skip)]
+    pub(super) of_torque: Vec<String>,
 }
 
 /// Judges `calibration`.
@@ -55,6 +58,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
                 "Record another motion and give it with --heldout, or fit at least three logs."
                     .into(),
             ],
+            of_torque: Vec::new(),
         };
     }
     let ratio = scores.rmse_calibrated / scores.rmse_nominal;
@@ -67,7 +71,8 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     let honest = (COVERAGE.0..=COVERAGE.1).contains(&scores.coverage95);
     let off = shape::off(calibration);
     let large = large(scores, joints);
-    let limits = limits(calibration, joints, &worse, &large);
+    let of_torque = limits_of_torque(calibration, joints, &worse, &large);
+    let limits = limits(calibration, of_torque.clone());
     let serious = calibration
         .findings
         .iter()
@@ -133,6 +138,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         headline: headline.into(),
         grounds: grounds(calibration, joints, found),
         limits,
+        of_torque,
     }
 }
 
@@ -201,15 +207,15 @@ fn large(scores: &Scores, joints: &[Joint<'_>]) -> Vec<String> {
     joints.map(|joint| joint.name.to_owned()).collect()
 }
 
-fn limits(
+/// What errors and intervals of held-out torque say against the twin.
+fn limits_of_torque(
     calibration: &Calibration,
     joints: &[Joint<'_>],
     worse: &[String],
     large: &[String],
 ) -> Vec<String> {
     let scores = &calibration.validation.filtered;
-    let doubts = calibration.findings.iter().filter(|f| f.doubts_the_log());
-    let mut out: Vec<String> = doubts.map(|f| f.message.clone()).collect();
+    let mut out = Vec::new();
     let mut say = |joints: &[String], one: &str, many: &str| {
         if !joints.is_empty() {
             out.push(format!(
@@ -245,6 +251,13 @@ fn limits(
     );
     out.append(&mut out_of_shape);
     out.extend(beyond(calibration, joints));
+    out
+}
+
+fn limits(calibration: &Calibration, of_torque: Vec<String>) -> Vec<String> {
+    let doubts = calibration.findings.iter().filter(|f| f.doubts_the_log());
+    let mut out: Vec<String> = doubts.map(|f| f.message.clone()).collect();
+    out.extend(of_torque);
     if calibration.validation.split == Split::LastThirty {
         out.push(
             "It was tested on later parts of the same motions only; another motion was not tried."

@@ -25,7 +25,7 @@ const AUTO: SignalSettings = SignalSettings {
     coulomb_velocity: None,
     corrections: twincal::signal::Corrections {
         lag: twincal::signal::Lag::Unsaid,
-        velocity_from_position: false,
+        velocity: None,
     },
     every_sample: false,
 };

@@ -105,6 +105,7 @@ fn case_23_a_wrapped_angle_is_unfolded_and_counted_a_slider_never() {
         coulomb_velocity: 0.02,
         standstill_velocity: vec![0.02; 2],
         derived_from: vec![DerivedFrom::Position; 2],
+        velocity_from: Vec::new(),
         corrections: twincal::signal::Corrections::default(),
     };
     let (trajectory, findings) = align(&robot, &recording, &pipeline).unwrap();

@@ -3,15 +3,17 @@
 use crate::error::{Finding, Severity};
 use crate::robot::Robot;
 use crate::validate::{Scores, WORSE};
+use crate::words::significant;
 
 /// One finding on all joints together where they are worse than nominal by more than [`WORSE`], else one per joint that is.
 pub(super) fn findings(robot: &Robot, scores: &Scores) -> Vec<Finding> {
     let ratio = |[nominal, calibrated]: [f64; 2]| calibrated / nominal;
     if ratio([scores.rmse_nominal, scores.rmse_calibrated]) > WORSE {
         let message = format!(
-            "on held-out data the calibrated torque is worse than the model's own: RMSE {:.3} instead of {:.3} over all joints: do not use \
+            "on held-out data the calibrated torque is worse than the model's own: RMSE {} instead of {} over all joints: do not use \
              this twin; log longer, with motion in all of the range that it is for",
-            scores.rmse_calibrated, scores.rmse_nominal
+            significant(scores.rmse_calibrated, 3),
+            significant(scores.rmse_nominal, 3)
         );
         return vec![finding(String::new(), message)];
     }
@@ -20,9 +22,10 @@ pub(super) fn findings(robot: &Robot, scores: &Scores) -> Vec<Finding> {
     let told = worse.map(|(joint, score)| {
         let (name, unit) = (&score.joint, robot.joint_kind(joint).torque_unit());
         let message = format!(
-            "joint `{name}`: on held-out data the calibrated torque is worse than the model's own: RMSE {:.3} {unit} instead of \
-             {:.3} {unit}; its corrections do not hold beyond the motion of the fit: log it longer, in the motion that the twin is for",
-            score.rmse_calibrated, score.rmse_nominal
+            "joint `{name}`: on held-out data the calibrated torque is worse than the model's own: RMSE {} {unit} instead of \
+             {} {unit}; its corrections do not hold beyond the motion of the fit: log it longer, in the motion that the twin is for",
+            significant(score.rmse_calibrated, 3),
+            significant(score.rmse_nominal, 3)
         );
         finding(name.clone(), message)
     });
@@ -87,8 +90,8 @@ mod tests {
         let subjects: Vec<&str> = some.iter().map(|f| f.subject.as_str()).collect();
         assert_eq!(subjects, ["joint1", "joint2"]);
         let units = [
-            "RMSE 2.500 N instead of 2.000 N;",
-            "RMSE 1.500 N·m instead of 1.000 N·m;",
+            "RMSE 2.50 N instead of 2.00 N;",
+            "RMSE 1.50 N·m instead of 1.00 N·m;",
         ];
         for (finding, part) in some.iter().zip(units) {
             assert!(finding.message.contains(part), "{}", finding.message);

@@ -340,6 +340,7 @@ mod tests {
             coulomb_velocity: 0.02,
             standstill_velocity: vec![0.02; 2],
             derived_from: vec![DerivedFrom::Position; 2],
+            velocity_from: Vec::new(),
             corrections: Corrections::default(),
         };
         for (acts, most) in [(true, 0), (true, 1000), (false, 1000)] {

@@ -97,6 +97,7 @@ fn pipeline(cutoff_hz: f64) -> Pipeline {
         coulomb_velocity: 0.02,
         standstill_velocity: vec![0.02; 2],
         derived_from: vec![DerivedFrom::Position; 2],
+        velocity_from: Vec::new(),
         corrections: crate::signal::Corrections::default(),
     }
 }
@@ -552,6 +553,7 @@ fn a_coarser_clock_changes_no_row() {
             motion_interval,
             standstill_velocity: vec![0.02; dof],
             derived_from: vec![DerivedFrom::Velocity; dof],
+            velocity_from: Vec::new(),
             ..pipeline(5.0)
         };
         let (trajectory, _) = prepare(&robot, &recording, &pipeline)

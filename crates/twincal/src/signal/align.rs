@@ -349,12 +349,7 @@ fn smoothed(
         .zip(qdd.par_chunks_exact_mut(len))
         .zip(still.par_chunks_exact_mut(len))
         .for_each(|(((((joint, channels), q), qd), qdd), still)| {
-            let travel = derivatives(
-                &kernels,
-                channels,
-                pipeline.derived_from[joint],
-                [q, qd, qdd],
-            );
+            let travel = derivatives(&kernels, channels, pipeline.sources(joint), [q, qd, qdd]);
             // Position tells standstill: a drive's velocity is often a difference of counts and far noisier at rest.
             still.copy_from_slice(&standstill(
                 travel.as_deref().unwrap_or(qd),
@@ -394,10 +389,11 @@ fn smoothed(
 fn derivatives(
     kernels: &MotionKernels,
     channels: &Values<'_>,
-    derived: DerivedFrom,
+    [velocity_from, derived]: [DerivedFrom; 2],
     [q, qd, qdd]: [&mut [f64]; 3],
 ) -> Option<Vec<f64>> {
-    let Some(velocity) = &channels.qd else {
+    let logged = channels.qd.as_ref();
+    let Some(velocity) = logged.filter(|_| velocity_from == DerivedFrom::Velocity) else {
         correlate_two([&kernels.smooth, &kernels.first], &channels.q, [q, qd]);
         match &channels.qdd {
             Some(logged) => correlate(&kernels.smooth, logged, qdd),

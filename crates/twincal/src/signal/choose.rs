@@ -2,7 +2,9 @@
 
 use super::align::PreparedLog;
 use super::clock::even_interval;
-use super::cutoff::{JointSpectra, automatic, derived_from, motion_band, rms_acceleration, wider};
+use super::cutoff::{
+    JointSpectra, automatic, derived_from, motion_band, noisy_velocity, rms_acceleration, wider,
+};
 use super::encoder::{Encoder, velocity_resolution};
 use super::fir::{column_half_seconds, column_kernel, motion_half_seconds, noise_gain};
 use super::prepare::{JointFacts, prepare};
@@ -12,6 +14,7 @@ use super::{
     Auto, DerivedFrom, Log, LongLog, LongReady, Pipeline, ReadyLog, Recording, SignalSettings,
 };
 use crate::error::{Error, Finding, Result, Severity};
+use crate::words::significant;
 use rayon::prelude::*;
 
 /// v_s where the pipeline is on and nothing is said, rad/s or m/s.
@@ -238,6 +241,7 @@ fn off(
         coulomb_velocity: settings.coulomb_velocity.unwrap_or(0.0),
         standstill_velocity: vec![0.0; joints.len()],
         derived_from: vec![DerivedFrom::Position; joints.len()],
+        velocity_from: Vec::new(),
         corrections: settings.corrections.clone(),
     };
     Ok((pipeline, findings))
@@ -263,6 +267,17 @@ pub(crate) fn require_derivatives(joints: &[JointFacts], log: &Recording) -> Res
         }
     }
     Ok(())
+}
+
+/// Says that a joint's logged velocity is left out.
+fn replaced_velocity(facts: &JointFacts, noise: [f64; 2]) -> Finding {
+    let name = &facts.name;
+    let [logged, travel] = noise.map(|noise| significant(noise, 2));
+    let message = format!(
+        "joint `{name}`: the logged velocity has a noise of {logged} per s (after the motion filter), the change of position {travel}: velocity is \
+         taken from position; [signal] velocity = \"logged\" takes the log's"
+    );
+    Finding::new(Severity::Warning, "noisy_velocity", name, message, 0)
 }
 
 /// Pipeline on; and a wider cut-off, see [`Chosen::wider_hz`].
@@ -340,6 +355,20 @@ fn on(
             0,
         ));
     }
+    let mut derived: Vec<DerivedFrom> = (0..joints.len())
+        .map(|joint| derived_from(&of_joint(joint), cutoff))
+        .collect();
+    let mut velocity_from = vec![DerivedFrom::Velocity; joints.len()];
+    let said = settings.corrections.velocity.is_some();
+    for (joint, facts) in joints.iter().enumerate().filter(|_| !said) {
+        if let Some(noise) = noisy_velocity(&of_joint(joint), motion_cutoff) {
+            (velocity_from[joint], derived[joint]) = (DerivedFrom::Position, DerivedFrom::Position);
+            findings.push(replaced_velocity(facts, noise));
+        }
+    }
+    if !velocity_from.contains(&DerivedFrom::Position) {
+        velocity_from.clear();
+    }
     let acceleration = moving.iter().map(|logs| rms_acceleration(logs));
     let acceleration = acceleration.fold(0.0, f64::max);
     let mut pipeline = Pipeline {
@@ -353,9 +382,8 @@ fn on(
         },
         coulomb_velocity,
         standstill_velocity: Vec::with_capacity(joints.len()),
-        derived_from: (0..joints.len())
-            .map(|joint| derived_from(&of_joint(joint), cutoff))
-            .collect(),
+        derived_from: derived,
+        velocity_from,
         corrections: settings.corrections.clone(),
     };
     if intervals

@@ -1,5 +1,6 @@
 //! What a user says of a log's channels: torque that comes later than the motion, a velocity that is not to be used.
 
+use super::DerivedFrom;
 use super::prepare::{JointFacts, Values};
 use super::spline::resample;
 use crate::error::{Error, Result};
@@ -30,8 +31,9 @@ pub enum Lag {
 pub struct Corrections {
     /// Torque is moved back by this.
     pub lag: Lag,
-    /// The logged velocity is left out and derived from position.
-    pub velocity_from_position: bool,
+    /// Where velocity comes from, if that was said: the log, or the change of position whatever is logged. Else per joint what leaves less
+    /// noise ([`Pipeline::velocity_from`](super::Pipeline::velocity_from)).
+    pub velocity: Option<DerivedFrom>,
 }
 
 impl Corrections {
@@ -102,7 +104,7 @@ impl Corrections {
             let problem = "with cutoff_hz = 0 every row stays as logged, so torque cannot be moved";
             return setting("signal.lag", problem.into(), filter.into());
         }
-        if off && self.velocity_from_position {
+        if off && self.velocity == Some(DerivedFrom::Position) {
             let problem = "with cutoff_hz = 0 nothing is derived from position";
             return setting("signal.velocity", problem.into(), filter.into());
         }
@@ -173,7 +175,7 @@ mod tests {
         let mut moved = logged.clone();
         let corrections = Corrections {
             lag: Lag::Joints(BTreeMap::from([("a".into(), 0.025)])),
-            velocity_from_position: false,
+            velocity: None,
         };
         corrections.check(&facts, false).unwrap();
         let kept = corrections.move_torque(&facts, &stamps, &logged, &stamps, &mut moved);

@@ -33,6 +33,11 @@ const HIGHEST: f64 = 0.11;
 /// A wider band than the automatic one, in f_c.
 const WIDER: f64 = 4.0;
 
+/// Noise in velocity over its rms from which friction suffers.
+const NOISY: f64 = 0.02;
+/// How much more noise than the change of position a logged velocity must have to be left out.
+const NOISIER: f64 = 2.0;
+
 /// Spectra of one joint in one log.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct JointSpectra {
@@ -118,6 +123,20 @@ pub(crate) fn derived_from(logs: &[&JointSpectra], cutoff: f64) -> DerivedFrom {
     } else {
         DerivedFrom::Position
     }
+}
+
+/// Noise below `cutoff` of a logged velocity that is not worth using, and of the change of position, rad/s or m/s: where that is by far less and the
+/// logged one's is more than a small share of the motion. `None` where the logged velocity is as good, or is not in every log.
+pub(crate) fn noisy_velocity(logs: &[&JointSpectra], cutoff: f64) -> Option<[f64; 2]> {
+    let time: f64 = logs.iter().map(|log| log.duration).sum();
+    let (mut logged, mut travel) = (0.0, 0.0);
+    for log in logs {
+        logged += log.duration * log.velocity_noise?.power(0, cutoff);
+        travel += log.duration * log.position_noise.power(1, cutoff);
+    }
+    let matters = NOISY * motion_band(logs).1;
+    let noise = [logged, travel].map(|energy| (energy / time).sqrt());
+    (noise[0] > NOISIER * noise[1] && noise[0] > matters).then_some(noise)
 }
 
 /// Frequency f_m and rms velocity of one joint over all logs.

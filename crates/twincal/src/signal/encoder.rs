@@ -31,7 +31,8 @@ pub(crate) fn velocity_resolution(
         logged: [has_qd, has_qdd],
         step,
     } = *encoder;
-    let derived = pipeline.derived_from[joint];
+    let [velocity_from, derived] = pipeline.sources(joint);
+    let has_qd = has_qd && velocity_from == DerivedFrom::Velocity;
     let (mut velocity, mut acceleration, mut position) = (0.0_f64, 0.0_f64, 0.0_f64);
     let mut travel = 0.0_f64;
     for log in spectra {

@@ -150,13 +150,13 @@ impl Recording {
     }
 }
 
-/// What an acceleration that is not logged is derived from.
+/// What a velocity that is noisy, or an acceleration that is not logged, is derived from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DerivedFrom {
-    /// Position, twice.
+    /// Position.
     Position,
-    /// Logged velocity, once.
+    /// Logged velocity.
     Velocity,
 }
 
@@ -179,6 +179,9 @@ pub struct Pipeline {
     pub standstill_velocity: Vec<f64>,
     /// What q̈ is derived from where it is not logged, per joint: the channel that leaves less noise.
     pub derived_from: Vec<DerivedFrom>,
+    /// Where velocity comes from per joint: from position where the logged one has by far more noise; empty as logged.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub velocity_from: Vec<DerivedFrom>,
     /// What is put right in every log first.
     #[serde(default, skip_serializing_if = "Corrections::is_default")]
     pub corrections: Corrections,
@@ -299,6 +302,7 @@ impl Pipeline {
             coulomb_velocity: 0.0,
             standstill_velocity: vec![0.0; dof],
             derived_from: vec![DerivedFrom::Position; dof],
+            velocity_from: Vec::new(),
             corrections: Corrections::default(),
         }
     }
@@ -306,6 +310,15 @@ impl Pipeline {
     /// True with cut-off 0.
     pub fn is_off(&self) -> bool {
         self.cutoff_hz == 0.0
+    }
+
+    /// Where velocity and an acceleration that is not logged come from, of one joint.
+    pub(crate) fn sources(&self, joint: usize) -> [DerivedFrom; 2] {
+        let velocity = self.velocity_from.get(joint);
+        [
+            velocity.copied().unwrap_or(DerivedFrom::Velocity),
+            self.derived_from[joint],
+        ]
     }
 
     /// Samples between kept rows of a log with this interval, s.

@@ -1,5 +1,6 @@
 //! One log on even clocks: cut, unfolded, resampled where the clock is uneven; nothing filtered yet.
 
+use super::DerivedFrom;
 use super::clock::{Run, even_interval, read_clock, report_jitter};
 use super::jumps::cut_jumps;
 use super::spline::resample;
@@ -206,7 +207,7 @@ pub(crate) fn prepare<'a>(
                 None => pick(&own.q, &run.rows),
                 Some(q) => run.rows.iter().map(|&row| q[row]).collect(),
             },
-            qd: channel(&own.qd).filter(|_| !corrections.velocity_from_position),
+            qd: channel(&own.qd).filter(|_| corrections.velocity != Some(DerivedFrom::Position)),
             qdd: channel(&own.qdd),
             tau: channel(&own.tau),
         }

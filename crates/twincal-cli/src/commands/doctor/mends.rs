@@ -26,7 +26,7 @@ pub(super) struct Mend {
 const NOT_USED: &str = "nothing, if it does not act in these logs; else write its effect into the model in a form that is read";
 
 /// Findings in the order in which they matter, with what mends them.
-const ORDER: [(&str, &str); 48] = [
+const ORDER: [(&str, &str); 49] = [
     (
         "joint_order",
         "map the columns in [columns.q], [columns.qd], [columns.tau] of twincal.toml; twincal init writes them",
@@ -56,6 +56,10 @@ const ORDER: [(&str, &str); 48] = [
     (
         "velocity_mismatch",
         "twincal.toml: [signal] velocity = \"position\"",
+    ),
+    (
+        "noisy_velocity",
+        "nothing: velocity is taken from position; [signal] velocity = \"logged\" keeps the log's",
     ),
     (
         "truncated",
