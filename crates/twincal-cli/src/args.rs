@@ -103,6 +103,24 @@ Examples:
     Schema,
 }
 
+impl Command {
+    /// True where a program reads standard output.
+    pub(crate) fn wants_json(&self) -> bool {
+        match self {
+            Self::Demo(flags) => flags.json,
+            Self::Inspect(flags) => flags.log.json,
+            Self::Doctor(flags) => flags.log.json,
+            Self::Fit(flags) => flags.log.json,
+            Self::Check(flags) => flags.log.json,
+            Self::Predict(flags) => flags.log.json,
+            Self::Diff(flags) => flags.json,
+            Self::Export(flags) => flags.json,
+            Self::Report(flags) => flags.json,
+            Self::Init(_) | Self::Schema => false,
+        }
+    }
+}
+
 /// Flags of every command that reads logs.
 #[derive(Debug, Args)]
 pub(crate) struct LogFlags {

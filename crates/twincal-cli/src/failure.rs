@@ -56,6 +56,14 @@ impl Failure {
         }
     }
 
+    /// What `--json` prints instead of a result.
+    pub(crate) fn json(&self) -> serde_json::Value {
+        let (problem, remedy) = self.words();
+        serde_json::json!({
+            "error": { "exit_code": self.exit_code(), "problem": problem, "remedy": remedy }
+        })
+    }
+
     /// What is wrong, and how to mend it.
     pub(crate) fn words(&self) -> (String, Option<String>) {
         match self {

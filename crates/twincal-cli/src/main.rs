@@ -33,6 +33,11 @@ fn main() -> ExitCode {
             Ok(code) => code,
             Err(failure) => {
                 terminal.failure(&failure);
+                if arguments.command.wants_json() {
+                    terminal.data(&format!("{:#}\n", failure.json()));
+                    // Without standard output there is the exit code.
+                    let _ = terminal.finish();
+                }
                 failure.exit_code()
             }
         }

@@ -133,6 +133,21 @@ fn case_07_too_few_rows_are_refused_with_the_counts() {
         .says(&["refused", "5 rows"]);
 }
 
+/// Who reads standard output learns as much as who reads the terminal.
+#[test]
+fn json_holds_the_error_where_there_is_no_result() {
+    let (_, done) = with_log_and(csv(5, &|_, row| row), &["--json"]);
+    let done = done.expect(4);
+    let said: serde_json::Value = serde_json::from_str(&done.out).unwrap();
+    assert_eq!(said["error"]["exit_code"], 4);
+    let [problem, remedy] = ["problem", "remedy"].map(|key| said["error"][key].as_str().unwrap());
+    assert!(
+        problem.contains("5 rows") && done.err.contains("5 rows"),
+        "{said}"
+    );
+    assert!(remedy.contains("log"), "{said}");
+}
+
 #[test]
 fn case_12_stamps_that_are_all_zero() {
     with_log(cell(0, 0, 400, "0"))

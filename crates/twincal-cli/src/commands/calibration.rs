@@ -128,7 +128,12 @@ impl Job<'_> {
         );
         for file in &stored.context.files {
             // Writing to a string cannot fail.
-            let _ = writeln!(text, "input {} {}", file.sha256, file.name);
+            let checksum = if file.sha256.is_empty() {
+                "-"
+            } else {
+                &file.sha256
+            };
+            let _ = writeln!(text, "input {checksum} {}", file.name);
         }
         for finding in &stored.calibration.findings {
             let _ = writeln!(

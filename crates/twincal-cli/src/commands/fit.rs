@@ -10,6 +10,7 @@ use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::path::PathBuf;
 use twincal_io::artifact::{Claim, Maker, Replace};
+use twincal_io::report::FileHash;
 
 pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     let watch = Stopwatch::start();
@@ -66,24 +67,22 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     Ok(code)
 }
 
-/// A log that is fitted says nothing of what was not, and counts for one experiment only.
+/// A log that is fitted says nothing of what was not, and counts for one experiment only. What came through a pipe has no checksum.
 fn every_log_once(logs: &LogInput, heldout: &LogInput) -> Outcome<()> {
+    let same = |a: &FileHash, b: &FileHash| !a.sha256.is_empty() && a.sha256 == b.sha256;
     for (i, file) in heldout.files.iter().enumerate() {
-        if logs.files.iter().any(|log| log.sha256 == file.sha256) {
+        if logs.files.iter().any(|log| same(log, file)) {
             return Err(Failure::usage(
                 format!("`{}` is fitted and held out", file.name),
                 "hold out a log that the fit does not see, or leave --heldout away",
             ));
         }
-        if heldout.files[..i]
-            .iter()
-            .any(|log| log.sha256 == file.sha256)
-        {
+        if heldout.files[..i].iter().any(|log| same(log, file)) {
             return Err(twice(&file.name));
         }
     }
     for (i, file) in logs.files.iter().enumerate() {
-        if logs.files[..i].iter().any(|log| log.sha256 == file.sha256) {
+        if logs.files[..i].iter().any(|log| same(log, file)) {
             return Err(twice(&file.name));
         }
     }

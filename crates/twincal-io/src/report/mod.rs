@@ -48,7 +48,7 @@ pub struct ReportContext {
 pub struct FileHash {
     /// File name as given; the caller leaves out the folder of an absolute one.
     pub name: String,
-    /// SHA-256, hexadecimal.
+    /// SHA-256, hexadecimal; empty for what can be read only once (a pipe).
     pub sha256: String,
 }
 
