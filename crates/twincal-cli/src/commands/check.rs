@@ -90,10 +90,40 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     for gate in gates.iter().filter(|gate| !gate.passed) {
         paragraph(&gate.words, terminal);
     }
+    terminal.say("All rows, standstill with them");
     scores(&validation.filtered, terminal);
+    if let Some(text) = beyond(&validation) {
+        paragraph(&text, terminal);
+    }
     terminal.say("");
     findings(&found, Notes::In("the output of --json"), terminal);
     Ok(code)
+}
+
+/// How much of the motion is new to the twin, and how it does there.
+fn beyond(validation: &Validation) -> Option<String> {
+    let rows = |scores: &Scores| scores.joints.iter().map(|joint| joint.rows).sum::<u64>();
+    let (within, beyond) = (&validation.within, &validation.beyond);
+    let all = rows(within) + rows(beyond);
+    if rows(beyond) == 0 {
+        return None;
+    }
+    let say = |scores: &Scores| {
+        format!(
+            "RMSE {}, {:.1} % in 95 % intervals",
+            significant(scores.rmse_calibrated, 3),
+            100.0 * scores.coverage95
+        )
+    };
+    let inside = match rows(within) {
+        0 => String::new(),
+        _ => format!("; within it {}", say(within)),
+    };
+    Some(format!(
+        "{:.0} % of the moving rows are beyond the motion of the fit: {} there{inside}",
+        100.0 * rows(beyond) as f64 / all as f64,
+        say(beyond)
+    ))
 }
 
 /// Scores of all logs together.

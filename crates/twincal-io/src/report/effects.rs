@@ -35,7 +35,7 @@ pub(super) struct Effect {
     pub(super) parameters: Vec<Parameter>,
     /// Names of the others.
     pub(super) unseen: Vec<String>,
-    /// The sampler cannot tell on which side of 0.5 it lies.
+    /// The data do not say whether it is there, or the sampler cannot tell on which side of 0.5 it lies.
     pub(super) undecided: bool,
     /// The data say nothing about it.
     pub(super) not_seen: bool,
@@ -105,9 +105,10 @@ fn effect(component: &ComponentSummary, pip: f64) -> Effect {
         pip: probability(pip),
         parameters: seen(component, true).map(parameter).collect(),
         unseen: seen(component, false).map(name).collect(),
-        undecided: component
-            .pip_mcse
-            .is_some_and(|e| e > 0.0 && (pip - 0.5).abs() < 3.0 * e),
+        undecided: component.verdict == Some(Verdict::Undecided)
+            || component
+                .pip_mcse
+                .is_some_and(|e| e > 0.0 && (pip - 0.5).abs() < 3.0 * e),
         not_seen: component.verdict == Some(Verdict::NotSeen),
         alias_of: component.alias_of.clone(),
     }
@@ -158,7 +159,9 @@ fn dropped(term: &TermSummary) -> Option<Dropped> {
         Status::AliasOf(other) => {
             format!("its torque cannot be told from that of {other}, which stands for both")
         }
-        Status::NullLagrangian => "it is a total time derivative: it makes no torque at all".into(),
+        Status::NullLagrangian => {
+            "no motion of this robot gives it a torque: what it acts on has no load or no mass, or its energy is a total time derivative".into()
+        }
         Status::ZeroColumn => "it makes no torque in any of these logs".into(),
     };
     Some(Dropped {

@@ -69,6 +69,16 @@ impl Shape {
         }
     }
 
+    /// False where the central intervals hold too little for ones that are too wide, or too much for ones that are too narrow.
+    fn agrees(self, coverage: &[(f64, f64)]) -> bool {
+        let all = |of: fn(f64, f64) -> bool| coverage.iter().all(|(level, seen)| of(*level, *seen));
+        match self {
+            Self::Wide => all(|level, seen| seen >= level),
+            Self::Narrow => all(|level, seen| seen <= level),
+            Self::Above | Self::Below => true,
+        }
+    }
+
     /// What is said of joints, and of one; `slightly` where intervals are still of use.
     fn words(self, slightly: bool) -> &'static str {
         match (self, slightly) {
@@ -125,7 +135,7 @@ pub(super) fn sentences(calibration: &Calibration) -> Vec<String> {
     for (shape, slightly) in Shape::ALL.into_iter().flat_map(|s| [(s, false), (s, true)]) {
         let own: Vec<&Reliability> = (validation.reliability.iter())
             .filter(|j| Shape::of(&j.pit) == Some(shape) && (j.pit.distance <= OFF) == slightly)
-            .filter(|j| !said(&j.joint, shape))
+            .filter(|j| !said(&j.joint, shape) && shape.agrees(&j.coverage_levels))
             .collect();
         let Some(worst) = (own.iter()).max_by(|a, b| a.pit.distance.total_cmp(&b.pit.distance))
         else {

@@ -4,7 +4,7 @@ use super::shape;
 use super::text::{list, number, percent, with_sd};
 use super::view::{Joint, independent_rows, memory, pooled_unit, standard_deviation};
 use serde::Serialize;
-use twincal::calibrate::Calibration;
+use twincal::calibrate::{Calibration, Verdict as Decision};
 use twincal::posterior::Method;
 use twincal::validate::{JointScore, Scores, Split, Validation, WORSE};
 use twincal::{Finding, Severity};
@@ -17,6 +17,8 @@ const LEVEL: f64 = 0.95;
 const BETTER: f64 = 0.95;
 /// Held-out rows, in independent ones, below which nothing is promised.
 const FEW: f64 = 20.0;
+/// Probability from which a half of the data shows an effect.
+const LIKELY: f64 = 0.5;
 /// Share of the torque's standard deviation from which the remaining error is called large.
 const LARGE: f64 = 0.5;
 
@@ -53,7 +55,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         return Verdict {
             grade: Grade::Bad,
             headline: "Not yet: there are no held-out rows to judge this twin by.".into(),
-            grounds: vec![effects_found(found)],
+            grounds: vec![effects_found(calibration)],
             limits: vec![
                 "Record another motion and give it with --heldout, or fit at least three logs."
                     .into(),
@@ -136,7 +138,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     Verdict {
         grade,
         headline: headline.into(),
-        grounds: grounds(calibration, joints, found),
+        grounds: grounds(calibration, joints),
         limits,
         of_torque,
     }
@@ -148,7 +150,7 @@ fn no_measurement(calibration: &Calibration) -> bool {
     findings.any(|f| f.code == "constant_torque" && f.severity == Severity::Degraded)
 }
 
-fn grounds(calibration: &Calibration, joints: &[Joint<'_>], found: usize) -> Vec<String> {
+fn grounds(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
     let scores = &calibration.validation.filtered;
     let change = scores.rmse_calibrated / scores.rmse_nominal - 1.0;
     let way = match change {
@@ -174,7 +176,7 @@ fn grounds(calibration: &Calibration, joints: &[Joint<'_>], found: usize) -> Vec
             percent(scores.coverage95),
             super::text::count(rows)
         ),
-        effects_found(found),
+        effects_found(calibration),
     ]
 }
 
@@ -188,12 +190,54 @@ pub(super) fn too_wide(joint: &JointScore) -> bool {
     joint.rows > 0 && joint.coverage95 > COVERAGE.1
 }
 
-fn effects_found(found: usize) -> String {
-    match found {
-        0 => "No missing effect is more likely than not.".into(),
-        1 => "One missing effect found.".into(),
-        n => format!("{n} missing effects found."),
+/// What is more likely than not, without and with what the data leave open.
+fn effects_found(calibration: &Calibration) -> String {
+    let likely = || calibration.components.iter().filter(|c| c.selected);
+    let all = likely().count();
+    let open = likely().filter(|c| c.verdict == Some(Decision::Undecided));
+    let open = open.count();
+    let more = match open {
+        0 => String::new(),
+        n => format!(", {n} more likely than not, but undecided"),
+    };
+    match all - open {
+        0 if open == 0 => "No missing effect is more likely than not.".into(),
+        0 => format!("No missing effect is sure{more}."),
+        1 => format!("One missing effect found{more}."),
+        n => format!("{n} missing effects found{more}."),
     }
+}
+
+/// Links of which what was found is no rigid body, and effects that neither half of the data has.
+fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
+    let mut out = Vec::new();
+    let bodies = calibration.findings.iter();
+    let bodies = bodies.filter(|f| f.code == "unphysical_inertia_found");
+    let bodies: Vec<&str> = bodies
+        .filter(|f| f.severity == Severity::Warning)
+        .map(|f| f.subject.as_str())
+        .collect();
+    if !bodies.is_empty() {
+        out.push(format!(
+            "What was found of {} is no rigid body: it stands in for another effect; do not read it as mass or inertia.",
+            list(&bodies)
+        ));
+    }
+    let groups = calibration
+        .repeatability
+        .chunk_by(|a, b| a.component == b.component);
+    let in_neither = groups.filter(|own| {
+        own.iter()
+            .all(|r| r.first_pip < LIKELY && r.second_pip < LIKELY)
+    });
+    let in_neither: Vec<&str> = in_neither.map(|own| own[0].component.as_str()).collect();
+    if !in_neither.is_empty() {
+        out.push(format!(
+            "Neither half of the data shows by itself: {}.",
+            list(&in_neither)
+        ));
+    }
+    out
 }
 
 /// Joints on which the calibrated torque is off by more than [`LARGE`].
@@ -231,13 +275,13 @@ fn limits_of_torque(
         "its torque got worse by calibration",
         "their torque got worse by calibration",
     );
-    let narrow = names(scores.joints.iter().filter(|j| too_narrow(j)));
+    let narrow = with_coverage(scores.joints.iter().filter(|j| too_narrow(j)));
     say(
         &narrow,
         "its intervals are too narrow",
         "their intervals are too narrow",
     );
-    let wide = names(scores.joints.iter().filter(|j| too_wide(j)));
+    let wide = with_coverage(scores.joints.iter().filter(|j| too_wide(j)));
     say(
         &wide,
         "its intervals are wider than they need to be",
@@ -258,6 +302,7 @@ fn limits(calibration: &Calibration, of_torque: Vec<String>) -> Vec<String> {
     let doubts = calibration.findings.iter().filter(|f| f.doubts_the_log());
     let mut out: Vec<String> = doubts.map(|f| f.message.clone()).collect();
     out.extend(of_torque);
+    out.extend(not_to_rest_on(calibration));
     if calibration.validation.split == Split::LastThirty {
         out.push(
             "It was tested on later parts of the same motions only; another motion was not tried."
@@ -270,7 +315,7 @@ fn limits(calibration: &Calibration, of_torque: Vec<String>) -> Vec<String> {
     let degraded = calibration
         .findings
         .iter()
-        .filter(|f| f.severity == Severity::Degraded);
+        .filter(|f| f.severity == Severity::Degraded && !f.doubts_the_log());
     out.extend(degraded.map(|f| f.message.clone()));
     match calibration
         .findings
@@ -331,6 +376,13 @@ pub(super) fn converged(calibration: &Calibration) -> bool {
 /// Standard deviation of the measured held-out torque.
 pub(super) fn torque_deviation(joint: &Joint<'_>) -> f64 {
     standard_deviation(joint.traces.iter().flat_map(|t| t.measured.iter().copied()))
+}
+
+/// Names with the share of rows in the 95 % interval.
+fn with_coverage<'a>(scores: impl Iterator<Item = &'a JointScore>) -> Vec<String> {
+    let named =
+        |s: &JointScore| format!("{} ({} in 95 % intervals)", s.joint, percent(s.coverage95));
+    scores.filter(|s| s.rows > 0).map(named).collect()
 }
 
 fn names<'a>(scores: impl Iterator<Item = &'a JointScore>) -> Vec<String> {
@@ -442,10 +494,10 @@ mod tests {
     fn intervals_off_by_more_than_their_stated_limit_are_in_the_verdict() {
         let wide = judged(|c| {
             c.validation.pit = pit(0.75, 0.0);
-            c.validation
-                .reliability
-                .iter_mut()
-                .for_each(|j| j.pit = pit(0.75, 0.0));
+            c.validation.reliability.iter_mut().for_each(|j| {
+                j.pit = pit(0.75, 0.0);
+                j.coverage_levels = vec![(0.5, 0.75), (0.95, 0.97)];
+            });
         });
         assert_eq!(wide.grade, Grade::Care);
         assert_eq!(

@@ -324,6 +324,7 @@ fn road(
     let (validation, more) = held_out::validate(own, &library, plan, fits_of_folds, progress)?;
     findings.extend(more);
     findings.extend(worse::findings(robot, &validation.filtered));
+    findings.extend(worse::of_compact(validation.compact));
 
     // What follows reads the smoothed logs at other cut-offs and nothing of the recordings.
     drop((trajectories, others, every_log));

@@ -2,8 +2,11 @@
 
 use crate::error::{Finding, Severity};
 use crate::robot::Robot;
-use crate::validate::{Scores, WORSE};
+use crate::validate::{Loss, Scores, WORSE};
 use crate::words::significant;
+
+/// Error of the compact twin over the average's from which it is told.
+const COMPACT: f64 = 1.25;
 
 /// One finding on all joints together where they are worse than nominal by more than [`WORSE`], else one per joint that is.
 pub(super) fn findings(robot: &Robot, scores: &Scores) -> Vec<Finding> {
@@ -32,6 +35,24 @@ pub(super) fn findings(robot: &Robot, scores: &Scores) -> Vec<Finding> {
     told.collect()
 }
 
+/// One on the compact twin where it loses by more than [`COMPACT`] of the error to the average over all models, or says of a held-out row that
+/// it could not be.
+pub(super) fn of_compact(losses: Option<[Loss; 2]>) -> Option<Finding> {
+    let [average, own] = losses?;
+    let impossible = own.log_score == f64::NEG_INFINITY && average.log_score.is_finite();
+    let worse = own.rmse > COMPACT * average.rmse;
+    (worse || impossible).then(|| {
+        let message = format!(
+            "the compact twin (effects with probability 0.5 or more alone) predicts held-out torque worse than the average over all models: RMSE {} instead \
+             of {} on moving joints; effects below 0.5 matter here: predict with the twin as it is, and do not read the compact one's numbers for \
+             the robot's",
+            significant(own.rmse, 3),
+            significant(average.rmse, 3)
+        );
+        Finding::new(Severity::Warning, "compact_worse", "", message, 0)
+    })
+}
+
 fn finding(subject: String, message: String) -> Finding {
     Finding::new(Severity::Warning, "worse_than_model", subject, message, 0)
 }
@@ -42,6 +63,21 @@ mod tests {
     use crate::robot::{JointDescription, JointKind, LinkDescription, RobotDescription};
     use crate::validate::ScoreKeeper;
     use std::collections::BTreeMap;
+
+    #[test]
+    fn a_compact_twin_that_loses_much_is_told() {
+        let loss = |rmse, log_score| Loss {
+            rows: 9,
+            rmse,
+            log_score,
+        };
+        let told = |own| of_compact(Some([loss(1.0, 0.3), own])).map(|f| f.message);
+        assert_eq!(told(loss(1.2, 0.2)), None);
+        let message = told(loss(1.87, -3.0)).unwrap();
+        assert!(message.contains("RMSE 1.87 instead of 1.00"), "{message}");
+        assert!(told(loss(1.0, f64::NEG_INFINITY)).is_some());
+        assert!(of_compact(None).is_none());
+    }
 
     /// A chain of a hinge, a slider and another hinge.
     fn chain() -> Robot {

@@ -2,10 +2,11 @@
 //!
 //! Every joint's torque is compared with what the nominal model, passive friction and motor inertia can explain; a mistake
 //! is named only where another reading of the log explains by far more. Nothing is ever mended in silence: degrees are
-//! refused, all else is a warning with the mend to try.
+//! refused, all else counts as degraded data, with the mend to try.
 
 mod explain;
 mod mend;
+mod no_help;
 mod sample;
 
 use crate::error::{Error, Finding, Result, Severity};
@@ -46,6 +47,7 @@ const PART: f64 = 0.3;
 /// | `torque_scale` | a joint's torque has the model's shape, but is more than 5 times larger or smaller |
 /// | `sign_flip` | a joint's torque, or its motion, has the opposite sign |
 /// | `joint_order` | joints are exchanged |
+/// | `model_of_no_help` | none of these, but a joint that holds a weight has torque of which the model's weight explains nothing |
 ///
 /// # Errors
 /// [`Error::Log`] for positions in degrees.
@@ -134,6 +136,9 @@ pub fn look<'a>(
     });
     let joints = joints.collect();
     findings.extend(scales.into_iter().map(|scale| scale.finding));
+    if findings.is_empty() && sample.independent >= LEAST_INDEPENDENT {
+        findings.extend(no_help::finding(robot, &explained));
+    }
     Ok(Look { joints, findings })
 }
 
@@ -272,7 +277,7 @@ impl Scale {
         };
         Self {
             finding: Finding::new(
-                Severity::Warning,
+                Severity::Degraded,
                 "torque_scale",
                 subject,
                 format!(
@@ -386,7 +391,7 @@ fn signs_and_order(
             _ => "",
         };
         findings.push(Finding::new(
-            Severity::Warning,
+            Severity::Degraded,
             "sign_flip",
             *name,
             format!(
@@ -404,7 +409,7 @@ fn signs_and_order(
             format!("{:.0} %", 100.0 * (1.0 - worst.fold(0.0, f64::max)))
         };
         findings.push(Finding::new(
-            Severity::Warning,
+            Severity::Degraded,
             "joint_order",
             "",
             format!(

@@ -24,6 +24,9 @@ use twincal_io::log::{
 };
 use twincal_io::memory;
 
+/// Mistakes in units that are mended one after the other: of time, of position, of velocity.
+const MISTAKES: usize = 3;
+
 /// Why `fit` would stop.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Refusal {
@@ -278,22 +281,26 @@ impl Examination {
         if together.is_err() {
             // Which of them it is, and whether other units help.
             for log in &mut logs.logs {
-                let one = std::slice::from_ref(log);
-                let Err(error) = filtered(robot, one, settings) else {
-                    continue;
-                };
-                // A log in which nothing moves may still be one of several.
-                if matches!(error, twincal::Error::Refused { .. }) {
-                    continue;
-                }
-                let mut refusal = Refusal::from(Failure::from(error.clone()));
-                if let Some(mended) = converted(robot, log, &error, settings) {
+                for _ in 0..MISTAKES {
+                    let one = std::slice::from_ref(log);
+                    let Err(error) = filtered(robot, one, settings) else {
+                        break;
+                    };
+                    // A log in which nothing moves may still be one of several.
+                    if matches!(error, twincal::Error::Refused { .. }) {
+                        break;
+                    }
+                    let mut refusal = Refusal::from(Failure::from(error.clone()));
+                    let Some(mended) = converted(robot, log, &error, settings) else {
+                        self.refusals.push(refusal);
+                        break;
+                    };
                     self.converted.push(mended.words);
                     refusal.time_unit = mended.time;
                     refusal.degrees = mended.degrees;
                     *log = mended.log;
+                    self.refusals.push(refusal);
                 }
-                self.refusals.push(refusal);
             }
             (logs.logs).retain(|log| describe(robot, log).is_ok());
             together = filtered(robot, &logs.logs, settings);

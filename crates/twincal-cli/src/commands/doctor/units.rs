@@ -120,7 +120,11 @@ pub(super) fn converted(
                 };
                 let changed = units.of(robot, log)?;
                 let words = format!("{}: time was taken as {unit}", log.name());
-                describe(robot, &changed).ok()?;
+                // Other units may have to be mended as well.
+                match describe(robot, &changed) {
+                    Err(twincal::Error::Log { problem, .. }) if problem.contains("degrees") => {}
+                    seen => drop(seen.ok()?),
+                }
                 return Some(Converted {
                     log: changed,
                     words,
