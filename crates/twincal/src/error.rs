@@ -100,12 +100,11 @@ pub struct Finding {
 
 impl Finding {
     /// Codes of findings after which log and model are not believed to speak of the same robot.
-    const NOT_THIS_ROBOT: [&str; 5] = [
+    const NOT_THIS_ROBOT: [&str; 4] = [
         "sign_flip",
         "joint_order",
         "torque_scale",
         "velocity_opposite",
-        "model_of_no_help",
     ];
 
     /// True if it says that log and model hardly speak of the same robot: turned signs, exchanged joints, torque of another scale. What

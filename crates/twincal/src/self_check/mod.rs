@@ -6,7 +6,6 @@
 
 mod explain;
 mod mend;
-mod no_help;
 mod sample;
 
 use crate::error::{Error, Finding, Result, Severity};
@@ -47,7 +46,6 @@ const PART: f64 = 0.3;
 /// | `torque_scale` | a joint's torque has the model's shape, but is more than 5 times larger or smaller |
 /// | `sign_flip` | a joint's torque, or its motion, has the opposite sign |
 /// | `joint_order` | joints are exchanged |
-/// | `model_of_no_help` | none of these, but a joint that holds a weight has torque of which the model's weight explains nothing |
 ///
 /// # Errors
 /// [`Error::Log`] for positions in degrees.
@@ -136,9 +134,6 @@ pub fn look<'a>(
     });
     let joints = joints.collect();
     findings.extend(scales.into_iter().map(|scale| scale.finding));
-    if findings.is_empty() && sample.independent >= LEAST_INDEPENDENT {
-        findings.extend(no_help::finding(robot, &explained));
-    }
     Ok(Look { joints, findings })
 }
 

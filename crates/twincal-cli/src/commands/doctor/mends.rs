@@ -26,7 +26,7 @@ pub(super) struct Mend {
 const NOT_USED: &str = "nothing, if it does not act in these logs; else write its effect into the model in a form that is read";
 
 /// Findings in the order in which they matter, with what mends them.
-const ORDER: [(&str, &str); 50] = [
+const ORDER: [(&str, &str); 49] = [
     (
         "joint_order",
         "map the columns in [columns.q], [columns.qd], [columns.tau] of twincal.toml; twincal init writes them",
@@ -35,10 +35,6 @@ const ORDER: [(&str, &str); 50] = [
     (
         "torque_scale",
         "say what the torque is ([log] torque, gear_ratio, drive_constant), or give [columns.factor] tau",
-    ),
-    (
-        "model_of_no_help",
-        "give the model of this robot: --model; or map the columns in [columns] where the joints' order is another",
     ),
     (
         "unphysical_inertia",
