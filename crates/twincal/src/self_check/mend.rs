@@ -78,11 +78,18 @@ impl Step {
     }
 }
 
+/// Share left as which a torque counts that the model makes larger.
+const AGAINST: f64 = 2.0;
+
 /// By which share that is left a reading is judged: with a free factor at the model's torque, or with the model as it is. Friction and
 /// motor inertia explain much of the torque of a wrong joint too where the model's may be left out; a model that is wrong in its masses
-/// is told by the first alone.
+/// is told by the first alone. A torque that the model only adds to counts as unexplained, and twice at most ([`AGAINST`]): to make the model's
+/// smaller is no gain.
 type Left = fn(&Explained) -> f64;
-const LEFT: [Left; 2] = [|joint| joint.left, |joint| joint.left_as_modelled];
+const LEFT: [Left; 2] = [
+    |joint| joint.left,
+    |joint| joint.left_as_modelled.min(AGAINST),
+];
 
 /// True where a joint's torque is not well explained, so that it is worth looking for another reading.
 fn doubtful(joints: &[Option<Explained>], left: Left) -> bool {

@@ -35,6 +35,26 @@ fn a_good_log_is_passed_in_silence() {
     }
 }
 
+/// Torque of which nothing is the model's: other readings only make the model's smaller.
+#[test]
+fn noise_for_torque_is_no_other_order() {
+    for size in [0.1, 1.0, 10.0, 100.0] {
+        let mut noise = log(0.0);
+        let mut state = 3_u64;
+        for tau in &mut noise.segments[0].tau {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            *tau = size * ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5);
+        }
+        let codes: Vec<String> = said(&noise).into_iter().map(|(code, _)| code).collect();
+        assert!(
+            codes.iter().all(|code| code == "torque_scale"),
+            "{size}: {codes:?}"
+        );
+    }
+}
+
 #[test]
 fn case_18_degrees_are_refused() {
     let mut degrees = log(0.0);
