@@ -119,7 +119,15 @@ fn init_mends_units_signs_and_order_and_the_twin_reads_new_logs_likewise() {
         row.swap(3, 4);
         row.swap(5, 6);
     };
+    let all_at_once: fn(&mut [f64; 7]) = |row| {
+        row[0] *= 1e3;
+        row[1..5].iter_mut().for_each(|v| *v *= 360.0 / TAU);
+        row[5] *= -1e3;
+        row[6] *= 1e3;
+    };
     for (change, line) in [
+        (all_at_once, "time_unit = \"ms\""),
+        (all_at_once, "tau = { elbow = 0.001, shoulder = -0.001 }"),
         (
             degrees,
             "[columns.factor]\nq = 0.017453292519943295\nqd = 0.0174",
