@@ -123,8 +123,11 @@ fn a_pipe_is_read_by_the_columns_of_the_fit() {
         "mkfifo named; (cat run.csv > named &); timeout 60 \"$TWINCAL\" check named --twin twin";
     let done = shell(place(), line).expect(0);
     assert!(done.out.contains("passed"), "{}", done.out);
-    let line = "\"$TWINCAL\" check <(cat run.csv) <(cat run.csv) --twin twin";
+    let line = "\"$TWINCAL\" fit <(cat run.csv) <(cat run.csv) --model arm.urdf --config quick.toml -o piped";
     shell(place(), line).expect(0);
+    let of = |file: &str| fs::read_to_string(place().join("piped").join(file)).unwrap();
+    assert_eq!(of("run.log").matches("\ninput - ").count(), 2);
+    assert!(of("report.html").contains("read from a pipe, not kept"));
 }
 
 #[test]

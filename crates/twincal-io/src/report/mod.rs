@@ -11,6 +11,7 @@ mod figures;
 mod honesty;
 #[cfg(test)]
 mod fixture;
+mod limits;
 mod page;
 mod plot;
 mod scale;
@@ -56,8 +57,12 @@ pub struct FileHash {
 /// what stands at the top of the report.
 #[must_use]
 pub fn verdict(calibration: &Calibration) -> (String, Vec<String>) {
-    let verdict = verdict::judge(calibration, &view::joints(calibration));
-    (verdict.headline, verdict.of_torque)
+    let joints = view::joints(calibration);
+    let verdict = verdict::judge(calibration, &joints);
+    (
+        verdict.headline,
+        limits::limits_of_torque(calibration, &joints),
+    )
 }
 
 /// The report as HTML.

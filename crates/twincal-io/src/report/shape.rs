@@ -1,7 +1,7 @@
 //! Have the predicted distributions the right shape: what the PIT of held-out rows says, joint by joint, in words.
 
+use super::limits::{too_narrow, too_wide};
 use super::text::{list, number};
-use super::verdict::{too_narrow, too_wide};
 use twincal::calibrate::Calibration;
 use twincal::validate::{JointScore, Pit, Reliability, Scores};
 

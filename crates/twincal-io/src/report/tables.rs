@@ -1,7 +1,7 @@
 //! The report's tables besides the effects: scores, noise, motion, logs, findings, convergence, pipeline.
 
+use super::limits::{converged, torque_deviation};
 use super::text::{count, list, number, percent, probability};
-use super::verdict::{converged, torque_deviation};
 use super::view::Joint;
 use serde::Serialize;
 use twincal::Severity;

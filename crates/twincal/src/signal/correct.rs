@@ -5,7 +5,7 @@ use super::prepare::{JointFacts, Values};
 use super::spline::resample;
 use crate::error::{Error, Result};
 use crate::robot::did_you_mean;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -33,7 +33,24 @@ pub struct Corrections {
     pub lag: Lag,
     /// Where velocity comes from, if that was said: the log, or the change of position whatever is logged. Else per joint what leaves less
     /// noise ([`Pipeline::velocity_from`](super::Pipeline::velocity_from)).
+    #[serde(alias = "velocity_from_position", deserialize_with = "source")]
     pub velocity: Option<DerivedFrom>,
+}
+
+/// Twins of earlier versions hold `velocity_from_position`, true or false.
+fn source<'de, D: Deserializer<'de>>(
+    from: D,
+) -> std::result::Result<Option<DerivedFrom>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Said {
+        FromPosition(bool),
+        Source(Option<DerivedFrom>),
+    }
+    Ok(match Said::deserialize(from)? {
+        Said::FromPosition(said) => said.then_some(DerivedFrom::Position),
+        Said::Source(source) => source,
+    })
 }
 
 impl Corrections {
@@ -188,5 +205,23 @@ mod tests {
         assert!(corrections.check(&facts, true).is_err());
         assert!(corrections.check(&facts[1..], false).is_err());
         assert!(corrections.moves(&facts) && !corrections.moves(&facts[1..]));
+    }
+
+    #[test]
+    fn where_velocity_comes_from_is_read_of_earlier_twins_too() {
+        let read = |text: &str| {
+            serde_json::from_str::<Corrections>(text)
+                .map(|c| c.velocity)
+                .ok()
+        };
+        let position = Some(DerivedFrom::Position);
+        assert_eq!(read(r#"{"velocity_from_position":true}"#), Some(position));
+        assert_eq!(read(r#"{"velocity_from_position":false}"#), Some(None));
+        assert_eq!(read("{}"), Some(None));
+        for velocity in [None, position, Some(DerivedFrom::Velocity)] {
+            let lag = Lag::All(0.01);
+            let text = serde_json::to_string(&Corrections { lag, velocity }).unwrap_or_default();
+            assert_eq!(read(&text), Some(velocity), "{text}");
+        }
     }
 }

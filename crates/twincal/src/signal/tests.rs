@@ -307,3 +307,31 @@ fn without_its_recording_a_log_is_smoothed_to_the_same_bits() {
         assert!(kept.logged.is_none());
     }
 }
+
+/// q̇ with white noise on one joint: taken from position where that tells it better, and where it matters.
+#[test]
+fn a_noisy_velocity_gives_way_to_a_better_position() {
+    let fundamental = 0.2;
+    let noisy = |of_position: f64, of_velocity: f64| {
+        let mut log = recording(500.0, 30.0, fundamental, of_position, true);
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(11);
+        log.joints.iter_mut().for_each(|joint| joint.qdd = None);
+        for v in log.joints[1].qd.iter_mut().flatten() {
+            *v += of_velocity * normal(&mut random);
+        }
+        log
+    };
+    let source = |log: &Recording| pipeline(log).velocity_from;
+    let log = noisy(1e-6, 0.3);
+    assert_eq!(source(&log), [DerivedFrom::Velocity, DerivedFrom::Position]);
+    // A velocity that is clean enough stays, and so does one beside a position that is no better; as does what was said.
+    assert_eq!(source(&noisy(1e-6, 1e-3)), []);
+    assert_eq!(source(&noisy(5e-3, 0.3)), []);
+    let mut stated = settings(Auto::Auto);
+    stated.corrections.velocity = Some(DerivedFrom::Velocity);
+    let as_logged = chosen(&log, &stated).unwrap().0;
+    assert_eq!(as_logged.velocity_from, []);
+    let [from_position, logged] =
+        [pipeline(&log), as_logged].map(|pipeline| errors(&log, &pipeline, fundamental)[0]);
+    assert!(from_position < 0.05 * logged, "{from_position} {logged}");
+}

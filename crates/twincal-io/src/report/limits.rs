@@ -1,0 +1,325 @@
+//! Where a twin does not hold: what errors and intervals of held-out torque say against it, and what was found that is not to be rested on.
+
+use super::shape;
+use super::text::{list, percent};
+use super::view::{Joint, memory, standard_deviation};
+use twincal::Severity;
+use twincal::calibrate::Calibration;
+use twincal::posterior::Method;
+use twincal::validate::{JointScore, Scores, Split, Validation, WORSE};
+
+/// A 95 % interval is honest if it holds this share of the held-out rows.
+pub(super) const COVERAGE: (f64, f64) = (0.90, 0.99);
+/// What an interval promises to hold.
+const LEVEL: f64 = 0.95;
+/// Share of the torque's standard deviation from which the remaining error is called large.
+const LARGE: f64 = 0.5;
+/// Probability from which a half of the data shows an effect.
+const LIKELY: f64 = 0.5;
+
+/// Where the twin does not hold and what to mind, in the order of the report.
+pub(super) fn limits(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
+    let doubts = calibration.findings.iter().filter(|f| f.doubts_the_log());
+    let mut out: Vec<String> = doubts.map(|f| f.message.clone()).collect();
+    out.extend(limits_of_torque(calibration, joints));
+    out.extend(not_to_rest_on(calibration));
+    if calibration.validation.split == Split::LastThirty {
+        out.push(
+            "It was tested on later parts of the same motions only; another motion was not tried."
+                .into(),
+        );
+    }
+    if !converged(calibration) {
+        out.push("The sampler has not converged: run it with more draws before relying on the probabilities.".into());
+    }
+    let degraded = calibration
+        .findings
+        .iter()
+        .filter(|f| f.severity == Severity::Degraded && !f.doubts_the_log());
+    out.extend(degraded.map(|f| f.message.clone()));
+    match calibration
+        .findings
+        .iter()
+        .filter(|f| f.severity == Severity::Warning)
+        .count()
+    {
+        0 => {}
+        1 => out.push(
+            "There is one warning to read (see “What was read, dropped and filtered”).".into(),
+        ),
+        n => out.push(format!(
+            "There are {n} warnings to read (see “What was read, dropped and filtered”)."
+        )),
+    }
+    out.push("Outside the motion listed under “What the data cannot tell” it extrapolates.".into());
+    out
+}
+
+/// What errors and intervals of held-out torque say against the twin.
+pub(super) fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
+    let scores = &calibration.validation.filtered;
+    let mut out = Vec::new();
+    let mut say = |joints: &[String], one: &str, many: &str| {
+        if !joints.is_empty() {
+            out.push(format!(
+                "{} {}: {}.",
+                if joints.len() == 1 { "Joint" } else { "Joints" },
+                list(joints),
+                if joints.len() == 1 { one } else { many }
+            ));
+        }
+    };
+    say(
+        &worse(scores),
+        "its torque got worse by calibration",
+        "their torque got worse by calibration",
+    );
+    let narrow = with_coverage(scores.joints.iter().filter(|j| too_narrow(j)));
+    say(
+        &narrow,
+        "its intervals are too narrow",
+        "their intervals are too narrow",
+    );
+    let wide = with_coverage(scores.joints.iter().filter(|j| too_wide(j)));
+    say(
+        &wide,
+        "its intervals are wider than they need to be",
+        "their intervals are wider than they need to be",
+    );
+    let mut out_of_shape = shape::sentences(calibration);
+    say(
+        &large(scores, joints),
+        "the error left is more than half of the torque's standard deviation",
+        "the error left is more than half of the torque's standard deviation",
+    );
+    out.append(&mut out_of_shape);
+    out.extend(beyond(calibration, joints));
+    out
+}
+
+/// Links of which what was found is no rigid body, and effects that neither half of the data has.
+fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
+    let mut out = Vec::new();
+    let bodies = calibration.findings.iter();
+    let bodies = bodies.filter(|f| f.code == "unphysical_inertia_found");
+    let bodies: Vec<&str> = bodies
+        .filter(|f| f.severity == Severity::Warning)
+        .map(|f| f.subject.as_str())
+        .collect();
+    if !bodies.is_empty() {
+        out.push(format!(
+            "What was found of {} is no rigid body: it stands in for another effect; do not read it as mass or inertia.",
+            list(&bodies)
+        ));
+    }
+    let groups = calibration
+        .repeatability
+        .chunk_by(|a, b| a.component == b.component);
+    let in_neither = groups.filter(|own| {
+        own.iter()
+            .all(|r| r.first_pip < LIKELY && r.second_pip < LIKELY)
+    });
+    let in_neither: Vec<&str> = in_neither.map(|own| own[0].component.as_str()).collect();
+    if !in_neither.is_empty() {
+        out.push(format!(
+            "Neither half of the data shows by itself: {}.",
+            list(&in_neither)
+        ));
+    }
+    out
+}
+
+/// Joints whose intervals are too narrow where their motion was not seen before, and less so where it was: by more than two standard
+/// errors of as many independent rows.
+fn beyond(calibration: &Calibration, joints: &[Joint<'_>]) -> impl Iterator<Item = String> {
+    let Validation { within, beyond, .. } = &calibration.validation;
+    let narrow = within
+        .joints
+        .iter()
+        .zip(&beyond.joints)
+        .filter(|(within, beyond)| {
+            let independent = beyond.rows as f64 / memory(joints, &beyond.joint);
+            let chance = 2.0 * (LEVEL * (1.0 - LEVEL) / independent).sqrt();
+            let better_within = within.rows == 0 || within.coverage95 > beyond.coverage95;
+            better_within && too_narrow(beyond) && beyond.coverage95 < LEVEL - chance
+        });
+    narrow.map(|(within, beyond)| {
+        let seen = match within.rows {
+            0 => String::new(),
+            _ => format!(", within it {}", percent(within.coverage95)),
+        };
+        format!(
+            "Joint {}: beyond the training motion ({} of {} moving rows) its 95 % intervals hold {}{seen}.",
+            beyond.joint,
+            beyond.rows,
+            within.rows + beyond.rows,
+            percent(beyond.coverage95)
+        )
+    })
+}
+
+/// Joints whose torque got worse.
+pub(super) fn worse(scores: &Scores) -> Vec<String> {
+    let joints = scores.joints.iter();
+    names(joints.filter(|j| j.rmse_calibrated > WORSE * j.rmse_nominal))
+}
+
+/// Joints on which the calibrated torque is off by more than [`LARGE`].
+pub(super) fn large(scores: &Scores, joints: &[Joint<'_>]) -> Vec<String> {
+    let is_large = |joint: &&Joint<'_>| {
+        let score = scores.joints.iter().find(|s| s.joint == joint.name);
+        let deviation = torque_deviation(joint);
+        score.is_some_and(|s| deviation > 0.0 && s.rmse_calibrated > LARGE * deviation)
+    };
+    let joints = joints.iter().filter(is_large);
+    joints.map(|joint| joint.name.to_owned()).collect()
+}
+
+/// Fewer held-out rows in the 95 % interval than an honest one has.
+pub(super) fn too_narrow(joint: &JointScore) -> bool {
+    joint.rows > 0 && joint.coverage95 < COVERAGE.0
+}
+
+/// More of them.
+pub(super) fn too_wide(joint: &JointScore) -> bool {
+    joint.rows > 0 && joint.coverage95 > COVERAGE.1
+}
+
+/// Names with the share of rows in the 95 % interval.
+fn with_coverage<'a>(scores: impl Iterator<Item = &'a JointScore>) -> Vec<String> {
+    let named =
+        |s: &JointScore| format!("{} ({} in 95 % intervals)", s.joint, percent(s.coverage95));
+    scores.filter(|s| s.rows > 0).map(named).collect()
+}
+
+fn names<'a>(scores: impl Iterator<Item = &'a JointScore>) -> Vec<String> {
+    scores
+        .filter(|s| s.rows > 0)
+        .map(|s| s.joint.clone())
+        .collect()
+}
+
+/// R̂ and effective sample size as Vehtari et al. (2021) ask for.
+pub(super) fn converged(calibration: &Calibration) -> bool {
+    match calibration.twin.posterior.method {
+        Method::Exact { .. } => true,
+        Method::Search { missing, .. } => missing < 1e-3,
+        Method::Gibbs { r_hat, ess, .. } => r_hat <= 1.01 && ess >= 400.0,
+    }
+}
+
+/// Standard deviation of the measured held-out torque.
+pub(super) fn torque_deviation(joint: &Joint<'_>) -> f64 {
+    standard_deviation(joint.traces.iter().flat_map(|t| t.measured.iter().copied()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::verdict::Verdict;
+    use super::super::verdict::tests::judged;
+    use super::*;
+    use crate::report::shape::tests::pit;
+    use twincal::Finding;
+
+    #[test]
+    fn what_is_not_to_rest_on_is_said() {
+        use twincal::Severity::{Note, Warning};
+        let body = |severity| {
+            judged(move |c| {
+                let finding = Finding::new(severity, "unphysical_inertia_found", "forearm", "", 0);
+                c.findings.push(finding);
+            })
+        };
+        let says =
+            |verdict: &Verdict, words: &str| verdict.limits.iter().any(|l| l.contains(words));
+        assert!(says(
+            &body(Warning),
+            "What was found of forearm is no rigid body"
+        ));
+        assert!(!says(&body(Note), "no rigid body"));
+        // Of two halves one may show it.
+        let halves = |second: f64| {
+            judged(move |c| {
+                for own in &mut c.repeatability {
+                    (own.first_pip, own.second_pip) = (0.4, second);
+                }
+            })
+        };
+        assert!(says(
+            &halves(0.3),
+            "Neither half of the data shows by itself: "
+        ));
+        assert!(!says(&halves(0.6), "Neither half"));
+    }
+
+    #[test]
+    fn the_middle_of_a_distribution_does_not_speak_against_what_its_intervals_hold() {
+        let of = |levels: [(f64, f64); 2]| {
+            let verdict = judged(move |c| {
+                c.validation.reliability[1].pit = pit(0.75, 0.0);
+                c.validation.reliability[1].coverage_levels = levels.to_vec();
+            });
+            verdict
+                .limits
+                .iter()
+                .any(|l| l.contains("elbow: its intervals are wider"))
+        };
+        assert!(of([(0.5, 0.75), (0.95, 0.97)]));
+        assert!(!of([(0.5, 0.75), (0.95, 0.925)]));
+        // With the share that they hold, and once.
+        let narrow = judged(|c| {
+            c.validation.filtered.joints[1].coverage95 = 0.697;
+            c.validation.reliability[1].pit = pit(0.25, 0.0);
+            c.validation.reliability[1].coverage_levels = vec![(0.5, 0.25), (0.95, 0.697)];
+        });
+        let of_elbow: Vec<&String> = narrow
+            .limits
+            .iter()
+            .filter(|l| l.contains("narrow"))
+            .collect();
+        assert_eq!(of_elbow.len(), 1, "{narrow:?}");
+        assert!(of_elbow[0].contains("elbow (69.7"), "{narrow:?}");
+    }
+
+    #[test]
+    fn what_is_too_narrow_beyond_the_training_motion_is_said_of_it() {
+        let beyond = |c: &mut Calibration, coverage95: f64| {
+            c.validation.beyond = c.validation.within.clone();
+            for (joint, rows) in c.validation.beyond.joints.iter_mut().zip([0, 34]) {
+                (joint.rows, joint.coverage95) = (rows, coverage95);
+            }
+            c.validation.within.joints[1].rows = 46;
+            c.validation.within.joints[1].coverage95 = 0.93;
+        };
+        let said = "Joint elbow: beyond the training motion (34 of 80 moving rows) its 95 % intervals hold 24.0\u{202f}%, within it 93.0\u{202f}%.";
+        let limits = judged(|c| beyond(c, 0.24)).limits;
+        assert!(limits.iter().any(|limit| limit == said), "{limits:?}");
+        assert_eq!(limits.iter().filter(|l| l.contains("beyond")).count(), 1);
+        // Nothing of it where the motion does not explain it.
+        let limits = judged(|c| {
+            beyond(c, 0.24);
+            c.validation.within.joints[1].coverage95 = 0.2;
+        });
+        assert!(!limits.limits.iter().any(|l| l.contains("beyond")));
+        // Nor of a handful of rows.
+        let limits = judged(|c| {
+            beyond(c, 0.8);
+            c.validation.beyond.joints[1].rows = 5;
+        });
+        assert!(!limits.limits.iter().any(|l| l.contains("beyond")));
+        let limits = judged(|c| beyond(c, 0.94)).limits;
+        assert!(!limits.iter().any(|l| l.contains("beyond")), "{limits:?}");
+    }
+
+    #[test]
+    fn limits_name_the_joints() {
+        let verdict = judged(|c| c.validation.filtered.joints[1].rmse_calibrated = 9.0);
+        assert!(
+            verdict
+                .limits
+                .iter()
+                .any(|l| l.contains("elbow") && l.contains("got worse")),
+            "{verdict:?}"
+        );
+    }
+}
