@@ -8,7 +8,7 @@ mod two_link;
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::sync::LazyLock;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
-use twincal::compare::{ParameterChange, compare, hindrances};
+use twincal::compare::{Became, ParameterChange, compare, hindrances};
 use twincal::posterior::random::Random;
 use twincal::posterior::{Model, Posterior};
 use twincal::signal::Auto;
@@ -245,6 +245,47 @@ fn two_normal_posteriors_differ_by_their_closed_form() {
             }
         }
     }
+}
+
+/// The payload or the hidden effect, never both: 0.94 and 0.06 before, 0.7 and 0.3 after.
+#[test]
+fn one_effect_under_two_names_is_as_before() {
+    let given = Given {
+        mean: [0.8, 0.5],
+        factor: [4.0, 1.5, 2.0],
+        noise: 0.04,
+        inside: 1.0,
+    };
+    let twin = |share: f64| {
+        let mut twin = given.twin();
+        let both = twin.posterior.models.remove(0);
+        let one = |k: usize, weight: f64| Model {
+            members: vec![both.members[k]],
+            weight,
+            mean: vec![both.mean[k]],
+            factor: vec![4.0],
+            ..both.clone()
+        };
+        twin.posterior.models = vec![one(0, 1.0 - share), one(1, share)];
+        for k in [0, 1] {
+            twin.posterior.inclusion[both.members[k] as usize] = [1.0 - share, share][k];
+        }
+        twin
+    };
+    let changes = compare(&twin(0.94), &twin(0.7)).expect("twins of one robot");
+    let of = |name: &str| changes.iter().find(|c| c.name == name).expect("compared");
+    let (payload, hidden) = (of("payload"), of("sin(q1 - q2)"));
+    assert_eq!(payload.became, Became::OneOfTwo);
+    assert_eq!(payload.rival.as_deref(), Some("sin(q1 - q2)"));
+    assert_eq!(hidden.rival.as_deref(), Some("payload"));
+    // Where the other does not stand for it, it went.
+    let mut without = twin(0.7);
+    without.posterior.models[0].members.clear();
+    without.posterior.models[0].mean.clear();
+    without.posterior.models[0].factor.clear();
+    let changes = compare(&twin(0.94), &without).expect("twins of one robot");
+    let payload = changes.iter().find(|c| c.name == "payload");
+    assert_eq!(payload.expect("compared").became, Became::PerhapsGone);
 }
 
 #[test]

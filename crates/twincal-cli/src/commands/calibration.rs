@@ -98,6 +98,7 @@ impl Job<'_> {
         let logs = self.logs.files.iter().chain(&self.heldout.files);
         ReportContext {
             version: env!("CARGO_PKG_VERSION").into(),
+            robot: self.robot.name.clone(),
             model: self.robot.file.name.clone(),
             command: self.command.clone(),
             settings: self.config.in_force(),

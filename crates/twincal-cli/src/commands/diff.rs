@@ -94,6 +94,7 @@ fn print_changed(changes: &[&Change], terminal: &mut Terminal) -> usize {
     for change in told {
         print_change(change, terminal);
     }
+    print_rivals(changes, terminal);
     if !weak.is_empty() {
         let name = |change: &&&Change| format!("{} ({})", change.name, pips(change));
         let names: Vec<String> = weak.iter().map(name).collect();
@@ -101,6 +102,31 @@ fn print_changed(changes: &[&Change], terminal: &mut Terminal) -> usize {
         paragraph(&text, terminal);
     }
     of(Became::AsBefore).count()
+}
+
+/// What is there on both sides under one of two names.
+fn print_rivals(changes: &[&Change], terminal: &mut Terminal) {
+    let find = |name: &str| changes.iter().copied().find(|change| change.name == name);
+    let mut told: Vec<&str> = Vec::new();
+    for change in changes
+        .iter()
+        .filter(|change| change.became == Became::OneOfTwo)
+    {
+        let Some(rival) = change.rival.as_deref().and_then(find) else {
+            continue;
+        };
+        if told.contains(&change.name.as_str()) {
+            continue;
+        }
+        told.extend([change.name.as_str(), rival.name.as_str()]);
+        let name = |change: &Change| format!("{} (PIP {})", change.story, pips(change));
+        let text = format!(
+            "one or the other in both, these logs leave open which: {} or {}",
+            name(change),
+            name(rival)
+        );
+        paragraph(&text, terminal);
+    }
 }
 
 /// Whether a component is likelier out than in on both sides, and its numbers are next to nothing.
@@ -121,7 +147,7 @@ fn print_change(change: &Change, terminal: &mut Terminal) {
         Became::Gone => "gone",
         Became::PerhapsNew => "perhaps new",
         Became::PerhapsGone => "perhaps gone",
-        Became::Changed | Became::AsBefore => "changed",
+        Became::OneOfTwo | Became::Changed | Became::AsBefore => "changed",
     };
     let text = format!("{mark}: {} (PIP {})", change.story, pips(change));
     paragraph(&text, terminal);
@@ -143,7 +169,7 @@ fn print_change(change: &Change, terminal: &mut Terminal) {
 
 /// "mass: 0 → +1.740 kg, difference +1.740 ± 0.004 (95 %: +1.732 to +1.748)".
 fn line(change: &Change, parameter: &ParameterChange) -> String {
-    let (factor, unit) = parameter.told_in(change.family);
+    let (factor, unit) = change.family.told_in(&parameter.unit);
     let name = match parameter.name.as_str() {
         "value" => String::new(),
         name => format!("{}: ", name.replace('_', " ")),

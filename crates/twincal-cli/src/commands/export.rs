@@ -401,14 +401,19 @@ fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
         );
         paragraph(&text, terminal);
     }
-    let small: Vec<&Residual> = told.iter().skip(TOLD).copied().chain(rest).collect();
-    if let Some(most) = small.iter().map(|r| largest(&r.torque)).reduce(f64::max) {
-        let text = format!(
-            "{} less sure or smaller components: none above {} N·m rms",
-            small.len(),
-            short(most)
-        );
-        paragraph(&text, terminal);
+    let smaller: Vec<&Residual> = told.into_iter().skip(TOLD).collect();
+    for (which, residuals) in [("smaller", smaller), ("less sure", rest)] {
+        let most = residuals.iter().map(|r| largest(&r.torque));
+        if let Some(most) = most.reduce(f64::max) {
+            let text = match residuals.len() {
+                1 => format!("one {which} component: up to {} N·m rms", short(most)),
+                n => format!(
+                    "{n} {which} components: each at most {} N·m rms",
+                    short(most)
+                ),
+            };
+            paragraph(&text, terminal);
+        }
     }
     if let Some(projection) = &change.projection {
         let text = format!(

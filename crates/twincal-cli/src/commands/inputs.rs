@@ -23,6 +23,8 @@ const DOUBLES_PER_SAMPLE: u64 = 12;
 /// The robot and what its file says.
 pub(super) struct RobotInput {
     pub(super) robot: Robot,
+    /// What its file calls it; may be empty.
+    pub(super) name: String,
     pub(super) file: FileHash,
     /// Name in the artefact and bytes of the file.
     pub(super) source: (&'static str, Vec<u8>),
@@ -47,6 +49,7 @@ impl RobotInput {
         };
         Ok(Self {
             robot,
+            name: model.robot_name().to_owned(),
             file: FileHash { name, sha256 },
             source: (stored, model.bytes),
             findings,

@@ -2,7 +2,7 @@
 
 use super::table::{print_table, table};
 use crate::terminal::{Terminal, clean};
-use twincal::calibrate::{Calibration, ComponentSummary, TermSummary, Verdict};
+use twincal::calibrate::{Calibration, ComponentSummary, Repeat, Repeated, TermSummary, Verdict};
 use twincal::term::Status;
 use twincal::validate::{Scores, Split};
 use twincal::words::significant;
@@ -10,26 +10,26 @@ use twincal::{Finding, Severity};
 use twincal_io::report;
 use twincal_io::result_json::status_word;
 
+/// What to do about a log that contradicts the model.
+const MENDS: &str = "`twincal init` with this log and model writes a twincal.toml that mends it, where it is a mistake of columns, signs or units";
 /// Dropped columns up to this number are named.
 const FEW: usize = 4;
-/// What the table of components holds.
+/// What the table of components that were not kept holds.
 const VALUE: &str = "value: median, given that it is in; ±: half of the central 68 % interval";
 /// Terms below this probability are only counted.
 const MENTIONED: f64 = 0.05;
-
-/// Probability that a half must give an effect for it to count as repeated.
-const HELD: f64 = 0.5;
 
 /// Prints the whole summary.
 pub(super) fn print(calibration: &Calibration, terminal: &mut Terminal) {
     let doubts = || calibration.findings.iter().filter(|f| f.doubts_the_log());
     if doubts().next().is_some() {
-        terminal.heading("Log and model do not seem to speak of the same robot");
+        terminal.heading("Log and model contradict each other in sign, scale or order of joints");
         doubts().for_each(|finding| paragraph(&finding.message, terminal));
+        paragraph(MENDS, terminal);
         terminal.say("");
     }
     effects(calibration, terminal);
-    components(calibration, terminal);
+    others(calibration, terminal);
     validation(calibration, terminal);
     verdict(calibration, terminal);
     findings(&calibration.findings, Notes::In("the report"), terminal);
@@ -42,25 +42,24 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
         terminal.say("  nothing: no candidate has a probability of 0.5 or more");
     }
     for component in all.iter().filter(|component| component.selected) {
-        let open = match component.verdict {
-            Some(Verdict::Undecided) => ", undecided",
-            _ => "",
-        };
-        let text = format!("{} (PIP {}{open})", component.words, pip(component.pip));
+        let mut said = vec![format!("PIP {}", pip(component.pip))];
+        if component.verdict == Some(Verdict::Undecided) {
+            said.push("undecided".into());
+        }
+        if let halves @ (Repeated::InNeitherHalf | Repeated::InOneHalf) =
+            repeated(component, calibration)
+        {
+            said.push(halves.words().into());
+        }
+        let text = format!("{} ({})", component.words, said.join(", "));
         paragraph(&text, terminal);
     }
-    for (verdict, words) in [
-        (Verdict::Undecided, "undecided, below 0.5"),
-        (Verdict::NotSeen, "not seen by these data"),
-    ] {
-        let names: Vec<&str> = all
-            .iter()
-            .filter(|component| component.verdict == Some(verdict) && !component.selected)
-            .map(|component| component.name.as_str())
-            .collect();
-        if !names.is_empty() {
-            paragraph(&format!("{words}: {}", names.join(", ")), terminal);
-        }
+    let unseen: Vec<&str> = (all.iter().filter(|component| is_unseen(component)))
+        .map(|component| component.name.as_str())
+        .collect();
+    if !unseen.is_empty() {
+        let text = format!("not seen by these data: {}", unseen.join(", "));
+        paragraph(&text, terminal);
     }
     for group in calibration.groups.iter().filter(|group| !group.settled) {
         paragraph(&group.words, terminal);
@@ -78,25 +77,47 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
     terminal.say("");
 }
 
-/// Every component worth mentioning; one of several columns has its numbers in the report and in result.json.
-fn components(calibration: &Calibration, terminal: &mut Terminal) {
+fn is_unseen(component: &ComponentSummary) -> bool {
+    component.verdict == Some(Verdict::NotSeen) && !component.selected
+}
+
+/// What the two halves of the data say about a component.
+fn repeated(component: &ComponentSummary, calibration: &Calibration) -> Repeated {
+    let all = &calibration.repeatability;
+    let mut effects = all.chunk_by(|a, b| a.component == b.component);
+    let own = effects.find(|own| own[0].component == component.name);
+    Repeat::of_effect(own.unwrap_or_default())
+}
+
+/// What was weighed and not kept, as far as it is worth mentioning; one of several columns has its numbers in the report and in
+/// result.json.
+fn others(calibration: &Calibration, terminal: &mut Terminal) {
     let mut table = table(&["component", "PIP", "value", "±", "unit"]);
     let (mut rare, mut dropped) = (0, Vec::new());
-    for component in &calibration.components {
+    for component in calibration
+        .components
+        .iter()
+        .filter(|c| !c.selected && !is_unseen(c))
+    {
         match component.pip {
-            Some(p) if p >= MENTIONED || component.selected => {
+            Some(p) if p >= MENTIONED => {
                 table.add_row(row(component, &calibration.terms));
             }
             Some(_) => rare += 1,
             None => dropped.extend(terms_of(component, &calibration.terms)),
         }
     }
+    if table.is_empty() && rare == 0 && dropped.is_empty() {
+        return;
+    }
+    terminal.heading("Weighed and not kept");
     print_table(&table, terminal);
     if !table.is_empty() {
         paragraph(VALUE, terminal);
     }
     if rare > 0 {
-        terminal.say(&format!("  {rare} more below PIP {MENTIONED}"));
+        let more = if table.is_empty() { "" } else { "more " };
+        terminal.say(&format!("  {rare} {more}below PIP {MENTIONED}"));
     }
     if dropped.len() > FEW {
         terminal.say(&format!(
@@ -221,32 +242,35 @@ fn repeatability(calibration: &Calibration, terminal: &mut Terminal) {
     let Some(halves) = calibration.halves else {
         return;
     };
-    let (mut same, mut other, mut weak) = (0, Vec::new(), Vec::new());
+    let (mut all, mut same, mut other, mut loose) = (0, 0, Vec::new(), Vec::new());
     for group in (calibration.repeatability).chunk_by(|a, b| a.component == b.component) {
-        let apart = group.iter().filter_map(|repeat| repeat.z).map(f64::abs);
-        let apart = apart.fold(f64::NAN, f64::max);
-        if apart >= 3.0 {
-            let name = clean(&group[0].component);
-            other.push(format!("{name} ({apart:.1} sd apart)"));
-        } else if group.iter().any(|r| r.first_pip.min(r.second_pip) < HELD) {
-            weak.push(clean(&group[0].component));
-        } else if apart < 3.0 {
-            same += 1;
+        let name = clean(&group[0].component);
+        all += 1;
+        match Repeat::of_effect(group) {
+            Repeated::Repeats | Repeated::Wavers => same += 1,
+            Repeated::Differs => {
+                let apart = group.iter().filter_map(|repeat| repeat.z).map(f64::abs);
+                let apart = apart.fold(0.0, f64::max);
+                other.push(format!("{name} ({apart:.1} sd apart)"));
+            }
+            Repeated::TooLoose => loose.push(name),
+            Repeated::InOneHalf | Repeated::InNeitherHalf => {}
+            Repeated::NotSeen => all -= 1,
         }
     }
-    let all = same + other.len() + weak.len();
     if all == 0 {
         return;
     }
     let (one, two) = halves.words();
     let text = format!("{same} of {all} effects repeat from {one} to {two}");
     paragraph(&text, terminal);
-    if !other.is_empty() {
-        paragraph(&format!("do not repeat: {}", other.join(", ")), terminal);
-    }
-    if !weak.is_empty() {
-        let text = format!("a half alone does not show: {}", weak.join(", "));
-        paragraph(&text, terminal);
+    for (words, names) in [
+        ("do not repeat", other),
+        ("too loose in either half to tell", loose),
+    ] {
+        if !names.is_empty() {
+            paragraph(&format!("{words}: {}", names.join(", ")), terminal);
+        }
     }
 }
 

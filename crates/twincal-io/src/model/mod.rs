@@ -90,6 +90,14 @@ impl Model {
         self.document.files.first().map_or("", |f| f.name.as_str())
     }
 
+    /// What the file calls the robot (`<robot name>`, `<mujoco model>`); empty without.
+    pub fn robot_name(&self) -> &str {
+        let root = self.document.elements.first();
+        let names = ["name", "model"];
+        let named = root.and_then(|root| names.iter().find_map(|name| root.text(name)));
+        named.map_or("", str::trim)
+    }
+
     /// Where its bodies and joints stand (MJCF).
     pub(crate) fn sites(&self) -> &mjcf::Sites {
         &self.sites

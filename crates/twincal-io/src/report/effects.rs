@@ -2,45 +2,71 @@
 //! effect is a component: one physical story with all its columns.
 
 use super::figures::inclusion::family_name;
+use super::remarks::remarks;
 use super::text::{interval, probability};
 use super::verdict::plus_minus;
 use serde::Serialize;
 use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary, TermSummary, Verdict};
-use twincal::term::Status;
+use twincal::term::{Family, Status};
 
-/// Below this probability an effect that was not kept is called absent.
-const ABSENT: f64 = 0.1;
+/// Below this probability an effect that was not kept is called absent, here as on the terminal.
+const ABSENT: f64 = 0.05;
+/// Numbers of an effect with several that stand in the table; the others are folded away.
+const TOLD: usize = 3;
+/// A number further from 0 than this many times its ± is clear.
+const CLEAR: f64 = 2.0;
 
-/// The effects in the order in which a reader wants them.
+/// The effects as a reader wants them: by kind, in the order of the library, joints in the order of the model.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(super) struct Effects {
-    /// PIP ≥ 0.5, surest and largest first.
-    pub(super) found: Vec<Effect>,
-    /// 0.1 ≤ PIP < 0.5.
-    pub(super) possible: Vec<Effect>,
-    /// PIP < 0.1.
-    pub(super) absent: Vec<Effect>,
+    /// PIP ≥ 0.5.
+    pub(super) found: Vec<Kind>,
+    /// 0.05 ≤ PIP < 0.5.
+    pub(super) possible: Vec<Kind>,
+    /// PIP < 0.05: names alone.
+    pub(super) absent: Vec<Absent>,
     /// Not columns of the regression.
     pub(super) dropped: Vec<Dropped>,
+    /// Number of effects in each list.
+    pub(super) counts: Counts,
 }
 
-/// One row of the table of effects.
+/// Effects in each list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub(super) struct Counts {
+    pub(super) possible: usize,
+    pub(super) absent: usize,
+    pub(super) dropped: usize,
+}
+
+/// Effects of one family.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Kind {
+    pub(super) title: String,
+    /// The part of their names after the dot; empty where a name has none.
+    pub(super) word: String,
+    pub(super) effects: Vec<Effect>,
+}
+
+/// One effect in the table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Effect {
-    pub(super) words: String,
+    /// The joint or link, or what it is where it belongs to none.
+    pub(super) title: String,
     pub(super) name: String,
-    pub(super) family: &'static str,
     pub(super) pip: String,
-    /// What it is known by, given that it is there; only what the data see.
-    pub(super) parameters: Vec<Parameter>,
+    /// What it is known by, given that it is there: the clearest numbers.
+    pub(super) told: Vec<Parameter>,
+    /// All numbers that the data see, where they are more than those told.
+    pub(super) all: Vec<Parameter>,
     /// Names of the others.
     pub(super) unseen: Vec<String>,
     /// The data do not say whether it is there, or the sampler cannot tell on which side of 0.5 it lies.
     pub(super) undecided: bool,
     /// The data say nothing about it.
     pub(super) not_seen: bool,
-    /// No motion of this robot can tell it from these.
-    pub(super) alias_of: Vec<String>,
+    /// What is to be minded.
+    pub(super) remarks: Vec<String>,
 }
 
 /// One physical parameter of an effect.
@@ -52,66 +78,127 @@ pub(super) struct Parameter {
     pub(super) interval: String,
 }
 
-/// A term that is no column.
+/// Absent effects of one family.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Absent {
+    pub(super) title: String,
+    pub(super) names: Vec<String>,
+}
+
+/// Terms that are no columns, for one reason.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Dropped {
-    pub(super) name: String,
+    pub(super) names: Vec<String>,
     pub(super) reason: String,
 }
 
 /// Sorts the components of `calibration`.
 pub(super) fn sort(calibration: &Calibration) -> Effects {
-    let mut live: Vec<(&ComponentSummary, f64)> = calibration
-        .components
-        .iter()
-        .filter_map(|c| Some((c, c.pip?)))
-        .collect();
-    let strength = |c: &ComponentSummary| {
-        let clear = |p: &ParameterSummary| {
-            let (value, spread) = p.told();
-            (value / spread).abs()
-        };
-        let all = c.parameters.iter().map(clear).filter(|x| x.is_finite());
-        all.fold(0.0, f64::max)
+    let live = || {
+        let all = calibration.components.iter();
+        all.filter_map(|c| Some((c, c.pip?)))
     };
-    // Ties keep the library's order: the sort is stable.
-    live.sort_by(|a, b| {
-        b.1.total_cmp(&a.1)
-            .then(strength(b.0).total_cmp(&strength(a.0)))
-    });
-    let pick = |keep: &dyn Fn(&ComponentSummary, f64) -> bool| {
-        live.iter()
+    let pick = |keep: &dyn Fn(&ComponentSummary, f64) -> bool| -> Vec<&ComponentSummary> {
+        live()
             .filter(|(c, p)| keep(c, *p))
-            .map(|(c, p)| effect(c, *p))
+            .map(|(c, _)| c)
             .collect()
     };
+    let dropped = dropped(&calibration.terms);
+    let possible = pick(&|c, p| !c.selected && p >= ABSENT);
+    let absent = pick(&|c, p| !c.selected && (p < ABSENT || p.is_nan()));
     Effects {
-        found: pick(&|c, _| c.selected),
-        possible: pick(&|c, p| !c.selected && p >= ABSENT),
-        absent: pick(&|c, p| !c.selected && (p < ABSENT || p.is_nan())),
-        dropped: calibration.terms.iter().filter_map(dropped).collect(),
+        found: kinds(&pick(&|c, _| c.selected), calibration),
+        counts: Counts {
+            possible: possible.len(),
+            absent: absent.len(),
+            dropped: dropped.iter().map(|d| d.names.len()).sum(),
+        },
+        possible: kinds(&possible, calibration),
+        absent: by_family(&absent)
+            .map(|own| Absent {
+                title: family_title(own[0]),
+                names: own.iter().map(|c| c.name.clone()).collect(),
+            })
+            .collect(),
+        dropped,
     }
 }
 
-fn effect(component: &ComponentSummary, pip: f64) -> Effect {
+/// The library has them in the order of families, but for what belongs to a payload.
+fn by_family<'a, 'b>(
+    components: &'b [&'a ComponentSummary],
+) -> impl Iterator<Item = &'b [&'a ComponentSummary]> {
+    components.chunk_by(|a, b| a.family == b.family)
+}
+
+fn kinds(components: &[&ComponentSummary], calibration: &Calibration) -> Vec<Kind> {
+    let kind = |own: &[&ComponentSummary]| Kind {
+        title: family_title(own[0]),
+        word: match own[0].name.rsplit_once('.') {
+            Some((_, word)) if word == own[0].family.word() => format!(".{word}"),
+            _ => String::new(),
+        },
+        effects: own.iter().map(|c| effect(c, calibration)).collect(),
+    };
+    by_family(components).map(kind).collect()
+}
+
+/// "Viscous friction".
+fn family_title(component: &ComponentSummary) -> String {
+    let name = family_name(component.family);
+    let mut letters = name.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string());
+    first.unwrap_or_default() + letters.as_str()
+}
+
+fn effect(component: &ComponentSummary, calibration: &Calibration) -> Effect {
+    let pip = component.pip.unwrap_or(f64::NAN);
+    let seen: Vec<&ParameterSummary> = seen(component, true).collect();
+    let told = told(component.family, &seen);
+    let show = |all: &[&ParameterSummary]| -> Vec<Parameter> {
+        all.iter().map(|p| parameter(p, component.family)).collect()
+    };
     Effect {
-        words: if component.words.is_empty() {
-            component.name.clone()
-        } else {
-            component.words.clone()
+        title: match component.name.rsplit_once('.') {
+            Some((place, word)) if word == component.family.word() => place.into(),
+            _ => component.story.clone(),
         },
         name: component.name.clone(),
-        family: family_name(component.family),
         pip: probability(pip),
-        parameters: seen(component, true).map(parameter).collect(),
-        unseen: seen(component, false).map(name).collect(),
+        all: if told.len() < seen.len() {
+            show(&seen)
+        } else {
+            Vec::new()
+        },
+        told: show(&told),
+        unseen: self::seen(component, false).map(name).collect(),
         undecided: component.verdict == Some(Verdict::Undecided)
             || component
                 .pip_mcse
                 .is_some_and(|e| e > 0.0 && (pip - 0.5).abs() < 3.0 * e),
         not_seen: component.verdict == Some(Verdict::NotSeen),
-        alias_of: component.alias_of.clone(),
+        remarks: remarks(component, calibration),
     }
+}
+
+/// The clearest numbers, at least one, in their order; of a payload mass and centre of mass.
+fn told<'a>(family: Family, seen: &[&'a ParameterSummary]) -> Vec<&'a ParameterSummary> {
+    if family == Family::Payload {
+        let body = |p: &&&ParameterSummary| p.name == "mass" || p.name.starts_with("com_");
+        return seen.iter().filter(body).copied().collect();
+    }
+    let clearness = |p: &ParameterSummary| {
+        let (value, spread) = p.told();
+        let clear = (value / spread).abs();
+        if clear.is_finite() { clear } else { 0.0 }
+    };
+    let mut order: Vec<usize> = (0..seen.len()).collect();
+    order.sort_by(|&a, &b| clearness(seen[b]).total_cmp(&clearness(seen[a])));
+    let clear = seen.iter().filter(|p| clearness(p) > CLEAR).count();
+    order.truncate(clear.clamp(1, TOLD));
+    order.sort_unstable();
+    order.into_iter().map(|k| seen[k]).collect()
 }
 
 /// The parameters that these data see, or those that they do not.
@@ -130,43 +217,49 @@ fn name(parameter: &ParameterSummary) -> String {
     }
 }
 
-fn parameter(parameter: &ParameterSummary) -> Parameter {
+fn parameter(parameter: &ParameterSummary, family: Family) -> Parameter {
+    let (factor, unit) = family.told_in(&parameter.unit);
     let (value, spread) = parameter.told();
-    let unit = match parameter.unit.as_str() {
-        "1" => "",
-        unit => unit,
-    };
+    // Otherwise only models too light to be listed hold it.
+    let known = value.is_finite();
+    let or_dash = |text: String| if known { text } else { "–".into() };
     Parameter {
         name: name(parameter),
-        // Only models too light to be listed hold it.
-        value: if value.is_finite() {
-            plus_minus(value, spread)
-        } else {
-            "–".into()
-        },
+        value: or_dash(plus_minus(factor * value, factor * spread)),
         unit: unit.into(),
-        interval: if value.is_finite() {
-            interval(parameter.interval95)
-        } else {
-            "–".into()
-        },
+        interval: or_dash(interval(parameter.interval95.map(|x| factor * x))),
     }
 }
 
-fn dropped(term: &TermSummary) -> Option<Dropped> {
-    let reason = match &term.term.status {
+/// Every term that is no column, by reason.
+fn dropped(terms: &[TermSummary]) -> Vec<Dropped> {
+    let mut out: Vec<Dropped> = Vec::new();
+    for term in terms {
+        let Some(reason) = reason(&term.term.status) else {
+            continue;
+        };
+        let name = term.term.name.clone();
+        match out.iter_mut().find(|dropped| dropped.reason == reason) {
+            Some(dropped) => dropped.names.push(name),
+            None => out.push(Dropped {
+                names: vec![name],
+                reason,
+            }),
+        }
+    }
+    out
+}
+
+fn reason(status: &Status) -> Option<String> {
+    Some(match status {
         Status::Candidate => return None,
         Status::AliasOf(other) => {
-            format!("its torque cannot be told from that of {other}, which stands for both")
+            format!("torque that cannot be told from that of {other}, which stands for all")
         }
         Status::NullLagrangian => {
-            "no motion of this robot gives it a torque: what it acts on has no load or no mass, or its energy is a total time derivative".into()
+            "no torque in any motion of this robot: what they act on has no load or no mass, or their energy is a total time derivative".into()
         }
-        Status::ZeroColumn => "it makes no torque in any of these logs".into(),
-    };
-    Some(Dropped {
-        name: term.term.name.clone(),
-        reason,
+        Status::ZeroColumn => "no torque in any of these logs".into(),
     })
 }
 
@@ -183,24 +276,46 @@ mod tests {
             fixture::nothing_found(),
         ] {
             let effects = sort(&calibration);
-            let listed = effects.found.len()
-                + effects.possible.len()
-                + effects.absent.len()
-                + effects.dropped.len();
+            let of = |kinds: &[Kind]| kinds.iter().map(|kind| kind.effects.len()).sum::<usize>();
+            let absent = effects.absent.iter().map(|kind| kind.names.len());
+            let absent: usize = absent.sum();
+            assert_eq!(effects.counts.possible, of(&effects.possible));
+            assert_eq!(effects.counts.absent, absent);
+            let listed =
+                of(&effects.found) + of(&effects.possible) + absent + effects.counts.dropped;
             assert_eq!(listed, calibration.components.len());
         }
     }
 
+    fn flat(kinds: Vec<Kind>) -> Vec<Effect> {
+        kinds.into_iter().flat_map(|kind| kind.effects).collect()
+    }
+
     #[test]
-    fn the_surest_and_strongest_come_first_and_reasons_are_given() {
-        let effects = sort(&fixture::two_joints());
-        let pips: Vec<_> = effects.found.iter().map(|e| e.pip.as_str()).collect();
-        assert_eq!(pips[0], "1.00");
+    fn effects_stand_by_kind_and_reasons_are_given() {
+        let mut calibration = fixture::two_joints();
+        for (component, name) in calibration
+            .components
+            .iter_mut()
+            .zip(["b.viscous", "a.viscous"])
+        {
+            component.name = name.into();
+            component.family = Family::Viscous;
+            (component.selected, component.pip) = (true, Some(1.0));
+        }
+        let effects = sort(&calibration);
+        let first = &effects.found[0];
+        assert_eq!(
+            (&*first.title, &*first.word),
+            ("Viscous friction", ".viscous")
+        );
+        let titles: Vec<&str> = first.effects.iter().map(|e| e.title.as_str()).collect();
+        assert_eq!(titles[..2], ["b", "a"]);
         assert!(
             effects
                 .dropped
                 .iter()
-                .any(|d| d.reason.contains("which stands for both"))
+                .any(|d| d.reason.contains("which stands for all"))
         );
         assert!(
             effects
@@ -208,6 +323,59 @@ mod tests {
                 .iter()
                 .any(|d| d.reason.contains("total time derivative"))
         );
+    }
+
+    #[test]
+    fn the_clearest_numbers_are_told_and_units_are_those_of_the_terminal() {
+        let parameter = |name: &str, unit: &str, median: f64, half: f64| ParameterSummary {
+            name: name.into(),
+            unit: unit.into(),
+            mean: median,
+            sd: half,
+            interval95: [median - 2.0 * half, median + 2.0 * half],
+            median,
+            interval68: [median - half, median + half],
+            seen: true,
+        };
+        let mut calibration = fixture::two_joints();
+        let component = &mut calibration.components[0];
+        component.family = Family::MassMoments;
+        component.parameters = [("m", 1.0), ("mx", 30.0), ("my", 1.5), ("mz", -40.0)]
+            .map(|(name, value)| parameter(name, "kg·m", value, 1.0))
+            .to_vec();
+        let names = |calibration: &Calibration| -> Vec<String> {
+            let told = effect(&calibration.components[0], calibration).told;
+            told.into_iter().map(|p| p.name).collect()
+        };
+        assert_eq!(names(&calibration), ["mx", "mz"]);
+        for p in &mut calibration.components[0].parameters {
+            p.median = 0.1;
+        }
+        assert_eq!(names(&calibration), ["m"]);
+        let component = &mut calibration.components[0];
+        component.family = Family::Payload;
+        component.parameters = vec![
+            parameter("mass", "kg", 1.2, 0.03),
+            parameter("com_x", "m", 0.061, 0.004),
+            parameter("ixx", "kg·m²", 5.0, 0.1),
+        ];
+        let told = effect(&calibration.components[0], &calibration).told;
+        let told: Vec<_> = told
+            .iter()
+            .map(|p| (&*p.name, &*p.value, &*p.unit))
+            .collect();
+        assert_eq!(
+            told,
+            [
+                ("mass", "1.200 ± 0.030", "kg"),
+                ("com x", "61.0 ± 4.0", "mm")
+            ]
+        );
+        let gain = self::parameter(
+            &parameter("value", "1", 0.0439, 0.0041),
+            Family::LoadFriction,
+        );
+        assert_eq!((&*gain.value, &*gain.unit), ("4.39 ± 0.41", "%"));
     }
 
     #[test]
@@ -236,9 +404,11 @@ mod tests {
         ];
         let name = component.name.clone();
         let effects = sort(&calibration);
-        let all = effects.found.iter().chain(&effects.possible);
-        let effect = all.chain(&effects.absent).find(|e| e.name == name).unwrap();
-        let values: Vec<&str> = effect.parameters.iter().map(|p| p.value.as_str()).collect();
+        let all = flat(effects.found)
+            .into_iter()
+            .chain(flat(effects.possible));
+        let effect = all.into_iter().find(|e| e.name == name).unwrap();
+        let values: Vec<&str> = effect.all.iter().map(|p| p.value.as_str()).collect();
         assert_eq!(values, ["0.470 ± 0.080", "–"]);
         assert_eq!(effect.unseen, ["com y", "izz"]);
         let html = crate::report::render(&calibration, &crate::report::ReportContext::default());
@@ -258,14 +428,9 @@ mod tests {
         calibration.components[1].pip = Some(0.57);
         let effects = sort(&calibration);
         let by_name = |name: &str| {
-            effects
-                .found
-                .iter()
-                .chain(&effects.possible)
-                .chain(&effects.absent)
-                .find(|e| e.name == name)
-                .unwrap()
-                .undecided
+            let all = [effects.found.clone(), effects.possible.clone()];
+            let mut all = all.into_iter().flat_map(flat);
+            all.find(|e| e.name == name).unwrap().undecided
         };
         assert!(
             by_name(&calibration.components[0].name) && !by_name(&calibration.components[1].name)

@@ -42,7 +42,7 @@ pub(super) struct Image {
     pub(super) wide: String,
     /// Drawn for a phone; empty: `wide` serves both.
     pub(super) narrow: String,
-    /// `whole` (own line), `side` (two to a line) or `fixed` (scrolls inside its box where it does not fit).
+    /// `whole` (own line) or `side` (two to a line).
     pub(super) layout: &'static str,
 }
 
@@ -64,15 +64,6 @@ impl Image {
             wide: svg,
             narrow: String::new(),
             layout: "side",
-        }
-    }
-
-    /// An image that keeps its size.
-    pub(super) fn fixed(svg: String) -> Self {
-        Self {
-            wide: svg,
-            layout: "fixed",
-            ..Self::default()
         }
     }
 }

@@ -7,11 +7,6 @@ use super::view::{Joint, pooled_unit};
 use twincal::calibrate::{Calibration, Halves};
 use twincal::validate::Validation;
 
-/// Sd between two halves from which a number is said not to repeat, and from which it is said to waver.
-const APART: (f64, f64) = (3.0, 2.0);
-/// Probability that a half must give an effect for it to count as found there.
-const HELD: f64 = 0.5;
-
 /// Coverage at four levels and shape of the predictions per joint; no rows without held-out rows.
 pub(super) fn reliability(validation: &Validation) -> Table {
     let mut table = Table::new([
@@ -120,26 +115,21 @@ pub(super) fn repeats(calibration: &Calibration) -> Table {
         "",
     ]);
     for repeat in &calibration.repeatability {
-        let (apart, words) = match repeat.z {
-            None => ("–".into(), "not seen in both halves"),
-            Some(z) if z.abs() >= APART.0 => (number(z.abs(), 2), "does not repeat"),
-            Some(z) if z.abs() >= APART.1 => (number(z.abs(), 2), "wavers"),
-            Some(z) if repeat.first_pip.max(repeat.second_pip) < HELD => {
-                (number(z.abs(), 2), "found in neither half alone")
-            }
-            Some(z) if repeat.first_pip.min(repeat.second_pip) < HELD => {
-                (number(z.abs(), 2), "found in one half alone")
-            }
-            Some(z) => (number(z.abs(), 2), "repeats"),
+        let apart = repeat.z.map_or("–".into(), |z| number(z.abs(), 2));
+        let words = repeat.repeated().words();
+        let own = calibration
+            .terms
+            .iter()
+            .find(|t| t.term.name == repeat.term);
+        let (factor, unit) = match own {
+            Some(own) => own.term.family.told_in(&repeat.unit),
+            None => (1.0, repeat.unit.as_str()),
         };
         table.rows.push(vec![
             repeat.term.clone(),
-            plus_minus(repeat.first, repeat.first_sd),
-            plus_minus(repeat.second, repeat.second_sd),
-            match repeat.unit.as_str() {
-                "1" => String::new(),
-                unit => unit.into(),
-            },
+            plus_minus(factor * repeat.first, factor * repeat.first_sd),
+            plus_minus(factor * repeat.second, factor * repeat.second_sd),
+            unit.into(),
             apart,
             format!(
                 "{} / {}",

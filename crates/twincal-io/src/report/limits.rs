@@ -1,10 +1,11 @@
 //! Where a twin does not hold: what errors and intervals of held-out torque say against it, and what was found that is not to be rested on.
 
+use super::findings;
 use super::shape;
 use super::text::{list, percent};
 use super::view::{Joint, memory, standard_deviation};
 use twincal::Severity;
-use twincal::calibrate::Calibration;
+use twincal::calibrate::{Calibration, Repeat, Repeated};
 use twincal::posterior::Method;
 use twincal::validate::{JointScore, Scores, Split, Validation, WORSE};
 
@@ -12,10 +13,9 @@ use twincal::validate::{JointScore, Scores, Split, Validation, WORSE};
 pub(super) const COVERAGE: (f64, f64) = (0.90, 0.99);
 /// What an interval promises to hold.
 const LEVEL: f64 = 0.95;
+const LEVEL_WORDS: &str = "95 % intervals";
 /// Share of the torque's standard deviation from which the remaining error is called large.
 const LARGE: f64 = 0.5;
-/// Probability from which a half of the data shows an effect.
-const LIKELY: f64 = 0.5;
 
 /// Where the twin does not hold and what to mind, in the order of the report.
 pub(super) fn limits(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
@@ -37,20 +37,7 @@ pub(super) fn limits(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Str
         .iter()
         .filter(|f| f.severity == Severity::Degraded && !f.doubts_the_log());
     out.extend(degraded.map(|f| f.message.clone()));
-    match calibration
-        .findings
-        .iter()
-        .filter(|f| f.severity == Severity::Warning)
-        .count()
-    {
-        0 => {}
-        1 => out.push(
-            "There is one warning to read (see “What was read, dropped and filtered”).".into(),
-        ),
-        n => out.push(format!(
-            "There are {n} warnings to read (see “What was read, dropped and filtered”)."
-        )),
-    }
+    out.extend(findings::warnings(calibration));
     out.push("Outside the motion listed under “What the data cannot tell” it extrapolates.".into());
     out
 }
@@ -74,18 +61,19 @@ pub(super) fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) 
         "its torque got worse by calibration",
         "their torque got worse by calibration",
     );
-    let narrow = with_coverage(scores.joints.iter().filter(|j| too_narrow(j)));
-    say(
-        &narrow,
-        "its intervals are too narrow",
-        "their intervals are too narrow",
-    );
-    let wide = with_coverage(scores.joints.iter().filter(|j| too_wide(j)));
-    say(
-        &wide,
-        "its intervals are wider than they need to be",
-        "their intervals are wider than they need to be",
-    );
+    let mut off = |is_off: fn(&JointScore) -> bool, words: &str| {
+        let joints: Vec<&JointScore> = scores.joints.iter().filter(|j| is_off(j)).collect();
+        let held: Vec<String> = joints.iter().map(|j| percent(j.coverage95)).collect();
+        let held = format!("({LEVEL_WORDS} hold {} of the rows)", list(&held));
+        let names: Vec<String> = joints.iter().map(|j| j.joint.clone()).collect();
+        say(
+            &names,
+            &format!("its intervals are {words} {held}"),
+            &format!("their intervals are {words} {held}"),
+        );
+    };
+    off(too_narrow, "too narrow");
+    off(too_wide, "wider than they need to be");
     let mut out_of_shape = shape::sentences(calibration);
     say(
         &large(scores, joints),
@@ -100,12 +88,7 @@ pub(super) fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) 
 /// Links of which what was found is no rigid body, and effects that neither half of the data has.
 fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
     let mut out = Vec::new();
-    let bodies = calibration.findings.iter();
-    let bodies = bodies.filter(|f| f.code == "unphysical_inertia_found");
-    let bodies: Vec<&str> = bodies
-        .filter(|f| f.severity == Severity::Warning)
-        .map(|f| f.subject.as_str())
-        .collect();
+    let bodies = no_bodies(calibration);
     if !bodies.is_empty() {
         out.push(format!(
             "What was found of {} is no rigid body: it stands in for another effect; do not read it as mass or inertia.",
@@ -115,10 +98,7 @@ fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
     let groups = calibration
         .repeatability
         .chunk_by(|a, b| a.component == b.component);
-    let in_neither = groups.filter(|own| {
-        own.iter()
-            .all(|r| r.first_pip < LIKELY && r.second_pip < LIKELY)
-    });
+    let in_neither = groups.filter(|own| Repeat::of_effect(own) == Repeated::InNeitherHalf);
     let in_neither: Vec<&str> = in_neither.map(|own| own[0].component.as_str()).collect();
     if !in_neither.is_empty() {
         out.push(format!(
@@ -127,6 +107,14 @@ fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
         ));
     }
     out
+}
+
+/// Links of which what was found is no rigid body.
+pub(super) fn no_bodies(calibration: &Calibration) -> Vec<&str> {
+    let found = calibration.findings.iter();
+    let found = found.filter(|f| f.code == "unphysical_inertia_found");
+    let sure = found.filter(|f| f.severity == Severity::Warning);
+    sure.map(|f| f.subject.as_str()).collect()
 }
 
 /// Joints whose intervals are too narrow where their motion was not seen before, and less so where it was: by more than two standard
@@ -183,13 +171,6 @@ pub(super) fn too_narrow(joint: &JointScore) -> bool {
 /// More of them.
 pub(super) fn too_wide(joint: &JointScore) -> bool {
     joint.rows > 0 && joint.coverage95 > COVERAGE.1
-}
-
-/// Names with the share of rows in the 95 % interval.
-fn with_coverage<'a>(scores: impl Iterator<Item = &'a JointScore>) -> Vec<String> {
-    let named =
-        |s: &JointScore| format!("{} ({} in 95 % intervals)", s.joint, percent(s.coverage95));
-    scores.filter(|s| s.rows > 0).map(named).collect()
 }
 
 fn names<'a>(scores: impl Iterator<Item = &'a JointScore>) -> Vec<String> {
@@ -278,7 +259,7 @@ mod tests {
             .filter(|l| l.contains("narrow"))
             .collect();
         assert_eq!(of_elbow.len(), 1, "{narrow:?}");
-        assert!(of_elbow[0].contains("elbow (69.7"), "{narrow:?}");
+        assert!(of_elbow[0].contains("hold 69.7"), "{narrow:?}");
     }
 
     #[test]

@@ -8,12 +8,14 @@ mod ambiguity;
 mod effects;
 mod figure;
 mod figures;
+mod findings;
 mod honesty;
 #[cfg(test)]
 mod fixture;
 mod limits;
 mod page;
 mod plot;
+mod remarks;
 mod scale;
 mod shape;
 mod svg;
@@ -32,6 +34,9 @@ use twincal::calibrate::Calibration;
 pub struct ReportContext {
     /// Version of the program.
     pub version: String,
+    /// What the model file calls the robot; empty where it has no name.
+    #[serde(default)]
+    pub robot: String,
     /// File name of the robot model, without its folder.
     pub model: String,
     /// Command line that repeats the run, with paths as given; the caller leaves out the folders of absolute ones.

@@ -5,8 +5,9 @@ use super::ambiguity;
 use super::effects::{self, Effects};
 use super::figure::Figure;
 use super::figures;
+use super::findings;
 use super::honesty;
-use super::tables::{self, Said, Table};
+use super::tables::{self, Table};
 use super::text;
 use super::verdict::{self, Verdict};
 use super::view::{self, Joint};
@@ -26,6 +27,8 @@ const LONG: usize = 24;
 #[derive(Debug, Serialize)]
 struct Page<'a> {
     run: &'a ReportContext,
+    /// Files and amount of data, in one line.
+    about: String,
     joints: Vec<&'a str>,
     verdict: Verdict,
     effects: Effects,
@@ -58,7 +61,7 @@ struct Page<'a> {
     open: Vec<String>,
     motion: Table,
     logs: Table,
-    findings: Vec<Said>,
+    findings: Vec<findings::Kind>,
     convergence: Vec<String>,
     pipeline: Vec<String>,
     /// c of the tempered likelihood; empty without.
@@ -121,6 +124,7 @@ fn gather<'a>(
         .map(|t| figures::sensitivity::name(t, components));
     Page {
         run,
+        about: tables::about(calibration, run),
         joints: joints.iter().map(|j| j.name).collect(),
         verdict: verdict::judge(calibration, joints),
         effects: effects::sort(calibration),
@@ -154,7 +158,7 @@ fn gather<'a>(
         open: ambiguity::sentences(calibration, joints),
         motion: tables::motion(calibration, joints),
         logs: tables::logs(calibration),
-        findings: tables::findings(calibration),
+        findings: findings::findings(calibration),
         convergence: tables::convergence(calibration),
         pipeline: tables::pipeline(calibration),
         tempering: if calibration.likelihood.tempering == 1.0 {

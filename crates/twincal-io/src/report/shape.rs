@@ -1,13 +1,15 @@
 //! Have the predicted distributions the right shape: what the PIT of held-out rows says, joint by joint, in words.
 
 use super::limits::{too_narrow, too_wide};
-use super::text::{list, number};
+use super::text::{list, number, percent};
 use twincal::calibrate::Calibration;
 use twincal::validate::{JointScore, Pit, Reliability, Scores};
 
 /// Distance of the PIT from uniform beyond which, if chance does not explain it, intervals are more than a little off: the
 /// 50 % interval then holds less than 40 % or more than 60 %.
 const OFF: f64 = 0.05;
+/// Share of right predictions that [`Pit::chance`] lets pass for wrong ones.
+const ALARM: f64 = 0.05;
 
 /// How a predicted distribution is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,9 +24,9 @@ pub(super) enum Shape {
 impl Shape {
     const ALL: [Self; 4] = [Self::Wide, Self::Narrow, Self::Above, Self::Below];
 
-    /// `None` where the distance from uniform is what chance allows.
-    fn of(pit: &Pit) -> Option<Self> {
-        let beyond = pit.distance > pit.chance;
+    /// `None` where the distance from uniform is what chance allows one of `joints` that are looked at, in 95 of 100 right predictions.
+    fn of(pit: &Pit, joints: usize) -> Option<Self> {
+        let beyond = pit.distance > pit.chance * of_one_among(joints);
         if pit.histogram.is_empty() || !beyond {
             return None;
         }
@@ -79,6 +81,20 @@ impl Shape {
         }
     }
 
+    /// What a reader can see of it: how much the 50 % interval holds, or on which side of the middle torque lies.
+    fn shown(self, pit: &Pit, coverage: &[(f64, f64)]) -> String {
+        let bins = pit.histogram.len();
+        let above =
+            pit.histogram[bins / 2..].iter().sum::<f64>() / pit.histogram.iter().sum::<f64>();
+        let half = coverage.iter().find(|(level, _)| *level == 0.5);
+        match (self, half) {
+            (Self::Above, _) => format!("{} of the rows above their middle", percent(above)),
+            (Self::Below, _) => format!("{} of the rows below their middle", percent(1.0 - above)),
+            (_, Some((_, seen))) => format!("{} of the rows in 50 % intervals", percent(*seen)),
+            (_, None) => format!("PIT off uniform by {}", number(pit.distance, 2)),
+        }
+    }
+
     /// What is said of joints, and of one; `slightly` where intervals are still of use.
     fn words(self, slightly: bool) -> &'static str {
         match (self, slightly) {
@@ -94,6 +110,13 @@ impl Shape {
     }
 }
 
+/// How much further the worst of some joints goes than one alone: the Kolmogorov–Smirnov distance exceeds d by chance with a probability of
+/// about 2 exp(−2 n d²), which has to be 0.05 for one and 0.05/`joints` for each of several.
+fn of_one_among(joints: usize) -> f64 {
+    let log_tail = |alarm: f64| (2.0 / alarm).ln();
+    (log_tail(ALARM / joints.max(1) as f64) / log_tail(ALARM)).sqrt()
+}
+
 /// Where the shape of the predictions is off by more than [`OFF`] and by more than chance.
 pub(super) struct Off {
     /// Over all joints.
@@ -104,10 +127,11 @@ pub(super) struct Off {
 
 pub(super) fn off(calibration: &Calibration) -> Off {
     let validation = &calibration.validation;
-    let far = |pit: &Pit| Shape::of(pit).filter(|_| pit.distance > OFF);
+    let far = |pit: &Pit, joints| Shape::of(pit, joints).filter(|_| pit.distance > OFF);
+    let joints = validation.reliability.len();
     Off {
-        all: far(&validation.pit),
-        single: validation.reliability.iter().any(|j| far(&j.pit).is_some()),
+        all: far(&validation.pit, 1),
+        single: (validation.reliability.iter()).any(|j| far(&j.pit, joints).is_some()),
     }
 }
 
@@ -115,14 +139,7 @@ pub(super) fn off(calibration: &Calibration) -> Off {
 pub(super) fn sentences(calibration: &Calibration) -> Vec<String> {
     let validation = &calibration.validation;
     let mut out = Vec::new();
-    let numbers = |pit: &Pit| {
-        let both = |digits| [pit.distance, pit.chance].map(|x| number(x, digits));
-        let [off, chance] = match both(2) {
-            [off, chance] if off == chance => both(3),
-            different => different,
-        };
-        format!("PIT off uniform by {off}, by chance below {chance}")
-    };
+    let joints = validation.reliability.len();
     // What its 95 % interval says of a joint stands elsewhere; the middle of the distribution neither contradicts nor repeats it.
     let scores = &validation.filtered.joints;
     let said = |joint: &str, shape: Shape| {
@@ -134,7 +151,9 @@ pub(super) fn sentences(calibration: &Calibration) -> Vec<String> {
     };
     for (shape, slightly) in Shape::ALL.into_iter().flat_map(|s| [(s, false), (s, true)]) {
         let own: Vec<&Reliability> = (validation.reliability.iter())
-            .filter(|j| Shape::of(&j.pit) == Some(shape) && (j.pit.distance <= OFF) == slightly)
+            .filter(|j| {
+                Shape::of(&j.pit, joints) == Some(shape) && (j.pit.distance <= OFF) == slightly
+            })
             .filter(|j| !said(&j.joint, shape) && shape.agrees(&j.coverage_levels))
             .collect();
         let Some(worst) = (own.iter()).max_by(|a, b| a.pit.distance.total_cmp(&b.pit.distance))
@@ -146,21 +165,22 @@ pub(super) fn sentences(calibration: &Calibration) -> Vec<String> {
             [one] => format!(
                 "Joint {one}: its {} ({}).",
                 shape.words(slightly),
-                numbers(&worst.pit)
+                shape.shown(&worst.pit, &worst.coverage_levels)
             ),
             _ => format!(
                 "Joints {}: their {} (on {} {}).",
                 list(&names),
                 shape.words(slightly),
                 worst.joint,
-                numbers(&worst.pit)
+                shape.shown(&worst.pit, &worst.coverage_levels)
             ),
         });
     }
-    if let (true, Some(shape)) = (out.is_empty(), Shape::of(&validation.pit)) {
+    if let (true, Some(shape)) = (out.is_empty(), Shape::of(&validation.pit, 1)) {
         let pit = &validation.pit;
         let words = shape.words(pit.distance <= OFF);
-        out.push(format!("All joints together: {words} ({}).", numbers(pit)));
+        let shown = shape.shown(pit, &validation.coverage_levels);
+        out.push(format!("All joints together: {words} ({shown})."));
     }
     out
 }
@@ -196,14 +216,43 @@ pub(super) mod tests {
             (0.75, 0.5, Shape::Wide),
         ] {
             assert_eq!(
-                Shape::of(&pit(middle, slope)),
+                Shape::of(&pit(middle, slope), 1),
                 Some(shape),
                 "{middle} {slope}"
             );
         }
         let mut chance = pit(0.75, 0.0);
         chance.chance = 0.13;
-        assert_eq!(Shape::of(&chance), None);
-        assert_eq!(Shape::of(&Pit::default()), None);
+        assert_eq!(Shape::of(&chance, 1), None);
+        assert_eq!(Shape::of(&Pit::default(), 1), None);
+    }
+    /// 2 exp(−2 n d²) = 0.05/6: √(ln 240 / ln 40) times the distance of one joint alone.
+    #[test]
+    fn the_worst_of_six_joints_may_be_further_off_by_chance_than_one() {
+        let mut pit = pit(0.75, 0.0);
+        let factor = (240f64.ln() / 40f64.ln()).sqrt();
+        for (distance, shape) in [(1.01, Some(Shape::Wide)), (0.99, None)] {
+            pit.distance = distance * factor * pit.chance;
+            assert_eq!(Shape::of(&pit, 6), shape);
+            assert_eq!(Shape::of(&pit, 1), Some(Shape::Wide));
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_shown_in_shares_of_rows() {
+        let shown = |shape: Shape, slope| shape.shown(&pit(0.5, slope), &[(0.5, 0.75)]);
+        assert_eq!(
+            shown(Shape::Wide, 0.0),
+            "75.0\u{202f}% of the rows in 50 % intervals"
+        );
+        // The slope's upper half: Σ (i − 9.5)/1000 over i = 10 … 19 is 0.05, times four.
+        assert_eq!(
+            shown(Shape::Above, 4.0),
+            "70.0\u{202f}% of the rows above their middle"
+        );
+        assert_eq!(
+            shown(Shape::Below, -4.0),
+            "70.0\u{202f}% of the rows below their middle"
+        );
     }
 }

@@ -1,11 +1,11 @@
 //! The report's tables besides the effects: scores, noise, motion, logs, findings, convergence, pipeline.
 
+use super::ReportContext;
 use super::limits::{converged, torque_deviation};
 use super::text::{count, list, number, percent, probability};
 use super::view::Joint;
 use serde::Serialize;
-use twincal::Severity;
-use twincal::calibrate::Calibration;
+use twincal::calibrate::{Calibration, LogSummary};
 use twincal::posterior::Method;
 use twincal::validate::Scores;
 
@@ -23,6 +23,33 @@ impl Table {
             rows: Vec::new(),
         }
     }
+}
+
+/// Logs up to this number are named at the head of the page.
+const NAMED: usize = 3;
+
+/// What the page is about: the model file and the logs with their length.
+pub(super) fn about(calibration: &Calibration, run: &ReportContext) -> String {
+    let of = |heldout: bool| -> Vec<&LogSummary> {
+        let logs = calibration.logs.iter();
+        logs.filter(|log| (log.role == "heldout") == heldout)
+            .collect()
+    };
+    let told = |logs: &[&LogSummary]| {
+        let seconds = with_unit(logs.iter().map(|log| log.duration).sum(), "s");
+        if logs.len() > NAMED {
+            return format!("{} logs ({seconds})", logs.len());
+        }
+        let each: Vec<String> = (logs.iter())
+            .map(|log| format!("{} ({})", log.name, with_unit(log.duration, "s")))
+            .collect();
+        list(&each)
+    };
+    let mut out = format!("{}, fitted to {}", run.model, told(&of(false)));
+    if !of(true).is_empty() {
+        out.push_str(&format!(", tested on {}", told(&of(true))));
+    }
+    out
 }
 
 /// Held-out scores per joint and pooled.
@@ -185,45 +212,6 @@ pub(super) fn logs(calibration: &Calibration) -> Table {
         ]);
     }
     table
-}
-
-/// One finding, as the page shows it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Said {
-    pub(super) class: &'static str,
-    pub(super) severity: &'static str,
-    pub(super) code: String,
-    pub(super) subject: String,
-    pub(super) message: String,
-    pub(super) count: String,
-}
-
-/// All findings, the gravest first.
-pub(super) fn findings(calibration: &Calibration) -> Vec<Said> {
-    let mut findings: Vec<_> = calibration.findings.iter().collect();
-    findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
-    findings
-        .into_iter()
-        .map(|f| {
-            let (class, severity) = match f.severity {
-                Severity::Note => ("note", "note"),
-                Severity::Warning => ("care", "warning"),
-                Severity::Degraded => ("bad", "data lost"),
-            };
-            Said {
-                class,
-                severity,
-                code: f.code.clone(),
-                subject: f.subject.clone(),
-                message: f.message.clone(),
-                count: if f.count > 0 {
-                    count(f.count)
-                } else {
-                    String::new()
-                },
-            }
-        })
-        .collect()
 }
 
 /// How the posterior was computed and whether to trust the computation.

@@ -7,6 +7,7 @@ use twincal::calibrate::Calibration;
 fn context() -> ReportContext {
     ReportContext {
         version: "0.1.0".into(),
+        robot: "planar arm".into(),
         model: "planar_arm.urdf".into(),
         command: "twincal fit run0.csv run1.csv run2.csv --model planar_arm.urdf".into(),
         settings: "[noise]\nmodel = \"tempered\"\n\n[inference]\nmethod = \"auto\"\nseed = 1\n"

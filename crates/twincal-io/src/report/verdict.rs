@@ -1,18 +1,20 @@
 //! Can this twin be used, and where not: the first thing the report says, derived from held-out data alone.
 
-use super::limits::{COVERAGE, converged, large, limits, worse};
+use super::limits::{COVERAGE, converged, large, limits, no_bodies, worse};
 use super::shape;
 use super::text::{number, percent, with_sd};
 use super::view::{Joint, independent_rows, pooled_unit};
 use serde::Serialize;
 use twincal::calibrate::{Calibration, Verdict as Decision};
-use twincal::validate::{Split, WORSE};
+use twincal::validate::{Scores, Split, WORSE};
 use twincal::{Finding, Severity};
 
 /// Ratio of errors from which calibration counts as an improvement.
 const BETTER: f64 = 0.95;
 /// Held-out rows, in independent ones, below which nothing is promised.
 const FEW: f64 = 20.0;
+/// Change of an error by the rows at standstill from which it is told without and with them.
+const WORTH_TELLING: f64 = 0.05;
 /// How the answer is coloured; the words carry the meaning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -64,7 +66,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     let (grade, headline) = if calibration.findings.iter().any(Finding::doubts_the_log) {
         (
             Grade::Bad,
-            "Not yet: log and model do not seem to speak of the same robot.",
+            "Not yet: log and model contradict each other in sign, scale or order of joints.",
         )
     } else if no_measurement(calibration) {
         (
@@ -108,6 +110,11 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         )
     } else if let Some(shape) = off.all.filter(|shape| !shape.contradicts(scores)) {
         (Grade::Care, shape.headline())
+    } else if no_bodies(calibration).len() > 1 {
+        (
+            Grade::Care,
+            "The torque yes; but what was found are no rigid bodies: look whether this is the robot's model.",
+        )
     } else if worse.is_empty() && !serious && !off.single {
         (
             Grade::Good,
@@ -132,25 +139,9 @@ fn no_measurement(calibration: &Calibration) -> bool {
 
 fn grounds(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
     let scores = &calibration.validation.filtered;
-    let change = scores.rmse_calibrated / scores.rmse_nominal - 1.0;
-    let way = match change {
-        c if c.abs() < 5e-4 => "unchanged".into(),
-        c if c < 0.0 => format!("{} less", percent(-c)),
-        c => format!("{} more", percent(c)),
-    };
     let rows: u64 = scores.joints.iter().map(|j| j.rows).sum();
     vec![
-        format!(
-            "Torque error (RMSE) on {}: {} → {} {}, {way}.",
-            match calibration.validation.split {
-                Split::HeldoutLogs => "held-out logs",
-                Split::LeaveOneLogOut => "logs left out one at a time",
-                Split::LastThirty => "the last 30 % of each log",
-            },
-            number(scores.rmse_nominal, 3),
-            number(scores.rmse_calibrated, 3),
-            pooled_unit(joints),
-        ),
+        torque_error(calibration, joints),
         format!(
             "The 95 % intervals contain {} of the {} held-out values.",
             percent(scores.coverage95),
@@ -158,6 +149,36 @@ fn grounds(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
         ),
         effects_found(calibration),
     ]
+}
+
+/// RMSE before and after on all held-out rows, and on those of moving joints where some stand still: there friction is whatever it takes.
+fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
+    let rows = |scores: &Scores| scores.joints.iter().map(|j| j.rows).sum::<u64>();
+    let told = |scores: &Scores| {
+        let way = match scores.rmse_calibrated / scores.rmse_nominal - 1.0 {
+            c if c.abs() < 5e-4 => "unchanged".into(),
+            c if c < 0.0 => format!("{} less", percent(-c)),
+            c => format!("{} more", percent(c)),
+        };
+        let [before, after] = [scores.rmse_nominal, scores.rmse_calibrated].map(|x| number(x, 3));
+        format!("{before} → {after} {}, {way}", pooled_unit(joints))
+    };
+    let validation = &calibration.validation;
+    let (all, moving) = (&validation.filtered, &validation.moving);
+    let split = match validation.split {
+        Split::HeldoutLogs => "held-out logs",
+        Split::LeaveOneLogOut => "logs left out one at a time",
+        Split::LastThirty => "the last 30 % of each log",
+    };
+    let differ = (all.rmse_calibrated / moving.rmse_calibrated - 1.0).abs() > WORTH_TELLING;
+    if differ && (1..rows(all)).contains(&rows(moving)) {
+        return format!(
+            "Torque error (RMSE) on {split}, joints that move: {}; with those at standstill {}.",
+            told(moving),
+            told(all)
+        );
+    }
+    format!("Torque error (RMSE) on {split}: {}.", told(all))
 }
 
 /// What is more likely than not, without and with what the data leave open.
@@ -278,6 +299,47 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn rows_at_standstill_do_not_hide_what_moving_joints_gain() {
+        let of = |moving: u64| {
+            let verdict = judged(move |c| {
+                c.validation.moving = c.validation.filtered.clone();
+                for joint in &mut c.validation.moving.joints {
+                    joint.rows = moving;
+                }
+                (
+                    c.validation.moving.rmse_nominal,
+                    c.validation.moving.rmse_calibrated,
+                ) = (2.0, 0.5);
+            });
+            verdict.grounds[0].clone()
+        };
+        let both = of(7);
+        assert!(
+            both.contains(
+                "joints that move: 2.00 → 0.500 N·m, 75.0\u{202f}% less; with those at standstill"
+            ),
+            "{both}"
+        );
+        assert!(!of(0).contains("standstill"));
+    }
+
+    #[test]
+    fn bodies_that_are_none_on_two_links_ask_for_the_right_model() {
+        let of = |links: &[&str]| {
+            judged(|c| {
+                let finding = |link: &&str| {
+                    Finding::new(Severity::Warning, "unphysical_inertia_found", *link, "", 0)
+                };
+                c.findings = links.iter().map(finding).collect();
+            })
+        };
+        let two = of(&["forearm", "hand"]);
+        assert!(two.headline.contains("the robot's model"), "{two:?}");
+        assert_eq!(two.grade, Grade::Care);
+        assert!(!of(&["forearm"]).headline.contains("model"));
+    }
+
+    #[test]
     fn what_is_undecided_is_counted_apart() {
         let of = |undecided: usize| {
             let verdict = judged(move |c| {
@@ -313,8 +375,8 @@ pub(super) mod tests {
             wide.headline,
             "The torque yes; its intervals are wider than they need to be."
         );
-        let said = "Joints shoulder and elbow: their intervals are wider than they need to be (on elbow PIT off uniform by 0.12, \
-                    by chance below 0.050).";
+        let said = "Joints shoulder and elbow: their intervals are wider than they need to be (on elbow 75.0\u{202f}% of the rows \
+                    in 50 % intervals).";
         assert!(wide.limits.iter().any(|limit| limit == said), "{wide:?}");
         let narrow = judged(|c| c.validation.pit = pit(0.25, 0.0));
         assert!(narrow.headline.contains("too narrow"), "{narrow:?}");
@@ -328,7 +390,7 @@ pub(super) mod tests {
         );
         let little = judged(|c| {
             c.validation.reliability[1].pit = Pit {
-                distance: 0.033,
+                distance: 0.045,
                 chance: 0.032,
                 ..pit(0.55, 0.0)
             }

@@ -88,6 +88,7 @@ fn summary(
         selected: false,
         verdict: None,
         alias_of: component.alias_of.clone(),
+        no_rigid_body: false,
         words: String::new(),
         parameters: Vec::new(),
     };

@@ -10,7 +10,7 @@ use crate::likelihood::Columns;
 use crate::observations::{Observations, Part};
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, Slice, count_rows, spread_raw, visit_slices};
-use crate::signal::{self, Payload, Pipeline, ReadyLog, Trajectory};
+use crate::signal::{self, Auto, Payload, Pipeline, ReadyLog, Trajectory};
 use crate::term::Library;
 use crate::twin::Twin;
 use rayon::prelude::*;
@@ -123,7 +123,12 @@ impl Data {
     /// Refuses a question with fewer rows than it needs.
     ///
     /// Columns with a physical prior do not count: what the data do not say about an inertia, the prior does.
-    pub(super) fn require_enough(&self, robot: &Robot, asking: &Columns) -> Result<()> {
+    pub(super) fn require_enough(
+        &self,
+        robot: &Robot,
+        asking: &Columns,
+        cutoff: Auto,
+    ) -> Result<()> {
         let names = robot.joint_names();
         let (mut rows, mut columns, mut culprit) = (0, 0, 0);
         for joint in 0..names.len() {
@@ -150,9 +155,12 @@ impl Data {
                     "the logs give {rows} rows, fewer than {ROWS_PER_COLUMN} × the {columns} candidate columns of joint `{}`",
                     names[culprit]
                 ),
-                &format!(
-                    "{longer}, raise a stated signal.cutoff_hz, or ask for fewer candidates ([library])"
-                ),
+                &match cutoff {
+                    Auto::Auto => format!("{longer}, or ask for fewer candidates ([library])"),
+                    Auto::Value(_) => format!(
+                        "{longer}, raise signal.cutoff_hz, or ask for fewer candidates ([library])"
+                    ),
+                },
             ));
         }
         Ok(())

@@ -17,6 +17,7 @@ mod outlook;
 mod prior_conflict;
 mod reader;
 mod repeat;
+mod repeated;
 mod ripples;
 mod result;
 mod room;
@@ -38,6 +39,7 @@ mod worse;
 mod testing;
 
 pub use outlook::{LookedAt, Outlook, outlook};
+pub use repeated::Repeated;
 pub use result::{
     Alike, Along, Calibration, Compact, CompactTerm, ComponentSummary, Curve, Draws, Group, Halves,
     LikelihoodUsed, LogSummary, ParameterSummary, PriorUsed, Repeat, SweepPoint, TermSummary,
@@ -245,7 +247,7 @@ fn road(
     findings.append(&mut data.findings);
     let cutoff_hz = pipeline.cutoff_hz;
     let too_few = |error| Ok(Road::TooFew(TooFew { error, cutoff_hz }));
-    if let Err(error) = data.require_enough(robot, &columns) {
+    if let Err(error) = data.require_enough(robot, &columns, settings.signal.cutoff_hz) {
         return too_few(error);
     }
 

@@ -1,6 +1,7 @@
 //! Which number can I trust? The same effects fitted to two halves of the data, each without the other.
 
 use super::compact::refit;
+use super::repeated::APART;
 use super::result::{Halves, Repeat};
 use crate::error::{Finding, Result, Severity};
 use crate::infer::approximate;
@@ -11,8 +12,6 @@ use crate::posterior::{Posterior, Problem};
 use crate::prior::PriorSettings;
 use crate::term::{Library, estimate};
 
-/// Sd between two halves from which a number is said not to repeat: 3 in 1000 of honest ones.
-const APART: f64 = 3.0;
 /// A half that leaves a coefficient this wide, in prior sd, has not seen it.
 const UNSEEN: f64 = 0.9;
 /// Share of a log that may be left out between its halves, so that no filter reaches over the cut.

@@ -69,6 +69,9 @@ pub struct ComponentSummary {
     pub verdict: Option<Verdict>,
     /// Components that no motion of this robot can tell from it.
     pub alias_of: Vec<String>,
+    /// True where no rigid body has what was found of its link, whatever else is in: torque is right, the numbers are no mass or inertia.
+    #[serde(default)]
+    pub no_rigid_body: bool,
     /// One sentence: "payload at tool0: +1.20 ± 0.03 kg, centre of mass (0, 2, 61) ± 4 mm".
     pub words: String,
     /// Its parameters given that it is in.

@@ -103,6 +103,7 @@ pub(super) fn tell(calibration: &mut Calibration, unphysical: Vec<Unphysical>) {
     {
         for component in components {
             calibration.components[component].words.push_str(NO_BODY);
+            calibration.components[component].no_rigid_body = true;
         }
         calibration.findings.push(finding);
     }

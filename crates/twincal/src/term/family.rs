@@ -125,6 +125,33 @@ impl Family {
         )
     }
 
+    /// Factor and unit in which people read a parameter that is kept in the SI `unit`: parts in per cent, angles in degrees, centres of
+    /// mass in millimetres.
+    #[must_use]
+    pub fn told_in(self, unit: &str) -> (f64, &str) {
+        match (self, unit) {
+            (Self::Gain | Self::LoadFriction | Self::MassScale, "1") => (100.0, "%"),
+            (Self::EncoderZero, "rad") => (1f64.to_degrees(), "°"),
+            (Self::EncoderZero | Self::Payload, "m") => (1e3, "mm"),
+            (_, "1") => (1.0, ""),
+            (_, unit) => (1.0, unit),
+        }
+    }
+
+    /// What a first number of this size means where no motor, brake or body can do it on its own: it is said of the model.
+    #[must_use]
+    pub fn remark(self, value: f64) -> Option<&'static str> {
+        let remark = match self {
+            Self::MotorInertia => "negative: the model has too much inertia there",
+            Self::Viscous | Self::Coulomb => "negative: the model has too much friction there",
+            Self::Stribeck => "negative: friction grows with speed here",
+            Self::QuadraticFriction => "negative: friction grows less than the speed",
+            Self::Payload => "negative: the model carries too much",
+            _ => return None,
+        };
+        (value < 0.0).then_some(remark)
+    }
+
     /// The part of a component's name after the dot, or `payload`.
     #[must_use]
     pub fn word(self) -> &'static str {

@@ -430,18 +430,10 @@ impl Library {
         if !value.is_finite() {
             return format!("{story}: {}", super::words::NO_MODEL);
         }
-        // What no motor or brake can do on its own is said of the model.
-        let hint = match self.terms[term].family {
-            Family::MotorInertia if value < 0.0 => {
-                " (negative: the model has too much inertia there)"
-            }
-            Family::Viscous | Family::Coulomb if value < 0.0 => {
-                " (negative: the model has too much friction there)"
-            }
-            _ => "",
-        };
+        let remark = self.terms[term].family.remark(value);
+        let remark = remark.map_or_else(String::new, |remark| format!(" ({remark})"));
         format!(
-            "{story}: {} {}{hint}",
+            "{story}: {} {}{remark}",
             super::words::estimate(value, spread),
             self.terms[term].unit
         )

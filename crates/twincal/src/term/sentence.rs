@@ -46,8 +46,11 @@ pub(super) fn sentence(component: &Component, parameters: &[Estimate]) -> String
         _ if parameters.len() == 1 => one(&parameters[0]),
         _ => several(parameters),
     };
-    let hint = hint(component.family, parameters);
-    format!("{}: {text}{hint}", component.story)
+    let remark = parameters
+        .first()
+        .and_then(|p| component.family.remark(p.value));
+    let remark = remark.map_or_else(String::new, |remark| format!(" ({remark})"));
+    format!("{}: {text}{remark}", component.story)
 }
 
 fn one(p: &Estimate) -> String {
@@ -109,21 +112,6 @@ fn tilt(parameters: &[Estimate]) -> String {
         .map(|p| format!("{} {}", p.name, estimate(p.value, p.spread)))
         .collect();
     format!("{} m/s²", values.join(", "))
-}
-
-/// What no motor or brake can do on its own is said of the model.
-fn hint(family: Family, parameters: &[Estimate]) -> &'static str {
-    let negative = parameters.first().is_some_and(|p| p.value < 0.0);
-    match family {
-        Family::MotorInertia if negative => " (negative: the model has too much inertia there)",
-        Family::Viscous | Family::Coulomb if negative => {
-            " (negative: the model has too much friction there)"
-        }
-        Family::Stribeck if negative => " (negative: friction grows with speed here)",
-        Family::QuadraticFriction if negative => " (negative: friction grows less than the speed)",
-        Family::Payload if negative => " (negative: the model carries too much)",
-        _ => "",
-    }
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ const ROW: f64 = 18.0;
 /// Space for names beside the bars: on a desk screen, on a phone.
 pub(super) const NAMES: (f64, f64) = (250.0, 138.0);
 /// More height of a row whose name stands above its bar.
-pub(super) const ABOVE: f64 = 13.0;
+pub(super) const ABOVE: f64 = 15.0;
 
 enum Row<'a> {
     Family(&'static str),
@@ -151,10 +151,16 @@ fn draw(rows: &[Row<'_>], width: f64, label: &str) -> String {
                     );
                 }
                 svg.text("t", (right + 6.0, base), Anchor::Start, &probability(*pip));
+                if stacked {
+                    // Not through the names.
+                    svg.line("half", (x.at(0.5), y + 3.0), (x.at(0.5), y + ROW - 1.0));
+                }
             }
         }
     }
-    svg.line("half", (x.at(0.5), top), (x.at(0.5), bottom));
+    if !stacked {
+        svg.line("half", (x.at(0.5), top), (x.at(0.5), bottom));
+    }
     svg.line("a", (left, top), (left, bottom));
     svg.text(
         "l",

@@ -1,6 +1,6 @@
 //! Joint and marginal posterior distributions of the kept coefficients (paper fig. 3).
 
-use crate::report::figure::{Figure, Image};
+use crate::report::figure::{Figure, Image, NARROW};
 use crate::report::scale::Scale;
 use crate::report::svg::{Anchor, Path, Svg};
 use crate::report::text::{count, fixed, list, shorten, text_width};
@@ -15,9 +15,13 @@ const BARS: usize = 18;
 /// What is drawn of long tails; of a normal distribution everything.
 const FAR: f64 = 4.0;
 /// Space between cells, px.
-const GAP: f64 = 8.0;
-/// Size of a label, px.
+const GAP: f64 = 10.0;
+/// Size of a label and distance of its lines, px.
 const LABEL: f64 = 11.0;
+const LINE: f64 = 13.0;
+/// Room for names, and for the numbers of an axis, px.
+const NAMES: f64 = 142.0;
+const TICKS: f64 = 46.0;
 
 /// The figure; `None` without kept coefficients or draws.
 pub(in crate::report) fn figure(draws: &Draws, terms: &[TermSummary]) -> Option<Figure> {
@@ -33,11 +37,17 @@ pub(in crate::report) fn figure(draws: &Draws, terms: &[TermSummary]) -> Option<
     Some(Figure {
         title: "Posterior distributions".into(),
         read: "On the diagonal each coefficient on its own, below it every pair (the stronger the colour, the more probable), above it their \
-               correlation: a slanted cloud means that the data know a combination of the two better than each of them. \
+               correlation: a slanted cloud means that the data know a combination of the two better than each of them (a phone shows \
+               each on its own). \
                Draws in which the coefficient is not in (exactly 0), the outermost 1 % of the others and what is four times ± away from their median are not drawn."
             .into(),
         legend: Vec::new(),
-        images: vec![Image::fixed(draw(&variables, &label))],
+        images: vec![Image {
+            wide: draw(&variables, &label),
+            narrow: draw_each(&variables, &label),
+            layout: "whole",
+            ..Image::default()
+        }],
     })
 }
 
@@ -55,9 +65,6 @@ pub(in crate::report) fn shown(draws: &Draws, terms: &[TermSummary]) -> String {
             count(drawn as u64),
             count(kept as u64)
         );
-        if !numbered {
-            out.push_str(&format!(": {}", list(&names)));
-        }
         out.push_str(". All of them stand in the table of effects and in result.json. ");
     }
     if numbered {
@@ -72,10 +79,16 @@ pub(in crate::report) fn shown(draws: &Draws, terms: &[TermSummary]) -> String {
 
 /// True where names do not fit beside their cells: cut short they could not be told from each other.
 fn numbered(names: &[&str]) -> bool {
-    let cell = cell(names.len());
-    names
-        .iter()
-        .any(|name| text_width(name, LABEL) > cell + GAP)
+    let mut lines = names.iter().flat_map(|name| name_lines(name));
+    lines.any(|line| text_width(line, LABEL) > NAMES)
+}
+
+/// The joint or link, and what belongs to it.
+fn name_lines(name: &str) -> Vec<&str> {
+    match name.split_once('.') {
+        Some((place, word)) if word.starts_with(char::is_alphabetic) => vec![place, word],
+        _ => vec![name],
+    }
 }
 
 /// The coefficients that have draws.
@@ -102,8 +115,8 @@ fn cell(k: usize) -> f64 {
         0 | 1 => 240.0,
         2 => 190.0,
         3..=4 => 150.0,
-        5..=6 => 120.0,
-        _ => 94.0,
+        5..=6 => 104.0,
+        _ => 76.0,
     }
 }
 
@@ -118,17 +131,26 @@ fn draw(variables: &[Variable<'_>], label: &str) -> String {
     let cell = cell(k);
     let names: Vec<&str> = variables.iter().map(|v| v.name).collect();
     let numbered = numbered(&names);
-    let label_of = |index: usize| {
+    let label_of = |index: usize| -> Vec<String> {
         if numbered {
-            (index + 1).to_string()
-        } else {
-            shorten(names[index], cell + GAP, LABEL)
+            return vec![(index + 1).to_string()];
         }
+        let name = name_lines(names[index]).into_iter().map(str::to_owned);
+        let unit = Some(variables[index].unit).filter(|unit| !unit.is_empty() && *unit != "1");
+        name.chain(unit.map(|unit| format!("({unit})"))).collect()
     };
-    let (left, top) = (64.0, 26.0);
+    let names_at = if numbered { 16.0 } else { NAMES };
+    let (left, top) = (names_at + TICKS, 8.0);
     let at = |i: usize| i as f64 * (cell + GAP);
     let size = at(k) - GAP;
-    let mut svg = Svg::new(left + size + 12.0, top + size + 52.0);
+    let labels: Vec<Vec<String>> = (0..k).map(label_of).collect();
+    let widths = labels.iter().flatten().map(|line| text_width(line, LABEL));
+    let longest = if numbered {
+        LINE
+    } else {
+        widths.fold(0.0, f64::max)
+    };
+    let mut svg = Svg::new(left + size + 12.0, top + size + 28.0 + longest);
     let scales: Vec<Scale> = variables
         .iter()
         .map(|v| Scale::over(bulk(v.values), (0.0, cell)))
@@ -178,32 +200,44 @@ fn draw(variables: &[Variable<'_>], label: &str) -> String {
                 }
             }
         }
+        let label = &labels[row];
         let middle = at(row) + 0.5 * cell;
-        svg.text(
-            "name",
-            (
-                left + middle,
-                top + at(row) - if row == 0 { 9.0 } else { 2.0 },
-            ),
-            Anchor::Middle,
-            &label_of(row),
-        );
-        svg.text(
-            "l",
-            (left + middle, top + size + 32.0),
-            Anchor::Middle,
-            &label_of(row),
-        );
-        if !y.unit.is_empty() {
-            svg.text(
-                "l",
-                (left + middle, top + size + 46.0),
-                Anchor::Middle,
-                &shorten(&format!("({})", y.unit), cell + 4.0, 11.0),
-            );
+        let first = -0.5 * LINE * (label.len() as f64 - 1.0);
+        for (line, text) in label.iter().enumerate() {
+            let shift = middle + first + LINE * line as f64 + 4.0;
+            let class = if line == 0 { "name small" } else { "l" };
+            svg.text(class, (names_at, top + shift), Anchor::End, text);
+            let below = top + size + 24.0;
+            if numbered {
+                svg.text(class, (left + middle, below + 8.0), Anchor::Middle, text);
+            } else {
+                svg.text_up(class, (left + shift, below), Anchor::End, text);
+            }
         }
-        if row > 0 {
-            svg.text_up("l", (12.0, top + middle), Anchor::Middle, &label_of(row));
+    }
+    svg.finish(label)
+}
+
+/// Each coefficient on its own, for a phone.
+fn draw_each(variables: &[Variable<'_>], label: &str) -> String {
+    const HEIGHT: f64 = 44.0;
+    let row = LINE + HEIGHT + 30.0;
+    let mut svg = Svg::new(NARROW, row * variables.len() as f64);
+    for (number, variable) in variables.iter().enumerate() {
+        let top = row * number as f64 + LINE;
+        let name = match variable.unit {
+            "" | "1" => variable.name.to_owned(),
+            unit => format!("{} ({unit})", variable.name),
+        };
+        let name = shorten(&name, NARROW - 8.0, LABEL);
+        svg.text("name small", (4.0, top - 3.0), Anchor::Start, &name);
+        let (from, to) = (4.0, NARROW - 4.0);
+        svg.rect("cell", (from, top), (to - from, HEIGHT), None);
+        let x = Scale::over(bulk(variable.values), (from + 12.0, to - 12.0));
+        histogram(&mut svg, variable.values, x, (top, top + HEIGHT));
+        for (value, text) in x.ticks(5) {
+            let at = (x.at(value), top + HEIGHT + 14.0);
+            svg.text("t", at, Anchor::Middle, &text);
         }
     }
     svg.finish(label)
@@ -436,10 +470,9 @@ mod tests {
         calibration.draws.values.truncate(2);
         let text = shown(&calibration.draws, &calibration.terms);
         assert!(!text.contains("In the figure"), "{text}");
-        let drawn = calibration.draws.terms.join(" and ");
         assert!(
             text.starts_with("Shown are the 2 of 7 kept coefficients")
-                && text.contains(&format!(": {drawn}. ")),
+                && !text.contains(&calibration.draws.terms[0]),
             "{text}"
         );
     }
@@ -456,6 +489,23 @@ mod tests {
         );
         let figure = figure(&calibration.draws, &calibration.terms).unwrap();
         assert!(figure.images[0].wide.contains(">7<") && !figure.images[0].wide.contains('…'));
+    }
+
+    #[test]
+    fn every_name_stands_whole_on_a_desk_screen_and_on_a_phone() {
+        let mut calibration = crate::report::fixture::two_joints();
+        calibration.draws.terms[0] = "shoulder_lift_joint.quadratic_friction".into();
+        let figure = figure(&calibration.draws, &calibration.terms).unwrap();
+        let image = &figure.images[0];
+        for line in [">shoulder_lift_joint<", ">quadratic_friction<"] {
+            assert_eq!(image.wide.matches(line).count(), 2, "{line}");
+        }
+        assert!(
+            image
+                .narrow
+                .contains(">shoulder_lift_joint.quadratic_friction<")
+        );
+        assert_eq!(name_lines("sin(0.5*q1)"), ["sin(0.5*q1)"]);
     }
 
     #[test]

@@ -89,7 +89,9 @@ fn draw(rows: &[Row<'_>], width: f64) -> String {
         svg.line("g", (x.at(value), top), (x.at(value), bottom));
         svg.text("t", (x.at(value), bottom + 15.0), Anchor::Middle, &text);
     }
-    svg.line("half", (x.at(0.5), top), (x.at(0.5), bottom));
+    if !stacked {
+        svg.line("half", (x.at(0.5), top), (x.at(0.5), bottom));
+    }
     for (i, row) in rows.iter().enumerate() {
         let (pip, (low, high)) = (row.pip, row.range);
         let mut y = top + height * i as f64;
@@ -109,6 +111,8 @@ fn draw(rows: &[Row<'_>], width: f64) -> String {
             let name = shorten(row.name, width - left, 12.0);
             svg.text("name", (left, y + 14.0), Anchor::Start, &name);
             y += ABOVE;
+            // Not through the names.
+            svg.line("half", (x.at(0.5), y + 3.0), (x.at(0.5), y + ROW - 1.0));
         } else {
             let name = shorten(row.name, left - 14.0, 12.0);
             svg.text("name", (left - 8.0, y + 14.0), Anchor::End, &name);

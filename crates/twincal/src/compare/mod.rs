@@ -3,6 +3,8 @@
 //! The two posteriors come from different logs and are independent, so that the difference of a parameter is the
 //! difference of independent draws. A component that a twin does not hold is 0 in it.
 
+mod rivals;
+
 use crate::error::{Error, Finding, Result, Severity};
 use crate::posterior::draws::{CoefficientDraws, draw};
 use crate::term::{Estimate, Family, Library};
@@ -33,6 +35,8 @@ pub enum Became {
     PerhapsNew,
     /// Less likely than before, where one of the two is undecided or no number differs for certain.
     PerhapsGone,
+    /// It or its rival is in on both sides: one effect under two names, and these logs leave open which.
+    OneOfTwo,
     /// In on both sides, or undecided on both, with another number.
     Changed,
     /// Nothing that these logs can tell.
@@ -77,6 +81,8 @@ pub struct Change {
     pub story: String,
     /// New, gone, changed, …
     pub became: Became,
+    /// Of [`Became::OneOfTwo`]: the component that stands for it where it is not in.
+    pub rival: Option<String>,
     /// False where the numbers of the two are not the same quantity (`coulomb_velocity_differs`).
     pub comparable: bool,
     /// Inclusion probability before and after; `None` where the twin does not have the component.
@@ -160,18 +166,6 @@ impl ParameterChange {
     pub fn changed(&self) -> bool {
         self.certainty > 1.0 - DOUBT
     }
-
-    /// Factor and unit in which people read the parameter: parts in per cent, angles in degrees, centres of mass in millimetres.
-    #[must_use]
-    pub fn told_in(&self, family: Family) -> (f64, &str) {
-        match (family, self.unit.as_str()) {
-            (Family::Gain | Family::LoadFriction | Family::MassScale, "1") => (100.0, "%"),
-            (Family::EncoderZero, "rad") => (1f64.to_degrees(), "°"),
-            (Family::EncoderZero | Family::Payload, "m") => (1e3, "mm"),
-            (_, "1") => (1.0, ""),
-            (_, unit) => (1.0, unit),
-        }
-    }
 }
 
 /// The parameters worth telling, the surest first: those that changed, else the two whose difference is clearest; none where most
@@ -217,10 +211,12 @@ pub fn compare(before: &Twin, after: &Twin) -> Result<Vec<Change>> {
             .names()
             .filter(|name| sides[0].find(name).is_none()),
     );
-    Ok(names
+    let mut changes: Vec<Change> = names
         .into_iter()
         .filter_map(|name| change(name, &sides, apart))
-        .collect())
+        .collect();
+    rivals::mark(&mut changes, &sides);
+    Ok(changes)
 }
 
 /// What has to be known before two twins are compared: friction that turns round within another velocity is another column, and its number
@@ -293,6 +289,15 @@ impl Side {
         Some(self.inclusion[first])
     }
 
+    /// Whether each draw holds a component; never where the twin does not know it.
+    fn holds(&self, name: &str) -> Vec<bool> {
+        let own = self.find(name).map(|component| self.columns(component));
+        let columns: Vec<usize> = own.into_iter().flatten().flatten().collect();
+        let beta = |row: usize, k: usize| self.draws.beta[row * self.draws.columns + k];
+        let holds = |row| columns.iter().any(|&k| beta(row, k) != 0.0);
+        (0..DRAWS).map(holds).collect()
+    }
+
     /// Parameters of a component in one draw; all 0 where it is not in.
     fn values(&self, component: usize, columns: &[Option<usize>], row: usize) -> Vec<f64> {
         let value = |column: &Option<usize>| {
@@ -349,6 +354,7 @@ fn change(name: &str, sides: &[Side; 2], apart: bool) -> Option<Change> {
         family: component.family,
         story: component.story.clone(),
         became: Became::of(pip, changed),
+        rival: None,
         comparable: !(apart && component.family.turns_round()),
         pip,
         changed,
@@ -399,7 +405,7 @@ fn words(story: &str, family: Family, parameters: &[ParameterChange]) -> String 
             } else {
                 format!("{} ", p.name.replace('_', " "))
             };
-            let (factor, unit) = p.told_in(family);
+            let (factor, unit) = family.told_in(&p.unit);
             let difference = Estimate {
                 name: p.name.clone(),
                 unit: unit.to_owned(),
