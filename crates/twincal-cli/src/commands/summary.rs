@@ -7,7 +7,7 @@ use twincal::term::Status;
 use twincal::validate::{Scores, Split};
 use twincal::words::significant;
 use twincal::{Finding, Severity};
-use twincal_io::report;
+use twincal_io::report::{self, MENTIONED};
 use twincal_io::result_json::status_word;
 
 /// What to do about a log that contradicts the model.
@@ -16,8 +16,6 @@ const MENDS: &str = "`twincal init` with this log and model writes a twincal.tom
 const FEW: usize = 4;
 /// What the table of components that were not kept holds.
 const VALUE: &str = "value: median, given that it is in; ±: half of the central 68 % interval";
-/// Terms below this probability are only counted.
-const MENTIONED: f64 = 0.05;
 
 /// Prints the whole summary.
 pub(super) fn print(calibration: &Calibration, terminal: &mut Terminal) {
@@ -191,10 +189,11 @@ fn validation(calibration: &Calibration, terminal: &mut Terminal) {
 
 /// What the report says first.
 fn verdict(calibration: &Calibration, terminal: &mut Terminal) {
-    let (headline, limits) = report::verdict(calibration);
+    let answer = report::answer(calibration);
     terminal.heading("Can this twin be used?");
-    paragraph(&headline, terminal);
-    limits.iter().for_each(|limit| paragraph(limit, terminal));
+    paragraph(&answer.headline, terminal);
+    let told = answer.grounds.iter().chain(&answer.limits);
+    told.for_each(|text| paragraph(text, terminal));
     terminal.say("");
 }
 
@@ -216,12 +215,19 @@ fn reliability(calibration: &Calibration) -> Vec<String> {
     }
     if let Some(conformal) = &validation.conformal {
         lines.push(format!(
-            "stretched by {}, they hold {:.0} % of the rows of the next such log with {} {} ({} logs)",
+            "stretched by {}, they hold {:.0} % of the rows of the next such log with {} {} ({})",
             significant(conformal.factor, 3),
             100.0 * conformal.rows,
-            if conformal.guaranteed { "guaranteed probability" } else { "probability about" },
+            if conformal.guaranteed {
+                "guaranteed probability"
+            } else {
+                "probability about"
+            },
             percent(conformal.level),
-            conformal.trajectories
+            match conformal.trajectories {
+                1 => "one log".into(),
+                n => format!("{n} logs"),
+            }
         ));
     }
     if let (Some(compact), Some([average, own])) = (&calibration.compact, validation.compact) {

@@ -1,20 +1,14 @@
 //! The effects found, the ones that cannot be excluded, the ones that are absent, and the terms that were dropped. An
 //! effect is a component: one physical story with all its columns.
 
+use super::MENTIONED;
 use super::figures::inclusion::family_name;
 use super::remarks::remarks;
 use super::text::{interval, probability};
 use super::verdict::plus_minus;
 use serde::Serialize;
 use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary, TermSummary, Verdict};
-use twincal::term::{Family, Status};
-
-/// Below this probability an effect that was not kept is called absent, here as on the terminal.
-const ABSENT: f64 = 0.05;
-/// Numbers of an effect with several that stand in the table; the others are folded away.
-const TOLD: usize = 3;
-/// A number further from 0 than this many times its ± is clear.
-const CLEAR: f64 = 2.0;
+use twincal::term::{Estimate, Family, Status, told};
 
 /// The effects as a reader wants them: by kind, in the order of the library, joints in the order of the model.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -105,8 +99,8 @@ pub(super) fn sort(calibration: &Calibration) -> Effects {
             .collect()
     };
     let dropped = dropped(&calibration.terms);
-    let possible = pick(&|c, p| !c.selected && p >= ABSENT);
-    let absent = pick(&|c, p| !c.selected && (p < ABSENT || p.is_nan()));
+    let possible = pick(&|c, p| !c.selected && p >= MENTIONED);
+    let absent = pick(&|c, p| !c.selected && (p < MENTIONED || p.is_nan()));
     Effects {
         found: kinds(&pick(&|c, _| c.selected), calibration),
         counts: Counts {
@@ -155,7 +149,10 @@ fn family_title(component: &ComponentSummary) -> String {
 fn effect(component: &ComponentSummary, calibration: &Calibration) -> Effect {
     let pip = component.pip.unwrap_or(f64::NAN);
     let seen: Vec<&ParameterSummary> = seen(component, true).collect();
-    let told = told(component.family, &seen);
+    let estimates: Vec<Estimate> = component.parameters.iter().map(estimate).collect();
+    let told = told(component.family, &estimates);
+    let told: Vec<&ParameterSummary> =
+        (told.into_iter().map(|k| &component.parameters[k])).collect();
     let show = |all: &[&ParameterSummary]| -> Vec<Parameter> {
         all.iter().map(|p| parameter(p, component.family)).collect()
     };
@@ -182,25 +179,6 @@ fn effect(component: &ComponentSummary, calibration: &Calibration) -> Effect {
     }
 }
 
-/// The clearest numbers, at least one, in their order; of a payload mass and centre of mass.
-fn told<'a>(family: Family, seen: &[&'a ParameterSummary]) -> Vec<&'a ParameterSummary> {
-    if family == Family::Payload {
-        let body = |p: &&&ParameterSummary| p.name == "mass" || p.name.starts_with("com_");
-        return seen.iter().filter(body).copied().collect();
-    }
-    let clearness = |p: &ParameterSummary| {
-        let (value, spread) = p.told();
-        let clear = (value / spread).abs();
-        if clear.is_finite() { clear } else { 0.0 }
-    };
-    let mut order: Vec<usize> = (0..seen.len()).collect();
-    order.sort_by(|&a, &b| clearness(seen[b]).total_cmp(&clearness(seen[a])));
-    let clear = seen.iter().filter(|p| clearness(p) > CLEAR).count();
-    order.truncate(clear.clamp(1, TOLD));
-    order.sort_unstable();
-    order.into_iter().map(|k| seen[k]).collect()
-}
-
 /// The parameters that these data see, or those that they do not.
 fn seen(component: &ComponentSummary, wanted: bool) -> impl Iterator<Item = &ParameterSummary> {
     component
@@ -214,6 +192,17 @@ fn name(parameter: &ParameterSummary) -> String {
     match parameter.name.as_str() {
         "value" => String::new(),
         name => name.replace('_', " "),
+    }
+}
+
+/// As it goes into a sentence: what these data do not see has no value.
+fn estimate(parameter: &ParameterSummary) -> Estimate {
+    let (value, spread) = parameter.told();
+    Estimate {
+        name: parameter.name.clone(),
+        unit: parameter.unit.clone(),
+        value: if parameter.seen { value } else { f64::NAN },
+        spread,
     }
 }
 
@@ -356,7 +345,12 @@ mod tests {
         component.family = Family::Payload;
         component.parameters = vec![
             parameter("mass", "kg", 1.2, 0.03),
-            parameter("com_x", "m", 0.061, 0.004),
+            ParameterSummary {
+                seen: false,
+                ..parameter("com_x", "m", 0.0, 0.0)
+            },
+            parameter("com_y", "m", 0.061, 0.004),
+            parameter("com_z", "m", 0.0, 0.004),
             parameter("ixx", "kg·m²", 5.0, 0.1),
         ];
         let told = effect(&calibration.components[0], &calibration).told;
@@ -368,7 +362,8 @@ mod tests {
             told,
             [
                 ("mass", "1.200 ± 0.030", "kg"),
-                ("com x", "61.0 ± 4.0", "mm")
+                ("com y", "61.0 ± 4.0", "mm"),
+                ("com z", "0.0 ± 4.0", "mm")
             ]
         );
         let gain = self::parameter(

@@ -1,9 +1,10 @@
 //! Where a twin does not hold: what errors and intervals of held-out torque say against it, and what was found that is not to be rested on.
 
+use super::figures::sensitivity;
 use super::findings;
 use super::shape;
-use super::text::{list, percent};
-use super::view::{Joint, memory, standard_deviation};
+use super::text::{list, number, percent};
+use super::view::{Joint, memory, pooled_unit, standard_deviation};
 use twincal::Severity;
 use twincal::calibrate::{Calibration, Repeat, Repeated};
 use twincal::posterior::Method;
@@ -11,8 +12,11 @@ use twincal::validate::{JointScore, Scores, Split, Validation, WORSE};
 
 /// A 95 % interval is honest if it holds this share of the held-out rows.
 pub(super) const COVERAGE: (f64, f64) = (0.90, 0.99);
+/// Share of honest intervals that are called too wide.
+const ALARM: f64 = 0.05;
 /// What an interval promises to hold.
 const LEVEL: f64 = 0.95;
+/// It in words.
 const LEVEL_WORDS: &str = "95 % intervals";
 /// Share of the torque's standard deviation from which the remaining error is called large.
 const LARGE: f64 = 0.5;
@@ -21,14 +25,7 @@ const LARGE: f64 = 0.5;
 pub(super) fn limits(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
     let doubts = calibration.findings.iter().filter(|f| f.doubts_the_log());
     let mut out: Vec<String> = doubts.map(|f| f.message.clone()).collect();
-    out.extend(limits_of_torque(calibration, joints));
-    out.extend(not_to_rest_on(calibration));
-    if calibration.validation.split == Split::LastThirty {
-        out.push(
-            "It was tested on later parts of the same motions only; another motion was not tried."
-                .into(),
-        );
-    }
+    out.extend(of_results(calibration, joints));
     if !converged(calibration) {
         out.push("The sampler has not converged: run it with more draws before relying on the probabilities.".into());
     }
@@ -42,9 +39,22 @@ pub(super) fn limits(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Str
     out
 }
 
+/// What held-out torque and the effects themselves say against the twin.
+pub(super) fn of_results(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
+    let mut out = limits_of_torque(calibration, joints);
+    out.extend(not_to_rest_on(calibration));
+    if calibration.validation.split == Split::LastThirty {
+        out.push(
+            "It was tested on later parts of the same motions only; another motion was not tried."
+                .into(),
+        );
+    }
+    out
+}
+
 /// What errors and intervals of held-out torque say against the twin.
-pub(super) fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
-    let scores = &calibration.validation.filtered;
+fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
+    let scores = decisive(&calibration.validation);
     let mut out = Vec::new();
     let mut say = |joints: &[String], one: &str, many: &str| {
         if !joints.is_empty() {
@@ -61,11 +71,14 @@ pub(super) fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) 
         "its torque got worse by calibration",
         "their torque got worse by calibration",
     );
-    let mut off = |is_off: fn(&JointScore) -> bool, words: &str| {
-        let joints: Vec<&JointScore> = scores.joints.iter().filter(|j| is_off(j)).collect();
-        let held: Vec<String> = joints.iter().map(|j| percent(j.coverage95)).collect();
+    let mut off = |is_off: fn(&JointScore, f64) -> bool, words: &str| {
+        let own = scores.joints.iter();
+        let own: Vec<&JointScore> = own
+            .filter(|j| is_off(j, memory(joints, &j.joint)))
+            .collect();
+        let held: Vec<String> = own.iter().map(|j| percent(j.coverage95)).collect();
         let held = format!("({LEVEL_WORDS} hold {} of the rows)", list(&held));
-        let names: Vec<String> = joints.iter().map(|j| j.joint.clone()).collect();
+        let names: Vec<String> = own.iter().map(|j| j.joint.clone()).collect();
         say(
             &names,
             &format!("its intervals are {words} {held}"),
@@ -74,7 +87,7 @@ pub(super) fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) 
     };
     off(too_narrow, "too narrow");
     off(too_wide, "wider than they need to be");
-    let mut out_of_shape = shape::sentences(calibration);
+    let mut out_of_shape = shape::sentences(calibration, joints);
     say(
         &large(scores, joints),
         "the error left is more than half of the torque's standard deviation",
@@ -82,11 +95,13 @@ pub(super) fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) 
     );
     out.append(&mut out_of_shape);
     out.extend(beyond(calibration, joints));
+    out.extend(mostly_beyond(calibration, joints));
+    out.extend(raw_is_worse(calibration, joints));
     out
 }
 
 /// Links of which what was found is no rigid body, and effects that neither half of the data has.
-fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
+pub(super) fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
     let mut out = Vec::new();
     let bodies = no_bodies(calibration);
     if !bodies.is_empty() {
@@ -95,16 +110,38 @@ fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
             list(&bodies)
         ));
     }
-    let groups = calibration
-        .repeatability
-        .chunk_by(|a, b| a.component == b.component);
-    let in_neither = groups.filter(|own| Repeat::of_effect(own) == Repeated::InNeitherHalf);
+    let effects = || (calibration.repeatability).chunk_by(|a, b| a.component == b.component);
+    let apart = effects().filter(|own| Repeat::of_effect(own) == Repeated::Differs);
+    let apart: Vec<String> = apart
+        .map(|own| {
+            let z = own.iter().filter_map(|number| number.z).map(f64::abs);
+            format!(
+                "{} ({} sd)",
+                own[0].component,
+                number(z.fold(0.0, f64::max), 2)
+            )
+        })
+        .collect();
+    if !apart.is_empty() {
+        out.push(format!(
+            "The two halves of the data differ by 3 sd or more on {}.",
+            list(&apart)
+        ));
+    }
+    let in_neither = effects().filter(|own| Repeat::of_effect(own) == Repeated::InNeitherHalf);
     let in_neither: Vec<&str> = in_neither.map(|own| own[0].component.as_str()).collect();
     if !in_neither.is_empty() {
         out.push(format!(
-            "Neither half of the data shows by itself: {}.",
+            "Found in the whole data, but in neither half alone: {}.",
             list(&in_neither)
         ));
+    }
+    let by_prior: Vec<&str> = sensitivity::by_prior(calibration)
+        .filter(|component| component.selected)
+        .map(|component| component.name.as_str())
+        .collect();
+    if !by_prior.is_empty() {
+        out.push(format!("Other priors would leave out {}.", list(&by_prior)));
     }
     out
 }
@@ -126,10 +163,8 @@ fn beyond(calibration: &Calibration, joints: &[Joint<'_>]) -> impl Iterator<Item
         .iter()
         .zip(&beyond.joints)
         .filter(|(within, beyond)| {
-            let independent = beyond.rows as f64 / memory(joints, &beyond.joint);
-            let chance = 2.0 * (LEVEL * (1.0 - LEVEL) / independent).sqrt();
             let better_within = within.rows == 0 || within.coverage95 > beyond.coverage95;
-            better_within && too_narrow(beyond) && beyond.coverage95 < LEVEL - chance
+            better_within && too_narrow(beyond, memory(joints, &beyond.joint))
         });
     narrow.map(|(within, beyond)| {
         let seen = match within.rows {
@@ -137,11 +172,40 @@ fn beyond(calibration: &Calibration, joints: &[Joint<'_>]) -> impl Iterator<Item
             _ => format!(", within it {}", percent(within.coverage95)),
         };
         format!(
-            "Joint {}: beyond the training motion ({} of {} moving rows) its 95 % intervals hold {}{seen}.",
+            "Joint {}: beyond the training motion ({} of {} moving rows) its {LEVEL_WORDS} hold {}{seen}.",
             beyond.joint,
             beyond.rows,
             within.rows + beyond.rows,
             percent(beyond.coverage95)
+        )
+    })
+}
+
+/// Joints that were mostly tested on motion that training did not have.
+fn mostly_beyond(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
+    let Validation { within, beyond, .. } = &calibration.validation;
+    let pairs = within.joints.iter().zip(&beyond.joints);
+    let told: Vec<String> = pairs
+        .filter(|(within, beyond)| beyond.rows > within.rows)
+        .filter(|(_, beyond)| joints.iter().any(|joint| joint.name == beyond.joint))
+        .map(|(within, beyond)| {
+            let all = within.rows + beyond.rows;
+            format!("{} ({} of {all} moving rows)", beyond.joint, beyond.rows)
+        })
+        .collect();
+    (!told.is_empty())
+        .then(|| format!("Tested mostly beyond the training motion: {}.", list(&told)))
+}
+
+/// Torque as it was logged, where the twin predicts it worse than the model did.
+fn raw_is_worse(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
+    let Validation { raw, .. } = &calibration.validation;
+    (raw.rmse_calibrated > WORSE * raw.rmse_nominal).then(|| {
+        format!(
+            "Unfiltered torque is predicted worse than by the model alone: RMSE {} → {} {}.",
+            number(raw.rmse_nominal, 3),
+            number(raw.rmse_calibrated, 3),
+            pooled_unit(joints)
         )
     })
 }
@@ -163,14 +227,30 @@ pub(super) fn large(scores: &Scores, joints: &[Joint<'_>]) -> Vec<String> {
     joints.map(|joint| joint.name.to_owned()).collect()
 }
 
-/// Fewer held-out rows in the 95 % interval than an honest one has.
-pub(super) fn too_narrow(joint: &JointScore) -> bool {
-    joint.rows > 0 && joint.coverage95 < COVERAGE.0
+/// Fewer held-out rows in the 95 % interval than an honest one has, and than chance leaves it; `memory` rows count as one.
+pub(super) fn too_narrow(joint: &JointScore, memory: f64) -> bool {
+    joint.rows > 0 && joint.coverage95 < COVERAGE.0.min(LEVEL - chance(joint.rows, memory))
 }
 
-/// More of them.
-pub(super) fn too_wide(joint: &JointScore) -> bool {
-    joint.rows > 0 && joint.coverage95 > COVERAGE.1
+/// More of them: so many independent rows that some ought to lie outside.
+pub(super) fn too_wide(joint: &JointScore, memory: f64) -> bool {
+    let all_inside = LEVEL.powf(joint.rows as f64 / memory);
+    joint.coverage95 > COVERAGE.1 && all_inside < ALARM
+}
+
+/// Two standard errors of the share of rows inside an honest interval.
+fn chance(rows: u64, memory: f64) -> f64 {
+    2.0 * (LEVEL * (1.0 - LEVEL) * memory / rows as f64).sqrt()
+}
+
+/// The scores that a twin is judged by: at standstill friction is whatever it takes, so those of moving joints where there are any.
+pub(super) fn decisive(validation: &Validation) -> &Scores {
+    let moves = validation.moving.joints.iter().any(|joint| joint.rows > 0);
+    if moves && validation.moving.rmse_nominal > 0.0 {
+        &validation.moving
+    } else {
+        &validation.filtered
+    }
 }
 
 fn names<'a>(scores: impl Iterator<Item = &'a JointScore>) -> Vec<String> {
@@ -226,11 +306,8 @@ mod tests {
                 }
             })
         };
-        assert!(says(
-            &halves(0.3),
-            "Neither half of the data shows by itself: "
-        ));
-        assert!(!says(&halves(0.6), "Neither half"));
+        assert!(says(&halves(0.3), "in neither half alone: "));
+        assert!(!says(&halves(0.6), "neither half"));
     }
 
     #[test]

@@ -29,6 +29,9 @@ mod view;
 use crate::error::{Error, Result};
 use twincal::calibrate::Calibration;
 
+/// Probability from which an effect that was not kept is worth a line: below it, it is absent.
+pub const MENTIONED: f64 = 0.05;
+
 /// What the report says about the run beside its result: only things that are the same when the run is repeated.
 #[derive(Debug, Clone, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub struct ReportContext {
@@ -58,16 +61,27 @@ pub struct FileHash {
     pub sha256: String,
 }
 
-/// Whether the calibrated torque can be used, in one sentence, and what errors and intervals of held-out torque say against it, joint by joint:
-/// what stands at the top of the report.
+/// Whether the calibrated torque can be used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Answer {
+    /// One sentence.
+    pub headline: String,
+    /// What it rests on.
+    pub grounds: Vec<String>,
+    /// What held-out torque and the effects say against it.
+    pub limits: Vec<String>,
+}
+
+/// What stands at the top of the report, without its pointers into the page.
 #[must_use]
-pub fn verdict(calibration: &Calibration) -> (String, Vec<String>) {
+pub fn answer(calibration: &Calibration) -> Answer {
     let joints = view::joints(calibration);
     let verdict = verdict::judge(calibration, &joints);
-    (
-        verdict.headline,
-        limits::limits_of_torque(calibration, &joints),
-    )
+    Answer {
+        headline: verdict.headline,
+        grounds: verdict.grounds,
+        limits: limits::of_results(calibration, &joints),
+    }
 }
 
 /// The report as HTML.

@@ -27,6 +27,8 @@ const LONG: usize = 24;
 #[derive(Debug, Serialize)]
 struct Page<'a> {
     run: &'a ReportContext,
+    /// Probability from which an effect that was not kept has a line.
+    mentioned: f64,
     /// Files and amount of data, in one line.
     about: String,
     joints: Vec<&'a str>,
@@ -115,15 +117,15 @@ fn gather<'a>(
     let pit: Vec<f64> = joints
         .iter()
         .flat_map(|j| &j.traces)
-        .flat_map(|t| t.pit.iter().copied())
+        .flat_map(|t| t.pit.iter().zip(&t.standstill))
+        .filter_map(|(pit, still)| (!still).then_some(*pit))
         .collect();
     let others = OTHER_TRACES / joints.len().max(1);
     let components = &calibration.components;
-    let sensitive = figures::sensitivity::one_each(terms)
-        .filter(|t| figures::sensitivity::depends_on_prior(t))
-        .map(|t| figures::sensitivity::name(t, components));
+    let sensitive = figures::sensitivity::by_prior(calibration).map(|c| c.name.as_str());
     Page {
         run,
+        mentioned: super::MENTIONED,
         about: tables::about(calibration, run),
         joints: joints.iter().map(|j| j.name).collect(),
         verdict: verdict::judge(calibration, joints),

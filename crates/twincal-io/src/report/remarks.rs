@@ -1,24 +1,35 @@
 //! What is to be minded about an effect before its numbers are used: it stands at the effect's own line.
 
 use super::text::{list, number};
-use twincal::calibrate::{Alike, Calibration, ComponentSummary, Repeat, Repeated};
+use twincal::calibrate::{
+    Alike, Calibration, ComponentSummary, ParameterSummary, Repeat, Repeated,
+};
+use twincal::term::Family;
 
 /// Rivals that are named; the others are counted.
 const NAMED: usize = 2;
+/// Change of the size of gravity, as a share, that no place on earth explains.
+const SIZE_OF_GRAVITY: f64 = 0.01;
+/// Width of a 95 % interval in spreads from which ± does not describe it; 3.92 where it is normal.
+const FAR: f64 = 12.0;
 
-/// Remarks on a found component, the gravest first.
+/// Remarks on a component, the gravest first.
 pub(super) fn remarks(component: &ComponentSummary, calibration: &Calibration) -> Vec<String> {
     let mut out = Vec::new();
-    let first = component.parameters.first().map(|p| p.told().0);
-    let negative = first.and_then(|value| component.family.remark(value));
+    let first = component.parameters.first().map(ParameterSummary::told);
+    let negative = first.and_then(|(value, spread)| component.family.remark(value, spread));
     out.extend(negative.map(str::to_owned));
+    out.extend(size_of_gravity(component, calibration));
     if component.no_rigid_body {
         out.push("no rigid body has this: it stands in for another effect".into());
     }
     out.extend(rivals(component, calibration));
     out.extend(repeats(component, calibration));
+    if component.parameters.iter().any(is_split) {
+        out.push("some models put it far off: see the 95 % interval".into());
+    }
     if moves_with_the_cutoff(component, calibration) {
-        out.push("moves with the cut-off by more than its ±".into());
+        out.push("depends on the filter's cut-off by more than its ±".into());
     }
     out
 }
@@ -47,12 +58,50 @@ fn rivals(component: &ComponentSummary, calibration: &Calibration) -> Option<Str
             "or {} instead: no motion can tell",
             others(&group.members)
         )),
-        None if component.alias_of.is_empty() => None,
-        None => Some(format!(
-            "no motion can tell it from {}; the prior prefers it",
-            others(&component.alias_of)
-        )),
+        None => {
+            let settled = calibration
+                .groups
+                .iter()
+                .find(|group| own(&group.members))?;
+            let first = settled.members.first()?;
+            Some(if *first == component.name {
+                format!(
+                    "the same as {} in every motion; the prior prefers it",
+                    others(&settled.members)
+                )
+            } else {
+                format!("the same as {first} in every motion, which the prior prefers")
+            })
+        }
     }
+}
+
+/// A tilt turns gravity; what changes its size is something else.
+fn size_of_gravity(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
+    if component.family != Family::Tilt {
+        return None;
+    }
+    let nominal = calibration.twin.robot.description().gravity;
+    let changed = |axis: usize| {
+        let names = ["x", "y", "z"];
+        let own = component.parameters.iter().find(|p| p.name == names[axis]);
+        let change = own.map_or(0.0, |p| p.told().0);
+        nominal[axis] + if change.is_finite() { change } else { 0.0 }
+    };
+    let size = |g: [f64; 3]| g.iter().map(|g| g * g).sum::<f64>().sqrt();
+    let (before, after) = (size(nominal), size([0, 1, 2].map(changed)));
+    ((after / before - 1.0).abs() > SIZE_OF_GRAVITY).then(|| {
+        format!(
+            "gravity would be {} m/s²: it stands in for masses, springs or the scale of torque",
+            number(after, 3)
+        )
+    })
+}
+
+/// Models that put a number far from the others: its 95 % interval says more than its ±.
+fn is_split(parameter: &ParameterSummary) -> bool {
+    let [low, high] = parameter.interval95;
+    parameter.seen && high - low > FAR * parameter.told().1
 }
 
 /// What the two halves of the data say, where they do not agree.
@@ -127,7 +176,7 @@ mod tests {
             [
                 "no rigid body has this: it stands in for another effect",
                 "or x, y and 2 more instead: these logs do not tell",
-                "moves with the cut-off by more than its ±",
+                "depends on the filter's cut-off by more than its ±",
             ]
         );
         // What the prior settled is said as such.
@@ -135,9 +184,48 @@ mod tests {
             let mut group = group(Alike::EveryMotion, true);
             group.members.push(c.components[0].name.clone());
             c.groups = vec![group];
-            c.components[0].alias_of = vec!["x".into()];
         });
-        assert_eq!(said, ["no motion can tell it from x; the prior prefers it"]);
+        assert_eq!(
+            said,
+            ["the same as x in every motion, which the prior prefers"]
+        );
+        let said = of(|c| {
+            let mut group = group(Alike::EveryMotion, true);
+            group.members.insert(0, c.components[0].name.clone());
+            c.groups = vec![group];
+        });
+        assert_eq!(
+            said,
+            ["the same as x, y and 2 more in every motion; the prior prefers it"]
+        );
+    }
+
+    #[test]
+    fn gravity_of_another_size_stands_in_for_something_else() {
+        let tilt = |z: f64| {
+            of(move |c| {
+                let component = &mut c.components[0];
+                component.family = Family::Tilt;
+                let size = c.twin.robot.description().gravity[2].abs();
+                assert!(size > 9.0, "the arm stands upright");
+                let p = &mut component.parameters[0];
+                (p.name, p.median) = ("z".into(), z);
+                p.interval68 = [z - 0.01, z + 0.01];
+                p.interval95 = [z - 0.02, z + 0.02];
+            })
+        };
+        assert_eq!(tilt(0.05), [""; 0]);
+        assert!(
+            tilt(1.17)[0].starts_with("gravity would be 8.64 m/s²"),
+            "{:?}",
+            tilt(1.17)
+        );
+    }
+
+    #[test]
+    fn models_far_from_the_others_are_told() {
+        let said = of(|c| c.components[0].parameters[0].interval95 = [-4.3, 4.5]);
+        assert_eq!(said, ["some models put it far off: see the 95 % interval"]);
     }
 
     #[test]

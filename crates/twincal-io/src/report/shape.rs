@@ -1,7 +1,8 @@
 //! Have the predicted distributions the right shape: what the PIT of held-out rows says, joint by joint, in words.
 
-use super::limits::{too_narrow, too_wide};
+use super::limits::{decisive, too_narrow, too_wide};
 use super::text::{list, number, percent};
+use super::view::{Joint, memory};
 use twincal::calibrate::Calibration;
 use twincal::validate::{JointScore, Pit, Reliability, Scores};
 
@@ -62,8 +63,11 @@ impl Shape {
     }
 
     /// True where the 95 % interval of some joint says the opposite: in the middle of a distribution and at its ends errors may differ.
-    pub(super) fn contradicts(self, scores: &Scores) -> bool {
-        let any = |of: fn(&JointScore) -> bool| scores.joints.iter().any(of);
+    pub(super) fn contradicts(self, scores: &Scores, joints: &[Joint<'_>]) -> bool {
+        let any = |of: fn(&JointScore, f64) -> bool| {
+            let mut scores = scores.joints.iter();
+            scores.any(|score| of(score, memory(joints, &score.joint)))
+        };
         match self {
             Self::Wide => any(too_narrow),
             Self::Narrow => any(too_wide),
@@ -88,8 +92,8 @@ impl Shape {
             pit.histogram[bins / 2..].iter().sum::<f64>() / pit.histogram.iter().sum::<f64>();
         let half = coverage.iter().find(|(level, _)| *level == 0.5);
         match (self, half) {
-            (Self::Above, _) => format!("{} of the rows above their middle", percent(above)),
-            (Self::Below, _) => format!("{} of the rows below their middle", percent(1.0 - above)),
+            (Self::Above, _) => format!("{} of the rows", percent(above)),
+            (Self::Below, _) => format!("{} of the rows", percent(1.0 - above)),
             (_, Some((_, seen))) => format!("{} of the rows in 50 % intervals", percent(*seen)),
             (_, None) => format!("PIT off uniform by {}", number(pit.distance, 2)),
         }
@@ -102,10 +106,10 @@ impl Shape {
             (Self::Wide, true) => "intervals are a little wider than they need to be",
             (Self::Narrow, false) => "intervals are too narrow",
             (Self::Narrow, true) => "intervals are a little too narrow",
-            (Self::Above, false) => "intervals lie too low",
-            (Self::Above, true) => "intervals lie a little too low",
-            (Self::Below, false) => "intervals lie too high",
-            (Self::Below, true) => "intervals lie a little too high",
+            (Self::Above, false) => "torque lies above the prediction too often",
+            (Self::Above, true) => "torque lies above the prediction a little too often",
+            (Self::Below, false) => "torque lies below the prediction too often",
+            (Self::Below, true) => "torque lies below the prediction a little too often",
         }
     }
 }
@@ -136,16 +140,19 @@ pub(super) fn off(calibration: &Calibration) -> Off {
 }
 
 /// Every joint whose predictions are off by more than chance allows, in words and with the number behind them.
-pub(super) fn sentences(calibration: &Calibration) -> Vec<String> {
+pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<String> {
     let validation = &calibration.validation;
     let mut out = Vec::new();
     let joints = validation.reliability.len();
     // What its 95 % interval says of a joint stands elsewhere; the middle of the distribution neither contradicts nor repeats it.
-    let scores = &validation.filtered.joints;
+    let scores = &decisive(validation).joints;
     let said = |joint: &str, shape: Shape| {
-        let mut own = scores.iter().filter(|score| score.joint == joint);
+        let (mut own, memory) = (
+            scores.iter().filter(|score| score.joint == joint),
+            memory(all, joint),
+        );
         own.any(|score| match shape {
-            Shape::Wide | Shape::Narrow => too_narrow(score) || too_wide(score),
+            Shape::Wide | Shape::Narrow => too_narrow(score, memory) || too_wide(score, memory),
             Shape::Above | Shape::Below => false,
         })
     };
@@ -176,7 +183,9 @@ pub(super) fn sentences(calibration: &Calibration) -> Vec<String> {
             ),
         });
     }
-    if let (true, Some(shape)) = (out.is_empty(), Shape::of(&validation.pit, 1)) {
+    let pooled = Shape::of(&validation.pit, 1);
+    let pooled = pooled.filter(|shape| shape.agrees(&validation.coverage_levels));
+    if let (true, Some(shape)) = (out.is_empty(), pooled) {
         let pit = &validation.pit;
         let words = shape.words(pit.distance <= OFF);
         let shown = shape.shown(pit, &validation.coverage_levels);
@@ -246,13 +255,7 @@ pub(super) mod tests {
             "75.0\u{202f}% of the rows in 50 % intervals"
         );
         // The slope's upper half: Σ (i − 9.5)/1000 over i = 10 … 19 is 0.05, times four.
-        assert_eq!(
-            shown(Shape::Above, 4.0),
-            "70.0\u{202f}% of the rows above their middle"
-        );
-        assert_eq!(
-            shown(Shape::Below, -4.0),
-            "70.0\u{202f}% of the rows below their middle"
-        );
+        assert_eq!(shown(Shape::Above, 4.0), "70.0\u{202f}% of the rows");
+        assert_eq!(shown(Shape::Below, -4.0), "70.0\u{202f}% of the rows");
     }
 }

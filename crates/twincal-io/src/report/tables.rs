@@ -272,15 +272,17 @@ pub(super) fn convergence(calibration: &Calibration) -> Vec<String> {
     }
     if let Some(first) = posterior.models.first() {
         out.push(format!(
-            "The most probable model has probability {} and {}; intervals use the most probable models ({}), which leave out {} of \
-             the probability.",
+            "The most probable model has probability {} and {}; intervals use the most probable models ({}), which {}.",
             probability(first.weight * posterior.models_mass),
             match first.members.len() {
                 1 => "one term".into(),
                 n => format!("{n} terms"),
             },
             count(posterior.models.len() as u64),
-            number((1.0 - posterior.models_mass).max(0.0), 2),
+            match 1.0 - posterior.models_mass {
+                rest if rest > 0.0 => format!("leave out {} of the probability", number(rest, 2)),
+                _ => "are all that count".into(),
+            },
         ));
     }
     if let Some(evidence) = posterior.log_evidence {

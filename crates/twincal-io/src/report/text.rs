@@ -64,7 +64,7 @@ pub(super) fn escape(text: &str) -> String {
     out
 }
 
-/// [`escape`]d text with places for line breaks after `_` and after `.` before a letter: names break there or nowhere, and
+/// [`escape`]d text with places for line breaks after `_` and `.` before a letter: names break there or nowhere, and
 /// only words of more than `whole` letters.
 pub(super) fn breakable(text: &str, whole: usize) -> String {
     let text = clean(text);
@@ -79,7 +79,7 @@ pub(super) fn breakable(text: &str, whole: usize) -> String {
         while let Some((at, letter)) = letters.next() {
             let next = letters.peek().map(|(_, next)| *next);
             let breaks = match letter {
-                '_' => next.is_some_and(|next| !next.is_whitespace()),
+                '_' => next.is_some_and(char::is_alphabetic),
                 '.' => next.is_some_and(char::is_alphabetic),
                 _ => false,
             };
@@ -290,7 +290,7 @@ mod tests {
     fn names_break_after_an_underscore_or_a_dot_before_a_letter() {
         assert_eq!(
             breakable("shoulder_pan.<b> 0.25 q_1.viscous: end.", 0),
-            "shoulder_<wbr/>pan.&lt;b&gt; 0.25 q_<wbr/>1.<wbr/>viscous: end."
+            "shoulder_<wbr/>pan.&lt;b&gt; 0.25 q_1.<wbr/>viscous: end."
         );
         assert_eq!(breakable("é_ü_", 0), "é_<wbr/>ü_");
         assert_eq!(

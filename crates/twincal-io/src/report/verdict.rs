@@ -1,9 +1,11 @@
 //! Can this twin be used, and where not: the first thing the report says, derived from held-out data alone.
 
-use super::limits::{COVERAGE, converged, large, limits, no_bodies, worse};
+use super::limits::{
+    COVERAGE, converged, decisive, large, limits, no_bodies, not_to_rest_on, too_narrow, worse,
+};
 use super::shape;
 use super::text::{number, percent, with_sd};
-use super::view::{Joint, independent_rows, pooled_unit};
+use super::view::{Joint, independent_rows, memory, pooled_unit};
 use serde::Serialize;
 use twincal::calibrate::{Calibration, Verdict as Decision};
 use twincal::validate::{Scores, Split, WORSE};
@@ -15,6 +17,8 @@ const BETTER: f64 = 0.95;
 const FEW: f64 = 20.0;
 /// Change of an error by the rows at standstill from which it is told without and with them.
 const WORTH_TELLING: f64 = 0.05;
+/// The same of the share of rows that intervals hold.
+const SHARE_WORTH_TELLING: f64 = 0.01;
 /// How the answer is coloured; the words carry the meaning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -39,8 +43,10 @@ pub(super) struct Verdict {
 /// Judges `calibration`.
 pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict {
     let scores = &calibration.validation.filtered;
-    let found = calibration.components.iter().filter(|c| c.selected).count();
-    let rows: u64 = scores.joints.iter().map(|j| j.rows).sum();
+    let found = || calibration.components.iter().filter(|c| c.selected);
+    let sure = found().filter(|c| c.verdict != Some(Decision::Undecided));
+    let (found, sure) = (found().count(), sure.count());
+    let rows = rows_of(scores);
     if rows == 0 || !(scores.rmse_nominal.is_finite() && scores.rmse_calibrated.is_finite()) {
         return Verdict {
             grade: Grade::Bad,
@@ -52,10 +58,14 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
             ],
         };
     }
+    let scores = decisive(&calibration.validation);
     let ratio = scores.rmse_calibrated / scores.rmse_nominal;
     let worse = worse(scores);
     let honest = (COVERAGE.0..=COVERAGE.1).contains(&scores.coverage95);
     let off = shape::off(calibration);
+    let mut each = scores.joints.iter();
+    let too_narrow = each.any(|j| too_narrow(j, memory(joints, &j.joint)));
+    let firm = not_to_rest_on(calibration).is_empty();
     let large = large(scores, joints);
     let limits = limits(calibration, joints);
     let serious = calibration
@@ -93,6 +103,11 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
             Grade::Care,
             "Hardly: on held-out data the calibrated torque is no better than the nominal one.",
         )
+    } else if found > 0 && sure == 0 {
+        (
+            Grade::Care,
+            "Perhaps: torque is better with it, but none of its effects is sure.",
+        )
     } else if 2 * large.len() > joints.len() {
         (
             Grade::Care,
@@ -108,14 +123,14 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
             Grade::Care,
             "Yes; its intervals are wider than they need to be.",
         )
-    } else if let Some(shape) = off.all.filter(|shape| !shape.contradicts(scores)) {
+    } else if let Some(shape) = off.all.filter(|shape| !shape.contradicts(scores, joints)) {
         (Grade::Care, shape.headline())
     } else if no_bodies(calibration).len() > 1 {
         (
             Grade::Care,
-            "The torque yes; but what was found are no rigid bodies: look whether this is the robot's model.",
+            "With care: what was found of several links is no rigid body. Is this the robot's model?",
         )
-    } else if worse.is_empty() && !serious && !off.single {
+    } else if worse.is_empty() && !serious && !off.single && !too_narrow && firm {
         (
             Grade::Good,
             "Yes, on motions like the ones it was tested on.",
@@ -131,29 +146,45 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     }
 }
 
+fn rows_of(scores: &Scores) -> u64 {
+    scores.joints.iter().map(|j| j.rows).sum()
+}
+
 /// Whether a log has no torque that changes.
 fn no_measurement(calibration: &Calibration) -> bool {
     let mut findings = calibration.findings.iter();
     findings.any(|f| f.code == "constant_torque" && f.severity == Severity::Degraded)
 }
 
-fn grounds(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
-    let scores = &calibration.validation.filtered;
-    let rows: u64 = scores.joints.iter().map(|j| j.rows).sum();
+pub(super) fn grounds(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
     vec![
         torque_error(calibration, joints),
-        format!(
-            "The 95 % intervals contain {} of the {} held-out values.",
-            percent(scores.coverage95),
-            super::text::count(rows)
-        ),
+        held(calibration),
         effects_found(calibration),
     ]
 }
 
+/// How much the 95 % intervals hold: of moving joints, and of all rows where some stand still.
+fn held(calibration: &Calibration) -> String {
+    let all = &calibration.validation.filtered;
+    let judged = decisive(&calibration.validation);
+    let (rows, share) = (
+        super::text::count(rows_of(judged)),
+        percent(judged.coverage95),
+    );
+    if (judged.coverage95 - all.coverage95).abs() < SHARE_WORTH_TELLING {
+        let (rows, share) = (super::text::count(rows_of(all)), percent(all.coverage95));
+        return format!("The 95 % intervals contain {share} of the {rows} held-out values.");
+    }
+    format!(
+        "The 95 % intervals contain {share} of the {rows} held-out values of moving joints, {} of all {}.",
+        percent(all.coverage95),
+        super::text::count(rows_of(all))
+    )
+}
+
 /// RMSE before and after on all held-out rows, and on those of moving joints where some stand still: there friction is whatever it takes.
 fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
-    let rows = |scores: &Scores| scores.joints.iter().map(|j| j.rows).sum::<u64>();
     let told = |scores: &Scores| {
         let way = match scores.rmse_calibrated / scores.rmse_nominal - 1.0 {
             c if c.abs() < 5e-4 => "unchanged".into(),
@@ -171,7 +202,7 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
         Split::LastThirty => "the last 30 % of each log",
     };
     let differ = (all.rmse_calibrated / moving.rmse_calibrated - 1.0).abs() > WORTH_TELLING;
-    if differ && (1..rows(all)).contains(&rows(moving)) {
+    if differ && (1..rows_of(all)).contains(&rows_of(moving)) {
         return format!(
             "Torque error (RMSE) on {split}, joints that move: {}; with those at standstill {}.",
             told(moving),
@@ -217,7 +248,16 @@ pub(super) mod tests {
     pub(in crate::report) fn judged(change: impl Fn(&mut Calibration)) -> Verdict {
         let mut calibration = fixture::two_joints();
         calibration.findings.clear();
+        calibration
+            .repeatability
+            .iter_mut()
+            .for_each(|r| r.z = Some(0.1));
+        (calibration.terms.iter_mut()).for_each(|t| t.pip_sensitivity.clear());
+        let moving = calibration.validation.moving.clone();
         change(&mut calibration);
+        if calibration.validation.moving == moving {
+            calibration.validation.moving = calibration.validation.filtered.clone();
+        }
         judge(&calibration, &view::joints(&calibration))
     }
 
@@ -334,9 +374,64 @@ pub(super) mod tests {
             })
         };
         let two = of(&["forearm", "hand"]);
-        assert!(two.headline.contains("the robot's model"), "{two:?}");
+        assert!(
+            two.headline.ends_with("Is this the robot's model?"),
+            "{two:?}"
+        );
         assert_eq!(two.grade, Grade::Care);
         assert!(!of(&["forearm"]).headline.contains("model"));
+    }
+
+    #[test]
+    fn what_is_not_to_rest_on_makes_an_exception() {
+        let apart = judged(|c| c.repeatability[0].z = Some(3.7));
+        assert!(apart.headline.contains("exceptions"), "{apart:?}");
+        assert!(
+            apart.limits.iter().any(|l| l.contains("(3.7 sd)")),
+            "{apart:?}"
+        );
+        let prior = judged(|c| {
+            let selected = c.terms.iter_mut().find(|t| t.selected);
+            selected.unwrap().pip_sensitivity = vec![0.3, 0.9];
+        });
+        assert!(prior.headline.contains("exceptions"), "{prior:?}");
+        assert!(
+            prior
+                .limits
+                .iter()
+                .any(|l| l.starts_with("Other priors would leave out"))
+        );
+        let narrow = judged(|c| c.validation.filtered.joints[1].coverage95 = 0.78);
+        assert!(narrow.headline.contains("exceptions"), "{narrow:?}");
+    }
+
+    #[test]
+    fn unfiltered_torque_that_gets_worse_is_said() {
+        let raw =
+            judged(|c| c.validation.raw.rmse_calibrated = 1.2 * c.validation.raw.rmse_nominal);
+        assert!(
+            raw.limits
+                .iter()
+                .any(|l| l.starts_with("Unfiltered torque")),
+            "{raw:?}"
+        );
+    }
+
+    #[test]
+    fn intervals_that_hold_every_one_of_few_rows_are_not_too_wide() {
+        // 0.95^58 = 0.051: fifty-eight rows in a row may be inside by chance.
+        let says = |rows: u64| {
+            let verdict = judged(|c| {
+                let memory = c.noise[1].autocorrelation_time.max(1.0);
+                let joint = &mut c.validation.filtered.joints[1];
+                (joint.rows, joint.coverage95) = ((rows as f64 * memory) as u64, 1.0);
+            });
+            verdict
+                .limits
+                .iter()
+                .any(|l| l.contains("elbow: its intervals are wider"))
+        };
+        assert!(!says(57) && says(60));
     }
 
     #[test]
@@ -350,6 +445,11 @@ pub(super) mod tests {
             });
             verdict.grounds.last().cloned().unwrap_or_default()
         };
+        let headline = judged(|c| {
+            let found = c.components.iter_mut().filter(|c| c.selected);
+            found.for_each(|c| c.verdict = Some(Decision::Undecided));
+        });
+        assert!(headline.headline.starts_with("Perhaps"), "{headline:?}");
         assert_eq!(of(0), "7 missing effects found.");
         assert_eq!(
             of(6),
@@ -386,7 +486,7 @@ pub(super) mod tests {
         assert!(
             one.limits
                 .iter()
-                .any(|l| l.contains("elbow: its intervals lie too low"))
+                .any(|l| l.contains("elbow: its torque lies above the prediction too often"))
         );
         let little = judged(|c| {
             c.validation.reliability[1].pit = Pit {

@@ -48,35 +48,42 @@ impl Repeat {
     /// What the two halves say about this number.
     #[must_use]
     pub fn repeated(&self) -> Repeated {
-        let spread = self.first_sd.hypot(self.second_sd);
-        let held = [self.first_pip, self.second_pip].map(|pip| pip >= HELD);
-        match self.z.map(f64::abs) {
-            None => Repeated::NotSeen,
-            Some(z) if z >= APART => Repeated::Differs,
-            Some(_) if held == [false; 2] => Repeated::InNeitherHalf,
-            Some(_) if held != [true; 2] => Repeated::InOneHalf,
-            Some(_) if WAVERS * spread > self.pooled().abs() => Repeated::TooLoose,
-            Some(z) if z >= WAVERS => Repeated::Wavers,
-            Some(_) => Repeated::Repeats,
-        }
+        self.judged(self.first_pip, self.second_pip)
     }
 
-    /// Of an effect, by all of its numbers: it differs where one of them does, and is too loose where all that both halves see are.
-    /// [`Repeated::NotSeen`] without numbers.
+    /// Of an effect, by all of its numbers: it differs where one of them does, and is too loose where all that both halves see are. It is in a
+    /// half where any of its columns is: the tensor of a payload may be out. [`Repeated::NotSeen`] without numbers.
     #[must_use]
     pub fn of_effect(numbers: &[Self]) -> Repeated {
-        let each: Vec<Repeated> = numbers.iter().map(Self::repeated).collect();
-        let seen = || each.iter().copied().filter(|r| *r != Repeated::NotSeen);
-        // The least sure first.
-        let worst = [
+        let most = |of: fn(&Self) -> f64| numbers.iter().map(of).fold(0.0, f64::max);
+        let (first, second) = (most(|r| r.first_pip), most(|r| r.second_pip));
+        let each = || numbers.iter().map(|number| number.judged(first, second));
+        // What one number is enough for, the least sure first; then what holds of all that are seen.
+        let order = [
             Repeated::Differs,
             Repeated::InNeitherHalf,
             Repeated::InOneHalf,
             Repeated::Wavers,
             Repeated::Repeats,
+            Repeated::TooLoose,
         ];
-        let worst = worst.into_iter().find(|worst| seen().any(|r| r == *worst));
-        worst.or(seen().next()).unwrap_or(Repeated::NotSeen)
+        let said = order.into_iter().find(|state| each().any(|r| r == *state));
+        said.unwrap_or(Repeated::NotSeen)
+    }
+
+    /// What the halves say about this number where they have its effect with these probabilities.
+    fn judged(&self, first_pip: f64, second_pip: f64) -> Repeated {
+        let spread = self.first_sd.hypot(self.second_sd);
+        let held = [first_pip, second_pip].map(|pip| pip >= HELD);
+        match self.z.map(f64::abs) {
+            Some(z) if z >= APART => Repeated::Differs,
+            _ if held == [false; 2] => Repeated::InNeitherHalf,
+            _ if held != [true; 2] => Repeated::InOneHalf,
+            None => Repeated::NotSeen,
+            Some(z) if z >= WAVERS => Repeated::Wavers,
+            Some(_) if WAVERS * spread > self.pooled().abs() => Repeated::TooLoose,
+            Some(_) => Repeated::Repeats,
+        }
     }
 
     /// Both halves together: the mean weighted by precision.
@@ -122,11 +129,14 @@ mod tests {
             of((7.0, 0.1), (7.0, 0.1), (0.4, 0.4)).repeated(),
             Repeated::InNeitherHalf
         );
-        let unseen = Repeat {
+        let unseen = |pips| Repeat {
             z: None,
-            ..of((0.0, 1.0), (0.0, 1.0), sure)
+            ..of((0.0, 1.0), (0.0, 1.0), pips)
         };
-        assert_eq!(unseen.repeated(), Repeated::NotSeen);
+        assert_eq!(unseen(sure).repeated(), Repeated::NotSeen);
+        assert_eq!(unseen((0.1, 0.1)).repeated(), Repeated::InNeitherHalf);
+        // Apart by 2.8 sd is no agreement, however loose either half is.
+        assert_eq!(says((-3.0, 1.0), (1.0, 1.0)), Repeated::Wavers);
     }
 
     #[test]
@@ -152,5 +162,11 @@ mod tests {
         assert_eq!(Repeat::of_effect(&[sharp, apart]), Repeated::Differs);
         assert_eq!(Repeat::of_effect(&[unseen]), Repeated::NotSeen);
         assert_eq!(Repeat::of_effect(&[]), Repeated::NotSeen);
+        // A payload's tensor may be out of both halves; the payload is in.
+        let (mass, tensor) = (
+            of((1.7, 0.1), (1.7, 0.1), sure),
+            of((0.2, 0.1), (0.2, 0.1), (0.4, 0.4)),
+        );
+        assert_eq!(Repeat::of_effect(&[mass, tensor]), Repeated::Repeats);
     }
 }

@@ -9,19 +9,21 @@ const POSSIBLE: f64 = 0.02;
 /// Rivals are in together less often than this share of what independent ones would be.
 const SELDOM: f64 = 0.5;
 
-/// Marks every component that seems new or gone, for certain or perhaps, where another stands for it in the other twin: one of the two is in on both sides, and
-/// where both are possible they exclude each other.
+/// Marks every component that is perhaps new or gone where another stands for it: one of the two is in on both sides, and where both are possible they exclude each
+/// other. Numbers of the two twins have to be the same quantities.
 pub(super) fn mark(changes: &mut [Change], sides: &[Side; 2]) {
     let inside: Vec<[Vec<bool>; 2]> = (changes.iter())
         .map(|change| [0, 1].map(|side: usize| sides[side].holds(&change.name)))
         .collect();
-    let moves = |change: &Change| !matches!(change.became, Became::Changed | Became::AsBefore);
+    let is_open =
+        |change: &Change| matches!(change.became, Became::PerhapsNew | Became::PerhapsGone);
     let rival = |own: usize| {
-        let mut others = (0..inside.len()).filter(|&other| other != own);
+        let mut others =
+            (0..inside.len()).filter(|&other| other != own && changes[other].comparable);
         others.find(|&other| are_rivals(&inside[own], &inside[other]))
     };
     let rivals: Vec<Option<usize>> = (0..changes.len())
-        .map(|own| rival(own).filter(|_| moves(&changes[own])))
+        .map(|own| rival(own).filter(|_| is_open(&changes[own]) && changes[own].comparable))
         .collect();
     let names: Vec<String> = changes.iter().map(|change| change.name.clone()).collect();
     for (change, rival) in changes.iter_mut().zip(rivals) {

@@ -54,6 +54,9 @@ pub enum Family {
     Ripple,
 }
 
+/// A number further from 0 than this many spreads is clear.
+pub(super) const CLEAR: f64 = 2.0;
+
 impl Family {
     /// All families that `[library] families` can name, in the order of `terms[]`.
     pub const NAMED: [Self; 20] = [
@@ -138,9 +141,10 @@ impl Family {
         }
     }
 
-    /// What a first number of this size means where no motor, brake or body can do it on its own: it is said of the model.
+    /// What a first number that is clearly negative means, where no motor, brake or body can do it on its own: it is said of the model. `spread`: half its
+    /// central 68.3 % interval.
     #[must_use]
-    pub fn remark(self, value: f64) -> Option<&'static str> {
+    pub fn remark(self, value: f64, spread: f64) -> Option<&'static str> {
         let remark = match self {
             Self::MotorInertia => "negative: the model has too much inertia there",
             Self::Viscous | Self::Coulomb => "negative: the model has too much friction there",
@@ -149,7 +153,7 @@ impl Family {
             Self::Payload => "negative: the model carries too much",
             _ => return None,
         };
-        (value < 0.0).then_some(remark)
+        (value < -CLEAR * spread).then_some(remark)
     }
 
     /// The part of a component's name after the dot, or `payload`.

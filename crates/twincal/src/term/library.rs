@@ -430,7 +430,9 @@ impl Library {
         if !value.is_finite() {
             return format!("{story}: {}", super::words::NO_MODEL);
         }
-        let remark = self.terms[term].family.remark(value);
+        // A payload is judged by its mass, which is not each of its terms.
+        let family = Some(self.terms[term].family).filter(|family| *family != Family::Payload);
+        let remark = family.and_then(|family| family.remark(value, spread));
         let remark = remark.map_or_else(String::new, |remark| format!(" ({remark})"));
         format!(
             "{story}: {} {}{remark}",

@@ -1,6 +1,7 @@
 //! A component with its parameters in one sentence.
 
 use super::component::Component;
+use super::family::CLEAR;
 use super::words::estimate;
 use super::{Family, words};
 
@@ -27,8 +28,6 @@ impl std::fmt::Display for Estimate {
 
 /// Parameters of a component that are told at most; the rest stands in the tables.
 const TOLD: usize = 3;
-/// A parameter further from 0 than this many spreads is worth telling.
-const CLEAR: f64 = 2.0;
 
 /// "payload at tool0: +1.200 ± 0.030 kg, centre of mass (0, 2, 61) ± 4 mm".
 pub(super) fn sentence(component: &Component, parameters: &[Estimate]) -> String {
@@ -48,7 +47,7 @@ pub(super) fn sentence(component: &Component, parameters: &[Estimate]) -> String
     };
     let remark = parameters
         .first()
-        .and_then(|p| component.family.remark(p.value));
+        .and_then(|p| component.family.remark(p.value, p.spread));
     let remark = remark.map_or_else(String::new, |remark| format!(" ({remark})"));
     format!("{}: {text}{remark}", component.story)
 }
@@ -57,15 +56,52 @@ fn one(p: &Estimate) -> String {
     format!("{} {}", estimate(p.value, p.spread), p.unit)
 }
 
+/// Indices of the parameters that are worth telling, in their order: of a payload its mass, and where that is clear its centre; of a tilt all; of any
+/// other component the clearest three that are further from 0 than two spreads, at least one. None where no value is known.
+#[must_use]
+pub fn told(family: Family, parameters: &[Estimate]) -> Vec<usize> {
+    let known = |p: &&usize| parameters[**p].value.is_finite();
+    let all: Vec<usize> = (0..parameters.len()).collect();
+    match family {
+        Family::Payload => {
+            let clear = parameters
+                .first()
+                .is_some_and(|mass| clearness(mass) >= CLEAR);
+            let centre = all.iter().take(CENTRE_ENDS).skip(1).filter(known).copied();
+            let mass = all.iter().take(1).filter(known).copied();
+            mass.chain(centre.filter(|_| clear)).collect()
+        }
+        Family::Tilt => all.iter().filter(known).copied().collect(),
+        _ => {
+            let mut order = clearest(parameters);
+            order.sort_unstable();
+            order
+        }
+    }
+}
+
+/// A payload's mass is its first parameter, its centre of mass the next three.
+const CENTRE_ENDS: usize = 4;
+
+fn clearness(p: &Estimate) -> f64 {
+    p.value.abs() / p.spread.max(f64::MIN_POSITIVE)
+}
+
+/// The parameters worth telling, the clearest first.
+fn clearest(parameters: &[Estimate]) -> Vec<usize> {
+    let clear = |p: usize| clearness(&parameters[p]);
+    let known = |p: &usize| parameters[*p].value.is_finite();
+    let mut order: Vec<usize> = (0..parameters.len()).filter(known).collect();
+    order.sort_by(|&a, &b| clear(b).total_cmp(&clear(a)));
+    let count = order.iter().filter(|&&p| clear(p) > CLEAR).count();
+    order.truncate(count.clamp(1, TOLD));
+    order
+}
+
 /// The clearest parameters by name.
 fn several(parameters: &[Estimate]) -> String {
-    let clearness = |p: &Estimate| p.value.abs() / p.spread.max(f64::MIN_POSITIVE);
-    let mut order: Vec<&Estimate> = parameters.iter().filter(|p| p.value.is_finite()).collect();
-    order.sort_by(|a, b| clearness(b).total_cmp(&clearness(a)));
-    let clear = order.iter().filter(|p| clearness(p) > CLEAR).count();
-    order.truncate(clear.clamp(1, TOLD));
-    let told: Vec<String> = order
-        .iter()
+    let told: Vec<String> = (clearest(parameters).into_iter())
+        .map(|p| &parameters[p])
         .map(|p| format!("{} {}", p.name.replace('_', " "), one(p)))
         .collect();
     told.join(", ")
@@ -75,10 +111,10 @@ fn payload(parameters: &[Estimate]) -> String {
     let Some((mass, rest)) = parameters.split_first() else {
         return String::new();
     };
-    let com = &rest[..3.min(rest.len())];
+    let com = &rest[..(CENTRE_ENDS - 1).min(rest.len())];
     let mass_text = one(mass);
     // Without a clear mass there is no centre of it.
-    if mass.value.abs() < CLEAR * mass.spread || !com.iter().any(|c| c.value.is_finite()) {
+    if told(Family::Payload, parameters).len() < 2 {
         return mass_text;
     }
     let millimetre = |c: &Estimate| match c.value {
@@ -191,6 +227,54 @@ mod tests {
             ),
             "inertia tensor of arm: izz +0.500 ± 0.010 kg·m², iyy -0.100 ± 0.010 kg·m²"
         );
+    }
+
+    #[test]
+    fn a_sign_is_explained_where_it_is_known() {
+        let of = |value, spread| {
+            let parameters = estimates(&[("value", "N·m", value, spread)]);
+            sentence(
+                &component(Family::Stribeck, "Stribeck friction on a"),
+                &parameters,
+            )
+        };
+        assert!(of(-11.5, 0.8).ends_with("(negative: friction grows with speed here)"));
+        assert!(of(-1.1, 2.1).ends_with("N·m"));
+    }
+
+    #[test]
+    fn a_table_tells_what_the_sentence_tells() {
+        let of = |family, values: &[(f64, f64)]| {
+            let one = |&(value, spread): &(f64, f64)| ("p", "kg", value, spread);
+            told(
+                family,
+                &estimates(&values.iter().map(one).collect::<Vec<_>>()),
+            )
+        };
+        let body = [
+            (1.2, 0.03),
+            (0.0, 0.002),
+            (f64::NAN, 0.0),
+            (0.06, 0.004),
+            (5.0, 0.1),
+        ];
+        assert_eq!(of(Family::Payload, &body), [0, 1, 3]);
+        assert_eq!(of(Family::Payload, &[(0.1, 0.2), (0.06, 0.004)]), [0]);
+        assert_eq!(
+            of(Family::Tilt, &[(0.1, 0.2), (f64::NAN, 0.0), (0.3, 0.2)]),
+            [0, 2]
+        );
+        let moments = [
+            (1.0, 1.0),
+            (-30.0, 1.0),
+            (2.5, 1.0),
+            (40.0, 1.0),
+            (3.0, 1.0),
+        ];
+        assert_eq!(of(Family::MassMoments, &moments), [1, 3, 4]);
+        assert_eq!(of(Family::MassMoments, &[(0.1, 1.0), (0.2, 1.0)]), [1]);
+        assert_eq!(of(Family::MassMoments, &[(f64::NAN, 1.0)]), [0; 0]);
+        assert_eq!(of(Family::Payload, &[]), [0; 0]);
     }
 
     #[test]

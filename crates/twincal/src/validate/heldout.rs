@@ -231,7 +231,14 @@ impl HeldOut {
             self.filtered.push(joint, measured, torque);
             self.moving
                 .push_where(joint, measured, torque, |row| !standstill[row]);
-            self.pit[joint].push(&torque.pit, predictors.twin.memory(joint));
+            // At standstill friction is whatever it takes: intervals are widened for it and say nothing of the others' shape.
+            let moves = torque
+                .pit
+                .iter()
+                .zip(standstill)
+                .filter(|(_, still)| !**still);
+            let moves: Vec<f64> = moves.map(|(pit, _)| *pit).collect();
+            self.pit[joint].push(&moves, predictors.twin.memory(joint));
             let outside = &torque.extrapolating;
             self.within.push_where(joint, measured, torque, |row| {
                 !standstill[row] && !outside[row]

@@ -148,9 +148,9 @@ pub struct Validation {
     pub beyond: Scores,
     /// Unfiltered torque.
     pub raw: Scores,
-    /// Coverage at 50, 80, 90 and 95 % of the filtered rows, pooled.
+    /// Coverage at 50, 80, 90 and 95 % of the filtered rows of moving joints, pooled.
     pub coverage_levels: Vec<(f64, f64)>,
-    /// PIT of the filtered rows of all joints.
+    /// PIT of the filtered rows of all joints that move.
     #[serde(default)]
     pub pit: Pit,
     /// Coverage at the same levels and PIT, joint by joint.

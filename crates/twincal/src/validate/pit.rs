@@ -22,7 +22,7 @@ pub struct Pit {
     pub chance: f64,
 }
 
-/// How well the intervals of one joint hold what they promise, on filtered rows.
+/// How well the intervals of one joint hold what they promise, on filtered rows in which it moves.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Reliability {
     /// Joint name.

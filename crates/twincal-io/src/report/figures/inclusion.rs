@@ -1,5 +1,6 @@
 //! Inclusion probabilities of all candidates with the line at one half (paper fig. 2).
 
+use crate::report::MENTIONED;
 use crate::report::figure::{Figure, Image, Legend};
 use crate::report::scale::Scale;
 use crate::report::svg::{Anchor, Svg};
@@ -10,7 +11,7 @@ use twincal::term::Family;
 /// Above this many candidates only those that stand out are drawn one by one.
 const MOST: usize = 60;
 /// "Stands out" means at least this inclusion probability.
-const LEAST: f64 = 0.05;
+const LEAST: f64 = MENTIONED;
 const ROW: f64 = 18.0;
 /// Space for names beside the bars: on a desk screen, on a phone.
 pub(super) const NAMES: (f64, f64) = (250.0, 138.0);

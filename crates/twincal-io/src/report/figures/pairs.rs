@@ -51,7 +51,7 @@ pub(in crate::report) fn figure(draws: &Draws, terms: &[TermSummary]) -> Option<
     })
 }
 
-/// Which coefficients are drawn and why, where it is not all, and what the numbers stand for that replace long names; empty
+/// How many coefficients are drawn and why, where it is not all, and what the numbers stand for that replace long names; empty
 /// where the figure says everything.
 pub(in crate::report) fn shown(draws: &Draws, terms: &[TermSummary]) -> String {
     let kept = terms.iter().filter(|term| term.selected).count();
@@ -65,7 +65,7 @@ pub(in crate::report) fn shown(draws: &Draws, terms: &[TermSummary]) -> String {
             count(drawn as u64),
             count(kept as u64)
         );
-        out.push_str(". All of them stand in the table of effects and in result.json. ");
+        out.push_str(". All of them stand under “Which numbers can I trust?” and in result.json. ");
     }
     if numbered {
         let each: Vec<String> = (1..)

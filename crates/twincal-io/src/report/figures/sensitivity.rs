@@ -1,15 +1,16 @@
 //! How much the inclusion probabilities depend on the prior.
 
 use super::inclusion::{ABOVE, left};
+use crate::report::MENTIONED;
 use crate::report::figure::{Figure, Image, Legend};
 use crate::report::scale::{Scale, extent};
 use crate::report::svg::{Anchor, Svg};
 use crate::report::text::{probability, shorten};
-use twincal::calibrate::{ComponentSummary, TermSummary};
+use twincal::calibrate::{Calibration, ComponentSummary, TermSummary};
 
 const ROW: f64 = 19.0;
 /// An effect is drawn if its probability reaches this under any of the priors.
-const LEAST: f64 = 0.05;
+const LEAST: f64 = MENTIONED;
 
 /// The first live term of every component: a component is in or out with all its terms, which share its probabilities.
 pub(in crate::report) fn one_each(
@@ -63,6 +64,17 @@ pub(in crate::report) fn name<'a>(
     let own = |component: &&ComponentSummary| component.columns.contains(&term.term.name);
     let component = components.iter().find(own);
     component.map_or(&term.term.name, |component| &component.name)
+}
+
+/// Components that some prior tried would decide otherwise about.
+pub(in crate::report) fn by_prior(
+    calibration: &Calibration,
+) -> impl Iterator<Item = &ComponentSummary> {
+    let terms = one_each(&calibration.terms).filter(|term| depends_on_prior(term));
+    terms.filter_map(|term| {
+        let own = |c: &&ComponentSummary| c.columns.contains(&term.term.name);
+        calibration.components.iter().find(own)
+    })
 }
 
 struct Row<'a> {
