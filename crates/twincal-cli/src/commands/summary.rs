@@ -62,14 +62,8 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
     for group in calibration.groups.iter().filter(|group| !group.settled) {
         paragraph(&group.words, terminal);
     }
-    let settled = calibration.groups.iter().filter(|group| group.settled);
-    let settled: Vec<String> = settled.map(|group| group.members.join(" = ")).collect();
-    if !settled.is_empty() {
-        let text = format!(
-            "same torque, told apart by the prior alone (the first is preferred): {}",
-            settled.join("; ")
-        );
-        paragraph(&text, terminal);
+    for told in calibration.told_apart_by_the_prior() {
+        paragraph(&told, terminal);
     }
     repeatability(calibration, terminal);
     terminal.say("");
@@ -179,8 +173,14 @@ fn validation(calibration: &Calibration, terminal: &mut Terminal) {
         Split::LeaveOneLogOut => "each log predicted from the others",
         Split::LastThirty => "last 30 % of each log",
     };
-    terminal.heading(&format!("Held-out torque: {split}"));
-    scores(&validation.filtered, terminal);
+    let judged = report::decisive(validation);
+    let moving = if judged == &validation.filtered {
+        ""
+    } else {
+        ", joints that move"
+    };
+    terminal.heading(&format!("Held-out torque: {split}{moving}"));
+    scores(judged, terminal);
     for line in reliability(calibration) {
         paragraph(&line, terminal);
     }

@@ -86,14 +86,8 @@ fn either_or(calibration: &Calibration) -> Vec<String> {
     let groups = || calibration.groups.iter();
     let open = groups().filter(|group| !group.settled);
     let mut out: Vec<String> = open.map(|group| sentence(&group.words)).collect();
-    let settled = groups().filter(|group| group.settled);
-    let settled: Vec<String> = settled.map(|group| group.members.join(" = ")).collect();
-    if !settled.is_empty() {
-        out.push(format!(
-            "The same torque, told apart by the prior alone (the first is preferred): {}.",
-            settled.join("; ")
-        ));
-    }
+    let by_prior = calibration.told_apart_by_the_prior();
+    out.extend(by_prior.iter().map(|told| sentence(told)));
     out
 }
 

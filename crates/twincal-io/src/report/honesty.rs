@@ -107,12 +107,12 @@ pub(super) fn guarantee(validation: &Validation) -> String {
 pub(super) fn repeats(calibration: &Calibration) -> Table {
     let mut table = Table::new([
         "coefficient",
+        "the two halves",
         "first half",
         "second half",
         "unit",
         "sd apart",
         "probability in each half",
-        "",
     ]);
     for repeat in &calibration.repeatability {
         let apart = repeat.z.map_or("–".into(), |z| number(z.abs(), 2));
@@ -127,6 +127,7 @@ pub(super) fn repeats(calibration: &Calibration) -> Table {
         };
         table.rows.push(vec![
             repeat.term.clone(),
+            words.into(),
             plus_minus(factor * repeat.first, factor * repeat.first_sd),
             plus_minus(factor * repeat.second, factor * repeat.second_sd),
             unit.into(),
@@ -136,7 +137,6 @@ pub(super) fn repeats(calibration: &Calibration) -> Table {
                 probability(repeat.first_pip),
                 probability(repeat.second_pip)
             ),
-            words.into(),
         ]);
     }
     table
@@ -198,7 +198,7 @@ mod tests {
         let mut calibration = fixture::two_joints();
         let words = |calibration: &Calibration| -> Vec<String> {
             let rows = repeats(calibration).rows;
-            rows.iter().map(|row| row[6].clone()).collect()
+            rows.iter().map(|row| row[1].clone()).collect()
         };
         assert_eq!(
             words(&calibration)[..3],

@@ -71,13 +71,18 @@ fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Stri
         "its torque got worse by calibration",
         "their torque got worse by calibration",
     );
+    let moving = if scores == &calibration.validation.filtered {
+        ""
+    } else {
+        " moving"
+    };
     let mut off = |is_off: fn(&JointScore, f64) -> bool, words: &str| {
         let own = scores.joints.iter();
         let own: Vec<&JointScore> = own
             .filter(|j| is_off(j, memory(joints, &j.joint)))
             .collect();
         let held: Vec<String> = own.iter().map(|j| percent(j.coverage95)).collect();
-        let held = format!("({LEVEL_WORDS} hold {} of the rows)", list(&held));
+        let held = format!("({LEVEL_WORDS} hold {} of the{} rows)", list(&held), moving);
         let names: Vec<String> = own.iter().map(|j| j.joint.clone()).collect();
         say(
             &names,
@@ -244,7 +249,8 @@ fn chance(rows: u64, memory: f64) -> f64 {
 }
 
 /// The scores that a twin is judged by: at standstill friction is whatever it takes, so those of moving joints where there are any.
-pub(super) fn decisive(validation: &Validation) -> &Scores {
+#[must_use]
+pub fn decisive(validation: &Validation) -> &Scores {
     let moves = validation.moving.joints.iter().any(|joint| joint.rows > 0);
     if moves && validation.moving.rmse_nominal > 0.0 {
         &validation.moving

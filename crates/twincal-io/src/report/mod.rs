@@ -61,6 +61,8 @@ pub struct FileHash {
     pub sha256: String,
 }
 
+pub use limits::decisive;
+
 /// Whether the calibrated torque can be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Answer {

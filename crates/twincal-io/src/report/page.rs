@@ -7,6 +7,7 @@ use super::figure::Figure;
 use super::figures;
 use super::findings;
 use super::honesty;
+use super::limits;
 use super::tables::{self, Table};
 use super::text;
 use super::verdict::{self, Verdict};
@@ -55,7 +56,9 @@ struct Page<'a> {
     /// Effects whose selection depends on the prior, in one phrase; may be empty.
     sensitive: String,
     scores: Table,
-    moving: Table,
+    all_rows: Table,
+    /// Whether some held-out rows are of joints that stand still.
+    standstill: bool,
     beyond: Table,
     raw: Table,
     noise: Table,
@@ -152,8 +155,9 @@ fn gather<'a>(
         compact: honesty::compact(calibration, joints),
         sensitivity: figures::sensitivity::figure(terms, components),
         sensitive: text::list(&sensitive.collect::<Vec<_>>()),
-        scores: tables::scores(&validation.filtered, joints),
-        moving: tables::scores(&validation.moving, joints),
+        scores: tables::scores(limits::decisive(validation), joints),
+        all_rows: tables::scores(&validation.filtered, joints),
+        standstill: limits::decisive(validation) != &validation.filtered,
         beyond: honesty::beyond(validation, joints),
         raw: tables::scores(&validation.raw, joints),
         noise: tables::noise(joints),

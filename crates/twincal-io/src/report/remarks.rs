@@ -49,14 +49,15 @@ fn rivals(component: &ComponentSummary, calibration: &Calibration) -> Option<Str
             Some(more) => format!("{} and {more} more", others[..NAMED].join(", ")),
         }
     };
+    let place = |alike: Alike| match alike {
+        Alike::TheseLogs => "in these logs",
+        Alike::EveryMotion => "in every motion",
+    };
     match group {
-        Some(group) if group.alike == Alike::TheseLogs => Some(format!(
-            "or {} instead: these logs do not tell",
-            others(&group.members)
-        )),
         Some(group) => Some(format!(
-            "or {} instead: no motion can tell",
-            others(&group.members)
+            "not to be told from {} {}",
+            others(&group.members),
+            place(group.alike)
         )),
         None => {
             let settled = calibration
@@ -64,13 +65,14 @@ fn rivals(component: &ComponentSummary, calibration: &Calibration) -> Option<Str
                 .iter()
                 .find(|group| own(&group.members))?;
             let first = settled.members.first()?;
+            let place = place(settled.alike);
             Some(if *first == component.name {
                 format!(
-                    "the same as {} in every motion; the prior prefers it",
+                    "the same as {} {place}; the prior prefers it",
                     others(&settled.members)
                 )
             } else {
-                format!("the same as {first} in every motion, which the prior prefers")
+                format!("the same as {first} {place}, which the prior prefers")
             })
         }
     }
@@ -175,7 +177,7 @@ mod tests {
             said,
             [
                 "no rigid body has this: it stands in for another effect",
-                "or x, y and 2 more instead: these logs do not tell",
+                "not to be told from x, y and 2 more in these logs",
                 "depends on the filter's cut-off by more than its ±",
             ]
         );

@@ -240,7 +240,7 @@ pub(super) fn convergence(calibration: &Calibration) -> Vec<String> {
                 count(chains as u64),
                 count(draws as u64),
                 if r_hat.is_finite() { format!("{r_hat:.3}") } else { "–".into() },
-                number(ess.round(), 6),
+                count(ess.max(0.0) as u64),
             ));
             out.push(if converged(calibration) {
                 "The chains agree.".into()

@@ -106,12 +106,22 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     } else if found > 0 && sure == 0 {
         (
             Grade::Care,
-            "Perhaps: torque is better with it, but none of its effects is sure.",
+            "Perhaps: low-passed torque is better with it, but none of its effects is sure.",
         )
     } else if 2 * large.len() > joints.len() {
         (
             Grade::Care,
             "Better than the model alone, but on most joints the error that is left is large.",
+        )
+    } else if no_bodies(calibration).len() > 1 {
+        (
+            Grade::Care,
+            "With care: what was found of several links is no rigid body. Is this the robot's model?",
+        )
+    } else if !worse.is_empty() {
+        (
+            Grade::Care,
+            "With care: better than the model alone, but on some joints torque got worse.",
         )
     } else if scores.coverage95 < COVERAGE.0 {
         (
@@ -125,12 +135,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         )
     } else if let Some(shape) = off.all.filter(|shape| !shape.contradicts(scores, joints)) {
         (Grade::Care, shape.headline())
-    } else if no_bodies(calibration).len() > 1 {
-        (
-            Grade::Care,
-            "With care: what was found of several links is no rigid body. Is this the robot's model?",
-        )
-    } else if worse.is_empty() && !serious && !off.single && !too_narrow && firm {
+    } else if !serious && !off.single && !too_narrow && firm {
         (
             Grade::Good,
             "Yes, on motions like the ones it was tested on.",
@@ -172,14 +177,19 @@ fn held(calibration: &Calibration) -> String {
         super::text::count(rows_of(judged)),
         percent(judged.coverage95),
     );
-    if (judged.coverage95 - all.coverage95).abs() < SHARE_WORTH_TELLING {
-        let (rows, share) = (super::text::count(rows_of(all)), percent(all.coverage95));
+    if judged == all {
         return format!("The 95 % intervals contain {share} of the {rows} held-out values.");
     }
+    let differ = (judged.coverage95 - all.coverage95).abs() > SHARE_WORTH_TELLING;
+    let all = match differ {
+        true => {
+            let rows = super::text::count(rows_of(all));
+            format!(", {} of all {rows}", percent(all.coverage95))
+        }
+        false => String::new(),
+    };
     format!(
-        "The 95 % intervals contain {share} of the {rows} held-out values of moving joints, {} of all {}.",
-        percent(all.coverage95),
-        super::text::count(rows_of(all))
+        "The 95 % intervals contain {share} of the {rows} held-out values of moving joints{all}."
     )
 }
 
@@ -201,15 +211,18 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
         Split::LeaveOneLogOut => "logs left out one at a time",
         Split::LastThirty => "the last 30 % of each log",
     };
-    let differ = (all.rmse_calibrated / moving.rmse_calibrated - 1.0).abs() > WORTH_TELLING;
-    if differ && (1..rows_of(all)).contains(&rows_of(moving)) {
-        return format!(
-            "Torque error (RMSE) on {split}, joints that move: {}; with those at standstill {}.",
-            told(moving),
-            told(all)
-        );
+    if decisive(validation) == all {
+        return format!("Torque error (RMSE) on {split}: {}.", told(all));
     }
-    format!("Torque error (RMSE) on {split}: {}.", told(all))
+    let differ = (all.rmse_calibrated / moving.rmse_calibrated - 1.0).abs() > WORTH_TELLING;
+    let all = match differ {
+        true => format!("; with those at standstill {}", told(all)),
+        false => String::new(),
+    };
+    format!(
+        "Torque error (RMSE) on {split}, joints that move: {}{all}.",
+        told(moving)
+    )
 }
 
 /// What is more likely than not, without and with what the data leave open.
@@ -297,7 +310,7 @@ pub(super) mod tests {
             (
                 |c| c.validation.filtered.joints[1].rmse_calibrated = 9.0,
                 Grade::Care,
-                "exceptions",
+                "got worse",
             ),
             (
                 |c| {

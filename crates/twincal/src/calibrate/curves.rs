@@ -8,7 +8,7 @@ use crate::posterior::draws::{CoefficientDraws, Drawer};
 use crate::robot::{JointKind, Motion, Robot};
 use crate::term::Library;
 
-/// Points of a curve; even, so that a velocity of exactly 0 is not among them.
+/// Points of a curve.
 const POINTS: usize = 80;
 /// Draws behind mean and interval.
 const DRAWS: usize = 2000;
@@ -79,10 +79,7 @@ fn grid(hull: &[f64; 6], along: Along, kind: JointKind) -> Option<Vec<f64>> {
             (-std::f64::consts::PI, std::f64::consts::PI)
         }
         Along::Position => (hull[0], hull[1]),
-        Along::Velocity => {
-            let fastest = hull[2].abs().max(hull[3].abs());
-            (-fastest, fastest)
-        }
+        Along::Velocity => (hull[2], hull[3]),
     };
     let step = (high - low) / (POINTS - 1) as f64;
     (step > 0.0 && step.is_finite()).then(|| (0..POINTS).map(|i| low + step * i as f64).collect())
@@ -269,7 +266,7 @@ mod tests {
             assert!((columns[2].torque[i] - 1.0).abs() < 1e-12 && columns[2].constant);
         }
         let x = grid(&HULL[1], Along::Velocity, JointKind::Revolute).unwrap();
-        assert_eq!((x[0], x[POINTS - 1]), (-3.0, 3.0));
+        assert_eq!((x[0], x[POINTS - 1]), (-3.0, 2.0));
         let columns = columns_along(&library, 1, Along::Velocity, &x, &HULL);
         let names: Vec<String> = columns.iter().map(name).collect();
         assert_eq!(names, ["elbow.viscous"]);

@@ -1,6 +1,6 @@
 //! Which components say the same: in these logs, or for every motion of this robot.
 
-use super::result::{Alike, Group};
+use super::result::{Alike, Calibration, Group};
 use crate::linear_algebra::Cholesky;
 use crate::posterior::{Posterior, Problem};
 use crate::term::{Family, Library};
@@ -264,6 +264,30 @@ impl<'a> Candidates<'a> {
             settled,
             words,
         })
+    }
+}
+
+impl Calibration {
+    /// Groups of which the prior alone prefers a member, in a sentence for those alike in every motion and one for those alike in these logs:
+    /// "same torque in every motion, told apart by the prior alone (the first is preferred): payload = tool.tensor; …".
+    #[must_use]
+    pub fn told_apart_by_the_prior(&self) -> Vec<String> {
+        let kinds = [
+            (Alike::EveryMotion, "in every motion"),
+            (Alike::TheseLogs, "in these logs"),
+        ];
+        let sentence = |(alike, place): (Alike, &str)| {
+            let own = self.groups.iter().filter(|group| group.settled);
+            let own = own.filter(|group| group.alike == alike);
+            let told: Vec<String> = own.map(|group| group.members.join(" = ")).collect();
+            (!told.is_empty()).then(|| {
+                format!(
+                    "same torque {place}, told apart by the prior alone (the first is preferred): {}",
+                    told.join("; ")
+                )
+            })
+        };
+        kinds.into_iter().filter_map(sentence).collect()
     }
 }
 
