@@ -107,16 +107,18 @@ pub(super) fn guarantee(validation: &Validation) -> String {
 pub(super) fn repeats(calibration: &Calibration) -> Table {
     let mut table = Table::new([
         "coefficient",
-        "the two halves",
+        "the two halves (sd apart)",
         "first half",
         "second half",
         "unit",
-        "sd apart",
         "probability in each half",
     ]);
     for repeat in &calibration.repeatability {
-        let apart = repeat.z.map_or("–".into(), |z| number(z.abs(), 2));
         let words = repeat.repeated().words();
+        let words = match repeat.z {
+            None => words.to_owned(),
+            Some(z) => format!("{words} ({})", number(z.abs(), 2)),
+        };
         let own = calibration
             .terms
             .iter()
@@ -127,11 +129,10 @@ pub(super) fn repeats(calibration: &Calibration) -> Table {
         };
         table.rows.push(vec![
             repeat.term.clone(),
-            words.into(),
+            words,
             plus_minus(factor * repeat.first, factor * repeat.first_sd),
             plus_minus(factor * repeat.second, factor * repeat.second_sd),
             unit.into(),
-            apart,
             format!(
                 "{} / {}",
                 probability(repeat.first_pip),
@@ -202,10 +203,14 @@ mod tests {
         };
         assert_eq!(
             words(&calibration)[..3],
-            ["does not repeat", "not seen in both halves", "repeats"]
+            [
+                "does not repeat (3.6)",
+                "not seen in both halves",
+                "repeats (0.40)"
+            ]
         );
         calibration.repeatability[0].z = Some(-2.5);
-        assert_eq!(words(&calibration)[0], "wavers");
+        assert_eq!(words(&calibration)[0], "wavers (2.5)");
     }
 
     #[test]

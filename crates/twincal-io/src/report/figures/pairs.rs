@@ -20,8 +20,8 @@ const GAP: f64 = 10.0;
 const LABEL: f64 = 11.0;
 const LINE: f64 = 13.0;
 /// Room for names, and for the numbers of an axis, px.
-const NAMES: f64 = 142.0;
-const TICKS: f64 = 46.0;
+const NAMES: f64 = 136.0;
+const TICKS: f64 = 54.0;
 
 /// The figure; `None` without kept coefficients or draws.
 pub(in crate::report) fn figure(draws: &Draws, terms: &[TermSummary]) -> Option<Figure> {
