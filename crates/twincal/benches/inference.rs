@@ -179,6 +179,38 @@ fn components(settings: impl Fn(Choice, usize) -> InferenceSettings) {
     }
 }
 
+/// How far the worst of 200 probabilities is off after half a second on one core, beside chains forty times as long from another seed.
+fn worst_errors(settings: fn(Choice, usize) -> InferenceSettings) {
+    const SECONDS: f64 = 0.5;
+    for (correlation, effect) in [(0.5, 0.3), (0.9, 0.3), (0.9, 1.0)] {
+        let problem = problem(200, correlation, effect);
+        let gibbs = |draws: usize, seed: u64| {
+            let asked = InferenceSettings {
+                seed,
+                allow_disagreement: true,
+                ..settings(Choice::Gibbs, draws)
+            };
+            infer(&problem, &asked).expect("gibbs")
+        };
+        let (short, _) = least(1, || gibbs(1000, 1));
+        let (long, _) = least(1, || gibbs(5000, 1));
+        let each = (long - short) / 4000.0;
+        let draws = (1000.0 + (SECONDS - short) / each).max(1000.0) as usize;
+        let (seconds, own) = least(1, || gibbs(draws, 1));
+        let reference = gibbs(40 * draws, 2);
+        let worst = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+        let off = own.inclusion.iter().zip(&reference.inclusion);
+        let off = worst(&mut off.map(|(a, b)| (a - b).abs()));
+        let sure = worst(&mut reference.inclusion_mcse.iter().copied());
+        let open = (reference.inclusion.iter()).filter(|pip| (0.05..0.95).contains(*pip));
+        println!(
+            "{:<44} {seconds:>10.6} worst PIP off by {off:.4} (reference: largest MCSE {sure:.4}, {} of 200 between 0.05 and 0.95)",
+            format!("gibbs/200 columns/{correlation}/effect {effect}"),
+            open.count()
+        );
+    }
+}
+
 fn main() {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
@@ -231,6 +263,7 @@ fn main() {
             );
         }
     }
+    pool.install(|| worst_errors(settings));
     let problem = problem(24, 0.5, 1.0);
     let (seconds, posterior) = pool.install(|| {
         least(3, || {

@@ -207,7 +207,7 @@ fn reliability(calibration: &Calibration) -> Vec<String> {
         .map(|(level, seen)| format!("{:.0} % interval {}", 100.0 * level, percent(*seen)))
         .collect();
     if !levels.is_empty() {
-        let share = percent(validation.filtered.epistemic_share);
+        let share = percent(report::decisive(validation).epistemic_share);
         lines.push(format!("held-out values inside: {}", levels.join(", ")));
         lines.push(format!(
             "{share} of the predicted variance is what coefficients leave open, the rest noise"

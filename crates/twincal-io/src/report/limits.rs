@@ -2,6 +2,7 @@
 
 use super::figures::sensitivity;
 use super::findings;
+use super::remarks::size_of_gravity;
 use super::shape;
 use super::text::{list, number, percent};
 use super::view::{Joint, memory, pooled_unit, standard_deviation};
@@ -115,6 +116,11 @@ pub(super) fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
             list(&bodies)
         ));
     }
+    let found = calibration.components.iter().filter(|c| c.selected);
+    out.extend(found.filter_map(|component| {
+        let words = size_of_gravity(component, calibration)?;
+        Some(format!("{}: {words}.", component.name))
+    }));
     let effects = || (calibration.repeatability).chunk_by(|a, b| a.component == b.component);
     let apart = effects().filter(|own| Repeat::of_effect(own) == Repeated::Differs);
     let apart: Vec<String> = apart

@@ -79,7 +79,10 @@ fn rivals(component: &ComponentSummary, calibration: &Calibration) -> Option<Str
 }
 
 /// A tilt turns gravity; what changes its size is something else.
-fn size_of_gravity(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
+pub(super) fn size_of_gravity(
+    component: &ComponentSummary,
+    calibration: &Calibration,
+) -> Option<String> {
     if component.family != Family::Tilt {
         return None;
     }

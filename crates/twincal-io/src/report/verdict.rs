@@ -8,7 +8,7 @@ use super::text::{number, percent, with_sd};
 use super::view::{Joint, independent_rows, memory, pooled_unit};
 use serde::Serialize;
 use twincal::calibrate::{Calibration, Verdict as Decision};
-use twincal::validate::{Scores, Split, WORSE};
+use twincal::validate::{JointScore, Scores, Split, WORSE};
 use twincal::{Finding, Severity};
 
 /// Ratio of errors from which calibration counts as an improvement.
@@ -193,36 +193,47 @@ fn held(calibration: &Calibration) -> String {
     )
 }
 
-/// RMSE before and after on all held-out rows, and on those of moving joints where some stand still: there friction is whatever it takes.
+/// RMSE before and after: of joints that move, and apart from them of those that stand still where that is another matter, for there friction
+/// is whatever it takes.
 fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
-    let told = |scores: &Scores| {
-        let way = match scores.rmse_calibrated / scores.rmse_nominal - 1.0 {
+    let told = |[before, after]: [f64; 2]| {
+        let way = match after / before - 1.0 {
             c if c.abs() < 5e-4 => "unchanged".into(),
             c if c < 0.0 => format!("{} less", percent(-c)),
             c => format!("{} more", percent(c)),
         };
-        let [before, after] = [scores.rmse_nominal, scores.rmse_calibrated].map(|x| number(x, 3));
+        let [before, after] = [before, after].map(|x| number(x, 3));
         format!("{before} → {after} {}, {way}", pooled_unit(joints))
     };
     let validation = &calibration.validation;
-    let (all, moving) = (&validation.filtered, &validation.moving);
+    let (all, moving) = (&validation.filtered, decisive(validation));
     let split = match validation.split {
         Split::HeldoutLogs => "held-out logs",
         Split::LeaveOneLogOut => "logs left out one at a time",
         Split::LastThirty => "the last 30 % of each log",
     };
-    if decisive(validation) == all {
-        return format!("Torque error (RMSE) on {split}: {}.", told(all));
+    let judged = told([moving.rmse_nominal, moving.rmse_calibrated]);
+    if moving == all {
+        return format!("Torque error (RMSE) on {split}: {judged}.");
     }
     let differ = (all.rmse_calibrated / moving.rmse_calibrated - 1.0).abs() > WORTH_TELLING;
-    let all = match differ {
-        true => format!("; with those at standstill {}", told(all)),
+    let at_rest = match differ {
+        true => format!("; at standstill {}", told(still(all, moving))),
         false => String::new(),
     };
-    format!(
-        "Torque error (RMSE) on {split}, joints that move: {}{all}.",
-        told(moving)
-    )
+    format!("Torque error (RMSE) on {split}, joints that move: {judged}{at_rest}.")
+}
+
+/// RMSE before and after on the rows that are not among the moving ones.
+fn still(all: &Scores, moving: &Scores) -> [f64; 2] {
+    let squares = |scores: &Scores, of: fn(&JointScore) -> f64| -> f64 {
+        let some = scores.joints.iter().filter(|joint| joint.rows > 0);
+        some.map(|joint| joint.rows as f64 * of(joint).powi(2))
+            .sum()
+    };
+    let rows = (rows_of(all) - rows_of(moving)) as f64;
+    let each: [fn(&JointScore) -> f64; 2] = [|j| j.rmse_nominal, |j| j.rmse_calibrated];
+    each.map(|of| ((squares(all, of) - squares(moving, of)).max(0.0) / rows).sqrt())
 }
 
 /// What is more likely than not, without and with what the data leave open.
@@ -352,28 +363,33 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn rows_at_standstill_do_not_hide_what_moving_joints_gain() {
-        let of = |moving: u64| {
+    fn rows_at_standstill_are_told_apart_from_what_moving_joints_gain() {
+        let of = |moves: bool| {
             let verdict = judged(move |c| {
                 c.validation.moving = c.validation.filtered.clone();
                 for joint in &mut c.validation.moving.joints {
-                    joint.rows = moving;
+                    (joint.rows, joint.rmse_nominal, joint.rmse_calibrated) = (50, 2.0, 0.5);
                 }
-                (
-                    c.validation.moving.rmse_nominal,
-                    c.validation.moving.rmse_calibrated,
-                ) = (2.0, 0.5);
+                // As many rows again, of which the mean square is 1 before and 9 after.
+                for joint in &mut c.validation.filtered.joints {
+                    joint.rows = 100;
+                    joint.rmse_nominal = (0.5f64 * (4.0 + 1.0)).sqrt();
+                    joint.rmse_calibrated = (0.5f64 * (0.25 + 9.0)).sqrt();
+                }
+                let all = &mut c.validation.filtered;
+                (all.rmse_nominal, all.rmse_calibrated) = (1.6, 2.2);
+                let moving = &mut c.validation.moving;
+                (moving.rmse_nominal, moving.rmse_calibrated) = (2.0, 0.5);
+                if !moves {
+                    moving.joints.iter_mut().for_each(|joint| joint.rows = 0);
+                }
             });
             verdict.grounds[0].clone()
         };
-        let both = of(7);
-        assert!(
-            both.contains(
-                "joints that move: 2.00 → 0.500 N·m, 75.0\u{202f}% less; with those at standstill"
-            ),
-            "{both}"
-        );
-        assert!(!of(0).contains("standstill"));
+        let both = of(true);
+        let said = "joints that move: 2.00 → 0.500 N·m, 75.0\u{202f}% less; at standstill 1.00 → 3.00 N·m, 200.0\u{202f}% more.";
+        assert!(both.ends_with(said), "{both}");
+        assert!(!of(false).contains("standstill"));
     }
 
     #[test]

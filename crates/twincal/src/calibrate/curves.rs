@@ -16,8 +16,8 @@ const DRAWS: usize = 2000;
 const STREAM: u64 = (1 << 32) + 1;
 /// Relative change of a column that counts as none.
 const SAME: f64 = 1e-9;
-/// PIP from which a component is named beside a curve.
-const NAMED: f64 = 0.1;
+/// PIP from which a component is named beside a curve: rarer ones cannot move an end of the 95 % band.
+const NAMED: f64 = 0.025;
 
 /// The curves to which a component that was found contributes.
 ///

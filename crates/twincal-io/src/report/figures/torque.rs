@@ -5,7 +5,7 @@ use crate::report::plot::{Frame, Panel, thin, thin_band};
 use crate::report::scale::extent;
 use crate::report::svg::Svg;
 use crate::report::text::number;
-use crate::report::view::{Joint, rmse, rows};
+use crate::report::view::{Joint, rmse, root_mean_square, rows};
 use std::ops::Range;
 use twincal::validate::Trace;
 
@@ -101,11 +101,22 @@ fn scores(joint: &Joint<'_>, trace: &Trace) -> String {
         0 | 1 => String::new(),
         step => format!(", from one row in {step}"),
     };
+    let some = |still: bool| trace.standstill.contains(&still);
+    let moving = some(true) && some(false);
+    let of = |predicted: &[f64]| {
+        if !moving {
+            return number(rmse(trace, predicted), 3);
+        }
+        let rows = trace.measured.iter().zip(predicted).zip(&trace.standstill);
+        let moves = rows.filter(|(_, still)| !**still);
+        number(root_mean_square(moves.map(|((m, p), _)| m - p)), 3)
+    };
     format!(
-        "{} — error (RMSE) {} → {} {}{thinned}",
+        "{} — error (RMSE){} {} → {} {}{thinned}",
         trace.log,
-        number(rmse(trace, &trace.nominal), 3),
-        number(rmse(trace, &trace.calibrated), 3),
+        if moving { " while it moves" } else { "" },
+        of(&trace.nominal),
+        of(&trace.calibrated),
         joint.units.torque
     )
 }
