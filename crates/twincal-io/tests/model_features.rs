@@ -110,3 +110,20 @@ fn a_base_on_wall_or_ceiling_is_a_turned_robot() {
         assert!(worst(&build(None, None), &case["samples"]) > 0.1);
     }
 }
+
+#[test]
+fn a_robot_is_called_what_its_file_calls_it() {
+    let body = r#"<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><joint type="hinge"/>"#;
+    let named = |attribute: &str| {
+        let text = format!(
+            "<mujoco {attribute}><worldbody><body name=\"a\">{body}</body></worldbody></mujoco>"
+        );
+        let model = parse_model("arm.xml", text.as_bytes(), &ModelSettings::default()).unwrap();
+        model.robot_name().to_owned()
+    };
+    assert_eq!(named("model=\" my arm \""), "my arm");
+    assert_eq!(named(""), "");
+    let urdf = r#"<robot name="r2"><link name="a"/></robot>"#;
+    let model = parse_model("arm.urdf", urdf.as_bytes(), &ModelSettings::default()).unwrap();
+    assert_eq!(model.robot_name(), "r2");
+}

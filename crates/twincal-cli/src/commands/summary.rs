@@ -174,10 +174,10 @@ fn validation(calibration: &Calibration, terminal: &mut Terminal) {
         Split::LastThirty => "last 30 % of each log",
     };
     let judged = report::decisive(validation);
-    let moving = if judged == &validation.filtered {
-        ""
-    } else {
+    let moving = if report::has_standstill(validation) {
         ", joints that move"
+    } else {
+        ""
     };
     terminal.heading(&format!("Held-out torque: {split}{moving}"));
     scores(judged, terminal);

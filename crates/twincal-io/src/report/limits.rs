@@ -72,10 +72,10 @@ fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Stri
         "its torque got worse by calibration",
         "their torque got worse by calibration",
     );
-    let moving = if scores == &calibration.validation.filtered {
-        ""
-    } else {
+    let moving = if has_standstill(&calibration.validation) {
         " moving"
+    } else {
+        ""
     };
     let mut off = |is_off: fn(&JointScore, f64) -> bool, words: &str| {
         let own = scores.joints.iter();
@@ -106,7 +106,8 @@ fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Stri
     out
 }
 
-/// Links of which what was found is no rigid body, and effects that neither half of the data has.
+/// What was found and is not to be rested on: bodies that are none, gravity of another size, numbers on which the halves of the data differ, effects
+/// that neither half has alone, and those that another prior would leave out.
 pub(super) fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
     let mut out = Vec::new();
     let bodies = no_bodies(calibration);
@@ -231,7 +232,7 @@ pub(super) fn worse(scores: &Scores) -> Vec<String> {
 pub(super) fn large(scores: &Scores, joints: &[Joint<'_>]) -> Vec<String> {
     let is_large = |joint: &&Joint<'_>| {
         let score = scores.joints.iter().find(|s| s.joint == joint.name);
-        let deviation = torque_deviation(joint);
+        let deviation = torque_deviation(joint, Rows::Moving);
         score.is_some_and(|s| deviation > 0.0 && s.rmse_calibrated > LARGE * deviation)
     };
     let joints = joints.iter().filter(is_large);
@@ -265,6 +266,13 @@ pub fn decisive(validation: &Validation) -> &Scores {
     }
 }
 
+/// Whether [`decisive`] leaves out held-out rows in which a joint stands still.
+#[must_use]
+pub fn has_standstill(validation: &Validation) -> bool {
+    let rows = |scores: &Scores| scores.joints.iter().map(|joint| joint.rows).sum::<u64>();
+    rows(decisive(validation)) < rows(&validation.filtered)
+}
+
 fn names<'a>(scores: impl Iterator<Item = &'a JointScore>) -> Vec<String> {
     scores
         .filter(|s| s.rows > 0)
@@ -281,9 +289,26 @@ pub(super) fn converged(calibration: &Calibration) -> bool {
     }
 }
 
+/// Which held-out rows of a joint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Rows {
+    All,
+    /// Those in which it moves; all where it never does.
+    Moving,
+}
+
 /// Standard deviation of the measured held-out torque.
-pub(super) fn torque_deviation(joint: &Joint<'_>) -> f64 {
-    standard_deviation(joint.traces.iter().flat_map(|t| t.measured.iter().copied()))
+pub(super) fn torque_deviation(joint: &Joint<'_>, which: Rows) -> f64 {
+    let rows = || {
+        let traces = joint.traces.iter();
+        traces.flat_map(|t| t.measured.iter().copied().zip(t.standstill.iter().copied()))
+    };
+    let left_out = which == Rows::Moving && rows().any(|(_, still)| !still);
+    standard_deviation(
+        rows()
+            .filter(|(_, still)| !(left_out && *still))
+            .map(|(torque, _)| torque),
+    )
 }
 
 #[cfg(test)]
@@ -379,6 +404,78 @@ mod tests {
         assert!(!limits.limits.iter().any(|l| l.contains("beyond")));
         let limits = judged(|c| beyond(c, 0.94)).limits;
         assert!(!limits.iter().any(|l| l.contains("beyond")), "{limits:?}");
+    }
+
+    #[test]
+    fn the_error_of_moving_rows_is_measured_by_their_torque() {
+        let mut calibration = crate::report::fixture::two_joints();
+        for trace in &mut calibration.validation.traces {
+            let rows = trace.measured.len();
+            // ±2 while it moves, 0 while it stands still.
+            trace.standstill = (0..rows).map(|i| i % 2 == 1).collect();
+            let sign = |i: usize| if i.is_multiple_of(4) { 2.0 } else { -2.0 };
+            trace.measured = (0..rows)
+                .map(|i| if i % 2 == 1 { 0.0 } else { sign(i) })
+                .collect();
+        }
+        let joints = crate::report::view::joints(&calibration);
+        let of = |rows| torque_deviation(&joints[0], rows);
+        assert!(
+            (of(Rows::Moving) - 2.0).abs() < 0.01,
+            "{}",
+            of(Rows::Moving)
+        );
+        assert!(
+            (of(Rows::All) - 2f64.sqrt()).abs() < 0.01,
+            "{}",
+            of(Rows::All)
+        );
+    }
+
+    #[test]
+    fn joints_without_a_score_are_no_rows_at_standstill() {
+        let mut validation = crate::report::fixture::two_joints().validation;
+        validation.moving = validation.filtered.clone();
+        for scores in [&mut validation.filtered, &mut validation.moving] {
+            (scores.joints[1].rows, scores.joints[1].coverage95) = (0, f64::NAN);
+        }
+        assert!(!has_standstill(&validation));
+        validation.moving.joints[0].rows -= 1;
+        assert!(has_standstill(&validation));
+    }
+
+    #[test]
+    fn what_was_mostly_tested_beyond_the_training_motion_is_said() {
+        let of = |beyond: u64| {
+            let verdict = judged(|c| {
+                c.validation.within = c.validation.filtered.clone();
+                c.validation.beyond = c.validation.filtered.clone();
+                for (joint, rows) in c.validation.beyond.joints.iter_mut().zip([0, beyond]) {
+                    joint.rows = rows;
+                }
+                c.validation.within.joints[1].rows = 40;
+            });
+            let said = "Tested mostly beyond the training motion: elbow (41 of 81 moving rows).";
+            verdict.limits.iter().any(|limit| limit == said)
+        };
+        assert!(of(41) && !of(40));
+    }
+
+    #[test]
+    fn gravity_of_another_size_is_in_the_verdict() {
+        let verdict = judged(|c| {
+            let tilt = c.components.iter_mut().find(|c| c.selected);
+            let Some(tilt) = tilt else { return };
+            tilt.family = twincal::term::Family::Tilt;
+            tilt.name = "base.tilt".into();
+            let z = &mut tilt.parameters[0];
+            (z.name, z.median, z.interval68) = ("z".into(), 1.17, [1.16, 1.18]);
+        });
+        let said = "base.tilt: gravity would be 8.64 m/s²";
+        assert!(
+            verdict.limits.iter().any(|l| l.starts_with(said)),
+            "{verdict:?}"
+        );
     }
 
     #[test]

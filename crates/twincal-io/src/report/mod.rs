@@ -61,7 +61,7 @@ pub struct FileHash {
     pub sha256: String,
 }
 
-pub use limits::decisive;
+pub use limits::{decisive, has_standstill};
 
 /// Whether the calibrated torque can be used.
 #[derive(Debug, Clone, PartialEq, Eq)]

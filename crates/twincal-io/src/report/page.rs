@@ -7,7 +7,7 @@ use super::figure::Figure;
 use super::figures;
 use super::findings;
 use super::honesty;
-use super::limits;
+use super::limits::{self, Rows};
 use super::tables::{self, Table};
 use super::text;
 use super::verdict::{self, Verdict};
@@ -155,11 +155,11 @@ fn gather<'a>(
         compact: honesty::compact(calibration, joints),
         sensitivity: figures::sensitivity::figure(terms, components),
         sensitive: text::list(&sensitive.collect::<Vec<_>>()),
-        scores: tables::scores(limits::decisive(validation), joints),
-        all_rows: tables::scores(&validation.filtered, joints),
-        standstill: limits::decisive(validation) != &validation.filtered,
+        scores: tables::scores(limits::decisive(validation), joints, Rows::Moving),
+        all_rows: tables::scores(&validation.filtered, joints, Rows::All),
+        standstill: limits::has_standstill(validation),
         beyond: honesty::beyond(validation, joints),
-        raw: tables::scores(&validation.raw, joints),
+        raw: tables::scores(&validation.raw, joints, Rows::All),
         noise: tables::noise(joints),
         open: ambiguity::sentences(calibration, joints),
         motion: tables::motion(calibration, joints),

@@ -1,7 +1,7 @@
 //! The report's tables besides the effects: scores, noise, motion, logs, findings, convergence, pipeline.
 
 use super::ReportContext;
-use super::limits::{converged, torque_deviation};
+use super::limits::{Rows, converged, torque_deviation};
 use super::text::{count, list, number, percent, probability};
 use super::view::Joint;
 use serde::Serialize;
@@ -53,7 +53,7 @@ pub(super) fn about(calibration: &Calibration, run: &ReportContext) -> String {
 }
 
 /// Held-out scores per joint and pooled.
-pub(super) fn scores(scores: &Scores, joints: &[Joint<'_>]) -> Table {
+pub(super) fn scores(scores: &Scores, joints: &[Joint<'_>], rows: Rows) -> Table {
     let mut table = Table::new([
         "joint",
         "rows",
@@ -69,7 +69,9 @@ pub(super) fn scores(scores: &Scores, joints: &[Joint<'_>]) -> Table {
     for score in scores.joints.iter() {
         let joint = joints.iter().find(|j| j.name == score.joint);
         let unit = joint.map_or("", |j| j.units.torque);
-        let share = joint.map_or(f64::NAN, |j| score.rmse_calibrated / torque_deviation(j));
+        let share = joint.map_or(f64::NAN, |j| {
+            score.rmse_calibrated / torque_deviation(j, rows)
+        });
         table.rows.push(vec![
             score.joint.clone(),
             count(score.rows),

@@ -1,7 +1,8 @@
-//! Can this twin be used, and where not: the first thing the report says, derived from held-out data alone.
+//! Can this twin be used, and where not: the first thing the report says, by held-out data and by what was found that is not to be rested on.
 
 use super::limits::{
-    COVERAGE, converged, decisive, large, limits, no_bodies, not_to_rest_on, too_narrow, worse,
+    COVERAGE, converged, decisive, has_standstill, large, limits, no_bodies, not_to_rest_on,
+    too_narrow, worse,
 };
 use super::shape;
 use super::text::{number, percent, with_sd};
@@ -15,7 +16,7 @@ use twincal::{Finding, Severity};
 const BETTER: f64 = 0.95;
 /// Held-out rows, in independent ones, below which nothing is promised.
 const FEW: f64 = 20.0;
-/// Change of an error by the rows at standstill from which it is told without and with them.
+/// Change of an error by the rows at standstill from which these are told apart.
 const WORTH_TELLING: f64 = 0.05;
 /// The same of the share of rows that intervals hold.
 const SHARE_WORTH_TELLING: f64 = 0.01;
@@ -161,7 +162,7 @@ fn no_measurement(calibration: &Calibration) -> bool {
     findings.any(|f| f.code == "constant_torque" && f.severity == Severity::Degraded)
 }
 
-pub(super) fn grounds(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
+fn grounds(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
     vec![
         torque_error(calibration, joints),
         held(calibration),
@@ -177,7 +178,7 @@ fn held(calibration: &Calibration) -> String {
         super::text::count(rows_of(judged)),
         percent(judged.coverage95),
     );
-    if judged == all {
+    if !has_standstill(&calibration.validation) {
         return format!("The 95 % intervals contain {share} of the {rows} held-out values.");
     }
     let differ = (judged.coverage95 - all.coverage95).abs() > SHARE_WORTH_TELLING;
@@ -213,7 +214,7 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
         Split::LastThirty => "the last 30 % of each log",
     };
     let judged = told([moving.rmse_nominal, moving.rmse_calibrated]);
-    if moving == all {
+    if !has_standstill(validation) {
         return format!("Torque error (RMSE) on {split}: {judged}.");
     }
     let differ = (all.rmse_calibrated / moving.rmse_calibrated - 1.0).abs() > WORTH_TELLING;
