@@ -250,18 +250,27 @@ fn main() {
             format!("exact/2^{size}/{what}")
         );
     }
-    for (size, scans) in [(24, 400_000), (50, 100_000), (200, 10_000)] {
-        for correlation in [0.5, 0.9] {
-            let problem = problem(size, correlation, 1.0);
-            let (seconds, flips) =
-                pool.install(|| least(5, || scan(&problem, scans, 1).expect("scans")));
-            let (rate, flips) = (scans as f64 / seconds, 2.0 * flips as f64 / scans as f64);
-            let name = format!("gibbs/{size} columns/correlation {correlation}");
-            println!(
-                "{name:<44} {seconds:>10.6} {:>9.3} M scans/s, {flips:.2} flips per scan",
-                rate * 1e-6
-            );
-        }
+    // The narrower the slab, the more effects are undecided and the more flips a scan has.
+    for (size, scans, correlation, effect, slab) in [
+        (24, 400_000, 0.5, 1.0, 100.0),
+        (24, 400_000, 0.9, 1.0, 100.0),
+        (24, 400_000, 0.9, 0.3, 3.0),
+        (50, 100_000, 0.5, 1.0, 100.0),
+        (50, 100_000, 0.9, 1.0, 100.0),
+        (200, 10_000, 0.5, 1.0, 100.0),
+        (200, 10_000, 0.9, 1.0, 100.0),
+        (200, 10_000, 0.9, 0.1, 0.1),
+    ] {
+        let mut problem = problem(size, correlation, effect);
+        problem.prior.slab.fill(slab);
+        let (seconds, flips) =
+            pool.install(|| least(5, || scan(&problem, scans, 1).expect("scans")));
+        let (rate, flips) = (scans as f64 / seconds, 2.0 * flips as f64 / scans as f64);
+        let name = format!("gibbs/{size} columns/{correlation}/effect {effect}/slab {slab}");
+        println!(
+            "{name:<44} {seconds:>10.6} {:>9.3} M scans/s, {flips:.2} flips per scan",
+            rate * 1e-6
+        );
     }
     pool.install(|| worst_errors(settings));
     let problem = problem(24, 0.5, 1.0);

@@ -56,6 +56,8 @@ pub(super) struct Tableau<'a> {
     /// pivot is the smallest possible, the slab's part.
     most_rounding: f64,
     scratch: Vec<f64>,
+    /// `−t_ij` of the members towards a position that enters.
+    towards: Vec<f64>,
 }
 
 impl<'a> Tableau<'a> {
@@ -88,6 +90,7 @@ impl<'a> Tableau<'a> {
             rounding: 0.0,
             most_rounding: most_rounding(standard),
             scratch: vec![0.0; width],
+            towards: Vec::new(),
         };
         let mut end = 0;
         for block in &standard.blocks {
@@ -233,40 +236,33 @@ impl<'a> Tableau<'a> {
     fn include<S: Simd>(&mut self, simd: S, j: usize) {
         let width = self.width;
         // scratch = S_jk = A_jk − Σ_i t_ij A_ik for the excluded k
-        self.scratch
-            .copy_from_slice(&self.matrix[j * width..(j + 1) * width]);
-        for (slot, &i) in self.members.iter().enumerate() {
-            let t = self.rows[slot * width + j];
-            axpy(
-                simd,
-                -t,
-                &self.matrix[i * width..(i + 1) * width],
-                &mut self.scratch,
-            );
-        }
+        self.towards.clear();
+        let towards = |slot: usize| -self.rows[slot * width + j];
+        self.towards.extend((0..self.members.len()).map(towards));
+        schur_row(
+            simd,
+            &self.matrix,
+            j,
+            self.members.iter().zip(&self.towards),
+            &mut self.scratch,
+        );
         let pivot = self.scratch[j].max(self.standard.precision[j]);
         let beta = self.gradient[j] / pivot;
         self.excess = (self.excess - self.gradient[j] * beta).max(0.0);
         // Over the included k the same vector holds −t_kj, so that one formula serves both.
-        for (slot, &k) in self.members.iter().enumerate() {
-            self.scratch[k] = -self.rows[slot * width + j];
+        for (&k, &t) in self.members.iter().zip(&self.towards) {
+            self.scratch[k] = t;
         }
         self.scratch[j] = 0.0;
         let inverse = 1.0 / pivot;
-        for k in 0..width {
-            let s = self.scratch[k];
-            // Excluded: s_k −= S²/p, u_k −= S b. Included: C_k += t²/p, β_k −= t b = β_k + s b.
-            self.diagonal[k] += self.sign[k] * s * s * inverse;
-            self.gradient[k] += self.sign[k] * s * beta;
-        }
+        // Excluded: s_k −= S²/p, u_k −= S b. Included: C_k += t²/p, β_k −= t b = β_k + s b.
+        self.shift(inverse, beta);
         self.update_squares(j, inverse, inverse);
         self.scratch.iter_mut().for_each(|s| *s *= inverse);
         self.scratch[j] = inverse;
-        for slot in 0..self.members.len() {
-            let row = &mut self.rows[slot * width..(slot + 1) * width];
-            let t = row[j];
+        for (row, &t) in self.rows.chunks_exact_mut(width).zip(&self.towards) {
             row[j] = 0.0;
-            axpy(simd, -t, &self.scratch, row);
+            axpy(simd, t, &self.scratch, row);
         }
         self.slot[j] = self.members.len();
         self.members.push(j);
@@ -299,12 +295,8 @@ impl<'a> Tableau<'a> {
         let step = self.gradient[j] * pivot;
         self.excess += self.gradient[j] * step;
         self.scratch[j] = 0.0;
-        for k in 0..width {
-            let s = self.scratch[k];
-            // Excluded: s_k += t²/C, u_k += t b/C. Included: C_k −= C_kj²/C, β_k −= C_kj b/C.
-            self.diagonal[k] -= self.sign[k] * s * s * pivot;
-            self.gradient[k] -= self.sign[k] * s * step;
-        }
+        // Excluded: s_k += t²/C, u_k += t b/C. Included: C_k −= C_kj²/C, β_k −= C_kj b/C.
+        self.shift(-pivot, -step);
         self.update_squares(j, pivot, -pivot);
         for row in self.rows.chunks_exact_mut(width) {
             let factor = -row[j] * pivot;
@@ -314,6 +306,24 @@ impl<'a> Tableau<'a> {
         self.diagonal[j] = pivot;
         self.gradient[j] = step;
         self.sign[j] = -1.0;
+    }
+
+    /// `diagonal_k += sign_k s_k² a`, `gradient_k += sign_k s_k b` with s in `scratch`.
+    #[inline(always)]
+    fn shift(&mut self, a: f64, b: f64) {
+        let (scratch, _) = self.scratch.as_chunks::<LANES>();
+        let (sign, _) = self.sign.as_chunks::<LANES>();
+        let (diagonal, _) = self.diagonal.as_chunks_mut::<LANES>();
+        let (gradient, _) = self.gradient.as_chunks_mut::<LANES>();
+        for (((s, sign), diagonal), gradient) in
+            scratch.iter().zip(sign).zip(diagonal).zip(gradient)
+        {
+            for lane in 0..LANES {
+                let signed = sign[lane] * s[lane];
+                diagonal[lane] += signed * s[lane] * a;
+                gradient[lane] += signed * b;
+            }
+        }
     }
 
     /// Squares after a move of position j, `scratch` its row and `step` ± 1/pivot, j's own entry `diagonal`; `sign[j]` is
@@ -455,6 +465,30 @@ fn dot(x: &[f64], y: &[f64]) -> f64 {
         }
     }
     sums.iter().sum()
+}
+
+/// `out = A_j + Σ a_i A_i`, eight columns at a time.
+#[inline(always)]
+fn schur_row<'a, S: Simd>(
+    simd: S,
+    matrix: &[f64],
+    j: usize,
+    others: impl Iterator<Item = (&'a usize, &'a f64)> + Clone,
+    out: &mut [f64],
+) {
+    let width = out.len();
+    let (out, _) = S::as_mut_simd_f64s(out);
+    for (place, out) in out.iter_mut().enumerate() {
+        let column = |row: usize| {
+            let (row, _) = S::as_simd_f64s(&matrix[row * width..(row + 1) * width]);
+            row[place]
+        };
+        let mut sum = column(j);
+        for (&i, &a) in others.clone() {
+            sum = simd.mul_add_e_f64s(simd.splat_f64s(a), column(i), sum);
+        }
+        *out = sum;
+    }
 }
 
 /// y += a x.

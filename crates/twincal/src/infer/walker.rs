@@ -19,11 +19,30 @@ pub(super) struct Walker<'a> {
     pub(super) tableau: Tableau<'a>,
     prior: &'a Prior,
     kin: Option<Kin>,
-    /// Members and size of each family.
+    /// Members of each family.
     members: Vec<usize>,
-    sizes: Vec<usize>,
-    /// `Σ ln factor − ½ ln |A_zz| Π v`.
+    /// Prior odds of one more member and 1 over them, by family and by the members beside it.
+    odds: Vec<Vec<[f64; 2]>>,
+    /// `Σ ln factor − ½ ln |A_zz| Π v` without ½ ln `squared`, the part that was not taken the logarithm of yet.
     log_slab: f64,
+    squared: f64,
+}
+
+/// Products in this range go on as such.
+const SMALL: std::ops::Range<f64> = 1e-100..1e100;
+
+/// See [`Walker::odds`].
+fn odds(prior: &Prior) -> Vec<Vec<[f64; 2]>> {
+    let sizes = prior.family_sizes();
+    let one_more = |family: usize, others: usize| {
+        let (p, q) = prior.next(family, others, sizes[family] - 1);
+        [p / q, q / p]
+    };
+    sizes
+        .iter()
+        .enumerate()
+        .map(|(family, &size)| (0..size).map(|others| one_more(family, others)).collect())
+        .collect()
 }
 
 /// A step: components that leave and enter.
@@ -42,8 +61,9 @@ impl<'a> Walker<'a> {
             prior,
             kin: Kin::new(standard, prior),
             members: standard.held.clone(),
-            sizes: prior.family_sizes(),
+            odds: odds(prior),
             log_slab: standard.log_held,
+            squared: 1.0,
         }
     }
 
@@ -59,7 +79,7 @@ impl<'a> Walker<'a> {
 
     /// ln of the present model's weight; it must be one that heredity allows.
     pub(super) fn log_weight(&self) -> f64 {
-        self.prior.log_model(&self.members) + self.log_slab
+        self.prior.log_model(&self.members) + self.log_slab + 0.5 * self.squared.ln()
             - self.standard.shape * self.tableau.excess.ln_1p()
     }
 
@@ -68,13 +88,16 @@ impl<'a> Walker<'a> {
     pub(super) fn flip<S: Simd>(&mut self, simd: S, block: usize) {
         let own = self.standard.blocks[block];
         let (d, _) = self.tableau.block(block);
-        self.log_slab -= 0.5 * d.ln();
+        let factor = own.factor * own.factor;
         if self.tableau.holds(block) {
             self.members[own.family] -= 1;
-            self.log_slab -= own.factor.ln();
+            self.squared /= d * factor;
         } else {
             self.members[own.family] += 1;
-            self.log_slab += own.factor.ln();
+            self.squared *= factor / d;
+        }
+        if !SMALL.contains(&self.squared) {
+            self.log_slab += 0.5 * std::mem::replace(&mut self.squared, 1.0).ln();
         }
         if let Some(log_determinant) = self.tableau.flip_block(simd, block) {
             let held = |b: &usize| self.tableau.holds(*b);
@@ -83,6 +106,7 @@ impl<'a> Walker<'a> {
                 .map(|b| self.standard.blocks[b].factor.ln())
                 .sum();
             self.log_slab = self.standard.log_held + factors - 0.5 * log_determinant;
+            self.squared = 1.0;
         }
     }
 
@@ -112,11 +136,12 @@ impl<'a> Walker<'a> {
         let own = &self.standard.blocks[block];
         let inside = self.tableau.holds(block);
         let others = self.members[own.family] - usize::from(inside);
-        let (p, q) = self
-            .prior
-            .next(own.family, others, self.sizes[own.family] - 1);
-        let odds = p / q * own.factor;
-        if inside { 1.0 / odds } else { odds }
+        let [odds, inverse] = self.odds[own.family][others];
+        if inside {
+            inverse / own.factor
+        } else {
+            odds * own.factor
+        }
     }
 
     /// (ln of the weight's growth, c after) of moving one component.
@@ -178,10 +203,7 @@ impl<'a> Walker<'a> {
     fn log_prior_change(&self, members: &[usize]) -> f64 {
         let mut sum = 0.0;
         for (family, (&now, &then)) in self.members.iter().zip(members).enumerate() {
-            let odds = |others: usize| {
-                let (p, q) = self.prior.next(family, others, self.sizes[family] - 1);
-                (p / q).ln()
-            };
+            let odds = |others: usize| self.odds[family][others][0].ln();
             sum += (now..then).map(odds).sum::<f64>() - (then..now).map(odds).sum::<f64>();
         }
         sum

@@ -11,7 +11,7 @@ use super::random::Source;
 use super::state::State;
 use super::swaps::Swaps;
 use crate::infer::exchanges::Exchange;
-use crate::infer::standard::{Reduced, Response};
+use crate::infer::standard::{Reduced, Response, Standard};
 use crate::infer::walker::Walker;
 use crate::lanes::{LANES, Lane, exp, ln};
 use crate::prior::Prior;
@@ -77,12 +77,30 @@ pub(super) struct Trace {
 /// Eight components whose conditionals are known.
 #[derive(Debug, Clone, Copy)]
 struct Chunk {
-    /// State of the chain that they belong to.
+    /// Position of the first, where all eight are single columns one after the other.
+    first: Option<usize>,
+    /// State of the chain that the rest belongs to.
     version: u64,
     /// P(z = 1 | all other z).
     conditional: Lane,
     /// Π over the lanes up to this one of (1 − f).
     stays: Lane,
+}
+
+impl Chunk {
+    fn new(standard: &Standard, blocks: &[usize]) -> Self {
+        let first = standard.blocks[blocks[0]].start;
+        let next = |(lane, &block): (usize, &usize)| {
+            let own = &standard.blocks[block];
+            own.len == 1 && own.start == first + lane
+        };
+        Self {
+            first: blocks.iter().enumerate().all(next).then_some(first),
+            version: 0,
+            conditional: [0.0; LANES],
+            stays: [1.0; LANES],
+        }
+    }
 }
 
 /// Runs one chain.
@@ -173,8 +191,13 @@ struct Chain<'a> {
     listed: bool,
     looked: u64,
     response: Response,
+    /// Places in `active` of each family.
+    families: Vec<Vec<usize>>,
     /// Prior ratio of flipping each of them, slab's mass within the bounds included.
     odds: Vec<f64>,
+    /// The slabs' precisions by position and what they are 1 over, padded like the tableau's vectors.
+    precision: Vec<f64>,
+    slab: Vec<f64>,
     chunks: Vec<Chunk>,
     version: u64,
     /// Uniform number that the running product has not reached yet, and that product.
@@ -192,25 +215,30 @@ impl<'a> Chain<'a> {
         let mut walker = Walker::new(standard, target.prior);
         let (certain, active) = (&target.reduced.certain, target.reduced.active.clone());
         certain.iter().for_each(|&block| walker.flip(simd, block));
-        let chunks = active.len().div_ceil(LANES);
+        let chunks: Vec<Chunk> = active
+            .chunks(LANES)
+            .map(|blocks| Chunk::new(standard, blocks))
+            .collect();
         let uniform = source.uniform();
+        let mut precision = standard.precision.clone();
+        precision.resize(walker.tableau.width + LANES, 1.0);
+        let mut families = vec![Vec::new(); walker.families()];
+        for (index, &block) in active.iter().enumerate() {
+            families[standard.blocks[block].family].push(index);
+        }
         let mut chain = Self {
+            families,
+            slab: precision.iter().map(|precision| 1.0 / precision).collect(),
+            precision,
             swaps: Swaps::new(standard, &active),
             exchanges: target.exchanges,
             source,
-            odds: vec![0.0; chunks * LANES],
-            chunks: vec![
-                Chunk {
-                    version: 0,
-                    conditional: [0.0; LANES],
-                    stays: [1.0; LANES]
-                };
-                chunks
-            ],
+            odds: vec![0.0; chunks.len() * LANES],
+            sums: vec![0.0; chunks.len() * LANES],
+            chunks,
             version: 1,
             target: uniform,
             product: 1.0,
-            sums: vec![0.0; chunks * LANES],
             moves: 0,
             walker,
             active,
@@ -241,10 +269,8 @@ impl<'a> Chain<'a> {
 
     /// `P(z_j flips)/P(z_j stays)` a priori.
     fn update_odds(&mut self, family: usize) {
-        for (odds, &block) in self.odds.iter_mut().zip(&self.active) {
-            if self.walker.standard.blocks[block].family == family {
-                *odds = self.walker.flip_odds(block);
-            }
+        for &index in &self.families[family] {
+            self.odds[index] = self.walker.flip_odds(self.active[index]);
         }
     }
 
@@ -265,19 +291,19 @@ impl<'a> Chain<'a> {
     fn scan<S: Simd>(&mut self, simd: S) {
         for index in 0..self.chunks.len() {
             let mut from = 0;
+            // The product without what the lanes before `from` would make of it.
+            let mut product = self.product;
             while from < LANES {
                 if self.chunks[index].version != self.version {
                     self.evaluate(simd, index);
                 }
                 let chunk = self.chunks[index];
-                let before = if from == 0 {
-                    1.0
-                } else {
-                    chunk.stays[from - 1]
-                };
+                if from > 0 {
+                    // f ≤ 0.95 keeps it positive.
+                    product = self.product / chunk.stays[from - 1];
+                }
                 let sums = &mut self.sums[index * LANES..(index + 1) * LANES];
-                // No flip up to lane l with probability stays_l / before; f ≤ 0.95 keeps `before` positive.
-                let whole = self.product * (chunk.stays[LANES - 1] / before);
+                let whole = product * chunk.stays[LANES - 1];
                 if self.target < whole {
                     for lane in 0..LANES {
                         sums[lane] += if lane >= from {
@@ -290,8 +316,7 @@ impl<'a> Chain<'a> {
                     break;
                 }
                 let mut lane = from;
-                while lane < LANES - 1 && self.target < self.product * (chunk.stays[lane] / before)
-                {
+                while lane < LANES - 1 && self.target < product * chunk.stays[lane] {
                     lane += 1;
                 }
                 for l in from..=lane {
@@ -302,9 +327,13 @@ impl<'a> Chain<'a> {
                 from = lane + 1;
             }
         }
-        self.swap(simd);
-        for _ in 0..EXCHANGES {
-            self.exchange(simd);
+        for _ in 0..self.swaps.turns() {
+            self.swap(simd);
+        }
+        if !self.exchanges.is_empty() {
+            for _ in 0..EXCHANGES {
+                self.exchange(simd);
+            }
         }
     }
 
@@ -312,9 +341,6 @@ impl<'a> Chain<'a> {
     /// there and back with the same probability.
     #[inline(always)]
     fn exchange<S: Simd>(&mut self, simd: S) {
-        if self.exchanges.is_empty() {
-            return;
-        }
         let index = (self.source.uniform() * self.exchanges.len() as f64) as usize;
         let Some(step) = self.exchanges[index].step(&self.walker) else {
             return;
@@ -376,28 +402,27 @@ impl<'a> Chain<'a> {
         self.product = 1.0;
     }
 
-    /// The scan's proposals to exchange an included column for one that resembles it. Whether and when the next one is
+    /// Proposals of one group to exchange an included column for one that resembles it. Whether and when the next one is
     /// accepted is again one uniform number; which one, another.
     #[inline(always)]
     fn swap<S: Simd>(&mut self, simd: S) {
-        let mut left = self.swaps.proposals_per_scan();
+        let index = self.swaps.turn();
+        let group = self.swaps.group(simd, index, &self.walker, self.version);
+        let all = self.product * group.stays();
+        if self.target < all {
+            self.product = all;
+            return;
+        }
+        let mut left = group.proposals();
         while left > 0 {
-            if self.swaps.version != self.version {
-                self.swaps.evaluate(simd, &self.walker, self.version);
-            }
-            let stay = 1.0 - LAZY * self.swaps.accepted;
-            let all = self.product * stay.powi(left);
-            if self.target < all {
-                self.product = all;
+            let group = self.swaps.group(simd, index, &self.walker, self.version);
+            let Some(proposal) = group.first(self.target / self.product, left) else {
+                self.product *= group.stay().powi(left);
                 return;
-            }
-            let proposal = ((self.target / self.product).ln() / stay.ln())
-                .ceil()
-                .clamp(1.0, f64::from(left));
-            left -= proposal as i32;
-            let (i, j) = self.swaps.pick(self.source.uniform());
-            self.flip(simd, i);
-            self.flip(simd, j);
+            };
+            left -= proposal;
+            let blocks = group.pick(self.source.uniform());
+            blocks.iter().for_each(|&block| self.flip(simd, block));
             self.moves -= 1;
             self.renew();
         }
@@ -408,24 +433,49 @@ impl<'a> Chain<'a> {
     fn evaluate<S: Simd>(&mut self, simd: S, index: usize) {
         let (tableau, standard) = (&self.walker.tableau, self.walker.standard);
         let misfit = 1.0 + tableau.excess;
-        let (mut change, mut ratio, mut sign) = ([1.0; LANES], [0.0; LANES], [-1.0; LANES]);
-        let blocks = self.active[index * LANES..].iter().take(LANES);
-        for (lane, &block) in blocks.enumerate() {
-            let (d, square) = tableau.block(block);
-            if tableau.holds(block) {
-                sign[lane] = 1.0;
+        let (mut d, mut square, mut over) = ([1.0; LANES], [0.0; LANES], [1.0; LANES]);
+        let mut sign = [-1.0; LANES];
+        if let Some(first) = self.chunks[index].first {
+            let eight =
+                |values: &[f64]| -> Lane { *values[first..].first_chunk().expect("padded") };
+            let (diagonal, gradient) = (eight(&tableau.diagonal), eight(&tableau.gradient));
+            let (precision, slab) = (eight(&self.precision), eight(&self.slab));
+            sign = eight(&tableau.sign);
+            for lane in 0..LANES {
+                let inside = sign[lane] > 0.0;
+                let (least, unit) = if inside {
+                    (1.0, precision[lane])
+                } else {
+                    (precision[lane], slab[lane])
+                };
+                over[lane] = if diagonal[lane] > least {
+                    diagonal[lane]
+                } else {
+                    least
+                };
+                d[lane] = over[lane] * unit;
+                square[lane] = gradient[lane] * gradient[lane];
             }
-            let flipped = (misfit + sign[lane] * square) / misfit;
+        } else {
+            let blocks = self.active[index * LANES..].iter().take(LANES);
+            for (lane, &block) in blocks.enumerate() {
+                (d[lane], square[lane]) = tableau.block(block);
+                sign[lane] = tableau.sign[standard.blocks[block].start];
+            }
+        }
+        let (mut change, mut ratio) = ([1.0; LANES], [0.0; LANES]);
+        let odds = &self.odds[index * LANES..(index + 1) * LANES];
+        for lane in 0..LANES {
+            let flipped = (misfit + sign[lane] * (square[lane] / over[lane])) / misfit;
             change[lane] = if flipped > f64::MIN_POSITIVE {
                 flipped
             } else {
                 f64::MIN_POSITIVE
             };
-            ratio[lane] = self.odds[index * LANES + lane] / d.sqrt();
+            ratio[lane] = odds[lane] / d[lane].sqrt();
         }
         let power = to_the(simd, change, -standard.shape);
         let chunk = &mut self.chunks[index];
-        let mut product = 1.0;
         let mut stay = [0.0; LANES];
         for lane in 0..LANES {
             let r = ratio[lane] * power[lane];
@@ -433,10 +483,7 @@ impl<'a> Chain<'a> {
             chunk.conditional[lane] = if sign[lane] > 0.0 { 1.0 } else { r } / (1.0 + r);
             stay[lane] = 1.0 - LAZY * if r < 1.0 { r } else { 1.0 };
         }
-        for lane in 0..LANES {
-            product *= stay[lane];
-            chunk.stays[lane] = product;
-        }
+        chunk.stays = running_product(stay);
         chunk.version = self.version;
     }
 
@@ -496,6 +543,18 @@ impl<'a> Chain<'a> {
         }
         trace.misfit += state.misfit;
     }
+}
+
+/// Π of the lanes up to each, in three steps instead of seven.
+#[inline(always)]
+fn running_product(mut x: Lane) -> Lane {
+    for step in [1, 2, 4] {
+        let before = x;
+        for lane in step..LANES {
+            x[lane] = before[lane] * before[lane - step];
+        }
+    }
+    x
 }
 
 /// x^power of eight positive numbers.

@@ -1,32 +1,84 @@
 //! Proposals to exchange an included component of one column for an excluded one that resembles it.
 //!
-//! A proposal draws one of E fixed pairs uniformly and is void unless exactly one of the two is included: the same
-//! probability there and back. The chance that a proposal is accepted is the mean of the acceptance probabilities over
-//! all pairs, which is computed once per state.
+//! The pairs are dealt into fixed groups of eight, which have their turn scan after scan. A proposal draws one of the
+//! group's pairs uniformly and is void unless exactly one of the two is included: the same probability there and back.
+//! The chance that a proposal is accepted is the mean of the acceptance probabilities over the group, which is computed
+//! once per state.
 
 use super::chain::{LAZY, to_the};
 use crate::infer::standard::Standard;
 use crate::infer::walker::Walker;
-use crate::lanes::LANES;
+use crate::lanes::{LANES, Lane};
 use pulp::Simd;
 
 /// Columns less alike than this (cosine) are no pair: two flips do the same.
 const ALIKE: f64 = 0.3;
 /// Pairs per column, the most alike first.
 const PAIRS_PER_COLUMN: usize = 6;
+/// Scans in which every group has its turn.
+const SCANS_PER_ROUND: usize = 8;
 
 /// See the module's text.
 #[derive(Debug)]
 pub(super) struct Swaps {
-    pairs: Vec<(u32, u32)>,
+    groups: Vec<Group>,
+    /// Groups that a scan turns to, and the first of the next scan.
+    turns: usize,
+    next: usize,
+}
+
+/// Up to eight pairs.
+#[derive(Debug, Clone)]
+pub(super) struct Group {
+    /// Components and their positions.
+    pairs: Vec<Pair>,
     /// State of the chain that the rest belongs to.
-    pub(super) version: u64,
-    /// Pairs that are no void proposals: (included, excluded).
-    live: Vec<(u32, u32)>,
-    /// Running sums of their acceptance probabilities.
-    sums: Vec<f64>,
-    /// Σ of acceptance probabilities / E.
-    pub(super) accepted: f64,
+    version: u64,
+    /// Running sums of the acceptance probabilities; a void proposal has none.
+    sums: Lane,
+    /// Chance that none of its proposals is accepted.
+    stays: f64,
+}
+
+/// Two components of one column.
+#[derive(Debug, Clone, Copy)]
+struct Pair {
+    blocks: [usize; 2],
+    positions: [usize; 2],
+}
+
+impl Group {
+    /// Proposals when it is its turn: each pair once on average. They cost nothing unless accepted.
+    pub(super) fn proposals(&self) -> i32 {
+        self.pairs.len() as i32
+    }
+
+    /// Chance that a proposal is not accepted.
+    pub(super) fn stay(&self) -> f64 {
+        1.0 - LAZY * (self.sums[LANES - 1] / self.pairs.len() as f64)
+    }
+
+    /// Chance that none of all its proposals is accepted.
+    pub(super) fn stays(&self) -> f64 {
+        self.stays
+    }
+
+    /// Proposals of `left` up to and with the first that is accepted, if one is: `uniform` is below that chance.
+    pub(super) fn first(&self, uniform: f64, left: i32) -> Option<i32> {
+        let stay = self.stay();
+        if uniform < stay.powi(left) {
+            return None;
+        }
+        let proposal = (uniform.ln() / stay.ln()).ceil();
+        Some(proposal.clamp(1.0, f64::from(left)) as i32)
+    }
+
+    /// The components (out, in) at share `uniform` of the accepted ones.
+    pub(super) fn pick(&self, uniform: f64) -> [usize; 2] {
+        let target = uniform * self.sums[LANES - 1];
+        let index = self.sums.partition_point(|&sum| sum <= target);
+        self.pairs[index.min(self.pairs.len() - 1)].blocks
+    }
 }
 
 impl Swaps {
@@ -49,86 +101,126 @@ impl Swaps {
                 .collect();
             others.sort_by(|&a, &b| alike(b).total_cmp(&alike(a)));
             others.truncate(PAIRS_PER_COLUMN);
-            pairs.extend(
-                others
-                    .into_iter()
-                    .map(|b| (a.min(b) as u32, a.max(b) as u32)),
-            );
+            pairs.extend(others.into_iter().map(|b| (a.min(b), a.max(b))));
         }
         pairs.sort_unstable();
         pairs.dedup();
+        let pair = |&(a, b): &(usize, usize)| Pair {
+            blocks: [a, b],
+            positions: [standard.blocks[a].start, standard.blocks[b].start],
+        };
+        let groups: Vec<Group> = pairs
+            .chunks(LANES)
+            .map(|pairs| Group {
+                pairs: pairs.iter().map(pair).collect(),
+                version: 0,
+                sums: [0.0; LANES],
+                stays: 1.0,
+            })
+            .collect();
         Self {
-            pairs,
-            version: 0,
-            live: Vec::new(),
-            sums: Vec::new(),
-            accepted: 0.0,
+            turns: groups.len().div_ceil(SCANS_PER_ROUND),
+            groups,
+            next: 0,
         }
     }
 
-    /// As many as there are pairs: each is proposed once per scan on average. They cost nothing unless accepted.
-    pub(super) fn proposals_per_scan(&self) -> i32 {
-        self.pairs.len() as i32
+    /// Groups that a scan turns to.
+    pub(super) fn turns(&self) -> usize {
+        self.turns
     }
 
-    /// The pair (out, in) at share `uniform` of the accepted ones.
-    pub(super) fn pick(&self, uniform: f64) -> (usize, usize) {
-        let target = uniform * self.sums.last().copied().unwrap_or(0.0);
-        let index = self
-            .sums
-            .partition_point(|&sum| sum <= target)
-            .min(self.live.len() - 1);
-        let (i, j) = self.live[index];
-        (i as usize, j as usize)
+    /// The next group.
+    pub(super) fn turn(&mut self) -> usize {
+        let group = self.next;
+        self.next = if group + 1 == self.groups.len() {
+            0
+        } else {
+            group + 1
+        };
+        group
     }
 
+    /// A group with the acceptance probabilities of the present state.
+    #[inline(always)]
+    pub(super) fn group<S: Simd>(
+        &mut self,
+        simd: S,
+        index: usize,
+        walker: &Walker<'_>,
+        version: u64,
+    ) -> &Group {
+        let group = &mut self.groups[index];
+        if group.version != version {
+            group.evaluate(simd, walker);
+            group.version = version;
+        }
+        group
+    }
+}
+
+impl Group {
     /// Acceptance probabilities of all pairs in the present state.
     #[inline(always)]
-    pub(super) fn evaluate<S: Simd>(&mut self, simd: S, walker: &Walker<'_>, version: u64) {
+    fn evaluate<S: Simd>(&mut self, simd: S, walker: &Walker<'_>) {
         let (standard, tableau) = (walker.standard, &walker.tableau);
-        self.live.clear();
-        self.sums.clear();
-        for &(a, b) in &self.pairs {
-            match (tableau.holds(a as usize), tableau.holds(b as usize)) {
-                (true, false) => self.live.push((a, b)),
-                (false, true) => self.live.push((b, a)),
-                _ => {}
-            }
-        }
         let misfit = 1.0 + tableau.excess;
-        let mut total = 0.0;
-        for pairs in self.live.chunks(LANES) {
-            let (mut change, mut ratio) = ([1.0; LANES], [0.0; LANES]);
-            for (lane, &(i, j)) in pairs.iter().enumerate() {
-                let (out, into) = (i as usize, j as usize);
-                let (i, j) = (standard.blocks[out].start, standard.blocks[into].start);
-                // Without i: s_j grows by t²/C_i, u_j by t β_i/C_i.
-                let (t, inverse, beta) = (
-                    tableau.row(i)[j],
-                    tableau.diagonal[i].max(1.0),
-                    tableau.gradient[i],
-                );
-                let schur = (tableau.diagonal[j] + t * t / inverse).max(standard.precision[j]);
-                let gradient = tableau.gradient[j] + t * beta / inverse;
-                let swapped = misfit + beta * beta / inverse - gradient * gradient / schur;
-                change[lane] = (swapped / misfit).max(f64::MIN_POSITIVE);
-                let slabs = (standard.precision[j] / standard.precision[i]).sqrt();
-                let prior = walker.exchange_odds(out, into) * slabs;
-                ratio[lane] = prior / (inverse * schur).sqrt();
+        // Of a void proposal the ratio is 0.
+        let (mut prior, mut t, mut slabs) = ([0.0; LANES], [0.0; LANES], [1.0; LANES]);
+        let (mut inverse, mut beta) = ([1.0; LANES], [0.0; LANES]);
+        let (mut schur, mut gradient, mut least) = ([1.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let mut live = false;
+        for (lane, pair) in self.pairs.iter_mut().enumerate() {
+            let inside = pair.positions.map(|j| tableau.sign[j] > 0.0);
+            if inside[0] == inside[1] {
+                continue;
             }
-            let power = to_the(simd, change, -standard.shape);
-            for lane in 0..pairs.len() {
-                total += (ratio[lane] * power[lane]).min(1.0);
-                self.sums.push(total);
+            live = true;
+            if inside[1] {
+                pair.blocks.swap(0, 1);
+                pair.positions.swap(0, 1);
             }
+            let ([out, into], [i, j]) = (pair.blocks, pair.positions);
+            prior[lane] = walker.exchange_odds(out, into);
+            t[lane] = tableau.row(i)[j];
+            (inverse[lane], beta[lane]) = (tableau.diagonal[i], tableau.gradient[i]);
+            (schur[lane], gradient[lane]) = (tableau.diagonal[j], tableau.gradient[j]);
+            least[lane] = standard.precision[j];
+            slabs[lane] = standard.precision[j] / standard.precision[i];
         }
-        self.accepted = if self.pairs.is_empty() {
-            0.0
-        } else {
-            total / self.pairs.len() as f64
-        };
-        debug_assert!(LAZY * self.accepted < 1.0);
-        self.version = version;
+        (self.sums, self.stays) = ([0.0; LANES], 1.0);
+        if !live {
+            return;
+        }
+        let (mut change, mut ratio) = ([1.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            // Without i: s_j grows by t²/C_i, u_j by t β_i/C_i.
+            let c = if inverse[lane] > 1.0 {
+                inverse[lane]
+            } else {
+                1.0
+            };
+            let without = t[lane] / c;
+            let s = schur[lane] + t[lane] * without;
+            let s = if s > least[lane] { s } else { least[lane] };
+            let u = gradient[lane] + without * beta[lane];
+            let swapped = misfit + beta[lane] * beta[lane] / c - u * u / s;
+            let swapped = swapped / misfit;
+            change[lane] = if swapped > f64::MIN_POSITIVE {
+                swapped
+            } else {
+                f64::MIN_POSITIVE
+            };
+            ratio[lane] = prior[lane] * (slabs[lane] / (c * s)).sqrt();
+        }
+        let power = to_the(simd, change, -standard.shape);
+        let mut total = 0.0;
+        for lane in 0..LANES {
+            let r = ratio[lane] * power[lane];
+            total += if r < 1.0 { r } else { 1.0 };
+            self.sums[lane] = total;
+        }
+        self.stays = self.stay().powi(self.proposals());
     }
 }
 
@@ -152,28 +244,60 @@ mod tests {
         let (mut compared, mut uncertain) = (0, 0);
         for scan in 0..40 {
             walker.flip(simd, (7 * scan + scan / 9) % all.len());
-            swaps.evaluate(simd, &walker, scan as u64);
             let before = walker.log_weight();
-            let mut sum = 0.0;
-            for (index, &(out, into)) in swaps.live.iter().enumerate() {
-                let accepted = swaps.sums[index] - sum;
-                sum = swaps.sums[index];
-                let there = Step {
-                    leaving: vec![out as usize],
-                    entering: vec![into as usize],
-                };
-                let back = Step {
-                    leaving: there.entering.clone(),
-                    entering: there.leaving.clone(),
-                };
-                walker.take(simd, &there);
-                let ratio = (walker.log_weight() - before).exp().min(1.0);
-                walker.take(simd, &back);
-                assert!((accepted - ratio).abs() < 1e-9, "{accepted} {ratio}");
-                compared += 1;
-                uncertain += usize::from(ratio > 1e-3 && ratio < 0.999);
+            for index in 0..swaps.groups.len() {
+                let group = swaps.group(simd, index, &walker, 1 + scan as u64).clone();
+                let mut sum = 0.0;
+                for (pair, &up_to) in group.pairs.iter().zip(&group.sums) {
+                    let accepted = up_to - sum;
+                    sum = up_to;
+                    let [out, into] = pair.blocks;
+                    if walker.tableau.holds(out) == walker.tableau.holds(into) {
+                        assert_eq!(accepted, 0.0);
+                        continue;
+                    }
+                    let there = Step {
+                        leaving: vec![out],
+                        entering: vec![into],
+                    };
+                    let back = Step {
+                        leaving: there.entering.clone(),
+                        entering: there.leaving.clone(),
+                    };
+                    walker.take(simd, &there);
+                    let ratio = (walker.log_weight() - before).exp().min(1.0);
+                    walker.take(simd, &back);
+                    assert!((accepted - ratio).abs() < 1e-9, "{accepted} {ratio}");
+                    compared += 1;
+                    uncertain += usize::from(ratio > 1e-3 && ratio < 0.999);
+                }
+                // What a uniform number says of one proposal, and of all.
+                let stay = 1.0 - LAZY * sum / group.pairs.len() as f64;
+                let all = stay.powi(group.proposals());
+                assert!((group.stays() - all).abs() < 1e-12);
+                assert_eq!(group.first(0.999 * all, group.proposals()), None);
+                if stay < 0.99 {
+                    let first = |u: f64| group.first(u, group.proposals());
+                    assert_eq!(first(stay + 1e-9), Some(1));
+                    assert_eq!(first(stay - 1e-9), Some(2));
+                }
             }
         }
         assert!(compared > 100 && uncertain > 30, "{compared} {uncertain}");
+    }
+
+    /// Every group has its turn within a round.
+    #[test]
+    fn every_pair_has_its_turn() {
+        let problem = problem(3, 40, 60, 0.8, Inclusion::ExpectedTerms(3.0));
+        let standard = Standard::new(&problem).unwrap();
+        let all: Vec<usize> = (0..standard.blocks.len()).collect();
+        let mut swaps = Swaps::new(&standard, &all);
+        let groups = swaps.groups.len();
+        assert!(groups > SCANS_PER_ROUND, "{groups}");
+        let turned: std::collections::BTreeSet<usize> = (0..SCANS_PER_ROUND * swaps.turns())
+            .map(|_| swaps.turn())
+            .collect();
+        assert_eq!(turned.len(), groups);
     }
 }
