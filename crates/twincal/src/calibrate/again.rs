@@ -1,7 +1,7 @@
 //! The road from logs to a calibration, gone once more where its fit says so: with gear ripple among the candidates, in a wider band, or
-//! in a lower one where a coarse encoder leaves too few rows.
+//! in a lower one where a coarse encoder leaves too few rows or drowns the torque of the model.
 
-use super::lower_band::{TooFew, lower, lowered};
+use super::lower_band::{Band, TooFew, clear, lower, lowered, most_rows};
 use super::ripples::Seen;
 use super::wider_band::{Wider, not_wider};
 use super::{Calibration, CalibrationSettings, Stage, road};
@@ -12,8 +12,10 @@ use crate::signal::{Auto, Logs};
 /// How far a road is to be gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Goal {
-    /// To its end.
+    /// To its end, if the torque of the model is not drowned by a coarse encoder.
     End,
+    /// To its end.
+    Anyway,
     /// To where independent rows can be counted.
     Count,
 }
@@ -28,13 +30,15 @@ pub(super) enum Road {
     Wider(Wider),
     /// Nowhere in this band.
     TooFew(TooFew),
-    /// To where it was asked for: the independent rows of the joint that has most.
-    Counted(f64),
+    /// Nowhere good in this band.
+    Drowned(TooFew),
+    /// To where it was asked for.
+    Counted(Band),
 }
 
 /// [`super::calibrate`]; `findings` holds what was found where it ends early. Where nobody chose families and the fit shows gear ripple, that
 /// becomes a candidate, and all is done once more; so it is in a wider band where the noise allows that, and where that ends early
-/// in the usual one after all; and in a lower one where a coarse encoder leaves too few rows in the usual one.
+/// in the usual one after all; and in a lower one where a coarse encoder leaves too few rows in the usual one or drowns the model's torque.
 pub(super) fn whole_road(
     robot: &Robot,
     recordings: (Logs<'_>, Logs<'_>),
@@ -45,10 +49,11 @@ pub(super) fn whole_road(
     let (mut recordings, asked) = (Some(recordings), settings);
     let mut settings = asked.clone();
     let (mut added, mut usual, mut first) = (Vec::new(), None, None);
+    let mut goal = Goal::End;
     loop {
         findings.clone_from(&added);
         let logs = &mut recordings;
-        let few = match road(robot, logs, &settings, Goal::End, progress, findings) {
+        let few = match road(robot, logs, &settings, goal, progress, findings) {
             Ok(Road::End(calibration)) => return Ok(*calibration),
             Ok(Road::Again(ripples)) => {
                 added.extend(ripples.iter().map(Seen::added));
@@ -65,6 +70,17 @@ pub(super) fn whole_road(
                 continue;
             }
             Ok(Road::TooFew(few)) => few,
+            Ok(Road::Drowned(few)) => {
+                // With what follows the road ends here or in the band that is found now.
+                goal = Goal::Anyway;
+                let logs = &mut recordings;
+                let bands = lower_bands(robot, logs, &settings, lower(&few, findings, asked));
+                if let Some(cutoff_hz) = clear(&bands) {
+                    settings.signal.cutoff_hz = Auto::Value(cutoff_hz);
+                    added.push(lowered(&few, cutoff_hz));
+                }
+                continue;
+            }
             // Only a road with `Goal::Count` ends there.
             Ok(Road::Counted(_)) => unreachable!("the goal is the end"),
             Err(error) => TooFew::from(error),
@@ -81,22 +97,33 @@ pub(super) fn whole_road(
             added.push(not_wider(&few.error));
             continue;
         }
-        let mut best = None;
-        for cutoff_hz in lower(&few, findings, asked) {
-            settings.signal.cutoff_hz = Auto::Value(cutoff_hz);
-            let (logs, goal) = (&mut recordings, Goal::Count);
-            let end = road(robot, logs, &settings, goal, &|_| (), &mut Vec::new());
-            if let Ok(Road::Counted(rows)) = end
-                && best.is_none_or(|(_, most)| rows > most)
-            {
-                best = Some((cutoff_hz, rows));
-            }
-        }
-        let Some((cutoff_hz, _)) = best else {
+        let logs = &mut recordings;
+        let bands = lower_bands(robot, logs, &settings, lower(&few, findings, asked));
+        let Some(cutoff_hz) = most_rows(&bands) else {
             return Err(few.error);
         };
         settings.signal.cutoff_hz = Auto::Value(cutoff_hz);
         added.push(lowered(&few, cutoff_hz));
         first = Some((few.error, findings.clone()));
     }
+}
+
+/// Those of these cut-offs at which independent rows can be counted.
+fn lower_bands(
+    robot: &Robot,
+    recordings: &mut Option<(Logs<'_>, Logs<'_>)>,
+    settings: &CalibrationSettings,
+    cutoffs: Vec<f64>,
+) -> Vec<Band> {
+    let mut settings = settings.clone();
+    let mut bands = Vec::new();
+    for cutoff_hz in cutoffs {
+        settings.signal.cutoff_hz = Auto::Value(cutoff_hz);
+        let goal = Goal::Count;
+        let end = road(robot, recordings, &settings, goal, &|_| (), &mut Vec::new());
+        if let Ok(Road::Counted(band)) = end {
+            bands.push(band);
+        }
+    }
+    bands
 }

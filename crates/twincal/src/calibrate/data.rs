@@ -166,6 +166,33 @@ impl Data {
         Ok(())
     }
 
+    /// How far the nominal torque is from the measured one, of the joint that moves where it is least far: its number and the root mean squares of
+    /// difference and torque, N·m. Moving rows of the fit logs; `None` without any.
+    pub(super) fn nominal_misfit(&self) -> Option<(usize, [f64; 2])> {
+        let joints = self.fit.first()?.observations.joints.len();
+        let ratio = |[difference, torque]: [f64; 2]| difference / torque;
+        let mut least: Option<(usize, [f64; 2])> = None;
+        for joint in 0..joints {
+            let (mut sums, mut rows) = ([0.0; 2], 0.0);
+            for log in &self.fit {
+                let own = &log.observations.joints[joint];
+                let measured = own.measured.get();
+                let torques = own.y.iter().zip(measured.iter());
+                let moving = torques.zip(&own.standstill).filter(|(_, still)| !**still);
+                for ((difference, torque), _) in moving {
+                    sums[0] += difference * difference;
+                    sums[1] += torque * torque;
+                    rows += 1.0;
+                }
+            }
+            let rms = sums.map(|sum| (sum / rows).sqrt());
+            if rows > 0.0 && least.is_none_or(|(_, other)| ratio(rms) < ratio(other)) {
+                least = Some((joint, rms));
+            }
+        }
+        least
+    }
+
     /// sd per joint of the torque outside the filter's band, from the raw residual of the fit logs; 0 with the filter off.
     pub(super) fn out_of_band(
         &self,

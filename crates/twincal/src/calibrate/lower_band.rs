@@ -5,15 +5,26 @@
 //! where a fit is refused for want of rows, it is tried at half the cut-off and so on, not below [`LEAST`], and done where the rows of a joint
 //! count as most independent ones. Where they are too few everywhere the first refusal stands.
 //!
+//! So it is where the fit would begin, but accelerations drown the model: its torque differs from the measured one by more than twice that, on every
+//! joint that moves. Vibration of an encoder's step or two counts as motion, and what rounding adds to its acceleration grows as f_c^2.5, while
+//! what a model lacks is of a size in every band. The fit is done in the highest of the lower bands in which the model's torque is about as little off
+//! as in any; if it is as far off in all of them the usual one stands (units or signs may be wrong, which a fit tells).
+//!
 //! A log of some seconds has few rows as well, and more of them in a wider band. They say no more of what the robot does elsewhere: of six seconds of
 //! a UR10 that were fitted in twice the band, 95 % intervals held none to all of the next seconds' torque. Such a log is refused.
 
 use super::CalibrationSettings;
 use crate::error::{Error, Finding, Severity};
+use crate::robot::Robot;
 use crate::signal::Auto;
+use crate::words::significant;
 
 /// No band of a coarse encoder ends below, Hz: friction that reverses would blur.
 const LEAST: f64 = 2.0;
+/// How far the nominal torque may be from the measured one, in rms of that, before a lower band is tried.
+const DROWNED: f64 = 2.0;
+/// A band is as good as the best where the nominal torque is no further off than this times: a fifth of its square may be rounding.
+const AS_GOOD: f64 = 1.1;
 
 /// A fit that ended early, and what another band may do for it.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +43,63 @@ impl From<Error> for TooFew {
             cutoff_hz: 0.0,
         }
     }
+}
+
+/// A lower band that was tried.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Band {
+    /// Its cut-off, Hz.
+    pub(super) cutoff_hz: f64,
+    /// Independent rows of the joint that has most.
+    pub(super) rows: f64,
+    /// [`super::data::Data::nominal_misfit`] as a ratio.
+    pub(super) misfit: f64,
+}
+
+/// The band with most independent rows, the higher one where they are as many.
+pub(super) fn most_rows(bands: &[Band]) -> Option<f64> {
+    let more = |best: &Band, band: &Band| band.rows > best.rows;
+    best(bands, more)
+}
+
+/// The highest band in which the model is as little drowned as in others.
+pub(super) fn clear(bands: &[Band]) -> Option<f64> {
+    let least = bands.iter().map(|band| band.misfit).fold(DROWNED, f64::min);
+    let as_good = |band: &&Band| band.misfit <= AS_GOOD * least;
+    let good: Vec<Band> = bands.iter().filter(as_good).copied().collect();
+    best(&good, |best, band| band.cutoff_hz > best.cutoff_hz)
+}
+
+fn best(bands: &[Band], better: fn(&Band, &Band) -> bool) -> Option<f64> {
+    let mut bands = bands.iter();
+    let first = bands.next()?;
+    let best = bands.fold(first, |best, band| match better(best, band) {
+        true => band,
+        false => best,
+    });
+    Some(best.cutoff_hz)
+}
+
+/// What is said of a band in which the nominal torque differs from the measured one by far more than that on every joint that moves.
+pub(super) fn drowned(
+    robot: &Robot,
+    (joint, [difference, torque]): (usize, [f64; 2]),
+    cutoff_hz: f64,
+) -> Option<TooFew> {
+    if difference <= DROWNED * torque {
+        return None;
+    }
+    let names = robot.joint_names();
+    let [difference, torque] = [difference, torque].map(|rms| significant(rms, 2));
+    let problem = format!(
+        "joint `{}`: accelerations of a coarse encoder make the model's torque wrong by {difference} (rms), {torque} was measured",
+        names[joint]
+    );
+    let remedy = "log the encoder's full resolution".into();
+    Some(TooFew {
+        error: Error::Refused { problem, remedy },
+        cutoff_hz,
+    })
 }
 
 /// Cut-offs that are open to a fit by `settings` that ended with `few` and `findings`, Hz.
@@ -56,7 +124,7 @@ pub(super) fn lowered(few: &TooFew, cutoff_hz: f64) -> Finding {
         error => error.to_string(),
     };
     let message = format!(
-        "nothing can be concluded at the automatic cut-off of {} Hz ({problem}): fitted at {cutoff_hz} Hz, where the coarse encoder hides \
+        "nothing can be concluded at the automatic cut-off of {} Hz ({problem}): fitted at {cutoff_hz} Hz, where the coarse encoder spoils \
          less of the motion; [signal] cutoff_hz states another one",
         few.cutoff_hz
     );
@@ -100,6 +168,27 @@ mod tests {
         let message = lowered(&refused(), 8.3).message;
         let told = "cut-off of 33 Hz (5 rows): fitted at 8.3 Hz, where the coarse encoder";
         assert!(message.contains(told), "{message}");
+    }
+
+    #[test]
+    fn the_highest_band_that_is_not_drowned_is_the_one() {
+        let band = |cutoff_hz, rows, misfit| Band {
+            cutoff_hz,
+            rows,
+            misfit,
+        };
+        let bands = [
+            band(16.5, 30.0, 1.4),
+            band(8.3, 40.0, 0.32),
+            band(4.1, 12.0, 0.3),
+        ];
+        assert_eq!(clear(&bands), Some(8.3));
+        assert_eq!(most_rows(&bands), Some(8.3));
+        assert_eq!(clear(&bands[..1]), Some(16.5));
+        // As far off in every band: that is no encoder's.
+        assert_eq!(clear(&[band(16.5, 30.0, 9.0), band(8.3, 30.0, 8.9)]), None);
+        assert_eq!((clear(&[]), most_rows(&[])), (None, None));
+        assert_eq!(most_rows(&[bands[2], bands[0]]), Some(16.5));
     }
 
     #[test]

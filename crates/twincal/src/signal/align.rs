@@ -10,6 +10,7 @@ use super::standstill::standstill;
 use super::thin::thin;
 use super::{Channels, DerivedFrom, LoggedSamples, Pipeline, Recording, Segment, Trajectory};
 use crate::error::{Error, Finding, Result, Severity};
+use crate::words::significant;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -19,6 +20,8 @@ const STANDSTILL_PERIODS: f64 = 3.0;
 
 /// Share of standstill from which a joint counts as not moving in a log.
 const HARDLY_MOVES: f64 = 0.95;
+/// In v_s, from which speed on "standing still" would be no word for what is slower.
+const SLOW: f64 = 10.0;
 
 /// Samples as logged that are kept of a long log whose clock is thinned, about, and how many in a row.
 const SPREAD: usize = 1 << 16;
@@ -270,7 +273,7 @@ fn align(
     let names: Vec<&str> = joints.iter().map(|facts| facts.name.as_str()).collect();
     let agreement = velocity_agreement(&trajectory, &pipeline.standstill_velocity);
     findings.extend(agreement::findings(&names, &log.name, &agreement));
-    report_standstill(joints, log, &trajectory, findings);
+    report_standstill(joints, log, (&trajectory, pipeline), findings);
     saturated.mask(log, pipeline, &mut trajectory, findings);
     Ok(trajectory)
 }
@@ -477,7 +480,7 @@ fn logged_samples(
 fn report_standstill(
     joints: &[JointFacts],
     log: &Recording,
-    trajectory: &Trajectory,
+    (trajectory, pipeline): (&Trajectory, &Pipeline),
     findings: &mut Vec<Finding>,
 ) {
     for (joint, facts) in joints.iter().enumerate() {
@@ -492,18 +495,21 @@ fn report_standstill(
             continue;
         }
         let share = 100.0 * still as f64 / all as f64;
-        let (severity, code, text) = if still as f64 >= HARDLY_MOVES * all as f64 {
-            (
-                Severity::Warning,
-                "joint_stands_still",
-                format!("does not move in {share:.1} % of this log"),
+        let (severity, code, rest) = if still as f64 >= HARDLY_MOVES * all as f64 {
+            (Severity::Warning, "joint_stands_still", "does not move")
+        } else {
+            (Severity::Note, "standstill", "stands still")
+        };
+        let limit = pipeline.standstill_velocity[joint];
+        // A coarse encoder tells slow motion from standing still only where the filter leaves little of its steps.
+        let text = if limit > SLOW * pipeline.coulomb_velocity {
+            format!(
+                "is slower than {} per s in {share:.1} % of this log, which its encoder cannot tell from standstill at a cut-off of {} Hz",
+                significant(limit, 2),
+                pipeline.cutoff_hz
             )
         } else {
-            (
-                Severity::Note,
-                "standstill",
-                format!("stands still in {share:.1} % of this log"),
-            )
+            format!("{rest} in {share:.1} % of this log")
         };
         findings.push(Finding::new(
             severity,
