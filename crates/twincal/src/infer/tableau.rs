@@ -467,7 +467,10 @@ fn dot(x: &[f64], y: &[f64]) -> f64 {
     sums.iter().sum()
 }
 
-/// `out = A_j + Σ a_i A_i`, eight columns at a time.
+/// Vectors whose sums stay in registers.
+const HELD: usize = 4;
+
+/// `out = A_j + Σ a_i A_i`, some vectors of columns at a time.
 #[inline(always)]
 fn schur_row<'a, S: Simd>(
     simd: S,
@@ -477,15 +480,26 @@ fn schur_row<'a, S: Simd>(
     out: &mut [f64],
 ) {
     let width = out.len();
+    let row = |i: usize| S::as_simd_f64s(&matrix[i * width..(i + 1) * width]).0;
     let (out, _) = S::as_mut_simd_f64s(out);
-    for (place, out) in out.iter_mut().enumerate() {
-        let column = |row: usize| {
-            let (row, _) = S::as_simd_f64s(&matrix[row * width..(row + 1) * width]);
-            row[place]
-        };
-        let mut sum = column(j);
+    let (whole, rest) = out.as_chunks_mut::<HELD>();
+    let first = whole.len() * HELD;
+    for (place, out) in whole.iter_mut().enumerate() {
+        let part = |i: usize| &row(i)[place * HELD..][..HELD];
+        let mut sums = [part(j)[0]; HELD];
+        sums.copy_from_slice(part(j));
         for (&i, &a) in others.clone() {
-            sum = simd.mul_add_e_f64s(simd.splat_f64s(a), column(i), sum);
+            let a = simd.splat_f64s(a);
+            for (sum, x) in sums.iter_mut().zip(part(i)) {
+                *sum = simd.mul_add_e_f64s(a, *x, *sum);
+            }
+        }
+        *out = sums;
+    }
+    for (place, out) in rest.iter_mut().enumerate() {
+        let mut sum = row(j)[first + place];
+        for (&i, &a) in others.clone() {
+            sum = simd.mul_add_e_f64s(simd.splat_f64s(a), row(i)[first + place], sum);
         }
         *out = sum;
     }
