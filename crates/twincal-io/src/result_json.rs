@@ -153,6 +153,7 @@ struct ValidationRow<'a> {
     within: ScoresRow<'a>,
     beyond: ScoresRow<'a>,
     raw: ScoresRow<'a>,
+    raw_moving: ScoresRow<'a>,
 }
 
 #[derive(Serialize)]
@@ -361,6 +362,7 @@ impl<'a> ValidationRow<'a> {
             within: ScoresRow::of(&validation.within),
             beyond: ScoresRow::of(&validation.beyond),
             raw: ScoresRow::of(&validation.raw),
+            raw_moving: ScoresRow::of(&validation.raw_moving),
         }
     }
 }

@@ -88,6 +88,44 @@ fn friction_that_flattens_is_found_where_it_is() {
     );
 }
 
+/// What viscous and Coulomb friction alone leave of friction that bends. Truth: least squares of v|v| on v and tanh(v/0.02) over the first 70 % of
+/// the samples, its rms over the last 30 %, and the noise that the twin has left. Both halves are odd in v: no offset. 10 % for the low-passed steps.
+#[test]
+fn friction_alone_leaves_what_bends() {
+    let result = fitted(|_| {});
+    let qd = log(11).joints[0].qd.clone().expect("speeds");
+    let (training, tested) = qd.split_at(7 * qd.len() / 10);
+    let dry = |v: f64| (v / 0.02).tanh();
+    let sum = |of: &dyn Fn(f64) -> f64| training.iter().map(|v| of(*v)).sum::<f64>();
+    let bent = |v: f64| v * v.abs();
+    let (vv, vs, ss) = (
+        sum(&|v| v * v),
+        sum(&|v| v * dry(v)),
+        sum(&|v| dry(v).powi(2)),
+    );
+    let (vq, sq) = (sum(&|v| v * bent(v)), sum(&|v| dry(v) * bent(v)));
+    let det = vv * ss - vs * vs;
+    let (viscous, coulomb) = ((vq * ss - sq * vs) / det, (sq * vv - vq * vs) / det);
+    let left = tested
+        .iter()
+        .map(|v| FRICTION[0][2] * (bent(*v) - viscous * v - coulomb * dry(*v)));
+    let square = left.map(|x| x * x).sum::<f64>() / tested.len() as f64;
+    let joints = &result.validation.moving.joints;
+    let [shoulder, elbow] = [&joints[0], &joints[1]].map(|joint| {
+        let alone = joint.rmse_friction.expect("friction is a candidate");
+        (alone, joint.rmse_calibrated)
+    });
+    let truth = (square + shoulder.1.powi(2)).sqrt();
+    assert!(truth > 1.5 * shoulder.1, "{truth} {shoulder:?}");
+    assert!(
+        (shoulder.0 / truth - 1.0).abs() < 0.1,
+        "{truth} {shoulder:?}"
+    );
+    assert!((elbow.0 / elbow.1 - 1.0).abs() < 0.05, "{elbow:?}");
+    let without = fitted(|settings| settings.library.families = vec![Family::MotorInertia]);
+    assert_eq!(without.validation.moving.joints[0].rmse_friction, None);
+}
+
 /// A file holds the viscous and dry friction nearest to all friction of the joint. Truth: least squares of v|v| on v and tanh(v/0.02)
 /// over speeds spread evenly between the least and the largest of the log, by Cramer's rule.
 #[test]

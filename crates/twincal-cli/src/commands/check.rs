@@ -207,6 +207,7 @@ mod tests {
             epistemic_sd: 0.01,
             noise_sd: 0.1,
             epistemic_share: 0.01,
+            rmse_friction: None,
         };
         let moving = Scores {
             rmse_nominal: 1.0,

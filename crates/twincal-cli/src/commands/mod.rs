@@ -12,6 +12,7 @@ mod fit;
 mod inputs;
 mod inspect;
 mod predict;
+mod repeats;
 mod report;
 mod settings;
 mod summary;

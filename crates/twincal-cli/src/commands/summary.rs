@@ -1,5 +1,6 @@
 //! What a person reads after a fit: physical sentences, terms, held-out scores, findings.
 
+use super::repeats;
 use super::table::{print_table, table};
 use crate::terminal::{Terminal, clean};
 use twincal::calibrate::{Calibration, ComponentSummary, Repeat, Repeated, TermSummary, Verdict};
@@ -14,6 +15,8 @@ use twincal_io::result_json::status_word;
 const MENDS: &str = "`twincal init` with this log and model writes a twincal.toml that mends it, where it is a mistake of columns, signs or units";
 /// Dropped columns up to this number are named.
 const FEW: usize = 4;
+/// What stands where ± does not describe a number.
+const ENDS: &str = "a (b … c): median and both ends of the central 68 % interval, where it is lopsided and ± would mislead";
 /// What the table of components that were not kept holds.
 const VALUE: &str = "value: median, given that it is in; ±: half of the central 68 % interval";
 
@@ -65,7 +68,14 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
     for told in calibration.told_apart_by_the_prior() {
         paragraph(&told, terminal);
     }
-    repeatability(calibration, terminal);
+    for line in repeats::lines(&calibration.repeatability, calibration.halves) {
+        paragraph(&line, terminal);
+    }
+    let found = all.iter().filter(|component| component.selected);
+    let mut numbers = found.flat_map(|component| &component.parameters);
+    if numbers.any(|number| number.seen && number.ends().is_some()) {
+        paragraph(ENDS, terminal);
+    }
     terminal.say("");
 }
 
@@ -243,72 +253,29 @@ fn reliability(calibration: &Calibration) -> Vec<String> {
     lines
 }
 
-/// How many kept effects repeat on the two halves of the data, and which do not.
-fn repeatability(calibration: &Calibration, terminal: &mut Terminal) {
-    let Some(halves) = calibration.halves else {
-        return;
-    };
-    let (mut all, mut same, mut other, mut loose) = (0, 0, Vec::new(), Vec::new());
-    for group in (calibration.repeatability).chunk_by(|a, b| a.component == b.component) {
-        let name = clean(&group[0].component);
-        all += 1;
-        match Repeat::of_effect(group) {
-            Repeated::Repeats | Repeated::Wavers => same += 1,
-            Repeated::Differs => {
-                let apart = group.iter().filter_map(|repeat| repeat.z).map(f64::abs);
-                let apart = apart.fold(0.0, f64::max);
-                other.push(format!("{name} ({apart:.1} sd apart)"));
-            }
-            Repeated::TooLoose => loose.push(name),
-            Repeated::InOneHalf | Repeated::InNeitherHalf => {}
-            Repeated::NotSeen => all -= 1,
-        }
-    }
-    if all == 0 {
-        return;
-    }
-    let (one, two) = halves.words();
-    let text = format!("{same} of {all} effects repeat from {one} to {two}");
-    paragraph(&text, terminal);
-    for (words, names) in [
-        ("do not repeat", other),
-        ("too loose in either half to tell", loose),
-    ] {
-        if !names.is_empty() {
-            paragraph(&format!("{words}: {}", names.join(", ")), terminal);
-        }
-    }
-}
-
-/// Scores per joint, and over all of them.
+/// Scores per joint, and over all of them; what friction alone would leave where that was asked for.
 pub(super) fn scores(scores: &Scores, terminal: &mut Terminal) {
-    let mut table = table(&[
-        "joint",
-        "RMSE nominal",
-        "calibrated",
-        "in 95 % interval",
-        "its width",
-    ]);
+    let friction = report::friction_only(scores);
+    let mut heads = vec!["joint", "RMSE nominal"];
+    heads.extend(friction.is_some().then_some("friction only"));
+    heads.extend(["calibrated", "in 95 % interval", "its width"]);
+    let mut table = table(&heads);
+    let mut add = |name: &str, rmses: [f64; 3], coverage: f64, width: String| {
+        let [nominal, alone, calibrated] = rmses.map(|rmse| significant(rmse, 3));
+        let mut row = vec![clean(name), nominal];
+        row.extend(friction.is_some().then_some(alone));
+        row.extend([calibrated, percent(coverage), width]);
+        table.add_row(row);
+    };
     for joint in &scores.joints {
-        table.add_row([
-            &*clean(&joint.joint),
-            &significant(joint.rmse_nominal, 3),
-            &significant(joint.rmse_calibrated, 3),
-            &percent(joint.coverage95),
-            &significant(joint.mean_width95, 3),
-        ]);
+        let alone = joint.rmse_friction.unwrap_or(f64::NAN);
+        let rmses = [joint.rmse_nominal, alone, joint.rmse_calibrated];
+        let width = significant(joint.mean_width95, 3);
+        add(&joint.joint, rmses, joint.coverage95, width);
     }
-    let (nominal, calibrated) = (
-        significant(scores.rmse_nominal, 3),
-        significant(scores.rmse_calibrated, 3),
-    );
-    table.add_row([
-        "all",
-        &nominal,
-        &calibrated,
-        &percent(scores.coverage95),
-        "",
-    ]);
+    let alone = friction.unwrap_or(f64::NAN);
+    let rmses = [scores.rmse_nominal, alone, scores.rmse_calibrated];
+    add("all", rmses, scores.coverage95, String::new());
     print_table(&table, terminal);
 }
 

@@ -4,7 +4,7 @@
 use super::MENTIONED;
 use super::figures::inclusion::family_name;
 use super::remarks::remarks;
-use super::text::{interval, probability};
+use super::text::{interval, probability, with_ends};
 use super::verdict::plus_minus;
 use serde::Serialize;
 use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary, TermSummary, Verdict};
@@ -19,6 +19,8 @@ pub(super) struct Effects {
     pub(super) possible: Vec<Kind>,
     /// PIP < 0.05: names alone.
     pub(super) absent: Vec<Absent>,
+    /// Whatever their PIP, these data say nothing about them: names alone.
+    pub(super) unseen: Vec<Absent>,
     /// Not columns of the regression.
     pub(super) dropped: Vec<Dropped>,
     /// Number of effects in each list.
@@ -30,6 +32,7 @@ pub(super) struct Effects {
 pub(super) struct Counts {
     pub(super) possible: usize,
     pub(super) absent: usize,
+    pub(super) unseen: usize,
     pub(super) dropped: usize,
 }
 
@@ -57,8 +60,6 @@ pub(super) struct Effect {
     pub(super) unseen: Vec<String>,
     /// The data do not say whether it is there, or the sampler cannot tell on which side of 0.5 it lies.
     pub(super) undecided: bool,
-    /// The data say nothing about it.
-    pub(super) not_seen: bool,
     /// What is to be minded.
     pub(super) remarks: Vec<String>,
 }
@@ -72,7 +73,7 @@ pub(super) struct Parameter {
     pub(super) interval: String,
 }
 
-/// Absent effects of one family.
+/// Absent effects of one family, or those that are not seen.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Absent {
     pub(super) title: String,
@@ -99,24 +100,32 @@ pub(super) fn sort(calibration: &Calibration) -> Effects {
             .collect()
     };
     let dropped = dropped(&calibration.terms);
-    let possible = pick(&|c, p| !c.selected && p >= MENTIONED);
-    let absent = pick(&|c, p| !c.selected && (p < MENTIONED || p.is_nan()));
+    let is_unseen = |c: &ComponentSummary| !c.selected && c.verdict == Some(Verdict::NotSeen);
+    let unseen = pick(&|c, _| is_unseen(c));
+    let seen = |c: &ComponentSummary| !c.selected && !is_unseen(c);
+    let possible = pick(&|c, p| seen(c) && p >= MENTIONED);
+    let absent = pick(&|c, p| seen(c) && (p < MENTIONED || p.is_nan()));
     Effects {
         found: kinds(&pick(&|c, _| c.selected), calibration),
         counts: Counts {
             possible: possible.len(),
             absent: absent.len(),
+            unseen: unseen.len(),
             dropped: dropped.iter().map(|d| d.names.len()).sum(),
         },
         possible: kinds(&possible, calibration),
-        absent: by_family(&absent)
-            .map(|own| Absent {
-                title: family_title(own[0]),
-                names: own.iter().map(|c| c.name.clone()).collect(),
-            })
-            .collect(),
+        absent: names(&absent),
+        unseen: names(&unseen),
         dropped,
     }
+}
+
+fn names(components: &[&ComponentSummary]) -> Vec<Absent> {
+    let own = |own: &[&ComponentSummary]| Absent {
+        title: family_title(own[0]),
+        names: own.iter().map(|c| c.name.clone()).collect(),
+    };
+    by_family(components).map(own).collect()
 }
 
 /// The library has them in the order of families, but for what belongs to a payload.
@@ -174,7 +183,6 @@ fn effect(component: &ComponentSummary, calibration: &Calibration) -> Effect {
             || component
                 .pip_mcse
                 .is_some_and(|e| e > 0.0 && (pip - 0.5).abs() < 3.0 * e),
-        not_seen: component.verdict == Some(Verdict::NotSeen),
         remarks: remarks(component, calibration),
     }
 }
@@ -203,6 +211,7 @@ fn estimate(parameter: &ParameterSummary) -> Estimate {
         unit: parameter.unit.clone(),
         value: if parameter.seen { value } else { f64::NAN },
         spread,
+        ends: parameter.ends(),
     }
 }
 
@@ -214,7 +223,10 @@ fn parameter(parameter: &ParameterSummary, family: Family) -> Parameter {
     let or_dash = |text: String| if known { text } else { "–".into() };
     Parameter {
         name: name(parameter),
-        value: or_dash(plus_minus(factor * value, factor * spread)),
+        value: or_dash(match parameter.ends() {
+            None => plus_minus(factor * value, factor * spread),
+            Some(ends) => with_ends(factor * value, ends.map(|x| factor * x)),
+        }),
         unit: unit.into(),
         interval: or_dash(interval(parameter.interval95.map(|x| factor * x))),
     }
@@ -266,14 +278,62 @@ mod tests {
         ] {
             let effects = sort(&calibration);
             let of = |kinds: &[Kind]| kinds.iter().map(|kind| kind.effects.len()).sum::<usize>();
-            let absent = effects.absent.iter().map(|kind| kind.names.len());
-            let absent: usize = absent.sum();
+            let names = |all: &[Absent]| all.iter().map(|kind| kind.names.len()).sum::<usize>();
+            let (absent, unseen) = (names(&effects.absent), names(&effects.unseen));
             assert_eq!(effects.counts.possible, of(&effects.possible));
             assert_eq!(effects.counts.absent, absent);
-            let listed =
-                of(&effects.found) + of(&effects.possible) + absent + effects.counts.dropped;
+            assert_eq!(effects.counts.unseen, unseen);
+            let listed = of(&effects.found)
+                + of(&effects.possible)
+                + absent
+                + unseen
+                + effects.counts.dropped;
             assert_eq!(listed, calibration.components.len());
         }
+    }
+
+    #[test]
+    fn what_the_data_do_not_see_is_neither_absent_nor_possible() {
+        let mut calibration = fixture::two_joints();
+        for (name, pip) in [("elbow.offset", 0.01), ("qd1^2*cos(q2)", 0.21)] {
+            let own = calibration.components.iter_mut().find(|c| c.name == name);
+            let own = own.unwrap();
+            (own.pip, own.verdict) = (Some(pip), Some(Verdict::NotSeen));
+        }
+        let effects = sort(&calibration);
+        let unseen: Vec<&String> = effects.unseen.iter().flat_map(|u| &u.names).collect();
+        assert_eq!(unseen, ["qd1^2*cos(q2)", "elbow.offset"]);
+        let absent = effects.absent.iter().flat_map(|u| &u.names);
+        assert!(absent.into_iter().all(|name| name != "elbow.offset"));
+        assert!(
+            flat(effects.possible)
+                .iter()
+                .all(|e| e.name != "qd1^2*cos(q2)")
+        );
+        let html = crate::report::render(&calibration, &crate::report::ReportContext::default());
+        assert!(html.unwrap().contains("2 not seen by these data"));
+    }
+
+    #[test]
+    fn a_lopsided_number_has_both_ends_and_one_number_is_one() {
+        let mut calibration = fixture::two_joints();
+        let own = (calibration.components.iter_mut()).find(|c| c.name == "elbow.coulomb");
+        let own = own.unwrap();
+        let value = &mut own.parameters[0];
+        (value.median, value.interval68, value.interval95) =
+            (293.9, [284.5, 378.1], [276.0, 424.0]);
+        own.family = Family::Payload;
+        value.name = "com_x".into();
+        let unseen = ParameterSummary {
+            name: "mass".into(),
+            seen: false,
+            ..value.clone()
+        };
+        own.parameters.insert(0, unseen);
+        let shown = effect(own, &fixture::two_joints());
+        assert_eq!(shown.all[0].value, "294 (284 … 378)");
+        let html = crate::report::render(&calibration, &crate::report::ReportContext::default());
+        assert!(html.unwrap().contains("one number, 1 not seen"));
     }
 
     fn flat(kinds: Vec<Kind>) -> Vec<Effect> {

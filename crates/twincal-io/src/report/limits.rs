@@ -4,8 +4,9 @@ use super::figures::sensitivity;
 use super::findings;
 use super::remarks::size_of_gravity;
 use super::shape;
-use super::text::{list, number, percent};
-use super::view::{Joint, memory, pooled_unit, standard_deviation};
+use super::text::{THIN, list, number, percent, subject};
+use super::view::{Joint, independent_rows, memory, pooled_unit, standard_deviation};
+use super::{ambiguity, beyond};
 use twincal::Severity;
 use twincal::calibrate::{Calibration, Repeat, Repeated};
 use twincal::posterior::Method;
@@ -21,6 +22,15 @@ const LEVEL: f64 = 0.95;
 const LEVEL_WORDS: &str = "95 % intervals";
 /// Share of the torque's standard deviation from which the remaining error is called large.
 const LARGE: f64 = 0.5;
+
+/// Held-out rows, in independent ones, below which nothing is promised.
+pub(super) const FEW: f64 = 20.0;
+/// Held-out rows at standstill below which that is not tested.
+pub(super) const FEW_AT_REST: u64 = 20;
+/// Share of a joint's rows at standstill from which that is a part of what the robot does.
+const STANDS_STILL: f64 = 0.05;
+/// Ratio of errors from which friction alone does not do as well.
+const AS_WELL: f64 = 1.05;
 
 /// Where the twin does not hold and what to mind, in the order of the report.
 pub(super) fn limits(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
@@ -42,7 +52,9 @@ pub(super) fn limits(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Str
 
 /// What held-out torque and the effects themselves say against the twin.
 pub(super) fn of_results(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
-    let mut out = limits_of_torque(calibration, joints);
+    let mut out: Vec<String> = too_few(calibration, joints).into_iter().collect();
+    out.extend(limits_of_torque(calibration, joints));
+    out.extend(hardly_at_rest(calibration, joints));
     out.extend(not_to_rest_on(calibration));
     if calibration.validation.split == Split::LastThirty {
         out.push(
@@ -60,9 +72,8 @@ fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Stri
     let mut say = |joints: &[String], one: &str, many: &str| {
         if !joints.is_empty() {
             out.push(format!(
-                "{} {}: {}.",
-                if joints.len() == 1 { "Joint" } else { "Joints" },
-                list(joints),
+                "{}: {}.",
+                subject(joints),
                 if joints.len() == 1 { one } else { many }
             ));
         }
@@ -94,14 +105,25 @@ fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Stri
     off(too_narrow, "too narrow");
     off(too_wide, "wider than they need to be");
     let mut out_of_shape = shape::sentences(calibration, joints);
-    say(
-        &large(scores, joints),
-        "the error left is more than half of the torque's standard deviation",
-        "the error left is more than half of the torque's standard deviation",
+    let lost = lost(scores, joints);
+    let shares: Vec<String> = lost
+        .iter()
+        .map(|(_, share)| whole_percent(*share))
+        .collect();
+    let names: Vec<String> = lost.into_iter().map(|(name, _)| name).collect();
+    let words = format!(
+        "the error left is {} of the torque's standard deviation: a constant would do as well",
+        list(&shares)
     );
+    say(&names, &words, &words);
+    let mut large = large(scores, joints);
+    large.retain(|name| !names.contains(name));
+    let words = "the error left is more than half of the torque's standard deviation";
+    say(&large, words, words);
     out.append(&mut out_of_shape);
-    out.extend(beyond(calibration, joints));
-    out.extend(mostly_beyond(calibration, joints));
+    out.extend(friction_does_as_well(scores, joints));
+    out.extend(beyond::narrow(calibration, joints));
+    out.extend(beyond::mostly(calibration, joints));
     out.extend(raw_is_worse(calibration, joints));
     out
 }
@@ -166,47 +188,73 @@ pub(super) fn no_bodies(calibration: &Calibration) -> Vec<&str> {
     sure.map(|f| f.subject.as_str()).collect()
 }
 
-/// Joints whose intervals are too narrow where their motion was not seen before, and less so where it was: by more than two standard
-/// errors of as many independent rows.
-fn beyond(calibration: &Calibration, joints: &[Joint<'_>]) -> impl Iterator<Item = String> {
-    let Validation { within, beyond, .. } = &calibration.validation;
-    let narrow = within
-        .joints
-        .iter()
-        .zip(&beyond.joints)
-        .filter(|(within, beyond)| {
-            let better_within = within.rows == 0 || within.coverage95 > beyond.coverage95;
-            better_within && too_narrow(beyond, memory(joints, &beyond.joint))
-        });
-    narrow.map(|(within, beyond)| {
-        let seen = match within.rows {
-            0 => String::new(),
-            _ => format!(", within it {}", percent(within.coverage95)),
-        };
+/// How many rows count, how many are needed, and what to do.
+fn too_few(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
+    let independent = independent_rows(calibration, joints);
+    let tested = calibration.validation.filtered.joints.iter();
+    let tested = tested.map(|joint| joint.rows).sum::<u64>() > 0;
+    (tested && independent < FEW).then(|| {
+        // Not rounded up to what is needed.
+        let shown = (10.0 * independent).floor() / 10.0;
         format!(
-            "Joint {}: beyond the training motion ({} of {} moving rows) its {LEVEL_WORDS} hold {}{seen}.",
-            beyond.joint,
-            beyond.rows,
-            within.rows + beyond.rows,
-            percent(beyond.coverage95)
+            "The held-out rows count as {shown:.1} independent ones over all joints, {FEW} are needed: hold out {} times as much, by another log \
+             with --heldout or by longer logs.",
+            number(FEW / independent, 2)
         )
     })
 }
 
-/// Joints that were mostly tested on motion that training did not have.
-fn mostly_beyond(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
-    let Validation { within, beyond, .. } = &calibration.validation;
-    let pairs = within.joints.iter().zip(&beyond.joints);
-    let told: Vec<String> = pairs
-        .filter(|(within, beyond)| beyond.rows > within.rows)
-        .filter(|(_, beyond)| joints.iter().any(|joint| joint.name == beyond.joint))
-        .map(|(within, beyond)| {
-            let all = within.rows + beyond.rows;
-            format!("{} ({} of {all} moving rows)", beyond.joint, beyond.rows)
+/// What joints do at rest in the logs and hardly in held-out rows.
+fn hardly_at_rest(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
+    let validation = &calibration.validation;
+    let rows = |scores: &Scores| scores.joints.iter().map(|joint| joint.rows).sum::<u64>();
+    let moving = rows(&validation.moving);
+    let at_rest = rows(&validation.filtered).saturating_sub(moving);
+    let shares = (0..joints.len()).map(|j| ambiguity::standstill(calibration, j));
+    let most = joints
+        .iter()
+        .zip(shares)
+        .filter(|(_, share)| *share >= STANDS_STILL);
+    let (joint, share) = most.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    (moving > 0 && at_rest < FEW_AT_REST).then(|| {
+        let (tested, held_out) = match at_rest {
+            0 => ("not", "but no joint in a held-out row".to_owned()),
+            n => (
+                "hardly",
+                format!("but joints in only {n} of the held-out ones"),
+            ),
+        };
+        format!(
+            "Standstill is {tested} tested: {} stands still in {} of the logs' rows, {held_out}.",
+            joint.name,
+            percent(share)
+        )
+    })
+}
+
+/// Joints on which what was found besides friction gains nothing.
+fn friction_does_as_well(scores: &Scores, joints: &[Joint<'_>]) -> Option<String> {
+    let own = scores.joints.iter().filter(|score| score.rows > 0);
+    let named: Vec<String> = own
+        .filter_map(|score| Some((score, score.rmse_friction?)))
+        .filter(|(score, left)| *left <= AS_WELL * score.rmse_calibrated)
+        .map(|(score, left)| {
+            let joint = joints.iter().find(|joint| joint.name == score.joint);
+            format!(
+                "{} ({} instead of {} {})",
+                score.joint,
+                number(left, 3),
+                number(score.rmse_calibrated, 3),
+                joint.map_or("", |joint| joint.units.torque)
+            )
         })
         .collect();
-    (!told.is_empty())
-        .then(|| format!("Tested mostly beyond the training motion: {}.", list(&told)))
+    (!named.is_empty()).then(|| {
+        format!(
+            "Friction and an offset alone do as well on {}.",
+            list(&named)
+        )
+    })
 }
 
 /// Torque as it was logged, where the twin predicts it worse than the model did.
@@ -230,13 +278,31 @@ pub(super) fn worse(scores: &Scores) -> Vec<String> {
 
 /// Joints on which the calibrated torque is off by more than [`LARGE`].
 pub(super) fn large(scores: &Scores, joints: &[Joint<'_>]) -> Vec<String> {
-    let is_large = |joint: &&Joint<'_>| {
+    let large = shares(scores, joints).filter(|(_, share)| *share > LARGE);
+    large.map(|(name, _)| name).collect()
+}
+
+/// Joints on which it is off by as much as the torque varies, and by how much of that.
+pub(super) fn lost(scores: &Scores, joints: &[Joint<'_>]) -> Vec<(String, f64)> {
+    let lost = shares(scores, joints).filter(|(_, share)| *share >= 1.0);
+    lost.collect()
+}
+
+/// Error left of each joint, as a share of its torque's standard deviation.
+fn shares(scores: &Scores, joints: &[Joint<'_>]) -> impl Iterator<Item = (String, f64)> {
+    let share = |joint: &Joint<'_>| {
         let score = scores.joints.iter().find(|s| s.joint == joint.name);
         let deviation = torque_deviation(joint, Rows::Moving);
-        score.is_some_and(|s| deviation > 0.0 && s.rmse_calibrated > LARGE * deviation)
+        let error = score.map(|score| score.rmse_calibrated);
+        let error = error.filter(|_| deviation > 0.0)?;
+        Some((joint.name.to_owned(), error / deviation))
     };
-    let joints = joints.iter().filter(is_large);
-    joints.map(|joint| joint.name.to_owned()).collect()
+    joints.iter().filter_map(share)
+}
+
+/// "138 %".
+fn whole_percent(share: f64) -> String {
+    format!("{:.0}{THIN}%", 100.0 * share)
 }
 
 /// Fewer held-out rows in the 95 % interval than an honest one has, and than chance leaves it; `memory` rows count as one.
@@ -377,36 +443,6 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_narrow_beyond_the_training_motion_is_said_of_it() {
-        let beyond = |c: &mut Calibration, coverage95: f64| {
-            c.validation.beyond = c.validation.within.clone();
-            for (joint, rows) in c.validation.beyond.joints.iter_mut().zip([0, 34]) {
-                (joint.rows, joint.coverage95) = (rows, coverage95);
-            }
-            c.validation.within.joints[1].rows = 46;
-            c.validation.within.joints[1].coverage95 = 0.93;
-        };
-        let said = "Joint elbow: beyond the training motion (34 of 80 moving rows) its 95 % intervals hold 24.0\u{202f}%, within it 93.0\u{202f}%.";
-        let limits = judged(|c| beyond(c, 0.24)).limits;
-        assert!(limits.iter().any(|limit| limit == said), "{limits:?}");
-        assert_eq!(limits.iter().filter(|l| l.contains("beyond")).count(), 1);
-        // Nothing of it where the motion does not explain it.
-        let limits = judged(|c| {
-            beyond(c, 0.24);
-            c.validation.within.joints[1].coverage95 = 0.2;
-        });
-        assert!(!limits.limits.iter().any(|l| l.contains("beyond")));
-        // Nor of a handful of rows.
-        let limits = judged(|c| {
-            beyond(c, 0.8);
-            c.validation.beyond.joints[1].rows = 5;
-        });
-        assert!(!limits.limits.iter().any(|l| l.contains("beyond")));
-        let limits = judged(|c| beyond(c, 0.94)).limits;
-        assert!(!limits.iter().any(|l| l.contains("beyond")), "{limits:?}");
-    }
-
-    #[test]
     fn the_error_of_moving_rows_is_measured_by_their_torque() {
         let mut calibration = crate::report::fixture::two_joints();
         for trace in &mut calibration.validation.traces {
@@ -445,20 +481,44 @@ mod tests {
     }
 
     #[test]
-    fn what_was_mostly_tested_beyond_the_training_motion_is_said() {
-        let of = |beyond: u64| {
+    fn standstill_that_was_hardly_tested_is_said() {
+        let of = |logs: u64, still: u64| {
             let verdict = judged(|c| {
-                c.validation.within = c.validation.filtered.clone();
-                c.validation.beyond = c.validation.filtered.clone();
-                for (joint, rows) in c.validation.beyond.joints.iter_mut().zip([0, beyond]) {
-                    joint.rows = rows;
+                for log in &mut c.logs {
+                    (log.rows, log.standstill) = (vec![1000, 1000 - logs], vec![0, logs]);
                 }
-                c.validation.within.joints[1].rows = 40;
+                c.validation.moving = c.validation.filtered.clone();
+                c.validation.moving.joints[1].rows -= still;
             });
-            let said = "Tested mostly beyond the training motion: elbow (41 of 81 moving rows).";
-            verdict.limits.iter().any(|limit| limit == said)
+            let mut limits = verdict.limits.into_iter();
+            limits.find(|limit| limit.contains("tandstill"))
         };
-        assert!(of(41) && !of(40));
+        let said = |text: Option<String>| text.unwrap_or_default();
+        assert_eq!(
+            said(of(120, 4)),
+            "Standstill is hardly tested: elbow stands still in 12.0\u{202f}% of the logs' rows, but joints in only 4 of the held-out ones."
+        );
+        assert_eq!(
+            said(of(120, 0)),
+            "Standstill is not tested: elbow stands still in 12.0\u{202f}% of the logs' rows, but no joint in a held-out row."
+        );
+        assert_eq!(of(120, 40), None);
+        assert_eq!(of(10, 4), None);
+    }
+
+    #[test]
+    fn joints_on_which_friction_alone_does_as_well_are_named() {
+        let of = |left: f64| {
+            let verdict = judged(|c| {
+                let joint = &mut c.validation.filtered.joints[1];
+                (joint.rmse_calibrated, joint.rmse_friction) = (0.1, Some(left));
+            });
+            let mut limits = verdict.limits.into_iter();
+            limits.find(|limit| limit.starts_with("Friction"))
+        };
+        let said = "Friction and an offset alone do as well on elbow (0.104 instead of 0.100 N·m).";
+        assert_eq!(of(0.104).as_deref(), Some(said));
+        assert_eq!(of(0.106), None);
     }
 
     #[test]

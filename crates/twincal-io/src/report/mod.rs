@@ -5,10 +5,12 @@
 //! SVG builder; a content security policy forbids scripts as a second lock. The same calibration gives the same bytes.
 
 mod ambiguity;
+mod beyond;
 mod effects;
 mod figure;
 mod figures;
 mod findings;
+mod grounds;
 mod honesty;
 #[cfg(test)]
 mod fixture;
@@ -61,6 +63,7 @@ pub struct FileHash {
     pub sha256: String,
 }
 
+pub use grounds::friction_only;
 pub use limits::{decisive, has_standstill};
 
 /// Whether the calibrated torque can be used.

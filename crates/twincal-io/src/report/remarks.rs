@@ -1,5 +1,6 @@
 //! What is to be minded about an effect before its numbers are used: it stands at the effect's own line.
 
+use super::figures::sensitivity;
 use super::text::{list, number};
 use twincal::calibrate::{
     Alike, Calibration, ComponentSummary, ParameterSummary, Repeat, Repeated,
@@ -15,16 +16,26 @@ const FAR: f64 = 12.0;
 
 /// Remarks on a component, the gravest first.
 pub(super) fn remarks(component: &ComponentSummary, calibration: &Calibration) -> Vec<String> {
-    let mut out = Vec::new();
     let first = component.parameters.first().map(ParameterSummary::told);
     let negative = first.and_then(|(value, spread)| component.family.remark(value, spread));
-    out.extend(negative.map(str::to_owned));
+    let mut out: Vec<String> = negative.map(str::to_owned).into_iter().collect();
+    out.extend(doubts(component, calibration));
+    out
+}
+
+/// Of these, what speaks against the effect or its numbers: not what explains a sign.
+pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) -> Vec<String> {
+    let mut out = Vec::new();
     out.extend(size_of_gravity(component, calibration));
     if component.no_rigid_body {
         out.push("no rigid body has this: it stands in for another effect".into());
     }
     out.extend(rivals(component, calibration));
     out.extend(repeats(component, calibration));
+    let mut by_prior = sensitivity::by_prior(calibration);
+    if component.selected && by_prior.any(|other| other.name == component.name) {
+        out.push("other priors would leave it out".into());
+    }
     if component.parameters.iter().any(is_split) {
         out.push("some models put it far off: see the 95 % interval".into());
     }

@@ -1,8 +1,8 @@
 //! Have the predicted distributions the right shape: what the PIT of held-out rows says, joint by joint, in words.
 
 use super::limits::{decisive, too_narrow, too_wide};
-use super::text::{list, number, percent};
-use super::view::{Joint, memory};
+use super::text::{number, percent, subject};
+use super::view::{Joint, bias, memory};
 use twincal::calibrate::Calibration;
 use twincal::validate::{JointScore, Pit, Reliability, Scores};
 
@@ -168,19 +168,14 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
             continue;
         };
         let names: Vec<&str> = own.iter().map(|j| j.joint.as_str()).collect();
-        out.push(match names[..] {
-            [one] => format!(
-                "Joint {one}: its {} ({}).",
-                shape.words(slightly),
-                shape.shown(&worst.pit, &worst.coverage_levels)
-            ),
-            _ => format!(
-                "Joints {}: their {} (on {} {}).",
-                list(&names),
-                shape.words(slightly),
-                worst.joint,
-                shape.shown(&worst.pit, &worst.coverage_levels)
-            ),
+        let mut shown = shape.shown(&worst.pit, &worst.coverage_levels);
+        if matches!(shape, Shape::Above | Shape::Below) {
+            shown.push_str(&by_how_much(all, &worst.joint));
+        }
+        let (names, words) = (subject(&names), shape.words(slightly));
+        out.push(match own[..] {
+            [_] => format!("{names}: its {words} ({shown})."),
+            _ => format!("{names}: their {words} (on {} {shown}).", worst.joint),
         });
     }
     let pooled = Shape::of(&validation.pit, 1);
@@ -194,9 +189,37 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
     out
 }
 
+/// ", by 44.1 N·m on average".
+fn by_how_much(joints: &[Joint<'_>], name: &str) -> String {
+    let own = joints.iter().find(|joint| joint.name == name);
+    let told = own.map(|joint| (bias(joint).abs(), joint.units.torque));
+    match told.filter(|(bias, _)| bias.is_finite()) {
+        Some((bias, unit)) => format!(", by {} {unit} on average", number(bias, 3)),
+        None => String::new(),
+    }
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+
+    #[test]
+    fn torque_off_to_one_side_is_told_in_its_unit() {
+        let mut calibration = crate::report::fixture::two_joints();
+        for trace in &mut calibration.validation.traces {
+            let rows = trace.measured.len();
+            trace.standstill = (0..rows).map(|row| row % 2 == 1).collect();
+            // 44 below while it moves, 1000 above at rest.
+            for (row, measured) in trace.measured.iter_mut().enumerate() {
+                *measured = trace.calibrated[row] + if row % 2 == 1 { 1000.0 } else { -44.0 };
+            }
+        }
+        calibration.validation.reliability[1].pit = pit(0.5, -4.0);
+        let joints = crate::report::view::joints(&calibration);
+        let said = "Joint elbow: its torque lies below the prediction too often (70.0\u{202f}% of the rows, by 44.0 N·m on average).";
+        let all = sentences(&calibration, &joints);
+        assert!(all.iter().any(|s| s == said), "{all:?}");
+    }
 
     /// PIT with this many of 20 bins' share inside the middle ten, and a slope.
     pub(in crate::report) fn pit(middle: f64, slope: f64) -> Pit {

@@ -1,6 +1,7 @@
 //! The report's tables besides the effects: scores, noise, motion, logs, findings, convergence, pipeline.
 
 use super::ReportContext;
+use super::grounds::friction_only;
 use super::limits::{Rows, converged, torque_deviation};
 use super::text::{count, list, number, percent, probability};
 use super::view::Joint;
@@ -21,6 +22,15 @@ impl Table {
         Self {
             heads: heads.map(String::from).to_vec(),
             rows: Vec::new(),
+        }
+    }
+
+    fn drop_column(&mut self, head: &str) {
+        if let Some(at) = self.heads.iter().position(|other| other == head) {
+            self.heads.remove(at);
+            for row in self.rows.iter_mut().filter(|row| row.len() > at) {
+                row.remove(at);
+            }
         }
     }
 }
@@ -58,6 +68,7 @@ pub(super) fn scores(scores: &Scores, joints: &[Joint<'_>], rows: Rows) -> Table
         "joint",
         "rows",
         "RMSE nominal",
+        FRICTION,
         "RMSE calibrated",
         "change",
         "of torque's sd",
@@ -76,6 +87,7 @@ pub(super) fn scores(scores: &Scores, joints: &[Joint<'_>], rows: Rows) -> Table
             score.joint.clone(),
             count(score.rows),
             with_unit(score.rmse_nominal, unit),
+            with_unit(score.rmse_friction.unwrap_or(f64::NAN), unit),
             with_unit(score.rmse_calibrated, unit),
             change(score.rmse_nominal, score.rmse_calibrated),
             percent(share),
@@ -91,6 +103,7 @@ pub(super) fn scores(scores: &Scores, joints: &[Joint<'_>], rows: Rows) -> Table
             "all joints".into(),
             count(scores.joints.iter().map(|j| j.rows).sum()),
             with_unit(scores.rmse_nominal, unit),
+            with_unit(friction_only(scores).unwrap_or(f64::NAN), unit),
             with_unit(scores.rmse_calibrated, unit),
             change(scores.rmse_nominal, scores.rmse_calibrated),
             String::new(),
@@ -100,8 +113,18 @@ pub(super) fn scores(scores: &Scores, joints: &[Joint<'_>], rows: Rows) -> Table
             percent(scores.epistemic_share),
         ]);
     }
+    if scores
+        .joints
+        .iter()
+        .all(|joint| joint.rmse_friction.is_none())
+    {
+        table.drop_column(FRICTION);
+    }
     table
 }
+
+/// Head of the errors that friction alone would leave.
+const FRICTION: &str = "friction only";
 
 /// Noise per joint as it was used.
 pub(super) fn noise(joints: &[Joint<'_>]) -> Table {

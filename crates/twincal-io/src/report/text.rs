@@ -180,13 +180,30 @@ pub(super) fn interval(ends: [f64; 2]) -> String {
     format!("{low} … {high}")
 }
 
-/// A probability with two decimals that never rounds to certainty: 0.999 is "> 0.99".
+/// `x` and both ends of an interval around it, with the digits that its width supports: "294 (284 … 378)".
+pub(super) fn with_ends(x: f64, ends: [f64; 2]) -> String {
+    let spread = 0.5 * (ends[1] - ends[0]);
+    let [x, low, high] = [x, ends[0], ends[1]].map(|x| with_sd(x, spread).0);
+    format!("{x} ({low} … {high})")
+}
+
+/// Joints as the subject of a sentence; "joint" is not said twice where they are called so.
+pub(super) fn subject<S: AsRef<str>>(joints: &[S]) -> String {
+    let is_said = |name: &S| name.as_ref().to_lowercase().starts_with("joint");
+    let word = match joints {
+        all if all.iter().all(is_said) => "",
+        [_] => "Joint ",
+        _ => "Joints ",
+    };
+    format!("{word}{}", list(joints))
+}
+
+/// A probability with two decimals that never rounds to certainty: 0.999 and 1 are "> 0.99".
 pub(super) fn probability(p: f64) -> String {
     match p {
         _ if !p.is_finite() => "–".into(),
-        1.0 => "1.00".into(),
         _ if p > 0.995 => format!(">{THIN}0.99"),
-        _ if p > 0.0 && p < 0.005 => format!("<{THIN}0.01"),
+        _ if p < 0.005 => format!("<{THIN}0.01"),
         _ => format!("{p:.2}"),
     }
 }
@@ -323,8 +340,14 @@ mod tests {
             ("0.00".into(), "−0.13".into())
         );
         assert_eq!(probability(0.999_9), ">\u{202f}0.99");
-        assert_eq!(probability(1.0), "1.00");
+        assert_eq!(probability(1.0), ">\u{202f}0.99");
         assert_eq!(probability(1e-6), "<\u{202f}0.01");
+        assert_eq!(probability(0.0), "<\u{202f}0.01");
+        assert_eq!(with_ends(293.9, [284.5, 378.1]), "294 (284 … 378)");
+        assert_eq!(subject(&["joint_4"]), "joint_4");
+        assert_eq!(subject(&["Joint1", "joint2"]), "Joint1 and joint2");
+        assert_eq!(subject(&["elbow"]), "Joint elbow");
+        assert_eq!(subject(&["joint1", "elbow"]), "Joints joint1 and elbow");
         assert_eq!(percent(0.946_4), "94.6\u{202f}%");
         assert_eq!(count(1_048_576), "1\u{202f}048\u{202f}576");
         assert_eq!(list(&["a", "b", "c"]), "a, b and c");

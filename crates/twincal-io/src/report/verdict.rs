@@ -1,25 +1,20 @@
 //! Can this twin be used, and where not: the first thing the report says, by held-out data and by what was found that is not to be rested on.
 
+use super::grounds::{self, rows_of};
 use super::limits::{
-    COVERAGE, converged, decisive, has_standstill, large, limits, no_bodies, not_to_rest_on,
-    too_narrow, worse,
+    COVERAGE, FEW, converged, decisive, large, limits, lost, no_bodies, not_to_rest_on, too_narrow,
+    worse,
 };
 use super::shape;
-use super::text::{number, percent, with_sd};
-use super::view::{Joint, independent_rows, memory, pooled_unit};
+use super::text::with_sd;
+use super::view::{Joint, independent_rows, memory};
 use serde::Serialize;
 use twincal::calibrate::{Calibration, Verdict as Decision};
-use twincal::validate::{JointScore, Scores, Split, WORSE};
+use twincal::validate::WORSE;
 use twincal::{Finding, Severity};
 
 /// Ratio of errors from which calibration counts as an improvement.
 const BETTER: f64 = 0.95;
-/// Held-out rows, in independent ones, below which nothing is promised.
-const FEW: f64 = 20.0;
-/// Change of an error by the rows at standstill from which these are told apart.
-const WORTH_TELLING: f64 = 0.05;
-/// The same of the share of rows that intervals hold.
-const SHARE_WORTH_TELLING: f64 = 0.01;
 /// How the answer is coloured; the words carry the meaning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -52,7 +47,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         return Verdict {
             grade: Grade::Bad,
             headline: "Not yet: there are no held-out rows to judge this twin by.".into(),
-            grounds: vec![effects_found(calibration)],
+            grounds: vec![grounds::effects_found(calibration)],
             limits: vec![
                 "Record another motion and give it with --heldout, or fit at least three logs."
                     .into(),
@@ -67,7 +62,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     let mut each = scores.joints.iter();
     let too_narrow = each.any(|j| too_narrow(j, memory(joints, &j.joint)));
     let firm = not_to_rest_on(calibration).is_empty();
-    let large = large(scores, joints);
+    let (large, lost) = (large(scores, joints).len(), lost(scores, joints).len());
     let limits = limits(calibration, joints);
     let serious = calibration
         .findings
@@ -94,6 +89,16 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
             Grade::Bad,
             "No: on held-out data the calibrated torque is worse than the nominal one.",
         )
+    } else if lost > 0 && lost == joints.len() {
+        (
+            Grade::Bad,
+            "No: the error left is larger than the torque itself.",
+        )
+    } else if 2 * lost > joints.len() {
+        (
+            Grade::Bad,
+            "No: on most joints the error left is larger than the torque itself.",
+        )
     } else if found == 0 && ratio > BETTER {
         (
             Grade::Care,
@@ -109,7 +114,12 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
             Grade::Care,
             "Perhaps: low-passed torque is better with it, but none of its effects is sure.",
         )
-    } else if 2 * large.len() > joints.len() {
+    } else if large > 0 && large == joints.len() {
+        (
+            Grade::Care,
+            "Better than the model alone, but the error that is left is large.",
+        )
+    } else if 2 * large > joints.len() {
         (
             Grade::Care,
             "Better than the model alone, but on most joints the error that is left is large.",
@@ -147,112 +157,15 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     Verdict {
         grade,
         headline: headline.into(),
-        grounds: grounds(calibration, joints),
+        grounds: grounds::grounds(calibration, joints),
         limits,
     }
-}
-
-fn rows_of(scores: &Scores) -> u64 {
-    scores.joints.iter().map(|j| j.rows).sum()
 }
 
 /// Whether a log has no torque that changes.
 fn no_measurement(calibration: &Calibration) -> bool {
     let mut findings = calibration.findings.iter();
     findings.any(|f| f.code == "constant_torque" && f.severity == Severity::Degraded)
-}
-
-fn grounds(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
-    vec![
-        torque_error(calibration, joints),
-        held(calibration),
-        effects_found(calibration),
-    ]
-}
-
-/// How much the 95 % intervals hold: of moving joints, and of all rows where some stand still.
-fn held(calibration: &Calibration) -> String {
-    let all = &calibration.validation.filtered;
-    let judged = decisive(&calibration.validation);
-    let (rows, share) = (
-        super::text::count(rows_of(judged)),
-        percent(judged.coverage95),
-    );
-    if !has_standstill(&calibration.validation) {
-        return format!("The 95 % intervals contain {share} of the {rows} held-out values.");
-    }
-    let differ = (judged.coverage95 - all.coverage95).abs() > SHARE_WORTH_TELLING;
-    let all = match differ {
-        true => {
-            let rows = super::text::count(rows_of(all));
-            format!(", {} of all {rows}", percent(all.coverage95))
-        }
-        false => String::new(),
-    };
-    format!(
-        "The 95 % intervals contain {share} of the {rows} held-out values of moving joints{all}."
-    )
-}
-
-/// RMSE before and after: of joints that move, and apart from them of those that stand still where that is another matter, for there friction
-/// is whatever it takes.
-fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
-    let told = |[before, after]: [f64; 2]| {
-        let way = match after / before - 1.0 {
-            c if c.abs() < 5e-4 => "unchanged".into(),
-            c if c < 0.0 => format!("{} less", percent(-c)),
-            c => format!("{} more", percent(c)),
-        };
-        let [before, after] = [before, after].map(|x| number(x, 3));
-        format!("{before} → {after} {}, {way}", pooled_unit(joints))
-    };
-    let validation = &calibration.validation;
-    let (all, moving) = (&validation.filtered, decisive(validation));
-    let split = match validation.split {
-        Split::HeldoutLogs => "held-out logs",
-        Split::LeaveOneLogOut => "logs left out one at a time",
-        Split::LastThirty => "the last 30 % of each log",
-    };
-    let judged = told([moving.rmse_nominal, moving.rmse_calibrated]);
-    if !has_standstill(validation) {
-        return format!("Torque error (RMSE) on {split}: {judged}.");
-    }
-    let differ = (all.rmse_calibrated / moving.rmse_calibrated - 1.0).abs() > WORTH_TELLING;
-    let at_rest = match differ {
-        true => format!("; at standstill {}", told(still(all, moving))),
-        false => String::new(),
-    };
-    format!("Torque error (RMSE) on {split}, joints that move: {judged}{at_rest}.")
-}
-
-/// RMSE before and after on the rows that are not among the moving ones.
-fn still(all: &Scores, moving: &Scores) -> [f64; 2] {
-    let squares = |scores: &Scores, of: fn(&JointScore) -> f64| -> f64 {
-        let some = scores.joints.iter().filter(|joint| joint.rows > 0);
-        some.map(|joint| joint.rows as f64 * of(joint).powi(2))
-            .sum()
-    };
-    let rows = (rows_of(all) - rows_of(moving)) as f64;
-    let each: [fn(&JointScore) -> f64; 2] = [|j| j.rmse_nominal, |j| j.rmse_calibrated];
-    each.map(|of| ((squares(all, of) - squares(moving, of)).max(0.0) / rows).sqrt())
-}
-
-/// What is more likely than not, without and with what the data leave open.
-fn effects_found(calibration: &Calibration) -> String {
-    let likely = || calibration.components.iter().filter(|c| c.selected);
-    let all = likely().count();
-    let open = likely().filter(|c| c.verdict == Some(Decision::Undecided));
-    let open = open.count();
-    let more = match open {
-        0 => String::new(),
-        n => format!(", {n} more likely than not, but undecided"),
-    };
-    match all - open {
-        0 if open == 0 => "No missing effect is more likely than not.".into(),
-        0 => format!("No missing effect is sure{more}."),
-        1 => format!("One missing effect found{more}."),
-        n => format!("{n} missing effects found{more}."),
-    }
 }
 
 /// "mean ± sd" with matching digits.
@@ -265,6 +178,7 @@ pub(super) fn plus_minus(mean: f64, sd: f64) -> String {
 pub(super) mod tests {
     use super::*;
     use crate::report::fixture;
+    use crate::report::limits::{Rows, torque_deviation};
     use crate::report::shape::tests::pit;
     use crate::report::view;
     use twincal::posterior::Method;
@@ -364,36 +278,6 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn rows_at_standstill_are_told_apart_from_what_moving_joints_gain() {
-        let of = |moves: bool| {
-            let verdict = judged(move |c| {
-                c.validation.moving = c.validation.filtered.clone();
-                for joint in &mut c.validation.moving.joints {
-                    (joint.rows, joint.rmse_nominal, joint.rmse_calibrated) = (50, 2.0, 0.5);
-                }
-                // As many rows again, of which the mean square is 1 before and 9 after.
-                for joint in &mut c.validation.filtered.joints {
-                    joint.rows = 100;
-                    joint.rmse_nominal = (0.5f64 * (4.0 + 1.0)).sqrt();
-                    joint.rmse_calibrated = (0.5f64 * (0.25 + 9.0)).sqrt();
-                }
-                let all = &mut c.validation.filtered;
-                (all.rmse_nominal, all.rmse_calibrated) = (1.6, 2.2);
-                let moving = &mut c.validation.moving;
-                (moving.rmse_nominal, moving.rmse_calibrated) = (2.0, 0.5);
-                if !moves {
-                    moving.joints.iter_mut().for_each(|joint| joint.rows = 0);
-                }
-            });
-            verdict.grounds[0].clone()
-        };
-        let both = of(true);
-        let said = "joints that move: 2.00 → 0.500 N·m, 75.0\u{202f}% less; at standstill 1.00 → 3.00 N·m, 200.0\u{202f}% more.";
-        assert!(both.ends_with(said), "{both}");
-        assert!(!of(false).contains("standstill"));
-    }
-
-    #[test]
     fn bodies_that_are_none_on_two_links_ask_for_the_right_model() {
         let of = |links: &[&str]| {
             judged(|c| {
@@ -465,29 +349,75 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn what_is_undecided_is_counted_apart() {
-        let of = |undecided: usize| {
-            let verdict = judged(move |c| {
-                let found = c.components.iter_mut().filter(|c| c.selected);
-                for (i, component) in found.enumerate() {
-                    component.verdict = (i < undecided).then_some(Decision::Undecided);
-                }
-            });
-            verdict.grounds.last().cloned().unwrap_or_default()
-        };
-        let headline = judged(|c| {
+    fn effects_that_are_all_undecided_are_no_more_than_perhaps() {
+        let verdict = judged(|c| {
             let found = c.components.iter_mut().filter(|c| c.selected);
             found.for_each(|c| c.verdict = Some(Decision::Undecided));
         });
-        assert!(headline.headline.starts_with("Perhaps"), "{headline:?}");
-        assert_eq!(of(0), "7 missing effects found.");
+        assert!(verdict.headline.starts_with("Perhaps"), "{verdict:?}");
+        let said = "No missing effect is sure; 7 more likely than not, but undecided.";
+        assert_eq!(verdict.grounds.last().map(String::as_str), Some(said));
+    }
+
+    #[test]
+    fn an_error_as_large_as_the_torque_is_a_no() {
+        // The elbow is the fixture's second joint.
+        let of = |shoulder: bool, factor: f64| {
+            judged(move |c| {
+                let deviation = |index: usize| {
+                    let joints = view::joints(c);
+                    torque_deviation(&joints[index], Rows::Moving)
+                };
+                let deviations = [deviation(0), deviation(1)];
+                let joints = c.validation.filtered.joints.iter_mut();
+                for (joint, deviation) in joints.zip(deviations).skip(usize::from(!shoulder)) {
+                    joint.rmse_calibrated = factor * deviation;
+                    joint.rmse_nominal = 10.0 * deviation;
+                }
+            })
+        };
+        let all = of(true, 1.38);
         assert_eq!(
-            of(6),
-            "One missing effect found, 6 more likely than not, but undecided."
+            all.headline,
+            "No: the error left is larger than the torque itself."
+        );
+        assert_eq!(all.grade, Grade::Bad);
+        let said = "Joints shoulder and elbow: the error left is 138\u{202f}% and 138\u{202f}% of the torque's standard deviation: a constant would do as well.";
+        assert!(all.limits.iter().any(|l| l == said), "{all:?}");
+        let large = "Better than the model alone, but the error that is left is large.";
+        assert_eq!(of(true, 0.98).headline, large);
+        let one = of(false, 1.38);
+        assert_ne!(one.grade, Grade::Bad);
+        assert!(
+            one.limits
+                .iter()
+                .any(|l| l.starts_with("Joint elbow: the error left is 138"))
+        );
+        let single = judged(|c| {
+            let deviation = torque_deviation(&view::joints(c)[0], Rows::Moving);
+            let joints = &mut c.validation.filtered.joints;
+            (joints[0].rmse_calibrated, joints[0].rmse_nominal) =
+                (0.7 * deviation, 10.0 * deviation);
+            c.noise.truncate(1);
+        });
+        assert_eq!(single.headline, large);
+    }
+
+    #[test]
+    fn too_few_rows_are_counted_with_the_remedy() {
+        let few = judged(|c| {
+            // Memory 2.4 rows on either joint.
+            let joints = c.validation.filtered.joints.iter_mut();
+            joints.for_each(|j| j.rows = 12);
+        });
+        assert_eq!(
+            few.headline,
+            "Hard to say: the held-out rows count as too few independent ones to judge this twin by."
         );
         assert_eq!(
-            of(7),
-            "No missing effect is sure, 7 more likely than not, but undecided."
+            few.limits[0],
+            "The held-out rows count as 10.0 independent ones over all joints, 20 are needed: hold out 2.0 times as much, by another log with \
+             --heldout or by longer logs."
         );
     }
 

@@ -106,11 +106,15 @@ fn summary(
         .map(|p| Estimate {
             name: p.name.clone(),
             unit: p.unit.clone(),
-            value: p.told().0,
+            // What these data do not see has no value here as in the tables.
+            value: if p.seen { p.told().0 } else { f64::NAN },
             spread: p.told().1,
+            ends: p.ends(),
         })
         .collect();
-    summary.words = if summary.verdict == Some(Verdict::NotSeen) {
+    let held = || summary.parameters.iter().any(|p| p.median.is_finite());
+    let unseen = estimates.iter().all(|p| p.value.is_nan()) && held();
+    summary.words = if summary.verdict == Some(Verdict::NotSeen) || unseen {
         format!("{}: {NOT_SEEN}", component.story)
     } else {
         library.component_words(index, &estimates)

@@ -2,10 +2,11 @@
 
 use super::data::{Data, Log, Trajectories};
 use super::independent_rows::LEAST_EFFECTIVE_ROWS;
-use super::{CalibrationSettings, Fitted, Stage, compact, estimate, noise_of};
+use super::{CalibrationSettings, Fitted, Stage, compact, estimate, friction_only, noise_of};
 use crate::error::{Finding, Result, Severity};
 use crate::likelihood::{Columns, JointNoise};
 use crate::observations::{Observations, Part};
+use crate::plug_in::Fit;
 use crate::posterior::Posterior;
 use crate::signal::{Pipeline, Trajectory};
 use crate::term::Library;
@@ -39,11 +40,20 @@ struct LeftOut<'a> {
     from: f64,
 }
 
-/// The twin that was fitted to all logs, and the posterior of its compact form.
+/// The twin that was fitted to all logs, the posterior of its compact form, and the fit that they come from.
 #[derive(Clone, Copy)]
 pub(super) struct Own<'a> {
     pub(super) twin: &'a Twin,
     pub(super) compact: &'a Posterior,
+    pub(super) fit: &'a Fit,
+}
+
+/// Who predicts the rows of a fold.
+struct Rivals {
+    average: Twin,
+    compact: Posterior,
+    /// Friction and offsets alone, where they are candidates.
+    friction: Option<Posterior>,
 }
 
 impl Plan<'_> {
@@ -80,23 +90,36 @@ pub(super) fn validate(
     let mut fits = fits.into_iter();
     for (done, fold) in plan.folds.iter().enumerate() {
         progress(Stage::Validation(done, plan.folds.len()));
-        let (average, compact) = match fits.next() {
-            None => (twin.clone(), own.compact.clone()),
-            Some(fitted) => refitted(twin, &fold.training, fitted)?,
+        let Rivals {
+            average,
+            compact,
+            friction,
+        } = match fits.next() {
+            None => Rivals {
+                average: twin.clone(),
+                compact: own.compact.clone(),
+                friction: friction_only::fitted(library, own.fit),
+            },
+            Some(fitted) => refitted(twin, library, &fold.training, fitted)?,
         };
         if !fold.training.is_empty() && !says_something(&average.noise) {
             findings.push(not_scored(&fold.held_out, &average.noise));
             continue;
         }
         let predictor = average.predictor(library)?;
-        let compact = Twin {
-            posterior: compact,
-            ..average
-        }
-        .predictor(library)?;
+        let rival = |posterior| {
+            let twin = Twin {
+                posterior,
+                ..average.clone()
+            };
+            twin.predictor(library)
+        };
+        let compact = rival(compact)?;
+        let friction = friction.map(rival).transpose()?;
         let predictors = Predictors {
             twin: &predictor,
             compact: Some(&compact),
+            friction: friction.as_ref(),
         };
         for left_out in &fold.held_out {
             let LeftOut { rows, motion, from } = *left_out;
@@ -139,20 +162,30 @@ fn not_scored(held_out: &[LeftOut<'_>], noise: &[JointNoise]) -> Finding {
     )
 }
 
-/// `twin` with the posterior and noise of a fit to `training`, and the posterior of its compact form.
-fn refitted(twin: &Twin, training: &[Part<'_>], fitted: Fitted) -> Result<(Twin, Posterior)> {
+/// `twin` with the posterior and noise of a fit to `training`, and its rivals.
+fn refitted(
+    twin: &Twin,
+    library: &Library,
+    training: &[Part<'_>],
+    fitted: Fitted,
+) -> Result<Rivals> {
     let out_of_band: Vec<f64> = twin.noise.iter().map(|noise| noise.out_of_band).collect();
     let spreads: Vec<_> = twin.noise.iter().map(|n| n.spread.clone()).collect();
     let noise = noise_of(&twin.robot, &fitted, training, &out_of_band, &spreads);
     let Fitted { fit, .. } = fitted;
     let inside = compact::members(&fit.problem, &fit.posterior);
     let compact = compact::refit(&fit.problem, &inside, &fit.posterior)?;
+    let friction = friction_only::fitted(library, &fit);
     let average = Twin {
         posterior: fit.posterior,
         noise,
         ..twin.clone()
     };
-    Ok((average, compact))
+    Ok(Rivals {
+        average,
+        compact,
+        friction,
+    })
 }
 
 /// Which rows train and which are held out.

@@ -6,6 +6,7 @@ mod components;
 mod curves;
 mod data;
 mod drift;
+mod friction_only;
 mod groups;
 mod heavy_tails;
 mod held_out;
@@ -336,6 +337,7 @@ fn road(
     let own = held_out::Own {
         twin: &skeleton,
         compact: &compact,
+        fit: &fitted.fit,
     };
     let (validation, more) = held_out::validate(own, &library, plan, fits_of_folds, progress)?;
     findings.extend(more);

@@ -119,7 +119,28 @@ impl ParameterSummary {
         }
         (self.median, 0.5 * (high - low))
     }
+
+    /// Both ends of the central 68.3 % interval, where ± does not describe it: it is lopsided, ± reaches beyond the 95 % interval, or that
+    /// is far longer on one side. They are told instead of ±.
+    #[must_use]
+    pub fn ends(&self) -> Option<[f64; 2]> {
+        let (value, spread) = self.told();
+        let arms = |ends: [f64; 2]| {
+            let (low, high) = (value - ends[0], ends[1] - value);
+            (low.min(high).max(0.0), low.max(high))
+        };
+        let (near, far) = arms(self.interval68);
+        let (near95, far95) = arms(self.interval95);
+        let lopsided = far > LOPSIDED * near || far95 > LOPSIDED_95 * near95 || near95 < spread;
+        let known = near.is_finite() && far95.is_finite() && spread > 0.0;
+        (known && lopsided).then_some(self.interval68)
+    }
 }
+
+/// Ratio of the two sides of a central 68.3 % interval from which ± says too little.
+const LOPSIDED: f64 = 3.0;
+/// The same of a 95 % interval, whose ends are less sure.
+const LOPSIDED_95: f64 = 4.0;
 
 fn nan() -> f64 {
     f64::NAN
@@ -409,5 +430,36 @@ impl Calibration {
         self.twin
             .pipeline
             .common_rate(kept.filter(|rate| *rate > 0.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ParameterSummary;
+
+    #[test]
+    fn plus_minus_is_not_told_of_what_is_lopsided() {
+        let of = |median: f64, interval68: [f64; 2], interval95: [f64; 2]| {
+            let parameter = ParameterSummary {
+                name: "value".into(),
+                unit: "N·m".into(),
+                mean: median,
+                sd: 1.0,
+                interval95,
+                median,
+                interval68,
+                seen: true,
+            };
+            parameter.ends()
+        };
+        assert_eq!(of(5.0, [4.0, 6.0], [3.0, 7.0]), None);
+        // ± 47 would reach below the 95 % interval.
+        let skewed = [284.0, 378.0];
+        assert_eq!(of(294.0, skewed, [276.0, 424.0]), Some(skewed));
+        // A few models far off on one side.
+        let far = [-0.98, -0.44];
+        assert_eq!(of(-0.75, far, [-1.3, 6.6]), Some(far));
+        assert_eq!(of(f64::NAN, [f64::NAN; 2], [f64::NAN; 2]), None);
+        assert_eq!(of(0.0, [0.0; 2], [0.0; 2]), None);
     }
 }

@@ -411,6 +411,7 @@ fn words(story: &str, family: Family, parameters: &[ParameterChange]) -> String 
                 unit: unit.to_owned(),
                 value: factor * p.median,
                 spread: factor * p.spread(),
+                ends: None,
             };
             format!("{name}{difference}")
         })

@@ -16,13 +16,25 @@ pub struct Estimate {
     pub value: f64,
     /// Half the width of the central 68.3 % interval.
     pub spread: f64,
+    /// Its two ends, where ± does not describe it.
+    pub ends: Option<[f64; 2]>,
+}
+
+impl Estimate {
+    /// The number alone, times `factor`.
+    fn number(&self, factor: f64) -> String {
+        match self.ends {
+            None => estimate(factor * self.value, factor * self.spread),
+            Some(ends) => words::with_ends(factor * self.value, ends.map(|end| factor * end)),
+        }
+    }
 }
 
 impl std::fmt::Display for Estimate {
     /// "+1.740 ± 0.004 kg".
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let unit = if self.unit == "1" { "" } else { &self.unit };
-        write!(f, "{} {unit}", estimate(self.value, self.spread))
+        write!(f, "{} {unit}", self.number(1.0))
     }
 }
 
@@ -38,7 +50,7 @@ pub(super) fn sentence(component: &Component, parameters: &[Estimate]) -> String
         Family::Payload => payload(parameters),
         Family::Gain | Family::LoadFriction | Family::MassScale => parameters
             .first()
-            .map(|p| format!("{} %", words::estimate(100.0 * p.value, 100.0 * p.spread)))
+            .map(|p| format!("{} %", p.number(100.0)))
             .unwrap_or_default(),
         Family::EncoderZero => parameters.first().map(angle).unwrap_or_default(),
         Family::Tilt => tilt(parameters),
@@ -53,7 +65,7 @@ pub(super) fn sentence(component: &Component, parameters: &[Estimate]) -> String
 }
 
 fn one(p: &Estimate) -> String {
-    format!("{} {}", estimate(p.value, p.spread), p.unit)
+    format!("{} {}", p.number(1.0), p.unit)
 }
 
 /// Indices of the parameters that are worth telling, in their order: of a payload its mass, and where that is clear its centre; of a tilt all; of any
@@ -107,11 +119,17 @@ fn several(parameters: &[Estimate]) -> String {
     told.join(", ")
 }
 
+/// Torque of a payload may be known where its mass is not: on a joint that turns about its centre, or beside what weighs the same.
+const MASS_NOT_SEEN: &str = "mass not seen by these data";
+
 fn payload(parameters: &[Estimate]) -> String {
     let Some((mass, rest)) = parameters.split_first() else {
         return String::new();
     };
     let com = &rest[..(CENTRE_ENDS - 1).min(rest.len())];
+    if mass.value.is_nan() {
+        return MASS_NOT_SEEN.into();
+    }
     let mass_text = one(mass);
     // Without a clear mass there is no centre of it.
     if told(Family::Payload, parameters).len() < 2 {
@@ -133,7 +151,7 @@ fn payload(parameters: &[Estimate]) -> String {
 
 fn angle(p: &Estimate) -> String {
     if p.unit == "m" {
-        return format!("{} mm", estimate(1e3 * p.value, 1e3 * p.spread));
+        return format!("{} mm", p.number(1e3));
     }
     format!(
         "{}°",
@@ -145,7 +163,7 @@ fn tilt(parameters: &[Estimate]) -> String {
     let values: Vec<String> = parameters
         .iter()
         .filter(|p| p.value.is_finite()) // the others no joint shows
-        .map(|p| format!("{} {}", p.name, estimate(p.value, p.spread)))
+        .map(|p| format!("{} {}", p.name, p.number(1.0)))
         .collect();
     format!("{} m/s²", values.join(", "))
 }
@@ -170,6 +188,7 @@ mod tests {
             unit: unit.into(),
             value,
             spread,
+            ends: None,
         };
         values.iter().map(one).collect()
     }
@@ -205,6 +224,20 @@ mod tests {
         assert_eq!(
             sentence(&component(Family::Tilt, "gravity"), &tilt),
             "gravity: x +0.200 ± 0.010 m/s²"
+        );
+        let no_mass = estimates(&[
+            ("mass", "kg", f64::NAN, f64::NAN),
+            ("com_x", "m", 0.002, 0.002),
+        ]);
+        assert_eq!(
+            sentence(&payload, &no_mass),
+            "payload at tool0: mass not seen by these data"
+        );
+        let mut skewed = estimates(&[("value", "N·m", 293.9, 46.8)]);
+        skewed[0].ends = Some([284.5, 378.1]);
+        assert_eq!(
+            sentence(&component(Family::Coulomb, "friction on a"), &skewed),
+            "friction on a: +294 (284 … 378) N·m"
         );
         let nothing = estimates(&[("value", "N·m", f64::NAN, f64::NAN)]);
         assert_eq!(

@@ -20,18 +20,53 @@ pub(crate) fn estimate(value: f64, spread: f64) -> String {
     plain(value, spread)
 }
 
-fn plain(value: f64, spread: f64) -> String {
-    let decimals = if spread > 0.0 {
+/// "+294 (284 … 378)": the value and both ends of its central 68.3 % interval, where ± does not describe it.
+pub(super) fn with_ends(value: f64, [low, high]: [f64; 2]) -> String {
+    let spread = 0.5 * (high - low);
+    let size = value.abs().max(spread);
+    let usual = size == 0.0 || (1e-3..1e6).contains(&size);
+    let power = if usual {
+        0
+    } else {
+        size.log10().floor() as i32
+    };
+    let unit = 10.0_f64.powi(power);
+    let decimals = decimals(spread / unit);
+    let [value, low, high] = [value, low, high].map(|x| x / unit);
+    let text = format!("{value:+.decimals$} ({low:.decimals$} … {high:.decimals$})");
+    match usual {
+        true => text,
+        false => format!("({text})·10^{power}"),
+    }
+}
+
+/// Decimals that show two digits of a spread.
+fn decimals(spread: f64) -> usize {
+    if spread > 0.0 {
         (1.0 - spread.log10().floor()).clamp(0.0, 6.0) as usize
     } else {
         4
-    };
+    }
+}
+
+fn plain(value: f64, spread: f64) -> String {
+    let decimals = decimals(spread);
     format!("{value:+.decimals$} ± {spread:.decimals$}")
 }
 
 #[cfg(test)]
 mod tests {
-    use super::estimate;
+    use super::{estimate, with_ends};
+
+    #[test]
+    fn both_ends_have_the_digits_of_their_half_distance() {
+        assert_eq!(with_ends(293.9, [284.5, 378.1]), "+294 (284 … 378)");
+        assert_eq!(
+            with_ends(-0.7466, [-0.9815, -0.4411]),
+            "-0.75 (-0.98 … -0.44)"
+        );
+        assert_eq!(with_ends(2e-5, [1e-5, 9e-5]), "(+2.0 (1.0 … 9.0))·10^-5");
+    }
 
     #[test]
     fn two_digits_of_the_spread_and_the_value_to_the_same_place() {

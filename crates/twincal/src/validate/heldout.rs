@@ -25,6 +25,7 @@ pub struct HeldOut {
     within: ScoreKeeper,
     beyond: ScoreKeeper,
     raw: ScoreKeeper,
+    raw_moving: ScoreKeeper,
     /// Per joint.
     pit: Vec<PitKeeper>,
     conformal: ConformalKeeper,
@@ -39,6 +40,8 @@ pub struct Predictors<'a> {
     pub twin: &'a Predictor,
     /// A rival on the same rows: the compact twin.
     pub compact: Option<&'a Predictor>,
+    /// Another: the nominal model with friction and offsets alone.
+    pub friction: Option<&'a Predictor>,
 }
 
 impl<'a> From<&'a Predictor> for Predictors<'a> {
@@ -47,6 +50,7 @@ impl<'a> From<&'a Predictor> for Predictors<'a> {
         Self {
             twin,
             compact: None,
+            friction: None,
         }
     }
 }
@@ -72,7 +76,8 @@ impl HeldOut {
             moving: keeper.clone(),
             within: keeper.clone(),
             beyond: keeper.clone(),
-            raw: keeper,
+            raw: keeper.clone(),
+            raw_moving: keeper,
             conformal: ConformalKeeper::default(),
             rivals: RivalKeeper::default(),
             traces: Vec::new(),
@@ -174,10 +179,11 @@ impl HeldOut {
         trajectory: &Trajectory,
         from: f64,
     ) -> Result<()> {
-        let keepers: Vec<ScoreKeeper> = spread_raw(pipeline, trajectory, from)
+        let keepers: Vec<[ScoreKeeper; 2]> = spread_raw(pipeline, trajectory, from)
             .into_par_iter()
             .map(|slice| {
-                let mut keeper = ScoreKeeper::new(self.names.clone());
+                let mut all = ScoreKeeper::new(self.names.clone());
+                let mut moving = all.clone();
                 visit_slices(
                     robot,
                     library,
@@ -188,15 +194,21 @@ impl HeldOut {
                     &mut |block| {
                         let torques = twin.block(block, TorqueSignal::Raw);
                         for (joint, torque) in torques.iter().enumerate() {
-                            keeper.push(joint, block.joints[joint].measured, torque);
+                            let rows = &block.joints[joint];
+                            let (measured, still) = (rows.measured, rows.standstill);
+                            all.push(joint, measured, torque);
+                            moving.push_where(joint, measured, torque, |row| !still[row]);
                         }
                         Ok(())
                     },
                 )?;
-                Ok(keeper)
+                Ok([all, moving])
             })
             .collect::<Result<_>>()?;
-        keepers.iter().for_each(|keeper| self.raw += keeper);
+        for [all, moving] in &keepers {
+            self.raw += all;
+            self.raw_moving += moving;
+        }
         Ok(())
     }
 
@@ -222,8 +234,9 @@ impl HeldOut {
         collected: &mut Collected,
     ) {
         let torques = predictors.twin.block(block, TorqueSignal::Filtered);
-        let rival = |compact: &Predictor| compact.block(block, TorqueSignal::Filtered);
+        let rival = |rival: &Predictor| rival.block(block, TorqueSignal::Filtered);
         let compact: Option<Vec<JointTorque>> = predictors.compact.map(rival);
+        let friction: Option<Vec<JointTorque>> = predictors.friction.map(rival);
         for (joint, torque) in torques.iter().enumerate() {
             let rows = &block.joints[joint];
             let own = joint * block.len..(joint + 1) * block.len;
@@ -231,6 +244,12 @@ impl HeldOut {
             self.filtered.push(joint, measured, torque);
             self.moving
                 .push_where(joint, measured, torque, |row| !standstill[row]);
+            if let Some(friction) = &friction {
+                let own = &friction[joint];
+                self.filtered.push_friction(joint, measured, own, |_| true);
+                self.moving
+                    .push_friction(joint, measured, own, |row| !standstill[row]);
+            }
             // At standstill friction is whatever it takes: intervals are widened for it and say nothing of the others' shape.
             let moves = torque
                 .pit
@@ -287,6 +306,7 @@ impl HeldOut {
             within: self.within.scores(),
             beyond: self.beyond.scores(),
             raw: self.raw.scores(),
+            raw_moving: self.raw_moving.scores(),
             coverage_levels: pooled.levels(),
             pit: pooled.pit(),
             reliability: self.names.iter().zip(&self.pit).map(reliability).collect(),
@@ -314,6 +334,7 @@ impl AddAssign for HeldOut {
         self.within += &other.within;
         self.beyond += &other.beyond;
         self.raw += &other.raw;
+        self.raw_moving += &other.raw_moving;
         for (own, more) in self.pit.iter_mut().zip(&other.pit) {
             *own += more;
         }

@@ -54,6 +54,10 @@ pub struct JointScore {
     /// Share of the epistemic part in the predictive variance, 0 … 1.
     #[serde(default = "nan", deserialize_with = "nan_if_null")]
     pub epistemic_share: f64,
+    /// RMSE of the nominal torque with viscous and Coulomb friction and an offset alone, fitted to the same training rows, N·m; `None` where it was not
+    /// asked for, or none of these is a candidate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rmse_friction: Option<f64>,
 }
 
 /// Scores over a set of rows: pooled over all rows of all joints, and per joint. Without rows the numbers are NaN here and
@@ -148,6 +152,9 @@ pub struct Validation {
     pub beyond: Scores,
     /// Unfiltered torque.
     pub raw: Scores,
+    /// Of this, rows of moving joints only.
+    #[serde(default)]
+    pub raw_moving: Scores,
     /// Coverage at 50, 80, 90 and 95 % of the filtered rows of moving joints, pooled.
     pub coverage_levels: Vec<(f64, f64)>,
     /// PIT of the filtered rows of all joints that move.

@@ -17,6 +17,9 @@ struct Sums {
     noise: f64,
     measured: f64,
     square_measured: f64,
+    /// Rows that friction alone predicted too.
+    friction_rows: u64,
+    square_friction: f64,
 }
 
 impl AddAssign for Sums {
@@ -31,6 +34,8 @@ impl AddAssign for Sums {
         self.noise += other.noise;
         self.measured += other.measured;
         self.square_measured += other.square_measured;
+        self.friction_rows += other.friction_rows;
+        self.square_friction += other.square_friction;
     }
 }
 
@@ -55,6 +60,8 @@ impl Sums {
             torque_sd: (self.mean(self.square_measured) - self.mean(self.measured).powi(2))
                 .max(0.0)
                 .sqrt(),
+            rmse_friction: (self.friction_rows == self.rows && self.rows > 0)
+                .then(|| self.mean(self.square_friction).sqrt()),
         }
     }
 }
@@ -109,6 +116,24 @@ impl ScoreKeeper {
                 noise: torque.noise[row].powi(2),
                 measured,
                 square_measured: measured * measured,
+                ..Sums::default()
+            };
+        }
+    }
+
+    /// Adds what friction alone predicts of rows that were pushed.
+    pub(super) fn push_friction(
+        &mut self,
+        joint: usize,
+        measured: &[f64],
+        friction: &JointTorque,
+        keep: impl Fn(usize) -> bool,
+    ) {
+        for (row, &measured) in measured.iter().enumerate().filter(|(row, _)| keep(*row)) {
+            self.joints[joint] += Sums {
+                friction_rows: 1,
+                square_friction: (measured - friction.calibrated[row]).powi(2),
+                ..Sums::default()
             };
         }
     }
@@ -255,6 +280,27 @@ mod tests {
         close(elbow.noise_sd, 0.4);
         assert!((elbow.epistemic_share - 0.36).abs() < 1e-12);
         assert!((scores.epistemic_share - 0.36).abs() < 1e-12);
+    }
+
+    #[test]
+    fn friction_alone_has_a_score_where_it_predicted_every_row() {
+        let mut keeper = ScoreKeeper::new(["a", "b"]);
+        keeper.push(0, &[3.0, 4.0], &torque(2));
+        keeper.push(1, &[3.0, 4.0], &torque(2));
+        let friction = JointTorque {
+            calibrated: vec![0.0, 1.0],
+            ..torque(2)
+        };
+        keeper.push_friction(0, &[3.0, 4.0], &friction, |_| true);
+        keeper.push_friction(1, &[3.0, 4.0], &friction, |row| row > 0);
+        let joints = keeper.scores().joints;
+        assert_eq!(joints[0].rmse_friction, Some(3.0));
+        assert_eq!(joints[1].rmse_friction, None);
+        assert!(
+            ScoreKeeper::new(["a"]).scores().joints[0]
+                .rmse_friction
+                .is_none()
+        );
     }
 
     #[test]

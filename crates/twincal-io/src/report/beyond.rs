@@ -1,0 +1,202 @@
+//! Rows on which the training data say less than on others, by cause: motion that training did not have, or torque that it leaves open.
+
+use super::limits::too_narrow;
+use super::text::{list, percent, subject};
+use super::view::{Joint, memory};
+use twincal::calibrate::Calibration;
+use twincal::validate::{JointScore, Split, Validation};
+
+/// Share of its range by which a joint may leave the training motion.
+const MARGIN: f64 = 0.05;
+/// Share of the rows beyond that are new motion, from which that is the cause.
+const MOSTLY: f64 = 0.5;
+
+/// Why [`Validation::beyond`] has a joint's rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Cause {
+    /// Its position or velocity leaves the training range.
+    NewMotion,
+    /// What is not known of its torque is more than the noise.
+    OpenTorque,
+}
+
+impl Cause {
+    /// New motion is only where whole logs were held out: of other splits the range is that of all logs.
+    fn of(calibration: &Calibration, joint: &str, rows: f64) -> Self {
+        if calibration.validation.split != Split::HeldoutLogs {
+            return Self::OpenTorque;
+        }
+        let index = calibration
+            .noise
+            .iter()
+            .position(|noise| noise.joint == joint);
+        let hull = index.and_then(|index| calibration.twin.hull.get(index));
+        let Some(hull) = hull else {
+            return Self::NewMotion;
+        };
+        let leaves = |x: f64, low: f64, high: f64| {
+            let margin = MARGIN * (high - low);
+            x < low - margin || x > high + margin
+        };
+        let (mut new, mut all) = (0.0, 0.0);
+        let traces = calibration.validation.traces.iter();
+        for trace in traces.filter(|trace| trace.joint == joint) {
+            for ((q, qd), still) in trace.q.iter().zip(&trace.qd).zip(&trace.standstill) {
+                if !still {
+                    all += 1.0;
+                    let outside = leaves(*q, hull[0], hull[1]) || leaves(*qd, hull[2], hull[3]);
+                    new += f64::from(u8::from(outside));
+                }
+            }
+        }
+        match new > MOSTLY * rows * all {
+            true => Self::NewMotion,
+            false => Self::OpenTorque,
+        }
+    }
+}
+
+/// A joint's moving rows within and beyond.
+struct Pair<'a> {
+    within: &'a JointScore,
+    beyond: &'a JointScore,
+    cause: Cause,
+}
+
+impl Pair<'_> {
+    /// "34 of 80 moving rows".
+    fn rows(&self) -> String {
+        let all = self.within.rows + self.beyond.rows;
+        format!("{} of {all} moving rows", self.beyond.rows)
+    }
+}
+
+/// Joints that are predicted no better where training says enough are left out: there it is no excuse.
+fn pairs(calibration: &Calibration) -> impl Iterator<Item = Pair<'_>> {
+    let Validation { within, beyond, .. } = &calibration.validation;
+    let pairs = within.joints.iter().zip(&beyond.joints);
+    pairs
+        .filter(|(within, beyond)| {
+            beyond.rows > 0 && (within.rows == 0 || within.coverage95 > beyond.coverage95)
+        })
+        .map(|(within, beyond)| {
+            let share = beyond.rows as f64 / (within.rows + beyond.rows) as f64;
+            let cause = Cause::of(calibration, &beyond.joint, share);
+            Pair {
+                within,
+                beyond,
+                cause,
+            }
+        })
+}
+
+/// Joints whose intervals are too narrow there, and less so elsewhere: by more than two standard errors of as many independent rows.
+pub(super) fn narrow(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
+    let narrow = pairs(calibration)
+        .filter(|pair| too_narrow(pair.beyond, memory(joints, &pair.beyond.joint)));
+    narrow
+        .map(|pair| {
+            let (place, elsewhere) = match pair.cause {
+                Cause::NewMotion => ("beyond the training motion", "within it"),
+                Cause::OpenTorque => ("where training leaves its torque open", "elsewhere"),
+            };
+            let seen = match pair.within.rows {
+                0 => String::new(),
+                _ => format!(", {elsewhere} {}", percent(pair.within.coverage95)),
+            };
+            format!(
+                "{}: {place} ({}) its 95 % intervals hold {}{seen}.",
+                subject(&[&pair.beyond.joint]),
+                pair.rows(),
+                percent(pair.beyond.coverage95)
+            )
+        })
+        .collect()
+}
+
+/// Joints that were mostly tested there.
+pub(super) fn mostly(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
+    let told = |wanted: Cause| -> Vec<String> {
+        pairs(calibration)
+            .filter(|pair| pair.cause == wanted && pair.beyond.rows > pair.within.rows)
+            .filter(|pair| joints.iter().any(|joint| joint.name == pair.beyond.joint))
+            .map(|pair| format!("{} ({})", pair.beyond.joint, pair.rows()))
+            .collect()
+    };
+    let each = [
+        (Cause::NewMotion, "Tested mostly beyond the training motion"),
+        (
+            Cause::OpenTorque,
+            "Training leaves the torque open, known less well than its noise, on most tested rows",
+        ),
+    ];
+    let each = each.map(|(cause, words)| (told(cause), words)).into_iter();
+    each.filter(|(names, _)| !names.is_empty())
+        .map(|(names, words)| format!("{words}: {}.", list(&names)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::verdict::tests::judged;
+    use super::*;
+
+    /// The elbow beyond on so many rows, within on as many; new motion where its held-out velocity is `speed` times what it is.
+    fn limits(beyond: (u64, f64), within: (u64, f64), split: Split, speed: f64) -> Vec<String> {
+        let verdict = judged(|c| {
+            c.validation.split = split.clone();
+            c.validation.beyond = c.validation.within.clone();
+            c.validation.beyond.joints[0].rows = 0;
+            for (scores, (rows, coverage95)) in [
+                (&mut c.validation.beyond, beyond),
+                (&mut c.validation.within, within),
+            ] {
+                (scores.joints[1].rows, scores.joints[1].coverage95) = (rows, coverage95);
+            }
+            let traces = c.validation.traces.iter_mut();
+            for trace in traces.filter(|trace| trace.joint == "elbow") {
+                trace.qd.iter_mut().for_each(|qd| *qd *= speed);
+            }
+        });
+        let told = verdict.limits.into_iter();
+        told.filter(|limit| limit.contains("beyond the") || limit.contains(" open"))
+            .collect()
+    }
+
+    #[test]
+    fn rows_of_new_motion_are_told_as_that_and_others_by_what_training_leaves_open() {
+        let (beyond, within) = ((41, 0.93), (40, 0.95));
+        assert_eq!(
+            limits(beyond, within, Split::HeldoutLogs, 10.0),
+            ["Tested mostly beyond the training motion: elbow (41 of 81 moving rows)."]
+        );
+        let open = "Training leaves the torque open, known less well than its noise, on most tested rows: elbow (41 of 81 moving rows).";
+        assert_eq!(limits(beyond, within, Split::HeldoutLogs, 1.0), [open]);
+        // Of later parts of the same logs the motion is in the training range by definition.
+        assert_eq!(limits(beyond, within, Split::LastThirty, 10.0), [open]);
+        assert!(limits((40, 0.93), within, Split::LastThirty, 1.0).is_empty());
+        // No excuse where it is not worse there.
+        assert!(limits((41, 0.95), (40, 0.93), Split::LastThirty, 1.0).is_empty());
+    }
+
+    #[test]
+    fn what_is_too_narrow_there_is_said_with_what_holds_elsewhere() {
+        let of = |beyond, within, speed| limits(beyond, within, Split::HeldoutLogs, speed);
+        assert_eq!(
+            of((34, 0.24), (46, 0.93), 10.0),
+            [
+                "Joint elbow: beyond the training motion (34 of 80 moving rows) its 95 % intervals hold 24.0\u{202f}%, within it 93.0\u{202f}%."
+            ]
+        );
+        assert_eq!(
+            of((34, 0.24), (46, 0.93), 1.0),
+            [
+                "Joint elbow: where training leaves its torque open (34 of 80 moving rows) its 95 % intervals hold 24.0\u{202f}%, elsewhere 93.0\u{202f}%."
+            ]
+        );
+        // Nothing of it where the cause does not explain it, nor of a handful of rows.
+        assert!(of((34, 0.24), (46, 0.2), 1.0).is_empty());
+        assert!(of((5, 0.8), (46, 0.93), 1.0).is_empty());
+        assert!(of((34, 0.94), (46, 0.95), 1.0).is_empty());
+    }
+}

@@ -1,0 +1,408 @@
+//! What the verdict rests on, a sentence each: error of held-out torque, what friction alone would leave, intervals, effects.
+
+use super::figures::sensitivity;
+use super::limits::{FEW_AT_REST, decisive, has_standstill};
+use super::remarks::doubts;
+use super::text::{count, list, number, percent};
+use super::view::{Joint, pooled_unit};
+use twincal::calibrate::{Calibration, ComponentSummary, Verdict as Decision};
+use twincal::validate::{JointScore, Scores, Split};
+
+/// Change of an error from which other rows are told apart.
+const WORTH_TELLING: f64 = 0.05;
+/// The same of unfiltered torque, which has noise that no twin explains.
+const UNFILTERED_WORTH_TELLING: f64 = 0.25;
+/// The same of the share of rows that intervals hold.
+const SHARE_WORTH_TELLING: f64 = 0.01;
+/// Held-out time that is told because it is short, s.
+const SHORT: f64 = 30.0;
+/// Joints that are named; the others are counted.
+const NAMED: usize = 3;
+
+pub(super) fn grounds(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
+    let mut out = vec![torque_error(calibration, joints)];
+    out.extend(at_standstill(calibration, joints));
+    out.extend(friction_alone(calibration, joints));
+    out.push(held(calibration));
+    out.push(effects_found(calibration));
+    out
+}
+
+/// Held-out values of all joints.
+pub(super) fn rows_of(scores: &Scores) -> u64 {
+    scores.joints.iter().map(|j| j.rows).sum()
+}
+
+/// "13.8 → 0.710 N·m, 94.9 % less".
+fn change([before, after]: [f64; 2], unit: &str) -> String {
+    let way = match after / before - 1.0 {
+        c if c.abs() < 5e-4 => "unchanged".into(),
+        c if c < 0.0 => format!("{} less", percent(-c)),
+        c => format!("{} more", percent(c)),
+    };
+    format!("{} → {} {unit}, {way}", number(before, 3), number(after, 3))
+}
+
+/// RMSE before and after, of joints that move, for what the filter lets pass; beside it that of the torque as it was logged where that is another matter.
+fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
+    let validation = &calibration.validation;
+    let judged = decisive(validation);
+    let split = match validation.split {
+        Split::HeldoutLogs => "held-out logs",
+        Split::LeaveOneLogOut => "logs left out one at a time",
+        Split::LastThirty => "the last 30 % of each log",
+    };
+    let cutoff = calibration.twin.pipeline.cutoff_hz;
+    let below = match cutoff > 0.0 {
+        true => format!(" below {} Hz", (100.0 * cutoff).round() / 100.0),
+        false => String::new(),
+    };
+    let which = match has_standstill(validation) {
+        true => ", joints that move",
+        false => "",
+    };
+    let unit = pooled_unit(joints);
+    let told = change([judged.rmse_nominal, judged.rmse_calibrated], unit);
+    let logged = match cutoff > 0.0 {
+        true => as_logged(calibration, unit),
+        false => None,
+    };
+    let logged = logged.unwrap_or_default();
+    format!("Torque error (RMSE){below} on {split}{which}: {told}{logged}.")
+}
+
+/// "; as logged, unfiltered: 0.959 → 0.373 N·m, on Joint1 more than the torque itself", of the rows that the filtered error is of.
+fn as_logged(calibration: &Calibration, unit: &str) -> Option<String> {
+    let validation = &calibration.validation;
+    let judged = decisive(validation);
+    // Results of earlier versions do not have it; there rows at standstill are in it.
+    let known = rows_of(&validation.raw_moving) > 0;
+    let (raw, which) = match (known, has_standstill(validation)) {
+        (true, true) => (&validation.raw_moving, ""),
+        (_, false) => (&validation.raw, ""),
+        (false, true) => (&validation.raw, " (standstill with it)"),
+    };
+    let lost: Vec<&str> = (raw.joints.iter())
+        .filter(|j| j.rows > 0 && j.rmse_calibrated > j.torque_sd)
+        .map(|j| j.joint.as_str())
+        .collect();
+    let apart = (raw.rmse_calibrated / judged.rmse_calibrated - 1.0).abs();
+    let worth_telling = apart > UNFILTERED_WORTH_TELLING || !lost.is_empty();
+    (rows_of(raw) > 0 && worth_telling).then(|| {
+        let lost = match lost.is_empty() {
+            true => String::new(),
+            false => format!(", on {} more than the torque itself", list(&lost)),
+        };
+        format!(
+            "; as logged, unfiltered{which}: {} → {} {unit}{lost}",
+            number(raw.rmse_nominal, 3),
+            number(raw.rmse_calibrated, 3)
+        )
+    })
+}
+
+/// RMSE before and after of joints that stand still, where it is another matter, for there friction is whatever it takes: and which of them got worse.
+fn at_standstill(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
+    let validation = &calibration.validation;
+    let (all, moving) = (&validation.filtered, decisive(validation));
+    if rows_of(all).saturating_sub(rows_of(moving)) < FEW_AT_REST {
+        return None;
+    }
+    let each = || all.joints.iter().zip(&moving.joints);
+    let rest: Vec<_> = each()
+        .filter(|(all, moving)| all.rows > moving.rows)
+        .collect();
+    let mut worse: Vec<(&str, [f64; 2])> = (rest.iter())
+        .filter_map(|pair| Some((pair.0.joint.as_str(), still(&[*pair])?)))
+        .filter(|(_, [before, after])| after / before - 1.0 > WORTH_TELLING)
+        .collect();
+    let gain = |errors: &[f64; 2]| errors[1] - errors[0];
+    worse.sort_by(|(_, a), (_, b)| gain(b).total_cmp(&gain(a)));
+    let together = still(&rest)?;
+    let differ = (all.rmse_calibrated / moving.rmse_calibrated - 1.0).abs() > WORTH_TELLING;
+    if worse.is_empty() && !differ {
+        return None;
+    }
+    let told = change(together, pooled_unit(joints));
+    if let ([only], true) = (&rest[..], joints.len() > 1) {
+        return Some(format!("At standstill ({}): {told}.", only.0.joint));
+    }
+    let mut names: Vec<String> = (worse.iter().take(NAMED))
+        .map(|(name, [before, after])| {
+            let unit = joints.iter().find(|joint| joint.name == *name);
+            let unit = unit.map_or("", |joint| joint.units.torque);
+            format!(
+                "{name} ({} → {} {unit})",
+                number(*before, 3),
+                number(*after, 3)
+            )
+        })
+        .collect();
+    if let Some(more) = worse.len().checked_sub(NAMED).filter(|more| *more > 0) {
+        names.push(format!("{more} more"));
+    }
+    Some(match names.is_empty() {
+        true => format!("At standstill: {told}."),
+        false => format!("At standstill: {told}; worse on {}.", list(&names)),
+    })
+}
+
+/// RMSE before and after on the rows that are not among the moving ones; `None` without any.
+fn still(pairs: &[(&JointScore, &JointScore)]) -> Option<[f64; 2]> {
+    let rows: u64 = pairs
+        .iter()
+        .map(|(all, moving)| all.rows - moving.rows.min(all.rows))
+        .sum();
+    let square = |score: &JointScore, of: fn(&JointScore) -> f64| match score.rows {
+        0 => 0.0,
+        rows => rows as f64 * of(score).powi(2),
+    };
+    let each: [fn(&JointScore) -> f64; 2] = [|j| j.rmse_nominal, |j| j.rmse_calibrated];
+    (rows > 0).then(|| {
+        each.map(|of| {
+            let left = pairs
+                .iter()
+                .map(|(all, moving)| square(all, of) - square(moving, of));
+            (left.sum::<f64>().max(0.0) / rows as f64).sqrt()
+        })
+    })
+}
+
+/// What the first thing that anybody adds to a model would leave: errors of a model without friction are large by that alone.
+fn friction_alone(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
+    let left = friction_only(decisive(&calibration.validation))?;
+    Some(format!(
+        "Viscous and Coulomb friction and an offset alone would leave {} {}.",
+        number(left, 3),
+        pooled_unit(joints)
+    ))
+}
+
+/// RMSE with friction alone over all rows of all joints; `None` where some joint has none.
+#[must_use]
+pub fn friction_only(scores: &Scores) -> Option<f64> {
+    let own = scores.joints.iter().filter(|joint| joint.rows > 0);
+    let squares: Option<Vec<f64>> = own
+        .map(|joint| Some(joint.rows as f64 * joint.rmse_friction?.powi(2)))
+        .collect();
+    let sum = squares?.iter().sum::<f64>();
+    let left = (sum / rows_of(scores) as f64).sqrt();
+    left.is_finite().then_some(left)
+}
+
+/// How much the 95 % intervals hold: of moving joints, and of all rows where some stand still.
+fn held(calibration: &Calibration) -> String {
+    let all = &calibration.validation.filtered;
+    let judged = decisive(&calibration.validation);
+    let (rows, share) = (count(rows_of(judged)), percent(judged.coverage95));
+    let seconds = held_out_seconds(calibration);
+    let short = match seconds < SHORT {
+        true => format!(", {} s of motion", number(seconds, 2)),
+        false => String::new(),
+    };
+    if !has_standstill(&calibration.validation) {
+        return format!("The 95 % intervals contain {share} of the {rows} held-out values{short}.");
+    }
+    let differ = (judged.coverage95 - all.coverage95).abs() > SHARE_WORTH_TELLING;
+    let all = match differ {
+        true => format!(
+            ", {} of all {}",
+            percent(all.coverage95),
+            count(rows_of(all))
+        ),
+        false => String::new(),
+    };
+    format!(
+        "The 95 % intervals contain {share} of the {rows} held-out values of moving joints{all}{short}."
+    )
+}
+
+/// The time that the held-out rows stand for.
+pub(super) fn held_out_seconds(calibration: &Calibration) -> f64 {
+    let scores = &calibration.validation.filtered;
+    let rows = scores.joints.iter().map(|joint| joint.rows).max();
+    rows.unwrap_or(0) as f64 / calibration.kept_rate_hz()
+}
+
+/// What is more likely than not, without and with what the data leave open, and how much of it stands every check.
+pub(super) fn effects_found(calibration: &Calibration) -> String {
+    let likely = || calibration.components.iter().filter(|c| c.selected);
+    let is_open = |c: &&ComponentSummary| c.verdict == Some(Decision::Undecided);
+    let sure: Vec<&ComponentSummary> = likely().filter(|c| !is_open(c)).collect();
+    let by_prior: Vec<&str> = (sensitivity::by_prior(calibration))
+        .map(|c| c.name.as_str())
+        .collect();
+    let doubted = (sure.iter())
+        .filter(|c| by_prior.contains(&c.name.as_str()) || !doubts(c, calibration).is_empty())
+        .count();
+    let open = likely().filter(is_open).count();
+    let more = match open {
+        0 => String::new(),
+        n => format!("; {n} more likely than not, but undecided"),
+    };
+    const WHERE: &str = "in the report’s table of effects";
+    match (sure.len(), doubted) {
+        (0, _) if open == 0 => "No missing effect is more likely than not.".into(),
+        (0, _) => format!("No missing effect is sure{more}."),
+        (1, 0) => format!("One missing effect found, which stands every check{more}."),
+        (1, _) => format!("One missing effect found, with a remark {WHERE}{more}."),
+        (n, 0) => format!("{n} missing effects found, which stand every check{more}."),
+        (n, d) if d == n => format!("{n} missing effects found, each with a remark {WHERE}{more}."),
+        (n, 1) => format!(
+            "{n} missing effects found: {} stand every check, one has a remark {WHERE}{more}.",
+            n - 1
+        ),
+        (n, d) => format!(
+            "{n} missing effects found: {} stand every check, {d} have a remark {WHERE}{more}.",
+            n - d
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::verdict::tests::judged;
+    use super::*;
+
+    /// Standstill rows as many as moving ones: of these the mean square is 4 before and 0.25 after; at rest `still` before and after, joint by joint.
+    fn with_standstill(c: &mut Calibration, still: [[f64; 2]; 2]) {
+        c.validation.moving = c.validation.filtered.clone();
+        for joint in &mut c.validation.moving.joints {
+            (joint.rows, joint.rmse_nominal, joint.rmse_calibrated) = (50, 2.0, 0.5);
+        }
+        for (joint, [before, after]) in c.validation.filtered.joints.iter_mut().zip(still) {
+            joint.rows = 100;
+            joint.rmse_nominal = (0.5f64 * (4.0 + before)).sqrt();
+            joint.rmse_calibrated = (0.5f64 * (0.25 + after)).sqrt();
+        }
+        let all = &mut c.validation.filtered;
+        (all.rmse_nominal, all.rmse_calibrated) = (1.6, 2.2);
+        let moving = &mut c.validation.moving;
+        (moving.rmse_nominal, moving.rmse_calibrated) = (2.0, 0.5);
+        c.validation.raw_moving = moving.clone();
+    }
+
+    #[test]
+    fn rows_at_standstill_are_told_apart_and_joints_that_got_worse_are_named() {
+        let of = |still: [[f64; 2]; 2]| judged(|c| with_standstill(c, still)).grounds;
+        let both = of([[1.0, 0.25], [1.0, 9.0]]);
+        let moving = "below 10 Hz on logs left out one at a time, joints that move: 2.00 → 0.500 N·m, 75.0\u{202f}% less.";
+        assert!(both[0].ends_with(moving), "{both:?}");
+        // The mean squares are 1 before and 4.625 after.
+        let still = "At standstill: 1.00 → 2.15 N·m, 115.1\u{202f}% more; worse on elbow (1.00 → 3.00 N·m).";
+        assert_eq!(both[1], still);
+        let better = of([[1.0, 0.25], [1.0, 0.25]]);
+        assert_eq!(
+            better[1],
+            "At standstill: 1.00 → 0.500 N·m, 50.0\u{202f}% less."
+        );
+        let one = judged(|c| {
+            with_standstill(c, [[1.0, 9.0]; 2]);
+            c.validation.filtered.joints[0] = c.validation.moving.joints[0].clone();
+        });
+        let said = "At standstill (elbow): 1.00 → 3.00 N·m, 200.0\u{202f}% more.";
+        assert_eq!(one.grounds[1], said);
+        let few = judged(|c| {
+            with_standstill(c, [[1.0, 9.0]; 2]);
+            c.validation
+                .moving
+                .joints
+                .iter_mut()
+                .for_each(|j| j.rows = 91);
+        });
+        assert!(!few.grounds.iter().any(|g| g.contains("standstill")));
+        let none = judged(|c| {
+            with_standstill(c, [[1.0, 9.0]; 2]);
+            let moving = &mut c.validation.moving;
+            moving.joints.iter_mut().for_each(|joint| joint.rows = 0);
+        });
+        assert!(!none.grounds.iter().any(|g| g.contains("standstill")));
+    }
+
+    #[test]
+    fn the_unfiltered_error_stands_beside_where_it_is_another_matter() {
+        let of = |rmse: f64, sd: f64, cutoff: f64| {
+            let change = |c: &mut Calibration| {
+                c.twin.pipeline.cutoff_hz = cutoff;
+                let raw = &mut c.validation.raw;
+                (raw.rmse_nominal, raw.rmse_calibrated) = (0.959, rmse);
+                (raw.joints[1].rmse_calibrated, raw.joints[1].torque_sd) = (0.4, sd);
+            };
+            judged(change).grounds[0].clone()
+        };
+        let told = of(0.373, 0.39, 5.0);
+        let said =
+            "; as logged, unfiltered: 0.959 → 0.373 N·m, on elbow more than the torque itself.";
+        assert!(told.ends_with(said), "{told}");
+        assert!(
+            told.starts_with("Torque error (RMSE) below 5 Hz on"),
+            "{told}"
+        );
+        assert!(of(0.373, 0.41, 5.0).ends_with("0.959 → 0.373 N·m."));
+        assert!(!of(0.09, 0.41, 5.0).contains("as logged"));
+        // Without a filter they are the same.
+        let same = of(0.373, 0.39, 0.0);
+        assert!(
+            !same.contains("as logged") && !same.contains("below"),
+            "{same}"
+        );
+    }
+
+    #[test]
+    fn friction_alone_and_short_tests_are_told() {
+        let grounds = judged(|c| {
+            for (joint, left) in c.validation.filtered.joints.iter_mut().zip([3.0, 4.0]) {
+                (joint.rows, joint.rmse_friction) = (100, Some(left));
+            }
+        })
+        .grounds;
+        // √((9 + 16)/2).
+        let said = "Viscous and Coulomb friction and an offset alone would leave 3.54 N·m.";
+        assert_eq!(grounds[1], said);
+        assert!(
+            grounds[2].ends_with("of the 200 held-out values, 4.0 s of motion."),
+            "{grounds:?}"
+        );
+        let grounds = judged(|c| c.validation.filtered.joints[0].rmse_friction = None).grounds;
+        assert!(
+            !grounds
+                .iter()
+                .any(|g| g.contains("friction") || g.contains("s of motion"))
+        );
+    }
+
+    #[test]
+    fn effects_with_a_remark_are_counted_apart() {
+        let of =
+            |change: &dyn Fn(&mut Calibration)| judged(change).grounds.pop().unwrap_or_default();
+        assert_eq!(
+            of(&|_| ()),
+            "7 missing effects found, which stand every check."
+        );
+        let one = "7 missing effects found: 6 stand every check, one has a remark in the report’s table of effects.";
+        assert_eq!(of(&|c| c.repeatability[0].z = Some(3.7)), one);
+        let prior = |c: &mut Calibration| {
+            let selected = c.terms.iter_mut().find(|t| t.selected);
+            selected.unwrap().pip_sensitivity = vec![0.3, 0.9];
+        };
+        assert_eq!(of(&prior), one);
+        // A sign that is explained is no doubt.
+        let negative = |c: &mut Calibration| {
+            let own = c.components.iter_mut().find(|c| c.name == "elbow.viscous");
+            let value = &mut own.unwrap().parameters[0];
+            (value.median, value.interval68) = (-1.0, [-1.01, -0.99]);
+            value.interval95 = [-1.02, -0.98];
+        };
+        assert_eq!(of(&negative), of(&|_| ()));
+        let undecided = |c: &mut Calibration| {
+            let found = c.components.iter_mut().filter(|c| c.selected);
+            for component in found.skip(1) {
+                component.verdict = Some(Decision::Undecided);
+            }
+        };
+        assert_eq!(
+            of(&undecided),
+            "One missing effect found, which stands every check; 6 more likely than not, but undecided."
+        );
+    }
+}
