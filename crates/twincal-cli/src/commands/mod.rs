@@ -16,6 +16,7 @@ mod report;
 mod settings;
 mod summary;
 mod table;
+mod verdict;
 
 use crate::args::Command;
 use crate::failure::{DEGRADED, Failure, Outcome};
