@@ -101,8 +101,8 @@ mod tests {
             ],
         };
         let (_, findings) = Robot::new(description, &BTreeMap::new()).unwrap();
-        let of = |code: &str| findings.iter().filter(move |f| f.code == code);
-        of("point_mass").map(|f| f.message.clone()).collect()
+        let points = findings.iter().filter(|f| f.code == super::CODE);
+        points.map(|finding| finding.message.clone()).collect()
     }
 
     /// The KR300's last link as its makers' file has it, and a ball of steel and of osmium (22 590 kg/m³) of the same mass: 2/5 m r².
