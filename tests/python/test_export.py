@@ -353,6 +353,11 @@ def test_bodies_of_a_real_robot_cost_next_to_no_torque(tmp_path):
     told = json.loads(said.stdout)
     assert told["projection"]["distance"] < 5 and told["projection"]["gap"] < 1e-8
     assert max(told["lost"]) < 0.1 and max(told["correction"]) > 10
+    text = (tmp_path / "exported.urdf").read_text()
+    links = {link["link"] for link in told["links"] if link["no_body"]}
+    assert "upper_arm_link" in links and links >= set(told["projection"]["links"])
+    commented = {link.split('"')[1] for link in text.split("<link ")[1:] if "<!-- twincal: no rigid body" in link.split("</link>")[0]}
+    assert commented == links
     model = pin.buildModelFromUrdf(str(tmp_path / "exported.urdf"))
     for inertia in list(model.inertias)[1:]:
         moments = np.linalg.eigvalsh(inertia.inertia)

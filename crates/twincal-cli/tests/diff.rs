@@ -53,7 +53,7 @@ fn each_change_is_told_with_both_values_and_the_difference() {
         "  gone: gravity-like potential sin(q2) (PIP >0.999 → ",
         "  changed: viscous friction on elbow (PIP >0.999 → >0.999)\n    +0.",
         " N·m·s/rad, difference +0.",
-        "  1 component as before (--json has the numbers)\n",
+        "  1 component as before (--json has the numbers)\n  values: medians over all models",
     ] {
         assert!(
             words.out.contains(line),
@@ -96,6 +96,7 @@ fn each_change_is_told_with_both_values_and_the_difference() {
     let (words, _) = diff(folder.path(), "before", "before");
     let nothing = "  nothing that these logs can tell\n  3 components as before";
     assert!(words.out.contains(nothing), "{}", words.out);
+    assert!(!words.out.contains("medians"), "{}", words.out);
 }
 
 /// A potential of a few standard errors is neither in nor out: "perhaps", in either direction.

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{ARM, files, fitted, fitted_copy, run};
+use common::{ARM, QUICK, Row, Run, csv, files, fit, fitted, fitted_copy, folder, run};
 use std::fs;
 
 fn export<'a>(more: &[&'a str]) -> Vec<&'a str> {
@@ -139,3 +139,128 @@ fn json_says_what_was_written() {
     assert_eq!(told["written"].as_array().unwrap().len(), 2);
     assert_eq!(told["residual"][0]["component"], "sin(q2)");
 }
+
+fn number(cell: &str) -> f64 {
+    cell.parse().unwrap()
+}
+
+/// A log whose torque `more(q2, [qd1, qd2])` adds to.
+fn log(more: &dyn Fn(f64, [f64; 2]) -> [f64; 2]) -> String {
+    csv(400, &|_, mut row: Row| {
+        let more = more(number(&row[2]), [number(&row[3]), number(&row[4])]);
+        for (cell, more) in row[7..9].iter_mut().zip(more) {
+            *cell = (number(cell) + more).to_string();
+        }
+        row
+    })
+}
+
+fn json(done: &Run) -> serde_json::Value {
+    serde_json::from_str(&done.out).unwrap()
+}
+
+/// The potential's torque −0.9 cos q2 and an offset of 0.5 N·m stay beside the file and take from each other: over q2 in ±0.6 the root of
+/// 0.81 ⟨cos²⟩ − 0.9 ⟨cos⟩ + 0.25 with ⟨cos⟩ = sin 0.6/0.6 and ⟨cos²⟩ = ½ + sin 1.2/2.4 is 0.350, where one has 0.85 and the other 0.5.
+#[test]
+fn what_the_file_lacks_is_the_sum_and_not_its_parts() {
+    let folder = folder();
+    fs::write(folder.path().join("run.csv"), log(&|_, _| [0.0, 0.5])).unwrap();
+    let config = QUICK.replace("offset = false", "offset = true");
+    fs::write(folder.path().join("quick.toml"), config).unwrap();
+    fit(folder.path(), &["-o", "twin"]).expect(0);
+    let told = json(
+        &run(
+            folder.path(),
+            export(&["--to", "urdf", "-o", "a.urdf", "--json"]),
+        )
+        .expect(0),
+    );
+    let lacks = |joint: usize| told["lacks"][joint].as_f64().unwrap();
+    assert!((lacks(1) - 0.350).abs() < 0.02 && lacks(0) < 0.01, "{told}");
+    let parts = told["residual"].as_array().unwrap().iter();
+    let parts: Vec<f64> = parts.map(|r| r["torque"][1].as_f64().unwrap()).collect();
+    // Over this range the two are nearly alike: they share what noise adds.
+    assert!(parts[0] > 0.7 && parts[1] > 0.4, "{parts:?}");
+    let done = run(folder.path(), export(&["--to", "urdf", "-o", "b.urdf"])).expect(0);
+    let shown = format!("{:.3}", lacks(1));
+    let table = done.out.split("How good the URDF is alone").nth(1).unwrap();
+    let row = table.lines().find(|line| line.contains("elbow")).unwrap();
+    assert!(row.contains(&shown), "{row}");
+}
+
+/// Fitted to a robot with friction and a potential, judged by one without: every command that uses the twin says so, and goes on.
+#[test]
+fn a_twin_that_is_no_good_says_so_wherever_it_is_used() {
+    let folder = folder();
+    let bare = log(&|q2, [v1, v2]| [-0.4 * v1, 0.9 * q2.cos() - 0.2 * v2]);
+    fs::write(folder.path().join("bare.csv"), bare).unwrap();
+    fit(folder.path(), &["--heldout", "bare.csv", "-o", "twin"]).expect(0);
+    let words =
+        "warning: can this twin be used? No: on held-out data the calibrated torque is worse";
+    let predict = |more: &[&'static str]| {
+        let line = ["predict", "run.csv", "--twin", "twin"];
+        line.into_iter().chain(more.iter().copied()).collect()
+    };
+    for (number, arguments) in [
+        export(&["--to", "urdf"]),
+        export(&["--to", "c"]),
+        export(&["--to", "urdf", "-o", "a.urdf"]),
+        export(&["--to", "urdf", "--draws", "2", "-o", "draws"]),
+        predict(&[]),
+        predict(&["-o", "a.csv"]),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let done = run(folder.path(), arguments).expect(0).says(&[words]);
+        assert_eq!(done.err.matches("can this twin").count(), 1, "{number}");
+        assert!(!done.out.contains("can this twin"), "{number}");
+    }
+    for arguments in [
+        export(&["--to", "urdf", "-o", "b.urdf", "--json"]),
+        export(&["--to", "c", "-o", "b.c", "--json"]),
+        export(&["--to", "urdf", "--draws", "2", "-o", "more", "--json"]),
+        predict(&["-o", "b.csv", "--json"]),
+    ] {
+        let told = json(&run(folder.path(), arguments).expect(0));
+        assert_eq!(told["findings"][0]["code"], "verdict", "{told}");
+        assert_eq!(told["findings"][0]["severity"], "warning");
+    }
+}
+
+/// Friction that is 3.4 standard errors large is neither in nor out: the file holds its average, which is another number than the one
+/// given that it is in.
+#[test]
+fn a_number_in_the_file_that_is_not_the_one_in_words_is_told() {
+    let folder = folder();
+    let rest = |_: f64, [_, v2]: [f64; 2]| [0.0, (WEAK - 0.2) * v2];
+    fs::write(folder.path().join("run.csv"), log(&rest)).unwrap();
+    fit(folder.path(), &["-o", "twin"]).expect(0);
+    let told = json(
+        &run(
+            folder.path(),
+            export(&["--to", "urdf", "-o", "a.urdf", "--json"]),
+        )
+        .expect(0),
+    );
+    let written = told["written"].as_array().unwrap();
+    let of = |name: &str| written.iter().find(|w| w["component"] == name).unwrap();
+    let pip = of("elbow.viscous")["pip"].as_f64().unwrap();
+    assert!((0.5..0.97).contains(&pip), "{pip}");
+    let value = of("elbow.viscous")["in_file"].as_f64().unwrap();
+    let text = fs::read_to_string(folder.path().join("a.urdf")).unwrap();
+    let damping = text.split("damping=\"").nth(2).unwrap();
+    let damping = number(damping.split('"').next().unwrap());
+    assert!((damping - value).abs() < 1e-9, "{damping} {value}");
+    assert_eq!(of("shoulder.viscous")["in_file"], serde_json::Value::Null);
+    let done = run(folder.path(), export(&["--to", "urdf", "-o", "b.urdf"])).expect(0);
+    let words: Vec<&str> = done.out.split_whitespace().collect();
+    let words = words.join(" ");
+    assert!(
+        words.contains("(joint elbow; in the file 0.00") && words.contains("(joint shoulder)"),
+        "{words}"
+    );
+}
+
+/// Friction that these 400 rows leave open, N·m·s/rad.
+const WEAK: f64 = 0.004;

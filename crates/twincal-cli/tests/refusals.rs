@@ -417,47 +417,6 @@ fn flags_override_their_keys() {
 }
 
 #[test]
-fn check_says_which_gate_failed() {
-    let folder = common::fitted_copy();
-    run(folder.path(), ["check", "run.csv", "--twin", "twin"]).expect(0);
-    let louder = csv(400, &|_, mut row| {
-        row[8] = (row[8].parse::<f64>().unwrap() + 0.5).to_string();
-        row
-    });
-    fs::write(folder.path().join("drifted.csv"), louder).unwrap();
-    let done = run(folder.path(), ["check", "drifted.csv", "--twin", "twin"]).expect(1);
-    assert!(
-        done.out.contains("joint `elbow`: RMSE 0.5") && !done.out.contains("`shoulder`: RMSE"),
-        "{}",
-        done.out
-    );
-    let done = run(
-        folder.path(),
-        ["check", "drifted.csv", "--twin", "twin", "--json"],
-    )
-    .expect(1);
-    let result: serde_json::Value = serde_json::from_str(&done.out).unwrap();
-    assert_eq!(result["passed"], false);
-    fs::write(
-        folder.path().join("gates.toml"),
-        "[check]\nrmse_ratio = 1000\ncoverage = [0, 1]\n",
-    )
-    .unwrap();
-    run(
-        folder.path(),
-        [
-            "check",
-            "drifted.csv",
-            "--twin",
-            "twin",
-            "--config",
-            "gates.toml",
-        ],
-    )
-    .expect(0);
-}
-
-#[test]
 fn predict_writes_one_row_per_input_row() {
     let folder = common::fitted_copy();
     let done = run(folder.path(), ["predict", "run.csv", "--twin", "twin"]).expect(0);

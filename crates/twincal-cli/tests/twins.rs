@@ -68,6 +68,61 @@ fn a_gate_that_the_config_does_not_give_stays_as_the_twin_has_it() {
     assert_eq!(check(coverage, 1), gates(true, false));
 }
 
+#[test]
+fn check_says_which_gate_failed() {
+    let folder = common::fitted_copy();
+    let known = run(folder.path(), ["check", "run.csv", "--twin", "twin"]).expect(0);
+    let no_check = "run.csv: this log is one that the twin was fitted to: no independent";
+    let judged = "What the gates judge: rows in which the joint moves";
+    assert!(
+        known.out.contains(no_check) && known.out.contains(judged) && known.out.contains(" ≤ 0.0"),
+        "{}",
+        known.out
+    );
+    let louder = csv(400, &|_, mut row| {
+        row[8] = (row[8].parse::<f64>().unwrap() + 0.5).to_string();
+        row
+    });
+    fs::write(folder.path().join("drifted.csv"), louder).unwrap();
+    let done = run(folder.path(), ["check", "drifted.csv", "--twin", "twin"]).expect(1);
+    assert!(
+        done.out.contains("joint `elbow`: RMSE 0.5") && !done.out.contains("`shoulder`: RMSE"),
+        "{}",
+        done.out
+    );
+    assert!(done.out.contains("of the twin on the") && !done.out.contains("fitted to"));
+    let rows: Vec<&str> = done.out.lines().filter(|line| line.contains('≤')).collect();
+    assert!(
+        rows.len() == 2 && rows[0].ends_with("passed") && rows[1].ends_with("failed"),
+        "{rows:?}"
+    );
+    let done = run(
+        folder.path(),
+        ["check", "drifted.csv", "--twin", "twin", "--json"],
+    )
+    .expect(1);
+    let result: serde_json::Value = serde_json::from_str(&done.out).unwrap();
+    assert_eq!(result["passed"], false);
+    assert_eq!(result["gates"][0]["rows"], "moving");
+    fs::write(
+        folder.path().join("gates.toml"),
+        "[check]\nrmse_ratio = 1000\ncoverage = [0, 1]\n",
+    )
+    .unwrap();
+    run(
+        folder.path(),
+        [
+            "check",
+            "drifted.csv",
+            "--twin",
+            "twin",
+            "--config",
+            "gates.toml",
+        ],
+    )
+    .expect(0);
+}
+
 /// Torque of motors, fifty times smaller than at the joints: `check` and `predict` take it as the fit did, and say so.
 #[test]
 fn new_logs_are_read_as_those_of_the_fit_were() {

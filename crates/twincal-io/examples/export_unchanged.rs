@@ -23,6 +23,7 @@ fn judge(path: &Path) -> String {
             link: link.name.clone(),
             before: link.inertia,
             after: link.inertia?,
+            no_body: false,
         })
     });
     let same = WriteBack {

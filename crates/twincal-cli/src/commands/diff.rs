@@ -12,6 +12,9 @@ use twincal::compare::{Became, Change, ParameterChange, compare, hindrances, sur
 use twincal_io::artifact::Artifact;
 use twincal_io::twin_json::StoredTwin;
 
+/// What stands before and after the arrows.
+const VALUES: &str = "values: medians over all models, 0 in those without the effect; `fit` prints medians given that it is in";
+
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Difference {
@@ -58,6 +61,9 @@ fn print(changes: &[Change], velocities: [f64; 2], terminal: &mut Terminal) {
             &format!("{components} as before (--json has the numbers)"),
             terminal,
         );
+    }
+    if same < changes.len() {
+        paragraph(VALUES, terminal);
     }
     terminal.say("");
     if other.is_empty() {
@@ -192,13 +198,19 @@ fn line(change: &Change, parameter: &ParameterChange) -> String {
         (x, false) => format!("{x:+.3e}"),
     };
     let spread = number(spread).trim_start_matches('+').to_owned();
-    let [low, high] = parameter.interval95.map(|x| number(factor * x));
+    let ends = |ends: [f64; 2]| ends.map(|x| number(factor * x)).join(" to ");
+    let how_sure = if parameter.lopsided() {
+        let central = ends(parameter.interval68);
+        format!(" (68 %: {central}, 95 %: {})", ends(parameter.interval95))
+    } else {
+        format!(" ± {spread} (95 %: {})", ends(parameter.interval95))
+    };
     let unit = match unit {
         "" | "°" => unit.to_owned(),
         unit => format!(" {unit}"),
     };
     format!(
-        "{name}{} → {}{unit}, difference {} ± {spread} (95 %: {low} to {high})",
+        "{name}{} → {}{unit}, difference {}{how_sure}",
         number(before),
         number(after),
         number(difference)

@@ -1,7 +1,9 @@
 //! `twincal export`: the calibrated model as a file of the user's own kind, or as code.
 
 use super::print_json;
-use super::summary::paragraph;
+use super::summary::{self, paragraph, wrapped};
+use super::table::{print_table, table};
+use super::verdict::doubt;
 use crate::args::{Beyond as BeyondFormat, Export, ExportFormat};
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
@@ -9,6 +11,8 @@ use crate::terminal::{Terminal, clean};
 use serde::Serialize;
 use std::io::Write as _;
 use std::path::Path;
+use twincal::Finding;
+use twincal::calibrate::Calibration;
 use twincal::evaluator::{Beyond, Evaluator};
 use twincal::posterior::draws::draw;
 use twincal::robot::Inertia;
@@ -17,12 +21,17 @@ use twincal_io::artifact::{Artifact, Claim, MODEL_MJCF, MODEL_URDF, Maker, Outpu
 use twincal_io::export::code::{Language, source};
 use twincal_io::export::write_model;
 use twincal_io::model::{Model, ModelSettings, parse_model};
+use twincal_io::report::decisive;
 use twincal_io::twin_json::StoredTwin;
 
 /// Random stream of the draws that are written.
 const STREAM: u64 = (1 << 32) + 2;
 /// Most models of one call.
 const MOST: usize = 100_000;
+/// Probability above which the model average is the component's own number, as words round it.
+const CERTAIN: f64 = 0.98;
+/// Share of its like below which a number is rounding.
+const ROUNDING: f64 = 1e-9;
 /// Residual components that are told one by one; the rest is summed up.
 const TOLD: usize = 8;
 
@@ -38,6 +47,7 @@ struct Exported<'a> {
     joint_names: Vec<&'a str>,
     #[serde(flatten)]
     change: &'a WriteBack,
+    findings: Vec<Finding>,
 }
 
 /// What `--json` prints of draws.
@@ -49,6 +59,7 @@ struct Drawn {
     seed: u64,
     /// How many of them had an inertia that had to be made physical.
     projected: usize,
+    findings: Vec<Finding>,
 }
 
 /// What `--json` prints of code.
@@ -63,6 +74,7 @@ struct Coded<'a> {
     kept: usize,
     /// Largest error of an end of the interval, as a share of its width.
     interval_error: f64,
+    findings: Vec<Finding>,
 }
 
 pub(super) fn run(flags: &Export, terminal: &mut Terminal) -> Outcome<u8> {
@@ -200,6 +212,7 @@ fn code(flags: &Export, language: Language, terminal: &mut Terminal) -> Outcome<
         }
     };
     let text = source(&evaluator, language, &about)?;
+    let findings = doubts(&stored, terminal);
     if !write(flags, output, text.as_bytes(), terminal)? {
         return Ok(0);
     }
@@ -211,6 +224,7 @@ fn code(flags: &Export, language: Language, terminal: &mut Terminal) -> Outcome<
             steps: evaluator.steps.len(),
             kept: evaluator.kept,
             interval_error: evaluator.interval_error,
+            findings,
         };
         print_json(terminal, &coded)?;
     } else {
@@ -234,6 +248,7 @@ fn one(flags: &Export, kind: Kind, terminal: &mut Terminal) -> Outcome<u8> {
     let (stored, model) = read(flags, kind)?;
     let change = Writer::new(&stored.calibration, kind.holds)?.mean()?;
     let bytes = write_model(&model, &change)?;
+    let findings = doubts(&stored, terminal);
     if !write(flags, output, &bytes, terminal)? {
         return Ok(0);
     }
@@ -243,10 +258,12 @@ fn one(flags: &Export, kind: Kind, terminal: &mut Terminal) -> Outcome<u8> {
             output: shown(flags),
             joint_names: stored.calibration.twin.robot.joint_names(),
             change: &change,
+            findings,
         };
         print_json(terminal, &exported)?;
     } else {
         say(&change, kind.holds, terminal);
+        how_good(&change, &stored.calibration, kind.holds, terminal);
         if stored.calibration.twin.payload_where_unknown {
             paragraph(CARRIED, terminal);
             terminal.say("");
@@ -277,6 +294,7 @@ fn draws(
     };
     let claim = Claim::new(folder, replace)?;
     let (stored, model) = read(flags, kind)?;
+    let findings = doubts(&stored, terminal);
     let writer = Writer::new(&stored.calibration, kind.holds)?;
     let seed = flags.seed.unwrap_or(stored.context.seed);
     let drawn = draw(&stored.calibration.twin.posterior, count, seed, STREAM);
@@ -305,6 +323,7 @@ fn draws(
             models: count,
             seed,
             projected,
+            findings,
         };
         print_json(terminal, &drawn)?;
     } else {
@@ -315,6 +334,15 @@ fn draws(
         terminal.say(&output);
     }
     Ok(0)
+}
+
+/// What the twin's own verdict says against it, at once on standard error.
+fn doubts(stored: &StoredTwin, terminal: &mut Terminal) -> Vec<Finding> {
+    let doubts: Vec<Finding> = doubt(&stored.calibration).into_iter().collect();
+    for finding in &doubts {
+        terminal.note(&format!("warning: {}", finding.message));
+    }
+    doubts
 }
 
 /// The twin, and the user's model as it was fitted.
@@ -355,6 +383,17 @@ fn read(flags: &Export, kind: Kind) -> Outcome<(StoredTwin, Model)> {
 fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
     let format = holds.format;
     terminal.heading(&format!("In the {format} now"));
+    if let Some(projection) = &change.projection {
+        let text = format!(
+            "warning: no body can have the inertia found for {}: the one with the nearest torque was taken; do not read it as mass or \
+             inertia (a comment in the file says so, too)",
+            projection.links.join(", ")
+        );
+        for (number, line) in wrapped(&text, 76).iter().enumerate() {
+            let begin = if number == 0 { "  " } else { "    " };
+            terminal.warning(&format!("{begin}{line}"));
+        }
+    }
     if change.written.is_empty() {
         terminal.say("  nothing: no found effect has a place there; the file is as it was");
     }
@@ -362,19 +401,22 @@ fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
         let Written {
             words, place, pip, ..
         } = written;
-        let text = if let Some(value) = written.in_file {
-            format!(
+        // The file holds the model average.
+        let text = match written.in_file {
+            Some(value) if written.nearest => format!(
                 "{words} ({place}; in the file {}, nearest to that and the joint's quadratic friction)",
                 short(value)
-            )
-        } else if *pip >= 0.5 {
-            format!("{words} ({place})")
-        } else {
-            // The file holds the model average.
-            format!(
+            ),
+            Some(value) => format!(
+                "{words} ({place}; in the file {}, the average over models with and without it, PIP {})",
+                short(value),
+                summary::pip(Some(*pip))
+            ),
+            None if *pip > CERTAIN => format!("{words} ({place})"),
+            None => format!(
                 "{words} ({place}; {:.0} % of that, its probability)",
                 100.0 * pip
-            )
+            ),
         };
         paragraph(&text, terminal);
     }
@@ -415,26 +457,52 @@ fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
             paragraph(&text, terminal);
         }
     }
-    if let Some(projection) = &change.projection {
-        let text = format!(
-            "no body can have the inertia found for {}: the one with the nearest torque was taken",
-            projection.links.join(", ")
-        );
-        paragraph(&text, terminal);
-    }
-    let text = format!(
-        "of what went in, {} N·m rms is lost in one physical model; all effects together are {} N·m rms",
-        short(largest(&change.lost)),
-        short(largest(&change.correction))
-    );
+    let (lost, all) = (largest(&change.lost), largest(&change.correction));
+    let lost = if lost > ROUNDING * all {
+        format!("{} N·m rms", short(lost))
+    } else {
+        "nothing".into()
+    };
+    let text = format!("of what went in, {lost} is lost in one physical model");
     paragraph(&text, terminal);
+    terminal.say("");
+}
+
+/// What the file alone lacks of the twin's torque, beside what all effects are and how far the twin itself is from held-out torque.
+fn how_good(change: &WriteBack, calibration: &Calibration, holds: Holds, terminal: &mut Terminal) {
+    let (robot, format) = (&calibration.twin.robot, holds.format);
+    terminal.heading(&format!("How good the {format} is alone"));
+    let mut rows = table(&[
+        "joint",
+        "nominal lacks",
+        &format!("this {format} lacks"),
+        "twin, held out",
+    ]);
+    let scores = decisive(&calibration.validation);
+    for (joint, name) in robot.joint_names().into_iter().enumerate() {
+        let number = |values: &[f64]| values.get(joint).map_or("–".into(), |x| short(*x));
+        let own = scores.joints.get(joint).map(|own| own.rmse_calibrated);
+        rows.add_row([
+            &*clean(name),
+            &*number(&change.correction),
+            &number(&change.lacks),
+            &own.filter(|own| own.is_finite()).map_or("–".into(), short),
+        ]);
+    }
+    print_table(&rows, terminal);
+    let text = "lacks: rms over states within the training range of the twin's torque that is not in the file, all effects together; held \
+                out: RMSE of the twin, to which that comes. N·m, of sliders N.";
+    paragraph(text, terminal);
     terminal.say("");
 }
 
 /// "upper_arm_link: 12.9 -> 6.28 kg, centre (-0.28, 0, 0.136) -> (-0.31, 0, 0.14) m"; `None` for a link of its own.
 fn change_of(change: &LinkChange) -> Option<String> {
     let before = change.before?;
-    let centre = |inertia: &Inertia| inertia.com.map(short).join(", ");
+    let coordinates = before.com.iter().chain(&change.after.com);
+    let far = coordinates.fold(0.0_f64, |far, x| far.max(x.abs()));
+    let shown = |x: f64| short(if x.abs() > ROUNDING * far { x } else { 0.0 });
+    let centre = |inertia: &Inertia| inertia.com.map(shown).join(", ");
     let (was, is) = (centre(&before), centre(&change.after));
     let mut text = format!("{}: ", clean(&change.link));
     let masses = (short(before.mass), short(change.after.mass));
@@ -451,6 +519,9 @@ fn change_of(change: &LinkChange) -> Option<String> {
     if before.tensor != change.after.tensor {
         text += ", new inertia tensor";
     }
+    if change.no_body {
+        text += "; no body can have what was found";
+    }
     Some(text)
 }
 
@@ -460,7 +531,9 @@ fn largest(values: &[f64]) -> f64 {
 
 /// Three digits.
 fn short(value: f64) -> String {
-    if value == 0.0 || (1e-3..1e4).contains(&value.abs()) {
+    if value == 0.0 {
+        "0".into()
+    } else if (1e-3..1e4).contains(&value.abs()) {
         let decimals = (2.0 - value.abs().max(1e-3).log10().floor()).clamp(0.0, 5.0);
         format!("{value:.*}", decimals as usize)
     } else {

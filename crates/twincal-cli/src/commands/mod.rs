@@ -17,6 +17,7 @@ mod report;
 mod settings;
 mod summary;
 mod table;
+mod verdict;
 
 use crate::args::Command;
 use crate::failure::{DEGRADED, Failure, Outcome};

@@ -2,6 +2,7 @@
 
 use super::inputs::{LogInput, refuse_input_as_output};
 use super::summary::{Notes, paragraph};
+use super::verdict::doubt;
 use super::{code_of, print_json, require_strict, settings, start_threads};
 use crate::args::Predict;
 use crate::failure::{Failure, Outcome};
@@ -91,13 +92,18 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
     let Prediction {
         rows,
         extrapolating,
-        findings,
+        mut findings,
     } = prediction;
+    let doubt = doubt(&stored.calibration);
+    if let Some(doubt) = &doubt {
+        terminal.note(&format!("warning: {}", doubt.message));
+    }
     let output = flags
         .output
         .as_ref()
         .map(|path| path.to_string_lossy().into_owned());
     if settings.json {
+        findings.splice(0..0, doubt);
         print_json(
             terminal,
             &Predicted {

@@ -437,7 +437,7 @@ pub(super) fn indented(text: &str, begin: [&str; 2], terminal: &mut Terminal) {
     }
 }
 
-fn wrapped(text: &str, width: usize) -> Vec<String> {
+pub(super) fn wrapped(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {
         match lines.last_mut() {

@@ -106,6 +106,14 @@ impl<'a> Edits<'a> {
         self.child(element, element.inside, lines);
     }
 
+    /// `comment` as a first line of a child block, unless it stands there before the element's first child.
+    pub(super) fn once(&self, element: &Element, comment: &str) -> Option<(usize, String)> {
+        let first = element.children.first();
+        let end = first.map_or(element.close, |&c| self.document.elements[c].offset);
+        let said = self.text[element.inside..end].contains(comment);
+        (!said).then(|| (0, comment.to_owned()))
+    }
+
     /// Adds a child as the last.
     pub(super) fn last_child(&mut self, element: &Element, lines: &[(usize, String)]) {
         let last = element.children.last();

@@ -1,5 +1,6 @@
 //! Changes of an MJCF: `<inertial>`, joint damping, frictionloss, armature and spring, gravity.
 
+use super::NO_BODY;
 use super::edit::{Edits, list};
 use crate::error::{Error, Place, Result};
 use crate::model::Model;
@@ -67,6 +68,7 @@ fn inertial<'e>(
     let Inertia { mass, com, tensor } = change.after;
     let com = add(com, site.origin);
     let found = site.inertial.as_ref();
+    let comment = edits.once(body, NO_BODY).filter(|_| change.no_body);
     let Some((element, frame, own)) =
         found.and_then(|(offset, frame, own)| Some((at(*offset)?, frame, own)))
     else {
@@ -76,9 +78,13 @@ fn inertial<'e>(
             list(&[mass]),
             list(&six(&tensor))
         );
-        edits.first_child(body, &[(0, line)]);
+        let lines: Vec<_> = comment.into_iter().chain([(0, line)]).collect();
+        edits.first_child(body, &lines);
         return;
     };
+    if let Some(comment) = comment {
+        edits.first_child(body, &[comment]);
+    }
     // In the frames around the element.
     let back = transpose(&frame.rotation);
     let com = apply(&back, add(com, scale(-1.0, frame.translation)));

@@ -12,6 +12,10 @@ use crate::model::{Model, ModelFormat, ModelSettings, parse_model};
 use twincal::robot::Inertia;
 use twincal::write_back::WriteBack;
 
+/// What a file says at a link whose inertia is no body's.
+const NO_BODY: &str = "<!-- twincal: no rigid body can have the inertia that was found here. These numbers are a body with the \
+                       nearest torque: do not read them as mass or inertia of this link. -->";
+
 /// The user's file with the change, byte by byte the same elsewhere.
 ///
 /// # Errors

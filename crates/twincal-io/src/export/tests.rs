@@ -63,6 +63,7 @@ fn only_the_changed_words_change() {
         link: "arm".into(),
         before: None,
         after,
+        no_body: false,
     };
     let wanted = ARM
         .replace("xyz='0.1  0\t0.0'", "xyz='0.1  0.02\t0.0'")
@@ -80,6 +81,7 @@ fn what_is_missing_is_added_with_the_indentation_around_it() {
             com: [0.0, 0.0, 1e-7],
             tensor: [[1e-3, 0.0, 0.0], [0.0, 1e-3, 0.0], [0.0, 0.0, 1e-3]],
         },
+        no_body: false,
     };
     let joint = joint("j", Some(0.5), Some(0.125));
     let wanted = ARM
@@ -158,6 +160,7 @@ fn mjcf_inertias_keep_their_form_where_it_can_say_them() {
         link: "a".into(),
         before: None,
         after,
+        no_body: false,
     };
     assert_eq!(mjcf(&change(vec![same.clone()], vec![])), MJCF);
     // Turned by 90 degrees about z, the file's x is the body's y. The link's frame sits on the joint, 0.1 m up.
@@ -205,6 +208,7 @@ fn mjcf_joints_and_gravity_change_and_classes_do_not() {
         link: "b".into(),
         before: None,
         after: Inertia { mass: 1.0, ..b },
+        no_body: false,
     };
     let mut change = change(vec![link], vec![one, two]);
     change.gravity = Some([0.1, 0.0, -9.8]);
@@ -215,4 +219,47 @@ fn mjcf_joints_and_gravity_change_and_classes_do_not() {
     assert!(text.contains("<default><joint damping='0.5' armature='0.1'/></default>"));
     assert!(text.starts_with("<mujoco>\n  <option gravity=\"0.1 0 -9.8\"/>\n  <default>"));
     assert!((inertia_in(&text, "b").mass - 1.0).abs() < 1e-12);
+}
+
+/// Where the inertia is no body's the file says so at the link, and once, however often it goes through.
+#[test]
+fn what_is_no_body_is_said_at_the_link() {
+    let impossible = |link: &str, after| LinkChange {
+        link: link.into(),
+        before: None,
+        after,
+        no_body: true,
+    };
+    let arm = |text: &str, link: &str| {
+        let model = parse_model("m.urdf", text.as_bytes(), &ModelSettings::default()).unwrap();
+        let mut inertia = model.description.links[1].inertia.unwrap();
+        inertia.mass = 1.75;
+        change(vec![impossible(link, inertia)], vec![])
+    };
+    let text = exported(ARM, &arm(ARM, "arm"));
+    let wanted = ARM.replace("value=' 1.50 '", "value=' 1.75 '").replace(
+        "'arm' >\r\n",
+        &format!("'arm' >\r\n\t\t{}\r\n", super::NO_BODY),
+    );
+    assert_eq!(text, wanted);
+    assert_eq!(exported(&text, &arm(&text, "arm")), wanted);
+    let text = exported(ARM, &arm(ARM, "tool"));
+    let begin = format!(
+        "<link name='tool'>\r\n\t\t{}\r\n\t\t<inertial>\r\n",
+        super::NO_BODY
+    );
+    assert!(text.contains(&begin), "{text}");
+    for (body, before) in [("a", "<joint name='j'"), ("b", "<inertial ")] {
+        let after = Inertia {
+            mass: 3.0,
+            ..inertia_in(MJCF, body)
+        };
+        let text = mjcf(&change(vec![impossible(body, after)], vec![]));
+        let (_, rest) = text.split_once(super::NO_BODY).unwrap();
+        assert!(rest.trim_start().starts_with(before), "{text}");
+        assert_eq!(text.matches("<!-- twincal").count(), 1);
+    }
+    // XML has no comment with two hyphens inside.
+    let inside = super::NO_BODY.strip_prefix("<!--").unwrap();
+    assert_eq!(inside.find("--"), Some(inside.len() - 3));
 }

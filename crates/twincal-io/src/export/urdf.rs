@@ -1,5 +1,6 @@
 //! Changes of a URDF: `<inertial>` of links, `<dynamics damping friction>` of joints.
 
+use super::NO_BODY;
 use super::edit::{Edits, digits, list};
 use crate::error::Result;
 use crate::model::Model;
@@ -51,10 +52,15 @@ fn inertial(
     change: &LinkChange,
 ) -> Result<()> {
     let Inertia { mass, com, tensor } = change.after;
+    let comment = edits.once(link, NO_BODY).filter(|_| change.no_body);
     let Some(inertial) = document.child(link, "inertial") else {
-        edits.first_child(link, &block(&change.after));
+        let lines: Vec<_> = comment.into_iter().chain(block(&change.after)).collect();
+        edits.first_child(link, &lines);
         return Ok(());
     };
+    if let Some(comment) = comment {
+        edits.first_child(link, &[comment]);
+    }
     let mut rotation: Matrix = IDENTITY;
     let far = com.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     match document.child(inertial, "origin") {

@@ -161,6 +161,16 @@ impl ParameterChange {
         0.5 * (self.interval68[1] - self.interval68[0])
     }
 
+    /// True where ± would mislead: one arm of the central 68.3 % interval is more than twice the other, or an end of the 95 % interval lies
+    /// more than twice as far out as the spread says of a normal distribution.
+    #[must_use]
+    pub fn lopsided(&self) -> bool {
+        let arms = |[low, high]: [f64; 2]| [self.median - low, high - self.median];
+        let (near, far) = (arms(self.interval68), arms(self.interval95));
+        let (short, long) = (near[0].min(near[1]), near[0].max(near[1]));
+        long > 2.0 * short || far[0].max(far[1]) > 2.0 * 1.96 * self.spread()
+    }
+
     /// True if the probability of a change in the other direction, or of none, is below 0.01.
     #[must_use]
     pub fn changed(&self) -> bool {
@@ -443,6 +453,27 @@ mod tests {
             words("payload", Family::Payload, &[unseen]),
             "payload: no difference"
         );
+    }
+
+    /// Of a normal distribution ± is all there is to say; of one with a tenth of its draws far below, and of one that ends where most of its
+    /// draws lie, it is not.
+    #[test]
+    fn an_interval_of_which_one_side_is_longer_is_lopsided() {
+        let of = |draws: Vec<f64>| {
+            let none = vec![0.0; draws.len()];
+            parameter_change("value".into(), "N·m".into(), none, draws).lopsided()
+        };
+        // Logistic quantiles: symmetric, 95 % at 2.15 instead of 1.96 spreads.
+        let even = |i: i32| {
+            let p = (f64::from(i) + 0.5) / 1000.0;
+            6.8 + (p / (1.0 - p)).ln()
+        };
+        assert!(!of((0..1000).map(even).collect()));
+        let split = |i: i32| if i < 100 { -8.0 } else { even(i) };
+        assert!(of((0..1000).map(split).collect()));
+        let square = |i: i32| (f64::from(i) / 1000.0).powi(3);
+        assert!(of((0..1000).map(square).collect()));
+        assert!(!of(vec![0.0; 1000]));
     }
 
     /// By the thresholds of a fit's verdicts.

@@ -136,9 +136,12 @@ pub(crate) fn check(
     if zero_tensor {
         return Ok(Some(Finding::new(
             Severity::Note,
-            "point_mass",
+            super::dense::CODE,
             link,
-            format!("link `{link}`: {mass} kg with inertia tensor 0: taken as a point mass"),
+            format!(
+                "link `{link}`: {mass} kg with inertia tensor 0: taken as a point mass. What its real tensor adds will be told as motor inertia \
+                 of its joint or as the tensor of another link; give the link its own in the model where you know it"
+            ),
             1,
         )));
     }

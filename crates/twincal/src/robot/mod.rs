@@ -11,6 +11,7 @@ mod inertia;
 mod tree;
 mod coordinates;
 mod bodies;
+mod dense;
 mod parameters;
 mod carry;
 mod regrouped;
@@ -120,6 +121,7 @@ impl Robot {
         let (sources, coordinates) = coordinates::assign(&description, locked, &mut findings)?;
         let (bodies, homes) = bodies::lay_out(&description, &tree, &sources, &mut findings)?;
         report_massless(&description, &coordinates, &bodies, &mut findings);
+        dense::report(&description, &coordinates, &bodies, &mut findings);
         let planar = axes_parallel(&bodies);
         Ok((
             Self {

@@ -69,7 +69,7 @@ pub(super) fn statuses(
                 } else {
                     repeated.push(format!("{name} (by {})", others.join(", ")));
                 }
-                Status::AliasOf(others.join(","))
+                Status::AliasOf(others.join(", "))
             }
         });
     }

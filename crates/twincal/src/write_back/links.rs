@@ -18,6 +18,8 @@ pub struct LinkChange {
     pub before: Option<Inertia>,
     /// As it is now: its pseudo-inertia is positive definite.
     pub after: Inertia,
+    /// True where no rigid body can have what was found: `after` is the one with the nearest torque, and no measure of the link.
+    pub no_body: bool,
 }
 
 /// The link that takes up what changes on a body: the payload's own frame, else the link that the body is named
@@ -100,6 +102,7 @@ pub(super) fn changes(
                 link: link.name.clone(),
                 before: link.inertia,
                 after,
+                no_body: (projection.iter()).any(|p| p.links.contains(&link.name)),
             });
         }
     }

@@ -15,17 +15,28 @@ pub(super) fn difference(
     held: &[Option<Place>],
     beta: &[f64],
 ) -> Vec<f64> {
+    let written = beta.iter().zip(held);
+    let written: Vec<f64> = written
+        .map(|(beta, place)| if place.is_some() { *beta } else { 0.0 })
+        .collect();
+    lacks(states, [before, after], joints, held, &written)
+}
+
+/// Torque per joint and state, N·m, that `before` + Σ β x of ALL columns has and the robot `after` with its dry friction has not.
+pub(super) fn lacks(
+    states: &States,
+    [before, after]: [&Robot; 2],
+    joints: &[JointChange],
+    held: &[Option<Place>],
+    beta: &[f64],
+) -> Vec<f64> {
     // Dry friction is what the file says, in the shape of the column.
     let names = before.joint_names();
     let mut beta: Vec<f64> = beta.to_vec();
     for (beta, place) in beta.iter_mut().zip(held) {
-        match place {
-            None => *beta = 0.0,
-            Some(Place::Coulomb(joint)) => {
-                let change = joints.iter().find(|change| change.joint == names[*joint]);
-                *beta -= change.and_then(|change| change.friction).unwrap_or(0.0);
-            }
-            Some(_) => {}
+        if let Some(Place::Coulomb(joint)) = place {
+            let change = joints.iter().find(|change| change.joint == names[*joint]);
+            *beta -= change.and_then(|change| change.friction).unwrap_or(0.0);
         }
     }
     let mut difference = states.torque(&beta);

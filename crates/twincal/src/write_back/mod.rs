@@ -58,9 +58,10 @@ pub struct Written {
     pub pip: f64,
     /// Link or joint that changes; `gravity`.
     pub place: String,
-    /// What the file holds of a joint's friction where it stands for more than this component (quadratic friction, which no file
-    /// holds): viscous, N·m·s/rad, or dry, N·m (for a slider N·s/m, N).
+    /// What the file holds of a joint's friction or motor inertia, SI, where it is another number than the one in `words` by more than 2 %.
     pub in_file: Option<f64>,
+    /// True where `in_file` stands for quadratic friction as well, which no file holds; else it is the average over all models.
+    pub nearest: bool,
 }
 
 /// A component that the file cannot hold, or that is too uncertain to be written.
@@ -100,6 +101,9 @@ pub struct WriteBack {
     pub lost: Vec<f64>,
     /// RMS of the torque that all components add to the nominal model, per joint, N·m (N).
     pub correction: Vec<f64>,
+    /// RMS of the torque that the twin has and the file has not, per joint, N·m (N): that of all residual components and of what is lost,
+    /// summed state by state.
+    pub lacks: Vec<f64>,
 }
 
 /// Everything that a write-back needs of a calibration, worked out once for mean and draws.
@@ -111,6 +115,8 @@ pub struct Writer<'a> {
     states: States,
 }
 
+/// Share by which a number in the file may differ from the one in words before both are told: words round, too.
+const AS_TOLD: f64 = 0.02;
 /// A component of a group that nobody can tell apart is written with the others from this probability on.
 const SHARE_OF_GROUP: f64 = 0.05;
 
@@ -199,6 +205,7 @@ impl<'a> Writer<'a> {
             projection,
             lost: Vec::new(),
             correction: Vec::new(),
+            lacks: Vec::new(),
         };
         let difference = |change: &WriteBack| -> Result<Vec<f64>> {
             let robots = [robot, &change.robot(robot)?];
@@ -214,6 +221,9 @@ impl<'a> Writer<'a> {
         change.gravity = lost::fitted_gravity(&self.states, robot, &change, &rest)?;
         change.lost = rms(&difference(&change)?);
         change.correction = self.states.rms(beta);
+        let robots = [robot, &change.robot(robot)?];
+        let lacks = lost::lacks(&self.states, robots, &change.joints, &held, beta);
+        change.lacks = rms(&lacks);
         self.tell(&mut change, (&whole, chosen), (beta, &file), &held, &shares);
         Ok(change)
     }
@@ -275,15 +285,31 @@ impl<'a> Writer<'a> {
             };
             if whole[index] {
                 let place = own.iter().find_map(|&column| held[column].as_ref());
-                let differs = own.iter().find(|&&column| file[column] != beta[column]);
+                let nearest = own.iter().find(|&&column| file[column] != beta[column]);
+                let averaged = || match (place, own.as_slice()) {
+                    (
+                        Some(Place::Viscous(_) | Place::Coulomb(_) | Place::Armature(_)),
+                        &[column],
+                    ) => {
+                        let told = component.parameters.first()?.told().0;
+                        let far = (file[column] - told).abs() > AS_TOLD * told.abs();
+                        far.then_some(file[column])
+                    }
+                    _ => None,
+                };
                 change.written.push(Written {
                     component: component.name.clone(),
                     words: component.words.clone(),
                     pip,
-                    in_file: differs.map(|&column| file[column]),
+                    in_file: nearest.map(|&column| file[column]).or_else(averaged),
+                    nearest: nearest.is_some(),
                     place: match place {
                         Some(Place::Inertia { body, .. }) => {
                             let link = links::home(self, *body, component.family);
+                            if component.no_rigid_body {
+                                let own = change.links.iter_mut().find(|own| own.link == link);
+                                own.into_iter().for_each(|own| own.no_body = true);
+                            }
                             format!("link {link}")
                         }
                         Some(Place::Gravity(_)) | None => "gravity".into(),

@@ -18,9 +18,41 @@ pub(super) struct Mend {
     /// Something is wrong, not only missing.
     #[serde(skip)]
     pub(super) wrong: bool,
+    /// When it can be mended.
+    #[serde(skip)]
+    pub(super) when: When,
     #[serde(skip)]
     rank: usize,
 }
+
+/// When something can be mended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum When {
+    /// With these logs.
+    Now,
+    /// In the next log only: the fit of this one goes ahead as it is.
+    NextLog,
+    /// Nothing has to be done.
+    Never,
+}
+
+impl When {
+    /// By what is to be done, and whether the fit goes ahead without.
+    fn of(how: &str, goes_ahead: bool) -> Self {
+        if how.starts_with("nothing") {
+            Self::Never
+        } else if goes_ahead && NEXT.iter().any(|begin| how.starts_with(begin)) {
+            Self::NextLog
+        } else {
+            Self::Now
+        }
+    }
+}
+
+/// How mends begin that ask for another recording.
+const NEXT: [&str; 2] = ["log ", "record "];
+/// What stands before a mend that is for the next log: of a published one there is no other.
+const FOR_THE_NEXT: &str = "nothing has to be done for this log; for the next one:";
 
 /// What to do about effects of a model that are left aside.
 const NOT_USED: &str = "nothing, if it does not act in these logs; else write its effect into the model in a form that is read";
@@ -204,6 +236,7 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
                 false => refusal.remedy.clone(),
             },
             wrong: true,
+            when: When::Now,
             rank: 0,
         })
         .collect();
@@ -247,8 +280,12 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
                 "the logs show {logs} of {robot} independent directions; {} more would come from moving {joint}",
                 unseen.directions
             ),
-            how: format!("record a log: {}", twincal::excitation::sentence(unseen)),
+            how: format!(
+                "for the next log: {}",
+                twincal::excitation::sentence(unseen)
+            ),
             wrong: false,
+            when: When::NextLog,
             rank: ORDER.len() + 3,
         });
     }
@@ -311,6 +348,12 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
         (_, Some(place)) => ORDER[place].1.into(),
         (_, None) => "read the message; the report of `twincal fit` repeats it".into(),
     };
+    let goes_ahead = examination.refusals.is_empty() && finding.severity < Severity::Degraded;
+    let when = When::of(&how, goes_ahead);
+    let how = match when {
+        When::NextLog => format!("{FOR_THE_NEXT} {how}"),
+        When::Now | When::Never => how,
+    };
     // Of the same place in the order, what is degraded comes before what is only doubtful.
     let rank = if finding.severity == Severity::Degraded {
         1
@@ -325,6 +368,7 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
         },
         how,
         wrong: true,
+        when,
         rank: rank + place.unwrap_or(ORDER.len()),
     }
 }
@@ -348,4 +392,30 @@ pub(super) fn lag(examination: &Examination) -> Option<f64> {
         .iter()
         .all(|(lag, interval)| (lag - mean).abs() <= *interval);
     agree.then_some((mean * 1e4).round() / 1e4)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::When;
+
+    #[test]
+    fn what_needs_another_recording_is_for_the_next_log_where_the_fit_goes_ahead() {
+        for (how, goes_ahead, when) in [
+            (
+                "log the full resolution of the encoder",
+                true,
+                When::NextLog,
+            ),
+            ("log the full resolution of the encoder", false, When::Now),
+            ("record a slower motion", true, When::NextLog),
+            (
+                "twincal.toml: [signal] cutoff_hz = 4.0, or log more",
+                true,
+                When::Now,
+            ),
+            ("nothing: left out", true, When::Never),
+        ] {
+            assert_eq!(When::of(how, goes_ahead), when, "{how}");
+        }
+    }
 }

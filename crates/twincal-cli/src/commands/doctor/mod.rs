@@ -15,7 +15,7 @@ use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use examine::{Examination, Mapping, Refusal, Trial, examine};
-use mends::{Mend, mends};
+use mends::{Mend, When, mends};
 use propose::propose;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -191,13 +191,21 @@ fn diagnosis(examination: Examination, asked: &Asked) -> Diagnosis {
     let refused = examination.refusals.iter().map(|refusal| refusal.exit_code);
     let degraded = code_of(&examination.findings);
     let exit_code = refused.clone().min().unwrap_or(degraded);
-    let wrong = mends.iter().filter(|mend| mend.wrong).count();
-    let warnings = wrong - examination.refusals.len();
+    let count = |when: When| {
+        let of = |mend: &&Mend| mend.wrong && mend.when == when;
+        mends.iter().filter(of).count()
+    };
+    // Refusals are mends of now.
+    let to_mend = match (count(When::Now), count(When::NextLog)) {
+        (0, 0) => String::new(),
+        (now, 0) => format!("; {now} to mend"),
+        (0, next) => format!("; {next} to do better in the next log"),
+        (now, next) => format!("; {now} to mend, {next} to do better in the next log"),
+    };
     let verdict = match (refused.count(), degraded) {
-        (0, 0) if warnings == 0 => "fit would go ahead".to_owned(),
-        (0, 0) => format!("fit would go ahead; {warnings} to mend"),
-        (0, _) => format!("fit would go ahead, but call the data degraded; {warnings} to mend"),
-        (all, _) => format!("fit would refuse; {} to mend", all + warnings),
+        (0, 0) => format!("fit would go ahead{to_mend}"),
+        (0, _) => format!("fit would go ahead, but call the data degraded{to_mend}"),
+        _ => format!("fit would refuse{to_mend}"),
     };
     let excitation = examination
         .outlook

@@ -8,6 +8,7 @@ use super::examine::Mapping;
 use super::{Diagnosis, LogRow};
 use crate::terminal::{Terminal, clean};
 use twincal::Severity;
+use twincal::lag::LogLag;
 use twincal::words::significant;
 
 /// Mends that come first.
@@ -37,6 +38,10 @@ pub(super) fn print(diagnosis: &Diagnosis, terminal: &mut Terminal) {
         let number = format!("  {}. ", number + 1);
         indented(&mend.problem, [&number, "     "], terminal);
         indented(&mend.how, HOW, terminal);
+    }
+    let of_model = diagnosis.findings.iter();
+    for finding in of_model.filter(|finding| finding.code == "point_mass") {
+        paragraph(&format!("note: {}", finding.message), terminal);
     }
     terminal.say("");
     for words in &diagnosis.converted {
@@ -135,12 +140,33 @@ fn print_log(log: &LogRow, terminal: &mut Terminal) {
                     None if mean.abs() > 3.0 * sd => format!(
                         "{told}: not for certain more than one sample, so that nothing has to be done; [signal] lag = {mean:.4} takes it out"
                     ),
-                    _ => told,
+                    None => format!("{told}: {}", no_clear_lag(lag)),
+                    Some(_) => told,
                 }
             }
             None => "the lag between motion and torque cannot be told: too few joints whose torque the model explains".into(),
         };
         paragraph(&text, terminal);
+    }
+}
+
+/// What follows from a lag that is no more than three of its errors: nothing; and why it is so loose.
+fn no_clear_lag(lag: &LogLag) -> String {
+    let sure = lag.joints.iter().filter(|joint| {
+        let clear = |sd: f64| joint.lag.abs() > 3.0 * sd;
+        joint.speaks && joint.sd.is_some_and(clear)
+    });
+    let ends = sure.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], joint| {
+        [low.min(joint.lag), high.max(joint.lag)]
+    });
+    if ends[0] < ends[1] {
+        format!(
+            "the joints differ ({:+.1} to {:+.1} ms), so that no one lag is at work and nothing has to be done",
+            1e3 * ends[0],
+            1e3 * ends[1]
+        )
+    } else {
+        "no more than its error, so that nothing has to be done".into()
     }
 }
 

@@ -1,0 +1,57 @@
+//! The twin's own verdict, for commands that use it: nobody ought to meet it in the simulator first.
+
+use twincal::calibrate::Calibration;
+use twincal::{Finding, Severity};
+use twincal_io::report::{Answer, answer};
+
+/// How the answer begins that nothing has to be added to.
+const PLAIN: &str = "Yes, on motions";
+
+/// The verdict where it is not a plain yes: the answer and its first reason. It is of the fit, not of what the command does, so that exit codes
+/// do not follow from it.
+pub(super) fn doubt(calibration: &Calibration) -> Option<Finding> {
+    let answer = answer(calibration);
+    (!answer.headline.starts_with(PLAIN)).then(|| {
+        let words = words(&answer);
+        Finding::new(Severity::Warning, "verdict", "", words, 0)
+    })
+}
+
+/// "Can this twin be used? No: … Joint elbow: …"
+fn words(answer: &Answer) -> String {
+    let mut reasons = answer.limits.iter().chain(&answer.grounds);
+    let reason = reasons.next().map_or("", String::as_str);
+    let more = match answer.limits.len() {
+        0 | 1 => String::new(),
+        n => format!(" ({} more in its report)", n - 1),
+    };
+    let headline = answer.headline.replace(" below.", ":");
+    format!("can this twin be used? {headline} {reason}{more}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_reason_stands_behind_the_answer() {
+        let told = |headline: &str, limits: &[&str]| {
+            words(&Answer {
+                headline: headline.into(),
+                grounds: vec!["Torque error: 1 → 2 N·m.".into()],
+                limits: limits.iter().map(|&limit| limit.into()).collect(),
+            })
+        };
+        assert_eq!(
+            told("No: worse.", &[]),
+            "can this twin be used? No: worse. Torque error: 1 → 2 N·m."
+        );
+        assert_eq!(
+            told(
+                "Yes, with the exceptions below.",
+                &["Joint a: one.", "Joint b: two."]
+            ),
+            "can this twin be used? Yes, with the exceptions: Joint a: one. (1 more in its report)"
+        );
+    }
+}
