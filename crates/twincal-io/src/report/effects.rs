@@ -19,6 +19,8 @@ pub(super) struct Effects {
     pub(super) possible: Vec<Kind>,
     /// PIP < 0.05: names alone.
     pub(super) absent: Vec<Absent>,
+    /// Unlikely beside what says the same in these logs, which is likelier.
+    pub(super) rivals: Vec<Absent>,
     /// Whatever their PIP, these data say nothing about them: names alone.
     pub(super) unseen: Vec<Absent>,
     /// Not columns of the regression.
@@ -32,6 +34,7 @@ pub(super) struct Effects {
 pub(super) struct Counts {
     pub(super) possible: usize,
     pub(super) absent: usize,
+    pub(super) rivals: usize,
     pub(super) unseen: usize,
     pub(super) dropped: usize,
 }
@@ -104,17 +107,23 @@ pub(super) fn sort(calibration: &Calibration) -> Effects {
     let unseen = pick(&|c, _| is_unseen(c));
     let seen = |c: &ComponentSummary| !c.selected && !is_unseen(c);
     let possible = pick(&|c, p| seen(c) && p >= MENTIONED);
-    let absent = pick(&|c, p| seen(c) && (p < MENTIONED || p.is_nan()));
+    let unlikely = |c: &ComponentSummary, p: f64| seen(c) && (p < MENTIONED || p.is_nan());
+    let mut open = calibration.groups.iter().filter(|group| !group.settled);
+    let alike: Vec<&String> = open.by_ref().flat_map(|group| &group.members).collect();
+    let rivals = pick(&|c, p| unlikely(c, p) && alike.contains(&&c.name));
+    let absent = pick(&|c, p| unlikely(c, p) && !alike.contains(&&c.name));
     Effects {
         found: kinds(&pick(&|c, _| c.selected), calibration),
         counts: Counts {
             possible: possible.len(),
             absent: absent.len(),
+            rivals: rivals.len(),
             unseen: unseen.len(),
             dropped: dropped.iter().map(|d| d.names.len()).sum(),
         },
         possible: kinds(&possible, calibration),
         absent: names(&absent),
+        rivals: names(&rivals),
         unseen: names(&unseen),
         dropped,
     }
@@ -280,16 +289,51 @@ mod tests {
             let of = |kinds: &[Kind]| kinds.iter().map(|kind| kind.effects.len()).sum::<usize>();
             let names = |all: &[Absent]| all.iter().map(|kind| kind.names.len()).sum::<usize>();
             let (absent, unseen) = (names(&effects.absent), names(&effects.unseen));
+            let rivals = names(&effects.rivals);
+            assert_eq!(effects.counts.rivals, rivals);
             assert_eq!(effects.counts.possible, of(&effects.possible));
             assert_eq!(effects.counts.absent, absent);
             assert_eq!(effects.counts.unseen, unseen);
             let listed = of(&effects.found)
                 + of(&effects.possible)
                 + absent
+                + rivals
                 + unseen
                 + effects.counts.dropped;
             assert_eq!(listed, calibration.components.len());
         }
+    }
+
+    #[test]
+    fn what_says_the_same_as_something_likelier_is_not_absent() {
+        use twincal::calibrate::{Alike, Group};
+        let mut calibration = fixture::two_joints();
+        let before = sort(&calibration).counts.absent;
+        let own = calibration.components.iter_mut();
+        let own = own
+            .filter(|c| !c.selected)
+            .find(|c| c.pip.is_some())
+            .unwrap();
+        (own.pip, own.verdict) = (Some(0.02), Some(Verdict::Absent));
+        let name = own.name.clone();
+        let group = |settled| Group {
+            members: vec!["elbow.coulomb".into(), name.clone()],
+            pip: 1.0,
+            alike: Alike::TheseLogs,
+            settled,
+            words: String::new(),
+        };
+        let rivals = |settled| {
+            let mut calibration = calibration.clone();
+            calibration.groups = vec![group(settled)];
+            let effects = sort(&calibration);
+            let names: Vec<String> = effects.rivals.into_iter().flat_map(|r| r.names).collect();
+            (names, effects.counts.absent)
+        };
+        let (open, absent) = rivals(false);
+        assert_eq!(open, [name.clone()]);
+        assert_eq!(rivals(true), (vec![], absent + 1));
+        assert!(absent <= before);
     }
 
     #[test]

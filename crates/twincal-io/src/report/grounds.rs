@@ -21,7 +21,8 @@ const NAMED: usize = 3;
 
 pub(super) fn grounds(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
     let mut out = vec![torque_error(calibration, joints)];
-    out.extend(at_standstill(calibration, joints));
+    // Where it got worse it is among what to mind.
+    out.extend(at_standstill(calibration, joints).filter(|_| !rest_got_worse(calibration)));
     out.extend(friction_alone(calibration, joints));
     out.push(held(calibration));
     out.push(effects_found(calibration));
@@ -71,7 +72,7 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
     format!("Torque error (RMSE){below} on {split}{which}: {told}{logged}.")
 }
 
-/// "; as logged, unfiltered: 0.959 → 0.373 N·m, on Joint1 more than the torque itself", of the rows that the filtered error is of.
+/// "; as logged, unfiltered: 0.959 → 0.373 N·m, more than the torque's own standard deviation on Joint1 (137 %)", of the rows that the filtered error is of.
 fn as_logged(calibration: &Calibration, unit: &str) -> Option<String> {
     let validation = &calibration.validation;
     let judged = decisive(validation);
@@ -82,16 +83,19 @@ fn as_logged(calibration: &Calibration, unit: &str) -> Option<String> {
         (_, false) => (&validation.raw, ""),
         (false, true) => (&validation.raw, " (standstill with it)"),
     };
-    let lost: Vec<&str> = (raw.joints.iter())
+    let lost: Vec<String> = (raw.joints.iter())
         .filter(|j| j.rows > 0 && j.rmse_calibrated > j.torque_sd)
-        .map(|j| j.joint.as_str())
+        .map(|j| format!("{} ({})", j.joint, percent(j.rmse_calibrated / j.torque_sd)))
         .collect();
     let apart = (raw.rmse_calibrated / judged.rmse_calibrated - 1.0).abs();
     let worth_telling = apart > UNFILTERED_WORTH_TELLING || !lost.is_empty();
     (rows_of(raw) > 0 && worth_telling).then(|| {
         let lost = match lost.is_empty() {
             true => String::new(),
-            false => format!(", on {} more than the torque itself", list(&lost)),
+            false => format!(
+                ", more than the torque's own standard deviation on {}",
+                list(&lost)
+            ),
         };
         format!(
             "; as logged, unfiltered{which}: {} → {} {unit}{lost}",
@@ -102,7 +106,7 @@ fn as_logged(calibration: &Calibration, unit: &str) -> Option<String> {
 }
 
 /// RMSE before and after of joints that stand still, where it is another matter, for there friction is whatever it takes: and which of them got worse.
-fn at_standstill(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
+pub(super) fn at_standstill(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
     let validation = &calibration.validation;
     let (all, moving) = (&validation.filtered, decisive(validation));
     if rows_of(all).saturating_sub(rows_of(moving)) < FEW_AT_REST {
@@ -147,6 +151,14 @@ fn at_standstill(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<Stri
     })
 }
 
+/// Whether torque at standstill, of all joints together, got worse.
+pub(super) fn rest_got_worse(calibration: &Calibration) -> bool {
+    let validation = &calibration.validation;
+    let (all, moving) = (&validation.filtered, decisive(validation));
+    let each: Vec<_> = all.joints.iter().zip(&moving.joints).collect();
+    still(&each).is_some_and(|[before, after]| after / before - 1.0 > WORTH_TELLING)
+}
+
 /// RMSE before and after on the rows that are not among the moving ones; `None` without any.
 fn still(pairs: &[(&JointScore, &JointScore)]) -> Option<[f64; 2]> {
     let rows: u64 = pairs
@@ -170,12 +182,17 @@ fn still(pairs: &[(&JointScore, &JointScore)]) -> Option<[f64; 2]> {
 
 /// What the first thing that anybody adds to a model would leave: errors of a model without friction are large by that alone.
 fn friction_alone(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
-    let left = friction_only(decisive(&calibration.validation))?;
-    Some(format!(
-        "Viscous and Coulomb friction and an offset alone would leave {} {}.",
-        number(left, 3),
-        pooled_unit(joints)
-    ))
+    let scores = decisive(&calibration.validation);
+    let left = friction_only(scores)?;
+    let told = format!("{} {}", number(left, 3), pooled_unit(joints));
+    Some(match left > scores.rmse_nominal {
+        false => {
+            format!("Viscous and Coulomb friction and an offset alone would leave {told}.")
+        }
+        true => format!(
+            "Viscous and Coulomb friction and an offset alone, fitted to the training rows, would be worse than the model: {told}."
+        ),
+    })
 }
 
 /// RMSE with friction alone over all rows of all joints; `None` where some joint has none.

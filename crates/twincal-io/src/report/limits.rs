@@ -2,7 +2,8 @@
 
 use super::figures::sensitivity;
 use super::findings;
-use super::remarks::size_of_gravity;
+use super::grounds::{at_standstill, rest_got_worse};
+use super::remarks::{size_of_gravity, whole_against_halves};
 use super::shape;
 use super::text::{THIN, list, number, percent, subject};
 use super::view::{Joint, independent_rows, memory, pooled_unit, standard_deviation};
@@ -54,6 +55,7 @@ pub(super) fn limits(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Str
 pub(super) fn of_results(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
     let mut out: Vec<String> = too_few(calibration, joints).into_iter().collect();
     out.extend(limits_of_torque(calibration, joints));
+    out.extend(at_standstill(calibration, joints).filter(|_| rest_got_worse(calibration)));
     out.extend(hardly_at_rest(calibration, joints));
     out.extend(not_to_rest_on(calibration));
     if calibration.validation.split == Split::LastThirty {
@@ -170,6 +172,19 @@ pub(super) fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
             list(&in_neither)
         ));
     }
+    let found = calibration.components.iter().filter(|c| c.selected);
+    let against: Vec<String> = found
+        .filter_map(|component| {
+            let apart = whole_against_halves(component, calibration)?;
+            Some(format!("{} ({} sd)", component.name, number(apart, 2)))
+        })
+        .collect();
+    if !against.is_empty() {
+        out.push(format!(
+            "All data together say what their two halves do not: {}.",
+            list(&against)
+        ));
+    }
     let by_prior: Vec<&str> = sensitivity::by_prior(calibration)
         .filter(|component| component.selected)
         .map(|component| component.name.as_str())
@@ -219,10 +234,8 @@ fn hardly_at_rest(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<Str
     (moving > 0 && at_rest < FEW_AT_REST).then(|| {
         let (tested, held_out) = match at_rest {
             0 => ("not", "but no joint in a held-out row".to_owned()),
-            n => (
-                "hardly",
-                format!("but joints in only {n} of the held-out ones"),
-            ),
+            1 => ("hardly", "but only one held-out row is at rest".to_owned()),
+            n => ("hardly", format!("but only {n} held-out rows are at rest")),
         };
         format!(
             "Standstill is {tested} tested: {} stands still in {} of the logs' rows, {held_out}.",
@@ -232,7 +245,7 @@ fn hardly_at_rest(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<Str
     })
 }
 
-/// Joints on which what was found besides friction gains nothing.
+/// Joints on which what was found besides friction gains nothing, and by how much friction alone is better.
 fn friction_does_as_well(scores: &Scores, joints: &[Joint<'_>]) -> Option<String> {
     let own = scores.joints.iter().filter(|score| score.rows > 0);
     let named: Vec<String> = own
@@ -251,7 +264,7 @@ fn friction_does_as_well(scores: &Scores, joints: &[Joint<'_>]) -> Option<String
         .collect();
     (!named.is_empty()).then(|| {
         format!(
-            "Friction and an offset alone do as well on {}.",
+            "Friction and an offset alone do as well or better on {}.",
             list(&named)
         )
     })
@@ -410,6 +423,15 @@ mod tests {
             })
         };
         assert!(says(&halves(0.3), "in neither half alone: "));
+        let against = judged(|c| {
+            for own in &mut c.repeatability {
+                (own.first, own.second) = (own.first + 100.0, own.second + 100.0);
+            }
+        });
+        assert!(says(
+            &against,
+            "All data together say what their two halves do not: "
+        ));
         assert!(!says(&halves(0.6), "neither half"));
     }
 

@@ -13,6 +13,8 @@ const NAMED: usize = 2;
 const SIZE_OF_GRAVITY: f64 = 0.01;
 /// Width of a 95 % interval in spreads from which ± does not describe it; 3.92 where it is normal.
 const FAR: f64 = 12.0;
+/// Sd between all data and both halves from which that is told.
+const APART: f64 = 3.0;
 
 /// Remarks on a component, the gravest first.
 pub(super) fn remarks(component: &ComponentSummary, calibration: &Calibration) -> Vec<String> {
@@ -32,6 +34,12 @@ pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) ->
     }
     out.extend(rivals(component, calibration));
     out.extend(repeats(component, calibration));
+    if let Some(apart) = whole_against_halves(component, calibration) {
+        out.push(format!(
+            "all data together are {} sd from what the two halves say",
+            number(apart, 2)
+        ));
+    }
     let mut by_prior = sensitivity::by_prior(calibration);
     if component.selected && by_prior.any(|other| other.name == component.name) {
         out.push("other priors would leave it out".into());
@@ -129,14 +137,33 @@ fn repeats(component: &ComponentSummary, calibration: &Calibration) -> Option<St
         .collect();
     let apart = own.iter().filter_map(|repeat| repeat.z).map(f64::abs);
     match Repeat::of_effect(&own) {
-        Repeated::Repeats | Repeated::Wavers | Repeated::NotSeen => None,
-        Repeated::Differs => Some(format!(
+        Repeated::Repeats | Repeated::NotSeen => None,
+        Repeated::Differs | Repeated::Wavers => Some(format!(
             "the two halves of the data differ by {} sd",
             number(apart.fold(0.0, f64::max), 2)
         )),
         Repeated::TooLoose => Some("either half alone is too loose to confirm it".into()),
         state => Some(state.words().into()),
     }
+}
+
+/// How far a number from all data is from what both halves say together, in sd of that, where that is [`APART`] or more: the halves with the same
+/// effects in have nearly all of its rows.
+pub(super) fn whole_against_halves(
+    component: &ComponentSummary,
+    calibration: &Calibration,
+) -> Option<f64> {
+    let own = calibration.repeatability.iter();
+    let own = own.filter(|repeat| repeat.component == component.name && repeat.z.is_some());
+    let apart = own.filter_map(|repeat| {
+        let term = (calibration.terms.iter()).find(|term| term.term.name == repeat.term)?;
+        let whole = term.conditional_median?;
+        let [first, second] = [repeat.first_sd, repeat.second_sd].map(|sd| sd.powi(-2));
+        let both = (first * repeat.first + second * repeat.second) / (first + second);
+        Some((whole - both).abs() * (first + second).sqrt())
+    });
+    let most = apart.fold(0.0, f64::max);
+    (most >= APART && most.is_finite()).then_some(most)
 }
 
 fn moves_with_the_cutoff(component: &ComponentSummary, calibration: &Calibration) -> bool {
@@ -245,6 +272,36 @@ mod tests {
     }
 
     #[test]
+    fn a_whole_that_neither_half_says_is_named() {
+        let whole = |value: f64| {
+            of(|c| {
+                let own = &c.components[0];
+                let (name, column) = (own.name.clone(), own.columns[0].clone());
+                let term = c.terms.iter_mut().find(|t| t.term.name == column).unwrap();
+                term.conditional_median = Some(value);
+                c.repeatability = vec![Repeat {
+                    component: name,
+                    term: column,
+                    unit: String::new(),
+                    first: 7.0,
+                    first_sd: 0.2,
+                    first_pip: 1.0,
+                    second: 7.0,
+                    second_sd: 0.2,
+                    second_pip: 1.0,
+                    z: Some(0.0),
+                }];
+            })
+        };
+        // Both halves together: 7.0 ± 0.141.
+        assert_eq!(whole(7.4), [""; 0]);
+        assert_eq!(
+            whole(7.5),
+            ["all data together are 3.5 sd from what the two halves say"]
+        );
+    }
+
+    #[test]
     fn halves_that_do_not_agree_are_named() {
         let halves = |z: f64, first: (f64, f64), pips: (f64, f64)| {
             of(|c| {
@@ -265,6 +322,10 @@ mod tests {
         };
         let sure = (1.0, 1.0);
         assert_eq!(halves(0.3, (7.0, 0.1), sure), [""; 0]);
+        assert_eq!(
+            halves(2.4, (7.0, 0.1), sure),
+            ["the two halves of the data differ by 2.4 sd"]
+        );
         assert_eq!(
             halves(-3.7, (7.0, 0.1), sure),
             ["the two halves of the data differ by 3.7 sd"]

@@ -109,6 +109,13 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
             Grade::Care,
             "Hardly: on held-out data the calibrated torque is no better than the nominal one.",
         )
+    } else if grounds::friction_only(scores)
+        .is_some_and(|left| left < BETTER * scores.rmse_calibrated)
+    {
+        (
+            Grade::Care,
+            "Hardly: friction and an offset alone predict held-out torque better.",
+        )
     } else if found > 0 && sure == 0 {
         (
             Grade::Care,

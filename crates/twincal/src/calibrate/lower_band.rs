@@ -52,8 +52,19 @@ pub(super) struct Band {
     pub(super) cutoff_hz: f64,
     /// Independent rows of the joint that has most.
     pub(super) rows: f64,
-    /// [`super::data::Data::nominal_misfit`] as a ratio.
+    /// How far the nominal torque is from the measured one, in rms of that.
     pub(super) misfit: f64,
+}
+
+impl Band {
+    /// With [`super::data::Data::nominal_misfit`].
+    pub(super) fn new(cutoff_hz: f64, rows: f64, misfit: Option<(usize, [f64; 2])>) -> Self {
+        Self {
+            cutoff_hz,
+            rows,
+            misfit: misfit.map_or(0.0, |(_, [difference, torque])| difference / torque),
+        }
+    }
 }
 
 /// The band with most independent rows, the higher one where they are as many.
@@ -80,12 +91,15 @@ fn best(bands: &[Band], better: fn(&Band, &Band) -> bool) -> Option<f64> {
     Some(best.cutoff_hz)
 }
 
-/// What is said of a band in which the nominal torque differs from the measured one by far more than that on every joint that moves.
+/// What is said of a band in which an encoder is coarse and the nominal torque differs from the measured one by far more than that on every joint
+/// that moves.
 pub(super) fn drowned(
     robot: &Robot,
-    (joint, [difference, torque]): (usize, [f64; 2]),
+    findings: &[Finding],
+    misfit: Option<(usize, [f64; 2])>,
     cutoff_hz: f64,
 ) -> Option<TooFew> {
+    let (joint, [difference, torque]) = misfit.filter(|_| is_coarse(findings))?;
     if difference <= DROWNED * torque {
         return None;
     }
@@ -102,6 +116,11 @@ pub(super) fn drowned(
     })
 }
 
+/// Whether an encoder is so coarse that it was told.
+fn is_coarse(findings: &[Finding]) -> bool {
+    findings.iter().any(|f| f.code == "quantised_encoder")
+}
+
 /// Cut-offs that are open to a fit by `settings` that ended with `few` and `findings`, Hz.
 pub(super) fn lower(
     few: &TooFew,
@@ -110,8 +129,7 @@ pub(super) fn lower(
 ) -> Vec<f64> {
     let signal = &settings.signal;
     let chosen = signal.cutoff_hz != Auto::Auto || signal.rate_hz != Auto::Auto;
-    let coarse = findings.iter().any(|f| f.code == "quantised_encoder");
-    match coarse && !chosen {
+    match is_coarse(findings) && !chosen {
         true => halves(few.cutoff_hz),
         false => Vec::new(),
     }

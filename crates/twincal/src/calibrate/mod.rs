@@ -70,7 +70,7 @@ use crate::twin::Twin;
 use again::{Goal, Road, whole_road};
 use data::Data;
 use heredity::Named;
-use lower_band::TooFew;
+use lower_band::{Band, TooFew};
 use ripples::Seen;
 use wider_band::wider;
 
@@ -251,17 +251,12 @@ fn road(
     if let Err(error) = data.require_enough(robot, &columns, settings.signal.cutoff_hz) {
         return too_few(error);
     }
-    // Accelerations of a coarse encoder may be larger than all that was measured.
     let misfit = data.nominal_misfit();
-    let coarse = findings.iter().any(|f| f.code == "quantised_encoder");
     if goal == Goal::End
-        && coarse
-        && let Some(drowned) =
-            misfit.and_then(|misfit| lower_band::drowned(robot, misfit, cutoff_hz))
+        && let Some(drowned) = lower_band::drowned(robot, findings, misfit, cutoff_hz)
     {
         return Ok(Road::Drowned(drowned));
     }
-
     // eq. (5): sparse regression with everything that is plugged in at its fixed point
     progress(Stage::Inference);
     let spreads = weigh::weigh(robot, &mut data, &columns, settings, findings)?;
@@ -269,11 +264,7 @@ fn road(
     let count = |fitted: &Fitted| independent_rows::require(robot, &data, &fitted.fit, &training);
     if goal == Goal::Count {
         let counted = count(&estimate(&training, &columns, settings)?)?;
-        return Ok(Road::Counted(lower_band::Band {
-            cutoff_hz,
-            rows: counted.most,
-            misfit: misfit.map_or(0.0, |(_, [difference, torque])| difference / torque),
-        }));
+        return Ok(Road::Counted(Band::new(cutoff_hz, counted.most, misfit)));
     }
     let plan = held_out::plan(&data, &trajectories, &pipeline);
     let (fitted, fits_of_folds) = rayon::join(

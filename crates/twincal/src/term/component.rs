@@ -57,7 +57,7 @@ pub(super) enum Meaning {
         /// In the payload's frame, m.
         centre: [f64; 3],
     },
-    /// Stiffness and preload → stiffness and rest position.
+    /// Stiffness and preload → stiffness, rest position and preload.
     Spring,
 }
 

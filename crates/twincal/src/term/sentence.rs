@@ -4,6 +4,7 @@ use super::component::Component;
 use super::family::CLEAR;
 use super::words::estimate;
 use super::{Family, words};
+use std::f64::consts::TAU;
 
 /// A parameter's value with its spread, as it goes into a sentence.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,7 +56,7 @@ pub(super) fn sentence(component: &Component, parameters: &[Estimate]) -> String
         Family::EncoderZero => parameters.first().map(angle).unwrap_or_default(),
         Family::Tilt => tilt(parameters),
         _ if parameters.len() == 1 => one(&parameters[0]),
-        _ => several(parameters),
+        family => several(family, parameters),
     };
     let remark = parameters
         .first()
@@ -84,6 +85,11 @@ pub fn told(family: Family, parameters: &[Estimate]) -> Vec<usize> {
             mass.chain(centre.filter(|_| clear)).collect()
         }
         Family::Tilt => all.iter().filter(known).copied().collect(),
+        Family::Spring => {
+            let mut order = of_spring(parameters);
+            order.sort_unstable();
+            order
+        }
         _ => {
             let mut order = clearest(parameters);
             order.sort_unstable();
@@ -110,9 +116,31 @@ fn clearest(parameters: &[Estimate]) -> Vec<usize> {
     order
 }
 
+/// Those of a spring: its rest position where a joint may stand there, else its preload.
+fn of_spring(parameters: &[Estimate]) -> Vec<usize> {
+    let [_, rest, _] = parameters else {
+        return clearest(parameters);
+    };
+    let is_place = rest.value.abs() <= TAU && rest.spread <= KNOWN_PLACE;
+    let left_out = if is_place { 2 } else { 1 };
+    let mut own = clearest(parameters);
+    own.retain(|p| *p != left_out);
+    match own.is_empty() {
+        true => vec![0],
+        false => own,
+    }
+}
+
+/// Spread up to which a rest position is a place, rad or m.
+const KNOWN_PLACE: f64 = 1.0;
+
 /// The clearest parameters by name.
-fn several(parameters: &[Estimate]) -> String {
-    let told: Vec<String> = (clearest(parameters).into_iter())
+fn several(family: Family, parameters: &[Estimate]) -> String {
+    let order = match family {
+        Family::Spring => of_spring(parameters),
+        _ => clearest(parameters),
+    };
+    let told: Vec<String> = (order.into_iter())
         .map(|p| &parameters[p])
         .map(|p| format!("{} {}", p.name.replace('_', " "), one(p)))
         .collect();
@@ -244,6 +272,33 @@ mod tests {
             sentence(&component(Family::Offset, "offset on a"), &nothing),
             "offset on a: in no model that counts"
         );
+    }
+
+    #[test]
+    fn a_spring_has_a_rest_position_only_where_a_joint_may_stand_there() {
+        let spring = |rest: (f64, f64), preload: (f64, f64)| {
+            let parameters = estimates(&[
+                ("stiffness", "N·m/rad", 0.144, 0.016),
+                ("rest_position", "rad", rest.0, rest.1),
+                ("preload", "N·m", preload.0, preload.1),
+            ]);
+            let spring = component(Family::Spring, "spring on a");
+            let by_name: Vec<&str> = (told(Family::Spring, &parameters).into_iter())
+                .map(|p| parameters[p].name.as_str())
+                .collect();
+            (sentence(&spring, &parameters), by_name.join(" "))
+        };
+        let (words, told) = spring((-0.88, 0.17), (0.127, 0.02));
+        assert!(words.ends_with("rest position -0.88 ± 0.17 rad"), "{words}");
+        assert_eq!(told, "stiffness rest_position");
+        let (words, told) = spring((-13.0, 0.6), (0.753, 0.032));
+        assert_eq!(
+            words,
+            "spring on a: preload +0.753 ± 0.032 N·m, stiffness +0.144 ± 0.016 N·m/rad"
+        );
+        assert_eq!(told, "stiffness preload");
+        let (_, told) = spring((-4.0, 1.4), (0.01, 0.032));
+        assert_eq!(told, "stiffness");
     }
 
     #[test]

@@ -31,17 +31,22 @@ pub(super) fn proposal(graph: &mut Graph, joint: &Joint) -> Proposal {
     Proposal { name, columns }
 }
 
-/// Stiffness and rest position.
+/// Stiffness, rest position and preload, the torque at position 0: of a soft spring far from its rest position the motion shows the latter.
 pub(super) fn parameters(columns: &[(String, String)]) -> Vec<Parameter> {
     let unit = columns.first().map_or("", |column| column.1.as_str());
-    let rest = if unit == "N/m" { "m" } else { "rad" };
+    let (rest, torque) = if unit == "N/m" {
+        ("m", "N")
+    } else {
+        ("rad", "N·m")
+    };
     vec![
         Parameter::new("stiffness", unit),
         Parameter::new("rest_position", rest),
+        Parameter::new("preload", torque),
     ]
 }
 
-/// `[k, −c/k]`.
+/// `[k, −c/k, c]`.
 pub(super) fn values(beta: &[f64]) -> Vec<f64> {
-    vec![beta[0], -beta[1] / beta[0]]
+    vec![beta[0], -beta[1] / beta[0], beta[1]]
 }
