@@ -148,13 +148,15 @@ fn repeats(component: &ComponentSummary, calibration: &Calibration) -> Option<St
 }
 
 /// How far a number from all data is from what both halves say together, in sd of that, where that is [`APART`] or more: the halves with the same
-/// effects in have nearly all of its rows.
+/// effects in have nearly all of its rows. Not where the halves differ themselves.
 pub(super) fn whole_against_halves(
     component: &ComponentSummary,
     calibration: &Calibration,
 ) -> Option<f64> {
     let own = calibration.repeatability.iter();
-    let own = own.filter(|repeat| repeat.component == component.name && repeat.z.is_some());
+    let own = own.filter(|repeat| {
+        repeat.component == component.name && repeat.z.is_some_and(|z| z.abs() < APART)
+    });
     let apart = own.filter_map(|repeat| {
         let term = (calibration.terms.iter()).find(|term| term.term.name == repeat.term)?;
         let whole = term.conditional_median?;
@@ -317,6 +319,9 @@ mod tests {
                     second_pip: pips.1,
                     z: Some(z),
                 };
+                let mut terms = c.terms.iter_mut();
+                let term = terms.find(|t| t.term.name == repeat.term).unwrap();
+                term.conditional_median = Some(first.0);
                 c.repeatability = vec![repeat];
             })
         };

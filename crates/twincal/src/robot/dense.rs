@@ -27,7 +27,11 @@ pub(super) fn report(
     let all: f64 = bodies.iter().map(|body| body.moments.mass).sum();
     for body in bodies {
         let (mass, link) = (body.moments.mass, &description.links[body.link].name);
-        let told = |finding: &Finding| finding.code == CODE && finding.subject == *link;
+        // An impossible tensor has no radius.
+        let told = |finding: &Finding| {
+            [CODE, "unphysical_inertia"].contains(&finding.code.as_str())
+                && finding.subject == *link
+        };
         if mass <= WORTH_TELLING * all || findings.iter().any(told) {
             continue;
         }
