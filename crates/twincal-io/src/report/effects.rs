@@ -331,7 +331,7 @@ mod tests {
             (names, effects.counts.absent)
         };
         let (open, absent) = rivals(false);
-        assert_eq!(open, [name.clone()]);
+        assert_eq!(open, std::slice::from_ref(&name));
         assert_eq!(rivals(true), (vec![], absent + 1));
         assert!(absent <= before);
     }
