@@ -3,7 +3,7 @@
 use super::figures::sensitivity;
 use super::text::{list, number};
 use twincal::calibrate::{
-    Alike, Calibration, ComponentSummary, ParameterSummary, Repeat, Repeated,
+    Alike, Calibration, ComponentSummary, ParameterSummary, Repeat, Repeated, Verdict,
 };
 use twincal::term::Family;
 
@@ -31,6 +31,8 @@ pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) ->
     out.extend(size_of_gravity(component, calibration));
     if component.no_rigid_body {
         out.push("no rigid body has this: it stands in for another effect".into());
+    } else if is_hardly_a_body(component, calibration) {
+        out.push("hardly a rigid body: these logs leave its inertia open".into());
     }
     out.extend(rivals(component, calibration));
     out.extend(repeats(component, calibration));
@@ -40,6 +42,7 @@ pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) ->
             number(apart, 2)
         ));
     }
+    out.extend(hangs_on(component, calibration));
     let mut by_prior = sensitivity::by_prior(calibration);
     if component.selected && by_prior.any(|other| other.name == component.name) {
         out.push("other priors would leave it out".into());
@@ -51,6 +54,42 @@ pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) ->
         out.push("depends on the filter's cut-off by more than its ±".into());
     }
     out
+}
+
+/// Whether its link, with what was found of it, is a rigid body in less than half of the draws.
+fn is_hardly_a_body(component: &ComponentSummary, calibration: &Calibration) -> bool {
+    let of_link = |link: &str| {
+        let rest = component.name.strip_prefix(link);
+        rest.is_some_and(|rest| [".mass_moments", ".tensor"].contains(&rest))
+    };
+    let mut findings = calibration.findings.iter();
+    component.selected
+        && findings.any(|f| f.code == "unphysical_inertia_found" && of_link(&f.subject))
+}
+
+/// Friction that is told together with a change of it of which the data do not say whether it is there.
+fn hangs_on(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
+    let changes: &[Family] = match component.family {
+        Family::Viscous => &[Family::QuadraticFriction],
+        Family::Coulomb => &[
+            Family::Stribeck,
+            Family::Asymmetry,
+            Family::QuadraticFriction,
+        ],
+        Family::Stribeck => &[Family::QuadraticFriction],
+        _ => return None,
+    };
+    let joint = component.name.rsplit_once('.')?.0;
+    let mut others = calibration.components.iter();
+    let open = others.find(|other| {
+        changes.contains(&other.family)
+            && other.verdict == Some(Verdict::Undecided)
+            && (other.name.rsplit_once('.')).is_some_and(|(own, _)| own == joint)
+    })?;
+    Some(format!(
+        "its value hangs on {}, which is undecided",
+        open.name
+    ))
 }
 
 /// What else may be behind the same torque.
@@ -243,6 +282,37 @@ mod tests {
             said,
             ["the same as x, y and 2 more in every motion; the prior prefers it"]
         );
+    }
+
+    #[test]
+    fn friction_beside_a_change_of_it_that_is_open_and_bodies_that_hardly_are() {
+        let viscous = |verdict: Verdict, joint: &str| {
+            of(|c| {
+                (c.components[0].name, c.components[0].family) =
+                    ("lift.viscous".into(), Family::Viscous);
+                let other = &mut c.components[1];
+                (other.name, other.family) = (
+                    format!("{joint}.quadratic_friction"),
+                    Family::QuadraticFriction,
+                );
+                other.verdict = Some(verdict);
+            })
+        };
+        let said = ["its value hangs on lift.quadratic_friction, which is undecided"];
+        assert_eq!(viscous(Verdict::Undecided, "lift"), said);
+        assert_eq!(viscous(Verdict::Found, "lift"), [""; 0]);
+        assert_eq!(viscous(Verdict::Undecided, "elbow"), [""; 0]);
+        let body = |link: &str| {
+            of(|c| {
+                (c.components[0].name, c.components[0].selected) =
+                    ("wrist.mass_moments".into(), true);
+                let code = "unphysical_inertia_found";
+                c.findings = vec![Finding::new(Severity::Note, code, link, "", 0)];
+            })
+        };
+        let said = ["hardly a rigid body: these logs leave its inertia open"];
+        assert_eq!(body("wrist"), said);
+        assert_eq!(body("fore"), [""; 0]);
     }
 
     #[test]
