@@ -102,6 +102,7 @@ pub(super) fn whole_road(
         let Some(cutoff_hz) = most_rows(&bands) else {
             return Err(few.error);
         };
+        goal = Goal::Anyway;
         settings.signal.cutoff_hz = Auto::Value(cutoff_hz);
         added.push(lowered(&few, cutoff_hz));
         first = Some((few.error, findings.clone()));

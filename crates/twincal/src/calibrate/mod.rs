@@ -252,11 +252,6 @@ fn road(
         return too_few(error);
     }
     let misfit = data.nominal_misfit();
-    if goal == Goal::End
-        && let Some(drowned) = lower_band::drowned(robot, findings, misfit, cutoff_hz)
-    {
-        return Ok(Road::Drowned(drowned));
-    }
     // eq. (5): sparse regression with everything that is plugged in at its fixed point
     progress(Stage::Inference);
     let spreads = weigh::weigh(robot, &mut data, &columns, settings, findings)?;
@@ -288,6 +283,11 @@ fn road(
     match counted {
         Ok(counted) => findings.extend(counted.findings),
         Err(error) => return too_few(error),
+    }
+    if goal == Goal::End
+        && let Some(drowned) = lower_band::drowned(robot, findings, misfit, cutoff_hz)
+    {
+        return Ok(Road::Drowned(drowned));
     }
     findings.extend(seen.iter().map(Seen::told));
     if fitted.sampled.is_empty() {
