@@ -91,3 +91,12 @@ def test_a_coarse_encoder_is_fitted_where_its_rows_say_something(tmp_path):
     assert result["noise"][0]["n_eff"] > 30
     scores = result["validation"]["joints"][0]
     assert scores["rmse_calibrated"] < 0.85 * scores["rmse_nominal"]
+
+
+def test_accelerations_that_drown_the_model_send_the_fit_to_a_lower_band(tmp_path):
+    """Two of its logs have rows enough at 33 Hz, where the model's torque is off by several times all that was measured."""
+    folder = SHARED / "simple_pendulum"
+    result = fit(tmp_path, [folder / "run0.csv", folder / "run1.csv"], "", model=folder / "model.urdf")
+    told = [f["message"] for f in result["findings"] if f["code"] == "lower_band"]
+    assert len(told) == 1 and "accelerations of a coarse encoder make the model's torque wrong" in told[0]
+    assert result["signal"]["cutoff_hz"] == 8.3

@@ -436,6 +436,7 @@ impl<'a> Chain<'a> {
         let (mut d, mut square, mut over) = ([1.0; LANES], [0.0; LANES], [1.0; LANES]);
         let mut sign = [-1.0; LANES];
         if let Some(first) = self.chunks[index].first {
+            // All four are padded by a lane behind the last position (`Tableau`, `Chain::new`): eight can be read from any.
             let eight =
                 |values: &[f64]| -> Lane { *values[first..].first_chunk().expect("padded") };
             let (diagonal, gradient) = (eight(&tableau.diagonal), eight(&tableau.gradient));
