@@ -21,12 +21,15 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::hint::black_box;
 use twincal::gram::{JointAccumulator, JointGram, Workspace};
+use twincal::lanes::{Aligned, LANES};
 use twincal::robot::{Motion, Robot, RobotDescription};
 use twincal::rows::MAX_BLOCK;
 use twincal::term::{Family, Library, LibrarySettings, Scratch};
 
 /// Samples of one run, evaluated [`MAX_BLOCK`] at a time, as rows are streamed.
 const SAMPLES: usize = 64 * MAX_BLOCK;
+/// From one signal to the next: not so far that they are all in the same places of the first-level cache.
+const STRIDE: usize = MAX_BLOCK + LANES;
 const REPEATS: usize = 20;
 const ROBOTS: &str = include_str!("peers/robots.json");
 
@@ -70,15 +73,23 @@ impl Way {
         }
     }
 
+    /// From one signal to the next.
+    fn stride(self) -> usize {
+        match self {
+            Self::Parts => STRIDE,
+            Self::Columns => MAX_BLOCK,
+        }
+    }
+
     fn evaluate(
         self,
         library: &Library,
         block: &Block,
-        out: &mut [Vec<f64>],
+        out: &mut [Aligned],
         scratch: &mut Scratch,
     ) {
         match self {
-            Self::Parts => library.evaluate_parts(of(block), out, scratch),
+            Self::Parts => library.evaluate_parts(of(block), STRIDE, out, scratch),
             Self::Columns => library.evaluate_with(of(block), out, scratch),
         }
     }
@@ -106,15 +117,18 @@ fn measured(way: Way, library: &Library, motion: &[Block], peak: f64) {
         "\n{way:?}: Panda, {} columns; signals of one joint with its torque: {widths:?}; {needed:.0} operations per row",
         library.columns().len()
     );
-    let blocks: Vec<Vec<Vec<f64>>> = (motion.iter())
+    let blocks: Vec<Vec<Aligned>> = (motion.iter())
         .map(|block| {
-            let mut out = vec![Vec::new(); library.joints()];
+            let mut out = vec![Aligned::default(); library.joints()];
             way.evaluate(library, block, &mut out, &mut Scratch::default());
             out
         })
         .collect();
     let evaluation = run(|| {
-        let (mut out, mut scratch) = (vec![Vec::new(); library.joints()], Scratch::default());
+        let (mut out, mut scratch) = (
+            vec![Aligned::default(); library.joints()],
+            Scratch::default(),
+        );
         for block in motion {
             way.evaluate(library, block, black_box(&mut out), &mut scratch);
         }
@@ -122,23 +136,26 @@ fn measured(way: Way, library: &Library, motion: &[Block], peak: f64) {
     let gram = run(|| {
         let (mut statistics, mut workspace) = (way.accumulators(library), Workspace::default());
         for block in &blocks {
-            add(&mut statistics, block, &mut workspace);
+            add(&mut statistics, block, way.stride(), &mut workspace);
         }
         finish(statistics)
     });
     let cached = run(|| {
         let (mut statistics, mut workspace) = (way.accumulators(library), Workspace::default());
         for _ in &blocks {
-            add(&mut statistics, &blocks[0], &mut workspace);
+            add(&mut statistics, &blocks[0], way.stride(), &mut workspace);
         }
         finish(statistics)
     });
     let both = run(|| {
-        let (mut out, mut scratch) = (vec![Vec::new(); library.joints()], Scratch::default());
+        let (mut out, mut scratch) = (
+            vec![Aligned::default(); library.joints()],
+            Scratch::default(),
+        );
         let (mut statistics, mut workspace) = (way.accumulators(library), Workspace::default());
         for block in motion {
             way.evaluate(library, block, &mut out, &mut scratch);
-            add(&mut statistics, &out, &mut workspace);
+            add(&mut statistics, &out, way.stride(), &mut workspace);
         }
         finish(statistics)
     });
@@ -198,10 +215,15 @@ fn of([q, qd, qdd]: &Block) -> Motion<'_> {
 }
 
 /// The torque is the first signal: what it says does not matter here.
-fn add(statistics: &mut [JointAccumulator], columns: &[Vec<f64>], workspace: &mut Workspace) {
+fn add(
+    statistics: &mut [JointAccumulator],
+    columns: &[Aligned],
+    stride: usize,
+    workspace: &mut Workspace,
+) {
     let keep = [true; MAX_BLOCK];
     for (joint, x) in statistics.iter_mut().zip(columns) {
-        joint.push_block(x, MAX_BLOCK, &x[..MAX_BLOCK], &keep, false, workspace);
+        joint.push_block(x, stride, &x[..MAX_BLOCK], &keep, false, workspace);
     }
 }
 

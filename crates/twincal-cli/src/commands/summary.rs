@@ -242,11 +242,10 @@ fn reliability(calibration: &Calibration) -> Vec<String> {
     }
     if let (Some(compact), Some([average, own])) = (&calibration.compact, validation.compact) {
         lines.push(format!(
-            "compact twin ({} effects): RMSE {} instead of {} on moving joints ({} with rows at standstill), log score {:+.3} nats per row",
+            "compact twin ({} effects): RMSE {} on moving joints, where the average of all models has {}; log score {:+.3} nats per row",
             compact.components.len(),
             significant(own.rmse, 3),
             significant(average.rmse, 3),
-            significant(validation.filtered.rmse_calibrated, 3),
             own.log_score - average.log_score
         ));
     }

@@ -31,12 +31,12 @@ pub(super) fn sentences(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<
         .enumerate()
         .filter_map(|(j, joint)| {
             let share = standstill(calibration, j);
-            (share > STOOD).then(|| format!("{} (stood still for {})", joint.name, percent(share)))
+            (share > STOOD).then(|| format!("{} ({} of the time)", joint.name, percent(share)))
         })
         .collect();
     if !still.is_empty() {
         out.push(format!(
-            "Hardly moved: {}. Effects on these joints rest on little data.",
+            "Stood still for most of the logs: {}. Effects on these joints rest on the rest.",
             list(&still)
         ));
     }

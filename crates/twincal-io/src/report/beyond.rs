@@ -1,13 +1,19 @@
 //! Rows on which the training data say less than on others, by cause: motion that training did not have, or torque that it leaves open.
 
 use super::limits::too_narrow;
-use super::text::{list, percent, subject};
-use super::view::{Joint, memory};
+use super::text::{list, number, percent, subject};
+use super::view::{Joint, memory, pooled_unit};
 use twincal::calibrate::Calibration;
-use twincal::validate::{JointScore, Split, Validation};
+use twincal::validate::{JointScore, Scores, Split, Validation};
 
 /// Share of its range by which a joint may leave the training motion.
 const MARGIN: f64 = 0.05;
+/// Share of the rows from which what training does not say is told of all joints, and of one.
+const MANY: f64 = 0.1;
+/// Ratio of errors there and elsewhere from which they are told.
+const FURTHER_OFF: f64 = 1.25;
+/// Joints that are named; the others are counted.
+const NAMED: usize = 3;
 /// Share of the rows beyond that are new motion, from which that is the cause.
 const MOSTLY: f64 = 0.5;
 
@@ -114,6 +120,36 @@ pub(super) fn narrow(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Str
         .collect()
 }
 
+/// How far off the twin is there and elsewhere, over all joints, where that is another matter on many of the rows.
+pub(super) fn error(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
+    let Validation { within, beyond, .. } = &calibration.validation;
+    let rows = |scores: &Scores| scores.joints.iter().map(|joint| joint.rows).sum::<u64>();
+    let (out, all) = (rows(beyond), rows(within) + rows(beyond));
+    let many = out as f64 >= MANY * all as f64 && out < all;
+    if !many || beyond.rmse_calibrated < FURTHER_OFF * within.rmse_calibrated {
+        return None;
+    }
+    let mut each: Vec<(&JointScore, u64)> = (within.joints.iter().zip(&beyond.joints))
+        .map(|(within, beyond)| (beyond, within.rows + beyond.rows))
+        .filter(|(beyond, all)| beyond.rows as f64 >= MANY * *all as f64 && beyond.rows > 0)
+        .collect();
+    each.sort_by_key(|(beyond, _)| std::cmp::Reverse(beyond.rows));
+    let mut named: Vec<String> = (each.iter().take(NAMED))
+        .map(|(beyond, all)| format!("{} {} of {all}", beyond.joint, beyond.rows))
+        .collect();
+    if let Some(more) = each.len().checked_sub(NAMED).filter(|more| *more > 0) {
+        named.push(format!("{more} more"));
+    }
+    Some(format!(
+        "On {out} of {all} tested moving rows ({}) the training data say less, mostly for want of such motion or load: there the error is {} {unit}, \
+         elsewhere {} {unit}.",
+        named.join(", "),
+        number(beyond.rmse_calibrated, 3),
+        number(within.rmse_calibrated, 3),
+        unit = pooled_unit(joints)
+    ))
+}
+
 /// Joints that were mostly tested there.
 pub(super) fn mostly(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
     let told = |wanted: Cause| -> Vec<String> {
@@ -177,6 +213,30 @@ mod tests {
         assert!(limits((40, 0.93), within, Split::LastThirty, 1.0).is_empty());
         // No excuse where it is not worse there.
         assert!(limits((41, 0.95), (40, 0.93), Split::LastThirty, 1.0).is_empty());
+    }
+
+    #[test]
+    fn an_error_that_is_larger_there_is_told_with_that_elsewhere() {
+        let of = |(out, error): (u64, f64)| {
+            let verdict = judged(|c| {
+                c.validation.beyond = c.validation.within.clone();
+                for (scores, rows, error) in [
+                    (&mut c.validation.beyond, [0, out], error),
+                    (&mut c.validation.within, [100, 100 - out], 0.1),
+                ] {
+                    scores.rmse_calibrated = error;
+                    for (joint, rows) in scores.joints.iter_mut().zip(rows) {
+                        joint.rows = rows;
+                    }
+                }
+            });
+            let told = verdict.limits.into_iter();
+            told.filter(|limit| limit.contains("say less"))
+                .collect::<Vec<_>>()
+        };
+        let said = "On 70 of 200 tested moving rows (elbow 70 of 100) the training data say less, mostly for want of such motion or load: there the error is 0.200 N·m, elsewhere 0.100 N·m.";
+        assert_eq!(of((70, 0.2)), [said]);
+        assert!(of((70, 0.12)).is_empty() && of((15, 0.2)).is_empty());
     }
 
     #[test]

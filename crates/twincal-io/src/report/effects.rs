@@ -3,6 +3,7 @@
 
 use super::MENTIONED;
 use super::figures::inclusion::family_name;
+use super::figures::sensitivity;
 use super::remarks::remarks;
 use super::text::{interval, probability, with_ends};
 use super::verdict::plus_minus;
@@ -90,6 +91,9 @@ pub(super) struct Dropped {
     pub(super) reason: String,
 }
 
+/// Probability of a group from which one of its members is likely there.
+const LIKELY: f64 = 0.5;
+
 /// Sorts the components of `calibration`.
 pub(super) fn sort(calibration: &Calibration) -> Effects {
     let live = || {
@@ -108,8 +112,13 @@ pub(super) fn sort(calibration: &Calibration) -> Effects {
     let seen = |c: &ComponentSummary| !c.selected && !is_unseen(c);
     let possible = pick(&|c, p| seen(c) && p >= MENTIONED);
     let unlikely = |c: &ComponentSummary, p: f64| seen(c) && (p < MENTIONED || p.is_nan());
-    let mut open = calibration.groups.iter().filter(|group| !group.settled);
-    let alike: Vec<&String> = open.by_ref().flat_map(|group| &group.members).collect();
+    // Not only where the data leave it open: what the prior alone tells apart, or would judge otherwise, is not excluded either.
+    let likely = calibration
+        .groups
+        .iter()
+        .filter(|group| group.pip >= LIKELY);
+    let mut alike: Vec<&String> = likely.flat_map(|group| &group.members).collect();
+    alike.extend(sensitivity::by_prior(calibration).map(|component| &component.name));
     let rivals = pick(&|c, p| unlikely(c, p) && alike.contains(&&c.name));
     let absent = pick(&|c, p| unlikely(c, p) && !alike.contains(&&c.name));
     Effects {
@@ -316,23 +325,25 @@ mod tests {
             .unwrap();
         (own.pip, own.verdict) = (Some(0.02), Some(Verdict::Absent));
         let name = own.name.clone();
-        let group = |settled| Group {
+        let group = |settled, pip| Group {
             members: vec!["elbow.coulomb".into(), name.clone()],
-            pip: 1.0,
+            pip,
             alike: Alike::TheseLogs,
             settled,
             words: String::new(),
         };
-        let rivals = |settled| {
+        let rivals = |settled, pip| {
             let mut calibration = calibration.clone();
-            calibration.groups = vec![group(settled)];
+            calibration.groups = vec![group(settled, pip)];
             let effects = sort(&calibration);
             let names: Vec<String> = effects.rivals.into_iter().flat_map(|r| r.names).collect();
             (names, effects.counts.absent)
         };
-        let (open, absent) = rivals(false);
+        let (open, absent) = rivals(false, 1.0);
         assert_eq!(open, std::slice::from_ref(&name));
-        assert_eq!(rivals(true), (vec![], absent + 1));
+        // Told apart by the prior alone, or none of them there.
+        assert_eq!(rivals(true, 1.0), (open, absent));
+        assert_eq!(rivals(true, 0.1), (vec![], absent + 1));
         assert!(absent <= before);
     }
 

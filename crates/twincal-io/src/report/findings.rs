@@ -35,7 +35,7 @@ pub(super) fn findings(calibration: &Calibration) -> Vec<Kind> {
         let (class, severity) = match wanted {
             Severity::Note => ("note", "note"),
             Severity::Warning => ("care", "warning"),
-            Severity::Degraded => ("bad", "data lost"),
+            Severity::Degraded => ("bad", "degraded"),
         };
         for f in calibration.findings.iter().filter(|f| f.severity == wanted) {
             let same = |kind: &&mut Kind| (kind.class, &kind.code) == (class, &f.code);

@@ -16,6 +16,8 @@ const UNFILTERED_WORTH_TELLING: f64 = 0.25;
 const SHARE_WORTH_TELLING: f64 = 0.01;
 /// Held-out time that is told because it is short, s.
 const SHORT: f64 = 30.0;
+/// Probability above which at least one of a group is sure.
+const SURE: f64 = 0.95;
 /// Joints that are named; the others are counted.
 const NAMED: usize = 3;
 
@@ -50,8 +52,8 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
     let judged = decisive(validation);
     let split = match validation.split {
         Split::HeldoutLogs => "held-out logs",
-        Split::LeaveOneLogOut => "logs left out one at a time",
-        Split::LastThirty => "the last 30 % of each log",
+        Split::LeaveOneLogOut => "logs left out one at a time, by fits without them",
+        Split::LastThirty => "the last 30 % of each log, by a fit without them",
     };
     let cutoff = calibration.twin.pipeline.cutoff_hz;
     let below = match cutoff > 0.0 {
@@ -59,7 +61,7 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
         false => String::new(),
     };
     let which = match has_standstill(validation) {
-        true => ", joints that move",
+        true => "; joints that move",
         false => "",
     };
     let unit = pooled_unit(joints);
@@ -155,6 +157,9 @@ pub(super) fn at_standstill(calibration: &Calibration, joints: &[Joint<'_>]) -> 
 pub(super) fn rest_got_worse(calibration: &Calibration) -> bool {
     let validation = &calibration.validation;
     let (all, moving) = (&validation.filtered, decisive(validation));
+    if rows_of(all).saturating_sub(rows_of(moving)) < FEW_AT_REST {
+        return false;
+    }
     let each: Vec<_> = all.joints.iter().zip(&moving.joints).collect();
     still(&each).is_some_and(|[before, after]| after / before - 1.0 > WORTH_TELLING)
 }
@@ -185,14 +190,55 @@ fn friction_alone(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<Str
     let scores = decisive(&calibration.validation);
     let left = friction_only(scores)?;
     let told = format!("{} {}", number(left, 3), pooled_unit(joints));
-    Some(match left > scores.rmse_nominal {
+    let mut findings = calibration.findings.iter();
+    let stated = match findings.any(|f| f.code == "urdf_dynamics") {
+        true => " Your model’s own friction is not part of its torque here.",
+        false => "",
+    };
+    let told_alone = match left > scores.rmse_nominal {
         false => {
             format!("Viscous and Coulomb friction and an offset alone would leave {told}.")
         }
-        true => format!(
-            "Viscous and Coulomb friction and an offset alone, fitted to the training rows, would be worse than the model: {told}."
-        ),
-    })
+        true => {
+            let (worse, better) = with_friction(scores, joints);
+            let better = match better {
+                0 => String::new(),
+                1 => "; better on one joint".into(),
+                n => format!("; better on {n} joints"),
+            };
+            format!(
+                "Viscous and Coulomb friction and an offset alone, fitted to the training rows, would leave {told}, more than your model does: \
+                 worse on {}{better}.",
+                list(&worse)
+            )
+        }
+    };
+    Some(told_alone + stated)
+}
+
+/// Joints on which friction alone would be worse than the model, the worst first, and the number of the others.
+fn with_friction(scores: &Scores, joints: &[Joint<'_>]) -> (Vec<String>, usize) {
+    let own = scores.joints.iter().filter(|joint| joint.rows > 0);
+    let own = own.filter_map(|joint| Some((joint, joint.rmse_friction?)));
+    let (mut worse, better): (Vec<_>, Vec<_>) =
+        own.partition(|(joint, left)| *left > joint.rmse_nominal);
+    let growth = |(joint, left): &(&JointScore, f64)| left - joint.rmse_nominal;
+    worse.sort_by(|a, b| growth(b).total_cmp(&growth(a)));
+    let named = worse.iter().take(NAMED).map(|(joint, left)| {
+        let unit = joints.iter().find(|other| other.name == joint.joint);
+        let unit = unit.map_or("", |joint| joint.units.torque);
+        format!(
+            "{} ({} → {} {unit})",
+            joint.joint,
+            number(joint.rmse_nominal, 3),
+            number(*left, 3)
+        )
+    });
+    let mut named: Vec<String> = named.collect();
+    if let Some(more) = worse.len().checked_sub(NAMED).filter(|more| *more > 0) {
+        named.push(format!("{more} more"));
+    }
+    (named, better.len())
 }
 
 /// RMSE with friction alone over all rows of all joints; `None` where some joint has none.
@@ -214,7 +260,7 @@ fn held(calibration: &Calibration) -> String {
     let (rows, share) = (count(rows_of(judged)), percent(judged.coverage95));
     let seconds = held_out_seconds(calibration);
     let short = match seconds < SHORT {
-        true => format!(", {} s of motion", number(seconds, 2)),
+        true => format!(" ({} s of log)", number(seconds, 2)),
         false => String::new(),
     };
     if !has_standstill(&calibration.validation) {
@@ -223,7 +269,7 @@ fn held(calibration: &Calibration) -> String {
     let differ = (judged.coverage95 - all.coverage95).abs() > SHARE_WORTH_TELLING;
     let all = match differ {
         true => format!(
-            ", {} of all {}",
+            ", and {} of all {} with those at standstill",
             percent(all.coverage95),
             count(rows_of(all))
         ),
@@ -260,17 +306,36 @@ pub(super) fn effects_found(calibration: &Calibration) -> String {
     const WHERE: &str = "in the report’s table of effects";
     match (sure.len(), doubted) {
         (0, _) if open == 0 => "No missing effect is more likely than not.".into(),
-        (0, _) => format!("No missing effect is sure{more}."),
+        (0, _) => {
+            let groups = calibration.groups.iter().filter(|group| group.pip > SURE);
+            let sure: Vec<String> = groups
+                .map(|group| {
+                    let (named, rest) = group.members.split_at(group.members.len().min(NAMED));
+                    let mut named = named.to_vec();
+                    if !rest.is_empty() {
+                        named.push(format!("{} more", rest.len()));
+                    }
+                    format!("at least one of {} is there", list(&named))
+                })
+                .collect();
+            match sure.is_empty() {
+                true => format!("No missing effect is sure{more}."),
+                false => format!(
+                    "No single missing effect is sure{more}. Sure: {}.",
+                    sure.join("; ")
+                ),
+            }
+        }
         (1, 0) => format!("One missing effect found, which stands every check{more}."),
-        (1, _) => format!("One missing effect found, with a remark {WHERE}{more}."),
+        (1, _) => format!("One missing effect found, with a doubt {WHERE}{more}."),
         (n, 0) => format!("{n} missing effects found, which stand every check{more}."),
-        (n, d) if d == n => format!("{n} missing effects found, each with a remark {WHERE}{more}."),
+        (n, d) if d == n => format!("{n} missing effects found, each with a doubt {WHERE}{more}."),
         (n, 1) => format!(
-            "{n} missing effects found: {} stand every check, one has a remark {WHERE}{more}.",
+            "{n} missing effects found: {} stand every check, one has a doubt {WHERE}{more}.",
             n - 1
         ),
         (n, d) => format!(
-            "{n} missing effects found: {} stand every check, {d} have a remark {WHERE}{more}.",
+            "{n} missing effects found: {} stand every check, {d} have a doubt {WHERE}{more}.",
             n - d
         ),
     }
@@ -280,6 +345,7 @@ pub(super) fn effects_found(calibration: &Calibration) -> String {
 mod tests {
     use super::super::verdict::tests::judged;
     use super::*;
+    use twincal::{Finding, Severity};
 
     /// Standstill rows as many as moving ones: of these the mean square is 4 before and 0.25 after; at rest `still` before and after, joint by joint.
     fn with_standstill(c: &mut Calibration, still: [[f64; 2]; 2]) {
@@ -304,7 +370,7 @@ mod tests {
         let verdict = |still: [[f64; 2]; 2]| judged(|c| with_standstill(c, still));
         let of = |still: [[f64; 2]; 2]| verdict(still).grounds;
         let both = of([[1.0, 0.25], [1.0, 9.0]]);
-        let moving = "below 10 Hz on logs left out one at a time, joints that move: 2.00 → 0.500 N·m, 75.0\u{202f}% less.";
+        let moving = "below 10 Hz on logs left out one at a time, by fits without them; joints that move: 2.00 → 0.500 N·m, 75.0\u{202f}% less.";
         assert!(both[0].ends_with(moving), "{both:?}");
         // The mean squares are 1 before and 4.625 after.
         let still = "At standstill: 1.00 → 2.15 N·m, 115.1\u{202f}% more; worse on elbow (1.00 → 3.00 N·m).";
@@ -388,8 +454,25 @@ mod tests {
                 .iter_mut()
                 .for_each(|joint| joint.rmse_friction = Some(9.0));
         });
-        let said = "Viscous and Coulomb friction and an offset alone, fitted to the training rows, would be worse than the model: 9.00 N·m.";
+        let said = "Viscous and Coulomb friction and an offset alone, fitted to the training rows, would leave 9.00 N·m, more than your model does: worse on elbow (0.431 → 9.00 N·m) and shoulder (0.715 → 9.00 N·m).";
         assert_eq!(worse.grounds[1], said);
+        let one = judged(|c| {
+            let joints = &mut c.validation.filtered.joints;
+            (joints[0].rmse_friction, joints[1].rmse_friction) = (Some(0.01), Some(9.0));
+            c.findings = vec![Finding::new(
+                Severity::Note,
+                "urdf_dynamics",
+                "elbow",
+                "",
+                0,
+            )];
+        });
+        assert!(
+            one.grounds[1].ends_with(
+                "worse on elbow (0.431 → 9.00 N·m); better on one joint. Your model’s own friction is not part of its torque here."
+            ),
+            "{one:?}"
+        );
         let better = judged(|c| {
             let joints = &mut c.validation.filtered.joints;
             joints
@@ -401,15 +484,38 @@ mod tests {
             "{better:?}"
         );
         assert!(
-            grounds[2].ends_with("of the 200 held-out values, 4.0 s of motion."),
+            grounds[2].ends_with("of the 200 held-out values (4.0 s of log)."),
             "{grounds:?}"
         );
         let grounds = judged(|c| c.validation.filtered.joints[0].rmse_friction = None).grounds;
         assert!(
             !grounds
                 .iter()
-                .any(|g| g.contains("friction") || g.contains("s of motion"))
+                .any(|g| g.contains("friction") || g.contains("s of log"))
         );
+    }
+
+    #[test]
+    fn where_no_effect_is_sure_groups_are_told_of_which_one_is() {
+        use twincal::calibrate::{Alike, Group};
+        let of = |pip: f64| {
+            let told = judged(|c| {
+                for component in c.components.iter_mut().filter(|c| c.selected) {
+                    component.verdict = Some(Decision::Undecided);
+                }
+                c.groups = vec![Group {
+                    members: ["a", "b", "c", "d", "e"].map(str::to_owned).to_vec(),
+                    pip,
+                    alike: Alike::EveryMotion,
+                    settled: false,
+                    words: String::new(),
+                }];
+            });
+            told.grounds.last().cloned().unwrap_or_default()
+        };
+        let sure = "No single missing effect is sure; 7 more likely than not, but undecided. Sure: at least one of a, b, c and 2 more is there.";
+        assert_eq!(of(0.999), sure);
+        assert!(of(0.9).starts_with("No missing effect is sure;"));
     }
 
     #[test]
@@ -420,7 +526,7 @@ mod tests {
             of(&|_| ()),
             "7 missing effects found, which stand every check."
         );
-        let one = "7 missing effects found: 6 stand every check, one has a remark in the report’s table of effects.";
+        let one = "7 missing effects found: 6 stand every check, one has a doubt in the report’s table of effects.";
         assert_eq!(of(&|c| c.repeatability[0].z = Some(3.7)), one);
         let prior = |c: &mut Calibration| {
             let selected = c.terms.iter_mut().find(|t| t.selected);

@@ -75,6 +75,9 @@ pub(super) fn beyond(validation: &Validation, joints: &[Joint<'_>]) -> Table {
     table
 }
 
+/// Probability below which it is said why there is no more.
+const WORTH_A_GUARANTEE: f64 = 0.9;
+
 /// What is guaranteed without believing the model, in one sentence.
 pub(super) fn guarantee(validation: &Validation) -> String {
     let Some(conformal) = &validation.conformal else {
@@ -88,7 +91,7 @@ pub(super) fn guarantee(validation: &Validation) -> String {
         .collect();
     format!(
         "Without believing the model: stretched by {}, the 95 % intervals of all joints hold {} of the rows of the next log \
-         like these with probability {}/{} = {} {}. Joint by joint: {}.",
+         like these with probability {}/{} = {} {}.{} Joint by joint: {}.",
         number(conformal.factor, 3),
         percent(conformal.rows),
         conformal.trajectories,
@@ -98,6 +101,11 @@ pub(super) fn guarantee(validation: &Validation) -> String {
             "(split-conformal by trajectory, guaranteed)"
         } else {
             "(by logs left out one at a time: about, not guaranteed; give logs with --heldout for a guarantee)"
+        },
+        match conformal.trajectories {
+            1 => " One log allows no more.".to_owned(),
+            n if conformal.level < WORTH_A_GUARANTEE => format!(" {n} logs allow no more."),
+            _ => String::new(),
         },
         each.join(", ")
     )
@@ -223,6 +231,13 @@ mod tests {
             text.contains("3/4") && text.contains("trajectory, guaranteed)"),
             "{text}"
         );
+        assert!(
+            text.contains("guaranteed). 3 logs allow no more. Joint"),
+            "{text}"
+        );
+        let conformal = validation.conformal.as_mut().unwrap();
+        (conformal.trajectories, conformal.level) = (19, 0.95);
+        assert!(!guarantee(&validation).contains("no more"));
         validation.conformal = None;
         assert!(guarantee(&validation).starts_with("No guarantee"));
     }

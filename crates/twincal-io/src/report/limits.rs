@@ -23,6 +23,8 @@ const LEVEL: f64 = 0.95;
 const LEVEL_WORDS: &str = "95 % intervals";
 /// Share of the torque's standard deviation from which the remaining error is called large.
 const LARGE: f64 = 0.5;
+/// Share of it from which a constant predicts torque better.
+const CLEARLY_LOST: f64 = 1.05;
 
 /// Held-out rows, in independent ones, below which nothing is promised.
 pub(super) const FEW: f64 = 20.0;
@@ -45,7 +47,13 @@ pub(super) fn limits(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Str
         .findings
         .iter()
         .filter(|f| f.severity == Severity::Degraded && !f.doubts_the_log());
-    out.extend(degraded.map(|f| f.message.clone()));
+    out.extend(degraded.map(|f| {
+        let log = calibration.logs.iter().any(|log| log.name == f.subject);
+        match log && calibration.logs.len() > 1 && !f.message.contains(&f.subject) {
+            true => format!("{}: {}", f.subject, f.message),
+            false => f.message.clone(),
+        }
+    }));
     out.extend(findings::warnings(calibration));
     out.push("Outside the motion listed under “What the data cannot tell” it extrapolates.".into());
     out
@@ -112,10 +120,19 @@ fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Stri
         .iter()
         .map(|(_, share)| whole_percent(*share))
         .collect();
+    let deviation = |(name, _): &(String, f64)| {
+        let joint = joints.iter().find(|joint| joint.name == name)?;
+        let deviation = torque_deviation(joint, Rows::Moving);
+        Some(format!("{} {}", number(deviation, 3), joint.units.torque))
+    };
+    let deviations: Vec<String> = lost.iter().filter_map(deviation).collect();
+    let better = lost.iter().all(|(_, share)| *share > CLEARLY_LOST);
     let names: Vec<String> = lost.into_iter().map(|(name, _)| name).collect();
     let words = format!(
-        "the error left is {} of the torque's standard deviation: a constant would do as well",
-        list(&shares)
+        "the error left is {} of the torque's standard deviation ({}): a constant would do {}",
+        list(&shares),
+        deviations.join(", "),
+        if better { "better" } else { "as well" }
     );
     say(&names, &words, &words);
     let mut large = large(scores, joints);
@@ -124,6 +141,7 @@ fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Stri
     say(&large, words, words);
     out.append(&mut out_of_shape);
     out.extend(friction_does_as_well(scores, joints));
+    out.extend(beyond::error(calibration, joints));
     out.extend(beyond::narrow(calibration, joints));
     out.extend(beyond::mostly(calibration, joints));
     out.extend(raw_is_worse(calibration, joints));

@@ -61,6 +61,8 @@ struct Page<'a> {
     standstill: bool,
     beyond: Table,
     raw: Table,
+    /// The same of moving joints; empty where none stands still.
+    raw_moving: Table,
     noise: Table,
     /// What the data leave open, a sentence each.
     open: Vec<String>,
@@ -160,6 +162,10 @@ fn gather<'a>(
         standstill: limits::has_standstill(validation),
         beyond: honesty::beyond(validation, joints),
         raw: tables::scores(&validation.raw, joints, Rows::All),
+        raw_moving: match limits::has_standstill(validation) {
+            true => tables::scores(&validation.raw_moving, joints, Rows::Moving),
+            false => Table::default(),
+        },
         noise: tables::noise(joints),
         open: ambiguity::sentences(calibration, joints),
         motion: tables::motion(calibration, joints),

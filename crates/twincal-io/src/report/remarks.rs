@@ -1,7 +1,7 @@
 //! What is to be minded about an effect before its numbers are used: it stands at the effect's own line.
 
 use super::figures::sensitivity;
-use super::text::{list, number};
+use super::text::{list, number, percent};
 use twincal::calibrate::{
     Alike, Calibration, ComponentSummary, ParameterSummary, Repeat, Repeated, Verdict,
 };
@@ -21,8 +21,43 @@ pub(super) fn remarks(component: &ComponentSummary, calibration: &Calibration) -
     let first = component.parameters.first().map(ParameterSummary::told);
     let negative = first.and_then(|(value, spread)| component.family.remark(value, spread));
     let mut out: Vec<String> = negative.map(str::to_owned).into_iter().collect();
+    out.extend(of_the_file(component, calibration));
     out.extend(doubts(component, calibration));
     out
+}
+
+/// What the model says of a tensor's numbers that are told, and what it would have to say: known where nothing else of the link was found.
+fn of_the_file(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
+    let link = component.name.strip_suffix(".tensor")?;
+    let moments = format!("{link}.mass_moments");
+    let mut found = calibration.components.iter().filter(|other| other.selected);
+    let robot = &calibration.twin.robot;
+    let last = robot.links_of_body(robot.bodies().len().saturating_sub(1));
+    let alone = !found
+        .any(|other| other.name == moments || other.family.is_payload() && last.contains(&link));
+    let links = &robot.description().links;
+    let inertia = links.iter().find(|own| own.name == link)?.inertia?;
+    let axis = |letter: char| "xyz".find(letter);
+    let told = component.parameters.iter().filter_map(|parameter| {
+        let mut letters = parameter.name.strip_prefix('i')?.chars();
+        let (i, j) = (axis(letters.next()?)?, axis(letters.next()?)?);
+        let before = inertia.tensor[i][j];
+        let (change, _) = parameter.told();
+        let worth = parameter.seen && i == j && before > 0.0 && change.is_finite();
+        worth.then(|| {
+            format!(
+                "{} {} → {} ({}{})",
+                parameter.name,
+                number(before, 3),
+                number(before + change, 3),
+                if change > 0.0 { "+" } else { "" },
+                percent(change / before)
+            )
+        })
+    });
+    let told: Vec<String> = told.take(3).collect();
+    (component.selected && alone && !told.is_empty())
+        .then(|| format!("in your model {}", told.join(", ")))
 }
 
 /// Of these, what speaks against the effect or its numbers: not what explains a sign.
@@ -230,6 +265,36 @@ mod tests {
     #[test]
     fn nothing_is_remarked_of_a_plain_effect() {
         assert_eq!(of(|_| ()), [""; 0]);
+    }
+
+    #[test]
+    fn a_tensor_says_what_the_model_has() {
+        let of = |moments: bool| {
+            let mut calibration = fixture::two_joints();
+            let robot = &calibration.twin.robot;
+            let links = &robot.description().links;
+            let link = links.iter().find(|link| link.inertia.is_some()).unwrap();
+            let (name, before) = (link.name.clone(), link.inertia.unwrap().tensor[2][2]);
+            let mut own = calibration.components[0].clone();
+            (own.name, own.selected) = (format!("{name}.tensor"), true);
+            own.parameters.truncate(1);
+            let value = &mut own.parameters[0];
+            (value.name, value.seen, value.median) = ("izz".into(), true, 0.5 * before);
+            let mut other = own.clone();
+            other.name = format!("{name}.mass_moments");
+            other.selected = moments;
+            calibration.components.push(other);
+            (of_the_file(&own, &calibration), before)
+        };
+        let (told, before) = of(false);
+        let said = format!(
+            "in your model izz {} → {} (+50.0\u{202f}%)",
+            number(before, 3),
+            number(1.5 * before, 3)
+        );
+        assert_eq!(told, Some(said));
+        // Its tensor about the new centre of mass is another one.
+        assert_eq!(of(true).0, None);
     }
 
     #[test]

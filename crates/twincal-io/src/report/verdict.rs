@@ -62,6 +62,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     let mut each = scores.joints.iter();
     let too_narrow = each.any(|j| too_narrow(j, memory(joints, &j.joint)));
     let firm = not_to_rest_on(calibration).is_empty();
+    let rest_worse = grounds::rest_got_worse(calibration);
     let (large, lost) = (large(scores, joints).len(), lost(scores, joints).len());
     let limits = limits(calibration, joints);
     let serious = calibration
@@ -144,12 +145,20 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     } else if scores.coverage95 < COVERAGE.0 {
         (
             Grade::Care,
-            "The torque yes, its intervals not: they are too narrow.",
+            match rest_worse {
+                false => "The torque yes, its intervals not: they are too narrow.",
+                true => "While joints move the torque yes, its intervals not: they are too narrow.",
+            },
         )
     } else if !honest {
         (
             Grade::Care,
             "Yes; its intervals are wider than they need to be.",
+        )
+    } else if rest_worse {
+        (
+            Grade::Care,
+            "While joints move, yes; at standstill it is worse than your model.",
         )
     } else if let Some(shape) = off.all.filter(|shape| !shape.contradicts(scores, joints)) {
         (Grade::Care, shape.headline())
@@ -293,6 +302,26 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn standstill_that_got_worse_is_in_the_headline() {
+        let of = |after: f64, at_rest: u64| {
+            judged(|c| {
+                c.validation.moving = c.validation.filtered.clone();
+                let joints = c.validation.filtered.joints.iter_mut();
+                for (all, moving) in joints.zip(&mut c.validation.moving.joints) {
+                    (all.rows, moving.rows) = (100 + at_rest, 100);
+                    all.rmse_nominal = moving.rmse_nominal;
+                    all.rmse_calibrated = after * moving.rmse_nominal;
+                }
+            })
+            .headline
+        };
+        assert!(of(2.0, 100).starts_with("While joints move, yes;"));
+        assert!(of(0.5, 100).starts_with("Yes"));
+        // Too few to say.
+        assert!(of(9.0, 9).starts_with("Yes"));
+    }
+
+    #[test]
     fn bodies_that_are_none_on_two_links_ask_for_the_right_model() {
         let of = |links: &[&str]| {
             judged(|c| {
@@ -397,8 +426,18 @@ pub(super) mod tests {
             "No: the error left is larger than the torque itself."
         );
         assert_eq!(all.grade, Grade::Bad);
-        let said = "Joints shoulder and elbow: the error left is 138\u{202f}% and 138\u{202f}% of the torque's standard deviation: a constant would do as well.";
-        assert!(all.limits.iter().any(|l| l == said), "{all:?}");
+        let said = "Joints shoulder and elbow: the error left is 138\u{202f}% and 138\u{202f}% of the torque's standard deviation (";
+        let told = all.limits.iter().find(|l| l.starts_with(said));
+        assert!(
+            told.is_some_and(|l| l.ends_with(" N·m): a constant would do better.")),
+            "{all:?}"
+        );
+        let as_well = of(true, 1.02).limits;
+        assert!(
+            as_well
+                .iter()
+                .any(|l| l.ends_with(": a constant would do as well."))
+        );
         let large = "Better than the model alone, but the error that is left is large.";
         assert_eq!(of(true, 0.98).headline, large);
         let one = of(false, 1.38);

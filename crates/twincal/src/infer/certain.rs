@@ -228,7 +228,10 @@ impl WithSimd for Climb<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> f64 {
         let mut walker = Walker::new(self.standard, self.prior);
         let all: Vec<usize> = (0..self.standard.blocks.len()).collect();
-        all.iter().for_each(|&block| walker.flip(simd, block));
+        // No closure: it would not be compiled for the instructions of its place.
+        for &block in &all {
+            walker.flip(simd, block);
+        }
         walker.tableau.refine();
         climb(simd, &mut walker, &all, &[]);
         walker.log_weight() + present(&walker, false).log_mass(self.standard)

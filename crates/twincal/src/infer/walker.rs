@@ -130,6 +130,15 @@ impl<'a> Walker<'a> {
         self.free_odds(block)
     }
 
+    /// A priori, how much likelier one more member of a family is, and one less; 0 where there is none to come or to go.
+    #[inline(always)]
+    pub(super) fn family_odds(&self, family: usize) -> [f64; 2] {
+        let (odds, members) = (&self.odds[family], self.members[family]);
+        let more = odds.get(members).map_or(0.0, |[odds, _]| *odds);
+        let less = members.checked_sub(1).map_or(0.0, |others| odds[others][1]);
+        [more, less]
+    }
+
     /// [`Walker::flip_odds`] without heredity.
     #[inline(always)]
     fn free_odds(&self, block: usize) -> f64 {

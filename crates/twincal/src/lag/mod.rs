@@ -130,7 +130,7 @@ pub fn estimate_lag(robot: &Robot, pipeline: &Pipeline, trajectory: &Trajectory)
 }
 
 /// One finding per log whose torque is clearly off by more than a sample: degraded (exit code 3) unless the user has said
-/// what the lag is.
+/// what the lag is, or most of the logs, which are all moved alike, do not say the same.
 pub fn lag_findings(pipeline: &Pipeline, lags: &[LogLag]) -> Vec<Finding> {
     let said = pipeline.corrections.lag != Lag::Unsaid;
     lags.iter()
@@ -138,14 +138,27 @@ pub fn lag_findings(pipeline: &Pipeline, lags: &[LogLag]) -> Vec<Finding> {
             let (lag, [_, sd]) = (log.clear()?, log.common?);
             let order = if lag > 0.0 { "after" } else { "before" };
             let speak = log.joints.iter().filter(|joint| joint.speaks).count();
+            let same = |other: &&LogLag| other.clear().is_some_and(|own| own * lag > 0.0);
+            let (alike, all) = (lags.iter().filter(same).count(), lags.len());
+            let most = 2 * alike >= all;
+            let severity = match said || !most {
+                true => Severity::Warning,
+                false => Severity::Degraded,
+            };
+            let others = match most {
+                true => String::new(),
+                false => format!(
+                    "; {alike} of {all} logs say so, and that moves all of them: keep it where held-out torque gets better"
+                ),
+            };
             let still = if said { " still" } else { "" };
             Some(Finding::new(
-                if said { Severity::Warning } else { Severity::Degraded },
+                severity,
                 "torque_lag",
                 &log.log,
                 format!(
                     "torque{still} comes {:.2} ± {:.2} ms ({:.1} samples) {order} the motion, as {speak} of {} moving joints say: rows \
-                     pair it with the wrong motion; move it with [signal] lag = {:.4}, or say lag = 0",
+                     pair it with the wrong motion; move it with [signal] lag = {:.4}, or say lag = 0{others}",
                     1e3 * lag.abs(),
                     1e3 * sd,
                     lag.abs() / log.interval,

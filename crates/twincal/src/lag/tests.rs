@@ -68,6 +68,17 @@ fn a_lag_that_was_said_is_no_degraded_data() {
 }
 
 #[test]
+fn what_one_of_many_logs_says_is_only_a_warning() {
+    let log = |seed: f64, lag: f64| estimate_lag(&arm(1.0), &pipeline(), &late(seed, lag)).unwrap();
+    let most = lag_findings(&pipeline(), &[log(0.0, 4.0), log(3.1, 4.0), log(6.2, 0.0)]);
+    let degraded = |f: &crate::Finding| f.severity == Severity::Degraded;
+    assert!(most.len() == 2 && most.iter().all(degraded), "{most:?}");
+    let one = lag_findings(&pipeline(), &[log(0.0, 4.0), log(3.1, 0.0), log(6.2, 0.0)]);
+    assert!(one.len() == 1 && one[0].severity == Severity::Warning);
+    assert!(one[0].message.contains("; 1 of 3 logs say so"), "{one:?}");
+}
+
+#[test]
 fn joints_that_disagree_have_no_clear_lag() {
     let joint = |lag: f64, speaks: bool| JointLag {
         joint: "j".into(),

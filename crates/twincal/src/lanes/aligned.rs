@@ -20,6 +20,14 @@ impl Aligned {
         let start = if start < LANES { start } else { 0 };
         Self { values, start, len }
     }
+
+    /// Another length; what the numbers are then is not said.
+    pub fn resize(&mut self, len: usize) {
+        match self.start + len <= self.values.len() {
+            true => self.len = len,
+            false => *self = Self::zeros(len),
+        }
+    }
 }
 
 impl Default for Aligned {
@@ -61,6 +69,17 @@ pub struct Line<T>(pub T);
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn any_length_starts_at_a_cache_line() {
+        let mut numbers = Aligned::default();
+        for len in [5, 1000, 0, 999, 1001] {
+            numbers.resize(len);
+            numbers.fill(1.0);
+            assert_eq!(numbers.len(), len);
+            assert_eq!(numbers.as_ptr().align_offset(64), 0);
+        }
+    }
 
     #[test]
     fn numbers_start_at_a_cache_line_in_every_copy() {

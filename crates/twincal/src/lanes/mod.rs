@@ -10,7 +10,7 @@ mod log_exp;
 mod trig;
 
 pub use aligned::{Aligned, Line};
-pub use log_exp::{exp, ln};
+pub use log_exp::{exp, ln, tanh};
 pub use trig::{sin_cos, sin_cos_fused};
 
 /// Whether `f64::mul_add` is one instruction in code that is compiled for these vectors; else it may be a slow call.

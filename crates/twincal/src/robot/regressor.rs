@@ -13,6 +13,7 @@ use super::dynamics::Motion;
 use super::lane_vectors::{
     V3, cross, cross_add, dot, dot_add, load, origin, store, to_child, turn_back,
 };
+use super::parameters::ENTRIES;
 use super::recursion::{State, move_body};
 use crate::lanes::{Aligned, LANES, Line};
 use pulp::Simd;
@@ -47,6 +48,12 @@ pub struct RegressorBlock {
     values: Aligned,
     /// Samples of the block before: nothing but zeros stands behind them.
     filled: usize,
+    workspace: Workspace,
+}
+
+/// Memory of the recursion.
+#[derive(Debug, Clone)]
+struct Workspace {
     angles: Angles,
     registers: Registers,
     axes: Registers,
@@ -138,9 +145,11 @@ impl Regressor {
         RegressorBlock {
             values: Aligned::zeros(self.pairs.len() * 10 * STRIDE),
             filled: 0,
-            angles: Angles::new(robot.bodies.len()),
-            registers: Registers::default(),
-            axes: Registers::default(),
+            workspace: Workspace {
+                angles: Angles::new(robot.bodies.len()),
+                registers: Registers::default(),
+                axes: Registers::default(),
+            },
         }
     }
 
@@ -178,13 +187,53 @@ impl Regressor {
         samples: Range<usize>,
         block: &mut RegressorBlock,
     ) {
+        let RegressorBlock {
+            values,
+            filled,
+            workspace,
+        } = block;
         instructions.dispatch(Kernel {
             regressor: self,
             robot,
             motion,
-            samples,
-            block,
+            samples: samples.clone(),
+            workspace,
+            sink: &mut Cells(values),
         });
+        clear(values, samples.len(), filled);
+    }
+
+    /// [`Regressor::evaluate`] where columns go straight to where they belong, which costs less than to bring them there: that of
+    /// parameter k of a pair to `places[pair * 10 + k]`, sample by sample of the motion, and into the block where that is empty.
+    ///
+    /// # Panics
+    /// As [`Regressor::evaluate`], or if a place is too short.
+    pub(crate) fn evaluate_to(
+        &self,
+        robot: &Robot,
+        motion: Motion<'_>,
+        samples: Range<usize>,
+        block: &mut RegressorBlock,
+        places: &mut [&mut [f64]],
+    ) {
+        let RegressorBlock {
+            values,
+            filled,
+            workspace,
+        } = block;
+        Instructions::Widest.dispatch(Kernel {
+            regressor: self,
+            robot,
+            motion,
+            samples: samples.clone(),
+            workspace,
+            sink: &mut Places {
+                cells: Cells(values),
+                places,
+                start: samples.start,
+            },
+        });
+        clear(values, samples.len(), filled);
     }
 
     /// Marks the columns that are zero in any state.
@@ -220,15 +269,63 @@ impl Regressor {
 /// One for each sample of a vector.
 const ONES: [f64; LANES] = [1.0; LANES];
 
-struct Kernel<'a> {
+/// Where columns go.
+trait Sink {
+    /// Takes the samples of a block from `at` on, of which the first `live` are some.
+    fn put<S: Simd>(&mut self, s: S, column: usize, at: usize, live: usize, value: S::f64s);
+}
+
+/// Sample `at` of a column at `column * STRIDE + at`.
+struct Cells<'a>(&'a mut [f64]);
+
+impl Sink for Cells<'_> {
+    /// Writes a whole vector: masked stores cost many times as much (Zen 3).
+    #[inline(always)]
+    fn put<S: Simd>(&mut self, s: S, column: usize, at: usize, _: usize, value: S::f64s) {
+        let start = column * STRIDE + at;
+        store(s, &mut self.0[start..start + S::F64_LANES], value);
+    }
+}
+
+/// See [`Regressor::evaluate_to`].
+struct Places<'a, 'b> {
+    cells: Cells<'a>,
+    places: &'a mut [&'b mut [f64]],
+    /// The block's first sample in the motion.
+    start: usize,
+}
+
+impl Sink for Places<'_, '_> {
+    #[inline(always)]
+    fn put<S: Simd>(&mut self, s: S, column: usize, at: usize, live: usize, value: S::f64s) {
+        let place = &mut *self.places[column];
+        if place.is_empty() {
+            return self.cells.put(s, column, at, live, value);
+        }
+        store(s, &mut place[self.start + at..][..live], value);
+    }
+}
+
+/// Nothing of an earlier block may stand behind the last sample.
+fn clear(values: &mut [f64], samples: usize, filled: &mut usize) {
+    if samples < *filled {
+        for column in values.chunks_exact_mut(STRIDE) {
+            column[samples..*filled].fill(0.0);
+        }
+    }
+    *filled = samples;
+}
+
+struct Kernel<'a, K> {
     regressor: &'a Regressor,
     robot: &'a Robot,
     motion: Motion<'a>,
     samples: Range<usize>,
-    block: &'a mut RegressorBlock,
+    workspace: &'a mut Workspace,
+    sink: &'a mut K,
 }
 
-impl pulp::WithSimd for Kernel<'_> {
+impl<K: Sink> pulp::WithSimd for Kernel<'_, K> {
     type Output = ();
 
     #[inline(always)]
@@ -238,15 +335,14 @@ impl pulp::WithSimd for Kernel<'_> {
             robot,
             motion,
             samples,
-            block,
+            workspace,
+            sink,
         } = self;
-        let RegressorBlock {
-            values,
-            filled,
+        let Workspace {
             angles,
             registers,
             axes,
-        } = block;
+        } = workspace;
         assert!(samples.len() <= BLOCK, "at most {BLOCK} samples");
         let bodies = &robot.bodies[..];
         let gravity = robot.description.gravity;
@@ -287,62 +383,53 @@ impl pulp::WithSimd for Kernel<'_> {
                         u[2] = s.add_f64s(u[2], own);
                     }
                     axes[pair] = Line([u, v]);
-                    let cells = &mut values[pair * 10 * STRIDE..(pair + 1) * 10 * STRIDE];
+                    let present = &regressor.pairs[pair].present;
                     let at = first - samples.start;
-                    columns(s, &regressor.pairs[pair].present, [u, v], state, cells, at);
+                    let put = |k, value| sink.put(s, pair * 10 + k, at, last - first, value);
+                    columns(s, present, [u, v], state, put);
                 }
             }
             first = last;
         }
-        // Nothing of an earlier block may stand behind the last sample.
-        if samples.len() < *filled {
-            for column in values.chunks_exact_mut(STRIDE) {
-                column[samples.len()..*filled].fill(0.0);
-            }
-        }
-        *filled = samples.len();
     }
 }
 
-/// The ten columns of one pair, written to `cells[k * STRIDE + at]`.
+/// The ten columns of one pair, by parameter.
 #[inline(always)]
 fn columns<S: Simd>(
     s: S,
     present: &[bool; 10],
     [u, v]: [V3<S>; 2],
     state: &State<S::f64s>,
-    cells: &mut [f64],
-    at: usize,
+    mut put: impl FnMut(usize, S::f64s),
 ) {
     let State { w, wd, a, b, .. } = state;
     if present[0] {
-        put(s, cells, 0, at, dot(s, v, *a));
+        put(0, dot(s, v, *a));
     }
     // Bᵀ v + a × u
     let turned: V3<S> = cross(s, *a, u);
     for k in 0..3 {
         if present[1 + k] {
             let column = [b[0][k], b[1][k], b[2][k]];
-            put(s, cells, 1 + k, at, dot_add(s, column, v, turned[k]));
+            put(1 + k, dot_add(s, column, v, turned[k]));
         }
     }
     // u·(I ω̇) + (u × ω)·(I ω)
     let e = cross(s, u, *w);
-    for (k, (i, j)) in super::parameters::ENTRIES.into_iter().enumerate() {
-        if !present[4 + k] {
-            continue;
-        }
-        let mut value = s.mul_add_e_f64s(u[i], wd[j], s.mul_f64s(e[i], w[j]));
-        if i != j {
-            value = s.mul_add_e_f64s(u[j], wd[i], s.mul_add_e_f64s(e[j], w[i], value));
-        }
-        put(s, cells, 4 + k, at, value);
+    // One by one: in a loop compilers keep vectors in memory, to index them.
+    macro_rules! tensor {
+        ($($k:literal)*) => {$(
+            if present[4 + $k] {
+                const IJ: (usize, usize) = ENTRIES[$k];
+                let (i, j) = IJ;
+                let mut value = s.mul_add_e_f64s(u[i], wd[j], s.mul_f64s(e[i], w[j]));
+                if i != j {
+                    value = s.mul_add_e_f64s(u[j], wd[i], s.mul_add_e_f64s(e[j], w[i], value));
+                }
+                put(4 + $k, value);
+            }
+        )*};
     }
-}
-
-/// Writes a whole vector of column `k`: masked stores cost many times as much (Zen 3).
-#[inline(always)]
-fn put<S: Simd>(s: S, cells: &mut [f64], k: usize, at: usize, value: S::f64s) {
-    let start = k * STRIDE + at;
-    store(s, &mut cells[start..start + S::F64_LANES], value);
+    tensor!(0 1 2 3 4 5);
 }

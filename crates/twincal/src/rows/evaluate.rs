@@ -1,5 +1,6 @@
 //! Columns and nominal torque of a stretch of samples.
 
+use crate::lanes::Aligned;
 use crate::robot::{Motion, Robot, nominal_torque};
 use crate::term::{Library, Recipes, Scratch};
 use std::sync::Arc;
@@ -13,9 +14,9 @@ pub(super) trait Source {
     /// How the columns of a joint follow from its parts.
     fn recipes(&self, joint: usize) -> &Arc<Recipes>;
     /// `nominal[joint * len + sample]`, `out[joint][i * len + sample]`.
-    fn evaluate(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]);
+    fn evaluate(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Aligned]);
     /// `nominal[joint * len + sample]`, `out[joint][part * len + sample]`.
-    fn evaluate_parts(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]);
+    fn evaluate_parts(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Aligned]);
 }
 
 /// `(joint, row)` of the columns that do not act in a log where the payload acts, or does not.
@@ -81,7 +82,7 @@ impl Source for OfLibrary<'_> {
         &self.recipes[joint]
     }
 
-    fn evaluate(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]) {
+    fn evaluate(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Aligned]) {
         nominal_torque(self.robot, motion, nominal);
         self.library.evaluate_with(motion, out, &mut self.scratch);
         for &(joint, row) in &self.absent {
@@ -89,9 +90,10 @@ impl Source for OfLibrary<'_> {
         }
     }
 
-    fn evaluate_parts(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]) {
+    fn evaluate_parts(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Aligned]) {
         nominal_torque(self.robot, motion, nominal);
-        self.library.evaluate_parts(motion, out, &mut self.scratch);
+        self.library
+            .evaluate_parts(motion, motion.len, out, &mut self.scratch);
     }
 }
 
@@ -109,14 +111,14 @@ pub(super) struct Stretch {
     /// Nominal torque.
     pub(super) nominal: Vec<f64>,
     /// Columns or parts: `values[joint][i * len + sample]`.
-    pub(super) values: Vec<Vec<f64>>,
+    pub(super) values: Vec<Aligned>,
 }
 
 impl Stretch {
     /// Memory for the joints of a robot.
     pub(super) fn new(dof: usize) -> Self {
         Self {
-            values: vec![Vec::new(); dof],
+            values: vec![Aligned::default(); dof],
             ..Self::default()
         }
     }
@@ -147,7 +149,7 @@ impl Stretch {
         source.evaluate_parts(motion, nominal, values);
     }
 
-    fn split(&mut self) -> (Motion<'_>, &mut [f64], &mut [Vec<f64>]) {
+    fn split(&mut self) -> (Motion<'_>, &mut [f64], &mut [Aligned]) {
         let len = self.len;
         self.nominal.resize(self.values.len() * len, 0.0);
         let motion = Motion {

@@ -162,7 +162,7 @@ impl Rows {
             for (joint, &first) in firsts.iter().enumerate() {
                 let parts = source.recipes(joint).parts();
                 let own = joint * count..(joint + 1) * count;
-                at_hand.push((first, &stretch.values[joint]));
+                at_hand.push((first, &stretch.values[joint][..]));
                 at_hand.push((first + parts, &stretch.nominal[own]));
                 if has_tau {
                     let tau = &segment.tau[joint * total + from..][..count];

@@ -2,6 +2,7 @@
 
 use super::evaluate::Source;
 use super::*;
+use crate::lanes::Aligned;
 use crate::robot::Motion;
 use crate::signal::fir::column_kernel;
 use crate::signal::{DerivedFrom, LoggedSamples, Payload, Segment};
@@ -52,11 +53,11 @@ impl StandIn {
     fn fill(
         motion: Motion<'_>,
         nominal: &mut [f64],
-        out: &mut [Vec<f64>],
+        out: &mut [Aligned],
         of: impl Fn(usize, usize, [f64; 3]) -> f64,
     ) {
         for joint in 0..2 {
-            out[joint].resize(COLUMNS[joint].len() * motion.len, 0.0);
+            out[joint].resize(COLUMNS[joint].len() * motion.len);
             for s in 0..motion.len {
                 let i = joint * motion.len + s;
                 nominal[i] = motion.q[i] * 3.0 - motion.qdd[i];
@@ -78,12 +79,12 @@ impl Source for StandIn {
         &self.recipes[joint]
     }
 
-    fn evaluate(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]) {
+    fn evaluate(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Aligned]) {
         let of = |joint: usize, c: usize, s: [f64; 3]| column(COLUMNS[joint][c], s[0], s[1], s[2]);
         Self::fill(motion, nominal, out, of);
     }
 
-    fn evaluate_parts(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Vec<f64>]) {
+    fn evaluate_parts(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Aligned]) {
         Self::fill(motion, nominal, out, part);
     }
 }

@@ -19,6 +19,7 @@ use crate::robot::{JointKind, Motion, Robot};
 use std::sync::Arc;
 
 pub use super::model_column::Scratch;
+pub use super::parts::Table;
 
 /// Ordered terms for one robot, ready to be evaluated. Column k of the regression is the k-th term whose status is
 /// [`Status::Candidate`].
@@ -379,14 +380,19 @@ impl Library {
     }
 
     /// [`Library::evaluate`] with working memory that is kept between calls: for many short batches.
-    pub fn evaluate_with(&self, motion: Motion<'_>, out: &mut [Vec<f64>], scratch: &mut Scratch) {
+    pub fn evaluate_with<T: Table>(
+        &self,
+        motion: Motion<'_>,
+        out: &mut [T],
+        scratch: &mut Scratch,
+    ) {
         let counts = self.by_joint.iter().map(Vec::len);
         parts::evaluate(
             counts,
             &self.tape,
             self.model.as_deref(),
             motion,
-            out,
+            (motion.len, out),
             scratch,
         );
     }
@@ -396,13 +402,24 @@ impl Library {
         self.parts.recipes(joint)
     }
 
-    /// Evaluates few signals whose fixed linear combinations are all columns: `out[j][part * motion.len + sample]`, each
+    /// Evaluates few signals whose fixed linear combinations are all columns: `out[j][part * stride + sample]`, each
     /// vector resized. What is linear (a filter) or quadratic (sums of products) is cheaper before [`Recipes`] are followed than after.
     ///
     /// # Panics
-    /// As [`Library::evaluate`].
-    pub fn evaluate_parts(&self, motion: Motion<'_>, out: &mut [Vec<f64>], scratch: &mut Scratch) {
-        self.parts.evaluate(motion, out, scratch);
+    /// As [`Library::evaluate`], or if `stride` is less than `motion.len`.
+    pub fn evaluate_parts<T: Table>(
+        &self,
+        motion: Motion<'_>,
+        stride: usize,
+        out: &mut [T],
+        scratch: &mut Scratch,
+    ) {
+        assert!(
+            stride >= motion.len,
+            "signals of {} samples every {stride} numbers",
+            motion.len
+        );
+        self.parts.evaluate(motion, stride, out, scratch);
     }
 
     /// φ(q, q̇) of a term (index into [`Library::terms`]) at one state, J per unit of β; `None` where the term

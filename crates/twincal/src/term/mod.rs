@@ -52,7 +52,7 @@ pub use component::{Component, Parameter};
 pub use expression::Function;
 pub(crate) use expression::{Graph, Id as GraphId, Node, Variable};
 pub use family::Family;
-pub use library::{Library, Scratch};
+pub use library::{Library, Scratch, Table};
 pub(crate) use model_column::ModelColumn;
 pub use recipes::Recipes;
 pub use sentence::{Estimate, told};

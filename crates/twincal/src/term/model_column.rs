@@ -5,12 +5,12 @@
 //! nominal torque.
 
 use super::expression::TapeScratch;
+use super::parts::Table;
 use crate::robot::{
     BLOCK, BlockWorkspace, Motion, Regressor, RegressorBlock, Robot, STRIDE, gravity_regressor,
     nominal_torque, position_derivative,
 };
 use pulp::{Simd, WithSimd};
-use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -52,6 +52,11 @@ impl ModelColumn {
     /// True if it comes from a recursion that works on blocks of samples.
     fn is_blockwise(&self) -> bool {
         !matches!(self, Self::Nominal { .. } | Self::LoadFriction { .. })
+    }
+
+    /// True if it comes from another recursion than the regressor's.
+    fn is_other(&self) -> bool {
+        matches!(self, Self::Gravity { .. } | Self::PositionDerivative { .. })
     }
 
     /// False on joints that it cannot act on by definition.
@@ -114,8 +119,81 @@ struct Blocks {
 struct Output {
     column: ModelColumn,
     slots: Vec<(usize, usize)>,
-    /// Of an inertial column, per slot: pair, parameter, weight.
-    entries: Vec<Vec<(usize, usize, f64)>>,
+}
+
+/// `(joint, row of that joint's table)`.
+type Slot = (usize, usize);
+
+/// Pair, parameter, weight: what an inertial column is made of.
+type Entries = Vec<(usize, usize, f64)>;
+
+/// How inertial columns follow from entries of the regressor.
+#[derive(Debug, Clone, Default)]
+struct Inertial {
+    /// By `pair * 10 + parameter`: the only column that an entry is part of, if that is this entry and nothing else. The regressor
+    /// writes it where it belongs.
+    alone: Vec<Option<Slot>>,
+    /// All others.
+    sums: Vec<(Slot, Entries)>,
+    /// Whether an entry is part of any column, in the same order.
+    asked: Vec<bool>,
+    /// Whose the rows of a joint's table are: by place in `alone` and, behind these, in `sums`.
+    places: Vec<Vec<Option<usize>>>,
+}
+
+impl Inertial {
+    fn new(pairs: usize) -> Self {
+        Self {
+            alone: vec![None; 10 * pairs],
+            sums: Vec::new(),
+            asked: vec![false; 10 * pairs],
+            places: Vec::new(),
+        }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.sums.is_empty() && self.alone.iter().all(Option::is_none)
+    }
+
+    /// Whose a row is.
+    fn place(&mut self, (joint, row): Slot, place: usize) {
+        if self.places.len() <= joint {
+            self.places.resize(joint + 1, Vec::new());
+        }
+        let rows = &mut self.places[joint];
+        if rows.len() <= row {
+            rows.resize(row + 1, None);
+        }
+        rows[row] = Some(place);
+    }
+
+    /// A column that is a sum.
+    fn sum(&mut self, slot: Slot, entries: Entries) {
+        self.place(slot, self.alone.len() + self.sums.len());
+        self.sums.push((slot, entries));
+    }
+
+    /// Adds a column.
+    fn push(&mut self, slot: Slot, entries: Entries) {
+        let mut alone = None;
+        for &(pair, k, weight) in &entries {
+            let entry = 10 * pair + k;
+            // What stood alone is part of two columns now.
+            if let Some(first) = self.alone[entry].take() {
+                self.sum(first, vec![(pair, k, 1.0)]);
+            } else if !self.asked[entry] && entries.len() == 1 && weight == 1.0 {
+                alone = Some(entry);
+            }
+            self.asked[entry] = true;
+        }
+        match alone {
+            Some(entry) => {
+                self.alone[entry] = Some(slot);
+                self.place(slot, entry);
+            }
+            None => self.sum(slot, entries),
+        }
+    }
 }
 
 /// All model columns of a library, ready to be evaluated.
@@ -124,12 +202,14 @@ pub(super) struct ModelColumns {
     robot: Arc<Robot>,
     regressor: Arc<Regressor>,
     outputs: Vec<Output>,
+    inertial: Inertial,
 }
 
 impl ModelColumns {
     pub(super) fn new(robot: Arc<Robot>) -> Self {
         let regressor = Arc::new(Regressor::new(&robot));
         Self {
+            inertial: Inertial::new(regressor.pairs().len()),
             robot,
             regressor,
             outputs: Vec::new(),
@@ -140,7 +220,9 @@ impl ModelColumns {
     pub(super) fn emptied(&self) -> Self {
         Self {
             outputs: Vec::new(),
-            ..self.clone()
+            inertial: Inertial::new(self.regressor.pairs().len()),
+            robot: self.robot.clone(),
+            regressor: self.regressor.clone(),
         }
     }
 
@@ -160,11 +242,8 @@ impl ModelColumns {
 
     /// The same where the regressor computes nothing that no column asks for.
     pub(super) fn trimmed(mut self) -> Self {
-        let asked: BTreeSet<(usize, usize)> = (self.outputs.iter())
-            .flat_map(|output| output.entries.iter().flatten())
-            .map(|&(pair, k, _)| (pair, k))
-            .collect();
-        let rest = self.regressor.only(&|pair, k| asked.contains(&(pair, k)));
+        let asked = &self.inertial.asked;
+        let rest = self.regressor.only(&|pair, k| asked[10 * pair + k]);
         self.regressor = Arc::new(rest);
         self
     }
@@ -189,22 +268,17 @@ impl ModelColumns {
 
     /// Adds a column.
     pub(super) fn push(&mut self, column: ModelColumn, slots: Vec<(usize, usize)>) {
-        let entries = match &column {
-            ModelColumn::Inertia { body, weights } => slots
-                .iter()
-                .map(|&(joint, _)| self.entries(*body, weights, joint))
-                .collect(),
-            _ => Vec::new(),
-        };
-        self.outputs.push(Output {
-            column,
-            slots,
-            entries,
-        });
+        if let ModelColumn::Inertia { body, weights } = &column {
+            for &(joint, row) in &slots {
+                let entries = self.entries(*body, weights, joint);
+                self.inertial.push((joint, row), entries);
+            }
+        }
+        self.outputs.push(Output { column, slots });
     }
 
     /// `(pair, parameter, weight)` that make up an inertial column on a joint.
-    fn entries(&self, body: usize, weights: &[f64; 10], joint: usize) -> Vec<(usize, usize, f64)> {
+    fn entries(&self, body: usize, weights: &[f64; 10], joint: usize) -> Entries {
         self.pairs(joint, body)
             .flat_map(|(pair, present)| {
                 (0..10)
@@ -214,9 +288,15 @@ impl ModelColumns {
             .collect()
     }
 
-    /// Writes every column: `out[joint][row * len + sample]`.
-    pub(super) fn evaluate(&self, motion: Motion<'_>, out: &mut [Vec<f64>], scratch: &mut Scratch) {
-        self.of_nominal_torque(motion, out, scratch);
+    /// Writes every column: `out[joint][row * stride + sample]`.
+    pub(super) fn evaluate<T: Table>(
+        &self,
+        motion: Motion<'_>,
+        stride: usize,
+        out: &mut [T],
+        scratch: &mut Scratch,
+    ) {
+        self.of_nominal_torque(motion, stride, out, scratch);
         if !self
             .outputs
             .iter()
@@ -230,16 +310,57 @@ impl ModelColumns {
             gravity: vec![0.0; 3 * self.robot.dof() * STRIDE],
             derivative: vec![0.0; self.robot.dof() * STRIDE],
         });
-        let mut first = 0;
-        while first < motion.len {
-            let last = motion.len.min(first + BLOCK);
-            self.block(motion, first..last, out, blocks);
-            first = last;
+        if !self.inertial.is_empty() {
+            self.inertial(motion, stride, out, &mut blocks.regressor);
+        }
+        if self.outputs.iter().any(|output| output.column.is_other()) {
+            for first in (0..motion.len).step_by(BLOCK) {
+                let samples = first..motion.len.min(first + BLOCK);
+                self.block(motion, samples, (stride, &mut *out), blocks);
+            }
+        }
+    }
+
+    /// Inertial columns: the regressor itself is never stored.
+    fn inertial<T: Table>(
+        &self,
+        motion: Motion<'_>,
+        stride: usize,
+        out: &mut [T],
+        block: &mut RegressorBlock,
+    ) {
+        let Inertial { alone, sums, .. } = &self.inertial;
+        let mut places: Vec<&mut [f64]> = Vec::new();
+        places.resize_with(alone.len() + sums.len(), Default::default);
+        for (table, own) in out.iter_mut().zip(&self.inertial.places) {
+            for (row, place) in table.chunks_mut(stride.max(1)).zip(own) {
+                if let Some(place) = place {
+                    places[*place] = row;
+                }
+            }
+        }
+        let (alone, cells) = places.split_at_mut(alone.len());
+        for first in (0..motion.len).step_by(BLOCK) {
+            let samples = first..motion.len.min(first + BLOCK);
+            let (regressor, robot) = (&self.regressor, &*self.robot);
+            regressor.evaluate_to(robot, motion, samples.clone(), block, alone);
+            pulp::Arch::new().dispatch(Combine {
+                sums,
+                cells,
+                block,
+                samples,
+            });
         }
     }
 
     /// Columns that are made from the nominal torque itself.
-    fn of_nominal_torque(&self, motion: Motion<'_>, out: &mut [Vec<f64>], scratch: &mut Scratch) {
+    fn of_nominal_torque<T: Table>(
+        &self,
+        motion: Motion<'_>,
+        stride: usize,
+        out: &mut [T],
+        scratch: &mut Scratch,
+    ) {
         let len = motion.len;
         let mut ready = false;
         for Output { column, slots, .. } in &self.outputs {
@@ -255,7 +376,7 @@ impl ModelColumns {
             }
             for &(joint, row) in slots.iter().filter(|slot| column.acts_on(slot.0)) {
                 let torque = &scratch.nominal[joint * len..(joint + 1) * len];
-                let cells = &mut out[joint][row * len..(row + 1) * len];
+                let cells = &mut out[joint][row * stride..][..len];
                 cells.copy_from_slice(torque);
                 if let Some(velocity) = friction {
                     let rates = &motion.qd[joint * len..(joint + 1) * len];
@@ -267,41 +388,29 @@ impl ModelColumns {
         }
     }
 
-    /// Columns from the recursions, one block of samples: the regressor itself is never stored.
-    fn block(
+    /// Columns from the other recursions, one block of samples.
+    fn block<T: Table>(
         &self,
         motion: Motion<'_>,
         samples: Range<usize>,
-        out: &mut [Vec<f64>],
+        (stride, out): (usize, &mut [T]),
         blocks: &mut Blocks,
     ) {
         let robot = &*self.robot;
-        let any = |test: fn(&ModelColumn) -> bool| self.outputs.iter().any(|o| test(&o.column));
-        if any(|column| matches!(column, ModelColumn::Inertia { .. })) {
-            let block = &mut blocks.regressor;
-            self.regressor
-                .evaluate(robot, motion, samples.clone(), block);
-            pulp::Arch::new().dispatch(Combine {
-                outputs: &self.outputs,
-                block,
-                out,
-                len: motion.len,
-                samples: samples.clone(),
-            });
-        }
-        if any(|column| matches!(column, ModelColumn::Gravity { .. })) {
+        let gravity = |output: &Output| matches!(output.column, ModelColumn::Gravity { .. });
+        if self.outputs.iter().any(gravity) {
             let (workspace, gravity) = (&mut blocks.workspace, &mut blocks.gravity);
             gravity_regressor(robot, workspace, motion, samples.clone(), gravity);
         }
         let count = samples.len();
-        for output in &self.outputs {
+        for output in self.outputs.iter().filter(|o| o.column.is_other()) {
             let (column, slots) = (&output.column, &output.slots);
             if let ModelColumn::PositionDerivative { joint } = *column {
                 let (workspace, change) = (&mut blocks.workspace, &mut blocks.derivative);
                 position_derivative(robot, workspace, joint, motion, samples.clone(), change);
             }
             for &(joint, row) in slots {
-                let cells = row * motion.len + samples.start..row * motion.len + samples.end;
+                let cells = row * stride + samples.start..row * stride + samples.end;
                 let cells = &mut out[joint][cells];
                 match column {
                     ModelColumn::Gravity { axis } => {
@@ -325,36 +434,32 @@ impl ModelColumns {
 /// Vectors of a column that are summed side by side in registers.
 const SIDE_BY_SIDE: usize = 4;
 
-/// Writes the inertial columns of a block of samples: Σ weight · entry.
-struct Combine<'a> {
-    outputs: &'a [Output],
+/// Writes the inertial columns that are sums in a block of samples: Σ weight · entry.
+struct Combine<'a, 'b> {
+    sums: &'a [(Slot, Entries)],
+    /// Of each of them, the samples of the motion.
+    cells: &'a mut [&'b mut [f64]],
     block: &'a RegressorBlock,
-    out: &'a mut [Vec<f64>],
-    /// Of the motion, of which these are the samples of the block.
-    len: usize,
+    /// Of the block in the motion.
     samples: Range<usize>,
 }
 
-impl WithSimd for Combine<'_> {
+impl WithSimd for Combine<'_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, s: S) {
-        for output in self.outputs {
-            for (entries, &(joint, row)) in output.entries.iter().zip(&output.slots) {
-                let first = row * self.len;
-                let cells = first + self.samples.start..first + self.samples.end;
-                let cells = &mut self.out[joint][cells];
-                let step = SIDE_BY_SIDE * S::F64_LANES;
-                for (i, cells) in cells.chunks_mut(step).enumerate() {
-                    let sum = combined(s, self.block, entries, i * SIDE_BY_SIDE);
-                    let (whole, rest) = S::as_mut_simd_f64s(cells);
-                    for (cells, sum) in whole.iter_mut().zip(sum) {
-                        *cells = sum;
-                    }
-                    if !rest.is_empty() {
-                        s.partial_store_f64s(rest, sum[whole.len()]);
-                    }
+        for ((_, entries), cells) in self.sums.iter().zip(self.cells) {
+            let cells = &mut cells[self.samples.clone()];
+            let step = SIDE_BY_SIDE * S::F64_LANES;
+            for (i, cells) in cells.chunks_mut(step).enumerate() {
+                let sum = combined(s, self.block, entries, i * SIDE_BY_SIDE);
+                let (whole, rest) = S::as_mut_simd_f64s(cells);
+                for (cells, sum) in whole.iter_mut().zip(sum) {
+                    *cells = sum;
+                }
+                if !rest.is_empty() {
+                    s.partial_store_f64s(rest, sum[whole.len()]);
                 }
             }
         }
@@ -366,7 +471,7 @@ impl WithSimd for Combine<'_> {
 fn combined<S: Simd>(
     s: S,
     block: &RegressorBlock,
-    entries: &[(usize, usize, f64)],
+    entries: &Entries,
     first: usize,
 ) -> [S::f64s; SIDE_BY_SIDE] {
     let mut sum = [s.splat_f64s(0.0); SIDE_BY_SIDE];

@@ -8,12 +8,32 @@
 use super::expression::{Graph, Id, Slot, Tape};
 use super::model_column::{ModelColumn, ModelColumns, Scratch};
 use super::recipes::Recipes;
+use crate::lanes::Aligned;
 use crate::robot::{Motion, Robot, regrouped};
 use std::collections::BTreeMap;
+use std::ops::DerefMut;
 use std::sync::Arc;
 
 /// Shares below this of a column's largest are rounding.
 const ROUNDING: f64 = 1e-14;
+
+/// Memory for the signals of a joint, one after the other. Where it starts at a cache line they are written faster.
+pub trait Table: DerefMut<Target = [f64]> {
+    /// Another length; what the numbers are then is not said.
+    fn resize(&mut self, len: usize);
+}
+
+impl Table for Vec<f64> {
+    fn resize(&mut self, len: usize) {
+        Self::resize(self, len, 0.0);
+    }
+}
+
+impl Table for Aligned {
+    fn resize(&mut self, len: usize) {
+        Self::resize(self, len);
+    }
+}
 
 /// The parts of all columns of a library, ready to be evaluated.
 #[derive(Debug, Clone, Default)]
@@ -160,15 +180,21 @@ impl Parts {
         &self.recipes[joint]
     }
 
-    /// Writes every part: `out[joint][part * len + sample]`.
-    pub(super) fn evaluate(&self, motion: Motion<'_>, out: &mut [Vec<f64>], scratch: &mut Scratch) {
+    /// Writes every part: `out[joint][part * stride + sample]`.
+    pub(super) fn evaluate<T: Table>(
+        &self,
+        motion: Motion<'_>,
+        stride: usize,
+        out: &mut [T],
+        scratch: &mut Scratch,
+    ) {
         let counts = self.recipes.iter().map(|recipes| recipes.parts());
         evaluate(
             counts,
             &self.tape,
             self.model.as_ref(),
             motion,
-            out,
+            (stride, out),
             scratch,
         );
     }
@@ -192,20 +218,20 @@ fn ways(robot: &Robot, body: usize, weights: &[f64; 10]) -> [Sum; 2] {
     [own, entries(&regrouped(robot, parameters))]
 }
 
-/// Writes what a tape and a model make of a motion, `counts` signals on each joint: `out[joint][signal * len + sample]`.
-pub(super) fn evaluate(
+/// Writes what a tape and a model make of a motion, `counts` signals on each joint: `out[joint][signal * stride + sample]`.
+pub(super) fn evaluate<T: Table>(
     counts: impl Iterator<Item = usize>,
     tape: &Tape,
     model: Option<&ModelColumns>,
     motion: Motion<'_>,
-    out: &mut [Vec<f64>],
+    (stride, out): (usize, &mut [T]),
     scratch: &mut Scratch,
 ) {
     for (count, out) in counts.zip(out.iter_mut()) {
-        out.resize(count * motion.len, 0.0);
+        out.resize(count * stride);
     }
-    tape.evaluate(motion, out, &mut scratch.tape);
+    tape.evaluate(motion, stride, out, &mut scratch.tape);
     if let Some(model) = model {
-        model.evaluate(motion, out, scratch);
+        model.evaluate(motion, stride, out, scratch);
     }
 }

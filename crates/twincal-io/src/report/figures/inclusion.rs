@@ -5,7 +5,7 @@ use crate::report::figure::{Figure, Image, Legend};
 use crate::report::scale::Scale;
 use crate::report::svg::{Anchor, Svg};
 use crate::report::text::{count, probability, shorten, text_width};
-use twincal::calibrate::ComponentSummary;
+use twincal::calibrate::{ComponentSummary, Verdict};
 use twincal::term::Family;
 
 /// Above this many candidates only those that stand out are drawn one by one.
@@ -26,30 +26,54 @@ enum Row<'a> {
 
 /// The figure; `None` without candidates.
 pub(in crate::report) fn figure(components: &[ComponentSummary]) -> Option<Figure> {
+    let told = |component: &&ComponentSummary| {
+        component.selected || component.verdict != Some(Verdict::NotSeen)
+    };
+    let all = components.len();
+    let components: Vec<&ComponentSummary> = components.iter().filter(told).collect();
+    let unseen = all > components.len();
     let live = components.iter().filter(|t| t.pip.is_some()).count();
     if live == 0 {
         return None;
     }
-    let rows = rows(components, live);
+    let rows = rows(&components, live);
     let selected = components.iter().filter(|t| t.selected).count();
     let label = format!(
         "Bar chart of the inclusion probabilities of {live} candidates; {selected} reach one half and are kept."
     );
     Some(Figure {
         title: "Which effects the data support".into(),
-        read: "Each bar is the probability that the effect is really there, given this log and the prior; bars that reach \
-               the line at 0.5 are kept in the twin."
-            .into(),
+        read: format!(
+            "Each bar is the probability that the effect is really there, given this log and the prior; bars that reach \
+             the line at 0.5 are kept in the twin.{}",
+            if unseen {
+                " What these data do not see has none."
+            } else {
+                ""
+            }
+        ),
         legend: vec![
-            Legend { mark: "area", class: "kept", label: "kept" },
-            Legend { mark: "area", class: "left", label: "not kept" },
-            Legend { mark: "line", class: "half", label: "0.5" },
+            Legend {
+                mark: "area",
+                class: "kept",
+                label: "kept",
+            },
+            Legend {
+                mark: "area",
+                class: "left",
+                label: "not kept",
+            },
+            Legend {
+                mark: "line",
+                class: "half",
+                label: "0.5",
+            },
         ],
         images: vec![Image::full("", |width| draw(&rows, width, &label))],
     })
 }
 
-fn rows<'a>(components: &'a [ComponentSummary], live: usize) -> Vec<Row<'a>> {
+fn rows<'a>(components: &[&'a ComponentSummary], live: usize) -> Vec<Row<'a>> {
     let mut rows = Vec::new();
     let mut families: Vec<Family> = components
         .iter()
@@ -63,7 +87,7 @@ fn rows<'a>(components: &'a [ComponentSummary], live: usize) -> Vec<Row<'a>> {
         let members = components
             .iter()
             .filter(|t| t.family == family)
-            .filter_map(|t| Some((t, t.pip?)));
+            .filter_map(|t| Some((*t, t.pip?)));
         let mut rest = 0;
         for (term, pip) in members {
             if live <= MOST || pip >= LEAST || term.selected {

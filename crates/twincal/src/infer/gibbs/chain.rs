@@ -79,6 +79,8 @@ pub(super) struct Trace {
 struct Chunk {
     /// Position of the first, where all eight are single columns one after the other.
     first: Option<usize>,
+    /// Their family, where it is the same.
+    family: Option<usize>,
     /// State of the chain that the rest belongs to.
     version: u64,
     /// P(z = 1 | all other z).
@@ -94,8 +96,11 @@ impl Chunk {
             let own = &standard.blocks[block];
             own.len == 1 && own.start == first + lane
         };
+        let family = standard.blocks[blocks[0]].family;
+        let same = |&block: &usize| standard.blocks[block].family == family;
         Self {
             first: blocks.iter().enumerate().all(next).then_some(first),
+            family: blocks.iter().all(same).then_some(family),
             version: 0,
             conditional: [0.0; LANES],
             stays: [1.0; LANES],
@@ -191,9 +196,13 @@ struct Chain<'a> {
     listed: bool,
     looked: u64,
     response: Response,
-    /// Places in `active` of each family.
-    families: Vec<Vec<usize>>,
-    /// Prior ratio of flipping each of them, slab's mass within the bounds included.
+    /// Families of `active`.
+    families: Vec<usize>,
+    /// The slab's mass within the bounds and 1 over it, of each of them; 0 behind the last.
+    factors: Vec<[f64; 2]>,
+    /// See [`Walker::family_odds`].
+    family_odds: Vec<[f64; 2]>,
+    /// Prior ratio of flipping each of `active`, where heredity makes it more than that of its family.
     odds: Vec<f64>,
     /// The slabs' precisions by position and what they are 1 over, padded like the tableau's vectors.
     precision: Vec<f64>,
@@ -214,7 +223,10 @@ impl<'a> Chain<'a> {
         let standard = &target.reduced.open;
         let mut walker = Walker::new(standard, target.prior);
         let (certain, active) = (&target.reduced.certain, target.reduced.active.clone());
-        certain.iter().for_each(|&block| walker.flip(simd, block));
+        // No closure: it would not be compiled for the instructions of its place.
+        for &block in certain {
+            walker.flip(simd, block);
+        }
         let chunks: Vec<Chunk> = active
             .chunks(LANES)
             .map(|blocks| Chunk::new(standard, blocks))
@@ -222,12 +234,21 @@ impl<'a> Chain<'a> {
         let uniform = source.uniform();
         let mut precision = standard.precision.clone();
         precision.resize(walker.tableau.width + LANES, 1.0);
-        let mut families = vec![Vec::new(); walker.families()];
-        for (index, &block) in active.iter().enumerate() {
-            families[standard.blocks[block].family].push(index);
-        }
+        let mut families: Vec<usize> = (active.iter())
+            .map(|&block| standard.blocks[block].family)
+            .collect();
+        families.resize(chunks.len() * LANES, 0);
+        let factor = |&block: &usize| standard.blocks[block].factor;
+        let mut factors: Vec<[f64; 2]> = (active.iter().map(factor))
+            .map(|factor| [factor, 1.0 / factor])
+            .collect();
+        factors.resize(chunks.len() * LANES, [0.0; 2]);
         let mut chain = Self {
             families,
+            factors,
+            family_odds: (0..walker.families())
+                .map(|family| walker.family_odds(family))
+                .collect(),
             slab: precision.iter().map(|precision| 1.0 / precision).collect(),
             precision,
             swaps: Swaps::new(standard, &active),
@@ -249,7 +270,7 @@ impl<'a> Chain<'a> {
             looked: 0,
             response: Response::default(),
         };
-        (0..target.prior.families()).for_each(|family| chain.update_odds(family));
+        chain.update_odds();
         chain
     }
 
@@ -261,27 +282,59 @@ impl<'a> Chain<'a> {
         let share = [0.0, 0.9, 0.5, 0.1][chain % 4] * (100.0 / count as f64).min(1.0);
         for index in 0..count {
             // Odds of 0: a child whose parent is out.
-            if self.source.uniform() < share && self.odds[index] > 0.0 {
-                self.flip(simd, self.active[index]);
+            let block = self.active[index];
+            if self.source.uniform() < share && self.walker.flip_odds(block) > 0.0 {
+                self.flip(simd, block);
             }
         }
     }
 
-    /// `P(z_j flips)/P(z_j stays)` a priori.
-    fn update_odds(&mut self, family: usize) {
-        for &index in &self.families[family] {
-            self.odds[index] = self.walker.flip_odds(self.active[index]);
+    /// `P(z_j flips)/P(z_j stays)` a priori, where heredity has a say.
+    fn update_odds(&mut self) {
+        if self.walker.has_kin() {
+            for (odds, &block) in self.odds.iter_mut().zip(&self.active) {
+                *odds = self.walker.flip_odds(block);
+            }
         }
+    }
+
+    /// The same of the eight of a chunk, `sign` is +1 where they are in.
+    #[inline(always)]
+    fn chunk_odds(&self, index: usize, sign: &Lane) -> Lane {
+        let own = index * LANES..(index + 1) * LANES;
+        let mut odds = [0.0; LANES];
+        if self.walker.has_kin() {
+            odds.copy_from_slice(&self.odds[own]);
+            return odds;
+        }
+        let (factors, families) = (&self.factors[own.clone()], &self.families[own]);
+        let of = |[more, less]: [f64; 2], [factor, inverse]: [f64; 2], inside: bool| match inside {
+            true => less * inverse,
+            false => more * factor,
+        };
+        match self.chunks[index].family {
+            Some(family) => {
+                let all = self.family_odds[family];
+                for lane in 0..LANES {
+                    odds[lane] = of(all, factors[lane], sign[lane] > 0.0);
+                }
+            }
+            None => {
+                for lane in 0..LANES {
+                    let own = self.family_odds[families[lane]];
+                    odds[lane] = of(own, factors[lane], sign[lane] > 0.0);
+                }
+            }
+        }
+        odds
     }
 
     #[inline(always)]
     fn flip<S: Simd>(&mut self, simd: S, block: usize) {
         self.walker.flip(simd, block);
-        if self.walker.has_kin() {
-            (0..self.walker.families()).for_each(|family| self.update_odds(family));
-        } else {
-            self.update_odds(self.walker.standard.blocks[block].family);
-        }
+        let family = self.walker.standard.blocks[block].family;
+        self.family_odds[family] = self.walker.family_odds(family);
+        self.update_odds();
         self.version += 1;
         self.moves += 1;
     }
@@ -422,7 +475,9 @@ impl<'a> Chain<'a> {
             };
             left -= proposal;
             let blocks = group.pick(self.source.uniform());
-            blocks.iter().for_each(|&block| self.flip(simd, block));
+            for block in blocks {
+                self.flip(simd, block);
+            }
             self.moves -= 1;
             self.renew();
         }
@@ -464,25 +519,25 @@ impl<'a> Chain<'a> {
                 sign[lane] = tableau.sign[standard.blocks[block].start];
             }
         }
-        let (mut change, mut ratio) = ([1.0; LANES], [0.0; LANES]);
-        let odds = &self.odds[index * LANES..(index + 1) * LANES];
-        for lane in 0..LANES {
-            let flipped = (misfit + sign[lane] * (square[lane] / over[lane])) / misfit;
-            change[lane] = if flipped > f64::MIN_POSITIVE {
-                flipped
-            } else {
-                f64::MIN_POSITIVE
-            };
-            ratio[lane] = odds[lane] / d[lane].sqrt();
-        }
-        let power = to_the(simd, change, -standard.shape);
+        let odds = self.chunk_odds(index, &sign);
         let chunk = &mut self.chunks[index];
         let mut stay = [0.0; LANES];
-        for lane in 0..LANES {
-            let r = ratio[lane] * power[lane];
-            let r = if r < RATIO_MAX { r } else { RATIO_MAX };
-            chunk.conditional[lane] = if sign[lane] > 0.0 { 1.0 } else { r } / (1.0 + r);
-            stay[lane] = 1.0 - LAZY * if r < 1.0 { r } else { 1.0 };
+        let inputs = [&odds, &d, &square, &over, &sign];
+        let [odds, d, square, over, sign] = inputs.map(|lanes| S::as_simd_f64s(lanes).0);
+        let conditional = S::as_mut_simd_f64s(&mut chunk.conditional).0;
+        let stays = S::as_mut_simd_f64s(&mut stay).0;
+        let [zero, one, misfit] = [0.0, 1.0, misfit].map(|x| simd.splat_f64s(x));
+        let [least, most] = [f64::MIN_POSITIVE, RATIO_MAX].map(|x| simd.splat_f64s(x));
+        let [power, lazy] = [-standard.shape, -LAZY].map(|x| simd.splat_f64s(x));
+        for v in 0..odds.len() {
+            let gain = simd.div_f64s(square[v], simd.mul_f64s(over[v], misfit));
+            let change = simd.max_f64s(simd.mul_add_e_f64s(sign[v], gain, one), least);
+            let weight = exp(simd, simd.mul_f64s(power, ln(simd, change)));
+            let ratio = simd.div_f64s(odds[v], simd.sqrt_f64s(d[v]));
+            let r = simd.min_f64s(simd.mul_f64s(ratio, weight), most);
+            let inside = simd.select_f64s(simd.less_than_f64s(zero, sign[v]), one, r);
+            conditional[v] = simd.div_f64s(inside, simd.add_f64s(one, r));
+            stays[v] = simd.mul_add_e_f64s(lazy, simd.min_f64s(r, one), one);
         }
         chunk.stays = running_product(stay);
         chunk.version = self.version;

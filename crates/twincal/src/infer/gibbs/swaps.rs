@@ -45,6 +45,25 @@ pub(super) struct Group {
 struct Pair {
     blocks: [usize; 2],
     positions: [usize; 2],
+    /// Of the first out and the second in, then the other way round: ratio of the slabs' precisions.
+    slabs: [f64; 2],
+    /// Of the slabs' masses within the bounds; `None` where that is not all that the prior says.
+    prior: Option<[f64; 2]>,
+}
+
+impl Pair {
+    fn new(standard: &Standard, [a, b]: [usize; 2]) -> Self {
+        let own = [&standard.blocks[a], &standard.blocks[b]];
+        let both_ways = |ratio: f64| [ratio, 1.0 / ratio];
+        let precision = own.map(|block| standard.precision[block.start]);
+        let same = own[0].family == own[1].family;
+        Self {
+            blocks: [a, b],
+            positions: own.map(|block| block.start),
+            slabs: both_ways(precision[1] / precision[0]),
+            prior: same.then(|| both_ways(own[1].factor / own[0].factor)),
+        }
+    }
 }
 
 impl Group {
@@ -105,10 +124,7 @@ impl Swaps {
         }
         pairs.sort_unstable();
         pairs.dedup();
-        let pair = |&(a, b): &(usize, usize)| Pair {
-            blocks: [a, b],
-            positions: [standard.blocks[a].start, standard.blocks[b].start],
-        };
+        let pair = |&(a, b): &(usize, usize)| Pair::new(standard, [a, b]);
         let groups: Vec<Group> = pairs
             .chunks(LANES)
             .map(|pairs| Group {
@@ -179,14 +195,21 @@ impl Group {
             if inside[1] {
                 pair.blocks.swap(0, 1);
                 pair.positions.swap(0, 1);
+                pair.slabs.swap(0, 1);
+                if let Some(prior) = &mut pair.prior {
+                    prior.swap(0, 1);
+                }
             }
             let ([out, into], [i, j]) = (pair.blocks, pair.positions);
-            prior[lane] = walker.exchange_odds(out, into);
+            prior[lane] = match pair.prior {
+                Some([prior, _]) if !walker.has_kin() => prior,
+                _ => walker.exchange_odds(out, into),
+            };
             t[lane] = tableau.row(i)[j];
             (inverse[lane], beta[lane]) = (tableau.diagonal[i], tableau.gradient[i]);
             (schur[lane], gradient[lane]) = (tableau.diagonal[j], tableau.gradient[j]);
             least[lane] = standard.precision[j];
-            slabs[lane] = standard.precision[j] / standard.precision[i];
+            slabs[lane] = pair.slabs[0];
         }
         (self.sums, self.stays) = ([0.0; LANES], 1.0);
         if !live {

@@ -4,9 +4,10 @@
 //! first-level cache); sine and cosine of one argument share one instruction.
 
 use super::graph::{Function, Graph, Id, Node, Variable};
-use crate::lanes::{LANES, Lane, sin_cos};
+use crate::lanes::{LANES, Lane, sin_cos, tanh};
 use crate::robot::Motion;
 use std::collections::HashMap;
+use std::ops::DerefMut;
 
 /// Lane groups per block.
 const GROUPS: usize = 8;
@@ -37,10 +38,13 @@ enum Instruction {
     Power(u32, u32, f64),
     /// Writes register to output `slot`.
     Store(u32, u32),
+    /// Writes a variable, or a number, to output `slot`.
+    StoreVariable(Variable, u32),
+    StoreConstant(f64, u32),
 }
 use Instruction as I;
 
-/// Where an output goes: `out[table][row * len + sample]`.
+/// Where an output goes: `out[table][row * stride + sample]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Slot {
     pub(crate) table: usize,
@@ -73,10 +77,13 @@ impl Tape {
         };
         let mut slots = Vec::with_capacity(outputs.len());
         for &(id, slot) in outputs {
-            let register = compiler.compile(id);
-            compiler
-                .instructions
-                .push(I::Store(register, slots.len() as u32));
+            let to = slots.len() as u32;
+            let store = match graph.node(id) {
+                Node::Constant(value) => I::StoreConstant(value.get(), to),
+                &Node::Variable(variable) => I::StoreVariable(variable, to),
+                _ => I::Store(compiler.compile(id), to),
+            };
+            compiler.instructions.push(store);
             slots.push(slot);
         }
         let (instructions, registers) = allocate(compiler.instructions, compiler.next as usize);
@@ -88,7 +95,13 @@ impl Tape {
     }
 
     /// Computes all outputs; `out[table]` must hold its rows.
-    pub(crate) fn evaluate(&self, motion: Motion<'_>, out: &mut [Vec<f64>], scratch: &mut Scratch) {
+    pub(crate) fn evaluate<T: DerefMut<Target = [f64]>>(
+        &self,
+        motion: Motion<'_>,
+        stride: usize,
+        out: &mut [T],
+        scratch: &mut Scratch,
+    ) {
         if scratch.registers.len() < self.registers {
             scratch
                 .registers
@@ -97,6 +110,7 @@ impl Tape {
         let run = Run {
             tape: self,
             motion,
+            stride,
             out,
             registers: &mut scratch.registers[..self.registers],
         };
@@ -287,6 +301,7 @@ impl Instruction {
                 change(a, false);
             }
             I::Store(a, _) => change(a, false),
+            I::StoreVariable(..) | I::StoreConstant(..) => {}
         }
     }
 }
@@ -321,30 +336,32 @@ fn allocate(mut instructions: Vec<Instruction>, values: usize) -> (Vec<Instructi
 }
 
 /// One evaluation, compiled once per instruction set.
-struct Run<'a> {
+struct Run<'a, T> {
     tape: &'a Tape,
     motion: Motion<'a>,
-    out: &'a mut [Vec<f64>],
+    stride: usize,
+    out: &'a mut [T],
     registers: &'a mut [Block],
 }
 
-impl pulp::WithSimd for Run<'_> {
+impl<T: DerefMut<Target = [f64]>> pulp::WithSimd for Run<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _simd: S) {
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
         let len = self.motion.len;
         let mut start = 0;
         while start < len {
             let width = BLOCK.min(len - start);
             for instruction in &self.tape.instructions {
                 step(
+                    simd,
                     instruction,
                     self.registers,
                     self.motion,
                     start,
                     width,
                     &self.tape.slots,
-                    self.out,
+                    (self.stride, &mut *self.out),
                 );
             }
             start += width;
@@ -388,23 +405,23 @@ macro_rules! binary {
 }
 
 #[inline(always)]
-fn step(
+fn step<S: pulp::Simd, T: DerefMut<Target = [f64]>>(
+    simd: S,
     instruction: &Instruction,
     registers: &mut [Block],
     motion: Motion<'_>,
     start: usize,
     width: usize,
     slots: &[Slot],
-    out: &mut [Vec<f64>],
+    (stride, out): (usize, &mut [T]),
 ) {
+    let mut store = |slot: u32, samples: &[f64]| {
+        let Slot { table, row } = slots[slot as usize];
+        out[table][row * stride + start..][..width].copy_from_slice(samples);
+    };
     match *instruction {
         I::Load(r, variable) => {
-            let (source, joint) = match variable {
-                Variable::Position(joint) => (motion.q, joint),
-                Variable::Velocity(joint) => (motion.qd, joint),
-                Variable::Acceleration(joint) => (motion.qdd, joint),
-            };
-            let source = &source[joint * motion.len + start..][..width];
+            let source = samples(motion, variable, start, width);
             let target = registers[r as usize].as_flattened_mut();
             target[..width].copy_from_slice(source);
             target[width..].fill(source[width - 1]); // the tail of the last block repeats a real sample
@@ -414,6 +431,14 @@ fn step(
         I::AddConstant(r, a, c) => unary!(registers, r, a, |x| x + c),
         I::Square(r, a) => unary!(registers, r, a, |x| x * x),
         I::Reciprocal(r, a) => unary!(registers, r, a, |x| 1.0 / x),
+        I::Apply(r, a, Function::Tanh) => {
+            let [dst, a] = apart(registers, [r, a]);
+            let from = S::as_simd_f64s(a.as_flattened()).0;
+            let to = S::as_mut_simd_f64s(dst.as_flattened_mut()).0;
+            for (to, from) in to.iter_mut().zip(from) {
+                *to = tanh(simd, *from);
+            }
+        }
         I::Apply(r, a, function) => unary!(registers, r, a, |x| function.value(x)),
         I::Power(r, a, exponent) => unary!(registers, r, a, |x| x.powf(exponent)),
         I::Add(r, a, b) => binary!(registers, r, a, b, |x, y| x + y),
@@ -428,9 +453,22 @@ fn step(
             }
         }
         I::Store(a, slot) => {
-            let Slot { table, row } = slots[slot as usize];
-            let target = &mut out[table][row * motion.len + start..][..width];
-            target.copy_from_slice(&registers[a as usize].as_flattened()[..width]);
+            store(slot, &registers[a as usize].as_flattened()[..width]);
         }
+        I::StoreVariable(variable, slot) => {
+            store(slot, samples(motion, variable, start, width));
+        }
+        I::StoreConstant(value, slot) => store(slot, &[value; BLOCK][..width]),
     }
+}
+
+/// Some samples of a variable.
+#[inline(always)]
+fn samples<'a>(motion: Motion<'a>, variable: Variable, start: usize, width: usize) -> &'a [f64] {
+    let (source, joint) = match variable {
+        Variable::Position(joint) => (motion.q, joint),
+        Variable::Velocity(joint) => (motion.qd, joint),
+        Variable::Acceleration(joint) => (motion.qdd, joint),
+    };
+    &source[joint * motion.len + start..][..width]
 }

@@ -88,7 +88,7 @@ fn torques(
         qdd: &qdd,
     };
     let mut out = vec![vec![0.0; sources.len() * len]; joints];
-    all.evaluate(motion, &mut out, &mut Scratch::default());
+    all.evaluate(motion, motion.len, &mut out, &mut Scratch::default());
     sources
         .iter()
         .enumerate()

@@ -282,6 +282,7 @@ fn the_tape_computes_what_the_graph_says() {
             qd: &qd,
             qdd: &qdd,
         },
+        len,
         &mut out,
         &mut TapeScratch::default(),
     );

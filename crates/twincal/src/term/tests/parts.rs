@@ -58,14 +58,21 @@ fn compare(library: &Library, joints: usize) {
         qd: &qd,
         qdd: &qdd,
     };
-    let (mut whole, mut parts) = (vec![Vec::new(); joints], vec![Vec::new(); joints]);
+    let mut whole = vec![Vec::new(); joints];
     library.evaluate(motion, &mut whole);
-    library.evaluate_parts(motion, &mut parts, &mut Scratch::default());
+    // What stands between two signals is left alone.
+    let (stride, apart) = (len + 3, 1e9);
+    let counts = (0..joints).map(|joint| library.recipes(joint).parts());
+    let mut parts: Vec<Vec<f64>> = counts.map(|count| vec![apart; count * stride]).collect();
+    library.evaluate_parts(motion, stride, &mut parts, &mut Scratch::default());
     let mut combined = Vec::new();
     for joint in 0..joints {
-        assert_eq!(parts[joint].len(), library.recipes(joint).parts() * len);
         let recipes = library.recipes(joint);
-        recipes.combine(&parts[joint], len, len, &mut combined);
+        assert_eq!(parts[joint].len(), recipes.parts() * stride);
+        for signal in parts[joint].chunks_exact(stride) {
+            assert!(signal[len..].iter().all(|x| *x == apart));
+        }
+        recipes.combine(&parts[joint], stride, len, &mut combined);
         assert_eq!(combined.len(), whole[joint].len());
         for (i, &column) in library.columns_of_joint(joint).iter().enumerate() {
             let expected = &whole[joint][i * len..(i + 1) * len];

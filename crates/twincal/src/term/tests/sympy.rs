@@ -84,6 +84,7 @@ fn thirty_lagrangians_have_sympys_torque() {
                 qd: &qd,
                 qdd: &qdd,
             },
+            len,
             &mut out,
             &mut Scratch::default(),
         );
