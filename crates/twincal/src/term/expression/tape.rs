@@ -110,8 +110,11 @@ impl Tape {
         let run = Run {
             tape: self,
             motion,
-            stride,
-            out,
+            outputs: Outputs {
+                slots: &self.slots,
+                stride,
+                out,
+            },
             registers: &mut scratch.registers[..self.registers],
         };
         pulp::Arch::new().dispatch(run);
@@ -335,19 +338,34 @@ fn allocate(mut instructions: Vec<Instruction>, values: usize) -> (Vec<Instructi
     (instructions, used as usize)
 }
 
+/// Where the results go.
+struct Outputs<'a, T> {
+    slots: &'a [Slot],
+    stride: usize,
+    out: &'a mut [T],
+}
+
+impl<T: DerefMut<Target = [f64]>> Outputs<'_, T> {
+    #[inline(always)]
+    fn store(&mut self, slot: u32, start: usize, samples: &[f64]) {
+        let Slot { table, row } = self.slots[slot as usize];
+        let from = row * self.stride + start;
+        self.out[table][from..from + samples.len()].copy_from_slice(samples);
+    }
+}
+
 /// One evaluation, compiled once per instruction set.
 struct Run<'a, T> {
     tape: &'a Tape,
     motion: Motion<'a>,
-    stride: usize,
-    out: &'a mut [T],
+    outputs: Outputs<'a, T>,
     registers: &'a mut [Block],
 }
 
 impl<T: DerefMut<Target = [f64]>> pulp::WithSimd for Run<'_, T> {
     type Output = ();
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, simd: S) {
+    fn with_simd<S: pulp::Simd>(mut self, simd: S) {
         let len = self.motion.len;
         let mut start = 0;
         while start < len {
@@ -360,8 +378,7 @@ impl<T: DerefMut<Target = [f64]>> pulp::WithSimd for Run<'_, T> {
                     self.motion,
                     start,
                     width,
-                    &self.tape.slots,
-                    (self.stride, &mut *self.out),
+                    &mut self.outputs,
                 );
             }
             start += width;
@@ -412,13 +429,8 @@ fn step<S: pulp::Simd, T: DerefMut<Target = [f64]>>(
     motion: Motion<'_>,
     start: usize,
     width: usize,
-    slots: &[Slot],
-    (stride, out): (usize, &mut [T]),
+    outputs: &mut Outputs<'_, T>,
 ) {
-    let mut store = |slot: u32, samples: &[f64]| {
-        let Slot { table, row } = slots[slot as usize];
-        out[table][row * stride + start..][..width].copy_from_slice(samples);
-    };
     match *instruction {
         I::Load(r, variable) => {
             let source = samples(motion, variable, start, width);
@@ -453,12 +465,12 @@ fn step<S: pulp::Simd, T: DerefMut<Target = [f64]>>(
             }
         }
         I::Store(a, slot) => {
-            store(slot, &registers[a as usize].as_flattened()[..width]);
+            outputs.store(slot, start, &registers[a as usize].as_flattened()[..width]);
         }
         I::StoreVariable(variable, slot) => {
-            store(slot, samples(motion, variable, start, width));
+            outputs.store(slot, start, samples(motion, variable, start, width));
         }
-        I::StoreConstant(value, slot) => store(slot, &[value; BLOCK][..width]),
+        I::StoreConstant(value, slot) => outputs.store(slot, start, &[value; BLOCK][..width]),
     }
 }
 
