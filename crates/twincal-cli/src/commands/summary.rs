@@ -16,7 +16,7 @@ const MENDS: &str = "`twincal init` with this log and model writes a twincal.tom
 /// Dropped columns up to this number are named.
 const FEW: usize = 4;
 /// What stands where ± does not describe a number.
-const ENDS: &str = "a (b … c): median and both ends of the central 68 % interval, where it is lopsided and ± would mislead";
+const ENDS: &str = "a (b … c): median and both ends of the central 68 % interval, where it is lopsided and ± would mislead; of the 95 % interval, where some models are far off";
 /// What the table of components that were not kept holds.
 const VALUE: &str = "value: median, given that it is in; ±: half of the central 68 % interval";
 

@@ -2,18 +2,16 @@
 
 use super::limits::too_narrow;
 use super::text::{list, number, percent, subject};
-use super::view::{Joint, memory, pooled_unit};
+use super::view::{Joint, memory};
 use twincal::calibrate::Calibration;
-use twincal::validate::{JointScore, Scores, Split, Validation};
+use twincal::validate::{JointScore, Split, Validation};
 
 /// Share of its range by which a joint may leave the training motion.
 const MARGIN: f64 = 0.05;
-/// Share of the rows from which what training does not say is told of all joints, and of one.
+/// Share of a joint's rows from which the error there is told.
 const MANY: f64 = 0.1;
 /// Ratio of errors there and elsewhere from which they are told.
 const FURTHER_OFF: f64 = 1.25;
-/// Joints that are named; the others are counted.
-const NAMED: usize = 3;
 /// Share of the rows beyond that are new motion, from which that is the cause.
 const MOSTLY: f64 = 0.5;
 
@@ -69,7 +67,17 @@ struct Pair<'a> {
     cause: Cause,
 }
 
-impl Pair<'_> {
+impl<'a> Pair<'a> {
+    fn of(calibration: &Calibration, within: &'a JointScore, beyond: &'a JointScore) -> Self {
+        let share = beyond.rows as f64 / (within.rows + beyond.rows) as f64;
+        let cause = Cause::of(calibration, &beyond.joint, share);
+        Self {
+            within,
+            beyond,
+            cause,
+        }
+    }
+
     /// "34 of 80 moving rows".
     fn rows(&self) -> String {
         let all = self.within.rows + self.beyond.rows;
@@ -85,69 +93,58 @@ fn pairs(calibration: &Calibration) -> impl Iterator<Item = Pair<'_>> {
         .filter(|(within, beyond)| {
             beyond.rows > 0 && (within.rows == 0 || within.coverage95 > beyond.coverage95)
         })
-        .map(|(within, beyond)| {
-            let share = beyond.rows as f64 / (within.rows + beyond.rows) as f64;
-            let cause = Cause::of(calibration, &beyond.joint, share);
-            Pair {
-                within,
-                beyond,
-                cause,
-            }
-        })
+        .map(|(within, beyond)| Pair::of(calibration, within, beyond))
 }
 
-/// Joints whose intervals are too narrow there, and less so elsewhere: by more than two standard errors of as many independent rows.
+/// Joints whose intervals are too narrow there, and less so elsewhere: by more than two standard errors of as many independent rows; and those
+/// whose error is larger there, on many of their rows.
 pub(super) fn narrow(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
-    let narrow = pairs(calibration)
-        .filter(|pair| too_narrow(pair.beyond, memory(joints, &pair.beyond.joint)));
-    narrow
-        .map(|pair| {
-            let (place, elsewhere) = match pair.cause {
-                Cause::NewMotion => ("beyond the training motion", "within it"),
-                Cause::OpenTorque => ("where training leaves its torque open", "elsewhere"),
-            };
-            let seen = match pair.within.rows {
-                0 => String::new(),
-                _ => format!(", {elsewhere} {}", percent(pair.within.coverage95)),
-            };
-            format!(
-                "{}: {place} ({}) its 95 % intervals hold {}{seen}.",
-                subject(&[&pair.beyond.joint]),
-                pair.rows(),
-                percent(pair.beyond.coverage95)
-            )
-        })
-        .collect()
-}
-
-/// How far off the twin is there and elsewhere, over all joints, where that is another matter on many of the rows.
-pub(super) fn error(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
     let Validation { within, beyond, .. } = &calibration.validation;
-    let rows = |scores: &Scores| scores.joints.iter().map(|joint| joint.rows).sum::<u64>();
-    let (out, all) = (rows(beyond), rows(within) + rows(beyond));
-    let many = out as f64 >= MANY * all as f64 && out < all;
-    if !many || beyond.rmse_calibrated < FURTHER_OFF * within.rmse_calibrated {
-        return None;
-    }
-    let mut each: Vec<(&JointScore, u64)> = (within.joints.iter().zip(&beyond.joints))
-        .map(|(within, beyond)| (beyond, within.rows + beyond.rows))
-        .filter(|(beyond, all)| beyond.rows as f64 >= MANY * *all as f64 && beyond.rows > 0)
-        .collect();
-    each.sort_by_key(|(beyond, _)| std::cmp::Reverse(beyond.rows));
-    let mut named: Vec<String> = (each.iter().take(NAMED))
-        .map(|(beyond, all)| format!("{} {} of {all}", beyond.joint, beyond.rows))
-        .collect();
-    if let Some(more) = each.len().checked_sub(NAMED).filter(|more| *more > 0) {
-        named.push(format!("{more} more"));
-    }
-    Some(format!(
-        "On {out} of {all} tested moving rows ({}) the training data say less, mostly for want of such motion or load: there the error is {} {unit}, \
-         elsewhere {} {unit}.",
-        named.join(", "),
-        number(beyond.rmse_calibrated, 3),
-        number(within.rmse_calibrated, 3),
-        unit = pooled_unit(joints)
-    ))
+    let open = within.joints.iter().zip(&beyond.joints);
+    let open = open.filter(|(_, beyond)| beyond.rows > 0);
+    let told = open.filter_map(|(within, beyond)| {
+        let all = within.rows + beyond.rows;
+        let own = too_narrow(beyond, memory(joints, &beyond.joint));
+        let narrow = own && (within.rows == 0 || within.coverage95 > beyond.coverage95);
+        let further = within.rows > 0
+            && beyond.rows as f64 >= MANY * all as f64
+            && beyond.rmse_calibrated > FURTHER_OFF * within.rmse_calibrated;
+        if !(narrow || further) {
+            return None;
+        }
+        let pair = Pair::of(calibration, within, beyond);
+        let (place, elsewhere) = match pair.cause {
+            Cause::NewMotion => ("beyond the training motion", "within it"),
+            Cause::OpenTorque => ("where training leaves its torque open", "elsewhere"),
+        };
+        let unit = joints.iter().find(|joint| joint.name == beyond.joint);
+        let unit = unit.map_or("", |joint| joint.units.torque);
+        let mut said = Vec::new();
+        if further {
+            said.push(format!(
+                "its error is {} {unit}, {elsewhere} {}",
+                number(beyond.rmse_calibrated, 3),
+                number(within.rmse_calibrated, 3)
+            ));
+        }
+        if narrow {
+            let seen = match within.rows {
+                0 => String::new(),
+                _ => format!(", {elsewhere} {}", percent(within.coverage95)),
+            };
+            said.push(format!(
+                "its 95 % intervals hold {}{seen}",
+                percent(beyond.coverage95)
+            ));
+        }
+        Some(format!(
+            "{}: {place} ({}) {}.",
+            subject(&[&beyond.joint]),
+            pair.rows(),
+            said.join("; ")
+        ))
+    });
+    told.collect()
 }
 
 /// Joints that were mostly tested there.
@@ -224,19 +221,18 @@ mod tests {
                     (&mut c.validation.beyond, [0, out], error),
                     (&mut c.validation.within, [100, 100 - out], 0.1),
                 ] {
-                    scores.rmse_calibrated = error;
                     for (joint, rows) in scores.joints.iter_mut().zip(rows) {
-                        joint.rows = rows;
+                        (joint.rows, joint.rmse_calibrated, joint.coverage95) = (rows, error, 0.95);
                     }
                 }
             });
             let told = verdict.limits.into_iter();
-            told.filter(|limit| limit.contains("say less"))
+            told.filter(|limit| limit.contains("its error"))
                 .collect::<Vec<_>>()
         };
-        let said = "On 70 of 200 tested moving rows (elbow 70 of 100) the training data say less, mostly for want of such motion or load: there the error is 0.200 N·m, elsewhere 0.100 N·m.";
+        let said = "Joint elbow: where training leaves its torque open (70 of 100 moving rows) its error is 0.200 N·m, elsewhere 0.100.";
         assert_eq!(of((70, 0.2)), [said]);
-        assert!(of((70, 0.12)).is_empty() && of((15, 0.2)).is_empty());
+        assert!(of((70, 0.12)).is_empty() && of((9, 0.2)).is_empty());
     }
 
     #[test]

@@ -18,6 +18,9 @@ const SHARE_WORTH_TELLING: f64 = 0.01;
 const SHORT: f64 = 30.0;
 /// Probability above which at least one of a group is sure.
 const SURE: f64 = 0.95;
+/// Share of the intervals' width that would have done from which they are called too wide, and the share of rows that they then hold.
+const MUCH_TOO_WIDE: f64 = 0.5;
+const SHARE_ALL: f64 = 0.99;
 /// Joints that are named; the others are counted.
 const NAMED: usize = 3;
 
@@ -63,6 +66,11 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
     let which = match has_standstill(validation) {
         true => "; joints that move",
         false => "",
+    };
+    let mut findings = calibration.findings.iter();
+    let which = match findings.any(|f| f.code == "urdf_dynamics") {
+        true => format!("{which}; your model without the friction that its file states"),
+        false => which.to_owned(),
     };
     let unit = pooled_unit(joints);
     let told = change([judged.rmse_nominal, judged.rmse_calibrated], unit);
@@ -190,14 +198,14 @@ fn friction_alone(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<Str
     let scores = decisive(&calibration.validation);
     let left = friction_only(scores)?;
     let told = format!("{} {}", number(left, 3), pooled_unit(joints));
-    let mut findings = calibration.findings.iter();
-    let stated = match findings.any(|f| f.code == "urdf_dynamics") {
-        true => " Your model’s own friction is not part of its torque here.",
-        false => "",
-    };
-    let told_alone = match left > scores.rmse_nominal {
+    Some(match left > scores.rmse_nominal {
         false => {
-            format!("Viscous and Coulomb friction and an offset alone would leave {told}.")
+            let (worse, _) = with_friction(scores, joints);
+            let worse = match worse.is_empty() {
+                true => String::new(),
+                false => format!("; worse than your model on {}", list(&worse)),
+            };
+            format!("Viscous and Coulomb friction and an offset alone would leave {told}{worse}.")
         }
         true => {
             let (worse, better) = with_friction(scores, joints);
@@ -212,8 +220,7 @@ fn friction_alone(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<Str
                 list(&worse)
             )
         }
-    };
-    Some(told_alone + stated)
+    })
 }
 
 /// Joints on which friction alone would be worse than the model, the worst first, and the number of the others.
@@ -263,8 +270,19 @@ fn held(calibration: &Calibration) -> String {
         true => format!(" ({} s of log)", number(seconds, 2)),
         false => String::new(),
     };
+    // Where all is inside, that is no praise.
+    let factor = calibration.validation.conformal.as_ref().map(|c| c.factor);
+    let wide = match factor.filter(|f| *f < MUCH_TOO_WIDE && judged.coverage95 > SHARE_ALL) {
+        Some(factor) => format!(
+            ": they are wider than they need to be, {} of their width would have done",
+            percent(factor)
+        ),
+        None => String::new(),
+    };
     if !has_standstill(&calibration.validation) {
-        return format!("The 95 % intervals contain {share} of the {rows} held-out values{short}.");
+        return format!(
+            "The 95 % intervals contain {share} of the {rows} held-out values{short}{wide}."
+        );
     }
     let differ = (judged.coverage95 - all.coverage95).abs() > SHARE_WORTH_TELLING;
     let all = match differ {
@@ -276,7 +294,7 @@ fn held(calibration: &Calibration) -> String {
         false => String::new(),
     };
     format!(
-        "The 95 % intervals contain {share} of the {rows} held-out values of moving joints{all}{short}."
+        "The 95 % intervals contain {share} of the {rows} held-out values of moving joints{all}{short}{wide}."
     )
 }
 
@@ -468,9 +486,10 @@ mod tests {
             )];
         });
         assert!(
-            one.grounds[1].ends_with(
-                "worse on elbow (0.431 → 9.00 N·m); better on one joint. Your model’s own friction is not part of its torque here."
-            ),
+            one.grounds[0].contains("; your model without the friction that its file states: ")
+        );
+        assert!(
+            one.grounds[1].ends_with("worse on elbow (0.431 → 9.00 N·m); better on one joint."),
             "{one:?}"
         );
         let better = judged(|c| {

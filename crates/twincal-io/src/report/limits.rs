@@ -141,7 +141,6 @@ fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Stri
     say(&large, words, words);
     out.append(&mut out_of_shape);
     out.extend(friction_does_as_well(scores, joints));
-    out.extend(beyond::error(calibration, joints));
     out.extend(beyond::narrow(calibration, joints));
     out.extend(beyond::mostly(calibration, joints));
     out.extend(raw_is_worse(calibration, joints));

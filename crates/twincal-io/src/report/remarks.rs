@@ -11,8 +11,6 @@ use twincal::term::Family;
 const NAMED: usize = 2;
 /// Change of the size of gravity, as a share, that no place on earth explains.
 const SIZE_OF_GRAVITY: f64 = 0.01;
-/// Width of a 95 % interval in spreads from which ± does not describe it; 3.92 where it is normal.
-const FAR: f64 = 12.0;
 /// Sd between all data and both halves from which that is told.
 const APART: f64 = 3.0;
 
@@ -22,8 +20,33 @@ pub(super) fn remarks(component: &ComponentSummary, calibration: &Calibration) -
     let negative = first.and_then(|(value, spread)| component.family.remark(value, spread));
     let mut out: Vec<String> = negative.map(str::to_owned).into_iter().collect();
     out.extend(of_the_file(component, calibration));
+    out.extend(all_friction(component, calibration));
     out.extend(doubts(component, calibration));
     out
+}
+
+/// The joint of a component that belongs to one.
+fn joint_of(component: &ComponentSummary) -> Option<&str> {
+    component.name.rsplit_once('.').map(|(joint, _)| joint)
+}
+
+/// Friction is all of it where what the model file states is no part of the nominal torque.
+fn all_friction(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
+    let is_stated = |joint: &str| {
+        let mut findings = calibration.findings.iter();
+        findings.any(|f| f.code == "urdf_dynamics" && f.subject == joint)
+    };
+    let friction = [Family::Viscous, Family::Coulomb].contains(&component.family);
+    (friction && component.selected && joint_of(component).is_some_and(is_stated))
+        .then(|| "all of it: what your model file states is not counted".into())
+}
+
+/// What is found on a joint alone whose rows count as few.
+fn few_rows(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
+    let joint = joint_of(component)?;
+    let mut findings = calibration.findings.iter();
+    (component.selected && findings.any(|f| f.code == "few_effective_rows" && f.subject == joint))
+        .then(|| format!("the rows of {joint} count as few independent ones"))
 }
 
 /// What the model says of a tensor's numbers that are told, and what it would have to say: known where nothing else of the link was found.
@@ -69,6 +92,7 @@ pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) ->
     } else if is_hardly_a_body(component, calibration) {
         out.push("hardly a rigid body: these logs leave its inertia open".into());
     }
+    out.extend(few_rows(component, calibration));
     out.extend(rivals(component, calibration));
     out.extend(repeats(component, calibration));
     if let Some(apart) = whole_against_halves(component, calibration) {
@@ -82,8 +106,10 @@ pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) ->
     if component.selected && by_prior.any(|other| other.name == component.name) {
         out.push("other priors would leave it out".into());
     }
-    if component.parameters.iter().any(is_split) {
-        out.push("some models put it far off: see the 95 % interval".into());
+    if component.parameters.iter().any(ParameterSummary::is_split) {
+        out.push(
+            "some models put a number of it far off: its brackets are the 95 % interval".into(),
+        );
     }
     if moves_with_the_cutoff(component, calibration) {
         out.push("depends on the filter's cut-off by more than its ±".into());
@@ -131,6 +157,13 @@ fn hangs_on(component: &ComponentSummary, calibration: &Calibration) -> Option<S
 fn rivals(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
     let mut groups = calibration.groups.iter();
     let own = |names: &[String]| names.contains(&component.name);
+    // A group holds what is alike by way of others, too.
+    let alike = |name: &str| {
+        let mut all = calibration.components.iter();
+        let other = all.find(|other| other.name == name);
+        let names = |one: &ComponentSummary, other: &str| one.alias_of.iter().any(|n| n == other);
+        other.is_none_or(|other| names(component, name) || names(other, &component.name))
+    };
     let group = groups.find(|group| own(&group.members) && !group.settled);
     let others = |names: &[String]| {
         let others: Vec<&str> = (names.iter())
@@ -147,6 +180,17 @@ fn rivals(component: &ComponentSummary, calibration: &Calibration) -> Option<Str
         Alike::EveryMotion => "in every motion",
     };
     match group {
+        Some(group) if group.alike == Alike::EveryMotion => {
+            let own = group.members.iter().filter(|name| alike(name));
+            let own: Vec<String> = own.cloned().collect();
+            (own.iter().any(|name| *name != component.name)).then(|| {
+                format!(
+                    "not to be told from {} {}",
+                    others(&own),
+                    place(group.alike)
+                )
+            })
+        }
         Some(group) => Some(format!(
             "not to be told from {} {}",
             others(&group.members),
@@ -194,12 +238,6 @@ pub(super) fn size_of_gravity(
             number(after, 3)
         )
     })
-}
-
-/// Models that put a number far from the others: its 95 % interval says more than its ±.
-fn is_split(parameter: &ParameterSummary) -> bool {
-    let [low, high] = parameter.interval95;
-    parameter.seen && high - low > FAR * parameter.told().1
 }
 
 /// What the two halves of the data say, where they do not agree.
@@ -265,6 +303,24 @@ mod tests {
     #[test]
     fn nothing_is_remarked_of_a_plain_effect() {
         assert_eq!(of(|_| ()), [""; 0]);
+    }
+
+    #[test]
+    fn friction_that_a_file_states_and_joints_with_few_rows_are_remarked() {
+        let of = |code: &str, family: Family| {
+            let mut calibration = fixture::two_joints();
+            calibration.repeatability.clear();
+            let subject = "elbow";
+            calibration.findings = vec![Finding::new(Severity::Note, code, subject, "", 0)];
+            let mut own = calibration.components[0].clone();
+            (own.family, own.name, own.selected) = (family, format!("{subject}.x"), true);
+            (remarks(&own, &calibration), doubts(&own, &calibration))
+        };
+        let said = "all of it: what your model file states is not counted".to_owned();
+        assert_eq!(of("urdf_dynamics", Family::Coulomb), (vec![said], vec![]));
+        assert!(of("urdf_dynamics", Family::Spring).0.is_empty());
+        let few = "the rows of elbow count as few independent ones".to_owned();
+        assert_eq!(of("few_effective_rows", Family::Spring).1, [few]);
     }
 
     #[test]
@@ -405,7 +461,10 @@ mod tests {
     #[test]
     fn models_far_from_the_others_are_told() {
         let said = of(|c| c.components[0].parameters[0].interval95 = [-4.3, 4.5]);
-        assert_eq!(said, ["some models put it far off: see the 95 % interval"]);
+        assert_eq!(
+            said,
+            ["some models put a number of it far off: its brackets are the 95 % interval"]
+        );
     }
 
     #[test]

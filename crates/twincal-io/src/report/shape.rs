@@ -11,6 +11,8 @@ use twincal::validate::{JointScore, Pit, Reliability, Scores};
 const OFF: f64 = 0.05;
 /// Share of right predictions that [`Pit::chance`] lets pass for wrong ones.
 const ALARM: f64 = 0.05;
+/// Probability below which so many joints are not off by chance.
+const TOO_MANY: f64 = 0.01;
 
 /// How a predicted distribution is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -114,6 +116,26 @@ impl Shape {
     }
 }
 
+/// Joints that count as looked at: one, where so many are beyond their own limit that chance would not do it in 99 of 100 right twins.
+fn looked_at(reliability: &[Reliability]) -> usize {
+    let joints = reliability.len();
+    let beyond = reliability
+        .iter()
+        .filter(|j| Shape::of(&j.pit, 1).is_some());
+    // P(X ≥ beyond) of a binomial distribution.
+    let tail = |least: usize| -> f64 {
+        let one = |k: usize| {
+            let ways = (0..k).map(|i| (joints - i) as f64 / (k - i) as f64);
+            ways.product::<f64>() * ALARM.powi(k as i32) * (1.0 - ALARM).powi((joints - k) as i32)
+        };
+        (least..=joints).map(one).sum()
+    };
+    match beyond.count() {
+        most if most > 1 && tail(most) < TOO_MANY => 1,
+        _ => joints,
+    }
+}
+
 /// How much further the worst of some joints goes than one alone: the Kolmogorov–Smirnov distance exceeds d by chance with a probability of
 /// about 2 exp(−2 n d²), which has to be 0.05 for one and 0.05/`joints` for each of several.
 fn of_one_among(joints: usize) -> f64 {
@@ -132,7 +154,7 @@ pub(super) struct Off {
 pub(super) fn off(calibration: &Calibration) -> Off {
     let validation = &calibration.validation;
     let far = |pit: &Pit, joints| Shape::of(pit, joints).filter(|_| pit.distance > OFF);
-    let joints = validation.reliability.len();
+    let joints = looked_at(&validation.reliability);
     Off {
         all: far(&validation.pit, 1),
         single: (validation.reliability.iter()).any(|j| far(&j.pit, joints).is_some()),
@@ -143,7 +165,7 @@ pub(super) fn off(calibration: &Calibration) -> Off {
 pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<String> {
     let validation = &calibration.validation;
     let mut out = Vec::new();
-    let joints = validation.reliability.len();
+    let joints = looked_at(&validation.reliability);
     // What its 95 % interval says of a joint stands elsewhere; the middle of the distribution neither contradicts nor repeats it.
     let scores = &decisive(validation).joints;
     let said = |joint: &str, shape: Shape| {
@@ -202,6 +224,24 @@ fn by_how_much(joints: &[Joint<'_>], name: &str) -> String {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+
+    /// Of six joints three beyond what 95 of 100 right ones stay below: by chance in 2 of 1000 right twins.
+    #[test]
+    fn many_joints_beyond_their_own_limit_are_not_there_by_chance() {
+        let of = |beyond: usize| {
+            let mut calibration = crate::report::fixture::two_joints();
+            let one = calibration.validation.reliability[0].clone();
+            let joint = |k: usize| {
+                let mut own = one.clone();
+                own.pit.chance = 0.1;
+                own.pit.distance = if k < beyond { 0.101 } else { 0.05 };
+                own
+            };
+            calibration.validation.reliability = (0..6).map(joint).collect();
+            looked_at(&calibration.validation.reliability)
+        };
+        assert_eq!([of(0), of(1), of(2), of(3), of(6)], [6, 6, 6, 1, 1]);
+    }
 
     #[test]
     fn torque_off_to_one_side_is_told_in_its_unit() {

@@ -80,9 +80,12 @@ pub(super) fn scores(scores: &Scores, joints: &[Joint<'_>], rows: Rows) -> Table
     for score in scores.joints.iter() {
         let joint = joints.iter().find(|j| j.name == score.joint);
         let unit = joint.map_or("", |j| j.units.torque);
-        let share = joint.map_or(f64::NAN, |j| {
-            score.rmse_calibrated / torque_deviation(j, rows)
-        });
+        // Results of earlier versions do not have it.
+        let deviation = match score.torque_sd > 0.0 {
+            true => score.torque_sd,
+            false => joint.map_or(f64::NAN, |j| torque_deviation(j, rows)),
+        };
+        let share = score.rmse_calibrated / deviation;
         table.rows.push(vec![
             score.joint.clone(),
             count(score.rows),

@@ -255,7 +255,17 @@ impl<'a> Candidates<'a> {
                 told.push(name);
             }
         }
-        let words = words(&told, pip, alike, settled);
+        // By way of others, where not each has the torque of each.
+        let aliases = |k: usize| &self.library.components()[self.component[k]].alias_of;
+        let pairs = members.iter().enumerate();
+        let mut pairs = pairs.flat_map(|(i, &a)| members[..i].iter().map(move |&b| (a, b)));
+        let whole = pairs.all(|(a, b)| {
+            let [left, right] = [a, b].map(|k| self.name(k));
+            left == right
+                || aliases(a).iter().any(|n| n == right)
+                || aliases(b).iter().any(|n| n == left)
+        });
+        let words = words(&told, pip, (alike, whole), settled);
         let names = told.into_iter().map(str::to_owned).collect();
         Some(Group {
             members: names,
@@ -292,7 +302,7 @@ impl Calibration {
 }
 
 /// "payload and link_6.tensor are one direction here: …", the likeliest name first.
-fn words(names: &[&str], pip: f64, alike: Alike, settled: bool) -> String {
+fn words(names: &[&str], pip: f64, (alike, whole): (Alike, bool), settled: bool) -> String {
     let list = match names {
         [] => String::new(),
         _ if names.len() > TOLD => format!(
@@ -302,9 +312,12 @@ fn words(names: &[&str], pip: f64, alike: Alike, settled: bool) -> String {
         ),
         [others @ .., last] => format!("{} and {last}", others.join(", ")),
     };
-    let same = match alike {
-        Alike::EveryMotion => "can explain the same torque in every motion of this robot",
-        Alike::TheseLogs => "say the same in these logs",
+    let same = match (alike, whole) {
+        (Alike::EveryMotion, true) => "can explain the same torque in every motion of this robot",
+        (Alike::EveryMotion, false) => {
+            "can stand in for one another in every motion of this robot, directly or by way of others"
+        }
+        (Alike::TheseLogs, _) => "say the same in these logs",
     };
     let pip = if pip > 0.999 {
         "> 0.999".to_owned()
@@ -327,11 +340,16 @@ mod tests {
     fn a_set_in_words() {
         let names = ["payload", "fore.tensor"];
         assert_eq!(
-            words(&names, 0.9999, Alike::EveryMotion, true),
+            words(&names, 0.9999, (Alike::EveryMotion, true), true),
             "payload and fore.tensor can explain the same torque in every motion of this robot: at least one of them is in with \
              probability > 0.999; the prior alone prefers `payload`"
         );
-        let open = words(&names, 0.98, Alike::TheseLogs, false);
+        let by_way = words(&names, 0.98, (Alike::EveryMotion, false), false);
+        assert!(
+            by_way.contains("directly or by way of others: at least one"),
+            "{by_way}"
+        );
+        let open = words(&names, 0.98, (Alike::TheseLogs, true), false);
         assert!(
             open.ends_with("0.980; another motion would tell more"),
             "{open}"

@@ -121,7 +121,7 @@ impl ParameterSummary {
     }
 
     /// Both ends of the central 68.3 % interval, where ± does not describe it: it is lopsided, ± reaches beyond the 95 % interval, or that
-    /// is far longer on one side. They are told instead of ±.
+    /// is far longer on one side; those of the 95 % interval where models far off make it three times as long as ± says. They are told instead of ±.
     #[must_use]
     pub fn ends(&self) -> Option<[f64; 2]> {
         let (value, spread) = self.told();
@@ -133,10 +133,24 @@ impl ParameterSummary {
         let (near95, far95) = arms(self.interval95);
         let lopsided = far > LOPSIDED * near || far95 > LOPSIDED_95 * near95 || near95 < spread;
         let known = near.is_finite() && far95.is_finite() && spread > 0.0;
+        if known && self.is_split() {
+            return Some(self.interval95);
+        }
         (known && lopsided).then_some(self.interval68)
     }
 }
 
+impl ParameterSummary {
+    /// True where models far from the others make the 95 % interval three times as long as ± says, or more.
+    #[must_use]
+    pub fn is_split(&self) -> bool {
+        let [low, high] = self.interval95;
+        self.seen && high - low > FAR * self.told().1
+    }
+}
+
+/// Width of a 95 % interval in spreads from which ± does not describe it; 3.92 where it is normal.
+const FAR: f64 = 12.0;
 /// Ratio of the two sides of a central 68.3 % interval from which ± says too little.
 const LOPSIDED: f64 = 2.0;
 /// The same of a 95 % interval, whose ends are less sure.
@@ -460,9 +474,11 @@ mod tests {
         // ± 47 would reach below the 95 % interval.
         let skewed = [284.0, 378.0];
         assert_eq!(of(294.0, skewed, [276.0, 424.0]), Some(skewed));
-        // A few models far off on one side.
+        // A few models far off on one side, and on both: UR10, preload of a spring beside an offset.
         let far = [-0.98, -0.44];
-        assert_eq!(of(-0.75, far, [-1.3, 6.6]), Some(far));
+        assert_eq!(of(-0.75, far, [-1.3, 2.0]), Some([-1.3, 2.0]));
+        assert_eq!(of(-0.75, far, [-1.3, 1.8]), Some(far));
+        assert_eq!(of(0.762, [0.723, 0.801], [-2.5, 3.7]), Some([-2.5, 3.7]));
         assert_eq!(of(f64::NAN, [f64::NAN; 2], [f64::NAN; 2]), None);
         assert_eq!(of(0.0, [0.0; 2], [0.0; 2]), None);
     }

@@ -165,6 +165,7 @@ impl<'a> Walker<'a> {
     }
 
     /// Prior ratio of an exchange of single components, slab's mass within the bounds included.
+    #[inline(always)]
     pub(super) fn exchange_odds(&self, leaving: usize, entering: usize) -> f64 {
         let (out, into) = (
             &self.standard.blocks[leaving],

@@ -6,7 +6,7 @@ use crate::report::figure::{Figure, Image, Legend};
 use crate::report::scale::{Scale, extent};
 use crate::report::svg::{Anchor, Svg};
 use crate::report::text::{probability, shorten};
-use twincal::calibrate::{Calibration, ComponentSummary, TermSummary};
+use twincal::calibrate::{Calibration, ComponentSummary, TermSummary, Verdict};
 
 const ROW: f64 = 19.0;
 /// An effect is drawn if its probability reaches this under any of the priors.
@@ -29,7 +29,14 @@ pub(in crate::report) fn figure(
     terms: &[TermSummary],
     components: &[ComponentSummary],
 ) -> Option<Figure> {
+    // What the data do not see is left to the prior by definition.
+    let unseen = |term: &&TermSummary| {
+        let mut own = components.iter();
+        let own = own.find(|component| component.columns.contains(&term.term.name));
+        own.is_some_and(|c| !c.selected && c.verdict == Some(Verdict::NotSeen))
+    };
     let rows: Vec<Row<'_>> = one_each(terms)
+        .filter(|term| !unseen(term))
         .filter_map(|term| {
             let pip = term.pip?;
             let range = extent(term.pip_sensitivity.iter().copied().chain([pip]));

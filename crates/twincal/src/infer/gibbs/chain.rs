@@ -350,7 +350,7 @@ impl<'a> Chain<'a> {
                 if self.chunks[index].version != self.version {
                     self.evaluate(simd, index);
                 }
-                let chunk = self.chunks[index];
+                let chunk = &self.chunks[index];
                 if from > 0 {
                     // f ≤ 0.95 keeps it positive.
                     product = self.product / chunk.stays[from - 1];
@@ -358,12 +358,18 @@ impl<'a> Chain<'a> {
                 let sums = &mut self.sums[index * LANES..(index + 1) * LANES];
                 let whole = product * chunk.stays[LANES - 1];
                 if self.target < whole {
-                    for lane in 0..LANES {
-                        sums[lane] += if lane >= from {
-                            chunk.conditional[lane]
-                        } else {
-                            0.0
-                        };
+                    if from == 0 {
+                        for (sum, conditional) in sums.iter_mut().zip(&chunk.conditional) {
+                            *sum += conditional;
+                        }
+                    } else {
+                        for (lane, sum) in sums.iter_mut().enumerate() {
+                            *sum += if lane >= from {
+                                chunk.conditional[lane]
+                            } else {
+                                0.0
+                            };
+                        }
                     }
                     self.product = whole;
                     break;
@@ -492,11 +498,15 @@ impl<'a> Chain<'a> {
         let mut sign = [-1.0; LANES];
         if let Some(first) = self.chunks[index].first {
             // All four are padded by a lane behind the last position (`Tableau`, `Chain::new`): eight can be read from any.
-            let eight =
-                |values: &[f64]| -> Lane { *values[first..].first_chunk().expect("padded") };
-            let (diagonal, gradient) = (eight(&tableau.diagonal), eight(&tableau.gradient));
-            let (precision, slab) = (eight(&self.precision), eight(&self.slab));
-            sign = eight(&tableau.sign);
+            macro_rules! eight {
+                ($values:expr) => {{
+                    let eight: Lane = *$values[first..].first_chunk().expect("padded");
+                    eight
+                }};
+            }
+            let (diagonal, gradient) = (eight!(tableau.diagonal), eight!(tableau.gradient));
+            let (precision, slab) = (eight!(self.precision), eight!(self.slab));
+            sign = eight!(tableau.sign);
             for lane in 0..LANES {
                 let inside = sign[lane] > 0.0;
                 let (least, unit) = if inside {
@@ -522,13 +532,18 @@ impl<'a> Chain<'a> {
         let odds = self.chunk_odds(index, &sign);
         let chunk = &mut self.chunks[index];
         let mut stay = [0.0; LANES];
-        let inputs = [&odds, &d, &square, &over, &sign];
-        let [odds, d, square, over, sign] = inputs.map(|lanes| S::as_simd_f64s(lanes).0);
+        let (odds, d) = (S::as_simd_f64s(&odds).0, S::as_simd_f64s(&d).0);
+        let (square, over) = (S::as_simd_f64s(&square).0, S::as_simd_f64s(&over).0);
+        let sign = S::as_simd_f64s(&sign).0;
         let conditional = S::as_mut_simd_f64s(&mut chunk.conditional).0;
         let stays = S::as_mut_simd_f64s(&mut stay).0;
-        let [zero, one, misfit] = [0.0, 1.0, misfit].map(|x| simd.splat_f64s(x));
-        let [least, most] = [f64::MIN_POSITIVE, RATIO_MAX].map(|x| simd.splat_f64s(x));
-        let [power, lazy] = [-standard.shape, -LAZY].map(|x| simd.splat_f64s(x));
+        let (zero, one) = (simd.splat_f64s(0.0), simd.splat_f64s(1.0));
+        let (least, most) = (
+            simd.splat_f64s(f64::MIN_POSITIVE),
+            simd.splat_f64s(RATIO_MAX),
+        );
+        let (misfit, power) = (simd.splat_f64s(misfit), simd.splat_f64s(-standard.shape));
+        let lazy = simd.splat_f64s(-LAZY);
         for v in 0..odds.len() {
             let gain = simd.div_f64s(square[v], simd.mul_f64s(over[v], misfit));
             let change = simd.max_f64s(simd.mul_add_e_f64s(sign[v], gain, one), least);

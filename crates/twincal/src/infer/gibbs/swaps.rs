@@ -16,7 +16,7 @@ const ALIKE: f64 = 0.3;
 /// Pairs per column, the most alike first.
 const PAIRS_PER_COLUMN: usize = 6;
 /// Scans in which every group has its turn.
-const SCANS_PER_ROUND: usize = 8;
+const SCANS_PER_ROUND: usize = 16;
 
 /// See the module's text.
 #[derive(Debug)]
