@@ -56,7 +56,10 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
     let split = match validation.split {
         Split::HeldoutLogs => "held-out logs",
         Split::LeaveOneLogOut => "logs left out one at a time, by fits without them",
-        Split::LastThirty => "the last 30 % of each log, by a fit without them",
+        Split::LastThirty => match calibration.logs.len() {
+            1 => "the last 30 % of the log, by a fit without them",
+            _ => "the last 30 % of each log, by a fit without them",
+        },
     };
     let cutoff = calibration.twin.pipeline.cutoff_hz;
     let below = match cutoff > 0.0 {

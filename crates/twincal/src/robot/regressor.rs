@@ -386,7 +386,11 @@ impl<K: Sink> pulp::WithSimd for Kernel<'_, K> {
                     let present = &regressor.pairs[pair].present;
                     let at = first - samples.start;
                     let put = |k, value| sink.put(s, pair * 10 + k, at, last - first, value);
-                    columns(s, present, [u, v], state, put);
+                    if regressor.parents[pair].is_none() && !body.prismatic {
+                        own_columns(s, present, own, state, put);
+                    } else {
+                        columns(s, present, [u, v], state, put);
+                    }
                 }
             }
             first = last;
@@ -407,17 +411,21 @@ fn columns<S: Simd>(
     if present[0] {
         put(0, dot(s, v, *a));
     }
-    // Bᵀ v + a × u
-    let turned: V3<S> = cross(s, *a, u);
-    for k in 0..3 {
-        if present[1 + k] {
-            let column = [b[0][k], b[1][k], b[2][k]];
-            put(1 + k, dot_add(s, column, v, turned[k]));
-        }
+    // Bᵀ v + a × u. One by one: in a loop compilers keep vectors in memory, to index them.
+    macro_rules! moment {
+        ($($k:literal)*) => {$(
+            if present[1 + $k] {
+                let (i, j) = (($k + 1) % 3, ($k + 2) % 3);
+                let turned = s.mul_f64s(a[i], u[j]);
+                let turned = s.sub_f64s(turned, s.mul_f64s(a[j], u[i]));
+                let column = [b[0][$k], b[1][$k], b[2][$k]];
+                put(1 + $k, dot_add(s, column, v, turned));
+            }
+        )*};
     }
+    moment!(0 1 2);
     // u·(I ω̇) + (u × ω)·(I ω)
     let e = cross(s, u, *w);
-    // One by one: in a loop compilers keep vectors in memory, to index them.
     macro_rules! tensor {
         ($($k:literal)*) => {$(
             if present[4 + $k] {
@@ -432,4 +440,42 @@ fn columns<S: Simd>(
         )*};
     }
     tensor!(0 1 2 3 4 5);
+}
+
+/// The same of a hinge's own body: its axis is z, `own` long, and goes through the origin. A quarter of a chain's pairs are such.
+#[inline(always)]
+fn own_columns<S: Simd>(
+    s: S,
+    present: &[bool; 10],
+    own: S::f64s,
+    state: &State<S::f64s>,
+    mut put: impl FnMut(usize, S::f64s),
+) {
+    let State { w, wd, a, .. } = state;
+    let zero = s.splat_f64s(0.0);
+    let (x, y) = (s.mul_f64s(own, w[0]), s.mul_f64s(own, w[1]));
+    macro_rules! scaled {
+        ($x:expr) => {
+            s.mul_f64s(own, $x)
+        };
+    }
+    macro_rules! write {
+        ($k:literal, $value:expr) => {
+            if present[$k] {
+                put($k, $value);
+            }
+        };
+    }
+    write!(0, zero);
+    // a × u
+    write!(1, scaled!(a[1]));
+    write!(2, s.neg_f64s(scaled!(a[0])));
+    write!(3, zero);
+    // u·(I ω̇) + (u × ω)·(I ω), u × ω = (−y, x, 0)
+    write!(4, s.neg_f64s(s.mul_f64s(y, w[0])));
+    write!(5, s.sub_f64s(s.mul_f64s(x, w[0]), s.mul_f64s(y, w[1])));
+    write!(6, s.sub_f64s(scaled!(wd[0]), s.mul_f64s(y, w[2])));
+    write!(7, s.mul_f64s(x, w[1]));
+    write!(8, s.mul_add_e_f64s(x, w[2], scaled!(wd[1])));
+    write!(9, scaled!(wd[2]));
 }
