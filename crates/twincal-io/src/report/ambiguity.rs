@@ -36,7 +36,7 @@ pub(super) fn sentences(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<
         .collect();
     if !still.is_empty() {
         out.push(format!(
-            "Stood still for most of the logs: {}. Effects on these joints rest on the rest.",
+            "Stood still for most of the logs: {}. What is found on them rests on the other rows.",
             list(&still)
         ));
     }

@@ -119,6 +119,8 @@ pub(super) fn sort(calibration: &Calibration) -> Effects {
         .filter(|group| group.pip >= LIKELY);
     let mut alike: Vec<&String> = likely.flat_map(|group| &group.members).collect();
     alike.extend(sensitivity::by_prior(calibration).map(|component| &component.name));
+    let found = calibration.components.iter().filter(|c| c.selected);
+    alike.extend(found.flat_map(|component| &component.alias_of));
     let rivals = pick(&|c, p| unlikely(c, p) && alike.contains(&&c.name));
     let absent = pick(&|c, p| unlikely(c, p) && !alike.contains(&&c.name));
     Effects {

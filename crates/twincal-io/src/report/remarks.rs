@@ -41,6 +41,16 @@ fn all_friction(component: &ComponentSummary, calibration: &Calibration) -> Opti
         .then(|| "all of it: what your model file states is not counted".into())
 }
 
+/// Motor inertia of a joint whose link has no tensor in the model.
+fn of_a_point_mass(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
+    let joint = joint_of(component).filter(|_| component.family == Family::MotorInertia)?;
+    let joints = &calibration.twin.robot.description().joints;
+    let link = &joints.iter().find(|own| own.name == joint)?.child;
+    let mut findings = calibration.findings.iter();
+    (component.selected && findings.any(|f| f.code == "point_mass" && f.subject == *link))
+        .then(|| format!("has in it the tensor that {link} lacks in your model"))
+}
+
 /// What is found on a joint alone whose rows count as few.
 fn few_rows(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
     let joint = joint_of(component)?;
@@ -93,6 +103,7 @@ pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) ->
         out.push("hardly a rigid body: these logs leave its inertia open".into());
     }
     out.extend(few_rows(component, calibration));
+    out.extend(of_a_point_mass(component, calibration));
     out.extend(rivals(component, calibration));
     out.extend(repeats(component, calibration));
     if let Some(apart) = whole_against_halves(component, calibration) {
@@ -157,14 +168,6 @@ fn hangs_on(component: &ComponentSummary, calibration: &Calibration) -> Option<S
 fn rivals(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
     let mut groups = calibration.groups.iter();
     let own = |names: &[String]| names.contains(&component.name);
-    // A group holds what is alike by way of others, too.
-    let alike = |name: &str| {
-        let mut all = calibration.components.iter();
-        let other = all.find(|other| other.name == name);
-        let names = |one: &ComponentSummary, other: &str| one.alias_of.iter().any(|n| n == other);
-        other.is_none_or(|other| names(component, name) || names(other, &component.name))
-    };
-    let group = groups.find(|group| own(&group.members) && !group.settled);
     let others = |names: &[String]| {
         let others: Vec<&str> = (names.iter())
             .filter(|name| **name != component.name)
@@ -179,28 +182,30 @@ fn rivals(component: &ComponentSummary, calibration: &Calibration) -> Option<Str
         Alike::TheseLogs => "in these logs",
         Alike::EveryMotion => "in every motion",
     };
+    let group = groups.find(|group| own(&group.members) && !group.settled);
     match group {
-        Some(group) if group.alike == Alike::EveryMotion => {
-            let own = group.members.iter().filter(|name| alike(name));
-            let own: Vec<String> = own.cloned().collect();
-            (own.iter().any(|name| *name != component.name)).then(|| {
-                format!(
-                    "not to be told from {} {}",
-                    others(&own),
-                    place(group.alike)
-                )
-            })
-        }
         Some(group) => Some(format!(
-            "not to be told from {} {}",
+            "not to be told from {} {}{}",
             others(&group.members),
-            place(group.alike)
+            place(group.alike),
+            if group.members.len() > 2 {
+                ", directly or by way of others"
+            } else {
+                ""
+            }
         )),
         None => {
-            let settled = calibration
-                .groups
-                .iter()
-                .find(|group| own(&group.members))?;
+            let mut all = calibration.groups.iter();
+            let Some(settled) = all.find(|group| own(&group.members)) else {
+                // Others have its torque together, and the prior prefers the one that does it alone.
+                let spanned = component.selected && !component.alias_of.is_empty();
+                return spanned.then(|| {
+                    format!(
+                        "its torque is also that of {} in every motion; the prior prefers it",
+                        others(&component.alias_of)
+                    )
+                });
+            };
             let first = settled.members.first()?;
             let place = place(settled.alike);
             Some(if *first == component.name {
@@ -306,6 +311,46 @@ mod tests {
     }
 
     #[test]
+    fn a_torque_that_others_have_together_is_remarked() {
+        let of = |aliases: &[&str], selected: bool| {
+            let mut calibration = fixture::two_joints();
+            calibration.repeatability.clear();
+            calibration.groups.clear();
+            let mut own = calibration.components[0].clone();
+            own.alias_of = aliases.iter().map(|&name| name.to_owned()).collect();
+            own.selected = selected;
+            doubts(&own, &calibration)
+        };
+        let said =
+            "its torque is also that of a, b and 1 more in every motion; the prior prefers it";
+        assert_eq!(of(&["a", "b", "c"], true), [said]);
+        assert!(of(&[], true).is_empty() && of(&["a"], false).is_empty());
+    }
+
+    #[test]
+    fn motor_inertia_beside_a_link_without_tensor_is_remarked() {
+        let of = |family: Family| {
+            let mut calibration = fixture::two_joints();
+            let joint = &calibration.twin.robot.description().joints[0];
+            let (name, child) = (joint.name.clone(), joint.child.clone());
+            calibration.findings = vec![Finding::new(
+                Severity::Note,
+                "point_mass",
+                child.as_str(),
+                "",
+                0,
+            )];
+            let mut own = calibration.components[0].clone();
+            (own.family, own.name, own.selected) = (family, format!("{name}.x"), true);
+            (of_a_point_mass(&own, &calibration), child)
+        };
+        let (told, child) = of(Family::MotorInertia);
+        let said = format!("has in it the tensor that {child} lacks in your model");
+        assert_eq!(told, Some(said));
+        assert_eq!(of(Family::Spring).0, None);
+    }
+
+    #[test]
     fn friction_that_a_file_states_and_joints_with_few_rows_are_remarked() {
         let of = |code: &str, family: Family| {
             let mut calibration = fixture::two_joints();
@@ -380,7 +425,7 @@ mod tests {
             said,
             [
                 "no rigid body has this: it stands in for another effect",
-                "not to be told from x, y and 2 more in these logs",
+                "not to be told from x, y and 2 more in these logs, directly or by way of others",
                 "depends on the filter's cut-off by more than its ±",
             ]
         );

@@ -200,6 +200,27 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
             _ => format!("{names}: their {words} (on {} {shown}).", worst.joint),
         });
     }
+    // Off, but neither to one side nor as a whole too wide or too narrow.
+    let odd: Vec<&Reliability> = (validation.reliability.iter())
+        .filter(|j| {
+            Shape::of(&j.pit, joints)
+                .is_some_and(|shape| !shape.agrees(&j.coverage_levels) && !said(&j.joint, shape))
+        })
+        .collect();
+    if let Some(worst) = (odd.iter()).max_by(|a, b| a.pit.distance.total_cmp(&b.pit.distance)) {
+        let names: Vec<&str> = odd.iter().map(|j| j.joint.as_str()).collect();
+        out.push(format!(
+            "{}: predicted probabilities are not evenly spread ({}off by {}, by chance below {}).",
+            subject(&names),
+            if odd.len() > 1 {
+                format!("on {} ", worst.joint)
+            } else {
+                String::new()
+            },
+            number(worst.pit.distance, 2),
+            number(worst.pit.chance, 2)
+        ));
+    }
     let pooled = Shape::of(&validation.pit, 1);
     let pooled = pooled.filter(|shape| shape.agrees(&validation.coverage_levels));
     if let (true, Some(shape)) = (out.is_empty(), pooled) {

@@ -259,12 +259,14 @@ impl<'a> Candidates<'a> {
         let aliases = |k: usize| &self.library.components()[self.component[k]].alias_of;
         let pairs = members.iter().enumerate();
         let mut pairs = pairs.flat_map(|(i, &a)| members[..i].iter().map(move |&b| (a, b)));
-        let whole = pairs.all(|(a, b)| {
-            let [left, right] = [a, b].map(|k| self.name(k));
-            left == right
-                || aliases(a).iter().any(|n| n == right)
-                || aliases(b).iter().any(|n| n == left)
-        });
+        let whole = told.len() < 3
+            || every_motion
+                && pairs.all(|(a, b)| {
+                    let [left, right] = [a, b].map(|k| self.name(k));
+                    left == right
+                        || aliases(a).iter().any(|n| n == right)
+                        || aliases(b).iter().any(|n| n == left)
+                });
         let words = words(&told, pip, (alike, whole), settled);
         let names = told.into_iter().map(str::to_owned).collect();
         Some(Group {
@@ -317,7 +319,10 @@ fn words(names: &[&str], pip: f64, (alike, whole): (Alike, bool), settled: bool)
         (Alike::EveryMotion, false) => {
             "can stand in for one another in every motion of this robot, directly or by way of others"
         }
-        (Alike::TheseLogs, _) => "say the same in these logs",
+        (Alike::TheseLogs, true) => "say the same in these logs",
+        (Alike::TheseLogs, false) => {
+            "can stand in for one another in these logs, directly or by way of others"
+        }
     };
     let pip = if pip > 0.999 {
         "> 0.999".to_owned()

@@ -80,7 +80,8 @@ pub(in crate::report) fn by_prior(
     let terms = one_each(&calibration.terms).filter(|term| depends_on_prior(term));
     terms.filter_map(|term| {
         let own = |c: &&ComponentSummary| c.columns.contains(&term.term.name);
-        calibration.components.iter().find(own)
+        let seen = |c: &&ComponentSummary| c.selected || c.verdict != Some(Verdict::NotSeen);
+        calibration.components.iter().find(own).filter(seen)
     })
 }
 
