@@ -168,10 +168,17 @@ fn hangs_on(component: &ComponentSummary, calibration: &Calibration) -> Option<S
 fn rivals(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
     let mut groups = calibration.groups.iter();
     let own = |names: &[String]| names.contains(&component.name);
+    // Of a spring beside the offset of its joint it is the preload that is alike.
+    let joint = joint_of(component).unwrap_or_default();
+    let told = |name: &String| match component.family {
+        Family::Offset if *name == format!("{joint}.spring") => format!("{name} (its preload)"),
+        Family::Spring if *name == format!("{joint}.offset") => format!("{name} (by its preload)"),
+        _ => name.clone(),
+    };
     let others = |names: &[String]| {
-        let others: Vec<&str> = (names.iter())
+        let others: Vec<String> = (names.iter())
             .filter(|name| **name != component.name)
-            .map(String::as_str)
+            .map(told)
             .collect();
         match others.len().checked_sub(NAMED) {
             None | Some(0) => list(&others),
@@ -214,7 +221,10 @@ fn rivals(component: &ComponentSummary, calibration: &Calibration) -> Option<Str
                     others(&settled.members)
                 )
             } else {
-                format!("the same as {first} {place}, which the prior prefers")
+                format!(
+                    "the same as {} {place}, which the prior prefers",
+                    told(first)
+                )
             })
         }
     }

@@ -11,6 +11,8 @@ use twincal::validate::{JointScore, Pit, Reliability, Scores};
 const OFF: f64 = 0.05;
 /// Share of right predictions that [`Pit::chance`] lets pass for wrong ones.
 const ALARM: f64 = 0.05;
+/// Share of the rows on one side of the prediction from which it is said to be off to that side.
+const ONE_SIDE: f64 = 0.6;
 /// Probability below which so many joints are not off by chance.
 const TOO_MANY: f64 = 0.01;
 
@@ -200,26 +202,35 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
             _ => format!("{names}: their {words} (on {} {shown}).", worst.joint),
         });
     }
-    // Off, but neither to one side nor as a whole too wide or too narrow.
-    let odd: Vec<&Reliability> = (validation.reliability.iter())
-        .filter(|j| {
-            Shape::of(&j.pit, joints)
-                .is_some_and(|shape| !shape.agrees(&j.coverage_levels) && !said(&j.joint, shape))
-        })
-        .collect();
-    if let Some(worst) = (odd.iter()).max_by(|a, b| a.pit.distance.total_cmp(&b.pit.distance)) {
-        let names: Vec<&str> = odd.iter().map(|j| j.joint.as_str()).collect();
-        out.push(format!(
-            "{}: predicted probabilities are not evenly spread ({}off by {}, by chance below {}).",
-            subject(&names),
-            if odd.len() > 1 {
-                format!("on {} ", worst.joint)
-            } else {
-                String::new()
-            },
-            number(worst.pit.distance, 2),
-            number(worst.pit.chance, 2)
-        ));
+    // Off, but neither too wide nor too narrow as a whole: to one side, if most of it lies there.
+    for joint in &validation.reliability {
+        let Some(shape) = Shape::of(&joint.pit, joints) else {
+            continue;
+        };
+        if shape.agrees(&joint.coverage_levels) || said(&joint.joint, shape) {
+            continue;
+        }
+        let bins = &joint.pit.histogram;
+        let above = bins[bins.len() / 2..].iter().sum::<f64>() / bins.iter().sum::<f64>();
+        let side = match above {
+            _ if above > ONE_SIDE => Some(Shape::Above),
+            _ if above < 1.0 - ONE_SIDE => Some(Shape::Below),
+            _ => None,
+        };
+        let name = subject(&[&joint.joint]);
+        out.push(match side {
+            Some(side) => format!(
+                "{name}: its {} ({}{}).",
+                side.words(false),
+                side.shown(&joint.pit, &joint.coverage_levels),
+                by_how_much(all, &joint.joint)
+            ),
+            None => format!(
+                "{name}: predicted probabilities are not evenly spread (off by {}, by chance below {}).",
+                number(joint.pit.distance, 2),
+                number(joint.pit.chance, 2)
+            ),
+        });
     }
     let pooled = Shape::of(&validation.pit, 1);
     let pooled = pooled.filter(|shape| shape.agrees(&validation.coverage_levels));

@@ -291,7 +291,7 @@ impl Calibration {
         let sentence = |(alike, place): (Alike, &str)| {
             let own = self.groups.iter().filter(|group| group.settled);
             let own = own.filter(|group| group.alike == alike);
-            let told: Vec<String> = own.map(|group| group.members.join(" = ")).collect();
+            let told: Vec<String> = own.map(|group| named(&group.members).join(" = ")).collect();
             (!told.is_empty()).then(|| {
                 format!(
                     "same torque {place}, told apart by the prior alone (the first is preferred): {}",
@@ -303,15 +303,27 @@ impl Calibration {
     }
 }
 
+/// Names of a group's members; of a spring beside the offset of its joint it is the preload that is alike.
+fn named<S: AsRef<str>>(members: &[S]) -> Vec<String> {
+    let offset = |joint: &str| {
+        let own = format!("{joint}.offset");
+        members.iter().any(|member| member.as_ref() == own)
+    };
+    let name = |member: &S| match member.as_ref().strip_suffix(".spring") {
+        Some(joint) if offset(joint) => format!("{} (its preload)", member.as_ref()),
+        _ => member.as_ref().to_owned(),
+    };
+    members.iter().map(name).collect()
+}
+
 /// "payload and link_6.tensor are one direction here: …", the likeliest name first.
 fn words(names: &[&str], pip: f64, (alike, whole): (Alike, bool), settled: bool) -> String {
-    let list = match names {
+    let told = named(names);
+    let list = match &told[..] {
         [] => String::new(),
-        _ if names.len() > TOLD => format!(
-            "{} and {} more",
-            names[..TOLD].join(", "),
-            names.len() - TOLD
-        ),
+        _ if told.len() > TOLD => {
+            format!("{} and {} more", told[..TOLD].join(", "), told.len() - TOLD)
+        }
         [others @ .., last] => format!("{} and {last}", others.join(", ")),
     };
     let same = match (alike, whole) {
@@ -348,6 +360,11 @@ mod tests {
             words(&names, 0.9999, (Alike::EveryMotion, true), true),
             "payload and fore.tensor can explain the same torque in every motion of this robot: at least one of them is in with \
              probability > 0.999; the prior alone prefers `payload`"
+        );
+        let springs = ["a.spring", "a.offset"];
+        assert!(
+            words(&springs, 0.98, (Alike::EveryMotion, true), false)
+                .starts_with("a.spring (its preload) and a.offset can explain")
         );
         let by_way = words(&names, 0.98, (Alike::EveryMotion, false), false);
         assert!(

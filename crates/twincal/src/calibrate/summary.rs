@@ -367,14 +367,26 @@ fn findings_of_posterior(
                 "undecided",
                 name.clone(),
                 format!(
-                    "`{name}` is undecided (inclusion probability {:.2}): more or richer motion would decide",
-                    component.pip.unwrap_or(f64::NAN)
+                    "`{name}` is undecided (inclusion probability {:.2}): {}",
+                    component.pip.unwrap_or(f64::NAN),
+                    what_would_decide(name, groups)
                 ),
                 0,
             ));
         }
     }
     findings
+}
+
+/// Motion decides nothing that others do alike in every motion.
+fn what_would_decide(name: &String, groups: &[Group]) -> &'static str {
+    let alike = |group: &Group| group.alike == super::Alike::EveryMotion && group.members.contains(name);
+    match groups.iter().any(alike) {
+        true => {
+            "others can stand in for it in every motion of this robot, wholly or in part; motion decides only what they do not share"
+        }
+        false => "more or richer motion would decide",
+    }
 }
 
 /// Columns of the pair plot: of the selected ones those with the largest value against its spread.

@@ -15,6 +15,8 @@ pub(super) fn statuses(
     findings: &mut Vec<Finding>,
 ) -> Result<Vec<Status>> {
     let mut repeated = Vec::new();
+    // What has no torque at all stands for nothing, whatever its share.
+    let stands = |k: usize| candidates[k].model.is_none() || !acting[k].is_empty();
     let mut statuses = Vec::with_capacity(candidates.len());
     for ((candidate, verdict), acting) in candidates.iter().zip(verdicts).zip(acting) {
         let name = &candidate.name;
@@ -57,10 +59,10 @@ pub(super) fn statuses(
                 Status::Candidate
             }
             Verdict::Combination(combination) => {
-                let others: Vec<&str> = combination.iter().map(|&(_, k)| candidates[k].name.as_str()).collect();
+                let others: Vec<&str> = combination.iter().filter(|(_, k)| stands(*k)).map(|&(_, k)| candidates[k].name.as_str()).collect();
                 if candidate.family == Family::User {
                     let formula: Vec<String> =
-                        combination.iter().map(|&(factor, k)| share(factor, &candidates[k].name)).collect();
+                        combination.iter().filter(|(_, k)| stands(*k)).map(|&(factor, k)| share(factor, &candidates[k].name)).collect();
                     let message = format!(
                         "term `{name}` has the same torque as {} for every motion: it is no column; keep one of them",
                         formula.join(" ")
