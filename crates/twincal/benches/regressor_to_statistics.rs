@@ -21,15 +21,13 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::hint::black_box;
 use twincal::gram::{JointAccumulator, JointGram, Workspace};
-use twincal::lanes::{Aligned, LANES};
+use twincal::lanes::Aligned;
 use twincal::robot::{Motion, Robot, RobotDescription};
-use twincal::rows::MAX_BLOCK;
+use twincal::rows::{MAX_BLOCK, PARTS_APART};
 use twincal::term::{Family, Library, LibrarySettings, Scratch};
 
 /// Samples of one run, evaluated [`MAX_BLOCK`] at a time, as rows are streamed.
 const SAMPLES: usize = 64 * MAX_BLOCK;
-/// From one signal to the next: not so far that they are all in the same places of the first-level cache.
-const STRIDE: usize = MAX_BLOCK + LANES;
 const REPEATS: usize = 20;
 const ROBOTS: &str = include_str!("peers/robots.json");
 
@@ -76,7 +74,7 @@ impl Way {
     /// From one signal to the next.
     fn stride(self) -> usize {
         match self {
-            Self::Parts => STRIDE,
+            Self::Parts => PARTS_APART,
             Self::Columns => MAX_BLOCK,
         }
     }
@@ -89,7 +87,7 @@ impl Way {
         scratch: &mut Scratch,
     ) {
         match self {
-            Self::Parts => library.evaluate_parts(of(block), STRIDE, out, scratch),
+            Self::Parts => library.evaluate_parts(of(block), PARTS_APART, out, scratch),
             Self::Columns => library.evaluate_with(of(block), out, scratch),
         }
     }

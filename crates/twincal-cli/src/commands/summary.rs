@@ -55,7 +55,7 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
         let text = format!("{} ({})", component.words, said.join(", "));
         paragraph(&text, terminal);
     }
-    let unseen: Vec<&str> = (all.iter().filter(|component| is_unseen(component)))
+    let unseen: Vec<&str> = (all.iter().filter(|component| component.is_unseen()))
         .map(|component| component.name.as_str())
         .collect();
     if !unseen.is_empty() {
@@ -79,10 +79,6 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
     terminal.say("");
 }
 
-fn is_unseen(component: &ComponentSummary) -> bool {
-    component.verdict == Some(Verdict::NotSeen) && !component.selected
-}
-
 /// What the two halves of the data say about a component.
 fn repeated(component: &ComponentSummary, calibration: &Calibration) -> Repeated {
     let all = &calibration.repeatability;
@@ -99,7 +95,7 @@ fn others(calibration: &Calibration, terminal: &mut Terminal) {
     for component in calibration
         .components
         .iter()
-        .filter(|c| !c.selected && !is_unseen(c))
+        .filter(|c| !c.selected && !c.is_unseen())
     {
         match component.pip {
             Some(p) if p >= MENTIONED => {

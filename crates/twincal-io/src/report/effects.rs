@@ -107,9 +107,8 @@ pub(super) fn sort(calibration: &Calibration) -> Effects {
             .collect()
     };
     let dropped = dropped(&calibration.terms);
-    let is_unseen = |c: &ComponentSummary| !c.selected && c.verdict == Some(Verdict::NotSeen);
-    let unseen = pick(&|c, _| is_unseen(c));
-    let seen = |c: &ComponentSummary| !c.selected && !is_unseen(c);
+    let unseen = pick(&|c, _| c.is_unseen());
+    let seen = |c: &ComponentSummary| !c.selected && !c.is_unseen();
     let possible = pick(&|c, p| seen(c) && p >= MENTIONED);
     let unlikely = |c: &ComponentSummary, p: f64| seen(c) && (p < MENTIONED || p.is_nan());
     // Not only where the data leave it open: what the prior alone tells apart, or would judge otherwise, is not excluded either.

@@ -518,6 +518,25 @@ mod tests {
     }
 
     #[test]
+    fn intervals_that_hold_everything_say_how_much_of_them_would_have_done() {
+        let of = |factor: f64, coverage: f64| {
+            let told = judged(|c| {
+                c.validation.conformal.as_mut().unwrap().factor = factor;
+                c.validation.filtered.coverage95 = coverage;
+            });
+            let held = told
+                .grounds
+                .into_iter()
+                .find(|g| g.starts_with("The 95 % intervals"));
+            held.unwrap_or_default()
+        };
+        let said =
+            ": they are wider than they need to be, 33.6\u{202f}% of their width would have done.";
+        assert!(of(0.336, 1.0).ends_with(said), "{}", of(0.336, 1.0));
+        assert!(!of(0.6, 1.0).contains("wider") && !of(0.336, 0.98).contains("wider"));
+    }
+
+    #[test]
     fn where_no_effect_is_sure_groups_are_told_of_which_one_is() {
         use twincal::calibrate::{Alike, Group};
         let of = |pip: f64| {

@@ -140,6 +140,14 @@ impl ParameterSummary {
     }
 }
 
+impl ComponentSummary {
+    /// True where these data do not see it: it may be there, and is not in.
+    #[must_use]
+    pub fn is_unseen(&self) -> bool {
+        !self.selected && self.verdict == Some(Verdict::NotSeen)
+    }
+}
+
 impl ParameterSummary {
     /// True where models far from the others make the 95 % interval three times as long as ± says, or more.
     #[must_use]

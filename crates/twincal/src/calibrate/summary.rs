@@ -380,7 +380,8 @@ fn findings_of_posterior(
 
 /// Motion decides nothing that others do alike in every motion.
 fn what_would_decide(name: &String, groups: &[Group]) -> &'static str {
-    let alike = |group: &Group| group.alike == super::Alike::EveryMotion && group.members.contains(name);
+    let alike =
+        |group: &Group| group.alike == super::Alike::EveryMotion && group.members.contains(name);
     match groups.iter().any(alike) {
         true => {
             "others can stand in for it in every motion of this robot, wholly or in part; motion decides only what they do not share"
@@ -426,4 +427,28 @@ fn autocorrelation(training: &[Part<'_>], beta: &[f64]) -> Vec<Vec<f64>> {
     };
     let both = (0..joints).flat_map(|joint| [(joint, &nothing[..]), (joint, beta)]);
     both.collect::<Vec<_>>().into_par_iter().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Alike;
+    use super::*;
+
+    #[test]
+    fn motion_is_not_promised_to_decide_what_is_alike_in_every_motion() {
+        let of = |alike, member: &str| {
+            let group = Group {
+                members: vec!["arm.offset".into(), "arm.spring".into()],
+                pip: 1.0,
+                alike,
+                settled: false,
+                words: String::new(),
+            };
+            what_would_decide(&member.to_owned(), &[group])
+        };
+        let motion = "more or richer motion would decide";
+        assert_ne!(of(Alike::EveryMotion, "arm.spring"), motion);
+        assert_eq!(of(Alike::TheseLogs, "arm.spring"), motion);
+        assert_eq!(of(Alike::EveryMotion, "arm.viscous"), motion);
+    }
 }

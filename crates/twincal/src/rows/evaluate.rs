@@ -15,8 +15,14 @@ pub(super) trait Source {
     fn recipes(&self, joint: usize) -> &Arc<Recipes>;
     /// `nominal[joint * len + sample]`, `out[joint][i * len + sample]`.
     fn evaluate(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Aligned]);
-    /// `nominal[joint * len + sample]`, `out[joint][part * len + sample]`.
-    fn evaluate_parts(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Aligned]);
+    /// `nominal[joint * len + sample]`, `out[joint][part * stride + sample]`.
+    fn evaluate_parts(
+        &mut self,
+        motion: Motion<'_>,
+        nominal: &mut [f64],
+        stride: usize,
+        out: &mut [Aligned],
+    );
 }
 
 /// `(joint, row)` of the columns that do not act in a log where the payload acts, or does not.
@@ -90,10 +96,16 @@ impl Source for OfLibrary<'_> {
         }
     }
 
-    fn evaluate_parts(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Aligned]) {
+    fn evaluate_parts(
+        &mut self,
+        motion: Motion<'_>,
+        nominal: &mut [f64],
+        stride: usize,
+        out: &mut [Aligned],
+    ) {
         nominal_torque(self.robot, motion, nominal);
         self.library
-            .evaluate_parts(motion, motion.len, out, &mut self.scratch);
+            .evaluate_parts(motion, stride, out, &mut self.scratch);
     }
 }
 
@@ -143,10 +155,10 @@ impl Stretch {
         source.evaluate(motion, nominal, values);
     }
 
-    /// Evaluates nominal torque and parts of the loaded motion.
-    pub(super) fn evaluate_parts(&mut self, source: &mut dyn Source) {
+    /// Evaluates nominal torque and parts of the loaded motion, `values[joint][part * stride + sample]`.
+    pub(super) fn evaluate_parts(&mut self, source: &mut dyn Source, stride: usize) {
         let (motion, nominal, values) = self.split();
-        source.evaluate_parts(motion, nominal, values);
+        source.evaluate_parts(motion, nominal, stride, values);
     }
 
     fn split(&mut self) -> (Motion<'_>, &mut [f64], &mut [Aligned]) {

@@ -157,7 +157,7 @@ impl Rows {
         while from < end {
             let count = STRETCH.min(end - from);
             stretch.load(from, count, total, [&segment.q, &segment.qd, &segment.qdd]);
-            stretch.evaluate_parts(source);
+            stretch.evaluate_parts(source, count);
             let mut at_hand: Vec<(usize, &[f64])> = Vec::with_capacity(3 * dof);
             for (joint, &first) in firsts.iter().enumerate() {
                 let parts = source.recipes(joint).parts();

@@ -53,17 +53,17 @@ impl StandIn {
     fn fill(
         motion: Motion<'_>,
         nominal: &mut [f64],
-        out: &mut [Aligned],
+        (stride, out): (usize, &mut [Aligned]),
         of: impl Fn(usize, usize, [f64; 3]) -> f64,
     ) {
         for joint in 0..2 {
-            out[joint].resize(COLUMNS[joint].len() * motion.len);
+            out[joint].resize(COLUMNS[joint].len() * stride);
             for s in 0..motion.len {
                 let i = joint * motion.len + s;
                 nominal[i] = motion.q[i] * 3.0 - motion.qdd[i];
                 for c in 0..COLUMNS[joint].len() {
                     let state = [motion.q[i], motion.qd[i], motion.qdd[i]];
-                    out[joint][c * motion.len + s] = of(joint, c, state);
+                    out[joint][c * stride + s] = of(joint, c, state);
                 }
             }
         }
@@ -81,11 +81,17 @@ impl Source for StandIn {
 
     fn evaluate(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Aligned]) {
         let of = |joint: usize, c: usize, s: [f64; 3]| column(COLUMNS[joint][c], s[0], s[1], s[2]);
-        Self::fill(motion, nominal, out, of);
+        Self::fill(motion, nominal, (motion.len, out), of);
     }
 
-    fn evaluate_parts(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Aligned]) {
-        Self::fill(motion, nominal, out, part);
+    fn evaluate_parts(
+        &mut self,
+        motion: Motion<'_>,
+        nominal: &mut [f64],
+        stride: usize,
+        out: &mut [Aligned],
+    ) {
+        Self::fill(motion, nominal, (stride, out), part);
     }
 }
 

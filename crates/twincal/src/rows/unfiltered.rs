@@ -1,7 +1,7 @@
 //! Rows as logged: for the pipeline off, for raw validation and for predictions.
 
 use super::evaluate::{Source, Stretch};
-use super::{Form, JointRows, MAX_BLOCK, RowBlock, Slice};
+use super::{Form, JointRows, MAX_BLOCK, PARTS_APART, RowBlock, Slice};
 use crate::error::Result;
 use crate::signal::Segment;
 use crate::signal::interpolate::Place;
@@ -81,15 +81,19 @@ pub(super) fn visit(
                 .copied()
                 .collect()
         };
+        let stride = match form {
+            Form::Columns => len,
+            Form::Parts => PARTS_APART,
+        };
         match form {
             Form::Columns => stretch.evaluate(source),
-            Form::Parts => stretch.evaluate_parts(source),
+            Form::Parts => stretch.evaluate_parts(source, stride),
         }
         let joints = (0..dof)
             .map(|joint| JointRows {
                 columns: source.columns(joint),
                 recipes: form.recipes(source, joint),
-                stride: len,
+                stride,
                 x: &stretch.values[joint],
                 measured: if tau.is_empty() {
                     &[]

@@ -5,7 +5,7 @@ use crate::report::figure::{Figure, Image, Legend};
 use crate::report::scale::Scale;
 use crate::report::svg::{Anchor, Svg};
 use crate::report::text::{count, probability, shorten, text_width};
-use twincal::calibrate::{ComponentSummary, Verdict};
+use twincal::calibrate::ComponentSummary;
 use twincal::term::Family;
 
 /// Above this many candidates only those that stand out are drawn one by one.
@@ -26,11 +26,8 @@ enum Row<'a> {
 
 /// The figure; `None` without candidates.
 pub(in crate::report) fn figure(components: &[ComponentSummary]) -> Option<Figure> {
-    let told = |component: &&ComponentSummary| {
-        component.selected || component.verdict != Some(Verdict::NotSeen)
-    };
     let all = components.len();
-    let components: Vec<&ComponentSummary> = components.iter().filter(told).collect();
+    let components: Vec<&ComponentSummary> = components.iter().filter(|c| !c.is_unseen()).collect();
     let unseen = all > components.len();
     let live = components.iter().filter(|t| t.pip.is_some()).count();
     if live == 0 {
@@ -229,6 +226,7 @@ pub(in crate::report) fn family_name(family: Family) -> &'static str {
 mod tests {
     use super::*;
     use crate::report::fixture;
+    use twincal::calibrate::Verdict;
 
     #[test]
     fn bars_are_as_long_as_their_probability() {
@@ -240,6 +238,21 @@ mod tests {
             svg.contains(&format!(r#"width="{}""#, 0.25 * (880.0 - 52.0 - 250.0))),
             "{svg}"
         );
+    }
+
+    #[test]
+    fn what_the_data_do_not_see_has_no_bar() {
+        let mut components = fixture::two_joints().components;
+        let said = |components: &[ComponentSummary]| figure(components).unwrap().read;
+        assert!(!said(&components).contains("do not see"));
+        let own = components
+            .iter_mut()
+            .find(|c| !c.selected && c.pip.is_some());
+        let own = own.unwrap();
+        own.verdict = Some(Verdict::NotSeen);
+        let name = format!(">{}<", own.name);
+        let drawn = figure(&components).unwrap();
+        assert!(drawn.read.contains("do not see") && !drawn.images[0].wide.contains(&name));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use crate::report::figure::{Figure, Image, Legend};
 use crate::report::scale::{Scale, extent};
 use crate::report::svg::{Anchor, Svg};
 use crate::report::text::{probability, shorten};
-use twincal::calibrate::{Calibration, ComponentSummary, TermSummary, Verdict};
+use twincal::calibrate::{Calibration, ComponentSummary, TermSummary};
 
 const ROW: f64 = 19.0;
 /// An effect is drawn if its probability reaches this under any of the priors.
@@ -33,7 +33,7 @@ pub(in crate::report) fn figure(
     let unseen = |term: &&TermSummary| {
         let mut own = components.iter();
         let own = own.find(|component| component.columns.contains(&term.term.name));
-        own.is_some_and(|c| !c.selected && c.verdict == Some(Verdict::NotSeen))
+        own.is_some_and(ComponentSummary::is_unseen)
     };
     let rows: Vec<Row<'_>> = one_each(terms)
         .filter(|term| !unseen(term))
@@ -80,8 +80,8 @@ pub(in crate::report) fn by_prior(
     let terms = one_each(&calibration.terms).filter(|term| depends_on_prior(term));
     terms.filter_map(|term| {
         let own = |c: &&ComponentSummary| c.columns.contains(&term.term.name);
-        let seen = |c: &&ComponentSummary| c.selected || c.verdict != Some(Verdict::NotSeen);
-        calibration.components.iter().find(own).filter(seen)
+        let own = calibration.components.iter().find(own);
+        own.filter(|component| !component.is_unseen())
     })
 }
 
