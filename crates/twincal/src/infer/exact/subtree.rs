@@ -220,20 +220,52 @@ impl<S: Simd> WithSimd for Descend<'_, S> {
             out.fill(simd.splat_f64s(0.0));
             return;
         }
-        let (s, scratch) = scratch.split_at_mut(triangle(m - 1));
-        let (h, scratch) = scratch.split_at_mut(m - 1);
-        let (inside, scratch) = scratch.split_at_mut(Layout::new(m - 1).len());
-        let (outside, scratch) = scratch.split_at_mut(Layout::new(m - 1).len());
-        let room = Room {
-            s,
-            h,
-            inside,
-            outside,
-        };
-        let branches = tree.levels[m - 1].branches(node.set);
-        let below = &mut Deeper { m: m - 1, scratch };
-        visit(simd, tree, m, node, branches, room, below, out, tally);
+        // Constant sizes: loops without counters and without checks of length.
+        let (s, h) = (node.s, node.h);
+        macro_rules! of_constant_size {
+            ($($size:literal)*) => {
+                match m {
+                    $($size => {
+                        let node = View {
+                            s: &s[..triangle($size)],
+                            h: &h[..$size],
+                            ..node
+                        };
+                        let out = &mut out[..Layout::new($size).len()];
+                        step(simd, tree, $size, node, out, scratch, tally);
+                    })*
+                    _ => step(simd, tree, m, node, out, scratch, tally),
+                }
+            };
+        }
+        of_constant_size!(4 5 6 7 8);
     }
+}
+
+/// One level of the recursion.
+#[inline(always)]
+fn step<S: Simd>(
+    simd: S,
+    tree: &Tree<S::f64s>,
+    m: usize,
+    node: View<'_, S::f64s>,
+    out: &mut [S::f64s],
+    scratch: &mut [S::f64s],
+    tally: &mut Tally,
+) {
+    let (s, scratch) = scratch.split_at_mut(triangle(m - 1));
+    let (h, scratch) = scratch.split_at_mut(m - 1);
+    let (inside, scratch) = scratch.split_at_mut(Layout::new(m - 1).len());
+    let (outside, scratch) = scratch.split_at_mut(Layout::new(m - 1).len());
+    let room = Room {
+        s,
+        h,
+        inside,
+        outside,
+    };
+    let branches = tree.levels[m - 1].branches(node.set);
+    let below = &mut Deeper { m: m - 1, scratch };
+    visit(simd, tree, m, node, branches, room, below, out, tally);
 }
 
 /// The recursion.

@@ -12,8 +12,8 @@ use pulp::{Simd, WithSimd};
 /// ln of the factor on all weights: puts the misfit of the full model at e^600, so that both far better priors and far
 /// worse misfits stay within the range of a double.
 pub(super) const LOG_REFERENCE: f64 = 600.0;
-/// Subtrees of up to this many components (2^13 models in every lane) are one task.
-const TASK_COMPONENTS: usize = 13;
+/// Subtrees of up to this many components (2^14 models in every lane) are one task.
+const TASK_COMPONENTS: usize = 14;
 /// ln of the share of a single model's weight below which a subtree is not visited, at first; where all those subtrees together may weigh
 /// more than [`NOT_VISITED`], what they weigh too much and so much more is taken off it.
 const LIGHT: f64 = -32.0;
