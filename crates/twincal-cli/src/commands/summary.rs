@@ -3,7 +3,8 @@
 use super::repeats;
 use super::table::{print_table, table};
 use crate::terminal::{Terminal, clean};
-use twincal::calibrate::{Calibration, ComponentSummary, Repeat, Repeated, TermSummary, Verdict};
+use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary};
+use twincal::calibrate::{Repeat, Repeated, TermSummary, Verdict};
 use twincal::term::Status;
 use twincal::validate::{Scores, Split};
 use twincal::words::significant;
@@ -71,12 +72,26 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
     for line in repeats::lines(&calibration.repeatability, calibration.halves) {
         paragraph(&line, terminal);
     }
-    let found = all.iter().filter(|component| component.selected);
-    let mut numbers = found.flat_map(|component| &component.parameters);
-    if numbers.any(|number| number.seen && number.ends().is_some()) {
+    if tells_ends(calibration) {
         paragraph(ENDS, terminal);
     }
     terminal.say("");
+}
+
+/// Whether both ends stand for some number of what was found.
+fn tells_ends(calibration: &Calibration) -> bool {
+    let found = calibration
+        .components
+        .iter()
+        .filter(|component| component.selected);
+    found
+        .flat_map(|component| &component.parameters)
+        .any(has_ends)
+}
+
+/// Whether ± does not describe a number that is told.
+fn has_ends(number: &ParameterSummary) -> bool {
+    number.seen && number.ends().is_some()
 }
 
 /// What the two halves of the data say about a component.
@@ -91,7 +106,7 @@ fn repeated(component: &ComponentSummary, calibration: &Calibration) -> Repeated
 /// result.json.
 fn others(calibration: &Calibration, terminal: &mut Terminal) {
     let mut table = table(&["component", "PIP", "value", "±", "unit"]);
-    let (mut rare, mut dropped) = (0, Vec::new());
+    let (mut rare, mut lopsided) = (0, false);
     for component in calibration
         .components
         .iter()
@@ -100,11 +115,17 @@ fn others(calibration: &Calibration, terminal: &mut Terminal) {
         match component.pip {
             Some(p) if p >= MENTIONED => {
                 table.add_row(row(component, &calibration.terms));
+                lopsided |= terms_of(component, &calibration.terms).count() == 1
+                    && component.parameters.first().is_some_and(has_ends);
             }
             Some(_) => rare += 1,
-            None => dropped.extend(terms_of(component, &calibration.terms)),
+            // It stands among what was left out.
+            None => {}
         }
     }
+    let dropped: Vec<&TermSummary> = (calibration.terms.iter())
+        .filter(|term| term.term.status != Status::Candidate)
+        .collect();
     if table.is_empty() && rare == 0 && dropped.is_empty() {
         return;
     }
@@ -112,6 +133,9 @@ fn others(calibration: &Calibration, terminal: &mut Terminal) {
     print_table(&table, terminal);
     if !table.is_empty() {
         paragraph(VALUE, terminal);
+    }
+    if lopsided && !tells_ends(calibration) {
+        paragraph(ENDS, terminal);
     }
     if rare > 0 {
         let more = if table.is_empty() { "" } else { "more " };
@@ -123,19 +147,29 @@ fn others(calibration: &Calibration, terminal: &mut Terminal) {
             dropped.len()
         ));
     } else if !dropped.is_empty() {
-        let reason = |term: &&TermSummary| match &term.term.status {
-            Status::AliasOf(other) => format!("{} = {other}", term.term.name),
-            Status::NullLagrangian => format!("{} (no torque in any motion)", term.term.name),
-            status => format!(
-                "{} ({})",
-                term.term.name,
-                status_word(status).replace('_', " ")
-            ),
-        };
-        let reasons: Vec<String> = dropped.iter().map(reason).collect();
-        paragraph(&format!("left out: {}", reasons.join(", ")), terminal);
+        paragraph(&format!("left out: {}", left_out(&dropped)), terminal);
     }
     terminal.say("");
+}
+
+/// Columns that say nothing of their own, by reason: "a, b (no torque in any motion); c (torque of d)".
+fn left_out(dropped: &[&TermSummary]) -> String {
+    let mut by_reason: Vec<(String, Vec<&str>)> = Vec::new();
+    for term in dropped {
+        let reason = match &term.term.status {
+            Status::AliasOf(other) => format!("torque of {other}"),
+            Status::NullLagrangian => "no torque in any motion".into(),
+            status => status_word(status).replace('_', " "),
+        };
+        match by_reason.iter_mut().find(|(own, _)| *own == reason) {
+            Some((_, names)) => names.push(&term.term.name),
+            None => by_reason.push((reason, vec![&term.term.name])),
+        }
+    }
+    let told = by_reason
+        .iter()
+        .map(|(reason, names)| format!("{} ({reason})", names.join(", ")));
+    told.collect::<Vec<_>>().join("; ")
 }
 
 /// A component's terms.
@@ -153,9 +187,10 @@ fn row(component: &ComponentSummary, terms: &[TermSummary]) -> [String; 5] {
     match own[..] {
         [term] => {
             let (value, spread) = match component.parameters.first() {
-                Some(parameter) if parameter.seen => match parameter.told() {
-                    (value, spread) if value.is_finite() => with_sd(value, spread),
-                    _ => ("–".into(), String::new()),
+                Some(parameter) if parameter.seen => match (parameter.told(), parameter.ends()) {
+                    ((value, _), _) if !value.is_finite() => ("–".into(), String::new()),
+                    ((value, _), Some(ends)) => (with_ends(value, ends), String::new()),
+                    ((value, spread), None) => with_sd(value, spread),
                 },
                 _ => ("not seen".into(), String::new()),
             };
@@ -475,6 +510,16 @@ fn with_sd(mean: f64, sd: f64) -> (String, String) {
     (format!("{mean:+.places$}"), format!("{sd:.places$}"))
 }
 
+/// A value and both ends of its interval, which give two digits.
+fn with_ends(value: f64, [low, high]: [f64; 2]) -> String {
+    let size = value.abs().max(high - low);
+    if !(1e-4..1e6).contains(&size) {
+        return format!("{value:+.3e} ({low:.1e} … {high:.1e})");
+    }
+    let places = (1 - (0.5 * (high - low)).log10().floor() as i32).clamp(0, 9) as usize;
+    format!("{value:+.places$} ({low:.places$} … {high:.places$})")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -485,6 +530,13 @@ mod tests {
         assert_eq!(with_sd(-12.3456, 3.1), ("-12.3".into(), "3.1".into()));
         assert_eq!(with_sd(0.0, 0.0), ("+0.000e0".into(), "0.0e0".into()));
         assert_eq!(with_sd(1e-7, 2e-8), ("+1.000e-7".into(), "2.0e-8".into()));
+        assert_eq!(
+            [
+                with_ends(263.4, [-40.2, 5000.0]),
+                with_ends(0.0321, [0.02, 0.09])
+            ],
+            ["+263 (-40 … 5000)", "+0.032 (0.020 … 0.090)"]
+        );
         assert_eq!(
             (pip(Some(1.0)), pip(Some(0.0)), pip(Some(0.5))),
             (">0.999".into(), "<0.001".into(), "0.500".into())

@@ -31,7 +31,7 @@ pub(super) fn sentences(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<
         .enumerate()
         .filter_map(|(j, joint)| {
             let share = standstill(calibration, j);
-            (share > STOOD).then(|| format!("{} ({} of the time)", joint.name, percent(share)))
+            (share > STOOD).then(|| format!("{} ({} of the rows)", joint.name, percent(share)))
         })
         .collect();
     if !still.is_empty() {

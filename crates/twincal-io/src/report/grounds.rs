@@ -1,15 +1,16 @@
 //! What the verdict rests on, a sentence each: error of held-out torque, what friction alone would leave, intervals, effects.
 
 use super::figures::sensitivity;
-use super::limits::{FEW_AT_REST, decisive, has_standstill};
+use super::limits::{decisive, has_standstill};
 use super::remarks::doubts;
+use super::standstill::{at_standstill, rest_got_worse};
 use super::text::{count, list, number, percent};
 use super::view::{Joint, pooled_unit};
 use twincal::calibrate::{Calibration, ComponentSummary, Verdict as Decision};
 use twincal::validate::{JointScore, Scores, Split};
 
 /// Change of an error from which other rows are told apart.
-const WORTH_TELLING: f64 = 0.05;
+pub(super) const WORTH_TELLING: f64 = 0.05;
 /// The same of unfiltered torque, which has noise that no twin explains.
 const UNFILTERED_WORTH_TELLING: f64 = 0.25;
 /// The same of the share of rows that intervals hold.
@@ -22,7 +23,7 @@ const SURE: f64 = 0.95;
 const MUCH_TOO_WIDE: f64 = 0.5;
 const SHARE_ALL: f64 = 0.99;
 /// Joints that are named; the others are counted.
-const NAMED: usize = 3;
+pub(super) const NAMED: usize = 3;
 
 pub(super) fn grounds(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
     let mut out = vec![torque_error(calibration, joints)];
@@ -40,7 +41,7 @@ pub(super) fn rows_of(scores: &Scores) -> u64 {
 }
 
 /// "13.8 → 0.710 N·m, 94.9 % less".
-fn change([before, after]: [f64; 2], unit: &str) -> String {
+pub(super) fn change([before, after]: [f64; 2], unit: &str) -> String {
     let way = match after / before - 1.0 {
         c if c.abs() < 5e-4 => "unchanged".into(),
         c if c < 0.0 => format!("{} less", percent(-c)),
@@ -115,84 +116,6 @@ fn as_logged(calibration: &Calibration, unit: &str) -> Option<String> {
             number(raw.rmse_nominal, 3),
             number(raw.rmse_calibrated, 3)
         )
-    })
-}
-
-/// RMSE before and after of joints that stand still, where it is another matter, for there friction is whatever it takes: and which of them got worse.
-pub(super) fn at_standstill(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
-    let validation = &calibration.validation;
-    let (all, moving) = (&validation.filtered, decisive(validation));
-    if rows_of(all).saturating_sub(rows_of(moving)) < FEW_AT_REST {
-        return None;
-    }
-    let each = || all.joints.iter().zip(&moving.joints);
-    let rest: Vec<_> = each()
-        .filter(|(all, moving)| all.rows > moving.rows)
-        .collect();
-    let mut worse: Vec<(&str, [f64; 2])> = (rest.iter())
-        .filter_map(|pair| Some((pair.0.joint.as_str(), still(&[*pair])?)))
-        .filter(|(_, [before, after])| after / before - 1.0 > WORTH_TELLING)
-        .collect();
-    let gain = |errors: &[f64; 2]| errors[1] - errors[0];
-    worse.sort_by(|(_, a), (_, b)| gain(b).total_cmp(&gain(a)));
-    let together = still(&rest)?;
-    let differ = (all.rmse_calibrated / moving.rmse_calibrated - 1.0).abs() > WORTH_TELLING;
-    if worse.is_empty() && !differ {
-        return None;
-    }
-    let told = change(together, pooled_unit(joints));
-    if let ([only], true) = (&rest[..], joints.len() > 1) {
-        return Some(format!("At standstill ({}): {told}.", only.0.joint));
-    }
-    let mut names: Vec<String> = (worse.iter().take(NAMED))
-        .map(|(name, [before, after])| {
-            let unit = joints.iter().find(|joint| joint.name == *name);
-            let unit = unit.map_or("", |joint| joint.units.torque);
-            format!(
-                "{name} ({} → {} {unit})",
-                number(*before, 3),
-                number(*after, 3)
-            )
-        })
-        .collect();
-    if let Some(more) = worse.len().checked_sub(NAMED).filter(|more| *more > 0) {
-        names.push(format!("{more} more"));
-    }
-    Some(match names.is_empty() {
-        true => format!("At standstill: {told}."),
-        false => format!("At standstill: {told}; worse on {}.", list(&names)),
-    })
-}
-
-/// Whether torque at standstill, of all joints together, got worse.
-pub(super) fn rest_got_worse(calibration: &Calibration) -> bool {
-    let validation = &calibration.validation;
-    let (all, moving) = (&validation.filtered, decisive(validation));
-    if rows_of(all).saturating_sub(rows_of(moving)) < FEW_AT_REST {
-        return false;
-    }
-    let each: Vec<_> = all.joints.iter().zip(&moving.joints).collect();
-    still(&each).is_some_and(|[before, after]| after / before - 1.0 > WORTH_TELLING)
-}
-
-/// RMSE before and after on the rows that are not among the moving ones; `None` without any.
-fn still(pairs: &[(&JointScore, &JointScore)]) -> Option<[f64; 2]> {
-    let rows: u64 = pairs
-        .iter()
-        .map(|(all, moving)| all.rows - moving.rows.min(all.rows))
-        .sum();
-    let square = |score: &JointScore, of: fn(&JointScore) -> f64| match score.rows {
-        0 => 0.0,
-        rows => rows as f64 * of(score).powi(2),
-    };
-    let each: [fn(&JointScore) -> f64; 2] = [|j| j.rmse_nominal, |j| j.rmse_calibrated];
-    (rows > 0).then(|| {
-        each.map(|of| {
-            let left = pairs
-                .iter()
-                .map(|(all, moving)| square(all, of) - square(moving, of));
-            (left.sum::<f64>().max(0.0) / rows as f64).sqrt()
-        })
     })
 }
 

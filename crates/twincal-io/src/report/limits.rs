@@ -1,13 +1,13 @@
 //! Where a twin does not hold: what errors and intervals of held-out torque say against it, and what was found that is not to be rested on.
 
+use super::beyond;
 use super::figures::sensitivity;
 use super::findings;
-use super::grounds::{at_standstill, rest_got_worse};
 use super::remarks::{size_of_gravity, whole_against_halves};
 use super::shape;
+use super::standstill::{at_standstill, hardly_at_rest, rest_got_worse};
 use super::text::{THIN, list, number, percent, subject};
 use super::view::{Joint, independent_rows, memory, pooled_unit, standard_deviation};
-use super::{ambiguity, beyond};
 use twincal::Severity;
 use twincal::calibrate::{Calibration, Repeat, Repeated};
 use twincal::posterior::Method;
@@ -28,10 +28,6 @@ const CLEARLY_LOST: f64 = 1.05;
 
 /// Held-out rows, in independent ones, below which nothing is promised.
 pub(super) const FEW: f64 = 20.0;
-/// Held-out rows at standstill below which that is not tested.
-pub(super) const FEW_AT_REST: u64 = 20;
-/// Share of a joint's rows at standstill from which that is a part of what the robot does.
-const STANDS_STILL: f64 = 0.05;
 /// Ratio of errors from which friction alone does not do as well.
 const AS_WELL: f64 = 1.05;
 
@@ -154,7 +150,7 @@ pub(super) fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
     let bodies = no_bodies(calibration);
     if !bodies.is_empty() {
         out.push(format!(
-            "What was found of {} is no rigid body: it stands in for another effect; do not read it as mass or inertia.",
+            "What was found of {} is no rigid body (in more than 95 % of the draws): another effect is missing among the candidates, or inertias of the model are wrong; do not read it as mass or inertia.",
             list(&bodies)
         ));
     }
@@ -232,32 +228,6 @@ fn too_few(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
             "The held-out rows count as {shown:.1} independent ones over all joints, {FEW} are needed: hold out {} times as much, by another log \
              with --heldout or by longer logs.",
             number(FEW / independent, 2)
-        )
-    })
-}
-
-/// What joints do at rest in the logs and hardly in held-out rows.
-fn hardly_at_rest(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
-    let validation = &calibration.validation;
-    let rows = |scores: &Scores| scores.joints.iter().map(|joint| joint.rows).sum::<u64>();
-    let moving = rows(&validation.moving);
-    let at_rest = rows(&validation.filtered).saturating_sub(moving);
-    let shares = (0..joints.len()).map(|j| ambiguity::standstill(calibration, j));
-    let most = joints
-        .iter()
-        .zip(shares)
-        .filter(|(_, share)| *share >= STANDS_STILL);
-    let (joint, share) = most.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
-    (moving > 0 && at_rest < FEW_AT_REST).then(|| {
-        let (tested, held_out) = match at_rest {
-            0 => ("not", "but no joint in a held-out row".to_owned()),
-            1 => ("hardly", "but only one held-out row is at rest".to_owned()),
-            n => ("hardly", format!("but only {n} held-out rows are at rest")),
-        };
-        format!(
-            "Standstill is {tested} tested: {} stands still in {} of the logs' rows, {held_out}.",
-            joint.name,
-            percent(share)
         )
     })
 }
@@ -539,7 +509,7 @@ mod tests {
         );
         assert_eq!(
             said(of(120, 0)),
-            "Standstill is not tested: elbow stands still in 12.0\u{202f}% of the logs' rows, but no joint in a held-out row."
+            "Standstill is not tested: elbow stands still in 12.0\u{202f}% of the logs' rows, but no held-out row is at rest."
         );
         assert_eq!(of(120, 40), None);
         assert_eq!(of(10, 4), None);

@@ -20,6 +20,7 @@ mod plot;
 mod remarks;
 mod scale;
 mod shape;
+mod standstill;
 mod svg;
 mod tables;
 #[cfg(test)]

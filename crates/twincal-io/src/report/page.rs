@@ -8,6 +8,7 @@ use super::figures;
 use super::findings;
 use super::honesty;
 use super::limits::{self, Rows};
+use super::standstill;
 use super::tables::{self, Table};
 use super::text;
 use super::verdict::{self, Verdict};
@@ -59,6 +60,7 @@ struct Page<'a> {
     all_rows: Table,
     /// Whether some held-out rows are of joints that stand still.
     standstill: bool,
+    at_rest: Table,
     beyond: Table,
     raw: Table,
     /// The same of moving joints; empty where none stands still.
@@ -138,7 +140,7 @@ fn gather<'a>(
         inclusion: figures::inclusion::figure(&calibration.components),
         pairs: figures::pairs::figure(&calibration.draws, terms),
         pairs_shown: figures::pairs::shown(&calibration.draws, terms),
-        curves: figures::curves::figure(&calibration.curves, joints),
+        curves: figures::curves::figure(&calibration.curves, components, joints),
         torque: joints.iter().filter_map(figures::torque::figure).collect(),
         other_torque: joints
             .iter()
@@ -160,6 +162,7 @@ fn gather<'a>(
         scores: tables::scores(limits::decisive(validation), joints, Rows::Moving),
         all_rows: tables::scores(&validation.filtered, joints, Rows::All),
         standstill: limits::has_standstill(validation),
+        at_rest: standstill::table(validation, joints),
         beyond: honesty::beyond(validation, joints),
         raw: tables::scores(&validation.raw, joints, Rows::All),
         raw_moving: match limits::has_standstill(validation) {

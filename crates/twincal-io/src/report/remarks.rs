@@ -98,9 +98,15 @@ pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) ->
     let mut out = Vec::new();
     out.extend(size_of_gravity(component, calibration));
     if component.no_rigid_body {
-        out.push("no rigid body has this: it stands in for another effect".into());
+        out.push(
+            "no rigid body in more than 95 % of the draws: do not read it as mass or inertia"
+                .into(),
+        );
     } else if is_hardly_a_body(component, calibration) {
-        out.push("hardly a rigid body: these logs leave its inertia open".into());
+        out.push(
+            "no rigid body in more than half of the draws: these logs leave its inertia open"
+                .into(),
+        );
     }
     out.extend(few_rows(component, calibration));
     out.extend(of_a_point_mass(component, calibration));
@@ -434,7 +440,7 @@ mod tests {
         assert_eq!(
             said,
             [
-                "no rigid body has this: it stands in for another effect",
+                "no rigid body in more than 95 % of the draws: do not read it as mass or inertia",
                 "not to be told from x, y and 2 more in these logs, directly or by way of others",
                 "depends on the filter's cut-off by more than its ±",
             ]
@@ -486,7 +492,8 @@ mod tests {
                 c.findings = vec![Finding::new(Severity::Note, code, link, "", 0)];
             })
         };
-        let said = ["hardly a rigid body: these logs leave its inertia open"];
+        let said =
+            ["no rigid body in more than half of the draws: these logs leave its inertia open"];
         assert_eq!(body("wrist"), said);
         assert_eq!(body("fore"), [""; 0]);
     }

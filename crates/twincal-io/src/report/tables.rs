@@ -180,7 +180,7 @@ pub(super) fn motion(calibration: &Calibration, joints: &[Joint<'_>]) -> Table {
         "position",
         "velocity",
         "acceleration",
-        "stood still",
+        "rows at standstill",
     ]);
     for (j, (joint, hull)) in joints.iter().zip(&calibration.twin.hull).enumerate() {
         let range = |low: f64, high: f64, unit: &str| {
@@ -357,7 +357,7 @@ pub(super) fn with_unit(x: f64, unit: &str) -> String {
     }
 }
 
-fn change(before: f64, after: f64) -> String {
+pub(super) fn change(before: f64, after: f64) -> String {
     let change = after / before - 1.0;
     if change > 0.0 {
         format!("+{}", percent(change))

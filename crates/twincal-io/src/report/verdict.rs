@@ -6,6 +6,7 @@ use super::limits::{
     worse,
 };
 use super::shape;
+use super::standstill;
 use super::text::with_sd;
 use super::view::{Joint, independent_rows, memory};
 use serde::Serialize;
@@ -62,7 +63,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     let mut each = scores.joints.iter();
     let too_narrow = each.any(|j| too_narrow(j, memory(joints, &j.joint)));
     let firm = not_to_rest_on(calibration).is_empty();
-    let rest_worse = grounds::rest_got_worse(calibration);
+    let rest_worse = standstill::rest_got_worse(calibration);
     let (large, lost) = (large(scores, joints).len(), lost(scores, joints).len());
     let limits = limits(calibration, joints);
     let serious = calibration

@@ -120,24 +120,39 @@ impl ParameterSummary {
         (self.median, 0.5 * (high - low))
     }
 
-    /// Both ends of the central 68.3 % interval, where ± does not describe it: it is lopsided, ± reaches beyond the 95 % interval, or that
-    /// is far longer on one side; those of the 95 % interval where models far off make it three times as long as ± says. They are told instead of ±.
+    /// What is told instead of ±, where that does not describe it: see [`ends`].
     #[must_use]
     pub fn ends(&self) -> Option<[f64; 2]> {
         let (value, spread) = self.told();
-        let arms = |ends: [f64; 2]| {
-            let (low, high) = (value - ends[0], ends[1] - value);
-            (low.min(high).max(0.0), low.max(high))
-        };
-        let (near, far) = arms(self.interval68);
-        let (near95, far95) = arms(self.interval95);
-        let lopsided = far > LOPSIDED * near || far95 > LOPSIDED_95 * near95 || near95 < spread;
-        let known = near.is_finite() && far95.is_finite() && spread > 0.0;
-        if known && self.is_split() {
-            return Some(self.interval95);
-        }
-        (known && lopsided).then_some(self.interval68)
+        ends(value, spread, self.interval68, self.interval95)
     }
+}
+
+/// Both ends of the central 68.3 % interval, where ± does not describe it: it is lopsided, ± reaches beyond the 95 % interval, or that
+/// is far longer on one side; those of the 95 % interval where models far off make it three times as long as ± says.
+pub(super) fn ends(
+    value: f64,
+    spread: f64,
+    interval68: [f64; 2],
+    interval95: [f64; 2],
+) -> Option<[f64; 2]> {
+    let arms = |ends: [f64; 2]| {
+        let (low, high) = (value - ends[0], ends[1] - value);
+        (low.min(high).max(0.0), low.max(high))
+    };
+    let (near, far) = arms(interval68);
+    let (near95, far95) = arms(interval95);
+    let lopsided = far > LOPSIDED * near || far95 > LOPSIDED_95 * near95 || near95 < spread;
+    let known = near.is_finite() && far95.is_finite() && spread > 0.0;
+    match known {
+        true if is_split(spread, interval95) => Some(interval95),
+        true if lopsided => Some(interval68),
+        _ => None,
+    }
+}
+
+fn is_split(spread: f64, [low, high]: [f64; 2]) -> bool {
+    high - low > FAR * spread
 }
 
 impl ComponentSummary {
@@ -152,8 +167,7 @@ impl ParameterSummary {
     /// True where models far from the others make the 95 % interval three times as long as ± says, or more.
     #[must_use]
     pub fn is_split(&self) -> bool {
-        let [low, high] = self.interval95;
-        self.seen && high - low > FAR * self.told().1
+        self.seen && is_split(self.told().1, self.interval95)
     }
 }
 

@@ -7,7 +7,7 @@ use super::result::{
     Calibration, ComponentSummary, Draws, Group, LikelihoodUsed, PriorUsed, SweepPoint,
     TermSummary, Verdict,
 };
-use super::result::{Compact, Halves, Repeat};
+use super::result::{Compact, Halves, Repeat, ends};
 use super::{CalibrationSettings, Fitted, prior_conflict, sandwich};
 use crate::error::{Finding, Result, Severity};
 use crate::infer::approximate;
@@ -274,20 +274,25 @@ fn terms(
                 words: if verdict == Verdict::NotSeen {
                     format!("{}: {NOT_SEEN}", library.story(index))
                 } else {
-                    let (value, spread) = told(s);
-                    library.words(index, value, spread)
+                    let (value, spread, ends) = told(s);
+                    library.words(index, value, spread, ends)
                 },
             }
         })
         .collect()
 }
 
-/// Median and half the central 68.3 %; NaN where no listed model holds the column.
-fn told(summary: &ColumnSummary) -> (f64, f64) {
-    match (summary.conditional_median, summary.conditional_interval68) {
-        (Some(median), Some([low, high])) => (median, 0.5 * (high - low)),
-        _ => (f64::NAN, f64::NAN),
-    }
+/// Median, half the central 68.3 % and what is told where that does not describe it; NaN where no listed model holds the column.
+fn told(summary: &ColumnSummary) -> (f64, f64, Option<[f64; 2]>) {
+    let (Some(median), Some(interval68)) =
+        (summary.conditional_median, summary.conditional_interval68)
+    else {
+        return (f64::NAN, f64::NAN, None);
+    };
+    let spread = 0.5 * (interval68[1] - interval68[0]);
+    let interval95 = summary.conditional_interval95;
+    let ends = interval95.and_then(|interval95| ends(median, spread, interval68, interval95));
+    (median, spread, ends)
 }
 
 fn dropped(term: &crate::term::Term) -> TermSummary {

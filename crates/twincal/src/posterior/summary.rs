@@ -31,6 +31,8 @@ pub struct ColumnSummary {
     /// Central 68.3 % interval of β_k | y, z_k = 1: one sd to either side where it is normal, and not wider because a few
     /// light models lie far off.
     pub conditional_interval68: Option<[f64; 2]>,
+    /// Central 95 % interval of β_k | y, z_k = 1.
+    pub conditional_interval95: Option<[f64; 2]>,
     /// pip ≥ 0.5: a member of the median-probability model (Barbieri & Berger 2004).
     pub selected: bool,
 }
@@ -70,6 +72,7 @@ impl ColumnSummary {
             conditional_sd: conditional.map(|pair| pair.1),
             conditional_median: quantiles.map(|[_, median, _]| median),
             conditional_interval68: quantiles.map(|[low, _, high]| [low, high]),
+            conditional_interval95: quantiles.map(|_| components.interval95(student, 0.0)),
             selected: pip >= 0.5,
         }
     }

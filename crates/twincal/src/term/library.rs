@@ -440,9 +440,9 @@ impl Library {
     }
 
     /// A term (index into [`Library::terms`]) with its coefficient in one sentence, e.g.
-    /// "viscous friction on elbow: +0.120 ± 0.010 N·m·s/rad"; `spread` is half the width of the central 68.3 % interval.
-    /// NaN: no model that counts holds it.
-    pub fn words(&self, term: usize, value: f64, spread: f64) -> String {
+    /// "viscous friction on elbow: +0.120 ± 0.010 N·m·s/rad"; `spread` is half the width of the central 68.3 % interval, `ends` what is
+    /// told where ± does not describe it. NaN: no model that counts holds it.
+    pub fn words(&self, term: usize, value: f64, spread: f64, ends: Option<[f64; 2]>) -> String {
         let story = &self.stories[term];
         if !value.is_finite() {
             return format!("{story}: {}", super::words::NO_MODEL);
@@ -451,11 +451,11 @@ impl Library {
         let family = Some(self.terms[term].family).filter(|family| *family != Family::Payload);
         let remark = family.and_then(|family| family.remark(value, spread));
         let remark = remark.map_or_else(String::new, |remark| format!(" ({remark})"));
-        format!(
-            "{story}: {} {}{remark}",
-            super::words::estimate(value, spread),
-            self.terms[term].unit
-        )
+        let number = match ends {
+            None => super::words::estimate(value, spread),
+            Some(ends) => super::words::with_ends(value, ends),
+        };
+        format!("{story}: {number} {}{remark}", self.terms[term].unit)
     }
 }
 

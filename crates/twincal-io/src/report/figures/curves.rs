@@ -6,7 +6,7 @@ use crate::report::scale::extent;
 use crate::report::svg::Svg;
 use crate::report::text;
 use crate::report::view::Joint;
-use twincal::calibrate::{Along, Curve};
+use twincal::calibrate::{Along, ComponentSummary, Curve};
 
 const MEAN: Legend = Legend {
     mark: "line",
@@ -15,12 +15,16 @@ const MEAN: Legend = Legend {
 };
 
 /// The figure over all curves; `None` if nothing of that kind was found.
-pub(in crate::report) fn figure(curves: &[Curve], joints: &[Joint<'_>]) -> Option<Figure> {
+pub(in crate::report) fn figure(
+    curves: &[Curve],
+    components: &[ComponentSummary],
+    joints: &[Joint<'_>],
+) -> Option<Figure> {
     let images: Vec<Image> = curves
         .iter()
         .filter_map(|curve| {
             let joint = joints.iter().find(|joint| joint.name == curve.joint)?;
-            Some(draw(curve, joint))
+            Some(draw(curve, components, joint))
         })
         .collect();
     (!images.is_empty()).then(|| Figure {
@@ -34,7 +38,7 @@ pub(in crate::report) fn figure(curves: &[Curve], joints: &[Joint<'_>]) -> Optio
     })
 }
 
-fn draw(curve: &Curve, joint: &Joint<'_>) -> Image {
+fn draw(curve: &Curve, components: &[ComponentSummary], joint: &Joint<'_>) -> Image {
     let ends = curve.low95.iter().chain(&curve.high95).copied();
     let (low, high) = extent(ends.chain([0.0]));
     let y = (low - 0.04 * (high - low), high + 0.04 * (high - low));
@@ -71,9 +75,71 @@ fn draw(curve: &Curve, joint: &Joint<'_>) -> Image {
         "Missing torque of joint {} over its {quantity}, with its 95 percent interval.",
         joint.name
     );
-    let names: Vec<&str> = curve.components.iter().map(String::as_str).collect();
+    let laws = laws(curve, components);
     Image::half(
-        format!("{} over {quantity}: {}", joint.name, text::list(&names)),
+        format!("{} over {quantity}: {laws}", joint.name),
         svg.finish(&label),
     )
+}
+
+/// "a and b; the band also allows for c (PIP 0.110)": what was found, and what was not and widens the band.
+fn laws(curve: &Curve, components: &[ComponentSummary]) -> String {
+    let mut found = Vec::new();
+    let mut open = Vec::new();
+    for name in &curve.components {
+        match components.iter().find(|own| own.name == *name) {
+            Some(ComponentSummary {
+                selected: false,
+                pip: Some(pip),
+                ..
+            }) => open.push(format!("{name} (PIP {})", text::probability(*pip))),
+            _ => found.push(name.as_str()),
+        }
+    }
+    match open.is_empty() {
+        true => text::list(&found),
+        false => format!(
+            "{}; the band also allows for {}",
+            text::list(&found),
+            text::list(&open)
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::fixture;
+
+    #[test]
+    fn what_was_not_found_is_told_apart_from_what_was() {
+        let calibration = fixture::two_joints();
+        let (found, open) = {
+            let of = |selected: bool| {
+                let mut all = calibration.components.iter();
+                all.find(|own| own.selected == selected && own.pip.is_some())
+            };
+            (of(true).unwrap(), of(false).unwrap())
+        };
+        let curve = |names: &[&String]| Curve {
+            joint: "elbow".into(),
+            along: Along::Velocity,
+            components: names.iter().map(|name| (*name).clone()).collect(),
+            x: Vec::new(),
+            mean: Vec::new(),
+            low95: Vec::new(),
+            high95: Vec::new(),
+        };
+        let of = |names: &[&String]| laws(&curve(names), &calibration.components);
+        assert_eq!(of(&[&found.name]), found.name);
+        assert_eq!(
+            of(&[&open.name, &found.name]),
+            format!(
+                "{}; the band also allows for {} (PIP {})",
+                found.name,
+                open.name,
+                text::probability(open.pip.unwrap())
+            )
+        );
+    }
 }

@@ -3,7 +3,7 @@
 use crate::report::figure::{Figure, Image, NARROW};
 use crate::report::scale::Scale;
 use crate::report::svg::{Anchor, Path, Svg};
-use crate::report::text::{count, fixed, list, shorten, text_width};
+use crate::report::text::{count, fixed, list, percent, shorten, text_width};
 use std::collections::BTreeMap;
 use twincal::calibrate::{Draws, TermSummary};
 
@@ -16,6 +16,8 @@ const BARS: usize = 18;
 const FAR: f64 = 4.0;
 /// Space between cells, px.
 const GAP: f64 = 10.0;
+/// Share of a coefficient's draws from which it is told that they are not drawn: more than the outermost 1 %.
+const MANY: f64 = 0.02;
 /// Size of a label and distance of its lines, px.
 const LABEL: f64 = 11.0;
 const LINE: f64 = 13.0;
@@ -39,7 +41,7 @@ pub(in crate::report) fn figure(draws: &Draws, terms: &[TermSummary]) -> Option<
         read: "On the diagonal each coefficient on its own, below it every pair (the stronger the colour, the more probable), above it their \
                correlation: a slanted cloud means that the data know a combination of the two better than each of them (a phone shows \
                each on its own). \
-               Draws in which the coefficient is not in (exactly 0), the outermost 1 % of the others and what is four times ± away from their median are not drawn."
+               Not drawn are draws in which the coefficient is not in (exactly 0), the outermost 1 % of the others, and what is four times ± away from their median."
             .into(),
         legend: Vec::new(),
         images: vec![Image {
@@ -74,7 +76,27 @@ pub(in crate::report) fn shown(draws: &Draws, terms: &[TermSummary]) -> String {
             .collect();
         out.push_str(&format!("In the figure: {}.", list(&each)));
     }
-    out.trim_end().to_owned()
+    let beyond: Vec<String> = (variables(draws, terms).iter())
+        .map(|v| (v.name, not_drawn(v.values)))
+        .filter(|(_, share)| *share > MANY)
+        .map(|(name, share)| format!("{} of the draws of {name}", percent(share)))
+        .collect();
+    if !beyond.is_empty() {
+        out = format!(
+            "{} {} lie so far off that they are not drawn.",
+            out.trim_end(),
+            list(&beyond)
+        );
+    }
+    out.trim().to_owned()
+}
+
+/// Share of the draws of models that hold a term that are beyond what is drawn.
+fn not_drawn(values: &[f64]) -> f64 {
+    let [low, high] = bulk(values);
+    let held = || values.iter().filter(|v| is_in(**v));
+    let beyond = held().filter(|v| !(low..=high).contains(*v));
+    beyond.count() as f64 / held().count().max(1) as f64
 }
 
 /// True where names do not fit beside their cells: cut short they could not be told from each other.
@@ -83,11 +105,16 @@ fn numbered(names: &[&str]) -> bool {
     lines.any(|line| text_width(line, LABEL) > NAMES)
 }
 
-/// The joint or link, and what belongs to it.
+/// The joint or link, what belongs to it, and which number of that; an expression stays whole.
 fn name_lines(name: &str) -> Vec<&str> {
-    match name.split_once('.') {
-        Some((place, word)) if word.starts_with(char::is_alphabetic) => vec![place, word],
-        _ => vec![name],
+    let parts: Vec<&str> = name.split('.').collect();
+    match parts
+        .iter()
+        .skip(1)
+        .all(|part| part.starts_with(char::is_alphabetic))
+    {
+        true => parts,
+        false => vec![name],
     }
 }
 
@@ -458,6 +485,8 @@ mod tests {
         values[402..460].fill(40.0);
         let [low, high] = bulk(&values);
         assert!(low > 4.0 && high < 8.0, "{low} to {high}");
+        // Of the 600 that are not zero 58 and 2, and one more: three are the lowest half percent.
+        assert_eq!(not_drawn(&values), 61.0 / 600.0);
         assert!(bulk(&[f64::NAN])[0].is_nan());
         assert_eq!(bulk(&[2.0]), [2.0; 2]);
     }

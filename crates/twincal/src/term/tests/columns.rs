@@ -378,7 +378,7 @@ fn words_tell_what_it_is() {
             .iter()
             .position(|term| term.name == name)
             .unwrap();
-        library.words(term, 0.12, 0.01)
+        library.words(term, 0.12, 0.01, None)
     };
     for (name, expected) in [
         (
