@@ -2,7 +2,9 @@
 
 use super::coordinates::Source;
 use super::inertia::{Moments, check};
-use super::spatial::{IDENTITY, Matrix, axis_angle, multiply, norm, scale, transpose, z_to};
+use super::spatial::{
+    IDENTITY, Matrix, axis_angle, is_about_x, multiply, norm, scale, transpose, z_to,
+};
 use super::tree::Tree;
 use super::{JointDescription, JointKind, Placement, RobotDescription};
 use crate::error::{Error, Finding, Result, Severity};
@@ -17,6 +19,8 @@ pub(crate) struct Body {
     pub(crate) parent: Option<usize>,
     /// Own frame at joint position 0 in the parent body's frame.
     pub(crate) rotation: Matrix,
+    /// That rotation is one about x, as where frames follow Denavit and Hartenberg: it costs four products instead of nine.
+    pub(crate) about_x: bool,
     /// Origin of that frame in the parent body's frame, m.
     pub(crate) translation: [f64; 3],
     /// Slides along z instead of turning about it.
@@ -97,9 +101,11 @@ pub(crate) fn lay_out(
                 offset,
             } => {
                 let to_z = z_to(unit_axis(joint, findings)?);
+                let rotation = multiply(&frame.rotation, &to_z);
                 bodies.push(Body {
                     parent: parent_body,
-                    rotation: multiply(&frame.rotation, &to_z),
+                    rotation,
+                    about_x: is_about_x(&rotation),
                     translation: frame.translation,
                     prismatic: joint.kind == JointKind::Prismatic,
                     link: child,

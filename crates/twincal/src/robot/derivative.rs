@@ -5,7 +5,7 @@ use super::block::{BlockWorkspace, Group, Registers, STRIDE, add_to, run};
 use super::bodies::Body;
 use super::dynamics::Motion;
 use super::lane_vectors::{
-    V3, cross_add, dot, dot_add, origin, splat, to_child, to_parent_add, turn, turn_back,
+    V3, cross_add, dot, dot_add, origin, splat, to_child, to_parent, to_parent_add, turn, turn_back,
 };
 use super::recursion::{State, newton_euler};
 use pulp::Simd;
@@ -258,12 +258,11 @@ fn backward<S: Simd>(
         df = of_turning(s, turning, f, turn(s, c, n, df));
         dn = of_turning(s, turning, turn(s, c, n, state.moment), turn(s, c, n, dn));
     }
-    let zero = [s.splat_f64s(0.0); 3];
-    let df = to_parent_add(s, body, df, zero);
+    let df = to_parent(s, body, df);
     let dn = to_parent_add(s, body, dn, above.moment);
     // d(p × f) = p × df + dp × f
     let dn = cross_add(s, origin(s, body, state.position), df, dn);
-    let f = to_parent_add(s, body, f, zero);
+    let f = to_parent(s, body, f);
     above.moment = cross_add(s, slide(s, body, seed), f, dn);
     for k in 0..3 {
         above.force[k] = s.add_f64s(above.force[k], df[k]);

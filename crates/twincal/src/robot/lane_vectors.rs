@@ -109,6 +109,13 @@ pub(super) fn turn<S: Simd>(s: S, cos: S::f64s, sin: S::f64s, v: V3<S>) -> V3<S>
 #[inline(always)]
 pub(super) fn to_child<S: Simd>(s: S, body: &Body, v: V3<S>) -> V3<S> {
     let r = &body.rotation;
+    if body.about_x {
+        return [
+            v[0],
+            two(s, r[1][1], r[2][1], [v[1], v[2]]),
+            two(s, r[1][2], r[2][2], [v[1], v[2]]),
+        ];
+    }
     [
         dot(
             s,
@@ -140,10 +147,42 @@ pub(super) fn to_child<S: Simd>(s: S, body: &Body, v: V3<S>) -> V3<S> {
     ]
 }
 
+/// The first product of [`dot`] left out, where it is with zero: the same bytes.
+#[inline(always)]
+fn two<S: Simd>(s: S, a: f64, b: f64, v: [S::f64s; 2]) -> S::f64s {
+    let first = s.mul_f64s(s.splat_f64s(a), v[0]);
+    s.mul_add_e_f64s(s.splat_f64s(b), v[1], first)
+}
+
+/// R v for the body's constant rotation R.
+#[inline(always)]
+pub(super) fn to_parent<S: Simd>(s: S, body: &Body, v: V3<S>) -> V3<S> {
+    let r = &body.rotation;
+    if body.about_x {
+        return [
+            v[0],
+            two(s, r[1][1], r[1][2], [v[1], v[2]]),
+            two(s, r[2][1], r[2][2], [v[1], v[2]]),
+        ];
+    }
+    [
+        dot(s, splat(s, r[0]), v),
+        dot(s, splat(s, r[1]), v),
+        dot(s, splat(s, r[2]), v),
+    ]
+}
+
 /// R v + c for the body's constant rotation R.
 #[inline(always)]
 pub(super) fn to_parent_add<S: Simd>(s: S, body: &Body, v: V3<S>, c: V3<S>) -> V3<S> {
     let r = &body.rotation;
+    if body.about_x {
+        let y = s.mul_add_e_f64s(s.splat_f64s(r[1][1]), v[1], c[1]);
+        let z = s.mul_add_e_f64s(s.splat_f64s(r[2][1]), v[1], c[2]);
+        let y = s.mul_add_e_f64s(s.splat_f64s(r[1][2]), v[2], y);
+        let z = s.mul_add_e_f64s(s.splat_f64s(r[2][2]), v[2], z);
+        return [s.add_f64s(v[0], c[0]), y, z];
+    }
     [
         dot_add(s, splat(s, r[0]), v, c[0]),
         dot_add(s, splat(s, r[1]), v, c[1]),

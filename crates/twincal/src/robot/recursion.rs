@@ -5,7 +5,7 @@
 
 use super::bodies::Body;
 use super::lane_vectors::{
-    cross_add, dot, dot_add, origin, splat, to_child, to_parent_add, turn, turn_back,
+    cross_add, dot, dot_add, origin, splat, to_child, to_parent, to_parent_add, turn, turn_back,
 };
 use pulp::Simd;
 
@@ -222,7 +222,7 @@ fn backward<S: Simd>(
         f = turn(s, state.cos, state.sin, f);
         n = turn(s, state.cos, state.sin, n);
     }
-    let f = to_parent_add(s, body, f, [s.splat_f64s(0.0); 3]);
+    let f = to_parent(s, body, f);
     let n = to_parent_add(s, body, n, parent.moment);
     // n_parent += R n + p × R f
     parent.moment = cross_add(s, origin(s, body, state.position), f, n);

@@ -82,6 +82,11 @@ pub fn axis_angle(axis: Vector, angle: f64) -> Matrix {
     ]
 }
 
+/// True for a rotation about x, to the last bit.
+pub fn is_about_x(m: &Matrix) -> bool {
+    m[0] == [1.0, 0.0, 0.0] && m[1][0] == 0.0 && m[2][0] == 0.0
+}
+
 /// Rotation from roll, pitch, yaw about FIXED x, y, z (URDF): `Rz(yaw) Ry(pitch) Rx(roll)`.
 pub fn roll_pitch_yaw([roll, pitch, yaw]: Vector) -> Matrix {
     let x = axis_angle([1.0, 0.0, 0.0], roll);
