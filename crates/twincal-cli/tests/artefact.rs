@@ -103,7 +103,6 @@ fn case_99_unusable_output_is_refused_before_any_work() {
         ("file", "file: is a file"),
         ("link", "link: is a symbolic link"),
         ("closed/out", "closed: the folder is read-only"),
-        ("absent/out", "mkdir -p"),
         ("/proc/out", "/proc"),
     ] {
         let base = [

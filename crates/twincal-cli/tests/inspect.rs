@@ -151,7 +151,7 @@ fn an_elbow_that_stands_still_is_asked_to_move() {
     let why = viscous["words"].as_str().unwrap();
     assert!(why.contains("not seen: move `elbow` more"), "{why}");
     let report = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
-    assert!(report.contains("Move `elbow` more"));
+    assert!(report.contains("Move <code>elbow</code> more"));
 }
 
 /// Tools are mounted on the arm, not on a finger of the gripper that the model holds still.

@@ -16,6 +16,7 @@ use twincal::calibrate::Calibration;
 use twincal::evaluator::{Beyond, Evaluator};
 use twincal::posterior::draws::draw;
 use twincal::robot::Inertia;
+use twincal::validate::WORSE;
 use twincal::write_back::{Holds, LinkChange, Residual, WriteBack, Writer, Written};
 use twincal_io::artifact::{Artifact, Claim, MODEL_MJCF, MODEL_URDF, Maker, OutputFile, Replace};
 use twincal_io::export::code::{Language, source};
@@ -389,10 +390,7 @@ fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
              inertia (a comment in the file says so, too)",
             projection.links.join(", ")
         );
-        for (number, line) in wrapped(&text, 76).iter().enumerate() {
-            let begin = if number == 0 { "  " } else { "    " };
-            terminal.warning(&format!("{begin}{line}"));
-        }
+        warn(&text, terminal);
     }
     if change.written.is_empty() {
         terminal.say("  nothing: no found effect has a place there; the file is as it was");
@@ -490,10 +488,48 @@ fn how_good(change: &WriteBack, calibration: &Calibration, holds: Holds, termina
         ]);
     }
     print_table(&rows, terminal);
+    if let Some(text) = worse_alone(
+        &change.correction,
+        &change.lacks,
+        robot.joint_names(),
+        format,
+    ) {
+        warn(&format!("warning: {text}"), terminal);
+    }
     let text = "lacks: rms over states within the training range of the twin's torque that is not in the file, all effects together; held \
                 out: RMSE of the twin, to which that comes. N·m, of sliders N.";
     paragraph(text, terminal);
     terminal.say("");
+}
+
+/// A warning in its place among what is said, at most 80 columns wide.
+fn warn(text: &str, terminal: &mut Terminal) {
+    for (number, line) in wrapped(text, 76).iter().enumerate() {
+        let begin = if number == 0 { "  " } else { "    " };
+        terminal.warning(&format!("{begin}{line}"));
+    }
+}
+
+/// Joints on which the file alone is further from the twin than the nominal model is: what cannot be in it held the rest in balance.
+fn worse_alone<'a>(
+    nominal: &[f64],
+    file: &[f64],
+    joints: impl IntoIterator<Item = &'a str>,
+    format: &str,
+) -> Option<String> {
+    let each = nominal.iter().zip(file).zip(joints);
+    let worse: Vec<String> = each
+        .filter(|((nominal, file), _)| **file > WORSE * **nominal)
+        .map(|((nominal, file), joint)| {
+            format!("{} ({} -> {})", clean(joint), short(*nominal), short(*file))
+        })
+        .collect();
+    (!worse.is_empty()).then(|| {
+        format!(
+            "this {format} alone is WORSE than your model on {}: add what stays beside it (--to c, rust, python or json)",
+            worse.join(", ")
+        )
+    })
 }
 
 /// "upper_arm_link: 12.9 -> 6.28 kg, centre (-0.28, 0, 0.136) -> (-0.31, 0, 0.14) m"; `None` for a link of its own.
@@ -538,5 +574,18 @@ fn short(value: f64) -> String {
         format!("{value:.*}", decimals as usize)
     } else {
         format!("{value:.1e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn joints_that_a_file_alone_makes_worse_are_named() {
+        let of = |file: &[f64]| worse_alone(&[10.0, 20.0], file, ["a", "b"], "URDF");
+        assert_eq!(of(&[1.0, 20.1]), None);
+        let said = "this URDF alone is WORSE than your model on b (20.0 -> 30.0): add what stays beside it (--to c, rust, python or json)";
+        assert_eq!(of(&[1.0, 30.0]).as_deref(), Some(said));
     }
 }

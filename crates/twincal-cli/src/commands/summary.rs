@@ -17,7 +17,7 @@ const MENDS: &str = "`twincal init` with this log and model writes a twincal.tom
 /// Dropped columns up to this number are named.
 const FEW: usize = 4;
 /// What stands where ± does not describe a number.
-const ENDS: &str = "a (b … c): median and both ends of the central 68 % interval, where it is lopsided and ± would mislead; of the 95 % interval, where some models are far off";
+const ENDS: &str = "a (b … c): median and both ends of the 95 % interval, where ± would mislead";
 /// What the table of components that were not kept holds.
 const VALUE: &str = "value: median, given that it is in; ±: half of the central 68 % interval";
 
@@ -256,7 +256,7 @@ fn reliability(calibration: &Calibration) -> Vec<String> {
     }
     if let Some(conformal) = &validation.conformal {
         lines.push(format!(
-            "stretched by {}, they hold {:.0} % of the rows of the next such log with {} {} ({})",
+            "stretched by {}, they hold {:.0} % of all rows, those at standstill too, of the next such log with {} {} ({})",
             significant(conformal.factor, 3),
             100.0 * conformal.rows,
             if conformal.guaranteed {

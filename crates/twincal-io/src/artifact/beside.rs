@@ -47,17 +47,25 @@ impl Beside {
         })
     }
 
-    /// Refuses a parent folder that is missing, not a folder, or marked read-only (for root too).
+    /// Makes a parent folder that is missing; refuses one that is no folder, or marked read-only (for root too).
     pub(super) fn check_parent(&self) -> Result<()> {
         let shown = self.parent.to_string_lossy();
-        let metadata = std::fs::metadata(&self.parent).map_err(|e| {
-            Error::system(
-                &*shown,
-                "write into",
-                &e,
-                format!("create it first: mkdir -p '{shown}'"),
-            )
-        })?;
+        let made = match std::fs::metadata(&self.parent) {
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+                std::fs::create_dir_all(&self.parent)
+            }
+            _ => Ok(()),
+        };
+        let metadata = made
+            .and_then(|()| std::fs::metadata(&self.parent))
+            .map_err(|e| {
+                Error::system(
+                    &*shown,
+                    "write into",
+                    &e,
+                    format!("create it first: mkdir -p '{shown}'"),
+                )
+            })?;
         if !metadata.is_dir() {
             return Err(Error::content(
                 Place::file(shown),

@@ -119,7 +119,6 @@ fn case_99_file_symlink_read_only_and_foreign_folders_are_refused() {
         ("foreign", "holds `notes.txt`, which twincal did not write"),
         ("closed", "read-only"),
         ("closed/out", "read-only"),
-        ("absent/out", "mkdir -p"),
         ("..", "cannot be replaced"),
     ] {
         let error = write(&at(name), "x", Replace::Artifact)
@@ -128,6 +127,9 @@ fn case_99_file_symlink_read_only_and_foreign_folders_are_refused() {
         assert!(error.contains(words), "{name}: {error}");
     }
     assert_eq!(fs::read(at("foreign/notes.txt")).unwrap(), b"mine");
+    // A folder that is missing is made.
+    write(&at("absent/too/out"), "x", Replace::Never).unwrap();
+    assert!(at("absent/too/out").is_dir());
     let proc = write(Path::new("/proc/twincal-out"), "x", Replace::Never)
         .unwrap_err()
         .to_string();

@@ -44,11 +44,15 @@ pub(super) fn sentences(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<
         .findings
         .iter()
         .filter(|f| f.code == "unseen_motion");
-    out.extend(
-        unseen
-            .take(MOTIONS)
-            .map(|finding| sentence(&finding.message)),
-    );
+    let mut unseen: Vec<String> = unseen.map(|finding| sentence(&finding.message)).collect();
+    let more = unseen.len().saturating_sub(MOTIONS);
+    unseen.truncate(MOTIONS);
+    out.append(&mut unseen);
+    if more > 0 {
+        out.push(format!(
+            "{more} more such motions stand among the findings."
+        ));
+    }
     out
 }
 

@@ -85,15 +85,24 @@ impl<'a> Pair<'a> {
     }
 }
 
-/// Joints that are predicted no better where training says enough are left out: there it is no excuse.
-fn pairs(calibration: &Calibration) -> impl Iterator<Item = Pair<'_>> {
+/// Joints that have most of their rows there. Of torque that training leaves open only those that are predicted better elsewhere: otherwise
+/// that is no excuse.
+fn mostly_there(calibration: &Calibration) -> impl Iterator<Item = Pair<'_>> {
     let Validation { within, beyond, .. } = &calibration.validation;
     let pairs = within.joints.iter().zip(&beyond.joints);
     pairs
-        .filter(|(within, beyond)| {
-            beyond.rows > 0 && (within.rows == 0 || within.coverage95 > beyond.coverage95)
-        })
+        .filter(|(within, beyond)| beyond.rows > within.rows)
         .map(|(within, beyond)| Pair::of(calibration, within, beyond))
+        .filter(
+            |Pair {
+                 within,
+                 beyond,
+                 cause,
+             }| {
+                let better = within.rows == 0 || within.coverage95 > beyond.coverage95;
+                *cause == Cause::NewMotion || better
+            },
+        )
 }
 
 /// Joints whose intervals are too narrow there, and less so elsewhere: by more than two standard errors of as many independent rows; and those
@@ -150,8 +159,8 @@ pub(super) fn narrow(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Str
 /// Joints that were mostly tested there.
 pub(super) fn mostly(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
     let told = |wanted: Cause| -> Vec<String> {
-        pairs(calibration)
-            .filter(|pair| pair.cause == wanted && pair.beyond.rows > pair.within.rows)
+        mostly_there(calibration)
+            .filter(|pair| pair.cause == wanted)
             .filter(|pair| joints.iter().any(|joint| joint.name == pair.beyond.joint))
             .map(|pair| format!("{} ({})", pair.beyond.joint, pair.rows()))
             .collect()

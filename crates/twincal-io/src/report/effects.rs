@@ -4,7 +4,7 @@
 use super::MENTIONED;
 use super::figures::inclusion::family_name;
 use super::figures::sensitivity;
-use super::remarks::remarks;
+use super::remarks::{doubts, remarks};
 use super::text::{interval, probability, with_ends};
 use super::verdict::plus_minus;
 use serde::Serialize;
@@ -65,6 +65,8 @@ pub(super) struct Effect {
     /// The data do not say whether it is there, or the sampler cannot tell on which side of 0.5 it lies.
     pub(super) undecided: bool,
     /// What is to be minded.
+    /// Found, and nothing speaks against it or its numbers.
+    pub(super) stands: bool,
     pub(super) remarks: Vec<String>,
 }
 
@@ -184,6 +186,7 @@ fn effect(component: &ComponentSummary, calibration: &Calibration) -> Effect {
     let show = |all: &[&ParameterSummary]| -> Vec<Parameter> {
         all.iter().map(|p| parameter(p, component.family)).collect()
     };
+    let undecided = component.verdict == Some(Verdict::Undecided);
     Effect {
         title: match component.name.rsplit_once('.') {
             Some((place, word)) if word == component.family.word() => place.into(),
@@ -198,10 +201,11 @@ fn effect(component: &ComponentSummary, calibration: &Calibration) -> Effect {
         },
         told: show(&told),
         unseen: self::seen(component, false).map(name).collect(),
-        undecided: component.verdict == Some(Verdict::Undecided)
+        undecided: undecided
             || component
                 .pip_mcse
                 .is_some_and(|e| e > 0.0 && (pip - 0.5).abs() < 3.0 * e),
+        stands: component.selected && !undecided && doubts(component, calibration).is_empty(),
         remarks: remarks(component, calibration),
     }
 }
@@ -387,7 +391,7 @@ mod tests {
         };
         own.parameters.insert(0, unseen);
         let shown = effect(own, &fixture::two_joints());
-        assert_eq!(shown.all[0].value, "294 (284 … 378)");
+        assert_eq!(shown.all[0].value, "294 (276 … 424)");
         let html = crate::report::render(&calibration, &crate::report::ReportContext::default());
         assert!(html.unwrap().contains("one number, 1 not seen"));
     }

@@ -3,7 +3,7 @@
 use super::figures::sensitivity;
 use super::limits::{decisive, has_standstill};
 use super::remarks::doubts;
-use super::standstill::{at_standstill, rest_got_worse};
+use super::standstill::{at_standstill, held_at_rest, rest_got_worse};
 use super::text::{count, list, number, percent};
 use super::view::{Joint, pooled_unit};
 use twincal::calibrate::{Calibration, ComponentSummary, Verdict as Decision};
@@ -99,20 +99,24 @@ fn as_logged(calibration: &Calibration, unit: &str) -> Option<String> {
     };
     let lost: Vec<String> = (raw.joints.iter())
         .filter(|j| j.rows > 0 && j.rmse_calibrated > j.torque_sd)
-        .map(|j| format!("{} ({})", j.joint, percent(j.rmse_calibrated / j.torque_sd)))
+        .map(|j| {
+            let share = percent(j.rmse_calibrated / j.torque_sd);
+            let error = number(j.rmse_calibrated, 3);
+            format!(
+                "{} has {error} left, {share} of its torque's standard deviation",
+                j.joint
+            )
+        })
         .collect();
     let apart = (raw.rmse_calibrated / judged.rmse_calibrated - 1.0).abs();
     let worth_telling = apart > UNFILTERED_WORTH_TELLING || !lost.is_empty();
     (rows_of(raw) > 0 && worth_telling).then(|| {
         let lost = match lost.is_empty() {
             true => String::new(),
-            false => format!(
-                ", more than the torque's own standard deviation on {}",
-                list(&lost)
-            ),
+            false => format!("; there {}", list(&lost)),
         };
         format!(
-            "; as logged, unfiltered{which}: {} → {} {unit}{lost}",
+            "; as logged, unfiltered (noise included){which}: {} → {} {unit}{lost}",
             number(raw.rmse_nominal, 3),
             number(raw.rmse_calibrated, 3)
         )
@@ -129,7 +133,7 @@ fn friction_alone(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<Str
             let (worse, _) = with_friction(scores, joints);
             let worse = match worse.is_empty() {
                 true => String::new(),
-                false => format!("; worse than your model on {}", list(&worse)),
+                false => format!("; such a fit is worse than your model on {}", list(&worse)),
             };
             format!("Viscous and Coulomb friction and an offset alone would leave {told}{worse}.")
         }
@@ -213,9 +217,9 @@ fn held(calibration: &Calibration) -> String {
     let differ = (judged.coverage95 - all.coverage95).abs() > SHARE_WORTH_TELLING;
     let all = match differ {
         true => format!(
-            ", and {} of all {} with those at standstill",
-            percent(all.coverage95),
-            count(rows_of(all))
+            ", and {} of the {} at standstill",
+            percent(held_at_rest(&calibration.validation)),
+            count(rows_of(all).saturating_sub(rows_of(judged)))
         ),
         false => String::new(),
     };
@@ -224,11 +228,11 @@ fn held(calibration: &Calibration) -> String {
     )
 }
 
-/// The time that the held-out rows stand for.
+/// From the first held-out row to the last, in s.
 pub(super) fn held_out_seconds(calibration: &Calibration) -> f64 {
     let scores = &calibration.validation.filtered;
     let rows = scores.joints.iter().map(|joint| joint.rows).max();
-    rows.unwrap_or(0) as f64 / calibration.kept_rate_hz()
+    rows.unwrap_or(0).saturating_sub(1) as f64 / calibration.kept_rate_hz()
 }
 
 /// What is more likely than not, without and with what the data leave open, and how much of it stands every check.
@@ -274,13 +278,10 @@ pub(super) fn effects_found(calibration: &Calibration) -> String {
         (1, _) => format!("One missing effect found, with a doubt {WHERE}{more}."),
         (n, 0) => format!("{n} missing effects found, which stand every check{more}."),
         (n, d) if d == n => format!("{n} missing effects found, each with a doubt {WHERE}{more}."),
-        (n, 1) => format!(
-            "{n} missing effects found: {} stand every check, one has a doubt {WHERE}{more}.",
-            n - 1
-        ),
         (n, d) => format!(
-            "{n} missing effects found: {} stand every check, {d} have a doubt {WHERE}{more}.",
-            n - d
+            "Missing effects: {} found that {} every check, {d} found with a doubt {WHERE}{more}.",
+            n - d,
+            if n - d == 1 { "stands" } else { "stand" }
         ),
     }
 }
@@ -365,7 +366,7 @@ mod tests {
             judged(change).grounds[0].clone()
         };
         let told = of(0.373, 0.39, 5.0);
-        let said = "; as logged, unfiltered: 0.959 → 0.373 N·m, more than the torque's own standard deviation on elbow (102.6\u{202f}%).";
+        let said = "; as logged, unfiltered (noise included): 0.959 → 0.373 N·m; there elbow has 0.400 left, 102.6\u{202f}% of its torque's standard deviation.";
         assert!(told.ends_with(said), "{told}");
         assert!(
             told.starts_with("Torque error (RMSE) below 5 Hz on"),
@@ -490,7 +491,7 @@ mod tests {
             of(&|_| ()),
             "7 missing effects found, which stand every check."
         );
-        let one = "7 missing effects found: 6 stand every check, one has a doubt in the report’s table of effects.";
+        let one = "Missing effects: 6 found that stand every check, 1 found with a doubt in the report’s table of effects.";
         assert_eq!(of(&|c| c.repeatability[0].z = Some(3.7)), one);
         let prior = |c: &mut Calibration| {
             let selected = c.terms.iter_mut().find(|t| t.selected);

@@ -21,7 +21,7 @@ pub(super) fn reliability(validation: &Validation) -> Table {
     let mut add = |name: &str, levels: &[(f64, f64)], distance: f64, chance: f64| {
         let mut row = vec![name.to_owned()];
         row.extend(levels.iter().map(|(_, seen)| percent(*seen)));
-        row.extend([number(distance, 2), format!("below {}", number(chance, 2))]);
+        row.extend([number(distance, 3), format!("below {}", number(chance, 3))]);
         table.rows.push(row);
     };
     for joint in validation.reliability.iter().filter(|joint| joint.rows > 0) {
@@ -90,8 +90,8 @@ pub(super) fn guarantee(validation: &Validation) -> String {
         .map(|joint| format!("{} {}", joint.joint, number(joint.factor, 3)))
         .collect();
     format!(
-        "Without believing the model: stretched by {}, the 95 % intervals of all joints hold {} of the rows of the next log \
-         like these with probability {}/{} = {} {}.{} Joint by joint: {}.",
+        "Without believing the model: stretched by {}, the 95 % intervals of all joints hold {} of all rows of the next log \
+         like these, those at standstill too, with probability {}/{} = {} {}.{} Joint by joint: {}.",
         number(conformal.factor, 3),
         percent(conformal.rows),
         conformal.trajectories,
@@ -118,6 +118,7 @@ pub(super) fn repeats(calibration: &Calibration) -> Table {
         "the two halves (sd apart)",
         "first half",
         "second half",
+        "all data",
         "unit",
         "probability in each half",
     ]);
@@ -131,6 +132,11 @@ pub(super) fn repeats(calibration: &Calibration) -> Table {
             .terms
             .iter()
             .find(|t| t.term.name == repeat.term);
+        let mut compact = calibration
+            .compact
+            .iter()
+            .flat_map(|compact| &compact.terms);
+        let all = compact.find(|own| own.name == repeat.term);
         let (factor, unit) = match own {
             Some(own) => own.term.family.told_in(&repeat.unit),
             None => (1.0, repeat.unit.as_str()),
@@ -140,6 +146,9 @@ pub(super) fn repeats(calibration: &Calibration) -> Table {
             words,
             plus_minus(factor * repeat.first, factor * repeat.first_sd),
             plus_minus(factor * repeat.second, factor * repeat.second_sd),
+            all.map_or_else(String::new, |own| {
+                plus_minus(factor * own.mean, factor * own.sd)
+            }),
             unit.into(),
             format!(
                 "{} / {}",

@@ -1,15 +1,14 @@
 //! Where a twin does not hold: what errors and intervals of held-out torque say against it, and what was found that is not to be rested on.
 
 use super::beyond;
-use super::figures::sensitivity;
 use super::findings;
-use super::remarks::{size_of_gravity, whole_against_halves};
+use super::reservations::{not_to_rest_on, of_settings};
 use super::shape;
 use super::standstill::{at_standstill, hardly_at_rest, rest_got_worse};
 use super::text::{THIN, list, number, percent, subject};
 use super::view::{Joint, independent_rows, memory, pooled_unit, standard_deviation};
 use twincal::Severity;
-use twincal::calibrate::{Calibration, Repeat, Repeated};
+use twincal::calibrate::Calibration;
 use twincal::posterior::Method;
 use twincal::validate::{JointScore, Scores, Split, Validation, WORSE};
 
@@ -62,6 +61,7 @@ pub(super) fn of_results(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec
     out.extend(at_standstill(calibration, joints).filter(|_| rest_got_worse(calibration)));
     out.extend(hardly_at_rest(calibration, joints));
     out.extend(not_to_rest_on(calibration));
+    out.extend(of_settings(calibration));
     if calibration.validation.split == Split::LastThirty {
         out.push(
             "It was tested on later parts of the same motions only; another motion was not tried."
@@ -125,10 +125,11 @@ fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Stri
     let better = lost.iter().all(|(_, share)| *share > CLEARLY_LOST);
     let names: Vec<String> = lost.into_iter().map(|(name, _)| name).collect();
     let words = format!(
-        "the error left is {} of the torque's standard deviation ({}): a constant would do {}",
+        "the error left is {} of the torque's standard deviation ({}): a constant would do {}{}",
         list(&shares),
         deviations.join(", "),
-        if better { "better" } else { "as well" }
+        if better { "better" } else { "as well" },
+        hardly_driven(&names, calibration)
     );
     say(&names, &words, &words);
     let mut large = large(scores, joints);
@@ -143,77 +144,24 @@ fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Stri
     out
 }
 
-/// What was found and is not to be rested on: bodies that are none, gravity of another size, numbers on which the halves of the data differ, effects
-/// that neither half has alone, and those that another prior would leave out.
-pub(super) fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
-    let mut out = Vec::new();
-    let bodies = no_bodies(calibration);
-    if !bodies.is_empty() {
-        out.push(format!(
-            "What was found of {} is no rigid body (in more than 95 % of the draws): another effect is missing among the candidates, or inertias of the model are wrong; do not read it as mass or inertia.",
-            list(&bodies)
-        ));
+/// Whether such a joint is hardly driven in a held-out log: then nothing could be seen there.
+fn hardly_driven(names: &[String], calibration: &Calibration) -> &'static str {
+    let held_out = |log: &str| {
+        let mut logs = calibration.logs.iter();
+        logs.any(|own| own.name == log && own.role == "heldout")
+    };
+    let mut findings = calibration.findings.iter();
+    let own = findings.any(|f| {
+        f.code == "joint_not_driven"
+            && held_out(&f.subject)
+            && names
+                .iter()
+                .any(|name| f.message.contains(&format!("`{name}`")))
+    });
+    match own {
+        true => "; it is hardly driven in the held-out log",
+        false => "",
     }
-    let found = calibration.components.iter().filter(|c| c.selected);
-    out.extend(found.filter_map(|component| {
-        let words = size_of_gravity(component, calibration)?;
-        Some(format!("{}: {words}.", component.name))
-    }));
-    let effects = || (calibration.repeatability).chunk_by(|a, b| a.component == b.component);
-    let apart = effects().filter(|own| Repeat::of_effect(own) == Repeated::Differs);
-    let apart: Vec<String> = apart
-        .map(|own| {
-            let z = own.iter().filter_map(|number| number.z).map(f64::abs);
-            format!(
-                "{} ({} sd)",
-                own[0].component,
-                number(z.fold(0.0, f64::max), 2)
-            )
-        })
-        .collect();
-    if !apart.is_empty() {
-        out.push(format!(
-            "The two halves of the data differ by 3 sd or more on {}.",
-            list(&apart)
-        ));
-    }
-    let in_neither = effects().filter(|own| Repeat::of_effect(own) == Repeated::InNeitherHalf);
-    let in_neither: Vec<&str> = in_neither.map(|own| own[0].component.as_str()).collect();
-    if !in_neither.is_empty() {
-        out.push(format!(
-            "Found in the whole data, but in neither half alone: {}.",
-            list(&in_neither)
-        ));
-    }
-    let found = calibration.components.iter().filter(|c| c.selected);
-    let against: Vec<String> = found
-        .filter_map(|component| {
-            let apart = whole_against_halves(component, calibration)?;
-            Some(format!("{} ({} sd)", component.name, number(apart, 2)))
-        })
-        .collect();
-    if !against.is_empty() {
-        out.push(format!(
-            "All data together say what their two halves do not: {}.",
-            list(&against)
-        ));
-    }
-    let by_prior: Vec<&str> = sensitivity::by_prior(calibration)
-        .filter(|component| component.selected)
-        .map(|component| component.name.as_str())
-        .collect();
-    if !by_prior.is_empty() {
-        out.push(format!("Other priors would leave out {}.", list(&by_prior)));
-    }
-    out
-}
-
-/// Links of which what was found is no rigid body.
-pub(super) fn no_bodies(calibration: &Calibration) -> Vec<&str> {
-    let found = calibration.findings.iter();
-    let found = found.filter(|f| f.code == "unphysical_inertia_found");
-    let sure = found.filter(|f| f.severity == Severity::Warning);
-    sure.map(|f| f.subject.as_str()).collect()
 }
 
 /// How many rows count, how many are needed, and what to do.
@@ -251,7 +199,7 @@ fn friction_does_as_well(scores: &Scores, joints: &[Joint<'_>]) -> Option<String
         .collect();
     (!named.is_empty()).then(|| {
         format!(
-            "Friction and an offset alone do as well or better on {}.",
+            "Friction and an offset alone do about as well or better on {}.",
             list(&named)
         )
     })
@@ -525,7 +473,7 @@ mod tests {
             let mut limits = verdict.limits.into_iter();
             limits.find(|limit| limit.starts_with("Friction"))
         };
-        let said = "Friction and an offset alone do as well or better on elbow (0.104 instead of 0.100 N·m).";
+        let said = "Friction and an offset alone do about as well or better on elbow (0.104 instead of 0.100 N·m).";
         assert_eq!(of(0.104).as_deref(), Some(said));
         assert_eq!(of(0.106), None);
     }

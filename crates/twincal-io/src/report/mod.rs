@@ -11,6 +11,7 @@ mod figure;
 mod figures;
 mod findings;
 mod grounds;
+mod halves;
 mod honesty;
 #[cfg(test)]
 mod fixture;
@@ -18,6 +19,7 @@ mod limits;
 mod page;
 mod plot;
 mod remarks;
+mod reservations;
 mod scale;
 mod shape;
 mod standstill;

@@ -1,18 +1,15 @@
 //! What is to be minded about an effect before its numbers are used: it stands at the effect's own line.
 
 use super::figures::sensitivity;
+use super::halves::{repeats, whole_against_halves};
 use super::text::{list, number, percent};
-use twincal::calibrate::{
-    Alike, Calibration, ComponentSummary, ParameterSummary, Repeat, Repeated, Verdict,
-};
+use twincal::calibrate::{Alike, Calibration, ComponentSummary, ParameterSummary, Verdict};
 use twincal::term::Family;
 
 /// Rivals that are named; the others are counted.
 const NAMED: usize = 2;
 /// Change of the size of gravity, as a share, that no place on earth explains.
 const SIZE_OF_GRAVITY: f64 = 0.01;
-/// Sd between all data and both halves from which that is told.
-const APART: f64 = 3.0;
 
 /// Remarks on a component, the gravest first.
 pub(super) fn remarks(component: &ComponentSummary, calibration: &Calibration) -> Vec<String> {
@@ -112,10 +109,9 @@ pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) ->
     out.extend(of_a_point_mass(component, calibration));
     out.extend(rivals(component, calibration));
     out.extend(repeats(component, calibration));
-    if let Some(apart) = whole_against_halves(component, calibration) {
+    if let Some(against) = whole_against_halves(component, calibration) {
         out.push(format!(
-            "all data together are {} sd from what the two halves say",
-            number(apart, 2)
+            "all data together do not say what the two halves say: {against}"
         ));
     }
     out.extend(hangs_on(component, calibration));
@@ -124,9 +120,7 @@ pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) ->
         out.push("other priors would leave it out".into());
     }
     if component.parameters.iter().any(ParameterSummary::is_split) {
-        out.push(
-            "some models put a number of it far off: its brackets are the 95 % interval".into(),
-        );
+        out.push("some models put a number of it far off".into());
     }
     if moves_with_the_cutoff(component, calibration) {
         out.push("depends on the filter's cut-off by more than its ±".into());
@@ -214,8 +208,9 @@ fn rivals(component: &ComponentSummary, calibration: &Calibration) -> Option<Str
                 let spanned = component.selected && !component.alias_of.is_empty();
                 return spanned.then(|| {
                     format!(
-                        "its torque is also that of {} in every motion; the prior prefers it",
-                        others(&component.alias_of)
+                        "its torque is also that of {} in every motion; the prior prefers {}",
+                        others(&component.alias_of),
+                        component.name
                     )
                 });
             };
@@ -223,7 +218,7 @@ fn rivals(component: &ComponentSummary, calibration: &Calibration) -> Option<Str
             let place = place(settled.alike);
             Some(if *first == component.name {
                 format!(
-                    "the same as {} {place}; the prior prefers it",
+                    "the same as {} {place}; the prior prefers {first}",
                     others(&settled.members)
                 )
             } else {
@@ -261,47 +256,10 @@ pub(super) fn size_of_gravity(
     })
 }
 
-/// What the two halves of the data say, where they do not agree.
-fn repeats(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
-    let of = |repeat: &&Repeat| repeat.component == component.name;
-    let own: Vec<Repeat> = (calibration.repeatability.iter())
-        .filter(of)
-        .cloned()
-        .collect();
-    let apart = own.iter().filter_map(|repeat| repeat.z).map(f64::abs);
-    match Repeat::of_effect(&own) {
-        Repeated::Repeats | Repeated::NotSeen => None,
-        Repeated::Differs | Repeated::Wavers => Some(format!(
-            "the two halves of the data differ by {} sd",
-            number(apart.fold(0.0, f64::max), 2)
-        )),
-        Repeated::TooLoose => Some("either half alone is too loose to confirm it".into()),
-        state => Some(state.words().into()),
-    }
-}
-
-/// How far a number from all data is from what both halves say together, in sd of that, where that is [`APART`] or more: the halves with the same
-/// effects in have nearly all of its rows. Not where the halves differ themselves.
-pub(super) fn whole_against_halves(
+pub(super) fn moves_with_the_cutoff(
     component: &ComponentSummary,
     calibration: &Calibration,
-) -> Option<f64> {
-    let own = calibration.repeatability.iter();
-    let own = own.filter(|repeat| {
-        repeat.component == component.name && repeat.z.is_some_and(|z| z.abs() < APART)
-    });
-    let apart = own.filter_map(|repeat| {
-        let term = (calibration.terms.iter()).find(|term| term.term.name == repeat.term)?;
-        let whole = term.conditional_median?;
-        let [first, second] = [repeat.first_sd, repeat.second_sd].map(|sd| sd.powi(-2));
-        let both = (first * repeat.first + second * repeat.second) / (first + second);
-        Some((whole - both).abs() * (first + second).sqrt())
-    });
-    let most = apart.fold(0.0, f64::max);
-    (most >= APART && most.is_finite()).then_some(most)
-}
-
-fn moves_with_the_cutoff(component: &ComponentSummary, calibration: &Calibration) -> bool {
+) -> bool {
     let mut findings = calibration.findings.iter();
     findings.any(|f| f.code == "depends_on_cutoff" && component.columns.contains(&f.subject))
 }
@@ -310,7 +268,7 @@ fn moves_with_the_cutoff(component: &ComponentSummary, calibration: &Calibration
 mod tests {
     use super::*;
     use crate::report::fixture;
-    use twincal::calibrate::Group;
+    use twincal::calibrate::{Group, Repeat};
     use twincal::{Finding, Severity};
 
     fn of(change: impl Fn(&mut Calibration)) -> Vec<String> {
@@ -337,8 +295,10 @@ mod tests {
             own.selected = selected;
             doubts(&own, &calibration)
         };
-        let said =
-            "its torque is also that of a, b and 1 more in every motion; the prior prefers it";
+        let said = format!(
+            "its torque is also that of a, b and 1 more in every motion; the prior prefers {}",
+            fixture::two_joints().components[0].name
+        );
         assert_eq!(of(&["a", "b", "c"], true), [said]);
         assert!(of(&[], true).is_empty() && of(&["a"], false).is_empty());
     }
@@ -462,7 +422,7 @@ mod tests {
         });
         assert_eq!(
             said,
-            ["the same as x, y and 2 more in every motion; the prior prefers it"]
+            ["the same as x, y and 2 more in every motion; the prior prefers q2^2"]
         );
     }
 
@@ -523,10 +483,7 @@ mod tests {
     #[test]
     fn models_far_from_the_others_are_told() {
         let said = of(|c| c.components[0].parameters[0].interval95 = [-4.3, 4.5]);
-        assert_eq!(
-            said,
-            ["some models put a number of it far off: its brackets are the 95 % interval"]
-        );
+        assert_eq!(said, ["some models put a number of it far off"]);
     }
 
     #[test]
@@ -555,7 +512,7 @@ mod tests {
         assert_eq!(whole(7.4), [""; 0]);
         assert_eq!(
             whole(7.5),
-            ["all data together are 3.5 sd from what the two halves say"]
+            ["all data together do not say what the two halves say: 7.5 against 7.0 and 7.0"]
         );
     }
 
@@ -593,7 +550,7 @@ mod tests {
         );
         assert_eq!(
             halves(0.3, (7.0, 6.0), sure),
-            ["either half alone is too loose to confirm it"]
+            ["its numbers from either half are too loose to be compared"]
         );
         assert_eq!(
             halves(0.3, (7.0, 0.1), (0.9, 0.1)),

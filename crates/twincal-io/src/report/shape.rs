@@ -192,13 +192,26 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
             continue;
         };
         let names: Vec<&str> = own.iter().map(|j| j.joint.as_str()).collect();
-        let mut shown = shape.shown(&worst.pit, &worst.coverage_levels);
-        if matches!(shape, Shape::Above | Shape::Below) {
-            shown.push_str(&by_how_much(all, &worst.joint));
-        }
+        let one = |j: &Reliability| {
+            let shown = shape.shown(&j.pit, &j.coverage_levels);
+            match shape {
+                Shape::Above | Shape::Below => shown + &by_how_much(all, &j.joint),
+                Shape::Wide | Shape::Narrow => shown,
+            }
+        };
+        let to_one_side = matches!(shape, Shape::Above | Shape::Below);
+        let shown: Vec<String> = match to_one_side && own.len() > 1 {
+            true => own
+                .iter()
+                .map(|j| format!("{}: {}", j.joint, one(j)))
+                .collect(),
+            false => vec![one(worst)],
+        };
+        let shown = shown.join("; ");
         let (names, words) = (subject(&names), shape.words(slightly));
         out.push(match own[..] {
             [_] => format!("{names}: its {words} ({shown})."),
+            _ if to_one_side => format!("{names}: their {words} ({shown})."),
             _ => format!("{names}: their {words} (on {} {shown}).", worst.joint),
         });
     }

@@ -11,6 +11,8 @@ use twincal::validate::{JointScore, Scores, Validation};
 
 /// Held-out rows at standstill below which that is not tested.
 const FEW_AT_REST: u64 = 20;
+/// Pauses in held-out data from which they say something of others.
+const FEW_PAUSES: usize = 3;
 /// Share of a joint's rows at standstill from which that is a part of what the robot does.
 const STANDS_STILL: f64 = 0.05;
 
@@ -37,9 +39,16 @@ pub(super) fn at_standstill(calibration: &Calibration, joints: &[Joint<'_>]) -> 
         return None;
     }
     let told = change(together, pooled_unit(joints));
+    let mut about = Vec::new();
     if let ([only], true) = (&rest[..], joints.len() > 1) {
-        return Some(format!("At standstill ({}): {told}.", only.0.joint));
+        about.push(only.0.joint.clone());
+        worse.clear();
     }
+    about.extend(few_pauses(calibration));
+    let place = match about.is_empty() {
+        true => "At standstill".to_owned(),
+        false => format!("At standstill ({})", about.join("; ")),
+    };
     let mut names: Vec<String> = (worse.iter().take(NAMED))
         .map(|(name, [before, after])| {
             let unit = joints.iter().find(|joint| joint.name == *name);
@@ -55,9 +64,40 @@ pub(super) fn at_standstill(calibration: &Calibration, joints: &[Joint<'_>]) -> 
         names.push(format!("{more} more"));
     }
     Some(match names.is_empty() {
-        true => format!("At standstill: {told}."),
-        false => format!("At standstill: {told}; worse on {}.", list(&names)),
+        true => format!("{place}: {told}."),
+        false => format!("{place}: {told}; worse on {}.", list(&names)),
     })
+}
+
+/// "one pause, 0.960 s", where held-out rows have so few that they say little of others.
+pub(super) fn few_pauses(calibration: &Calibration) -> Option<String> {
+    let (mut most, mut longest) = (0, 0.0f64);
+    for joint in &calibration.validation.filtered.joints {
+        let traces = calibration.validation.traces.iter();
+        let (mut pauses, mut seconds) = (0, 0.0);
+        for trace in traces.filter(|trace| trace.joint == joint.joint) {
+            let rows = trace.standstill.iter().zip(&trace.time);
+            let mut began = None;
+            for (still, &time) in rows {
+                match (still, began) {
+                    (true, None) => (pauses, began) = (pauses + 1, Some(time)),
+                    (true, Some(_)) => {}
+                    (false, Some(start)) => (seconds, began) = (seconds + time - start, None),
+                    (false, None) => {}
+                }
+            }
+            if let (Some(start), Some(end)) = (began, trace.time.last()) {
+                seconds += end - start;
+            }
+        }
+        most = most.max(pauses);
+        longest = longest.max(seconds);
+    }
+    match most {
+        1 => Some(format!("one pause, {} s", number(longest, 2))),
+        2..FEW_PAUSES => Some(format!("{most} pauses, {} s in all", number(longest, 2))),
+        _ => None,
+    }
 }
 
 /// Whether torque at standstill, of all joints together, got worse.
@@ -120,22 +160,118 @@ pub(super) fn hardly_at_rest(calibration: &Calibration, joints: &[Joint<'_>]) ->
 
 /// Errors before and after on the rows in which a joint stands still; no rows without any.
 pub(super) fn table(validation: &Validation, joints: &[Joint<'_>]) -> Table {
-    let mut table = Table::new(["joint", "rows", "RMSE nominal", "RMSE calibrated", "change"]);
+    let mut table = Table::new([
+        "joint",
+        "rows",
+        "RMSE nominal",
+        "RMSE calibrated",
+        "change",
+        "95 % coverage",
+    ]);
     let (all, moving) = (&validation.filtered, decisive(validation));
-    let pairs = all.joints.iter().zip(&moving.joints);
-    for (all, moving) in pairs.filter(|(all, moving)| all.rows > moving.rows) {
-        let Some([before, after]) = still(&[(all, moving)]) else {
-            continue;
-        };
-        let unit = joints.iter().find(|joint| joint.name == all.joint);
-        let unit = unit.map_or("", |joint| joint.units.torque);
-        table.rows.push(vec![
-            all.joint.clone(),
-            count(all.rows - moving.rows),
-            with_unit(before, unit),
-            with_unit(after, unit),
-            tables::change(before, after),
-        ]);
+    let pairs: Vec<_> = (all.joints.iter().zip(&moving.joints))
+        .filter(|(all, moving)| all.rows > moving.rows)
+        .collect();
+    let mut add = |name: &str, pairs: &[(&JointScore, &JointScore)], unit: &str| {
+        if let Some([before, after]) = still(pairs) {
+            let rows = pairs.iter().map(|(all, moving)| all.rows - moving.rows);
+            table.rows.push(vec![
+                name.to_owned(),
+                count(rows.sum()),
+                with_unit(before, unit),
+                with_unit(after, unit),
+                tables::change(before, after),
+                percent(held(pairs)),
+            ]);
+        }
+    };
+    for pair in &pairs {
+        let unit = joints.iter().find(|joint| joint.name == pair.0.joint);
+        add(
+            &pair.0.joint,
+            &[*pair],
+            unit.map_or("", |joint| joint.units.torque),
+        );
+    }
+    if pairs.len() > 1 {
+        add("all joints", &pairs, pooled_unit(joints));
     }
     table
+}
+
+/// Share of the rows at standstill that 95 % intervals hold.
+pub(super) fn held_at_rest(validation: &Validation) -> f64 {
+    let (all, moving) = (&validation.filtered, decisive(validation));
+    held(&all.joints.iter().zip(&moving.joints).collect::<Vec<_>>())
+}
+
+fn held(pairs: &[(&JointScore, &JointScore)]) -> f64 {
+    let inside = |score: &JointScore| match score.rows {
+        0 => 0.0,
+        rows => rows as f64 * score.coverage95,
+    };
+    let rows = pairs
+        .iter()
+        .map(|(all, moving)| all.rows - moving.rows.min(all.rows));
+    let held = pairs
+        .iter()
+        .map(|(all, moving)| inside(all) - inside(moving));
+    held.sum::<f64>() / rows.sum::<u64>() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::fixture;
+
+    /// Rows 0.1 s apart, of which these stand still, in every trace of the first log; none in the others.
+    fn resting(rows: &[std::ops::Range<usize>]) -> Calibration {
+        let mut calibration = fixture::two_joints();
+        let log = calibration.validation.traces[0].log.clone();
+        for trace in &mut calibration.validation.traces {
+            let first = trace.log == log;
+            trace.time = (0..trace.time.len()).map(|row| 0.1 * row as f64).collect();
+            trace.standstill = (0..trace.time.len())
+                .map(|row| first && rows.iter().any(|rows| rows.contains(&row)))
+                .collect();
+        }
+        calibration
+    }
+
+    #[test]
+    fn few_pauses_are_counted_and_many_are_not_told() {
+        let of = |rows: &[std::ops::Range<usize>]| few_pauses(&resting(rows));
+        assert_eq!(of(&[]), None);
+        assert_eq!(of(&[3..13]).as_deref(), Some("one pause, 1.0 s"));
+        let two = of(&[3..13, 20..25]);
+        assert_eq!(two.as_deref(), Some("2 pauses, 1.5 s in all"));
+        assert_eq!(of(&[0..2, 4..6, 8..10]), None);
+    }
+
+    /// Of 100 rows 50 move; mean squares of all and of those that move leave 9 and 1 at rest, and 90 and 45 held ones 45.
+    #[test]
+    fn rows_at_rest_are_what_all_rows_have_more_than_moving_ones() {
+        let calibration = fixture::two_joints();
+        let joints = crate::report::view::joints(&calibration);
+        let mut validation = calibration.validation.clone();
+        validation.moving = validation.filtered.clone();
+        for (all, moving) in
+            (validation.filtered.joints.iter_mut()).zip(&mut validation.moving.joints)
+        {
+            (moving.rows, moving.rmse_nominal, moving.rmse_calibrated) = (50, 1.0, 1.0);
+            (all.rows, all.rmse_nominal, all.rmse_calibrated) = (100, 5f64.sqrt(), 1.0);
+            (moving.coverage95, all.coverage95) = (0.8, 0.85);
+        }
+        let table = table(&validation, &joints);
+        assert_eq!(table.rows.len(), 3);
+        for row in &table.rows {
+            assert!(
+                row[2].starts_with("3.00") && row[3].starts_with("1.00"),
+                "{row:?}"
+            );
+            assert_eq!(row[5], "90.0\u{202f}%");
+        }
+        validation.moving = validation.filtered.clone();
+        assert!(super::table(&validation, &joints).rows.is_empty());
+    }
 }

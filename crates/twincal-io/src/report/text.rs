@@ -66,8 +66,22 @@ pub(super) fn escape(text: &str) -> String {
 
 /// [`escape`]d text with places for line breaks after `_` and `.` before a letter: names break there or nowhere, and
 /// only words of more than `whole` letters.
+///
+/// What stands between two backticks is code.
 pub(super) fn breakable(text: &str, whole: usize) -> String {
     let text = clean(text);
+    let parts: Vec<&str> = text.split('`').collect();
+    if parts.len() % 2 == 0 {
+        return breaking(&text, whole);
+    }
+    let tagged = parts.iter().enumerate().map(|(n, part)| match n % 2 {
+        0 => breaking(part, whole),
+        _ => format!("<code>{}</code>", breaking(part, whole)),
+    });
+    tagged.collect()
+}
+
+fn breaking(text: &str, whole: usize) -> String {
     let mut out = String::with_capacity(text.len());
     for word in text.split_inclusive(char::is_whitespace) {
         if word.trim_end().chars().count() <= whole {

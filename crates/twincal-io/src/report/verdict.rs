@@ -1,10 +1,8 @@
 //! Can this twin be used, and where not: the first thing the report says, by held-out data and by what was found that is not to be rested on.
 
 use super::grounds::{self, rows_of};
-use super::limits::{
-    COVERAGE, FEW, converged, decisive, large, limits, lost, no_bodies, not_to_rest_on, too_narrow,
-    worse,
-};
+use super::limits::{COVERAGE, FEW, converged, decisive, large, limits, lost, too_narrow, worse};
+use super::reservations::{no_bodies, not_to_rest_on};
 use super::shape;
 use super::standstill;
 use super::text::with_sd;
@@ -63,7 +61,8 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     let mut each = scores.joints.iter();
     let too_narrow = each.any(|j| too_narrow(j, memory(joints, &j.joint)));
     let firm = not_to_rest_on(calibration).is_empty();
-    let rest_worse = standstill::rest_got_worse(calibration);
+    let rest_worse =
+        standstill::rest_got_worse(calibration) && standstill::few_pauses(calibration).is_none();
     let (large, lost) = (large(scores, joints).len(), lost(scores, joints).len());
     let limits = limits(calibration, joints);
     let serious = calibration

@@ -288,10 +288,21 @@ impl Calibration {
             (Alike::EveryMotion, "in every motion"),
             (Alike::TheseLogs, "in these logs"),
         ];
+        let in_a_group =
+            |name: &String| self.groups.iter().any(|group| group.members.contains(name));
         let sentence = |(alike, place): (Alike, &str)| {
             let own = self.groups.iter().filter(|group| group.settled);
             let own = own.filter(|group| group.alike == alike);
-            let told: Vec<String> = own.map(|group| named(&group.members).join(" = ")).collect();
+            let mut told: Vec<String> =
+                own.map(|group| named(&group.members).join(" = ")).collect();
+            // What several others have together only.
+            let spanned = self.components.iter().filter(|own| {
+                alike == Alike::EveryMotion
+                    && own.selected
+                    && !own.alias_of.is_empty()
+                    && !in_a_group(&own.name)
+            });
+            told.extend(spanned.map(|own| format!("{} = {}", own.name, own.alias_of.join(" + "))));
             (!told.is_empty()).then(|| {
                 format!(
                     "same torque {place}, told apart by the prior alone (the first is preferred): {}",

@@ -14,6 +14,8 @@ use crate::term::{Library, estimate};
 
 /// A half that leaves a coefficient this wide, in prior sd, has not seen it.
 const UNSEEN: f64 = 0.9;
+/// Rows of the smaller half per row of the larger one, below which they are no halves.
+const LEAST: f64 = 0.1;
 /// Share of a log that may be left out between its halves, so that no filter reaches over the cut.
 const MOST_GAP: f64 = 0.1;
 
@@ -62,6 +64,13 @@ pub(super) fn repeat(
     inside: &[bool],
 ) -> Result<Vec<Repeat>> {
     let mut found: Vec<(Problem, Posterior, Posterior)> = Vec::new();
+    let rows = cut
+        .halves
+        .each_ref()
+        .map(|half| half.iter().map(|part| part.rows.len()).sum::<usize>());
+    if (rows[0].min(rows[1]) as f64) < LEAST * rows[0].max(rows[1]) as f64 {
+        return Ok(Vec::new()); // two halves in name only
+    }
     for half in &cut.halves {
         let mut problem = assemble(&total(half), columns, &fit.plug_in, prior)?;
         problem.prior = fit.problem.prior.clone();

@@ -128,8 +128,8 @@ impl ParameterSummary {
     }
 }
 
-/// Both ends of the central 68.3 % interval, where ± does not describe it: it is lopsided, ± reaches beyond the 95 % interval, or that
-/// is far longer on one side; those of the 95 % interval where models far off make it three times as long as ± says.
+/// Both ends of the 95 % interval, where ± does not describe a number: the central 68.3 % are lopsided, ± reaches beyond the 95 % interval, or
+/// that is far longer on one side, or three times as long as ± says, for models far off.
 pub(super) fn ends(
     value: f64,
     spread: f64,
@@ -144,11 +144,7 @@ pub(super) fn ends(
     let (near95, far95) = arms(interval95);
     let lopsided = far > LOPSIDED * near || far95 > LOPSIDED_95 * near95 || near95 < spread;
     let known = near.is_finite() && far95.is_finite() && spread > 0.0;
-    match known {
-        true if is_split(spread, interval95) => Some(interval95),
-        true if lopsided => Some(interval68),
-        _ => None,
-    }
+    (known && (lopsided || is_split(spread, interval95))).then_some(interval95)
 }
 
 fn is_split(spread: f64, [low, high]: [f64; 2]) -> bool {
@@ -490,16 +486,16 @@ mod tests {
         };
         assert_eq!(of(5.0, [4.0, 6.0], [3.0, 7.0]), None);
         // UR10, viscous friction of the lift: ± 11 would say 26 to 48.
-        let ends = [20.05, 42.63];
-        assert_eq!(of(36.5, ends, [14.0, 48.0]), Some(ends));
+        let ends = [14.0, 48.0];
+        assert_eq!(of(36.5, [20.05, 42.63], ends), Some(ends));
         assert_eq!(of(36.5, [24.5, 42.63], [14.0, 48.0]), None);
         // ± 47 would reach below the 95 % interval.
-        let skewed = [284.0, 378.0];
-        assert_eq!(of(294.0, skewed, [276.0, 424.0]), Some(skewed));
+        let skewed = [276.0, 424.0];
+        assert_eq!(of(294.0, [284.0, 378.0], skewed), Some(skewed));
         // A few models far off on one side, and on both: UR10, preload of a spring beside an offset.
         let far = [-0.98, -0.44];
         assert_eq!(of(-0.75, far, [-1.3, 2.0]), Some([-1.3, 2.0]));
-        assert_eq!(of(-0.75, far, [-1.3, 1.8]), Some(far));
+        assert_eq!(of(-0.75, far, [-1.3, 1.4]), None);
         assert_eq!(of(0.762, [0.723, 0.801], [-2.5, 3.7]), Some([-2.5, 3.7]));
         assert_eq!(of(f64::NAN, [f64::NAN; 2], [f64::NAN; 2]), None);
         assert_eq!(of(0.0, [0.0; 2], [0.0; 2]), None);

@@ -148,7 +148,7 @@ pub fn lag_findings(pipeline: &Pipeline, lags: &[LogLag]) -> Vec<Finding> {
             let others = match most {
                 true => String::new(),
                 false => format!(
-                    "; {alike} of {all} logs say so, and that moves all of them: keep it where held-out torque gets better"
+                    "; only {alike} of {all} logs say so, and a lag moves all of them: try it, and keep what predicts held-out torque better"
                 ),
             };
             let still = if said { " still" } else { "" };

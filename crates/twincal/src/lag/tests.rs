@@ -75,7 +75,10 @@ fn what_one_of_many_logs_says_is_only_a_warning() {
     assert!(most.len() == 2 && most.iter().all(degraded), "{most:?}");
     let one = lag_findings(&pipeline(), &[log(0.0, 4.0), log(3.1, 0.0), log(6.2, 0.0)]);
     assert!(one.len() == 1 && one[0].severity == Severity::Warning);
-    assert!(one[0].message.contains("; 1 of 3 logs say so"), "{one:?}");
+    assert!(
+        one[0].message.contains("; only 1 of 3 logs say so"),
+        "{one:?}"
+    );
 }
 
 #[test]

@@ -61,7 +61,7 @@ pub(crate) fn velocity_resolution(
             "derived_acceleration",
             &facts.name,
             format!(
-                "joint `{}`: acceleration is not logged and was derived from {source}, by the motion filter at {:.3} Hz; encoder noise of {} leaves a noise of {} in velocity and {} in acceleration (SI units, per sample)",
+                "joint `{}`: acceleration is not logged and was derived from {source}, by the motion filter at {:.3} Hz; position noise of {}, as the spectrum has it, leaves a noise of {} in velocity and {} in acceleration (SI units, per sample)",
                 facts.name, pipeline.motion_cutoff_hz, significant(position, 2), significant(velocity, 2), significant(acceleration, 2)
             ),
             0,
@@ -76,7 +76,7 @@ pub(crate) fn velocity_resolution(
             &facts.name,
             format!(
                 "joint `{}`: the encoder steps by {}: quantisation alone leaves a noise of {} in velocity and {} in acceleration derived from \
-                 position (SI units, after the motion filter), and velocities below {} per s cannot be told from standstill; log the encoder's full resolution",
+                 position (SI units, after the motion filter; its whole noise may be more), and one step within the filter's window is {} per s, below which motion cannot be told from standstill; log the encoder's full resolution",
                 facts.name, significant(step, 3), significant(velocity, 2), significant(acceleration, 2), significant(stepping, 3)
             ),
             0,

@@ -272,8 +272,8 @@ pub(crate) fn report_short(log: &Recording, short: u64, rows: u64, findings: &mu
             "short_segments",
             &log.name,
             match short {
-                1 => format!("a segment between cuts ({rows} rows) is shorter than the motion filter and was dropped"),
-                _ => format!("{short} segments between cuts ({rows} rows) are shorter than the motion filter and were dropped"),
+                1 => format!("a segment between cuts ({rows} samples) is shorter than the motion filter and was dropped"),
+                _ => format!("{short} segments between cuts ({rows} samples) are shorter than the motion filter and were dropped"),
             },
             rows,
         ));

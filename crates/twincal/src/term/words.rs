@@ -20,7 +20,7 @@ pub(crate) fn estimate(value: f64, spread: f64) -> String {
     plain(value, spread)
 }
 
-/// "+294 (284 … 378)": the value and both ends of its central 68.3 % interval, where ± does not describe it.
+/// "+294 (284 … 378)": the value and both ends of its 95 % interval, where ± does not describe it.
 pub(super) fn with_ends(value: f64, [low, high]: [f64; 2]) -> String {
     let spread = 0.5 * (high - low);
     let size = value.abs().max(spread);

@@ -30,7 +30,7 @@ pub(in crate::report) fn figure(
     (!images.is_empty()).then(|| Figure {
         title: "Missing torque as a law of one joint".into(),
         read: "Over the range in the logs: what the model lacks on a joint as a function of its own position (springs, \
-               counterbalances) or velocity (friction). Where the band is narrow the law is known, even if its coefficients \
+               counterbalances) or velocity (friction), averaged over all models, those without an effect too. Where the band is narrow the law is known, even if its coefficients \
                cannot be told apart."
             .into(),
         legend: vec![MEAN, legend::BAND],
@@ -82,7 +82,7 @@ fn draw(curve: &Curve, components: &[ComponentSummary], joint: &Joint<'_>) -> Im
     )
 }
 
-/// "a and b; the band also allows for c (PIP 0.110)": what was found, and what was not and widens the band.
+/// "a and b; counted in by their probability: c (PIP 0.11)": what was found, and what was not and is in line and band all the same.
 fn laws(curve: &Curve, components: &[ComponentSummary]) -> String {
     let mut found = Vec::new();
     let mut open = Vec::new();
@@ -99,7 +99,7 @@ fn laws(curve: &Curve, components: &[ComponentSummary]) -> String {
     match open.is_empty() {
         true => text::list(&found),
         false => format!(
-            "{}; the band also allows for {}",
+            "{}; counted in by their probability: {}",
             text::list(&found),
             text::list(&open)
         ),
@@ -135,7 +135,7 @@ mod tests {
         assert_eq!(
             of(&[&open.name, &found.name]),
             format!(
-                "{}; the band also allows for {} (PIP {})",
+                "{}; counted in by their probability: {} (PIP {})",
                 found.name,
                 open.name,
                 text::probability(open.pip.unwrap())

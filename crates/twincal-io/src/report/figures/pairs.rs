@@ -309,12 +309,19 @@ fn labels_inside(x: &Scale) -> Vec<(f64, String)> {
         out
     };
     // Fewer candidates may leave more of them: 0.2 and 0.4 where 0.1, 0.2, 0.3 … would keep 0.1 and 0.4.
-    let tries = [2, 3, 4].map(|target| (fits(target), x.ticks(target).len()));
+    let tries = [2, 3, 4, 5, 6].map(|target| (fits(target), x.ticks(target).len()));
     let whole = tries
         .iter()
         .filter(|(kept, all)| kept.len() == *all)
         .max_by_key(|(kept, _)| kept.len());
-    whole.map_or_else(|| tries[0].0.clone(), |(kept, _)| kept.clone())
+    // One number alone is no scale.
+    match whole {
+        Some((kept, _)) if kept.len() > 1 => kept.clone(),
+        _ => {
+            let most = tries.iter().rev().max_by_key(|(kept, _)| kept.len());
+            most.map_or_else(Vec::new, |(kept, _)| kept.clone())
+        }
+    }
 }
 
 fn histogram(svg: &mut Svg, values: &[f64], x: Scale, (top, bottom): (f64, f64)) {

@@ -126,7 +126,7 @@ fn seconds(trace: &Trace, range: &Range<usize>) -> f64 {
     time.last().copied().unwrap_or(0.0) - time.first().copied().unwrap_or(0.0)
 }
 
-/// The fifth of the trace (2 s to 10 s) with the largest squared error of the calibrated torque; all of a short trace.
+/// The fifth of the trace (2 s to 10 s) with the largest squared error of the calibrated torque while the joint moves; all of a short trace.
 fn worst_window(trace: &Trace) -> Range<usize> {
     let n = rows(trace);
     let total = seconds(trace, &(0..n));
@@ -135,9 +135,12 @@ fn worst_window(trace: &Trace) -> Range<usize> {
     if total.is_nan() || total <= 1.5 * length || size < 20 || size >= n {
         return 0..n;
     }
+    // At standstill friction is whatever it takes: that is no fault of the twin's.
+    let moves = trace.standstill.contains(&false);
     let error = |i: usize| {
         let e = trace.measured[i] - trace.calibrated[i];
-        if e.is_finite() { e * e } else { 0.0 }
+        let still = moves && trace.standstill[i];
+        if e.is_finite() && !still { e * e } else { 0.0 }
     };
     let mut sum: f64 = (0..size).map(error).sum();
     let (mut best, mut largest) = (0, sum);

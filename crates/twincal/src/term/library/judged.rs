@@ -28,15 +28,26 @@ pub(super) fn judged(
     findings: &mut Vec<Finding>,
 ) -> Result<Judged> {
     let sources: Vec<(usize, ModelColumn)> = sources(candidates);
-    let at = |motions: &[&Motions]| match model {
-        Some(model) => torques(model, &sources, motions, joints),
-        None => Vec::new(),
-    };
-    let verdicts = judge(graph, candidates, joints, shares, &at);
     let acting = match model {
         Some(model) => acting_joints(model, candidates, joints),
         None => vec![Vec::new(); candidates.len()],
     };
+    let at = |motions: &[&Motions]| match model {
+        Some(model) => {
+            let mut all = torques(model, &sources, motions, joints);
+            // What rounding leaves of a torque that is zero by structure points somewhere, and would stand for whatever points there too.
+            for (k, torque) in &mut all {
+                for (entry, value) in torque.iter_mut().enumerate() {
+                    if !acting[*k].contains(&(entry % joints)) {
+                        *value = 0.0;
+                    }
+                }
+            }
+            all
+        }
+        None => Vec::new(),
+    };
+    let verdicts = judge(graph, candidates, joints, shares, &at);
     let statuses = statuses(graph, candidates, &verdicts, &acting, findings)?;
     Ok((statuses, acting))
 }

@@ -2,7 +2,7 @@
 
 use super::super::aliases::dependent;
 use super::super::{Family, Library};
-use super::all;
+use super::{all, status_of};
 use crate::robot::{
     Inertia, JointDescription, JointKind, LinkDescription, Motion, Robot, RobotDescription,
     nominal_torque,
@@ -207,4 +207,47 @@ fn generic_family_spans_the_inverse_dynamics_of_any_chain() {
             "{joints:?}: only the torque itself lies in the span, to 1e-9"
         );
     }
+}
+
+/// The axis y is turned to z by half a right angle's sine and cosine, of which one is 6e-17: what that leaves of a torque that is zero by
+/// structure must not stand for anything. `∂/∂q cos q` is the torque of a payload's moment along z, whose
+/// tensor about the rod's centre of mass is zero: of one about the hinge, which the motor's inertia takes off.
+#[test]
+fn rounding_stands_for_nothing() {
+    let inertia = Inertia {
+        mass: 0.7,
+        com: [0.02, 0.0, -0.4],
+        tensor: [[0.003, 0.0, 0.0], [0.0, 0.003, 0.0], [0.0, 0.0, 0.001]],
+    };
+    let description = RobotDescription {
+        name: "pendulum".to_owned(),
+        gravity: [0.0, 0.0, -9.81],
+        links: vec![
+            LinkDescription {
+                name: "base".to_owned(),
+                inertia: None,
+            },
+            LinkDescription {
+                name: "rod".to_owned(),
+                inertia: Some(inertia),
+            },
+        ],
+        joints: vec![JointDescription {
+            axis: [0.0, 1.0, 0.0],
+            ..JointDescription::new("hinge", JointKind::Revolute, "base", "rod")
+        }],
+        allow_unphysical: false,
+    };
+    let robot = Robot::new(description, &BTreeMap::new()).unwrap().0;
+    let mut settings = all(&[]);
+    settings.families.push(Family::Payload);
+    let (library, _) = Library::propose(&robot, &settings).unwrap();
+    assert_eq!(
+        status_of(&library, "cos(q1)").to_string(),
+        "alias_of:hinge.motor_inertia, payload.mz"
+    );
+    assert_eq!(
+        status_of(&library, "sin(q1)").to_string(),
+        "alias_of:hinge.motor_inertia, payload.mx"
+    );
 }

@@ -1,0 +1,115 @@
+//! What was found and is not to be rested on, in words.
+
+use super::figures::sensitivity;
+use super::grounds::NAMED;
+use super::halves::whole_against_halves;
+use super::remarks::{moves_with_the_cutoff, size_of_gravity};
+use super::text::{list, number};
+use twincal::Severity;
+use twincal::calibrate::{Calibration, Repeat, Repeated};
+
+/// What was found and is not to be rested on: bodies that are none, gravity of another size, numbers on which the halves of the data differ, effects
+/// that neither half has alone, and those that another prior would leave out.
+pub(super) fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
+    let mut out = Vec::new();
+    let bodies = no_bodies(calibration);
+    if !bodies.is_empty() {
+        out.push(format!(
+            "What was found of {} is no rigid body (in more than 95 % of the draws): another effect is missing among the candidates, or inertias of the model are wrong; do not read it as mass or inertia.",
+            list(&bodies)
+        ));
+    }
+    let found = calibration.components.iter().filter(|c| c.selected);
+    out.extend(found.filter_map(|component| {
+        let words = size_of_gravity(component, calibration)?;
+        Some(format!("{}: {words}.", component.name))
+    }));
+    let effects = || (calibration.repeatability).chunk_by(|a, b| a.component == b.component);
+    let apart = effects().filter(|own| Repeat::of_effect(own) == Repeated::Differs);
+    let apart: Vec<String> = apart
+        .map(|own| {
+            let z = own.iter().filter_map(|number| number.z).map(f64::abs);
+            format!(
+                "{} ({} sd)",
+                own[0].component,
+                number(z.fold(0.0, f64::max), 2)
+            )
+        })
+        .collect();
+    if !apart.is_empty() {
+        out.push(format!(
+            "The two halves of the data differ by 3 sd or more on {}.",
+            list(&apart)
+        ));
+    }
+    let in_neither = effects().filter(|own| Repeat::of_effect(own) == Repeated::InNeitherHalf);
+    let in_neither: Vec<&str> = in_neither.map(|own| own[0].component.as_str()).collect();
+    if !in_neither.is_empty() {
+        out.push(format!(
+            "Found in the whole data, but in neither half alone: {}.",
+            list(&in_neither)
+        ));
+    }
+    let found = calibration.components.iter().filter(|c| c.selected);
+    let against: Vec<String> = found
+        .filter_map(|component| {
+            let against = whole_against_halves(component, calibration)?;
+            Some(format!("{} ({against})", component.name))
+        })
+        .collect();
+    if !against.is_empty() {
+        out.push(format!(
+            "All data together say what their two halves do not: {}.",
+            list(&against)
+        ));
+    }
+    let by_prior: Vec<&str> = sensitivity::by_prior(calibration)
+        .filter(|component| component.selected)
+        .map(|component| component.name.as_str())
+        .collect();
+    if !by_prior.is_empty() {
+        out.push(format!("Other priors would leave out {}.", list(&by_prior)));
+    }
+    out
+}
+
+/// What hangs on settings that are as good: the filter's cut-off, and priors that would add something.
+pub(super) fn of_settings(calibration: &Calibration) -> Vec<String> {
+    let mut out = Vec::new();
+    let moved: Vec<String> = (calibration.components.iter())
+        .filter(|component| component.selected && moves_with_the_cutoff(component, calibration))
+        .map(|component| component.name.clone())
+        .collect();
+    if !moved.is_empty() {
+        out.push(format!(
+            "Another cut-off of the filter moves by more than their ±: {}.",
+            list(&named(moved))
+        ));
+    }
+    let added: Vec<String> = sensitivity::by_prior(calibration)
+        .filter(|component| !component.selected)
+        .map(|component| component.name.clone())
+        .collect();
+    if !added.is_empty() {
+        out.push(format!("Other priors would add {}.", list(&named(added))));
+    }
+    out
+}
+
+/// The first names; the others are counted.
+fn named(mut names: Vec<String>) -> Vec<String> {
+    let more = names.len().saturating_sub(NAMED);
+    names.truncate(NAMED);
+    if more > 0 {
+        names.push(format!("{more} more"));
+    }
+    names
+}
+
+/// Links of which what was found is no rigid body.
+pub(super) fn no_bodies(calibration: &Calibration) -> Vec<&str> {
+    let found = calibration.findings.iter();
+    let found = found.filter(|f| f.code == "unphysical_inertia_found");
+    let sure = found.filter(|f| f.severity == Severity::Warning);
+    sure.map(|f| f.subject.as_str()).collect()
+}
