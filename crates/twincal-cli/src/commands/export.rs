@@ -405,6 +405,10 @@ fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
                 "{words} ({place}; in the file {}, nearest to that and the joint's quadratic friction)",
                 short(value)
             ),
+            Some(value) if *pip > CERTAIN => format!(
+                "{words} ({place}; in the file {}, the average over models, some of which hold other effects beside it)",
+                short(value)
+            ),
             Some(value) => format!(
                 "{words} ({place}; in the file {}, the average over models with and without it, PIP {})",
                 short(value),
@@ -496,8 +500,8 @@ fn how_good(change: &WriteBack, calibration: &Calibration, holds: Holds, termina
     ) {
         warn(&format!("warning: {text}"), terminal);
     }
-    let text = "lacks: rms over states within the training range of the twin's torque that is not in the file, all effects together; held \
-                out: RMSE of the twin, to which that comes. N·m, of sliders N.";
+    let text = "lacks: rms of the twin's torque that is not in the file, all effects together, over states within the training range; held \
+                out: RMSE of the twin itself on held-out rows, which are other states. N·m, of sliders N.";
     paragraph(text, terminal);
     terminal.say("");
 }

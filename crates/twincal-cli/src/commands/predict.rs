@@ -119,7 +119,7 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
     } else if let Some(output) = output {
         paragraph(
             &format!(
-                "{rows} of {input_rows} rows predicted{}, {extrapolating} of them extrapolating",
+                "{rows} of {input_rows} rows predicted{}, {extrapolating} of them extrapolating on some joint; torque is unfiltered",
                 if rows < input_rows {
                     " (the motion filter takes some at either end of each stretch)"
                 } else {

@@ -56,9 +56,7 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
         let text = format!("{} ({})", component.words, said.join(", "));
         paragraph(&text, terminal);
     }
-    let unseen: Vec<&str> = (all.iter().filter(|component| component.is_unseen()))
-        .map(|component| component.name.as_str())
-        .collect();
+    let unseen: Vec<&str> = calibration.unseen().map(|own| own.name.as_str()).collect();
     if !unseen.is_empty() {
         let text = format!("not seen by these data: {}", unseen.join(", "));
         paragraph(&text, terminal);

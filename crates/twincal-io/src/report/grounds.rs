@@ -1,11 +1,12 @@
 //! What the verdict rests on, a sentence each: error of held-out torque, what friction alone would leave, intervals, effects.
 
+use super::figures::inclusion::family_name;
 use super::figures::sensitivity;
-use super::limits::{decisive, has_standstill};
+use super::limits::{FEW, decisive, has_standstill};
 use super::remarks::doubts;
 use super::standstill::{at_standstill, held_at_rest, rest_got_worse};
 use super::text::{count, list, number, percent};
-use super::view::{Joint, pooled_unit};
+use super::view::{Joint, independent_rows, pooled_unit};
 use twincal::calibrate::{Calibration, ComponentSummary, Verdict as Decision};
 use twincal::validate::{JointScore, Scores, Split};
 
@@ -22,6 +23,8 @@ const SURE: f64 = 0.95;
 /// Share of the intervals' width that would have done from which they are called too wide, and the share of rows that they then hold.
 const MUCH_TOO_WIDE: f64 = 0.5;
 const SHARE_ALL: f64 = 0.99;
+/// Effects up to this number are named.
+const FEW_EFFECTS: usize = 4;
 /// Joints that are named; the others are counted.
 pub(super) const NAMED: usize = 3;
 
@@ -30,7 +33,8 @@ pub(super) fn grounds(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<St
     // Where it got worse it is among what to mind.
     out.extend(at_standstill(calibration, joints).filter(|_| !rest_got_worse(calibration)));
     out.extend(friction_alone(calibration, joints));
-    out.push(held(calibration));
+    out.push(held(calibration, joints));
+    out.extend(what_was_found(calibration));
     out.push(effects_found(calibration));
     out
 }
@@ -191,7 +195,7 @@ pub fn friction_only(scores: &Scores) -> Option<f64> {
 }
 
 /// How much the 95 % intervals hold: of moving joints, and of all rows where some stand still.
-fn held(calibration: &Calibration) -> String {
+fn held(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
     let all = &calibration.validation.filtered;
     let judged = decisive(&calibration.validation);
     let (rows, share) = (count(rows_of(judged)), percent(judged.coverage95));
@@ -202,7 +206,10 @@ fn held(calibration: &Calibration) -> String {
     };
     // Where all is inside, that is no praise.
     let factor = calibration.validation.conformal.as_ref().map(|c| c.factor);
-    let wide = match factor.filter(|f| *f < MUCH_TOO_WIDE && judged.coverage95 > SHARE_ALL) {
+    let wide = match factor.filter(|f| {
+        let enough = independent_rows(calibration, joints) >= FEW;
+        *f < MUCH_TOO_WIDE && judged.coverage95 > SHARE_ALL && enough
+    }) {
         Some(factor) => format!(
             ": they are wider than they need to be, {} of their width would have done",
             percent(factor)
@@ -217,7 +224,7 @@ fn held(calibration: &Calibration) -> String {
     let differ = (judged.coverage95 - all.coverage95).abs() > SHARE_WORTH_TELLING;
     let all = match differ {
         true => format!(
-            ", and {} of the {} at standstill",
+            ", and {} of the {} at standstill, where they are widened",
             percent(held_at_rest(&calibration.validation)),
             count(rows_of(all).saturating_sub(rows_of(judged)))
         ),
@@ -233,6 +240,25 @@ pub(super) fn held_out_seconds(calibration: &Calibration) -> f64 {
     let scores = &calibration.validation.filtered;
     let rows = scores.joints.iter().map(|joint| joint.rows).max();
     rows.unwrap_or(0).saturating_sub(1) as f64 / calibration.kept_rate_hz()
+}
+
+/// Few effects by name, many by their kinds.
+fn what_was_found(calibration: &Calibration) -> Option<String> {
+    let all = calibration.components.iter();
+    let found: Vec<&ComponentSummary> = all
+        .filter(|c| c.selected && c.verdict != Some(Decision::Undecided))
+        .collect();
+    let told: Vec<String> = match found.len() {
+        0 => return None,
+        1..=FEW_EFFECTS => found.iter().map(|own| own.name.clone()).collect(),
+        _ => {
+            let kinds = found.chunk_by(|a, b| a.family == b.family);
+            kinds
+                .map(|own| format!("{} ({})", family_name(own[0].family), own.len()))
+                .collect()
+        }
+    };
+    Some(format!("Found: {}.", list(&told)))
 }
 
 /// What is more likely than not, without and with what the data leave open, and how much of it stands every check.
@@ -437,7 +463,7 @@ mod tests {
         assert!(
             !grounds
                 .iter()
-                .any(|g| g.contains("friction") || g.contains("s of log"))
+                .any(|g| g.contains("offset alone") || g.contains("s of log"))
         );
     }
 

@@ -118,7 +118,7 @@ pub(super) fn repeats(calibration: &Calibration) -> Table {
         "the two halves (sd apart)",
         "first half",
         "second half",
-        "all data",
+        "all data, likewise",
         "unit",
         "probability in each half",
     ]);
@@ -186,6 +186,7 @@ pub(super) fn compact(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<St
             }
         ),
     }];
+    out.push("It is a check: `predict` and `export` use the average over all models.".into());
     let [average, own] = compact.training_rmse;
     if average.is_finite() && own.is_finite() {
         out.push(format!(

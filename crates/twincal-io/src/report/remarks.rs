@@ -153,15 +153,20 @@ fn hangs_on(component: &ComponentSummary, calibration: &Calibration) -> Option<S
     };
     let joint = component.name.rsplit_once('.')?.0;
     let mut others = calibration.components.iter();
+    let undecided = |other: &ComponentSummary| other.verdict == Some(Verdict::Undecided);
+    let against = |other: &ComponentSummary| {
+        other.selected && whole_against_halves(other, calibration).is_some()
+    };
     let open = others.find(|other| {
         changes.contains(&other.family)
-            && other.verdict == Some(Verdict::Undecided)
+            && (undecided(other) || against(other))
             && (other.name.rsplit_once('.')).is_some_and(|(own, _)| own == joint)
     })?;
-    Some(format!(
-        "its value hangs on {}, which is undecided",
-        open.name
-    ))
+    let why = match undecided(open) {
+        true => "which is undecided",
+        false => "on which the halves say something else",
+    };
+    Some(format!("its value hangs on {}, {why}", open.name))
 }
 
 /// What else may be behind the same torque.
@@ -218,12 +223,12 @@ fn rivals(component: &ComponentSummary, calibration: &Calibration) -> Option<Str
             let place = place(settled.alike);
             Some(if *first == component.name {
                 format!(
-                    "the same as {} {place}; the prior prefers {first}",
+                    "can be told as {} {place}; the prior prefers {first}",
                     others(&settled.members)
                 )
             } else {
                 format!(
-                    "the same as {} {place}, which the prior prefers",
+                    "can be told as {} {place}, which the prior prefers",
                     told(first)
                 )
             })
@@ -413,7 +418,7 @@ mod tests {
         });
         assert_eq!(
             said,
-            ["the same as x in every motion, which the prior prefers"]
+            ["can be told as x in every motion, which the prior prefers"]
         );
         let said = of(|c| {
             let mut group = group(Alike::EveryMotion, true);
@@ -422,7 +427,7 @@ mod tests {
         });
         assert_eq!(
             said,
-            ["the same as x, y and 2 more in every motion; the prior prefers q2^2"]
+            ["can be told as x, y and 2 more in every motion; the prior prefers q2^2"]
         );
     }
 

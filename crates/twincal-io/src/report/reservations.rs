@@ -76,6 +76,13 @@ pub(super) fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
 /// What hangs on settings that are as good: the filter's cut-off, and priors that would add something.
 pub(super) fn of_settings(calibration: &Calibration) -> Vec<String> {
     let mut out = Vec::new();
+    let added: Vec<String> = sensitivity::by_prior(calibration)
+        .filter(|component| !component.selected)
+        .map(|component| component.name.clone())
+        .collect();
+    if !added.is_empty() {
+        out.push(format!("Other priors would add {}.", list(&named(added))));
+    }
     let moved: Vec<String> = (calibration.components.iter())
         .filter(|component| component.selected && moves_with_the_cutoff(component, calibration))
         .map(|component| component.name.clone())
@@ -85,13 +92,6 @@ pub(super) fn of_settings(calibration: &Calibration) -> Vec<String> {
             "Another cut-off of the filter moves by more than their ±: {}.",
             list(&named(moved))
         ));
-    }
-    let added: Vec<String> = sensitivity::by_prior(calibration)
-        .filter(|component| !component.selected)
-        .map(|component| component.name.clone())
-        .collect();
-    if !added.is_empty() {
-        out.push(format!("Other priors would add {}.", list(&named(added))));
     }
     out
 }

@@ -150,8 +150,15 @@ pub(super) fn hardly_at_rest(calibration: &Calibration, joints: &[Joint<'_>]) ->
             1 => ("hardly", "but only one held-out row is at rest".to_owned()),
             n => ("hardly", format!("but only {n} held-out rows are at rest")),
         };
+        let pairs: Vec<_> = (validation.filtered.joints.iter())
+            .zip(&validation.moving.joints)
+            .collect();
+        let error = still(&pairs).filter(|_| at_rest > 0);
+        let error = error.map_or_else(String::new, |error| {
+            format!(" (error {})", change(error, pooled_unit(joints)))
+        });
         format!(
-            "Standstill is {tested} tested: {} stands still in {} of the logs' rows, {held_out}.",
+            "Standstill is {tested} tested: {} stands still in {} of the logs' rows, {held_out}{error}.",
             joint.name,
             percent(share)
         )
@@ -167,6 +174,7 @@ pub(super) fn table(validation: &Validation, joints: &[Joint<'_>]) -> Table {
         "RMSE calibrated",
         "change",
         "95 % coverage",
+        "mean width",
     ]);
     let (all, moving) = (&validation.filtered, decisive(validation));
     let pairs: Vec<_> = (all.joints.iter().zip(&moving.joints))
@@ -181,7 +189,8 @@ pub(super) fn table(validation: &Validation, joints: &[Joint<'_>]) -> Table {
                 with_unit(before, unit),
                 with_unit(after, unit),
                 tables::change(before, after),
-                percent(held(pairs)),
+                percent(at_rest(pairs, |score| score.coverage95)),
+                with_unit(at_rest(pairs, |score| score.mean_width95), unit),
             ]);
         }
     };
@@ -202,13 +211,15 @@ pub(super) fn table(validation: &Validation, joints: &[Joint<'_>]) -> Table {
 /// Share of the rows at standstill that 95 % intervals hold.
 pub(super) fn held_at_rest(validation: &Validation) -> f64 {
     let (all, moving) = (&validation.filtered, decisive(validation));
-    held(&all.joints.iter().zip(&moving.joints).collect::<Vec<_>>())
+    let pairs: Vec<_> = all.joints.iter().zip(&moving.joints).collect();
+    at_rest(&pairs, |score| score.coverage95)
 }
 
-fn held(pairs: &[(&JointScore, &JointScore)]) -> f64 {
+/// The mean over the rows at standstill of what is a mean over all rows and over the moving ones.
+fn at_rest(pairs: &[(&JointScore, &JointScore)], of: fn(&JointScore) -> f64) -> f64 {
     let inside = |score: &JointScore| match score.rows {
         0 => 0.0,
-        rows => rows as f64 * score.coverage95,
+        rows => rows as f64 * of(score),
     };
     let rows = pairs
         .iter()
@@ -240,12 +251,12 @@ mod tests {
 
     #[test]
     fn few_pauses_are_counted_and_many_are_not_told() {
-        let of = |rows: &[std::ops::Range<usize>]| few_pauses(&resting(rows));
-        assert_eq!(of(&[]), None);
-        assert_eq!(of(&[3..13]).as_deref(), Some("one pause, 1.0 s"));
-        let two = of(&[3..13, 20..25]);
-        assert_eq!(two.as_deref(), Some("2 pauses, 1.5 s in all"));
-        assert_eq!(of(&[0..2, 4..6, 8..10]), None);
+        let pauses = [3..13, 20..25, 30..32];
+        let of = |first: usize| few_pauses(&resting(&pauses[..first]));
+        assert_eq!(of(0), None);
+        assert_eq!(of(1).as_deref(), Some("one pause, 1.0 s"));
+        assert_eq!(of(2).as_deref(), Some("2 pauses, 1.5 s in all"));
+        assert_eq!(of(3), None);
     }
 
     /// Of 100 rows 50 move; mean squares of all and of those that move leave 9 and 1 at rest, and 90 and 45 held ones 45.

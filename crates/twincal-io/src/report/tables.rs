@@ -129,12 +129,15 @@ pub(super) fn scores(scores: &Scores, joints: &[Joint<'_>], rows: Rows) -> Table
 /// Head of the errors that friction alone would leave.
 const FRICTION: &str = "friction only";
 
+/// Head of the autoregressive coefficients, which only that likelihood has.
+const RHO: &str = "AR(1) ρ";
+
 /// Noise per joint as it was used.
 pub(super) fn noise(joints: &[Joint<'_>]) -> Table {
     let mut table = Table::new([
         "joint",
         "noise sd",
-        "AR(1) ρ",
+        RHO,
         "weight",
         "rows",
         "effective rows",
@@ -161,6 +164,9 @@ pub(super) fn noise(joints: &[Joint<'_>]) -> Table {
             number(noise.interval_factor, 3),
             with_unit(noise.out_of_band, joint.units.torque),
         ]);
+    }
+    if joints.iter().all(|joint| joint.noise.rho == 0.0) {
+        table.drop_column(RHO);
     }
     table
 }

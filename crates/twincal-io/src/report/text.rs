@@ -71,7 +71,7 @@ pub(super) fn escape(text: &str) -> String {
 pub(super) fn breakable(text: &str, whole: usize) -> String {
     let text = clean(text);
     let parts: Vec<&str> = text.split('`').collect();
-    if parts.len() % 2 == 0 {
+    if parts.len().is_multiple_of(2) {
         return breaking(&text, whole);
     }
     let tagged = parts.iter().enumerate().map(|(n, part)| match n % 2 {

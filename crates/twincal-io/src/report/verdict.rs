@@ -1,7 +1,9 @@
 //! Can this twin be used, and where not: the first thing the report says, by held-out data and by what was found that is not to be rested on.
 
 use super::grounds::{self, rows_of};
-use super::limits::{COVERAGE, FEW, converged, decisive, large, limits, lost, too_narrow, worse};
+use super::limits::{
+    COVERAGE, FEW, converged, decisive, has_standstill, large, limits, lost, too_narrow, worse,
+};
 use super::reservations::{no_bodies, not_to_rest_on};
 use super::shape;
 use super::standstill;
@@ -172,7 +174,10 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     };
     Verdict {
         grade,
-        headline: headline.into(),
+        headline: match has_standstill(&calibration.validation) {
+            true => headline.replace("The torque yes", "While joints move, the torque yes"),
+            false => headline.into(),
+        },
         grounds: grounds::grounds(calibration, joints),
         limits,
     }

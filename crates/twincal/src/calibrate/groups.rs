@@ -281,7 +281,7 @@ impl<'a> Candidates<'a> {
 
 impl Calibration {
     /// Groups of which the prior alone prefers a member, in a sentence for those alike in every motion and one for those alike in these logs:
-    /// "same torque in every motion, told apart by the prior alone (the first is preferred): payload = tool.tensor; …".
+    /// "told as either in every motion, which the prior alone decides (the first is preferred): payload or tool.tensor; …".
     #[must_use]
     pub fn told_apart_by_the_prior(&self) -> Vec<String> {
         let kinds = [
@@ -293,8 +293,9 @@ impl Calibration {
         let sentence = |(alike, place): (Alike, &str)| {
             let own = self.groups.iter().filter(|group| group.settled);
             let own = own.filter(|group| group.alike == alike);
-            let mut told: Vec<String> =
-                own.map(|group| named(&group.members).join(" = ")).collect();
+            let mut told: Vec<String> = own
+                .map(|group| named(&group.members).join(" or "))
+                .collect();
             // What several others have together only.
             let spanned = self.components.iter().filter(|own| {
                 alike == Alike::EveryMotion
@@ -302,10 +303,10 @@ impl Calibration {
                     && !own.alias_of.is_empty()
                     && !in_a_group(&own.name)
             });
-            told.extend(spanned.map(|own| format!("{} = {}", own.name, own.alias_of.join(" + "))));
+            told.extend(spanned.map(|own| format!("{} or {}", own.name, own.alias_of.join(" + "))));
             (!told.is_empty()).then(|| {
                 format!(
-                    "same torque {place}, told apart by the prior alone (the first is preferred): {}",
+                    "told as either {place}, which the prior alone decides (the first is preferred): {}",
                     told.join("; ")
                 )
             })

@@ -401,7 +401,7 @@ fn pair_plot_columns(library: &Library, terms: &[TermSummary]) -> Vec<usize> {
     let mut selected: Vec<usize> = (0..library.columns().len())
         .filter(|&k| of(k).selected)
         .collect();
-    let strength = |k: usize| match (of(k).conditional_median, of(k).conditional_interval68) {
+    let strength = |k: usize| match (of(k).conditional_median, of(k).interval95) {
         (Some(median), Some([low, high])) => {
             median.abs() / (0.5 * (high - low)).max(f64::MIN_POSITIVE)
         }

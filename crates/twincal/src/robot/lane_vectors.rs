@@ -1,6 +1,7 @@
 //! Vectors of three components in lanes, and a body's frame seen from its parent's: what every recursion shares.
 
 use super::bodies::Body;
+use super::spatial::Matrix;
 use pulp::Simd;
 
 /// Three components, each a group of samples.
@@ -108,14 +109,36 @@ pub(super) fn turn<S: Simd>(s: S, cos: S::f64s, sin: S::f64s, v: V3<S>) -> V3<S>
 /// Rᵀ v for the body's constant rotation R.
 #[inline(always)]
 pub(super) fn to_child<S: Simd>(s: S, body: &Body, v: V3<S>) -> V3<S> {
+    let [v] = all_to_child(s, body, [v]);
+    v
+}
+
+/// The same of several vectors, which asks once what kind of rotation it is.
+#[inline(always)]
+pub(super) fn all_to_child<S: Simd, const N: usize>(
+    s: S,
+    body: &Body,
+    mut vectors: [V3<S>; N],
+) -> [V3<S>; N] {
     let r = &body.rotation;
     if body.about_x {
-        return [
-            v[0],
-            two(s, r[1][1], r[2][1], [v[1], v[2]]),
-            two(s, r[1][2], r[2][2], [v[1], v[2]]),
-        ];
+        for v in &mut vectors {
+            *v = [
+                v[0],
+                two(s, r[1][1], r[2][1], [v[1], v[2]]),
+                two(s, r[1][2], r[2][2], [v[1], v[2]]),
+            ];
+        }
+    } else {
+        for v in &mut vectors {
+            *v = back(s, r, *v);
+        }
     }
+    vectors
+}
+
+#[inline(always)]
+fn back<S: Simd>(s: S, r: &Matrix, v: V3<S>) -> V3<S> {
     [
         dot(
             s,
@@ -188,6 +211,20 @@ pub(super) fn to_parent_add<S: Simd>(s: S, body: &Body, v: V3<S>, c: V3<S>) -> V
         dot_add(s, splat(s, r[1]), v, c[1]),
         dot_add(s, splat(s, r[2]), v, c[2]),
     ]
+}
+
+/// R v and R n + c, which asks once what kind of rotation it is.
+#[inline(always)]
+pub(super) fn both_to_parent<S: Simd>(
+    s: S,
+    body: &Body,
+    [v, n]: [V3<S>; 2],
+    c: V3<S>,
+) -> (V3<S>, V3<S>) {
+    match body.about_x {
+        true => (to_parent(s, body, v), to_parent_add(s, body, n, c)),
+        false => (to_parent(s, body, v), to_parent_add(s, body, n, c)),
+    }
 }
 
 /// a × b.

@@ -5,7 +5,7 @@
 
 use super::bodies::Body;
 use super::lane_vectors::{
-    cross_add, dot, dot_add, origin, splat, to_child, to_parent, to_parent_add, turn, turn_back,
+    all_to_child, both_to_parent, cross_add, dot, dot_add, origin, splat, to_child, turn, turn_back,
 };
 use pulp::Simd;
 
@@ -112,11 +112,8 @@ pub(crate) fn move_body<S: Simd>(
                 dot_add(s, b[1], p, parent.a[1]),
                 dot_add(s, b[2], p, parent.a[2]),
             ];
-            (
-                to_child(s, body, parent.w),
-                to_child(s, body, parent.wd),
-                to_child(s, body, at_origin),
-            )
+            let [w, wd, a] = all_to_child(s, body, [parent.w, parent.wd, at_origin]);
+            (w, wd, a)
         }
         // a_base = −g: gravity as an acceleration of the base upwards.
         None => (
@@ -222,8 +219,7 @@ fn backward<S: Simd>(
         f = turn(s, state.cos, state.sin, f);
         n = turn(s, state.cos, state.sin, n);
     }
-    let f = to_parent(s, body, f);
-    let n = to_parent_add(s, body, n, parent.moment);
+    let (f, n) = both_to_parent(s, body, [f, n], parent.moment);
     // n_parent += R n + p × R f
     parent.moment = cross_add(s, origin(s, body, state.position), f, n);
     for k in 0..3 {

@@ -11,7 +11,7 @@ use super::base_parameters::random_states;
 use super::block::{Angles, BLOCK, Instructions, Registers, STRIDE};
 use super::dynamics::Motion;
 use super::lane_vectors::{
-    V3, cross, cross_add, dot, dot_add, load, origin, store, to_child, turn_back,
+    V3, all_to_child, cross, cross_add, dot, dot_add, load, origin, store, turn_back,
 };
 use super::parameters::ENTRIES;
 use super::recursion::{State, move_body};
@@ -369,8 +369,7 @@ impl<K: Sink> pulp::WithSimd for Kernel<'_, K> {
                     if let Some(parent) = regressor.parents[pair] {
                         Line([u, v]) = axes[parent];
                         v = cross_add(s, u, p, v);
-                        u = to_child(s, body, u);
-                        v = to_child(s, body, v);
+                        [u, v] = all_to_child(s, body, [u, v]);
                         if !body.prismatic {
                             u = turn_back(s, state.cos, state.sin, u);
                             v = turn_back(s, state.cos, state.sin, v);

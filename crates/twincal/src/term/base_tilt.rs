@@ -16,7 +16,7 @@ pub(super) fn proposal() -> Proposal {
                 format!("{name}.{column}"),
                 Family::Tilt,
                 "m/s²",
-                "gravity in the base frame".to_owned(),
+                "error of gravity in the base frame".to_owned(),
                 ModelColumn::Gravity { axis },
             )
         })

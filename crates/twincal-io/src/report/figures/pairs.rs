@@ -63,7 +63,7 @@ pub(in crate::report) fn shown(draws: &Draws, terms: &[TermSummary]) -> String {
     let numbered = numbered(&names);
     if drawn > 0 && drawn < kept {
         out = format!(
-            "Shown are the {} of {} kept coefficients that are largest against their ±",
+            "Shown are the {} of {} kept coefficients that are largest against their 95 % interval",
             count(drawn as u64),
             count(kept as u64)
         );
