@@ -11,6 +11,7 @@ mod export;
 mod fit;
 mod inputs;
 mod inspect;
+mod not_kept;
 mod predict;
 mod repeats;
 mod report;
