@@ -110,8 +110,7 @@ pub(super) fn sort(calibration: &Calibration) -> Effects {
     };
     let dropped = dropped(&calibration.terms);
     let unseen: Vec<&ComponentSummary> = calibration.unseen().collect();
-    let is_unseen = |c: &ComponentSummary| unseen.iter().any(|own| own.name == c.name);
-    let seen = |c: &ComponentSummary| !c.selected && !is_unseen(c) && !c.is_unseen();
+    let seen = |c: &ComponentSummary| !c.selected && calibration.sees(c);
     let possible = pick(&|c, p| seen(c) && p >= MENTIONED);
     let unlikely = |c: &ComponentSummary, p: f64| seen(c) && (p < MENTIONED || p.is_nan());
     // Not only where the data leave it open: what the prior alone tells apart, or would judge otherwise, is not excluded either.
@@ -123,9 +122,9 @@ pub(super) fn sort(calibration: &Calibration) -> Effects {
     alike.extend(sensitivity::by_prior(calibration).map(|component| &component.name));
     let found = calibration.components.iter().filter(|c| c.selected);
     alike.extend(found.flat_map(|component| &component.alias_of));
-    let told_by_another = |c: &ComponentSummary| c.is_unseen() && !is_unseen(c);
-    let rivals = pick(&|c, p| told_by_another(c) || unlikely(c, p) && alike.contains(&&c.name));
-    let absent = pick(&|c, p| unlikely(c, p) && !alike.contains(&&c.name));
+    let is_alike = |c: &ComponentSummary| c.is_unseen() || alike.contains(&&c.name);
+    let rivals = pick(&|c, p| unlikely(c, p) && is_alike(c));
+    let absent = pick(&|c, p| unlikely(c, p) && !is_alike(c));
     Effects {
         found: kinds(&pick(&|c, _| c.selected), calibration),
         counts: Counts {

@@ -137,7 +137,7 @@ fn gather<'a>(
         joints: joints.iter().map(|j| j.name).collect(),
         verdict: verdict::judge(calibration, joints),
         effects: effects::sort(calibration),
-        inclusion: figures::inclusion::figure(&calibration.components),
+        inclusion: figures::inclusion::figure(components, |c| calibration.sees(c)),
         pairs: figures::pairs::figure(&calibration.draws, terms),
         pairs_shown: figures::pairs::shown(&calibration.draws, terms),
         curves: figures::curves::figure(&calibration.curves, components, joints),

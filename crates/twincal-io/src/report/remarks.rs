@@ -261,10 +261,7 @@ pub(super) fn size_of_gravity(
     })
 }
 
-pub(super) fn moves_with_the_cutoff(
-    component: &ComponentSummary,
-    calibration: &Calibration,
-) -> bool {
+fn moves_with_the_cutoff(component: &ComponentSummary, calibration: &Calibration) -> bool {
     let mut findings = calibration.findings.iter();
     findings.any(|f| f.code == "depends_on_cutoff" && component.columns.contains(&f.subject))
 }

@@ -3,7 +3,7 @@
 use super::figures::sensitivity;
 use super::grounds::NAMED;
 use super::halves::whole_against_halves;
-use super::remarks::{moves_with_the_cutoff, size_of_gravity};
+use super::remarks::size_of_gravity;
 use super::text::{list, number};
 use twincal::Severity;
 use twincal::calibrate::{Calibration, Repeat, Repeated};
@@ -83,10 +83,19 @@ pub(super) fn of_settings(calibration: &Calibration) -> Vec<String> {
     if !added.is_empty() {
         out.push(format!("Other priors would add {}.", list(&named(added))));
     }
-    let moved: Vec<String> = (calibration.components.iter())
-        .filter(|component| component.selected && moves_with_the_cutoff(component, calibration))
-        .map(|component| component.name.clone())
-        .collect();
+    // Findings have those first that move most.
+    let mut moved: Vec<String> = Vec::new();
+    for finding in calibration
+        .findings
+        .iter()
+        .filter(|f| f.code == "depends_on_cutoff")
+    {
+        let mut all = calibration.components.iter();
+        let own = all.find(|own| own.selected && own.columns.contains(&finding.subject));
+        if let Some(own) = own.filter(|own| !moved.contains(&own.name)) {
+            moved.push(own.name.clone());
+        }
+    }
     if !moved.is_empty() {
         out.push(format!(
             "Another cut-off of the filter moves by more than their ±: {}.",

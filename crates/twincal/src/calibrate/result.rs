@@ -120,7 +120,7 @@ impl ParameterSummary {
         (self.median, 0.5 * (high - low))
     }
 
-    /// What is told instead of ±, where that does not describe it: see [`ends`].
+    /// What is told instead of ±, where that does not describe it: both ends of the 95 % interval.
     #[must_use]
     pub fn ends(&self) -> Option<[f64; 2]> {
         let (value, spread) = self.told();
@@ -152,12 +152,16 @@ fn is_split(spread: f64, [low, high]: [f64; 2]) -> bool {
 }
 
 impl Calibration {
-    /// Components that these data do not see, nor as what another one is told by: they may be there, and are not in.
+    /// Whether these data see a component, or another one that it can be told as.
+    #[must_use]
+    pub fn sees(&self, component: &ComponentSummary) -> bool {
+        let mut groups = self.groups.iter();
+        !component.is_unseen() || groups.any(|group| group.members.contains(&component.name))
+    }
+
+    /// Components that these data do not see: they may be there, and are not in.
     pub fn unseen(&self) -> impl Iterator<Item = &ComponentSummary> {
-        let in_a_group =
-            |name: &String| self.groups.iter().any(|group| group.members.contains(name));
-        let all = self.components.iter();
-        all.filter(move |own| own.is_unseen() && !in_a_group(&own.name))
+        self.components.iter().filter(|own| !self.sees(own))
     }
 }
 

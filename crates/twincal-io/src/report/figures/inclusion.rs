@@ -25,9 +25,12 @@ enum Row<'a> {
 }
 
 /// The figure; `None` without candidates.
-pub(in crate::report) fn figure(components: &[ComponentSummary]) -> Option<Figure> {
+pub(in crate::report) fn figure(
+    components: &[ComponentSummary],
+    sees: impl Fn(&ComponentSummary) -> bool,
+) -> Option<Figure> {
     let all = components.len();
-    let components: Vec<&ComponentSummary> = components.iter().filter(|c| !c.is_unseen()).collect();
+    let components: Vec<&ComponentSummary> = components.iter().filter(|c| sees(c)).collect();
     let unseen = all > components.len();
     let live = components.iter().filter(|t| t.pip.is_some()).count();
     if live == 0 {
@@ -243,7 +246,8 @@ mod tests {
     #[test]
     fn what_the_data_do_not_see_has_no_bar() {
         let mut components = fixture::two_joints().components;
-        let said = |components: &[ComponentSummary]| figure(components).unwrap().read;
+        let said =
+            |components: &[ComponentSummary]| figure(components, |c| !c.is_unseen()).unwrap().read;
         assert!(!said(&components).contains("do not see"));
         let own = components
             .iter_mut()
@@ -251,7 +255,7 @@ mod tests {
         let own = own.unwrap();
         own.verdict = Some(Verdict::NotSeen);
         let name = format!(">{}<", own.name);
-        let drawn = figure(&components).unwrap();
+        let drawn = figure(&components, |c| !c.is_unseen()).unwrap();
         assert!(drawn.read.contains("do not see") && !drawn.images[0].wide.contains(&name));
     }
 
@@ -278,13 +282,13 @@ mod tests {
             .clone();
         absent.family = Family::Generic;
         terms.extend(std::iter::repeat_n(absent, 100));
-        let figure = figure(&terms).unwrap();
+        let figure = figure(&terms, |_| true).unwrap();
         assert!(figure.images[0].wide.matches("<rect").count() < 40);
         assert!(figure.images[0].wide.contains("more, each below 0.05"));
     }
 
     #[test]
     fn no_candidates_no_figure() {
-        assert_eq!(figure(&[]), None);
+        assert_eq!(figure(&[], |_| true), None);
     }
 }
