@@ -212,6 +212,11 @@ mod tests {
             limits(beyond, within, Split::HeldoutLogs, 10.0),
             ["Tested mostly beyond the training motion: elbow (41 of 81 moving rows)."]
         );
+        // So is a joint that is no better within.
+        assert_eq!(
+            limits((41, 0.95), (40, 0.93), Split::HeldoutLogs, 10.0),
+            ["Tested mostly beyond the training motion: elbow (41 of 81 moving rows)."]
+        );
         let open = "Training leaves the torque open, known less well than its noise, on most tested rows: elbow (41 of 81 moving rows).";
         assert_eq!(limits(beyond, within, Split::HeldoutLogs, 1.0), [open]);
         // Of later parts of the same logs the motion is in the training range by definition.

@@ -320,6 +320,35 @@ mod tests {
     }
 
     #[test]
+    fn what_is_seen_as_another_effect_is_listed_by_its_probability() {
+        use twincal::calibrate::{Alike, Group};
+        let of = |pip: f64, alike: bool| {
+            let mut calibration = fixture::two_joints();
+            let found = calibration.components.iter().find(|own| own.selected);
+            let found = found.unwrap().name.clone();
+            let mut all = calibration.components.iter_mut();
+            let own = all.find(|own| !own.selected && own.pip.is_some()).unwrap();
+            (own.pip, own.verdict) = (Some(pip), Some(Verdict::NotSeen));
+            let members = vec![found, own.name.clone()];
+            let groups = alike.then(|| Group {
+                members: members.clone(),
+                pip: 0.98,
+                alike: Alike::EveryMotion,
+                settled: false,
+                words: String::new(),
+            });
+            calibration.groups = groups.into_iter().collect();
+            let effects = sort(&calibration);
+            let names = |all: &[Absent]| all.iter().any(|kind| kind.names.contains(&members[1]));
+            let possible = flat(effects.possible).iter().any(|e| e.name == members[1]);
+            [possible, names(&effects.rivals), names(&effects.unseen)]
+        };
+        assert_eq!(of(0.39, true), [true, false, false]);
+        assert_eq!(of(0.01, true), [false, true, false]);
+        assert_eq!(of(0.39, false), [false, false, true]);
+    }
+
+    #[test]
     fn what_says_the_same_as_something_likelier_is_not_absent() {
         use twincal::calibrate::{Alike, Group};
         let mut calibration = fixture::two_joints();

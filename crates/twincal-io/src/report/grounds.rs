@@ -5,7 +5,7 @@ use super::figures::sensitivity;
 use super::limits::{FEW, decisive, has_standstill};
 use super::remarks::doubts;
 use super::standstill::{at_standstill, held_at_rest, rest_got_worse};
-use super::text::{count, list, number, percent};
+use super::text::{count, first_of, list, number, percent};
 use super::view::{Joint, independent_rows, pooled_unit};
 use twincal::calibrate::{Calibration, ComponentSummary, Verdict as Decision};
 use twincal::validate::{JointScore, Scores, Split};
@@ -165,7 +165,7 @@ fn with_friction(scores: &Scores, joints: &[Joint<'_>]) -> (Vec<String>, usize) 
         own.partition(|(joint, left)| *left > joint.rmse_nominal);
     let growth = |(joint, left): &(&JointScore, f64)| left - joint.rmse_nominal;
     worse.sort_by(|a, b| growth(b).total_cmp(&growth(a)));
-    let named = worse.iter().take(NAMED).map(|(joint, left)| {
+    let named = worse.iter().map(|(joint, left)| {
         let unit = joints.iter().find(|other| other.name == joint.joint);
         let unit = unit.map_or("", |joint| joint.units.torque);
         format!(
@@ -175,11 +175,7 @@ fn with_friction(scores: &Scores, joints: &[Joint<'_>]) -> (Vec<String>, usize) 
             number(*left, 3)
         )
     });
-    let mut named: Vec<String> = named.collect();
-    if let Some(more) = worse.len().checked_sub(NAMED).filter(|more| *more > 0) {
-        named.push(format!("{more} more"));
-    }
-    (named, better.len())
+    (first_of(named.collect(), NAMED), better.len())
 }
 
 /// RMSE with friction alone over all rows of all joints; `None` where some joint has none.
@@ -284,11 +280,7 @@ pub(super) fn effects_found(calibration: &Calibration) -> String {
             let groups = calibration.groups.iter().filter(|group| group.pip > SURE);
             let sure: Vec<String> = groups
                 .map(|group| {
-                    let (named, rest) = group.members.split_at(group.members.len().min(NAMED));
-                    let mut named = named.to_vec();
-                    if !rest.is_empty() {
-                        named.push(format!("{} more", rest.len()));
-                    }
+                    let named = first_of(group.members.clone(), NAMED);
                     format!("at least one of {} is there", list(&named))
                 })
                 .collect();

@@ -2,7 +2,7 @@
 
 use super::figures::sensitivity;
 use super::halves::{repeats, whole_against_halves};
-use super::text::{list, number, percent};
+use super::text::{first_of, list, number, percent};
 use twincal::calibrate::{Alike, Calibration, ComponentSummary, ParameterSummary, Verdict};
 use twincal::term::Family;
 
@@ -181,14 +181,8 @@ fn rivals(component: &ComponentSummary, calibration: &Calibration) -> Option<Str
         _ => name.clone(),
     };
     let others = |names: &[String]| {
-        let others: Vec<String> = (names.iter())
-            .filter(|name| **name != component.name)
-            .map(told)
-            .collect();
-        match others.len().checked_sub(NAMED) {
-            None | Some(0) => list(&others),
-            Some(more) => format!("{} and {more} more", others[..NAMED].join(", ")),
-        }
+        let others = names.iter().filter(|name| **name != component.name);
+        list(&first_of(others.map(told).collect(), NAMED))
     };
     let place = |alike: Alike| match alike {
         Alike::TheseLogs => "in these logs",

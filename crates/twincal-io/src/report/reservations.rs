@@ -4,7 +4,7 @@ use super::figures::sensitivity;
 use super::grounds::NAMED;
 use super::halves::whole_against_halves;
 use super::remarks::size_of_gravity;
-use super::text::{list, number};
+use super::text::{first_of, list, number};
 use twincal::Severity;
 use twincal::calibrate::{Calibration, Repeat, Repeated};
 
@@ -81,7 +81,10 @@ pub(super) fn of_settings(calibration: &Calibration) -> Vec<String> {
         .map(|component| component.name.clone())
         .collect();
     if !added.is_empty() {
-        out.push(format!("Other priors would add {}.", list(&named(added))));
+        out.push(format!(
+            "Other priors would add {}.",
+            list(&first_of(added, NAMED))
+        ));
     }
     // Findings have those first that move most.
     let mut moved: Vec<String> = Vec::new();
@@ -99,20 +102,10 @@ pub(super) fn of_settings(calibration: &Calibration) -> Vec<String> {
     if !moved.is_empty() {
         out.push(format!(
             "Another cut-off of the filter moves by more than their ±: {}.",
-            list(&named(moved))
+            list(&first_of(moved, NAMED))
         ));
     }
     out
-}
-
-/// The first names; the others are counted.
-fn named(mut names: Vec<String>) -> Vec<String> {
-    let more = names.len().saturating_sub(NAMED);
-    names.truncate(NAMED);
-    if more > 0 {
-        names.push(format!("{more} more"));
-    }
-    names
 }
 
 /// Links of which what was found is no rigid body.
@@ -121,4 +114,38 @@ pub(super) fn no_bodies(calibration: &Calibration) -> Vec<&str> {
     let found = found.filter(|f| f.code == "unphysical_inertia_found");
     let sure = found.filter(|f| f.severity == Severity::Warning);
     sure.map(|f| f.subject.as_str()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::fixture;
+    use twincal::Finding;
+
+    #[test]
+    fn effects_that_a_cutoff_moves_are_named_those_that_move_most_first() {
+        let mut calibration = fixture::two_joints();
+        for term in &mut calibration.terms {
+            term.pip_sensitivity.clear();
+        }
+        let found: Vec<(String, String)> = (calibration.components.iter())
+            .filter(|own| own.selected)
+            .map(|own| (own.name.clone(), own.columns[0].clone()))
+            .collect();
+        let finding = |(_, column): &(String, String)| {
+            let code = "depends_on_cutoff";
+            Finding::new(Severity::Warning, code, column.as_str(), "", 0)
+        };
+        calibration.findings = found.iter().take(5).rev().map(finding).collect();
+        let name = |k: usize| found[k].0.as_str();
+        let said = format!(
+            "Another cut-off of the filter moves by more than their ±: {}, {}, {} and 2 more.",
+            name(4),
+            name(3),
+            name(2)
+        );
+        assert_eq!(of_settings(&calibration), [said]);
+        calibration.findings.clear();
+        assert!(of_settings(&calibration).is_empty());
+    }
 }

@@ -4,7 +4,7 @@ use super::ambiguity;
 use super::grounds::{NAMED, WORTH_TELLING, change, rows_of};
 use super::limits::decisive;
 use super::tables::{self, Table, with_unit};
-use super::text::{count, list, number, percent};
+use super::text::{count, first_of, list, number, percent};
 use super::view::{Joint, pooled_unit};
 use twincal::calibrate::Calibration;
 use twincal::validate::{JointScore, Scores, Validation};
@@ -49,7 +49,7 @@ pub(super) fn at_standstill(calibration: &Calibration, joints: &[Joint<'_>]) -> 
         true => "At standstill".to_owned(),
         false => format!("At standstill ({})", about.join("; ")),
     };
-    let mut names: Vec<String> = (worse.iter().take(NAMED))
+    let names = (worse.iter())
         .map(|(name, [before, after])| {
             let unit = joints.iter().find(|joint| joint.name == *name);
             let unit = unit.map_or("", |joint| joint.units.torque);
@@ -60,9 +60,7 @@ pub(super) fn at_standstill(calibration: &Calibration, joints: &[Joint<'_>]) -> 
             )
         })
         .collect();
-    if let Some(more) = worse.len().checked_sub(NAMED).filter(|more| *more > 0) {
-        names.push(format!("{more} more"));
-    }
+    let names = first_of(names, NAMED);
     Some(match names.is_empty() {
         true => format!("{place}: {told}."),
         false => format!("{place}: {told}; worse on {}.", list(&names)),

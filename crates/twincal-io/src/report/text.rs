@@ -253,6 +253,16 @@ pub(super) fn count(n: u64) -> String {
     out
 }
 
+/// At most so many names; the others are counted, as the last one: "2 more".
+pub(super) fn first_of(mut names: Vec<String>, most: usize) -> Vec<String> {
+    let more = names.len().saturating_sub(most);
+    names.truncate(most);
+    if more > 0 {
+        names.push(format!("{more} more"));
+    }
+    names
+}
+
 /// "a", "a and b", "a, b and c".
 pub(super) fn list<S: AsRef<str>>(items: &[S]) -> String {
     let mut out = String::new();

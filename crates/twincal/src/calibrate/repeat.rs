@@ -181,6 +181,15 @@ mod tests {
     }
 
     #[test]
+    fn a_half_of_a_few_rows_is_none() {
+        let mut random = Regression::new(6, 400);
+        let whole = random.log(&[2.0, -1.0], 1.0);
+        let rest = |rows: usize| Regression::new(7, rows).log(&[2.0, -1.0], 1.0);
+        assert!(random.repeats(&[whole.clone(), rest(39)]).is_empty());
+        assert_eq!(random.repeats(&[whole, rest(41)]).len(), 2);
+    }
+
+    #[test]
     fn a_number_that_moves_is_named_and_one_that_is_unseen_is_not_judged() {
         let mut random = Regression::new(6, 400);
         let logs = [random.log(&[2.0, -1.0], 1.0), random.log(&[3.0, -1.0], 1.0)];

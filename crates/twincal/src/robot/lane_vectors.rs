@@ -213,20 +213,6 @@ pub(super) fn to_parent_add<S: Simd>(s: S, body: &Body, v: V3<S>, c: V3<S>) -> V
     ]
 }
 
-/// R v and R n + c, which asks once what kind of rotation it is.
-#[inline(always)]
-pub(super) fn both_to_parent<S: Simd>(
-    s: S,
-    body: &Body,
-    [v, n]: [V3<S>; 2],
-    c: V3<S>,
-) -> (V3<S>, V3<S>) {
-    match body.about_x {
-        true => (to_parent(s, body, v), to_parent_add(s, body, n, c)),
-        false => (to_parent(s, body, v), to_parent_add(s, body, n, c)),
-    }
-}
-
 /// a × b.
 #[inline(always)]
 pub(super) fn cross<S: Simd>(s: S, a: V3<S>, b: V3<S>) -> V3<S> {
@@ -235,4 +221,51 @@ pub(super) fn cross<S: Simd>(s: S, a: V3<S>, b: V3<S>) -> V3<S> {
         s.negate_mul_add_e_f64s(a[0], b[2], s.mul_f64s(a[2], b[0])),
         s.negate_mul_add_e_f64s(a[1], b[0], s.mul_f64s(a[0], b[1])),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::{JointDescription, JointKind, LinkDescription, Robot, RobotDescription};
+    use pulp::Scalar;
+    use std::collections::BTreeMap;
+
+    /// A hinge about z whose frame is turned by 0.3 rad about x.
+    fn turned() -> Body {
+        let (n, c) = 0.3f64.sin_cos();
+        let mut joint = JointDescription::new("hinge", JointKind::Revolute, "base", "arm");
+        joint.axis = [0.0, 0.0, 1.0];
+        joint.placement.rotation = [[1.0, 0.0, 0.0], [0.0, c, -n], [0.0, n, c]];
+        let link = |name: &str| LinkDescription {
+            name: name.into(),
+            inertia: None,
+        };
+        let description = RobotDescription {
+            name: String::new(),
+            gravity: [0.0, 0.0, -9.81],
+            links: vec![link("base"), link("arm")],
+            joints: vec![joint],
+            allow_unphysical: false,
+        };
+        let (robot, _) = Robot::new(description, &BTreeMap::new()).unwrap();
+        robot.bodies[0].clone()
+    }
+
+    #[test]
+    fn a_rotation_about_x_gives_the_bytes_of_any_rotation() {
+        let short = turned();
+        assert!(short.about_x);
+        let long = Body {
+            about_x: false,
+            ..short.clone()
+        };
+        let (v, c) = ([0.1, -2.7, 31.3], [1e-3, 0.77, -5.1]);
+        assert_eq!(to_child(Scalar, &short, v), to_child(Scalar, &long, v));
+        assert_eq!(to_parent(Scalar, &short, v), to_parent(Scalar, &long, v));
+        let add = |body: &Body| to_parent_add(Scalar, body, v, c);
+        assert_eq!(add(&short), add(&long));
+        // There and back.
+        let back = to_child(Scalar, &short, to_parent(Scalar, &short, v));
+        assert!(back.iter().zip(v).all(|(a, b)| (a - b).abs() < 1e-14));
+    }
 }

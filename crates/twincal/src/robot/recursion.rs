@@ -5,7 +5,8 @@
 
 use super::bodies::Body;
 use super::lane_vectors::{
-    all_to_child, both_to_parent, cross_add, dot, dot_add, origin, splat, to_child, turn, turn_back,
+    all_to_child, cross_add, dot, dot_add, origin, splat, to_child, to_parent, to_parent_add, turn,
+    turn_back,
 };
 use pulp::Simd;
 
@@ -219,7 +220,8 @@ fn backward<S: Simd>(
         f = turn(s, state.cos, state.sin, f);
         n = turn(s, state.cos, state.sin, n);
     }
-    let (f, n) = both_to_parent(s, body, [f, n], parent.moment);
+    let f = to_parent(s, body, f);
+    let n = to_parent_add(s, body, n, parent.moment);
     // n_parent += R n + p × R f
     parent.moment = cross_add(s, origin(s, body, state.position), f, n);
     for k in 0..3 {

@@ -25,13 +25,12 @@ struct StandIn {
 }
 
 /// What a part of a joint is: its columns in order, but the last one of joint 1 with the one before added.
-fn part(joint: usize, part: usize, state: [f64; 3]) -> f64 {
-    let value = |c: usize| column(COLUMNS[joint][c], state[0], state[1], state[2]);
+fn part(joint: usize, part: usize, [q, qd, qdd]: [f64; 3]) -> f64 {
+    let value = |c: usize| column(COLUMNS[joint][c], q, qd, qdd);
     if (joint, part) == (1, 1) {
-        value(1) + value(0)
-    } else {
-        value(part)
+        return value(1) + value(0);
     }
+    value(part)
 }
 
 impl StandIn {
