@@ -2,6 +2,20 @@
 
 use faer::{MatRef, Side};
 
+/// aᵀb in eight running sums, which the compiler keeps in vectors.
+#[must_use]
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let (a8, a) = a.as_chunks::<8>();
+    let (b8, b) = b.as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for (x, y) in a8.iter().zip(b8) {
+        for k in 0..8 {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    sums.iter().sum::<f64>() + a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>()
+}
+
 /// A symmetric matrix has no Cholesky factor: the first pivot that is not a positive number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("pivot {pivot} is not positive")]

@@ -7,6 +7,7 @@ use super::result::{Along, Calibration, Curve};
 use crate::posterior::draws::{CoefficientDraws, Drawer};
 use crate::robot::{JointKind, Motion, Robot};
 use crate::term::Library;
+use rayon::prelude::*;
 
 /// Points of a curve.
 const POINTS: usize = 80;
@@ -32,41 +33,38 @@ pub(super) fn curves(
     drawer: &Drawer<'_>,
     seed: u64,
 ) -> Vec<Curve> {
-    let mut curves = Vec::new();
     let (components, hull) = (&calibration.components, &calibration.twin.hull);
     let draws = drawer.draw(DRAWS, seed, STREAM);
     if draws.models.is_empty() {
-        return curves; // nothing to draw from
+        return Vec::new(); // nothing to draw from
     }
-    for joint in 0..robot.dof() {
-        for along in [Along::Position, Along::Velocity] {
-            let Some(x) = grid(&hull[joint], along, robot.joint_kind(joint)) else {
-                continue;
-            };
-            let columns = columns_along(library, joint, along, &x, hull);
-            let own = |k: usize| library.terms()[library.columns()[k]].component;
-            let found = columns
-                .iter()
-                .any(|c| !c.constant && components[own(c.index)].selected);
-            if !found {
-                continue;
-            }
-            let mut names: Vec<usize> = columns.iter().map(|c| own(c.index)).collect();
-            names.dedup();
-            names.retain(|&c| components[c].pip.is_some_and(|pip| pip >= NAMED));
-            let [mean, low95, high95] = band(&draws, &columns, x.len());
-            curves.push(Curve {
-                joint: robot.joint_names()[joint].to_owned(),
-                along,
-                components: names.iter().map(|&c| components[c].name.clone()).collect(),
-                x,
-                mean,
-                low95,
-                high95,
-            });
+    let curve = |(joint, along): (usize, Along)| {
+        let x = grid(&hull[joint], along, robot.joint_kind(joint))?;
+        let columns = columns_along(library, joint, along, &x, hull);
+        let own = |k: usize| library.terms()[library.columns()[k]].component;
+        let found = columns
+            .iter()
+            .any(|c| !c.constant && components[own(c.index)].selected);
+        if !found {
+            return None;
         }
-    }
-    curves
+        let mut names: Vec<usize> = columns.iter().map(|c| own(c.index)).collect();
+        names.dedup();
+        names.retain(|&c| components[c].pip.is_some_and(|pip| pip >= NAMED));
+        let [mean, low95, high95] = band(&draws, &columns, x.len());
+        Some(Curve {
+            joint: robot.joint_names()[joint].to_owned(),
+            along,
+            components: names.iter().map(|&c| components[c].name.clone()).collect(),
+            x,
+            mean,
+            low95,
+            high95,
+        })
+    };
+    let both = |joint| [(joint, Along::Position), (joint, Along::Velocity)];
+    let all: Vec<(usize, Along)> = (0..robot.dof()).flat_map(both).collect();
+    all.into_par_iter().filter_map(curve).collect()
 }
 
 /// Evenly spaced over the range in the logs; `None` where the joint does not move.
@@ -180,20 +178,27 @@ fn evaluate(
 /// Mean and central 95 % of the torque at each point.
 fn band(draws: &CoefficientDraws, columns: &[Column], len: usize) -> [Vec<f64>; 3] {
     let count = draws.models.len();
+    let of_column = |c: &Column| -> Vec<f64> {
+        let betas = draws.beta.chunks_exact(draws.columns);
+        betas.map(|beta| beta[c.index]).collect()
+    };
+    let coefficients: Vec<Vec<f64>> = columns.iter().map(of_column).collect();
     let mut out = [vec![0.0; len], vec![0.0; len], vec![0.0; len]];
     let mut torque = vec![0.0; count];
     for point in 0..len {
-        for (draw, torque) in torque.iter_mut().enumerate() {
-            let beta = &draws.beta[draw * draws.columns..];
-            *torque = columns
-                .iter()
-                .map(|c| beta[c.index] * c.torque[point])
-                .sum();
+        torque.fill(0.0);
+        for (column, coefficients) in columns.iter().zip(&coefficients) {
+            let each = torque.iter_mut().zip(coefficients);
+            each.for_each(|(torque, beta)| *torque += beta * column.torque[point]);
         }
         out[0][point] = torque.iter().sum::<f64>() / count as f64;
-        torque.sort_by(f64::total_cmp);
-        let at = |p: f64| torque[(p * (count - 1) as f64).round() as usize];
-        (out[1][point], out[2][point]) = (at(0.025), at(0.975));
+        let [low, high] = [0.025, 0.975].map(|p| (p * (count - 1) as f64).round() as usize);
+        let (below, &mut top, _) = torque.select_nth_unstable_by(high, f64::total_cmp);
+        out[2][point] = top;
+        out[1][point] = match low < high {
+            true => *below.select_nth_unstable_by(low, f64::total_cmp).1,
+            false => top,
+        };
     }
     out
 }

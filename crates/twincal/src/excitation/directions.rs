@@ -1,7 +1,7 @@
 //! Subspaces of coefficient space: what the robot shows, what the logs show of it, and by which joint the rest appears.
 
 use super::{ROBOT_SHOWS, SHOWN, UNSEEN};
-use crate::linear_algebra::symmetric_eigen;
+use crate::linear_algebra::{dot, symmetric_eigen};
 
 /// Squares below which a direction is in the span of others, to rounding.
 const ROUNDING: f64 = 1e-6;
@@ -270,8 +270,4 @@ fn subtract(vector: &mut [f64], known: &[Vec<f64>]) {
 fn apply(matrix: &[f64], vector: &[f64]) -> Vec<f64> {
     let rows = matrix.chunks_exact(vector.len().max(1));
     rows.map(|row| dot(row, vector)).collect()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

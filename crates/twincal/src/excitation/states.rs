@@ -2,6 +2,7 @@
 
 use super::ROBOT_SHOWS;
 use crate::gram::Gram;
+use crate::linear_algebra::dot;
 use crate::robot::{JointKind, Motion, Robot, nominal_torque};
 use crate::term::Library;
 use rand::{RngExt, SeedableRng};
@@ -147,7 +148,7 @@ impl Reference<'_> {
                 .collect();
             for (i, (a, left)) in own.iter().enumerate() {
                 for (b, right) in &own[..=i] {
-                    let sum: f64 = left.iter().zip(right).map(|(x, y)| x * y).sum();
+                    let sum = dot(left, right);
                     power[a * count + b] += weight * sum;
                     if a != b {
                         power[b * count + a] += weight * sum;

@@ -19,7 +19,7 @@ const SECOND_CHOICE: f64 = 1e-6;
 /// ```text
 /// b_f = C/m0 − 1             m0 components expected in total, families by their size
 /// b_f = C_f/m_f − 1          m_f expected of family f, where the user says so
-/// b_f = 1/p − 1              unasked, with the probability p of what is more usual than the rest ([`Family::usual`])
+/// b_f = 1/p − 1              unasked, with the probability p of what is more or less usual than the rest ([`Family::usual`])
 /// b_f = 1e6 − 1              second choices, which no motion tells from something more usual (P(z = 1) = 1e-6)
 /// ```
 /// What a payload's tensor adds to the payload's probability, as its child, is taken off: with and without tensor together have p.
@@ -161,13 +161,13 @@ mod tests {
     use crate::prior::Prior;
     use crate::signal::Auto;
 
-    /// Nine components: four of `User`, three of `Offset`, two of `Viscous`.
+    /// Nine components: four of `User`, three of `Spring`, two of `Viscous`.
     fn columns(forced: &[usize]) -> Columns {
         Columns {
             names: (0..9).map(|k| format!("x{k}")).collect(),
             component: (0..9).collect(),
             family: vec![0, 1, 0, 2, 1, 0, 0, 2, 1],
-            families: vec![Family::User, Family::Offset, Family::Viscous],
+            families: vec![Family::User, Family::Spring, Family::Viscous],
             prior_sd: vec![None; 9],
             lower: vec![f64::NEG_INFINITY; 9],
             forced: (0..9).map(|c| forced.contains(&c)).collect(),
@@ -216,13 +216,23 @@ mod tests {
         let free = columns(&[]);
         // Unasked: m0 = 4.5 of 9, by size; viscous friction is as likely there as not.
         near(expected(&free, &settings(None, &[])), [2.0, 1.5, 1.0]);
-        let mine = [(Family::Offset, 0.3), (Family::Viscous, 1.9)];
+        let mine = [(Family::Spring, 0.3), (Family::Viscous, 1.9)];
         near(expected(&free, &settings(None, &mine)), [2.0, 0.3, 1.9]);
         let terms = Some(Inclusion::ExpectedTerms(1.8));
         near(expected(&free, &settings(terms, &[])), [0.8, 0.6, 0.4]);
         near(expected(&free, &settings(terms, &mine)), [0.8, 0.3, 1.9]);
         let half = Some(Inclusion::Probability(0.25));
         near(expected(&free, &settings(half, &mine)), [1.0, 0.3, 1.9]);
+    }
+
+    /// One torque offset in sixty joints, whatever else is expected; as many as the rest where the user says how many terms.
+    #[test]
+    fn torque_offsets_are_rarer_than_the_rest() {
+        let mut free = columns(&[]);
+        free.families[1] = Family::Offset;
+        near(expected(&free, &settings(None, &[])), [2.0, 0.05, 1.0]);
+        let terms = Some(Inclusion::ExpectedTerms(1.8));
+        near(expected(&free, &settings(terms, &[])), [0.8, 0.6, 0.4]);
     }
 
     #[test]
@@ -232,7 +242,7 @@ mod tests {
         near(expected(&some, &settings(None, &[])), [2.5, 1.5, 1.5]);
         let terms = Some(Inclusion::ExpectedTerms(1.4));
         near(expected(&some, &settings(terms, &[])), [1.6, 0.6, 1.2]);
-        let mine = [(Family::Offset, 0.3)];
+        let mine = [(Family::Spring, 0.3)];
         near(expected(&some, &settings(None, &mine)), [2.5, 0.3, 1.5]);
         let all = columns(&[0, 1, 2, 3, 4, 5, 6, 7, 8]);
         near(expected(&all, &settings(None, &[])), [4.0, 3.0, 2.0]);
@@ -244,7 +254,7 @@ mod tests {
         some.second_choice = (0..9).map(|c| c == 1 || c == 4).collect();
         // The third of their family is expected as the others are, m0 = 4.5 of 9.
         near(expected(&some, &settings(None, &[])), [2.0, 0.500_002, 1.0]);
-        let mine = [(Family::Offset, 0.3)];
+        let mine = [(Family::Spring, 0.3)];
         near(expected(&some, &settings(None, &mine)), [2.0, 0.3, 1.0]);
         let half = Some(Inclusion::Probability(0.25));
         near(expected(&some, &settings(half, &[])), [1.0, 0.75, 0.5]);
@@ -282,8 +292,8 @@ mod tests {
     #[test]
     fn impossible_numbers_name_their_key() {
         for (family, number) in [
-            (Family::Offset, 3.0),
-            (Family::Offset, 0.0),
+            (Family::Spring, 3.0),
+            (Family::Spring, 0.0),
             (Family::Payload, 1.0),
         ] {
             let error = structure(&columns(&[]), &settings(None, &[(family, number)]));

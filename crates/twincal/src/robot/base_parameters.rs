@@ -5,6 +5,7 @@ use super::block::BLOCK;
 use super::dynamics::Motion;
 use super::parameters::{PARAMETERS, to_body_frame};
 use super::regressor::Regressor;
+use crate::linear_algebra::dot;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
@@ -128,19 +129,6 @@ pub fn base_parameters(robot: &Robot) -> BaseParameters {
 /// 0: mass, 1: first moment, 2: tensor.
 fn kind_of(parameter: usize) -> usize {
     usize::from(parameter > 0) + usize::from(parameter > 3)
-}
-
-/// aᵀb in eight running sums, which the compiler keeps in vectors.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let (a8, a) = a.as_chunks::<8>();
-    let (b8, b) = b.as_chunks::<8>();
-    let mut sums = [0.0; 8];
-    for (x, y) in a8.iter().zip(b8) {
-        for k in 0..8 {
-            sums[k] += x[k] * y[k];
-        }
-    }
-    sums.iter().sum::<f64>() + a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>()
 }
 
 fn norm(v: &[f64]) -> f64 {

@@ -3,6 +3,7 @@
 use super::explain::{Explained, Reading, explain};
 use super::sample::Sample;
 use crate::robot::Robot;
+use rayon::prelude::*;
 
 /// Share of torque left beyond which it is worth looking for another reading.
 const DOUBTFUL: f64 = 0.1;
@@ -155,9 +156,14 @@ fn search(
             break;
         }
         let mut best: Option<(f64, Reading, Vec<Option<Explained>>)> = None;
-        for step in Step::all(dof) {
-            let tried = step.apply(&reading);
-            let explained = explain(robot, sample, &tried);
+        let tried: Vec<(Reading, Vec<Option<Explained>>)> = (Step::all(dof).into_par_iter())
+            .map(|step| {
+                let tried = step.apply(&reading);
+                let explained = explain(robot, sample, &tried);
+                (tried, explained)
+            })
+            .collect();
+        for (tried, explained) in tried {
             let gain = gain(&current, &explained, left);
             let most = best
                 .as_ref()

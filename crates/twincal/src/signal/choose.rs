@@ -319,7 +319,10 @@ fn on(
                 .into(),
         });
     }
-    let steps: Vec<Option<f64>> = (0..joints.len()).map(|j| candidates.step(j)).collect();
+    let steps: Vec<Option<f64>> = (0..joints.len())
+        .into_par_iter()
+        .map(|joint| candidates.step(joint))
+        .collect();
     let with_steps = |log: &&'_ Vec<JointSpectra>| -> Vec<JointSpectra> {
         let joints = log.iter().zip(&steps);
         joints.map(|(own, step)| own.quantised(*step)).collect()

@@ -114,14 +114,21 @@ pub(crate) fn quantum<'a>(runs: impl Iterator<Item = &'a [f64]> + Clone) -> Opti
     if !step.is_finite() {
         return None;
     }
-    let (mut all, mut multiples, mut small) = (0_u64, 0_u64, 0_u64);
+    let all: usize = runs.clone().map(|run| run.len().saturating_sub(1)).sum();
+    let mostly = |multiples: usize| multiples as f64 > 0.95 * all as f64;
+    let (mut others, mut small) = (0, 0);
     for change in changes() {
         let units = change / step;
-        all += 1;
-        multiples += u64::from((units - units.round()).abs() < (0.05 + 1e-3 * units).min(0.2));
-        small += u64::from(units < 1.5);
+        small += usize::from(units < 1.5);
+        if (units - units.round()).abs() >= (0.05 + 1e-3 * units).min(0.2) {
+            others += 1;
+            // A smooth channel has said so long before its end.
+            if !mostly(all - others) {
+                return None;
+            }
+        }
     }
-    (multiples as f64 > 0.95 * all as f64 && small as f64 > 0.05 * all as f64).then_some(step)
+    (mostly(all - others) && small as f64 > 0.05 * all as f64).then_some(step)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::candidate::Candidate;
 use super::expression::{Bounded, Graph, Variable, bounded_values};
+use crate::linear_algebra::dot;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::borrow::Borrow;
@@ -215,7 +216,7 @@ pub(super) fn dependent(columns: Vec<Vec<f64>>) -> Vec<(usize, Vec<(f64, usize)>
         let mut shares = vec![0.0; basis.len()];
         for _ in 0..2 {
             for (share, direction) in shares.iter_mut().zip(&basis) {
-                let along: f64 = direction.iter().zip(&column).map(|(a, b)| a * b).sum();
+                let along = dot(direction, &column);
                 *share += along;
                 column
                     .iter_mut()

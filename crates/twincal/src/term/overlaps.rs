@@ -3,6 +3,7 @@
 use super::aliases::{Motions, channels};
 use super::component::Component;
 use super::{Family, Library};
+use crate::linear_algebra::dot;
 use crate::robot::Motion;
 
 /// A column that leaves less than this part of its length outside a span lies in it.
@@ -135,7 +136,7 @@ fn outside(column: &[f64], basis: &[Vec<f64>]) -> Vec<f64> {
     let mut rest = column.to_vec();
     for _ in 0..2 {
         for direction in basis {
-            let along: f64 = direction.iter().zip(&rest).map(|(a, b)| a * b).sum();
+            let along = dot(direction, &rest);
             for (value, d) in rest.iter_mut().zip(direction) {
                 *value -= along * d;
             }
@@ -145,5 +146,5 @@ fn outside(column: &[f64], basis: &[Vec<f64>]) -> Vec<f64> {
 }
 
 fn norm(column: &[f64]) -> f64 {
-    column.iter().map(|value| value * value).sum::<f64>().sqrt()
+    dot(column, column).sqrt()
 }

@@ -1,6 +1,6 @@
 //! From the posterior's models to the t components that one joint can tell apart.
 
-use crate::linear_algebra::Cholesky;
+use crate::linear_algebra::{Cholesky, dot};
 use crate::posterior::{Model, Posterior};
 use std::collections::BTreeMap;
 
@@ -174,10 +174,6 @@ fn by_columns(mean: &[f64], packed: &[f64]) -> Vec<[f64; ROWS]> {
         }
     }
     root
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 /// R of W = Q R, packed by rows, so that |W x| = |R x| (modified Gram–Schmidt: R is backward stable, Björck 1967).
