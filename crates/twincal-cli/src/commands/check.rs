@@ -332,6 +332,7 @@ mod tests {
             rows: 10,
             rmse_nominal: 1.0,
             rmse_calibrated: rmse,
+            bias: 0.0,
             coverage95: coverage,
             mean_width95: 0.4,
             torque_sd: 5.0,

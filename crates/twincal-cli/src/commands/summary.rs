@@ -144,7 +144,8 @@ fn reliability(calibration: &Calibration) -> Vec<String> {
     }
     if let Some(conformal) = &validation.conformal {
         lines.push(format!(
-            "stretched by {}, they hold {:.0} % of all rows, those at standstill too, of the next such log with {} {} ({})",
+            "{} by {}, they hold {:.0} % of all rows, those at standstill too, of the next such log with {} {} ({})",
+            report::stretched(conformal.factor),
             significant(conformal.factor, 3),
             100.0 * conformal.rows,
             if conformal.guaranteed {

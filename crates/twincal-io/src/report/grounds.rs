@@ -2,7 +2,7 @@
 
 use super::figures::inclusion::family_name;
 use super::figures::sensitivity;
-use super::limits::{FEW, decisive, has_standstill};
+use super::limits::{FEW, decisive, has_standstill, other_shares};
 use super::remarks::doubts;
 use super::standstill::{at_standstill, held_at_rest, rest_got_worse};
 use super::text::{count, first_of, list, number, percent};
@@ -212,9 +212,13 @@ fn held(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
         ),
         None => String::new(),
     };
+    let single = match other_shares(judged, joints) {
+        Some(told) => format!(" On single joints, {told}."),
+        None => String::new(),
+    };
     if !has_standstill(&calibration.validation) {
         return format!(
-            "The 95 % intervals contain {share} of the {rows} held-out values{short}{wide}."
+            "The 95 % intervals contain {share} of the {rows} held-out values{short}{wide}.{single}"
         );
     }
     let differ = (judged.coverage95 - all.coverage95).abs() > SHARE_WORTH_TELLING;
@@ -227,7 +231,7 @@ fn held(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
         false => String::new(),
     };
     format!(
-        "The 95 % intervals contain {share} of the {rows} held-out values of moving joints{all}{short}{wide}."
+        "The 95 % intervals contain {share} of the {rows} held-out values of moving joints{all}{short}{wide}.{single}"
     )
 }
 

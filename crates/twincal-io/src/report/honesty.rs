@@ -90,8 +90,9 @@ pub(super) fn guarantee(validation: &Validation) -> String {
         .map(|joint| format!("{} {}", joint.joint, number(joint.factor, 3)))
         .collect();
     format!(
-        "Without believing the model: stretched by {}, the 95 % intervals of all joints hold {} of all rows of the next log \
+        "Without believing the model: {} by {}, the 95 % intervals of all joints hold {} of all rows of the next log \
          like these, those at standstill too, with probability {}/{} = {} {}.{} Joint by joint: {}.",
+        stretched(conformal.factor),
         number(conformal.factor, 3),
         percent(conformal.rows),
         conformal.trajectories,
@@ -111,6 +112,16 @@ pub(super) fn guarantee(validation: &Validation) -> String {
     )
 }
 
+/// What a factor does to intervals.
+#[must_use]
+pub fn stretched(factor: f64) -> &'static str {
+    if factor < 1.0 {
+        "narrowed"
+    } else {
+        "stretched"
+    }
+}
+
 /// Every coefficient of the compact twin on the two halves of the data.
 pub(super) fn repeats(calibration: &Calibration) -> Table {
     let mut table = Table::new([
@@ -126,7 +137,7 @@ pub(super) fn repeats(calibration: &Calibration) -> Table {
         let words = repeat.repeated().words();
         let words = match repeat.z {
             None => words.to_owned(),
-            Some(z) => format!("{words} ({})", number(z.abs(), 2)),
+            Some(z) => format!("{words} ({})", apart(z.abs())),
         };
         let own = calibration
             .terms
@@ -158,6 +169,13 @@ pub(super) fn repeats(calibration: &Calibration) -> Table {
         ]);
     }
     table
+}
+
+/// "2.5", and "1.97" where one digit less would be the next word's number.
+fn apart(z: f64) -> String {
+    let rounded = (10.0 * z).round() / 10.0;
+    let border = [2.0, 3.0].contains(&rounded) && z < rounded;
+    number(z, if border { 3 } else { 2 })
 }
 
 /// What the two halves are.
@@ -227,8 +245,14 @@ mod tests {
                 "repeats (0.40)"
             ]
         );
-        calibration.repeatability[0].z = Some(-2.5);
-        assert_eq!(words(&calibration)[0], "wavers (2.5)");
+        for (z, said) in [
+            (-2.5, "wavers (2.5)"),
+            (1.966, "repeats (1.97)"),
+            (2.0, "wavers (2.0)"),
+        ] {
+            calibration.repeatability[0].z = Some(z);
+            assert_eq!(words(&calibration)[0], said);
+        }
     }
 
     #[test]

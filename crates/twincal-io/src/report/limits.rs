@@ -18,6 +18,8 @@ pub(super) const COVERAGE: (f64, f64) = (0.90, 0.99);
 const ALARM: f64 = 0.05;
 /// What an interval promises to hold.
 const LEVEL: f64 = 0.95;
+/// Shares of rows inside that nothing needs to be said of.
+const ABOUT: (f64, f64) = (0.92, 0.98);
 /// It in words.
 const LEVEL_WORDS: &str = "95 % intervals";
 /// Share of the torque's standard deviation from which the remaining error is called large.
@@ -100,19 +102,8 @@ fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Stri
             .filter(|j| is_off(j, memory(joints, &j.joint)))
             .collect();
         let held: Vec<String> = own.iter().map(|j| percent(j.coverage95)).collect();
-        // The others below the promise, where the first are too narrow.
-        let narrow = own.iter().all(|j| j.coverage95 < COVERAGE.0);
-        let chance: Vec<String> = (scores.joints.iter())
-            .filter(|j| narrow && !own.is_empty() && j.coverage95 < COVERAGE.0)
-            .filter(|j| !own.iter().any(|told| told.joint == j.joint))
-            .map(|j| format!("{} {}", j.joint, percent(j.coverage95)))
-            .collect();
-        let chance = match chance.is_empty() {
-            true => String::new(),
-            false => format!("; within chance for so few: {}", list(&chance)),
-        };
         let held = list(&held);
-        let held = format!("({LEVEL_WORDS} hold {held} of the{moving} rows{chance})");
+        let held = format!("({LEVEL_WORDS} hold {held} of the{moving} rows)");
         let names: Vec<String> = own.iter().map(|j| j.joint.clone()).collect();
         say(
             &names,
@@ -274,6 +265,43 @@ pub(super) fn too_narrow(joint: &JointScore, memory: f64) -> bool {
 pub(super) fn too_wide(joint: &JointScore, memory: f64) -> bool {
     let all_inside = LEVEL.powf(joint.rows as f64 / memory);
     joint.coverage95 > COVERAGE.1 && all_inside < ALARM
+}
+
+/// "A little outside 92 to 98 %: joint_2 91.1 %; within chance for so few rows: joint_3 88.3 %": joints of several whose intervals hold another
+/// share than promised, where neither [`too_narrow`] nor [`too_wide`] says so.
+pub(super) fn other_shares(scores: &Scores, joints: &[Joint<'_>]) -> Option<String> {
+    let several = scores.joints.iter().filter(|j| j.rows > 0).count() > 1;
+    let memory = |j: &JointScore| memory(joints, &j.joint);
+    let told = |j: &JointScore| too_narrow(j, memory(j)) || too_wide(j, memory(j));
+    let outside = |j: &&JointScore| {
+        let inside = (ABOUT.0..=ABOUT.1).contains(&j.coverage95);
+        several && j.rows > 0 && !inside && !told(j)
+    };
+    let by_chance = |j: &JointScore| {
+        let rows_within = (j.coverage95 - LEVEL).abs() <= chance(j.rows, memory(j));
+        let all_inside = LEVEL.powf(j.rows as f64 / memory(j));
+        rows_within || j.coverage95 > LEVEL && all_inside >= ALARM
+    };
+    let (few, many): (Vec<&JointScore>, Vec<&JointScore>) = scores
+        .joints
+        .iter()
+        .filter(outside)
+        .partition(|j| by_chance(j));
+    let shares = |joints: &[&JointScore]| -> String {
+        let each = joints.iter();
+        let each: Vec<String> = each
+            .map(|j| format!("{} {}", j.joint, percent(j.coverage95)))
+            .collect();
+        list(&each)
+    };
+    let mut out = Vec::new();
+    if !many.is_empty() {
+        out.push(format!("a little outside 92 to 98 %: {}", shares(&many)));
+    }
+    if !few.is_empty() {
+        out.push(format!("within chance for so few rows: {}", shares(&few)));
+    }
+    (!out.is_empty()).then(|| out.join("; "))
 }
 
 /// Two standard errors of the share of rows inside an honest interval.
@@ -447,6 +475,30 @@ mod tests {
         assert!(!has_standstill(&validation));
         validation.moving.joints[0].rows -= 1;
         assert!(has_standstill(&validation));
+    }
+
+    #[test]
+    fn single_joints_that_hold_another_share_are_named_with_what_chance_has_to_do_with_it() {
+        let mut calibration = crate::report::fixture::two_joints();
+        let mut told = |rows: [u64; 2], shares: [f64; 2]| {
+            let scores = &mut calibration.validation.moving.joints;
+            for ((score, rows), share) in scores.iter_mut().zip(rows).zip(shares) {
+                (score.rows, score.coverage95) = (rows, share);
+            }
+            let joints = crate::report::view::joints(&calibration);
+            other_shares(&calibration.validation.moving, &joints)
+        };
+        let thin = "\u{202f}";
+        let said = format!(
+            "a little outside 92 to 98 %: shoulder 91.0{thin}%; within chance for so few rows: elbow 88.0{thin}%"
+        );
+        assert_eq!(told([100_000, 20], [0.91, 0.88]), Some(said));
+        assert_eq!(told([100_000, 20], [0.93, 0.97]), None);
+        // Too narrow, which is said elsewhere; all of a few rows inside, as in every third honest twin.
+        let said = format!("within chance for so few rows: elbow 100.0{thin}%");
+        assert_eq!(told([100_000, 20], [0.80, 1.0]), Some(said));
+        // Of one joint alone the share of all rows is its own.
+        assert_eq!(told([0, 20], [f64::NAN, 0.88]), None);
     }
 
     #[test]

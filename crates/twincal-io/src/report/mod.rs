@@ -67,6 +67,7 @@ pub struct FileHash {
 }
 
 pub use grounds::friction_only;
+pub use honesty::stretched;
 pub use limits::{decisive, has_standstill};
 
 /// Whether the calibrated torque can be used.

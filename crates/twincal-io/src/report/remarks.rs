@@ -484,7 +484,7 @@ mod tests {
 
     #[test]
     fn a_whole_that_neither_half_says_is_named() {
-        let whole = |value: f64| {
+        let told = |value: f64, second: f64| {
             of(|c| {
                 let own = &c.components[0];
                 let (name, column) = (own.name.clone(), own.columns[0].clone());
@@ -497,18 +497,24 @@ mod tests {
                     first: 7.0,
                     first_sd: 0.2,
                     first_pip: 1.0,
-                    second: 7.0,
+                    second,
                     second_sd: 0.2,
                     second_pip: 1.0,
-                    z: Some(0.0),
+                    z: Some((second - 7.0) / 0.2_f64.hypot(0.2)),
                 }];
             })
         };
+        let whole = |value: f64| told(value, 7.0);
         // Both halves together: 7.0 ± 0.141.
-        assert_eq!(whole(7.4), [""; 0]);
+        assert_eq!(whole(7.25), [""; 0]);
         assert_eq!(
-            whole(7.5),
-            ["all data together do not say what the two halves say: 7.5 against 7.0 and 7.0"]
+            whole(7.3),
+            ["all data together do not say what the two halves say: 7.3 against 7.0 and 7.0"]
+        );
+        // 2.5 sd from both together, and what one of them says.
+        assert_eq!(
+            told(7.05, 7.8),
+            ["the two halves of the data differ by 2.8 sd"]
         );
     }
 

@@ -1,8 +1,8 @@
 //! Have the predicted distributions the right shape: what the PIT of held-out rows says, joint by joint, in words.
 
-use super::limits::{decisive, too_narrow, too_wide};
+use super::limits::{decisive, has_standstill, too_narrow, too_wide};
 use super::text::{number, percent, subject};
-use super::view::{Joint, bias, memory};
+use super::view::{Joint, memory};
 use twincal::calibrate::Calibration;
 use twincal::validate::{JointScore, Pit, Reliability, Scores};
 
@@ -90,15 +90,15 @@ impl Shape {
     }
 
     /// What a reader can see of it: how much the 50 % interval holds, or on which side of the middle torque lies.
-    fn shown(self, pit: &Pit, coverage: &[(f64, f64)]) -> String {
+    fn shown(self, pit: &Pit, coverage: &[(f64, f64)], rows: &str) -> String {
         let bins = pit.histogram.len();
         let above =
             pit.histogram[bins / 2..].iter().sum::<f64>() / pit.histogram.iter().sum::<f64>();
         let half = coverage.iter().find(|(level, _)| *level == 0.5);
         match (self, half) {
-            (Self::Above, _) => format!("{} of the rows", percent(above)),
-            (Self::Below, _) => format!("{} of the rows", percent(1.0 - above)),
-            (_, Some((_, seen))) => format!("{} of the rows in 50 % intervals", percent(*seen)),
+            (Self::Above, _) => format!("{} of the {rows}", percent(above)),
+            (Self::Below, _) => format!("{} of the {rows}", percent(1.0 - above)),
+            (_, Some((_, seen))) => format!("{} of the {rows} in 50 % intervals", percent(*seen)),
             (_, None) => format!("PIT off uniform by {}", number(pit.distance, 2)),
         }
     }
@@ -170,6 +170,10 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
     let joints = looked_at(&validation.reliability);
     // What its 95 % interval says of a joint stands elsewhere; the middle of the distribution neither contradicts nor repeats it.
     let scores = &decisive(validation).joints;
+    let rows = match has_standstill(validation) {
+        true => "moving rows",
+        false => "rows",
+    };
     let said = |joint: &str, shape: Shape| {
         let (mut own, memory) = (
             scores.iter().filter(|score| score.joint == joint),
@@ -193,9 +197,9 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
         };
         let names: Vec<&str> = own.iter().map(|j| j.joint.as_str()).collect();
         let one = |j: &Reliability| {
-            let shown = shape.shown(&j.pit, &j.coverage_levels);
+            let shown = shape.shown(&j.pit, &j.coverage_levels, rows);
             match shape {
-                Shape::Above | Shape::Below => shown + &by_how_much(all, &j.joint),
+                Shape::Above | Shape::Below => shown + &by_how_much(scores, all, &j.joint),
                 Shape::Wide | Shape::Narrow => shown,
             }
         };
@@ -235,8 +239,8 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
             Some(side) => format!(
                 "{name}: its {} ({}{}).",
                 side.words(false),
-                side.shown(&joint.pit, &joint.coverage_levels),
-                by_how_much(all, &joint.joint)
+                side.shown(&joint.pit, &joint.coverage_levels, rows),
+                by_how_much(scores, all, &joint.joint)
             ),
             None => format!(
                 "{name}: predicted probabilities are not evenly spread (off by {}, by chance below {}).",
@@ -250,19 +254,22 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
     if let (true, Some(shape)) = (out.is_empty(), pooled) {
         let pit = &validation.pit;
         let words = shape.words(pit.distance <= OFF);
-        let shown = shape.shown(pit, &validation.coverage_levels);
+        let shown = shape.shown(pit, &validation.coverage_levels, rows);
         out.push(format!("All joints together: {words} ({shown})."));
     }
     out
 }
 
 /// ", by 44.1 N·m on average".
-fn by_how_much(joints: &[Joint<'_>], name: &str) -> String {
-    let own = joints.iter().find(|joint| joint.name == name);
-    let told = own.map(|joint| (bias(joint).abs(), joint.units.torque));
-    match told.filter(|(bias, _)| bias.is_finite()) {
-        Some((bias, unit)) => format!(", by {} {unit} on average", number(bias, 3)),
-        None => String::new(),
+fn by_how_much(scores: &[JointScore], joints: &[Joint<'_>], name: &str) -> String {
+    let score = scores.iter().find(|score| score.joint == name);
+    let joint = joints.iter().find(|joint| joint.name == name);
+    match score.zip(joint) {
+        Some((score, joint)) if score.bias.is_finite() => {
+            let (bias, unit) = (number(score.bias.abs(), 3), joint.units.torque);
+            format!(", by {bias} {unit} on average")
+        }
+        _ => String::new(),
     }
 }
 
@@ -291,14 +298,9 @@ pub(super) mod tests {
     #[test]
     fn torque_off_to_one_side_is_told_in_its_unit() {
         let mut calibration = crate::report::fixture::two_joints();
-        for trace in &mut calibration.validation.traces {
-            let rows = trace.measured.len();
-            trace.standstill = (0..rows).map(|row| row % 2 == 1).collect();
-            // 44 below while it moves, 1000 above at rest.
-            for (row, measured) in trace.measured.iter_mut().enumerate() {
-                *measured = trace.calibrated[row] + if row % 2 == 1 { 1000.0 } else { -44.0 };
-            }
-        }
+        // 44 below while it moves, 1000 above at rest.
+        calibration.validation.moving.joints[1].bias = -44.0;
+        calibration.validation.filtered.joints[1].bias = 478.0;
         calibration.validation.reliability[1].pit = pit(0.5, -4.0);
         let joints = crate::report::view::joints(&calibration);
         let said = "Joint elbow: its torque lies below the prediction too often (70.0\u{202f}% of the rows, by 44.0 N·m on average).";
@@ -357,7 +359,7 @@ pub(super) mod tests {
 
     #[test]
     fn what_is_wrong_is_shown_in_shares_of_rows() {
-        let shown = |shape: Shape, slope| shape.shown(&pit(0.5, slope), &[(0.5, 0.75)]);
+        let shown = |shape: Shape, slope| shape.shown(&pit(0.5, slope), &[(0.5, 0.75)], "rows");
         assert_eq!(
             shown(Shape::Wide, 0.0),
             "75.0\u{202f}% of the rows in 50 % intervals"

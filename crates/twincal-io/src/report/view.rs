@@ -96,18 +96,6 @@ pub(super) fn rmse(trace: &Trace, predicted: &[f64]) -> f64 {
     root_mean_square(trace.measured.iter().zip(predicted).map(|(m, p)| m - p))
 }
 
-/// Mean of measured − predicted over the held-out rows in which the joint moves; NaN without any.
-pub(super) fn bias(joint: &Joint<'_>) -> f64 {
-    let rows = joint.traces.iter().flat_map(|t| {
-        let rows = t.measured.iter().zip(&t.calibrated).zip(&t.standstill);
-        rows.filter(|(_, still)| !**still)
-            .map(|((measured, predicted), _)| measured - predicted)
-    });
-    let finite = rows.filter(|x| x.is_finite());
-    let (n, sum) = finite.fold((0.0, 0.0), |(n, sum), x| (n + 1.0, sum + x));
-    sum / n
-}
-
 /// Root mean square of the finite values; NaN without any.
 pub(super) fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     let (n, sum) = values

@@ -25,7 +25,7 @@ pub(super) fn findings(
     let advice = if robust {
         "they count little in this fit (noise.robust)"
     } else {
-        "intervals are wider than most rows need: cut what is no free motion (contacts, stops) out of the log, or set \
+        "they widen the intervals of all rows: cut what is no free motion (contacts, stops) out of the log, or set \
          noise.robust"
     };
     let mut findings = Vec::new();

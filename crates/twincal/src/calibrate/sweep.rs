@@ -100,6 +100,11 @@ pub(super) fn findings(
             .filter(|p| (p.mean[k] - posterior.mean[k]).abs() > posterior.sd[k]);
         if let Some(point) = largest {
             let name = &library.terms()[index].name;
+            // What is left of a mean by rounding, or by draws that are next to never in, is none.
+            let shown = |mean: f64| match mean.abs() < 1e-3 * posterior.sd[k] {
+                true => "0".to_owned(),
+                false => significant(mean, 3),
+            };
             let moved = (point.mean[k] - posterior.mean[k]).abs() / posterior.sd[k];
             let finding = Finding::new(
                 Severity::Warning,
@@ -109,8 +114,8 @@ pub(super) fn findings(
                     "`{name}` moves by {moved:.1} sd when the cut-off becomes {} Hz (mean over all models, in or out: from {} to {}): \
                      do not read its interval as the whole uncertainty",
                     significant(point.cutoff_hz, 3),
-                    significant(posterior.mean[k], 3),
-                    significant(point.mean[k], 3)
+                    shown(posterior.mean[k]),
+                    shown(point.mean[k])
                 ),
                 0,
             );

@@ -10,6 +10,7 @@ struct Sums {
     rows: u64,
     square_nominal: f64,
     square_calibrated: f64,
+    error: f64,
     inside: u64,
     width: f64,
     interval_score: f64,
@@ -27,6 +28,7 @@ impl AddAssign for Sums {
         self.rows += other.rows;
         self.square_nominal += other.square_nominal;
         self.square_calibrated += other.square_calibrated;
+        self.error += other.error;
         self.inside += other.inside;
         self.width += other.width;
         self.interval_score += other.interval_score;
@@ -51,6 +53,7 @@ impl Sums {
             rows: self.rows,
             rmse_nominal: self.mean(self.square_nominal).sqrt(),
             rmse_calibrated: self.mean(self.square_calibrated).sqrt(),
+            bias: self.mean(self.error),
             coverage95: self.mean(self.inside as f64),
             mean_width95: self.mean(self.width),
             interval_score95: self.mean(self.interval_score),
@@ -109,6 +112,7 @@ impl ScoreKeeper {
                 rows: 1,
                 square_nominal: (measured - torque.nominal[row]).powi(2),
                 square_calibrated: (measured - torque.calibrated[row]).powi(2),
+                error: measured - torque.calibrated[row],
                 inside: u64::from(measured >= low && measured <= high),
                 width: high - low,
                 interval_score: interval_score(low, high, measured),
@@ -260,6 +264,8 @@ mod tests {
         let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-15, "{a} {b}");
         close(scores.joints[0].rmse_nominal, (25.0_f64 / 2.0).sqrt());
         close(scores.joints[0].rmse_calibrated, (13.0_f64 / 2.0).sqrt());
+        close(scores.joints[0].bias, 2.5);
+        close(scores.joints[1].bias, 0.0);
         close(scores.joints[0].coverage95, 0.0);
         close(scores.joints[1].rmse_nominal, (5.0_f64 / 3.0).sqrt());
         // Both ends belong to the interval.

@@ -39,13 +39,13 @@ pub(in crate::report) fn figure(
     let rows = rows(&components, live);
     let selected = components.iter().filter(|t| t.selected).count();
     let label = format!(
-        "Bar chart of the inclusion probabilities of {live} candidates; {selected} reach one half and are kept."
+        "Bar chart of the inclusion probabilities of {live} candidates; {selected} reach one half."
     );
     Some(Figure {
         title: "Which effects the data support".into(),
         read: format!(
             "Each bar is the probability that the effect is really there, given this log and the prior; bars that reach \
-             the line at 0.5 are kept in the twin.{}",
+             the line at 0.5 are likelier there than not.{}",
             if unseen {
                 " What these data do not see has none."
             } else {

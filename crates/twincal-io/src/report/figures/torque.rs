@@ -26,9 +26,11 @@ pub(in crate::report) fn figure(joint: &Joint<'_>) -> Option<Figure> {
             draw(joint, trace, all.clone(), None, width, 270.0)
         }));
     } else {
+        let still = trace.standstill.contains(&true) && trace.standstill.contains(&false);
         let part = format!(
-            "The {} s in which it is furthest off.",
-            number(seconds(trace, &window), 2)
+            "The {} s in which it is furthest off{}.",
+            number(seconds(trace, &window), 2),
+            if still { " while it moves" } else { "" }
         );
         images.push(Image::full(scores(joint, trace), |width| {
             draw(
