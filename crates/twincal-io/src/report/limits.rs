@@ -18,8 +18,8 @@ pub(super) const COVERAGE: (f64, f64) = (0.90, 0.99);
 const ALARM: f64 = 0.05;
 /// What an interval promises to hold.
 const LEVEL: f64 = 0.95;
-/// Shares of rows inside that nothing needs to be said of.
-const ABOUT: (f64, f64) = (0.92, 0.98);
+/// Shares of rows inside that nothing needs to be said of: 92 to 98 % in whole percent.
+const ABOUT: (f64, f64) = (0.915, 0.985);
 /// It in words.
 const LEVEL_WORDS: &str = "95 % intervals";
 /// Share of the torque's standard deviation from which the remaining error is called large.

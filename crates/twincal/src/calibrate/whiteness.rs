@@ -18,6 +18,7 @@
 //! Noise that is one is taken for something else on one joint in fifty at most: 1 % for either. Heavy tails fail the second.
 
 use crate::signal::fir::filter_gains;
+use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Largest deviation of the cumulated periodogram: Kolmogorov's distribution at 99 %.
@@ -124,7 +125,8 @@ fn add_periodogram(innovation: &[f64], rho: f64, cutoff: f64, to: &mut Vec<Ordin
     let count = (HIGHEST * cutoff.min(0.5) * rows) as usize;
     let frequencies: Vec<f64> = (1..=count).map(|k| k as f64 / rows / cutoff).collect();
     let gains = filter_gains(1.0, &frequencies);
-    to.extend(frequencies.iter().zip(gains).map(|(&frequency, passed)| {
+    let ordinates = frequencies.par_iter().zip(gains);
+    to.par_extend(ordinates.map(|(&frequency, passed)| {
         let (turn_sin, turn_cos) = (TAU * frequency * cutoff).sin_cos();
         let (mut sin, mut cos, mut re, mut im) = (0.0, 1.0, 0.0, 0.0);
         for e in innovation {

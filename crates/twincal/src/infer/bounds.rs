@@ -185,16 +185,19 @@ pub(super) fn settle(
     };
     let reference = log_weight(problem, standard, heaviest) - heaviest.weight.ln();
     let mut log_weights: Vec<f64> = listed.models.iter().map(|m| m.weight.ln()).collect();
-    for (_, members, positions) in approximate::shares(reduced, &found, found.sums.total(), JOINED)
-    {
-        if known.contains(&members) {
-            continue;
-        }
-        let mut positions = positions;
-        positions.sort_unstable_by_key(|&d| standard.order[d]);
-        let mut model = standard.model(&positions, 1.0)?;
-        let log_weight = log_weight(problem, standard, &model) - reference;
-        model.weight = log_weight.exp();
+    let shares = approximate::shares(reduced, &found, found.sums.total(), JOINED);
+    let joined: Vec<(Vec<usize>, Model, f64)> = shares
+        .into_par_iter()
+        .filter(|(_, members, _)| !known.contains(members))
+        .map(|(_, _, mut positions)| {
+            positions.sort_unstable_by_key(|&d| standard.order[d]);
+            let mut model = standard.model(&positions, 1.0)?;
+            let log_weight = log_weight(problem, standard, &model) - reference;
+            model.weight = log_weight.exp();
+            Ok((positions, model, log_weight))
+        })
+        .collect::<Result<_>>()?;
+    for (positions, model, log_weight) in joined {
         log_weights.push(log_weight);
         listed.models.push(model);
         listed.positions.push(positions);
