@@ -202,12 +202,14 @@ fn held(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
     };
     // Where all is inside, that is no praise.
     let factor = calibration.validation.conformal.as_ref().map(|c| c.factor);
-    let wide = match factor.filter(|f| {
-        let enough = independent_rows(calibration, joints) >= FEW;
-        *f < MUCH_TOO_WIDE && judged.coverage95 > SHARE_ALL && enough
-    }) {
-        Some(factor) => format!(
+    let enough = independent_rows(calibration, joints) >= FEW;
+    let wide = match factor.filter(|f| *f < MUCH_TOO_WIDE && judged.coverage95 > SHARE_ALL) {
+        Some(factor) if enough => format!(
             ": they are wider than they need to be, {} of their width would have done",
+            percent(factor)
+        ),
+        Some(factor) => format!(
+            "; {} of their width would have done for these few",
             percent(factor)
         ),
         None => String::new(),
@@ -465,10 +467,13 @@ mod tests {
 
     #[test]
     fn intervals_that_hold_everything_say_how_much_of_them_would_have_done() {
-        let of = |factor: f64, coverage: f64| {
+        let told = |factor: f64, coverage: f64, memory: f64| {
             let told = judged(|c| {
                 c.validation.conformal.as_mut().unwrap().factor = factor;
                 c.validation.filtered.coverage95 = coverage;
+                for noise in &mut c.noise {
+                    noise.autocorrelation_time *= memory;
+                }
             });
             let held = told
                 .grounds
@@ -476,10 +481,14 @@ mod tests {
                 .find(|g| g.starts_with("The 95 % intervals"));
             held.unwrap_or_default()
         };
+        let of = |factor: f64, coverage: f64| told(factor, coverage, 1.0);
         let said =
             ": they are wider than they need to be, 33.6\u{202f}% of their width would have done.";
         assert!(of(0.336, 1.0).ends_with(said), "{}", of(0.336, 1.0));
         assert!(!of(0.6, 1.0).contains("wider") && !of(0.336, 0.98).contains("wider"));
+        let few = told(0.336, 1.0, 1000.0);
+        let said = "; 33.6\u{202f}% of their width would have done for these few.";
+        assert!(few.ends_with(said), "{few}");
     }
 
     #[test]

@@ -31,7 +31,7 @@ pub(in crate::report) fn figure(
         title: "Missing torque as a law of one joint".into(),
         read: "Over the range in the logs: what the model lacks on a joint as a function of its own position (springs, \
                counterbalances) or velocity (friction), averaged over all models, those without an effect too. Where the band is narrow the law is known, even if its coefficients \
-               cannot be told apart."
+               cannot be told apart. What also acts on other joints or with acceleration (a payload, masses) is not in it."
             .into(),
         legend: vec![MEAN, legend::BAND],
         images,
