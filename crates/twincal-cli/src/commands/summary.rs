@@ -144,10 +144,15 @@ fn reliability(calibration: &Calibration) -> Vec<String> {
     }
     if let Some(conformal) = &validation.conformal {
         lines.push(format!(
-            "{} by {}, they hold {:.0} % of all rows, those at standstill too, of the next such log with {} {} ({})",
+            "{} by {}, they hold {:.0} % of all rows{} of the next such log with {} {} ({})",
             report::stretched(conformal.factor),
             significant(conformal.factor, 3),
             100.0 * conformal.rows,
+            if report::has_standstill(validation) {
+                ", those at standstill too,"
+            } else {
+                ""
+            },
             if conformal.guaranteed {
                 "guaranteed probability"
             } else {

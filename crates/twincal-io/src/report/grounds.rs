@@ -115,12 +115,17 @@ fn as_logged(calibration: &Calibration, unit: &str) -> Option<String> {
     let apart = (raw.rmse_calibrated / judged.rmse_calibrated - 1.0).abs();
     let worth_telling = apart > UNFILTERED_WORTH_TELLING || !lost.is_empty();
     (rows_of(raw) > 0 && worth_telling).then(|| {
+        // The filter has no rows for half its window at both ends: much of a short log.
+        let ends = match held_out_seconds(calibration) < SHORT {
+            true => ", the log's ends too",
+            false => "",
+        };
         let lost = match lost.is_empty() {
             true => String::new(),
             false => format!("; there {}", list(&lost)),
         };
         format!(
-            "; as logged, unfiltered (noise included){which}: {} → {} {unit}{lost}",
+            "; as logged, unfiltered (noise included{ends}){which}: {} → {} {unit}{lost}",
             number(raw.rmse_nominal, 3),
             number(raw.rmse_calibrated, 3)
         )

@@ -1,5 +1,6 @@
 //! Can the numbers be believed: intervals joint by joint, a guarantee, what repeats, what the compact twin costs.
 
+use super::limits::has_standstill;
 use super::tables::{Table, with_unit};
 use super::text::{count, number, percent, probability};
 use super::verdict::plus_minus;
@@ -91,10 +92,15 @@ pub(super) fn guarantee(validation: &Validation) -> String {
         .collect();
     format!(
         "Without believing the model: {} by {}, the 95 % intervals of all joints hold {} of all rows of the next log \
-         like these, those at standstill too, with probability {}/{} = {} {}.{} Joint by joint: {}.",
+         like these{}, with probability {}/{} = {} {}.{} Joint by joint: {}.",
         stretched(conformal.factor),
         number(conformal.factor, 3),
         percent(conformal.rows),
+        if has_standstill(validation) {
+            ", those at standstill too"
+        } else {
+            ""
+        },
         conformal.trajectories,
         conformal.trajectories + 1,
         percent(conformal.level),

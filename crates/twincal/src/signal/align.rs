@@ -504,12 +504,12 @@ fn report_standstill(
         // A coarse encoder tells slow motion from standing still only where the filter leaves little of its steps.
         let text = if limit > SLOW * pipeline.coulomb_velocity {
             format!(
-                "is slower than {} per s in {share:.1} % of this log's samples, which its encoder cannot tell from standstill at a cut-off of {} Hz",
+                "is slower than {} per s in {share:.1} % of this log's filtered samples, which its encoder cannot tell from standstill at a cut-off of {} Hz",
                 significant(limit, 2),
                 pipeline.cutoff_hz
             )
         } else {
-            format!("{rest} in {share:.1} % of this log's samples")
+            format!("{rest} in {share:.1} % of this log's filtered samples")
         };
         findings.push(Finding::new(
             severity,
