@@ -190,14 +190,14 @@ impl Family {
     /// a payload, which one log in three or so carries unsaid, is the usual reason why the last link is not what the model says. What has
     /// mass somewhere has a tensor about any other point: that of a payload is next to certain where the payload is in; not quite,
     /// because the tensor of a small payload near the link's own centre of mass is too small to be seen. A drive's zero is calibrated,
-    /// while a constant is what is left on one motion of whatever else is missing: one arm of six joints in ten has an offset.
+    /// while a constant is what is left on one motion of whatever else is missing: one arm of six joints in five has an offset.
     #[must_use]
     pub fn usual(self) -> Option<f64> {
         match self {
             Self::Viscous | Self::Coulomb | Self::MotorInertia => Some(0.5),
             Self::Payload => Some(1.0 / 3.0),
             Self::PayloadTensor => Some(0.999),
-            Self::Offset => Some(1.0 / 60.0),
+            Self::Offset => Some(1.0 / 30.0),
             _ => None,
         }
     }
