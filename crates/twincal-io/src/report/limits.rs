@@ -263,11 +263,15 @@ pub(super) fn too_narrow(joint: &JointScore, memory: f64) -> bool {
 
 /// More of them: so many independent rows that some ought to lie outside.
 pub(super) fn too_wide(joint: &JointScore, memory: f64) -> bool {
-    let all_inside = LEVEL.powf(joint.rows as f64 / memory);
-    joint.coverage95 > COVERAGE.1 && all_inside < ALARM
+    joint.coverage95 > COVERAGE.1 && enough_to_leave_some(joint.rows, memory)
 }
 
-/// "A little outside 92 to 98 %: joint_2 91.1 %; within chance for so few rows: joint_3 88.3 %": joints of several whose intervals hold another
+/// Whether an honest interval holds all of so many rows in fewer than one twin in twenty.
+fn enough_to_leave_some(rows: u64, memory: f64) -> bool {
+    LEVEL.powf(rows as f64 / memory) < ALARM
+}
+
+/// "a little outside 92 to 98 %: joint_2 91.1 %; within chance for so few rows: joint_3 88.3 %": joints of several whose intervals hold another
 /// share than promised, where neither [`too_narrow`] nor [`too_wide`] says so.
 pub(super) fn other_shares(scores: &Scores, joints: &[Joint<'_>]) -> Option<String> {
     let several = scores.joints.iter().filter(|j| j.rows > 0).count() > 1;
@@ -279,8 +283,7 @@ pub(super) fn other_shares(scores: &Scores, joints: &[Joint<'_>]) -> Option<Stri
     };
     let by_chance = |j: &JointScore| {
         let rows_within = (j.coverage95 - LEVEL).abs() <= chance(j.rows, memory(j));
-        let all_inside = LEVEL.powf(j.rows as f64 / memory(j));
-        rows_within || j.coverage95 > LEVEL && all_inside >= ALARM
+        rows_within || j.coverage95 > LEVEL && !enough_to_leave_some(j.rows, memory(j))
     };
     let (few, many): (Vec<&JointScore>, Vec<&JointScore>) = scores
         .joints

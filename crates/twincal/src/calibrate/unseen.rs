@@ -96,13 +96,10 @@ pub(super) fn tell(calibration: &mut Calibration, excitation: &Excitation) {
         };
         component.words = format!("{}: not seen: {why}", component.story);
     }
-    // What is told by another effect, with a probability of its own, is not lost.
-    let told = |name: &String| {
-        let mut members = calibration.groups.iter().flat_map(|group| &group.members);
-        members.any(|member| member == name)
-    };
-    weak.retain(|name| !told(name));
-    never.retain(|name| !told(name));
+    // What others tell is not lost.
+    let unseen: Vec<&String> = calibration.unseen().map(|own| &own.name).collect();
+    weak.retain(|name| unseen.contains(&name));
+    never.retain(|name| unseen.contains(&name));
     let mut findings = Vec::new();
     // What hides only behind absent candidates is nobody's question.
     let matters = |name: &String| {

@@ -120,7 +120,9 @@ pub(crate) fn quantum<'a>(runs: impl Iterator<Item = &'a [f64]> + Clone) -> Opti
     for change in changes() {
         let units = change / step;
         small += usize::from(units < 1.5);
-        if (units - units.round()).abs() >= (0.05 + 1e-3 * units).min(0.2) {
+        // A change to or from a missing value is none.
+        let multiple = (units - units.round()).abs() < (0.05 + 1e-3 * units).min(0.2);
+        if !multiple {
             others += 1;
             // A smooth channel has said so long before its end.
             if !mostly(all - others) {
@@ -145,5 +147,9 @@ mod tests {
         let step = quantum(std::iter::once(coarse.as_slice())).unwrap();
         assert!((step / 3.8e-4 - 1.0).abs() < 1e-6);
         assert_eq!(quantum(std::iter::once(smooth.as_slice())), None);
+        // Gaps are no steps: with many of them nothing is told.
+        let mut holes = coarse;
+        holes.iter_mut().step_by(10).for_each(|q| *q = f64::NAN);
+        assert_eq!(quantum(std::iter::once(holes.as_slice())), None);
     }
 }
