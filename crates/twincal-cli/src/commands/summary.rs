@@ -5,7 +5,7 @@ use super::repeats;
 use super::table::{print_table, table};
 use crate::terminal::{Terminal, clean};
 use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary};
-use twincal::calibrate::{Repeat, Repeated, Verdict};
+use twincal::calibrate::{Repeat, Repeated};
 use twincal::validate::{Scores, Split};
 use twincal::words::significant;
 use twincal::{Finding, Severity};
@@ -40,13 +40,10 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
     }
     for component in all.iter().filter(|component| component.selected) {
         let mut said = vec![format!("PIP {}", pip(component.pip))];
-        if component.verdict == Some(Verdict::Undecided) {
-            said.push("undecided".into());
-        }
-        if let halves @ (Repeated::InNeitherHalf | Repeated::InOneHalf) =
-            repeated(component, calibration)
-        {
-            said.push(halves.words().into());
+        let why = report::why_suspected(component, calibration);
+        said.extend((!why.is_empty()).then(|| format!("only suspected: {}", why.join(", "))));
+        if repeated(component, calibration) == Repeated::InOneHalf {
+            said.push(Repeated::InOneHalf.words().into());
         }
         let text = format!("{} ({})", component.words, said.join(", "));
         paragraph(&text, terminal);
@@ -123,6 +120,13 @@ fn verdict(calibration: &Calibration, terminal: &mut Terminal) {
     paragraph(&answer.headline, terminal);
     let told = answer.grounds.iter().chain(&answer.limits);
     told.for_each(|text| paragraph(text, terminal));
+    if !answer.folded.is_empty() {
+        let text = format!("{} more to mind in the report.", answer.folded.len());
+        paragraph(&text, terminal);
+    }
+    if let Some(next) = &answer.next {
+        paragraph(&format!("Next recording: {next}"), terminal);
+    }
     terminal.say("");
 }
 

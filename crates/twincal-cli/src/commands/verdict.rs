@@ -21,7 +21,7 @@ pub(super) fn doubt(calibration: &Calibration) -> Option<Finding> {
 fn words(answer: &Answer) -> String {
     let mut reasons = answer.limits.iter().chain(&answer.grounds);
     let reason = reasons.next().map_or("", String::as_str);
-    let more = match answer.limits.len() {
+    let more = match answer.limits.len() + answer.folded.len() {
         0 | 1 => String::new(),
         n => format!(" ({} more in its report)", n - 1),
     };
@@ -40,6 +40,8 @@ mod tests {
                 headline: headline.into(),
                 grounds: vec!["Torque error: 1 → 2 N·m.".into()],
                 limits: limits.iter().map(|&limit| limit.into()).collect(),
+                folded: Vec::new(),
+                next: None,
             })
         };
         assert_eq!(

@@ -4,12 +4,13 @@
 use super::MENTIONED;
 use super::figures::inclusion::family_name;
 use super::figures::sensitivity;
-use super::remarks::{doubts, remarks};
+use super::remarks::remarks;
+use super::standing::{Standing, standing};
 use super::text::{interval, probability, with_ends};
 use super::verdict::plus_minus;
 use serde::Serialize;
 use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary, TermSummary, Verdict};
-use twincal::term::{Estimate, Family, Status, told};
+use twincal::term::{Estimate, Family, Status, is_place, told};
 
 /// The effects as a reader wants them: by kind, in the order of the library, joints in the order of the model.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -64,9 +65,11 @@ pub(super) struct Effect {
     pub(super) unseen: Vec<String>,
     /// The data do not say whether it is there, or the sampler cannot tell on which side of 0.5 it lies.
     pub(super) undecided: bool,
-    /// What is to be minded.
     /// Found, and nothing speaks against it or its numbers.
     pub(super) stands: bool,
+    /// More likely than not, but something speaks against its being there or being what it says.
+    pub(super) suspected: bool,
+    /// What is to be minded.
     pub(super) remarks: Vec<String>,
 }
 
@@ -179,7 +182,9 @@ fn family_title(component: &ComponentSummary) -> String {
 
 fn effect(component: &ComponentSummary, calibration: &Calibration) -> Effect {
     let pip = component.pip.unwrap_or(f64::NAN);
-    let seen: Vec<&ParameterSummary> = seen(component, true).collect();
+    let seen: Vec<&ParameterSummary> = seen(component, true)
+        .filter(|parameter| !is_no_place(parameter))
+        .collect();
     let estimates: Vec<Estimate> = component.parameters.iter().map(estimate).collect();
     let told = told(component.family, &estimates);
     let told: Vec<&ParameterSummary> =
@@ -188,6 +193,7 @@ fn effect(component: &ComponentSummary, calibration: &Calibration) -> Effect {
         all.iter().map(|p| parameter(p, component.family)).collect()
     };
     let undecided = component.verdict == Some(Verdict::Undecided);
+    let standing = standing(component, calibration);
     Effect {
         title: match component.name.rsplit_once('.') {
             Some((place, word)) if word == component.family.word() => place.into(),
@@ -206,7 +212,8 @@ fn effect(component: &ComponentSummary, calibration: &Calibration) -> Effect {
             || component
                 .pip_mcse
                 .is_some_and(|e| e > 0.0 && (pip - 0.5).abs() < 3.0 * e),
-        stands: component.selected && !undecided && doubts(component, calibration).is_empty(),
+        stands: standing == Some(Standing::Stands),
+        suspected: standing == Some(Standing::Suspected),
         remarks: remarks(component, calibration),
     }
 }
@@ -217,6 +224,11 @@ fn seen(component: &ComponentSummary, wanted: bool) -> impl Iterator<Item = &Par
         .parameters
         .iter()
         .filter(move |p| p.seen == wanted)
+}
+
+/// Whether it is a spring's rest position at which no joint stands: its preload says what it does.
+fn is_no_place(parameter: &ParameterSummary) -> bool {
+    parameter.name == "rest_position" && !is_place(&estimate(parameter))
 }
 
 /// A parameter's name; empty where there is only one.

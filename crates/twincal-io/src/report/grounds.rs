@@ -1,13 +1,12 @@
 //! What the verdict rests on, a sentence each: error of held-out torque, what friction alone would leave, intervals, effects.
 
-use super::figures::inclusion::family_name;
-use super::figures::sensitivity;
 use super::limits::{FEW, decisive, has_standstill, other_shares};
-use super::remarks::doubts;
+use super::standing::why_suspected;
 use super::standstill::{at_standstill, held_at_rest, rest_got_worse};
 use super::text::{count, first_of, list, number, percent};
+use super::uses;
 use super::view::{Joint, independent_rows, pooled_unit};
-use twincal::calibrate::{Calibration, ComponentSummary, Verdict as Decision};
+use twincal::calibrate::Calibration;
 use twincal::validate::{JointScore, Scores, Split};
 
 /// Change of an error from which other rows are told apart.
@@ -23,8 +22,6 @@ const SURE: f64 = 0.95;
 /// Share of the intervals' width that would have done from which they are called too wide, and the share of rows that they then hold.
 const MUCH_TOO_WIDE: f64 = 0.5;
 const SHARE_ALL: f64 = 0.99;
-/// Effects up to this number are named.
-const FEW_EFFECTS: usize = 4;
 /// Joints that are named; the others are counted.
 pub(super) const NAMED: usize = 3;
 
@@ -34,8 +31,7 @@ pub(super) fn grounds(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<St
     out.extend(at_standstill(calibration, joints).filter(|_| !rest_got_worse(calibration)));
     out.extend(friction_alone(calibration, joints));
     out.push(held(calibration, joints));
-    out.extend(what_was_found(calibration));
-    out.push(effects_found(calibration));
+    out.extend(effects_found(calibration));
     out
 }
 
@@ -249,45 +245,13 @@ pub(super) fn held_out_seconds(calibration: &Calibration) -> f64 {
     rows.unwrap_or(0).saturating_sub(1) as f64 / calibration.kept_rate_hz()
 }
 
-/// Few effects by name, many by their kinds.
-fn what_was_found(calibration: &Calibration) -> Option<String> {
-    let all = calibration.components.iter();
-    let found: Vec<&ComponentSummary> = all
-        .filter(|c| c.selected && c.verdict != Some(Decision::Undecided))
-        .collect();
-    let told: Vec<String> = match found.len() {
-        0 => return None,
-        1..=FEW_EFFECTS => found.iter().map(|own| own.name.clone()).collect(),
-        _ => {
-            let kinds = found.chunk_by(|a, b| a.family == b.family);
-            kinds
-                .map(|own| format!("{} ({})", family_name(own[0].family), own.len()))
-                .collect()
-        }
-    };
-    Some(format!("Found: {}.", list(&told)))
-}
-
-/// What is more likely than not, without and with what the data leave open, and how much of it stands every check.
-pub(super) fn effects_found(calibration: &Calibration) -> String {
+/// What was found, use by use; where nothing of it is sure, what at least one is.
+pub(super) fn effects_found(calibration: &Calibration) -> Vec<String> {
     let likely = || calibration.components.iter().filter(|c| c.selected);
-    let is_open = |c: &&ComponentSummary| c.verdict == Some(Decision::Undecided);
-    let sure: Vec<&ComponentSummary> = likely().filter(|c| !is_open(c)).collect();
-    let by_prior: Vec<&str> = (sensitivity::by_prior(calibration))
-        .map(|c| c.name.as_str())
-        .collect();
-    let doubted = (sure.iter())
-        .filter(|c| by_prior.contains(&c.name.as_str()) || !doubts(c, calibration).is_empty())
-        .count();
-    let open = likely().filter(is_open).count();
-    let more = match open {
-        0 => String::new(),
-        n => format!("; {n} more likely than not, but undecided"),
-    };
-    const WHERE: &str = "in the report’s table of effects";
-    match (sure.len(), doubted) {
-        (0, _) if open == 0 => "No missing effect is more likely than not.".into(),
-        (0, _) => {
+    let suspected = likely().filter(|own| !why_suspected(own, calibration).is_empty());
+    match (likely().count(), suspected.count()) {
+        (0, _) => vec!["No missing effect is more likely than not.".into()],
+        (n, suspected) if suspected == n => {
             let groups = calibration.groups.iter().filter(|group| group.pip > SURE);
             let sure: Vec<String> = groups
                 .map(|group| {
@@ -295,23 +259,16 @@ pub(super) fn effects_found(calibration: &Calibration) -> String {
                     format!("at least one of {} is there", list(&named))
                 })
                 .collect();
-            match sure.is_empty() {
-                true => format!("No missing effect is sure{more}."),
+            let more = format!("{n} more likely than not, but only suspected");
+            vec![match sure.is_empty() {
+                true => format!("No missing effect is sure; {more}."),
                 false => format!(
-                    "No single missing effect is sure{more}. Sure: {}.",
+                    "No single missing effect is sure; {more}. Sure: {}.",
                     sure.join("; ")
                 ),
-            }
+            }]
         }
-        (1, 0) => format!("One missing effect found, which stands every check{more}."),
-        (1, _) => format!("One missing effect found, with a doubt {WHERE}{more}."),
-        (n, 0) => format!("{n} missing effects found, which stand every check{more}."),
-        (n, d) if d == n => format!("{n} missing effects found, each with a doubt {WHERE}{more}."),
-        (n, d) => format!(
-            "Missing effects: {} found that {} every check, {d} found with a doubt {WHERE}{more}.",
-            n - d,
-            if n - d == 1 { "stands" } else { "stand" }
-        ),
+        _ => uses::sentences(calibration),
     }
 }
 
@@ -319,6 +276,7 @@ pub(super) fn effects_found(calibration: &Calibration) -> String {
 mod tests {
     use super::super::verdict::tests::judged;
     use super::*;
+    use twincal::calibrate::Verdict as Decision;
     use twincal::{Finding, Severity};
 
     /// Standstill rows as many as moving ones: of these the mean square is 4 before and 0.25 after; at rest `still` before and after, joint by joint.
@@ -514,43 +472,8 @@ mod tests {
             });
             told.grounds.last().cloned().unwrap_or_default()
         };
-        let sure = "No single missing effect is sure; 7 more likely than not, but undecided. Sure: at least one of a, b, c and 2 more is there.";
+        let sure = "No single missing effect is sure; 7 more likely than not, but only suspected. Sure: at least one of a, b, c and 2 more is there.";
         assert_eq!(of(0.999), sure);
         assert!(of(0.9).starts_with("No missing effect is sure;"));
-    }
-
-    #[test]
-    fn effects_with_a_remark_are_counted_apart() {
-        let of =
-            |change: &dyn Fn(&mut Calibration)| judged(change).grounds.pop().unwrap_or_default();
-        assert_eq!(
-            of(&|_| ()),
-            "7 missing effects found, which stand every check."
-        );
-        let one = "Missing effects: 6 found that stand every check, 1 found with a doubt in the report’s table of effects.";
-        assert_eq!(of(&|c| c.repeatability[0].z = Some(3.7)), one);
-        let prior = |c: &mut Calibration| {
-            let selected = c.terms.iter_mut().find(|t| t.selected);
-            selected.unwrap().pip_sensitivity = vec![0.3, 0.9];
-        };
-        assert_eq!(of(&prior), one);
-        // A sign that is explained is no doubt.
-        let negative = |c: &mut Calibration| {
-            let own = c.components.iter_mut().find(|c| c.name == "elbow.viscous");
-            let value = &mut own.unwrap().parameters[0];
-            (value.median, value.interval68) = (-1.0, [-1.01, -0.99]);
-            value.interval95 = [-1.02, -0.98];
-        };
-        assert_eq!(of(&negative), of(&|_| ()));
-        let undecided = |c: &mut Calibration| {
-            let found = c.components.iter_mut().filter(|c| c.selected);
-            for component in found.skip(1) {
-                component.verdict = Some(Decision::Undecided);
-            }
-        };
-        assert_eq!(
-            of(&undecided),
-            "One missing effect found, which stands every check; 6 more likely than not, but undecided."
-        );
     }
 }

@@ -16,18 +16,21 @@ mod honesty;
 #[cfg(test)]
 mod fixture;
 mod limits;
+mod next_recording;
 mod page;
 mod plot;
 mod remarks;
 mod reservations;
 mod scale;
 mod shape;
+mod standing;
 mod standstill;
 mod svg;
 mod tables;
 #[cfg(test)]
 mod tests;
 mod text;
+mod uses;
 mod verdict;
 mod view;
 
@@ -69,6 +72,7 @@ pub struct FileHash {
 pub use grounds::friction_only;
 pub use honesty::stretched;
 pub use limits::{decisive, has_standstill};
+pub use standing::why_suspected;
 
 /// Whether the calibrated torque can be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -77,8 +81,12 @@ pub struct Answer {
     pub headline: String,
     /// What it rests on.
     pub grounds: Vec<String>,
-    /// What held-out torque and the effects say against it.
+    /// What held-out torque and the effects say against it: what matters most.
     pub limits: Vec<String>,
+    /// And the rest of that.
+    pub folded: Vec<String>,
+    /// The recording to make next, where that would show more.
+    pub next: Option<String>,
 }
 
 /// What stands at the top of the report, without its pointers into the page.
@@ -86,10 +94,13 @@ pub struct Answer {
 pub fn answer(calibration: &Calibration) -> Answer {
     let joints = view::joints(calibration);
     let verdict = verdict::judge(calibration, &joints);
+    let (limits, folded) = limits::fold(limits::of_results(calibration, &joints));
     Answer {
         headline: verdict.headline,
         grounds: verdict.grounds,
-        limits: limits::of_results(calibration, &joints),
+        limits,
+        folded,
+        next: verdict.next,
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::figures::sensitivity;
 use super::halves::{repeats, whole_against_halves};
+use super::standing::no_body;
 use super::text::{first_of, list, number, percent};
 use twincal::calibrate::{Alike, Calibration, ComponentSummary, ParameterSummary, Verdict};
 use twincal::term::Family;
@@ -94,17 +95,11 @@ fn of_the_file(component: &ComponentSummary, calibration: &Calibration) -> Optio
 pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) -> Vec<String> {
     let mut out = Vec::new();
     out.extend(size_of_gravity(component, calibration));
-    if component.no_rigid_body {
-        out.push(
-            "no rigid body in more than 95 % of the draws: do not read it as mass or inertia"
-                .into(),
-        );
-    } else if is_hardly_a_body(component, calibration) {
-        out.push(
-            "no rigid body in more than half of the draws: these logs leave its inertia open"
-                .into(),
-        );
-    }
+    let open = match component.no_rigid_body {
+        true => "do not read it as mass or inertia",
+        false => "these logs leave its inertia open",
+    };
+    out.extend(no_body(component).map(|share| format!("{share}: {open}")));
     out.extend(few_rows(component, calibration));
     out.extend(of_a_point_mass(component, calibration));
     out.extend(rivals(component, calibration));
@@ -126,17 +121,6 @@ pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) ->
         out.push("depends on the filter's cut-off by more than its ±".into());
     }
     out
-}
-
-/// Whether its link, with what was found of it, is a rigid body in less than half of the draws.
-fn is_hardly_a_body(component: &ComponentSummary, calibration: &Calibration) -> bool {
-    let of_link = |link: &str| {
-        let rest = component.name.strip_prefix(link);
-        rest.is_some_and(|rest| [".mass_moments", ".tensor"].contains(&rest))
-    };
-    let mut findings = calibration.findings.iter();
-    component.selected
-        && findings.any(|f| f.code == "unphysical_inertia_found" && of_link(&f.subject))
 }
 
 /// Friction that is told together with a change of it of which the data do not say whether it is there.
@@ -384,6 +368,7 @@ mod tests {
             group.members.push(c.components[0].name.clone());
             c.groups = vec![group];
             c.components[0].no_rigid_body = true;
+            c.components[0].selected = true;
             let subject = c.components[0].columns[0].clone();
             c.findings.push(Finding::new(
                 Severity::Warning,
@@ -440,18 +425,16 @@ mod tests {
         assert_eq!(viscous(Verdict::Undecided, "lift"), said);
         assert_eq!(viscous(Verdict::Found, "lift"), [""; 0]);
         assert_eq!(viscous(Verdict::Undecided, "elbow"), [""; 0]);
-        let body = |link: &str| {
+        let body = |share: Option<f64>| {
             of(|c| {
-                (c.components[0].name, c.components[0].selected) =
-                    ("wrist.mass_moments".into(), true);
-                let code = "unphysical_inertia_found";
-                c.findings = vec![Finding::new(Severity::Note, code, link, "", 0)];
+                c.components[0].selected = true;
+                c.components[0].rigid_share = share;
             })
         };
         let said =
-            ["no rigid body in more than half of the draws: these logs leave its inertia open"];
-        assert_eq!(body("wrist"), said);
-        assert_eq!(body("fore"), [""; 0]);
+            ["no rigid body in 70.0\u{202f}% of the draws: these logs leave its inertia open"];
+        assert_eq!(body(Some(0.3)), said);
+        assert_eq!(body(None), [""; 0]);
     }
 
     #[test]

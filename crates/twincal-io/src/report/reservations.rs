@@ -3,37 +3,24 @@
 use super::figures::sensitivity;
 use super::grounds::NAMED;
 use super::halves::whole_against_halves;
-use super::remarks::size_of_gravity;
+use super::standing::{Standing, of_halves, standing};
 use super::text::{first_of, list, number};
+use super::uses;
 use twincal::Severity;
-use twincal::calibrate::{Calibration, Repeat, Repeated};
+use twincal::calibrate::{Calibration, Repeated};
 
-/// What was found and is not to be rested on: bodies that are none, gravity of another size, numbers on which the halves of the data differ, effects
-/// that neither half has alone, and those that another prior would leave out.
+/// What was found and is not to be rested on: what is only suspected, and numbers on which the halves of the data differ from each other or, of
+/// the rest, from all of it.
 pub(super) fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
-    let mut out = Vec::new();
-    let bodies = no_bodies(calibration);
-    if !bodies.is_empty() {
-        out.push(format!(
-            "What was found of {} is no rigid body (in more than 95 % of the draws): another effect is missing among the candidates, or inertias of the model are wrong; do not read it as mass or inertia.",
-            list(&bodies)
-        ));
-    }
-    let found = calibration.components.iter().filter(|c| c.selected);
-    out.extend(found.filter_map(|component| {
-        let words = size_of_gravity(component, calibration)?;
-        Some(format!("{}: {words}.", component.name))
-    }));
-    let effects = || (calibration.repeatability).chunk_by(|a, b| a.component == b.component);
-    let apart = effects().filter(|own| Repeat::of_effect(own) == Repeated::Differs);
-    let apart: Vec<String> = apart
+    let mut out: Vec<String> = uses::suspected(calibration).into_iter().collect();
+    let found = || calibration.components.iter().filter(|own| own.selected);
+    let apart: Vec<String> = found()
+        .filter(|own| of_halves(own, calibration) == Repeated::Differs)
         .map(|own| {
-            let z = own.iter().filter_map(|number| number.z).map(f64::abs);
-            format!(
-                "{} ({} sd)",
-                own[0].component,
-                number(z.fold(0.0, f64::max), 2)
-            )
+            let numbers = calibration.repeatability.iter();
+            let numbers = numbers.filter(|number| number.component == own.name);
+            let z = numbers.filter_map(|number| number.z).map(f64::abs);
+            format!("{} ({} sd)", own.name, number(z.fold(0.0, f64::max), 2))
         })
         .collect();
     if !apart.is_empty() {
@@ -42,16 +29,8 @@ pub(super) fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
             list(&apart)
         ));
     }
-    let in_neither = effects().filter(|own| Repeat::of_effect(own) == Repeated::InNeitherHalf);
-    let in_neither: Vec<&str> = in_neither.map(|own| own[0].component.as_str()).collect();
-    if !in_neither.is_empty() {
-        out.push(format!(
-            "Found in the whole data, but in neither half alone: {}.",
-            list(&in_neither)
-        ));
-    }
-    let found = calibration.components.iter().filter(|c| c.selected);
-    let against: Vec<String> = found
+    let against: Vec<String> = found()
+        .filter(|own| standing(own, calibration) == Some(Standing::Doubted))
         .filter_map(|component| {
             let against = whole_against_halves(component, calibration)?;
             Some(format!("{} ({against})", component.name))
@@ -62,13 +41,6 @@ pub(super) fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
             "All data together say what their two halves do not: {}.",
             list(&against)
         ));
-    }
-    let by_prior: Vec<&str> = sensitivity::by_prior(calibration)
-        .filter(|component| component.selected)
-        .map(|component| component.name.as_str())
-        .collect();
-    if !by_prior.is_empty() {
-        out.push(format!("Other priors would leave out {}.", list(&by_prior)));
     }
     out
 }

@@ -167,6 +167,7 @@ pub(super) fn off(calibration: &Calibration) -> Off {
 pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<String> {
     let validation = &calibration.validation;
     let mut out = Vec::new();
+    let mut to_one_side: [Vec<(Shape, &str, String)>; 2] = Default::default();
     let joints = looked_at(&validation.reliability);
     // What its 95 % interval says of a joint stands elsewhere; the middle of the distribution neither contradicts nor repeats it.
     let scores = &decisive(validation).joints;
@@ -203,20 +204,19 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
                 Shape::Wide | Shape::Narrow => shown,
             }
         };
-        let to_one_side = matches!(shape, Shape::Above | Shape::Below);
-        let shown: Vec<String> = match to_one_side && own.len() > 1 {
-            true => own
-                .iter()
-                .map(|j| format!("{}: {}", j.joint, one(j)))
-                .collect(),
-            false => vec![one(worst)],
-        };
-        let shown = shown.join("; ");
+        if matches!(shape, Shape::Above | Shape::Below) {
+            let told = own.iter().map(|j| (shape, j.joint.as_str(), one(j)));
+            to_one_side[usize::from(slightly)].extend(told);
+            continue;
+        }
         let (names, words) = (subject(&names), shape.words(slightly));
         out.push(match own[..] {
-            [_] => format!("{names}: its {words} ({shown})."),
-            _ if to_one_side => format!("{names}: their {words} ({shown})."),
-            _ => format!("{names}: their {words} (on {} {shown}).", worst.joint),
+            [_] => format!("{names}: its {words} ({}).", one(worst)),
+            _ => format!(
+                "{names}: their {words} (on {} {}).",
+                worst.joint,
+                one(worst)
+            ),
         });
     }
     // Off, but neither too wide nor too narrow as a whole: to one side, if most of it lies there.
@@ -234,21 +234,23 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
             _ if above < 1.0 - ONE_SIDE => Some(Shape::Below),
             _ => None,
         };
-        let name = subject(&[&joint.joint]);
-        out.push(match side {
-            Some(side) => format!(
-                "{name}: its {} ({}{}).",
-                side.words(false),
-                side.shown(&joint.pit, &joint.coverage_levels, rows),
-                by_how_much(scores, all, &joint.joint)
-            ),
-            None => format!(
-                "{name}: predicted probabilities are not evenly spread (off by {}, by chance below {}).",
+        match side {
+            Some(side) => {
+                let shown = side.shown(&joint.pit, &joint.coverage_levels, rows);
+                let shown = shown + &by_how_much(scores, all, &joint.joint);
+                to_one_side[0].push((side, &joint.joint, shown));
+            }
+            None => out.push(format!(
+                "{}: predicted probabilities are not evenly spread (off by {}, by chance below {}).",
+                subject(&[&joint.joint]),
                 number(joint.pit.distance, 2),
                 number(joint.pit.chance, 2)
-            ),
-        });
+            )),
+        }
     }
+    let sides = to_one_side.iter().zip([false, true]);
+    let sides = sides.filter_map(|(own, slightly)| off_to_sides(own, slightly));
+    out.splice(0..0, sides);
     let pooled = Shape::of(&validation.pit, 1);
     let pooled = pooled.filter(|shape| shape.agrees(&validation.coverage_levels));
     if let (true, Some(shape)) = (out.is_empty(), pooled) {
@@ -258,6 +260,34 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
         out.push(format!("All joints together: {words} ({shown})."));
     }
     out
+}
+
+/// Joints whose torque lies to one side of its prediction, all in one sentence.
+fn off_to_sides(own: &[(Shape, &str, String)], slightly: bool) -> Option<String> {
+    let names: Vec<&str> = own.iter().map(|(_, name, _)| *name).collect();
+    let subject = subject(&names);
+    let [(first, _, shown), others @ ..] = own else {
+        return None;
+    };
+    if others.is_empty() {
+        return Some(format!(
+            "{subject}: its {} ({shown}).",
+            first.words(slightly)
+        ));
+    }
+    let same = others.iter().all(|(shape, ..)| shape == first);
+    let each = own.iter().map(|(shape, name, shown)| match (same, shape) {
+        (true, _) => format!("{name}: {shown}"),
+        (false, Shape::Above) => format!("{name} above: {shown}"),
+        (false, _) => format!("{name} below: {shown}"),
+    });
+    let each: Vec<String> = each.collect();
+    let words = match (same, slightly) {
+        (true, _) => first.words(slightly),
+        (false, false) => "torque lies to one side of the prediction too often",
+        (false, true) => "torque lies to one side of the prediction a little too often",
+    };
+    Some(format!("{subject}: their {words} ({}).", each.join("; ")))
 }
 
 /// ", by 44.1 N·m on average".

@@ -129,7 +129,7 @@ fn case_109_names_are_text_everywhere() {
         "html", "head", "meta", "title", "style", "body", "header", "main", "section", "nav", "a",
         "h1", "h2", "h3", "p", "ul", "li", "span", "div", "table", "thead", "tbody", "tr", "th",
         "td", "code", "pre", "details", "summary", "dl", "dt", "dd", "figure", "svg", "path",
-        "rect", "circle", "text", "wbr",
+        "rect", "circle", "text", "wbr", "strong",
     ];
     assert!(
         parsed.elements.iter().all(|e| known.contains(&e.as_str())),

@@ -2,15 +2,18 @@
 
 use super::grounds::{self, rows_of};
 use super::limits::{
-    COVERAGE, FEW, converged, decisive, has_standstill, large, limits, lost, too_narrow, worse,
+    COVERAGE, FEW, converged, decisive, fold, has_standstill, large, limits, lost, too_narrow,
+    worse,
 };
+use super::next_recording;
 use super::reservations::{no_bodies, not_to_rest_on};
 use super::shape;
+use super::standing::why_suspected;
 use super::standstill;
 use super::text::with_sd;
 use super::view::{Joint, independent_rows, memory};
 use serde::Serialize;
-use twincal::calibrate::{Calibration, Verdict as Decision};
+use twincal::calibrate::Calibration;
 use twincal::validate::WORSE;
 use twincal::{Finding, Severity};
 
@@ -33,26 +36,30 @@ pub(super) struct Verdict {
     pub(super) headline: String,
     /// What the headline rests on.
     pub(super) grounds: Vec<String>,
-    /// Where it does not hold.
+    /// Where it does not hold: what matters most, and the rest.
     pub(super) limits: Vec<String>,
+    pub(super) folded: Vec<String>,
+    /// What to record next; `None` where nothing more would be learnt from it that is known of.
+    pub(super) next: Option<String>,
 }
 
 /// Judges `calibration`.
 pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict {
     let scores = &calibration.validation.filtered;
     let found = || calibration.components.iter().filter(|c| c.selected);
-    let sure = found().filter(|c| c.verdict != Some(Decision::Undecided));
+    let sure = found().filter(|c| why_suspected(c, calibration).is_empty());
     let (found, sure) = (found().count(), sure.count());
     let rows = rows_of(scores);
     if rows == 0 || !(scores.rmse_nominal.is_finite() && scores.rmse_calibrated.is_finite()) {
         return Verdict {
             grade: Grade::Bad,
             headline: "Not yet: there are no held-out rows to judge this twin by.".into(),
-            grounds: vec![grounds::effects_found(calibration)],
-            limits: vec![
-                "Record another motion and give it with --heldout, or fit at least three logs."
-                    .into(),
-            ],
+            grounds: grounds::effects_found(calibration),
+            limits: Vec::new(),
+            folded: Vec::new(),
+            next: Some(
+                "another motion, given with --heldout; or at least three logs to fit.".into(),
+            ),
         };
     }
     let scores = decisive(&calibration.validation);
@@ -66,7 +73,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     let rest_worse =
         standstill::rest_got_worse(calibration) && standstill::few_pauses(calibration).is_none();
     let (large, lost) = (large(scores, joints).len(), lost(scores, joints).len());
-    let limits = limits(calibration, joints);
+    let (limits, folded) = fold(limits(calibration, joints));
     let serious = calibration
         .findings
         .iter()
@@ -180,6 +187,8 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         },
         grounds: grounds::grounds(calibration, joints),
         limits,
+        folded,
+        next: next_recording::next(calibration, joints),
     }
 }
 
@@ -202,6 +211,7 @@ pub(super) mod tests {
     use crate::report::limits::{Rows, torque_deviation};
     use crate::report::shape::tests::pit;
     use crate::report::view;
+    use twincal::calibrate::Verdict as Decision;
     use twincal::posterior::Method;
     use twincal::validate::Pit;
 
@@ -226,7 +236,9 @@ pub(super) mod tests {
         if calibration.validation.moving == moving {
             calibration.validation.moving = calibration.validation.filtered.clone();
         }
-        judge(&calibration, &view::joints(&calibration))
+        let mut verdict = judge(&calibration, &view::joints(&calibration));
+        verdict.limits.append(&mut verdict.folded);
+        verdict
     }
 
     #[test]
@@ -362,7 +374,7 @@ pub(super) mod tests {
             prior
                 .limits
                 .iter()
-                .any(|l| l.starts_with("Other priors would leave out"))
+                .any(|l| l.starts_with("Only suspected, not to be rested on: "))
         );
         let narrow = judged(|c| c.validation.filtered.joints[1].coverage95 = 0.78);
         assert!(narrow.headline.contains("exceptions"), "{narrow:?}");
@@ -404,7 +416,7 @@ pub(super) mod tests {
             found.for_each(|c| c.verdict = Some(Decision::Undecided));
         });
         assert!(verdict.headline.starts_with("Perhaps"), "{verdict:?}");
-        let said = "No missing effect is sure; 7 more likely than not, but undecided.";
+        let said = "No missing effect is sure; 7 more likely than not, but only suspected.";
         assert_eq!(verdict.grounds.last().map(String::as_str), Some(said));
     }
 

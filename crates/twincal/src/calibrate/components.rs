@@ -89,6 +89,7 @@ fn summary(
         verdict: None,
         alias_of: component.alias_of.clone(),
         no_rigid_body: false,
+        rigid_share: None,
         words: String::new(),
         parameters: Vec::new(),
     };

@@ -72,6 +72,9 @@ pub struct ComponentSummary {
     /// True where no rigid body has what was found of its link, whatever else is in: torque is right, the numbers are no mass or inertia.
     #[serde(default)]
     pub no_rigid_body: bool,
+    /// Share of the posterior draws in which its link, with all that was found of it, is a rigid body; only where that is less than one half.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rigid_share: Option<f64>,
     /// One sentence: "payload at tool0: +1.20 ± 0.03 kg, centre of mass (0, 2, 61) ± 4 mm".
     pub words: String,
     /// Its parameters given that it is in.

@@ -22,7 +22,9 @@ const ROUNDING: f64 = 1e-9;
 /// A found inertia that is none.
 pub(super) struct Unphysical {
     finding: Finding,
-    /// Found components that contradict every rigid body.
+    /// Share of the draws that are those of a rigid body.
+    share: f64,
+    /// What was found of it.
     components: Vec<usize>,
 }
 
@@ -81,12 +83,12 @@ pub(super) fn findings(
             let of_column = |(column, _): &(usize, [f64; 10])| {
                 library.terms()[library.columns()[*column]].component
             };
-            let all_of_body = columns[body].iter().filter(|_| share < CONTRADICTS);
-            let mut components: Vec<usize> = all_of_body.map(of_column).collect();
+            let mut components: Vec<usize> = columns[body].iter().map(of_column).collect();
             components.dedup();
             components.retain(|component| calibration.components[*component].selected);
             all.push(Unphysical {
                 finding: finding(name, share),
+                share,
                 components,
             });
         }
@@ -98,12 +100,16 @@ pub(super) fn findings(
 pub(super) fn tell(calibration: &mut Calibration, unphysical: Vec<Unphysical>) {
     for Unphysical {
         finding,
+        share,
         components,
     } in unphysical
     {
         for component in components {
-            calibration.components[component].words.push_str(NO_BODY);
-            calibration.components[component].no_rigid_body = true;
+            let own = &mut calibration.components[component];
+            own.rigid_share = Some(share);
+            own.no_rigid_body = share < CONTRADICTS;
+            own.words
+                .push_str(if own.no_rigid_body { NO_BODY } else { "" });
         }
         calibration.findings.push(finding);
     }

@@ -55,7 +55,7 @@ pub use family::Family;
 pub use library::{Library, Scratch, Table};
 pub(crate) use model_column::ModelColumn;
 pub use recipes::Recipes;
-pub use sentence::{Estimate, told};
+pub use sentence::{Estimate, is_place, told};
 pub use status::Status;
 pub(crate) use words::estimate;
 

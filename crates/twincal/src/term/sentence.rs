@@ -121,14 +121,19 @@ fn of_spring(parameters: &[Estimate]) -> Vec<usize> {
     let [_, rest, _] = parameters else {
         return clearest(parameters);
     };
-    let is_place = rest.value.abs() <= TAU && rest.spread <= KNOWN_PLACE;
-    let left_out = if is_place { 2 } else { 1 };
+    let left_out = if is_place(rest) { 2 } else { 1 };
     let mut own = clearest(parameters);
     own.retain(|p| *p != left_out);
     match own.is_empty() {
         true => vec![0],
         false => own,
     }
+}
+
+/// Whether a joint may stand at a spring's rest position: within a turn of zero (or 2π m), and known to [`KNOWN_PLACE`].
+#[must_use]
+pub fn is_place(rest: &Estimate) -> bool {
+    rest.value.abs() <= TAU && rest.spread <= KNOWN_PLACE
 }
 
 /// Spread up to which a rest position is a place, rad or m.

@@ -5,7 +5,8 @@
 //! second moments come back up the tree, so the work is O(2^C) in all. The first three components are the lanes, the
 //! next ones the tasks of the thread pool, in an order that depends on the problem only: any number of threads gives the
 //! same bytes. Components that no model worth counting leaves out ([`super::certain`]) are not branched on, and subtrees whose
-//! models together weigh next to nothing are not visited (`ahead.rs`): all that is left out weighs, by a bound, less than 1e-10 of the sum.
+//! models together weigh next to nothing are not visited (`ahead.rs`): all that is left out weighs, by a
+//! bound, less than 1e-10 of the sum, or 1e-8 where more than 20 components are to be decided.
 
 mod ahead;
 mod node;

@@ -14,12 +14,37 @@ use pulp::{Simd, WithSimd};
 pub(super) const LOG_REFERENCE: f64 = 600.0;
 /// Subtrees of up to this many components (2^14 models in every lane) are one task.
 const TASK_COMPONENTS: usize = 14;
-/// ln of the share of a single model's weight below which a subtree is not visited, at first; where all those subtrees together may weigh
-/// more than [`NOT_VISITED`], what they weigh too much and so much more is taken off it.
-const LIGHT: f64 = -32.0;
+/// Up to so many components to decide, the sums are true to more digits: walking further costs next to nothing.
+const FEW: usize = 20;
+/// What is taken off the limit of a second walk besides what the first one left out too much.
 const LIGHTER: f64 = -1.0;
-/// Share of the sum that all models that are not visited may weigh together.
-const NOT_VISITED: f64 = 1e-10;
+
+/// How much of the models may stay unvisited.
+#[derive(Clone, Copy)]
+struct Unvisited {
+    /// ln of the share of a single model's weight below which a subtree is not visited, at first; where all those subtrees together
+    /// may weigh more than `most`, what they weigh too much and so much more is taken off it.
+    light: f64,
+    /// Share of the sum that all models that are not visited may weigh together, by their bounds; what they do weigh is a hundredth of that
+    /// or less.
+    most: f64,
+}
+
+impl Unvisited {
+    fn of(open: usize) -> Self {
+        if open <= FEW {
+            Self {
+                light: -32.0,
+                most: 1e-10,
+            }
+        } else {
+            Self {
+                light: -26.0,
+                most: 1e-8,
+            }
+        }
+    }
+}
 
 /// One column in the tree. `V` is a vector with one model per lane.
 pub(super) struct Level<V> {
@@ -97,21 +122,21 @@ pub(super) struct Tree<V> {
 
 /// Sums over all models ([`Layout`] of K columns; weights times e^[`LOG_REFERENCE`]) and the heaviest of them, as sets
 /// of the components after the first `certain` ones, which every model holds. `reference`: ln of the weight of any model; −∞ to visit
-/// every one. The tree is walked until what is not visited weighs less than [`NOT_VISITED`] of the sum, mostly once.
+/// every one. The tree is walked until what is not visited weighs no more than it may ([`Unvisited`]), mostly once.
 pub(super) fn sum_all_models(
     standard: &Standard,
     prior: &Prior,
     certain: usize,
     reference: f64,
 ) -> (Vec<f64>, Tally) {
-    let mut light = LIGHT;
+    let Unvisited { mut light, most } = Unvisited::of(standard.blocks.len() - certain);
     loop {
         let (sums, tally, bound) = sum_but(standard, prior, certain, reference + light);
         // Not a number where nothing has weight: another walk gains nothing.
-        if bound <= NOT_VISITED || bound.is_nan() {
+        if bound <= most || bound.is_nan() {
             return (sums, tally);
         }
-        light += LIGHTER - (bound / NOT_VISITED).ln();
+        light += LIGHTER - (bound / most).ln();
     }
 }
 

@@ -1,0 +1,250 @@
+//! What of what was found may be rested on, one sentence for each use that is made of a twin: friction, masses, gravity and so on.
+
+use super::figures::inclusion::family_name;
+use super::grounds::NAMED;
+use super::standing::{Standing, standing, why_suspected};
+use super::text::{first_of, list};
+use twincal::calibrate::{Calibration, ComponentSummary};
+use twincal::term::Family;
+
+/// Effects up to this number are named.
+const FEW_EFFECTS: usize = 3;
+
+/// Families that a reader uses for the same purpose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Use {
+    Friction,
+    Joints,
+    Inertia,
+    Gravity,
+    Lagrangian,
+}
+
+impl Use {
+    const ALL: [Self; 5] = [
+        Self::Friction,
+        Self::Inertia,
+        Self::Gravity,
+        Self::Joints,
+        Self::Lagrangian,
+    ];
+
+    fn of(family: Family) -> Self {
+        match family {
+            Family::Viscous
+            | Family::Coulomb
+            | Family::Asymmetry
+            | Family::Stribeck
+            | Family::QuadraticFriction
+            | Family::LoadFriction
+            | Family::CoupledFriction => Self::Friction,
+            Family::Payload
+            | Family::PayloadTensor
+            | Family::MassMoments
+            | Family::Tensor
+            | Family::MassScale
+            | Family::MotorInertia
+            | Family::CoupledInertia => Self::Inertia,
+            Family::Tilt => Self::Gravity,
+            Family::Offset
+            | Family::Spring
+            | Family::Potential
+            | Family::Gain
+            | Family::EncoderZero
+            | Family::Ripple => Self::Joints,
+            Family::User | Family::Generic => Self::Lagrangian,
+        }
+    }
+
+    fn title(self) -> &'static str {
+        match self {
+            Self::Friction => "Friction",
+            Self::Joints => "Offsets, springs and drives",
+            Self::Inertia => "Masses and inertias",
+            Self::Gravity => "Direction of gravity",
+            Self::Lagrangian => "Terms of the Lagrangian",
+        }
+    }
+}
+
+/// A sentence for each use of which something was found or is suspected.
+pub(super) fn sentences(calibration: &Calibration) -> Vec<String> {
+    let of = |purpose: Use| {
+        let all = calibration.components.iter();
+        let all = all.filter(|own| Use::of(own.family) == purpose);
+        let all: Vec<(&ComponentSummary, Standing)> = all
+            .filter_map(|own| Some((own, standing(own, calibration)?)))
+            .collect();
+        (!all.is_empty()).then(|| sentence(purpose.title(), &all))
+    };
+    Use::ALL.into_iter().filter_map(of).collect()
+}
+
+/// "Friction: viscous friction (6) and Coulomb friction (6) found, 7 stand every check, 5 have a doubt about their numbers; suspected: a, b and c."
+fn sentence(title: &str, all: &[(&ComponentSummary, Standing)]) -> String {
+    let with = |wanted: Standing| all.iter().filter(move |(_, own)| *own == wanted).count();
+    let found = all.iter().filter(|(_, own)| *own != Standing::Suspected);
+    let found: Vec<&ComponentSummary> = found.map(|(own, _)| *own).collect();
+    let suspected = all.iter().filter(|(_, own)| *own == Standing::Suspected);
+    let suspected: Vec<String> = suspected.map(|(own, _)| own.name.clone()).collect();
+    let told = match found.len() {
+        0 => "none is sure".into(),
+        1..=FEW_EFFECTS => {
+            let names: Vec<&str> = found.iter().map(|own| own.name.as_str()).collect();
+            format!("{} found", list(&names))
+        }
+        _ => {
+            let kinds = found.chunk_by(|a, b| a.family == b.family);
+            let kinds: Vec<String> = kinds
+                .map(|own| format!("{} ({})", family_name(own[0].family), own.len()))
+                .collect();
+            format!("{} found", list(&kinds))
+        }
+    };
+    let checked = match (with(Standing::Stands), with(Standing::Doubted)) {
+        (0, 0) => String::new(),
+        (1, 0) => ", which stands every check".into(),
+        (_, 0) => ", which stand every check".into(),
+        (0, 1) => ", with a doubt about its numbers".into(),
+        (0, _) => ", with doubts about their numbers".into(),
+        (stand, doubted) => format!(
+            "; {stand} {} every check, {doubted} {} numbers",
+            if stand == 1 { "stands" } else { "stand" },
+            if doubted == 1 {
+                "has a doubt about its"
+            } else {
+                "have a doubt about their"
+            }
+        ),
+    };
+    let suspected = match suspected.is_empty() {
+        true => String::new(),
+        false => format!("; only suspected: {}", list(&first_of(suspected, NAMED))),
+    };
+    format!("{title}: {told}{checked}{suspected}.")
+}
+
+/// What is only suspected and why, all uses together, the gravest first; `None` where nothing is.
+pub(super) fn suspected(calibration: &Calibration) -> Option<String> {
+    let all = calibration.components.iter();
+    let mut all: Vec<(&ComponentSummary, String)> = all
+        .filter_map(|own| {
+            let why = why_suspected(own, calibration).into_iter().next()?;
+            Some((own, why))
+        })
+        .collect();
+    // A body that is none contradicts physics, the others only leave it open.
+    all.sort_by_key(|(own, _)| own.rigid_share.is_none());
+    let body = all.iter().any(|(own, _)| own.no_rigid_body);
+    let told: Vec<String> = (all.iter())
+        .map(|(own, why)| format!("{} ({why})", own.name))
+        .collect();
+    let told = first_of(told, NAMED);
+    (!told.is_empty()).then(|| {
+        format!(
+            "Only suspected, not to be rested on: {}{}.{}",
+            list(&told),
+            if all.len() > NAMED { ", marked in the report’s table of effects" } else { "" },
+            if body {
+                " What is no rigid body is no mass or inertia: an effect is missing among the candidates, or the model’s inertias are wrong."
+            } else {
+                ""
+            }
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::fixture;
+    use twincal::calibrate::Verdict;
+
+    fn plain() -> Calibration {
+        let mut calibration = fixture::two_joints();
+        calibration.findings.clear();
+        calibration.repeatability.clear();
+        let terms = calibration.terms.iter_mut();
+        terms.for_each(|term| term.pip_sensitivity.clear());
+        calibration
+    }
+
+    /// The components of one use, the first of them changed.
+    fn told(families: &[Family], change: impl Fn(usize, &mut ComponentSummary)) -> Vec<String> {
+        let mut calibration = plain();
+        let own = calibration.components[0].clone();
+        let component = |(index, family): (usize, &Family)| {
+            let mut own = own.clone();
+            (own.family, own.name) = (*family, format!("joint{index}.x"));
+            own.selected = true;
+            change(index, &mut own);
+            own
+        };
+        calibration.components = families.iter().enumerate().map(component).collect();
+        sentences(&calibration)
+    }
+
+    #[test]
+    fn few_are_named_many_are_counted_and_each_use_has_its_own() {
+        let three = told(&[Family::Viscous, Family::Tilt, Family::User], |_, _| ());
+        assert_eq!(
+            three,
+            [
+                "Friction: joint0.x found, which stands every check.",
+                "Direction of gravity: joint1.x found, which stands every check.",
+                "Terms of the Lagrangian: joint2.x found, which stands every check.",
+            ]
+        );
+        let viscous = [Family::Viscous; 3];
+        let many = [&viscous[..], &[Family::Coulomb; 2]].concat();
+        assert_eq!(
+            told(&many, |_, _| ()),
+            [
+                "Friction: viscous friction (3) and Coulomb friction (2) found, which stand every check."
+            ]
+        );
+    }
+
+    #[test]
+    fn doubts_about_numbers_are_counted_apart_and_what_is_suspected_is_named() {
+        let masses = [Family::MassMoments; 6];
+        let none = told(&masses[..2], |_, own| own.rigid_share = Some(0.02));
+        assert_eq!(
+            none,
+            ["Masses and inertias: none is sure; only suspected: joint0.x and joint1.x."]
+        );
+        let some = told(&masses, |index, own| {
+            if index < 4 {
+                own.verdict = Some(Verdict::Undecided);
+            }
+            if index == 5 {
+                own.alias_of = vec!["other".into()];
+            }
+        });
+        assert_eq!(
+            some,
+            [
+                "Masses and inertias: joint4.x and joint5.x found; 1 stands every check, 1 has a doubt about its numbers; only suspected: \
+                 joint0.x, joint1.x, joint2.x and 1 more."
+            ]
+        );
+    }
+
+    #[test]
+    fn what_contradicts_physics_is_suspected_first() {
+        let mut calibration = plain();
+        assert_eq!(suspected(&calibration), None);
+        let mut found = calibration.components.iter_mut().filter(|own| own.selected);
+        let first = found.next().unwrap();
+        first.verdict = Some(Verdict::Undecided);
+        let first = first.name.clone();
+        let body = found.next().unwrap();
+        (body.rigid_share, body.no_rigid_body) = (Some(0.01), true);
+        let body = body.name.clone();
+        let said = format!(
+            "Only suspected, not to be rested on: {body} (no rigid body in 99.0\u{202f}% of the draws) and {first} (undecided). \
+             What is no rigid body is no mass or inertia: an effect is missing among the candidates, or the model’s inertias are wrong."
+        );
+        assert_eq!(suspected(&calibration), Some(said));
+    }
+}
