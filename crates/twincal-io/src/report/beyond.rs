@@ -105,6 +105,19 @@ fn mostly_there(calibration: &Calibration) -> impl Iterator<Item = Pair<'_>> {
         )
 }
 
+/// Joints of which a tenth of the held-out moving rows or more leave the training motion.
+pub(super) fn new_motion(calibration: &Calibration) -> Vec<&str> {
+    let Validation { within, beyond, .. } = &calibration.validation;
+    let pairs = within.joints.iter().zip(&beyond.joints);
+    pairs
+        .filter(|(within, beyond)| beyond.rows as f64 >= MANY * (within.rows + beyond.rows) as f64)
+        .filter(|(_, beyond)| beyond.rows > 0)
+        .map(|(within, beyond)| Pair::of(calibration, within, beyond))
+        .filter(|pair| pair.cause == Cause::NewMotion)
+        .map(|pair| pair.beyond.joint.as_str())
+        .collect()
+}
+
 /// Joints whose intervals are too narrow there, and less so elsewhere: by more than two standard errors of as many independent rows; and those
 /// whose error is larger there, on many of their rows.
 pub(super) fn narrow(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {

@@ -18,7 +18,7 @@ const SHARE_WORTH_TELLING: f64 = 0.01;
 /// Held-out time that is told because it is short, s.
 const SHORT: f64 = 30.0;
 /// Probability above which at least one of a group is sure.
-const SURE: f64 = 0.95;
+pub(super) const SURE: f64 = 0.95;
 /// Share of the intervals' width that would have done from which they are called too wide, and the share of rows that they then hold.
 const MUCH_TOO_WIDE: f64 = 0.5;
 const SHARE_ALL: f64 = 0.99;
@@ -234,7 +234,7 @@ fn held(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
         false => String::new(),
     };
     format!(
-        "The 95 % intervals contain {share} of the {rows} held-out values of moving joints{all}{short}{wide}.{single}"
+        "The 95 % intervals contain {share} of the {rows} held-out values of moving joints{short}{all}{wide}.{single}"
     )
 }
 

@@ -10,7 +10,7 @@ use super::view::{Joint, independent_rows, memory, pooled_unit, standard_deviati
 use twincal::Severity;
 use twincal::calibrate::Calibration;
 use twincal::posterior::Method;
-use twincal::validate::{JointScore, Scores, Split, Validation, WORSE};
+use twincal::validate::{JointScore, Scores, Validation, WORSE};
 
 /// A 95 % interval is honest if it holds this share of the held-out rows.
 pub(super) const COVERAGE: (f64, f64) = (0.90, 0.99);
@@ -51,13 +51,18 @@ pub(super) fn limits(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Str
         }
     }));
     out.extend(of_results(calibration, joints));
-    out.extend(findings::warnings(calibration));
+    out
+}
+
+/// Where on the page more of it stands.
+pub(super) fn pointers(calibration: &Calibration) -> Vec<String> {
+    let mut out: Vec<String> = findings::warnings(calibration).into_iter().collect();
     out.push("Outside the motion listed under “What the data cannot tell” it extrapolates.".into());
     out
 }
 
 /// What held-out torque and the effects themselves say against the twin, what matters most first.
-pub(super) fn of_results(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
+fn of_results(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
     let mut out: Vec<String> = too_few(calibration, joints).into_iter().collect();
     out.extend(limits_of_torque(calibration, joints));
     out.extend(at_standstill(calibration, joints).filter(|_| rest_got_worse(calibration)));
@@ -71,12 +76,6 @@ pub(super) fn of_results(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec
     out.extend(beyond::mostly(calibration, joints));
     out.extend(hardly_at_rest(calibration, joints));
     out.extend(of_settings(calibration));
-    if calibration.validation.split == Split::LastThirty {
-        out.push(
-            "It was tested on later parts of the same motions only; another motion was not tried."
-                .into(),
-        );
-    }
     out
 }
 

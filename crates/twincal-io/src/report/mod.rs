@@ -94,12 +94,11 @@ pub struct Answer {
 pub fn answer(calibration: &Calibration) -> Answer {
     let joints = view::joints(calibration);
     let verdict = verdict::judge(calibration, &joints);
-    let (limits, folded) = limits::fold(limits::of_results(calibration, &joints));
     Answer {
         headline: verdict.headline,
         grounds: verdict.grounds,
-        limits,
-        folded,
+        limits: verdict.limits,
+        folded: verdict.folded,
         next: verdict.next,
     }
 }

@@ -1,5 +1,6 @@
 //! The recording to make next: what it has to hold so that this data's open questions get an answer.
 
+use super::beyond;
 use super::limits::FEW;
 use super::standing::of_halves;
 use super::standstill::hardly_at_rest;
@@ -13,10 +14,17 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
     let mut holds = Vec::new();
     let mut halves = calibration.components.iter().filter(|own| own.selected);
     if halves.any(|own| of_halves(own, calibration) == Repeated::InNeitherHalf) {
-        holds.push("at least as long as all of these logs, so that each half of the data has what only all of it has now".to_owned());
+        holds.push("as long again as these logs: some effects show in all of the data only, in neither half of it".to_owned());
     }
     if hardly_at_rest(calibration, joints).is_some() {
         holds.push("with pauses in several poses, for standstill".into());
+    }
+    let new = beyond::new_motion(calibration);
+    if !new.is_empty() {
+        holds.push(format!(
+            "with what the held-out motion has of {} and these logs have not, to be fitted with them",
+            list(&new)
+        ));
     }
     let apart: Vec<String> = (calibration.groups.iter())
         .filter(|group| group.alike == Alike::TheseLogs && !group.settled)
@@ -37,9 +45,12 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
         true => String::new(),
         false => format!(", {}", holds.join("; ")),
     };
-    let test = match untried || few {
-        true => ". Given with --heldout it is the test on a motion that was not fitted",
-        false => "",
+    let test = match (untried, few) {
+        (true, _) => {
+            ". Given with --heldout it is the test on a motion that was not fitted; so far only later parts of the fitted ones were tried"
+        }
+        (false, true) => ". Given with --heldout it makes the test longer",
+        (false, false) => "",
     };
     Some(format!("another motion{holds}{test}."))
 }
@@ -64,7 +75,7 @@ mod tests {
         };
         assert_eq!(of(&|_| ()), None);
         let untried = of(&|c| c.validation.split = Split::LastThirty);
-        let test = "Given with --heldout it is the test on a motion that was not fitted.";
+        let test = "Given with --heldout it is the test on a motion that was not fitted; so far only later parts of the fitted ones were tried.";
         assert_eq!(untried, Some(format!("another motion. {test}")));
         let halves = of(&|c| {
             let mut own = fixture::two_joints().repeatability[0].clone();
@@ -75,7 +86,7 @@ mod tests {
         });
         let halves = halves.unwrap();
         assert!(
-            halves.starts_with("another motion, at least as long as all of these logs,"),
+            halves.starts_with("another motion, as long again as these logs: "),
             "{halves}"
         );
         let group = |alike| Group {

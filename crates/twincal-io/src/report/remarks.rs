@@ -2,7 +2,7 @@
 
 use super::figures::sensitivity;
 use super::halves::{repeats, whole_against_halves};
-use super::standing::no_body;
+use super::standing::{no_body, why_suspected};
 use super::text::{first_of, list, number, percent};
 use twincal::calibrate::{Alike, Calibration, ComponentSummary, ParameterSummary, Verdict};
 use twincal::term::Family;
@@ -118,37 +118,40 @@ pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) ->
         out.push("some models put a number of it far off".into());
     }
     if moves_with_the_cutoff(component, calibration) {
-        out.push("depends on the filter's cut-off by more than its ±".into());
+        out.push("its mean over all models, in or out, moves with the filter's cut-off by more than its sd".into());
     }
     out
 }
 
 /// Friction that is told together with a change of it of which the data do not say whether it is there.
 fn hangs_on(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
-    let changes: &[Family] = match component.family {
-        Family::Viscous => &[Family::QuadraticFriction],
-        Family::Coulomb => &[
-            Family::Stribeck,
-            Family::Asymmetry,
-            Family::QuadraticFriction,
-        ],
-        Family::Stribeck => &[Family::QuadraticFriction],
-        _ => return None,
-    };
+    let changes = [
+        Family::QuadraticFriction,
+        Family::Stribeck,
+        Family::Asymmetry,
+    ];
+    let is_friction = changes.contains(&component.family)
+        || [Family::Viscous, Family::Coulomb].contains(&component.family);
+    if !is_friction {
+        return None;
+    }
     let joint = component.name.rsplit_once('.')?.0;
     let mut others = calibration.components.iter();
     let undecided = |other: &ComponentSummary| other.verdict == Some(Verdict::Undecided);
     let against = |other: &ComponentSummary| {
         other.selected && whole_against_halves(other, calibration).is_some()
     };
+    let suspected = |other: &ComponentSummary| !why_suspected(other, calibration).is_empty();
     let open = others.find(|other| {
-        changes.contains(&other.family)
-            && (undecided(other) || against(other))
+        other.name != component.name
+            && changes.contains(&other.family)
+            && (undecided(other) || against(other) || suspected(other))
             && (other.name.rsplit_once('.')).is_some_and(|(own, _)| own == joint)
     })?;
-    let why = match undecided(open) {
-        true => "which is undecided",
-        false => "on which the halves say something else",
+    let why = match (undecided(open), against(open)) {
+        (true, _) => "which is undecided",
+        (_, true) => "on which the halves say something else",
+        _ => "which is only suspected",
     };
     Some(format!("its value hangs on {}, {why}", open.name))
 }
@@ -383,7 +386,7 @@ mod tests {
             [
                 "no rigid body in more than 95 % of the draws: do not read it as mass or inertia",
                 "not to be told from x, y and 2 more in these logs, directly or by way of others",
-                "depends on the filter's cut-off by more than its ±",
+                "its mean over all models, in or out, moves with the filter's cut-off by more than its sd",
             ]
         );
         // What the prior settled is said as such.

@@ -1,8 +1,9 @@
 //! How far an effect that is more likely than not may be rested on: it stands every check, its numbers have a doubt, or it is only suspected.
 
 use super::figures::sensitivity;
+use super::grounds::SURE;
 use super::remarks::{doubts, size_of_gravity};
-use super::text::percent;
+use super::text::{first_of, list, percent};
 use twincal::calibrate::{Calibration, ComponentSummary, Repeat, Repeated, Verdict};
 
 /// Of an effect that is more likely than not.
@@ -45,7 +46,19 @@ pub fn why_suspected(component: &ComponentSummary, calibration: &Calibration) ->
     }
     let mut by_prior = sensitivity::by_prior(calibration);
     if by_prior.any(|other| other.name == component.name) {
-        out.push("other priors would leave it out".into());
+        let mut groups = calibration.groups.iter().filter(|group| group.pip > SURE);
+        let others = groups.find_map(|group| {
+            let others = group.members.iter().filter(|name| **name != component.name);
+            let others: Vec<String> = others.cloned().collect();
+            (others.len() < group.members.len()).then_some(others)
+        });
+        out.push(match others {
+            Some(others) => format!(
+                "other priors would have {} in its place",
+                list(&first_of(others, 1))
+            ),
+            None => "other priors would leave it out".into(),
+        });
     }
     if component.verdict == Some(Verdict::Undecided) {
         out.push("undecided".into());

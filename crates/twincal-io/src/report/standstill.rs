@@ -93,7 +93,10 @@ pub(super) fn few_pauses(calibration: &Calibration) -> Option<String> {
     }
     match most {
         1 => Some(format!("one pause, {} s", number(longest, 2))),
-        2..FEW_PAUSES => Some(format!("{most} pauses, {} s in all", number(longest, 2))),
+        2..FEW_PAUSES => Some(format!(
+            "at most {most} pauses of a joint, {} s",
+            number(longest, 2)
+        )),
         _ => None,
     }
 }
@@ -253,7 +256,7 @@ mod tests {
         let of = |first: usize| few_pauses(&resting(&pauses[..first]));
         assert_eq!(of(0), None);
         assert_eq!(of(1).as_deref(), Some("one pause, 1.0 s"));
-        assert_eq!(of(2).as_deref(), Some("2 pauses, 1.5 s in all"));
+        assert_eq!(of(2).as_deref(), Some("at most 2 pauses of a joint, 1.5 s"));
         assert_eq!(of(3), None);
     }
 

@@ -8,6 +8,7 @@ use super::view::Joint;
 use serde::Serialize;
 use twincal::calibrate::{Calibration, LogSummary};
 use twincal::posterior::Method;
+use twincal::signal::Pipeline;
 use twincal::validate::Scores;
 
 /// A table: heads and rows of cells; the first column names the row.
@@ -348,14 +349,24 @@ pub(super) fn pipeline(calibration: &Calibration) -> Vec<String> {
             "Rows are kept at {}.",
             with_unit(calibration.kept_rate_hz(), "Hz")
         ),
-        format!(
-            "A joint stands still below {} (rad/s or m/s); such rows are left out of its fit.",
-            match pipeline.standstill_velocity.as_slice() {
-                [first, rest @ ..] if rest.iter().all(|v| v == first) => number(*first, 2),
-                each => list(&each.iter().map(|v| number(*v, 2)).collect::<Vec<_>>()),
-            }
-        ),
+        standstill_rule(pipeline),
     ]
+}
+
+/// Which rows count as standstill.
+fn standstill_rule(pipeline: &Pipeline) -> String {
+    let slow = match pipeline.standstill_velocity.as_slice() {
+        [first, rest @ ..] if rest.iter().all(|v| v == first) => number(*first, 2),
+        each => list(&each.iter().map(|v| number(*v, 2)).collect::<Vec<_>>()),
+    };
+    match pipeline.shortest_standstill() {
+        long if long.is_finite() => format!(
+            "A joint stands still where it stays below {slow} (rad/s or m/s) for longer than {} s; such rows are left out of its fit, shorter \
+             stops are not.",
+            number(long, 2)
+        ),
+        _ => "Without a filter no row counts as standstill.".into(),
+    }
 }
 
 pub(super) fn with_unit(x: f64, unit: &str) -> String {

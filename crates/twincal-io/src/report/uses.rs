@@ -1,7 +1,8 @@
 //! What of what was found may be rested on, one sentence for each use that is made of a twin: friction, masses, gravity and so on.
 
 use super::figures::inclusion::family_name;
-use super::grounds::NAMED;
+use super::grounds::{NAMED, SURE};
+use super::reservations::no_bodies;
 use super::standing::{Standing, standing, why_suspected};
 use super::text::{first_of, list};
 use twincal::calibrate::{Calibration, ComponentSummary};
@@ -75,20 +76,38 @@ pub(super) fn sentences(calibration: &Calibration) -> Vec<String> {
         let all: Vec<(&ComponentSummary, Standing)> = all
             .filter_map(|own| Some((own, standing(own, calibration)?)))
             .collect();
-        (!all.is_empty()).then(|| sentence(purpose.title(), &all))
+        (!all.is_empty()).then(|| {
+            let sure = at_least_one(&all, calibration);
+            sentence(purpose.title(), &all, &sure)
+        })
     };
     Use::ALL.into_iter().filter_map(of).collect()
 }
 
+/// "at least one of a and b is there": what is sure of those that are only suspected.
+fn at_least_one(all: &[(&ComponentSummary, Standing)], calibration: &Calibration) -> Vec<String> {
+    let of = |name: &String| all.iter().find(|(own, _)| own.name == *name);
+    let groups = calibration.groups.iter().filter(|group| group.pip > SURE);
+    let open = groups.filter(|group| {
+        let mut own = group.members.iter().filter_map(of).peekable();
+        own.peek().is_some() && own.all(|(_, standing)| *standing == Standing::Suspected)
+    });
+    open.map(|group| {
+        let named = first_of(group.members.clone(), NAMED);
+        format!("at least one of {} is there", list(&named))
+    })
+    .collect()
+}
+
 /// "Friction: viscous friction (6) and Coulomb friction (6) found, 7 stand every check, 5 have a doubt about their numbers; suspected: a, b and c."
-fn sentence(title: &str, all: &[(&ComponentSummary, Standing)]) -> String {
+fn sentence(title: &str, all: &[(&ComponentSummary, Standing)], sure: &[String]) -> String {
     let with = |wanted: Standing| all.iter().filter(move |(_, own)| *own == wanted).count();
     let found = all.iter().filter(|(_, own)| *own != Standing::Suspected);
     let found: Vec<&ComponentSummary> = found.map(|(own, _)| *own).collect();
     let suspected = all.iter().filter(|(_, own)| *own == Standing::Suspected);
     let suspected: Vec<String> = suspected.map(|(own, _)| own.name.clone()).collect();
     let told = match found.len() {
-        0 => "none is sure".into(),
+        0 => "none is sure by itself".into(),
         1..=FEW_EFFECTS => {
             let names: Vec<&str> = found.iter().map(|own| own.name.as_str()).collect();
             format!("{} found", list(&names))
@@ -121,7 +140,8 @@ fn sentence(title: &str, all: &[(&ComponentSummary, Standing)]) -> String {
         true => String::new(),
         false => format!("; only suspected: {}", list(&first_of(suspected, NAMED))),
     };
-    format!("{title}: {told}{checked}{suspected}.")
+    let sure: String = sure.iter().map(|one| format!("; {one}")).collect();
+    format!("{title}: {told}{checked}{suspected}{sure}.")
 }
 
 /// What is only suspected and why, all uses together, the gravest first; `None` where nothing is.
@@ -135,7 +155,7 @@ pub(super) fn suspected(calibration: &Calibration) -> Option<String> {
         .collect();
     // A body that is none contradicts physics, the others only leave it open.
     all.sort_by_key(|(own, _)| own.rigid_share.is_none());
-    let body = all.iter().any(|(own, _)| own.no_rigid_body);
+    let bodies = no_bodies(calibration);
     let told: Vec<String> = (all.iter())
         .map(|(own, why)| format!("{} ({why})", own.name))
         .collect();
@@ -145,10 +165,12 @@ pub(super) fn suspected(calibration: &Calibration) -> Option<String> {
             "Only suspected, not to be rested on: {}{}.{}",
             list(&told),
             if all.len() > NAMED { ", marked in the report’s table of effects" } else { "" },
-            if body {
-                " What is no rigid body is no mass or inertia: an effect is missing among the candidates, or the model’s inertias are wrong."
-            } else {
-                ""
+            match bodies.is_empty() {
+                true => String::new(),
+                false => format!(
+                    " {} contradicts every body (95 % of the draws): an effect is missing among the candidates, or the model’s inertias are wrong.",
+                    list(&bodies)
+                ),
             }
         )
     })
@@ -158,7 +180,8 @@ pub(super) fn suspected(calibration: &Calibration) -> Option<String> {
 mod tests {
     use super::*;
     use crate::report::fixture;
-    use twincal::calibrate::Verdict;
+    use twincal::calibrate::{Alike, Group, Verdict};
+    use twincal::{Finding, Severity};
 
     fn plain() -> Calibration {
         let mut calibration = fixture::two_joints();
@@ -211,7 +234,7 @@ mod tests {
         let none = told(&masses[..2], |_, own| own.rigid_share = Some(0.02));
         assert_eq!(
             none,
-            ["Masses and inertias: none is sure; only suspected: joint0.x and joint1.x."]
+            ["Masses and inertias: none is sure by itself; only suspected: joint0.x and joint1.x."]
         );
         let some = told(&masses, |index, own| {
             if index < 4 {
@@ -231,6 +254,29 @@ mod tests {
     }
 
     #[test]
+    fn of_which_at_least_one_is_there_is_said_where_each_is_only_suspected() {
+        let of = |verdict: Verdict, pip: f64| {
+            let mut calibration = plain();
+            let mut own = calibration.components[0].clone();
+            (own.family, own.selected) = (Family::Spring, true);
+            (own.name, own.verdict) = ("elbow.spring".into(), Some(verdict));
+            calibration.components = vec![own];
+            calibration.groups = vec![Group {
+                members: vec!["elbow.spring".into(), "elbow.potential".into()],
+                pip,
+                alike: Alike::EveryMotion,
+                settled: false,
+                words: String::new(),
+            }];
+            sentences(&calibration).remove(0)
+        };
+        let said = "; at least one of elbow.spring and elbow.potential is there.";
+        assert!(of(Verdict::Undecided, 0.99).ends_with(said));
+        assert!(!of(Verdict::Undecided, 0.9).contains("at least"));
+        assert!(!of(Verdict::Found, 0.99).contains("at least"));
+    }
+
+    #[test]
     fn what_contradicts_physics_is_suspected_first() {
         let mut calibration = plain();
         assert_eq!(suspected(&calibration), None);
@@ -243,8 +289,15 @@ mod tests {
         let body = body.name.clone();
         let said = format!(
             "Only suspected, not to be rested on: {body} (no rigid body in 99.0\u{202f}% of the draws) and {first} (undecided). \
-             What is no rigid body is no mass or inertia: an effect is missing among the candidates, or the model’s inertias are wrong."
+             forearm contradicts every body (95 % of the draws): an effect is missing among the candidates, or the model’s inertias are wrong."
         );
+        calibration.findings = vec![Finding::new(
+            Severity::Warning,
+            "unphysical_inertia_found",
+            "forearm",
+            "",
+            0,
+        )];
         assert_eq!(suspected(&calibration), Some(said));
     }
 }

@@ -2,8 +2,8 @@
 
 use super::grounds::{self, rows_of};
 use super::limits::{
-    COVERAGE, FEW, converged, decisive, fold, has_standstill, large, limits, lost, too_narrow,
-    worse,
+    COVERAGE, FEW, converged, decisive, fold, has_standstill, large, limits, lost, pointers,
+    too_narrow, worse,
 };
 use super::next_recording;
 use super::reservations::{no_bodies, not_to_rest_on};
@@ -39,6 +39,8 @@ pub(super) struct Verdict {
     /// Where it does not hold: what matters most, and the rest.
     pub(super) limits: Vec<String>,
     pub(super) folded: Vec<String>,
+    /// Where on the page more of that stands.
+    pub(super) pointers: Vec<String>,
     /// What to record next; `None` where nothing more would be learnt from it that is known of.
     pub(super) next: Option<String>,
 }
@@ -57,6 +59,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
             grounds: grounds::effects_found(calibration),
             limits: Vec::new(),
             folded: Vec::new(),
+            pointers: Vec::new(),
             next: Some(
                 "another motion, given with --heldout; or at least three logs to fit.".into(),
             ),
@@ -177,7 +180,10 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
             "Yes, on motions like the ones it was tested on.",
         )
     } else {
-        (Grade::Care, "Yes, with the exceptions below.")
+        (
+            Grade::Care,
+            "Yes, to predict torque, with the exceptions below.",
+        )
     };
     Verdict {
         grade,
@@ -188,6 +194,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         grounds: grounds::grounds(calibration, joints),
         limits,
         folded,
+        pointers: pointers(calibration),
         next: next_recording::next(calibration, joints),
     }
 }

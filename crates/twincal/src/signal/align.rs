@@ -16,7 +16,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 /// Standstill has to last for this many periods of the cut-off.
-const STANDSTILL_PERIODS: f64 = 3.0;
+pub(super) const STANDSTILL_PERIODS: f64 = 3.0;
 
 /// Share of standstill from which a joint counts as not moving in a log.
 const HARDLY_MOVES: f64 = 0.95;
@@ -357,7 +357,7 @@ fn smoothed(
             still.copy_from_slice(&standstill(
                 travel.as_deref().unwrap_or(qd),
                 pipeline.standstill_velocity[joint],
-                STANDSTILL_PERIODS / pipeline.cutoff_hz,
+                pipeline.shortest_standstill(),
                 piece.interval,
             ));
         });

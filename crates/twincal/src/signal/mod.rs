@@ -292,6 +292,13 @@ pub struct Trajectory {
 }
 
 impl Pipeline {
+    /// How long a joint has to be slow to stand still, s: three periods of the cut-off, so that the filter has forgotten what was before;
+    /// infinite without a filter.
+    #[must_use]
+    pub fn shortest_standstill(&self) -> f64 {
+        align::STANDSTILL_PERIODS / self.cutoff_hz
+    }
+
     /// The pipeline that changes nothing: every input row is one row.
     pub fn off(dof: usize) -> Self {
         Self {
