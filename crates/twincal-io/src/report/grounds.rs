@@ -121,7 +121,7 @@ fn as_logged(calibration: &Calibration, unit: &str) -> Option<String> {
             false => format!("; there {}", list(&lost)),
         };
         format!(
-            "; as logged, unfiltered (noise included{ends}){which}: {} → {} {unit}{lost}",
+            "; as logged, unfiltered (noise of torque and motion included{ends}){which}: {} → {} {unit}{lost}",
             number(raw.rmse_nominal, 3),
             number(raw.rmse_calibrated, 3)
         )
@@ -353,7 +353,7 @@ mod tests {
             judged(change).grounds[0].clone()
         };
         let told = of(0.373, 0.39, 5.0);
-        let said = "; as logged, unfiltered (noise included): 0.959 → 0.373 N·m; there elbow has 0.400 left, 102.6\u{202f}% of its torque's standard deviation.";
+        let said = "; as logged, unfiltered (noise of torque and motion included): 0.959 → 0.373 N·m; there elbow has 0.400 left, 102.6\u{202f}% of its torque's standard deviation.";
         assert!(told.ends_with(said), "{told}");
         assert!(
             told.starts_with("Torque error (RMSE) below 5 Hz on"),

@@ -1,10 +1,11 @@
 //! The recording to make next: what it has to hold so that this data's open questions get an answer.
 
 use super::beyond;
+use super::grounds::NAMED;
 use super::limits::FEW;
 use super::standing::of_halves;
 use super::standstill::hardly_at_rest;
-use super::text::list;
+use super::text::{first_of, list};
 use super::view::{Joint, independent_rows};
 use twincal::calibrate::{Alike, Calibration, Repeated};
 use twincal::validate::Split;
@@ -14,15 +15,24 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
     let mut holds = Vec::new();
     let mut halves = calibration.components.iter().filter(|own| own.selected);
     if halves.any(|own| of_halves(own, calibration) == Repeated::InNeitherHalf) {
-        holds.push("as long again as these logs: some effects show in all of the data only, in neither half of it".to_owned());
+        holds.push("as long as these together: some effects show in all of the data only, in neither half of it".to_owned());
     }
     if hardly_at_rest(calibration, joints).is_some() {
         holds.push("with pauses in several poses, for standstill".into());
     }
+    let findings = || calibration.findings.iter();
+    let mut more: Vec<String> = findings()
+        .filter(|f| f.code == "unseen_motion" && !f.subject.is_empty())
+        .map(|f| f.subject.clone())
+        .collect();
+    more.dedup();
+    if !more.is_empty() {
+        holds.push(format!("moving {} more", list(&first_of(more, NAMED))));
+    }
     let new = beyond::new_motion(calibration);
     if !new.is_empty() {
         holds.push(format!(
-            "with what the held-out motion has of {} and these logs have not, to be fitted with them",
+            "with the motion of {} that only the held-out logs have",
             list(&new)
         ));
     }
@@ -32,27 +42,29 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
         .collect();
     if !apart.is_empty() {
         holds.push(format!(
-            "moving otherwise than here, so that {} can be told from what is alike in these logs",
+            "of another motion, so that {} can be told from what is alike in these",
             list(&apart)
         ));
     }
+    if findings().any(|f| f.code == "quantised_encoder") {
+        holds.push("with the encoder’s full resolution".into());
+    }
     let untried = calibration.validation.split == Split::LastThirty;
     let few = independent_rows(calibration, joints) < FEW;
-    if holds.is_empty() && !untried && !few {
-        return None;
-    }
-    let holds = match holds.is_empty() {
-        true => String::new(),
-        false => format!(", {}", holds.join("; ")),
-    };
+    let fitted = (!holds.is_empty()).then(|| format!("to fit with these, {}", holds.join("; ")));
     let test = match (untried, few) {
-        (true, _) => {
-            ". Given with --heldout it is the test on a motion that was not fitted; so far only later parts of the fitted ones were tried"
-        }
-        (false, true) => ". Given with --heldout it makes the test longer",
-        (false, false) => "",
+        (true, _) => Some(
+            "another motion, given with --heldout, as the test: so far only later parts of the fitted motion were tried",
+        ),
+        (false, true) => Some("another motion, given with --heldout, for a longer test"),
+        (false, false) => None,
     };
-    Some(format!("another motion{holds}{test}."))
+    match (fitted, test) {
+        (None, None) => None,
+        (Some(one), None) => Some(format!("one {one}.")),
+        (None, Some(test)) => Some(format!("{test}.")),
+        (Some(one), Some(test)) => Some(format!("one {one}. And {test}.")),
+    }
 }
 
 #[cfg(test)]
@@ -60,11 +72,13 @@ mod tests {
     use super::*;
     use crate::report::{fixture, view};
     use twincal::calibrate::Group;
+    use twincal::{Finding, Severity};
 
     #[test]
     fn it_holds_what_these_data_leave_open_and_nothing_else() {
         let of = |change: &dyn Fn(&mut Calibration)| {
             let mut calibration = fixture::two_joints();
+            calibration.findings.clear();
             calibration.repeatability.clear();
             calibration.groups.clear();
             for log in &mut calibration.logs {
@@ -75,8 +89,8 @@ mod tests {
         };
         assert_eq!(of(&|_| ()), None);
         let untried = of(&|c| c.validation.split = Split::LastThirty);
-        let test = "Given with --heldout it is the test on a motion that was not fitted; so far only later parts of the fitted ones were tried.";
-        assert_eq!(untried, Some(format!("another motion. {test}")));
+        let test = "another motion, given with --heldout, as the test: so far only later parts of the fitted motion were tried.";
+        assert_eq!(untried.as_deref(), Some(test));
         let halves = of(&|c| {
             let mut own = fixture::two_joints().repeatability[0].clone();
             let found = c.components.iter().find(|own| own.selected);
@@ -86,8 +100,16 @@ mod tests {
         });
         let halves = halves.unwrap();
         assert!(
-            halves.starts_with("another motion, as long again as these logs: "),
+            halves.starts_with("one to fit with these, as long as these together: "),
             "{halves}"
+        );
+        let joint = of(&|c| {
+            let code = "unseen_motion";
+            c.findings = vec![Finding::new(Severity::Note, code, "elbow", "", 1)];
+        });
+        assert_eq!(
+            joint.as_deref(),
+            Some("one to fit with these, moving elbow more.")
         );
         let group = |alike| Group {
             members: vec!["elbow.spring".into(), "elbow.offset".into()],
@@ -96,7 +118,7 @@ mod tests {
             settled: false,
             words: String::new(),
         };
-        let said = "another motion, moving otherwise than here, so that elbow.spring can be told from what is alike in these logs.";
+        let said = "one to fit with these, of another motion, so that elbow.spring can be told from what is alike in these.";
         let apart = of(&|c| c.groups = vec![group(Alike::TheseLogs)]);
         assert_eq!(apart.as_deref(), Some(said));
         assert_eq!(of(&|c| c.groups = vec![group(Alike::EveryMotion)]), None);

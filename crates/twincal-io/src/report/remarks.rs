@@ -1,8 +1,7 @@
 //! What is to be minded about an effect before its numbers are used: it stands at the effect's own line.
 
-use super::figures::sensitivity;
 use super::halves::{repeats, whole_against_halves};
-use super::standing::{no_body, why_suspected};
+use super::standing::{by_another_prior, no_body, why_suspected};
 use super::text::{first_of, list, number, percent};
 use twincal::calibrate::{Alike, Calibration, ComponentSummary, ParameterSummary, Verdict};
 use twincal::term::Family;
@@ -110,10 +109,7 @@ pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) ->
         ));
     }
     out.extend(hangs_on(component, calibration));
-    let mut by_prior = sensitivity::by_prior(calibration);
-    if component.selected && by_prior.any(|other| other.name == component.name) {
-        out.push("other priors would leave it out".into());
-    }
+    out.extend(by_another_prior(component, calibration));
     if component.parameters.iter().any(ParameterSummary::is_split) {
         out.push("some models put a number of it far off".into());
     }

@@ -54,7 +54,7 @@ pub(super) fn of_settings(calibration: &Calibration) -> Vec<String> {
         .collect();
     if !added.is_empty() {
         out.push(format!(
-            "Other priors would add {}.",
+            "Another prior would add {}.",
             list(&first_of(added, NAMED))
         ));
     }
@@ -73,7 +73,7 @@ pub(super) fn of_settings(calibration: &Calibration) -> Vec<String> {
     }
     if !moved.is_empty() {
         out.push(format!(
-            "Another cut-off of the filter moves by more than their ±: {}.",
+            "Another cut-off of the filter moves by more than their sd (mean over all models, in or out): {}.",
             list(&first_of(moved, NAMED))
         ));
     }
@@ -111,7 +111,7 @@ mod tests {
         calibration.findings = found.iter().take(5).rev().map(finding).collect();
         let name = |k: usize| found[k].0.as_str();
         let said = format!(
-            "Another cut-off of the filter moves by more than their ±: {}, {}, {} and 2 more.",
+            "Another cut-off of the filter moves by more than their sd (mean over all models, in or out): {}, {}, {} and 2 more.",
             name(4),
             name(3),
             name(2)

@@ -44,26 +44,35 @@ pub fn why_suspected(component: &ComponentSummary, calibration: &Calibration) ->
     if of_halves(component, calibration) == Repeated::InNeitherHalf {
         out.push(Repeated::InNeitherHalf.words().into());
     }
-    let mut by_prior = sensitivity::by_prior(calibration);
-    if by_prior.any(|other| other.name == component.name) {
-        let mut groups = calibration.groups.iter().filter(|group| group.pip > SURE);
-        let others = groups.find_map(|group| {
-            let others = group.members.iter().filter(|name| **name != component.name);
-            let others: Vec<String> = others.cloned().collect();
-            (others.len() < group.members.len()).then_some(others)
-        });
-        out.push(match others {
-            Some(others) => format!(
-                "other priors would have {} in its place",
-                list(&first_of(others, 1))
-            ),
-            None => "other priors would leave it out".into(),
-        });
-    }
+    out.extend(by_another_prior(component, calibration));
     if component.verdict == Some(Verdict::Undecided) {
         out.push("undecided".into());
     }
     out
+}
+
+/// What another prior would have instead of a found effect.
+pub(super) fn by_another_prior(
+    component: &ComponentSummary,
+    calibration: &Calibration,
+) -> Option<String> {
+    let mut by_prior = sensitivity::by_prior(calibration);
+    if !(component.selected && by_prior.any(|other| other.name == component.name)) {
+        return None;
+    }
+    let mut groups = calibration.groups.iter().filter(|group| group.pip > SURE);
+    let others = groups.find_map(|group| {
+        let others = group.members.iter().filter(|name| **name != component.name);
+        let others: Vec<String> = others.cloned().collect();
+        (others.len() < group.members.len()).then_some(others)
+    });
+    Some(match others {
+        Some(others) => format!(
+            "another prior would have {} in its place",
+            list(&first_of(others, 1))
+        ),
+        None => "another prior would leave it out".into(),
+    })
 }
 
 /// "no rigid body in 97.2 % of the draws": what was found of its link, all of it together. Results of earlier versions have no share.

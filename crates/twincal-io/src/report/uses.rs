@@ -10,6 +10,8 @@ use twincal::term::Family;
 
 /// Effects up to this number are named.
 const FEW_EFFECTS: usize = 3;
+/// Effects that stand every check, beside others that do not, are those to use: so many are named.
+const NAMED_FIRM: usize = 8;
 
 /// Families that a reader uses for the same purpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -99,7 +101,7 @@ fn at_least_one(all: &[(&ComponentSummary, Standing)], calibration: &Calibration
     .collect()
 }
 
-/// "Friction: viscous friction (6) and Coulomb friction (6) found, 7 stand every check, 5 have a doubt about their numbers; suspected: a, b and c."
+/// "Friction: viscous friction (6) and Coulomb friction (6) found, 7 stand every check, 5 have a doubt; only suspected: a, b and c."
 fn sentence(title: &str, all: &[(&ComponentSummary, Standing)], sure: &[String]) -> String {
     let with = |wanted: Standing| all.iter().filter(move |(_, own)| *own == wanted).count();
     let found = all.iter().filter(|(_, own)| *own != Standing::Suspected);
@@ -120,19 +122,22 @@ fn sentence(title: &str, all: &[(&ComponentSummary, Standing)], sure: &[String])
             format!("{} found", list(&kinds))
         }
     };
+    let firm = all.iter().filter(|(_, own)| *own == Standing::Stands);
+    let firm: Vec<String> = firm.map(|(own, _)| own.name.clone()).collect();
     let checked = match (with(Standing::Stands), with(Standing::Doubted)) {
         (0, 0) => String::new(),
         (1, 0) => ", which stands every check".into(),
         (_, 0) => ", which stand every check".into(),
-        (0, 1) => ", with a doubt about its numbers".into(),
-        (0, _) => ", with doubts about their numbers".into(),
+        (0, 1) => ", with a doubt (in the report’s table of effects)".into(),
+        (0, _) => ", each with a doubt (in the report’s table of effects)".into(),
         (stand, doubted) => format!(
-            "; {stand} {} every check, {doubted} {} numbers",
+            "; {stand} {} every check ({}), {doubted} {} (in the report’s table of effects)",
             if stand == 1 { "stands" } else { "stand" },
+            list(&first_of(firm, NAMED_FIRM)),
             if doubted == 1 {
-                "has a doubt about its"
+                "has a doubt"
             } else {
-                "have a doubt about their"
+                "have a doubt"
             }
         ),
     };
@@ -162,13 +167,13 @@ pub(super) fn suspected(calibration: &Calibration) -> Option<String> {
     let told = first_of(told, NAMED);
     (!told.is_empty()).then(|| {
         format!(
-            "Only suspected, not to be rested on: {}{}.{}",
+            "Only suspected, not to be rested on by themselves (predicted torque has them): {}{}.{}",
             list(&told),
             if all.len() > NAMED { ", marked in the report’s table of effects" } else { "" },
             match bodies.is_empty() {
                 true => String::new(),
                 false => format!(
-                    " {} contradicts every body (95 % of the draws): an effect is missing among the candidates, or the model’s inertias are wrong.",
+                    " Hardly any body can have what was found of {}: an effect is missing among the candidates, or the model’s inertias are wrong.",
                     list(&bodies)
                 ),
             }
@@ -247,7 +252,7 @@ mod tests {
         assert_eq!(
             some,
             [
-                "Masses and inertias: joint4.x and joint5.x found; 1 stands every check, 1 has a doubt about its numbers; only suspected: \
+                "Masses and inertias: joint4.x and joint5.x found; 1 stands every check (joint4.x), 1 has a doubt (in the report’s table of effects); only suspected: \
                  joint0.x, joint1.x, joint2.x and 1 more."
             ]
         );
@@ -288,8 +293,8 @@ mod tests {
         (body.rigid_share, body.no_rigid_body) = (Some(0.01), true);
         let body = body.name.clone();
         let said = format!(
-            "Only suspected, not to be rested on: {body} (no rigid body in 99.0\u{202f}% of the draws) and {first} (undecided). \
-             forearm contradicts every body (95 % of the draws): an effect is missing among the candidates, or the model’s inertias are wrong."
+            "Only suspected, not to be rested on by themselves (predicted torque has them): {body} (no rigid body in 99.0\u{202f}% of the draws) and {first} (undecided). \
+             Hardly any body can have what was found of forearm: an effect is missing among the candidates, or the model’s inertias are wrong."
         );
         calibration.findings = vec![Finding::new(
             Severity::Warning,

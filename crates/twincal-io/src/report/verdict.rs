@@ -381,7 +381,7 @@ pub(super) mod tests {
             prior
                 .limits
                 .iter()
-                .any(|l| l.starts_with("Only suspected, not to be rested on: "))
+                .any(|l| l.starts_with("Only suspected, not to be rested on"))
         );
         let narrow = judged(|c| c.validation.filtered.joints[1].coverage95 = 0.78);
         assert!(narrow.headline.contains("exceptions"), "{narrow:?}");
