@@ -72,7 +72,6 @@ fn of_results(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
         decisive(&calibration.validation),
         joints,
     ));
-    out.extend(beyond::narrow(calibration, joints));
     out.extend(beyond::mostly(calibration, joints));
     out.extend(hardly_at_rest(calibration, joints));
     out.extend(of_settings(calibration));
@@ -158,6 +157,7 @@ fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Stri
     large.retain(|name| !names.contains(name));
     let words = "the error left is more than half of the torque's standard deviation";
     say(&large, words, words);
+    out.extend(beyond::narrow(calibration, joints));
     out.append(&mut out_of_shape);
     out
 }

@@ -5,7 +5,7 @@ use super::grounds::NAMED;
 use super::limits::FEW;
 use super::standing::of_halves;
 use super::standstill::hardly_at_rest;
-use super::text::{first_of, list};
+use super::text::{first_of, list, number};
 use super::view::{Joint, independent_rows};
 use twincal::calibrate::{Alike, Calibration, Repeated};
 use twincal::validate::Split;
@@ -13,9 +13,19 @@ use twincal::validate::Split;
 /// In one phrase, without its beginning; `None` where nothing is known that it would show.
 pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
     let mut holds = Vec::new();
-    let mut halves = calibration.components.iter().filter(|own| own.selected);
-    if halves.any(|own| of_halves(own, calibration) == Repeated::InNeitherHalf) {
-        holds.push("as long as these together: some effects show in all of the data only, in neither half of it".to_owned());
+    let found = calibration.components.iter().filter(|own| own.selected);
+    let open = found.filter(|own| of_halves(own, calibration) == Repeated::InNeitherHalf);
+    if let open @ 1.. = open.count() {
+        let fitted = calibration.logs.iter().filter(|log| log.role == "fit");
+        let seconds: f64 = fitted.map(|log| log.duration).sum();
+        holds.push(format!(
+            "at least {} s long, as these logs are: {} in all of the data only, in neither half of it",
+            number(seconds, 3),
+            match open {
+                1 => "one effect shows".to_owned(),
+                n => format!("{n} effects show"),
+            }
+        ));
     }
     if hardly_at_rest(calibration, joints).is_some() {
         holds.push("with pauses in several poses, for standstill".into());
@@ -27,7 +37,10 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
         .collect();
     more.dedup();
     if !more.is_empty() {
-        holds.push(format!("moving {} more", list(&first_of(more, NAMED))));
+        holds.push(format!(
+            "with more motion of {}",
+            list(&first_of(more, NAMED))
+        ));
     }
     let new = beyond::new_motion(calibration);
     if !new.is_empty() {
@@ -100,7 +113,7 @@ mod tests {
         });
         let halves = halves.unwrap();
         assert!(
-            halves.starts_with("one to fit with these, as long as these together: "),
+            halves.starts_with("one to fit with these, at least 180 s long, as these logs are: one effect shows in all of the data only"),
             "{halves}"
         );
         let joint = of(&|c| {
@@ -109,7 +122,7 @@ mod tests {
         });
         assert_eq!(
             joint.as_deref(),
-            Some("one to fit with these, moving elbow more.")
+            Some("one to fit with these, with more motion of elbow.")
         );
         let group = |alike| Group {
             members: vec!["elbow.spring".into(), "elbow.offset".into()],

@@ -48,8 +48,13 @@ pub(super) fn not_to_rest_on(calibration: &Calibration) -> Vec<String> {
 /// What hangs on settings that are as good: the filter's cut-off, and priors that would add something.
 pub(super) fn of_settings(calibration: &Calibration) -> Vec<String> {
     let mut out = Vec::new();
+    // What comes in the place of something found is told there.
+    let found = calibration.components.iter().filter(|own| own.selected);
+    let instead: Vec<String> = found
+        .flat_map(|own| sensitivity::instead_of(own, calibration))
+        .collect();
     let added: Vec<String> = sensitivity::by_prior(calibration)
-        .filter(|component| !component.selected)
+        .filter(|component| !component.selected && !instead.contains(&component.name))
         .map(|component| component.name.clone())
         .collect();
     if !added.is_empty() {

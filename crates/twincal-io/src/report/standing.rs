@@ -1,7 +1,6 @@
 //! How far an effect that is more likely than not may be rested on: it stands every check, its numbers have a doubt, or it is only suspected.
 
 use super::figures::sensitivity;
-use super::grounds::SURE;
 use super::remarks::{doubts, size_of_gravity};
 use super::text::{first_of, list, percent};
 use twincal::calibrate::{Calibration, ComponentSummary, Repeat, Repeated, Verdict};
@@ -60,18 +59,13 @@ pub(super) fn by_another_prior(
     if !(component.selected && by_prior.any(|other| other.name == component.name)) {
         return None;
     }
-    let mut groups = calibration.groups.iter().filter(|group| group.pip > SURE);
-    let others = groups.find_map(|group| {
-        let others = group.members.iter().filter(|name| **name != component.name);
-        let others: Vec<String> = others.cloned().collect();
-        (others.len() < group.members.len()).then_some(others)
-    });
-    Some(match others {
-        Some(others) => format!(
+    let instead = sensitivity::instead_of(component, calibration);
+    Some(match instead.is_empty() {
+        false => format!(
             "another prior would have {} in its place",
-            list(&first_of(others, 1))
+            list(&first_of(instead, 1))
         ),
-        None => "another prior would leave it out".into(),
+        true => "another prior would leave it out".into(),
     })
 }
 
@@ -133,5 +127,46 @@ mod tests {
         assert_eq!(neither.1, ["found in neither half alone"]);
         let apart = of(&|c| repeat(c, 1.0, 3.7));
         assert_eq!(apart, (Some(Standing::Doubted), reasons(&[])));
+    }
+
+    #[test]
+    fn what_takes_its_place_is_what_a_prior_without_it_has() {
+        use twincal::calibrate::{Alike, Group};
+        let of = |priors: [[f64; 2]; 2]| {
+            let mut calibration = fixture::two_joints();
+            let live = |found: bool| {
+                let all = calibration.components.iter();
+                let own = all
+                    .clone()
+                    .find(|c| c.selected == found && c.pip.is_some() && !c.is_unseen());
+                own.map(|own| (own.name.clone(), own.columns.clone()))
+                    .unwrap()
+            };
+            let (found, other) = (live(true), live(false));
+            for term in &mut calibration.terms {
+                term.pip_sensitivity.clear();
+                for ((_, columns), priors) in [&found, &other].into_iter().zip(priors) {
+                    if columns.contains(&term.term.name) {
+                        term.pip_sensitivity = priors.to_vec();
+                    }
+                }
+            }
+            calibration.groups = vec![Group {
+                members: vec![found.0.clone(), other.0.clone()],
+                pip: 0.99,
+                alike: Alike::TheseLogs,
+                settled: false,
+                words: String::new(),
+            }];
+            let own = calibration.components.iter().find(|c| c.name == found.0);
+            (by_another_prior(own.unwrap(), &calibration), other.0)
+        };
+        let (said, other) = of([[0.9, 0.1], [0.1, 0.9]]);
+        let instead = format!("another prior would have {other} in its place");
+        assert_eq!(said, Some(instead));
+        // In, but under a prior that has both.
+        let both = of([[0.9, 0.1], [0.9, 0.1]]).0;
+        assert_eq!(both.as_deref(), Some("another prior would leave it out"));
+        assert_eq!(of([[0.9, 0.8], [0.9, 0.1]]).0, None);
     }
 }

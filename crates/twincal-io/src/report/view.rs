@@ -91,9 +91,17 @@ pub(super) fn rows(trace: &Trace) -> usize {
         .min(trace.calibrated.len())
 }
 
-/// Root mean square of measured − predicted over the rows where both are finite; NaN without any.
+/// Whether the joint both moves and stands still in it.
+pub(super) fn stands_still_between(trace: &Trace) -> bool {
+    trace.standstill.contains(&true) && trace.standstill.contains(&false)
+}
+
+/// Root mean square of measured − predicted over the rows where both are finite, of moving ones where there are some; NaN without any.
 pub(super) fn rmse(trace: &Trace, predicted: &[f64]) -> f64 {
-    root_mean_square(trace.measured.iter().zip(predicted).map(|(m, p)| m - p))
+    let between = stands_still_between(trace);
+    let rows = trace.measured.iter().zip(predicted).enumerate();
+    let told = rows.filter(|(row, _)| !(between && trace.standstill[*row]));
+    root_mean_square(told.map(|(_, (m, p))| m - p))
 }
 
 /// Root mean square of the finite values; NaN without any.
@@ -133,6 +141,36 @@ pub(super) fn memory(joints: &[Joint<'_>], name: &str) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn logs_are_in_the_order_of_the_error_that_is_told_of_them() {
+        let mut calibration = crate::report::fixture::two_joints();
+        let traces = &mut calibration.validation.traces;
+        let own = |trace: &&mut Trace| trace.joint == "elbow";
+        for (k, trace) in traces.iter_mut().filter(own).enumerate() {
+            let len = trace.measured.len();
+            trace.standstill = (0..len).map(|row| row % 2 == 1).collect();
+            trace.measured = vec![0.0; len];
+            // The later ones are worse while they move and far better at rest.
+            let error = |row: usize| match row % 2 {
+                0 => 1.0 + k as f64,
+                _ => 9.0 - 3.0 * k as f64,
+            };
+            trace.calibrated = (0..len).map(error).collect();
+        }
+        let joints = joints(&calibration);
+        let elbow = joints.iter().find(|joint| joint.name == "elbow").unwrap();
+        let told: Vec<f64> = elbow
+            .traces
+            .iter()
+            .map(|t| rmse(t, &t.calibrated))
+            .collect();
+        assert!(
+            told.len() > 1 && told.is_sorted_by(|a, b| a >= b),
+            "{told:?}"
+        );
+        assert_eq!(told.last(), Some(&1.0));
+    }
 
     #[test]
     fn moments_ignore_what_is_not_finite() {

@@ -85,6 +85,35 @@ pub(in crate::report) fn by_prior(
     })
 }
 
+/// What is not found and tells the torque of a found component, and is in under a prior that leaves that out.
+pub(in crate::report) fn instead_of(
+    component: &ComponentSummary,
+    calibration: &Calibration,
+) -> Vec<String> {
+    let under = |name: &str| {
+        let mut all = calibration.components.iter();
+        let own = all.find(|own| own.name == name && !own.is_unseen())?;
+        let mut terms = one_each(&calibration.terms);
+        let term = terms.find(|term| own.columns.contains(&term.term.name))?;
+        Some((own.selected, &term.pip_sensitivity))
+    };
+    let Some((_, own)) = under(&component.name) else {
+        return Vec::new();
+    };
+    let groups = calibration.groups.iter();
+    let groups = groups.filter(|group| group.members.contains(&component.name));
+    let others = groups.flat_map(|group| &group.members);
+    let takes_over = |name: &&String| {
+        under(name).is_some_and(|(found, other)| {
+            let mut each = own.iter().zip(other);
+            !found && each.any(|(own, other)| *own < 0.5 && *other >= 0.5)
+        })
+    };
+    let mut out: Vec<String> = others.filter(takes_over).cloned().collect();
+    out.dedup();
+    out
+}
+
 struct Row<'a> {
     name: &'a str,
     term: &'a TermSummary,

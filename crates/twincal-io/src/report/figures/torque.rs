@@ -5,7 +5,7 @@ use crate::report::plot::{Frame, Panel, thin, thin_band};
 use crate::report::scale::extent;
 use crate::report::svg::Svg;
 use crate::report::text::number;
-use crate::report::view::{Joint, rmse, root_mean_square, rows};
+use crate::report::view::{Joint, rmse, rows, stands_still_between};
 use std::ops::Range;
 use twincal::validate::Trace;
 
@@ -26,7 +26,7 @@ pub(in crate::report) fn figure(joint: &Joint<'_>) -> Option<Figure> {
             draw(joint, trace, all.clone(), None, width, 270.0)
         }));
     } else {
-        let still = trace.standstill.contains(&true) && trace.standstill.contains(&false);
+        let still = stands_still_between(trace);
         let part = format!(
             "The {} s in which it is furthest off{}.",
             number(seconds(trace, &window), 2),
@@ -103,16 +103,8 @@ fn scores(joint: &Joint<'_>, trace: &Trace) -> String {
         0 | 1 => String::new(),
         step => format!(", from one row in {step}"),
     };
-    let some = |still: bool| trace.standstill.contains(&still);
-    let moving = some(true) && some(false);
-    let of = |predicted: &[f64]| {
-        if !moving {
-            return number(rmse(trace, predicted), 3);
-        }
-        let rows = trace.measured.iter().zip(predicted).zip(&trace.standstill);
-        let moves = rows.filter(|(_, still)| !**still);
-        number(root_mean_square(moves.map(|((m, p), _)| m - p)), 3)
-    };
+    let moving = stands_still_between(trace);
+    let of = |predicted: &[f64]| number(rmse(trace, predicted), 3);
     format!(
         "{} — error (RMSE){} {} → {} {}{thinned}",
         trace.log,
