@@ -130,7 +130,7 @@ fn of_spring(parameters: &[Estimate]) -> Vec<usize> {
     }
 }
 
-/// Whether a joint may stand at a spring's rest position: within a turn of zero (or 2π m), and known to [`KNOWN_PLACE`].
+/// Whether a joint may stand at a spring's rest position: within a turn of zero (or 2π m), and known to one rad (or m).
 #[must_use]
 pub fn is_place(rest: &Estimate) -> bool {
     rest.value.abs() <= TAU && rest.spread <= KNOWN_PLACE
