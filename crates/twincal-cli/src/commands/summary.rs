@@ -4,8 +4,7 @@ use super::not_kept::others;
 use super::repeats;
 use super::table::{print_table, table};
 use crate::terminal::{Terminal, clean};
-use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary};
-use twincal::calibrate::{Repeat, Repeated};
+use twincal::calibrate::{Calibration, ParameterSummary, Repeated};
 use twincal::validate::{Scores, Split};
 use twincal::words::significant;
 use twincal::{Finding, Severity};
@@ -42,7 +41,7 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
         let mut said = vec![format!("PIP {}", pip(component.pip))];
         let why = report::why_suspected(component, calibration);
         said.extend((!why.is_empty()).then(|| format!("only suspected: {}", why.join(", "))));
-        if repeated(component, calibration) == Repeated::InOneHalf {
+        if report::of_halves(component, calibration) == Repeated::InOneHalf {
             said.push(Repeated::InOneHalf.words().into());
         }
         let text = format!("{} ({})", component.words, said.join(", "));
@@ -84,14 +83,6 @@ pub(super) fn has_ends(number: &ParameterSummary) -> bool {
     number.seen && number.ends().is_some()
 }
 
-/// What the two halves of the data say about a component.
-fn repeated(component: &ComponentSummary, calibration: &Calibration) -> Repeated {
-    let all = &calibration.repeatability;
-    let mut effects = all.chunk_by(|a, b| a.component == b.component);
-    let own = effects.find(|own| own[0].component == component.name);
-    Repeat::of_effect(own.unwrap_or_default())
-}
-
 fn validation(calibration: &Calibration, terminal: &mut Terminal) {
     let validation = &calibration.validation;
     let split = match &validation.split {
@@ -118,7 +109,12 @@ fn verdict(calibration: &Calibration, terminal: &mut Terminal) {
     let answer = report::answer(calibration);
     terminal.heading("Can this twin be used?");
     paragraph(&answer.headline, terminal);
-    let told = answer.grounds.iter().chain(&answer.limits);
+    // Findings follow in full.
+    let limits = answer.limits.iter().filter(|limit| {
+        let mut findings = calibration.findings.iter();
+        !findings.any(|finding| limit.contains(&finding.message))
+    });
+    let told = answer.grounds.iter().chain(limits);
     told.for_each(|text| paragraph(text, terminal));
     if !answer.folded.is_empty() {
         let text = format!("{} more to mind in the report.", answer.folded.len());

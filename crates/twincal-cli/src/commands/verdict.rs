@@ -19,8 +19,9 @@ pub(super) fn doubt(calibration: &Calibration) -> Option<Finding> {
 
 /// "Can this twin be used? No: … Joint elbow: …"
 fn words(answer: &Answer) -> String {
-    let mut reasons = answer.limits.iter().chain(&answer.grounds);
-    let reason = reasons.next().map_or("", String::as_str);
+    let mut reasons = answer.limits.iter().chain(&answer.next);
+    let reason = reasons.next().or(answer.grounds.first());
+    let reason = reason.map_or("", String::as_str);
     let more = match answer.limits.len() + answer.folded.len() {
         0 | 1 => String::new(),
         n => format!(" ({} more in its report)", n - 1),
@@ -50,10 +51,10 @@ mod tests {
         );
         assert_eq!(
             told(
-                "Yes, with the exceptions below.",
+                "Yes, to predict torque, with the exceptions below.",
                 &["Joint a: one.", "Joint b: two."]
             ),
-            "can this twin be used? Yes, with the exceptions: Joint a: one. (1 more in its report)"
+            "can this twin be used? Yes, to predict torque, with the exceptions: Joint a: one. (1 more in its report)"
         );
     }
 }

@@ -105,8 +105,8 @@ fn mostly_there(calibration: &Calibration) -> impl Iterator<Item = Pair<'_>> {
         )
 }
 
-/// Joints of which a tenth of the held-out moving rows or more leave the training motion.
-pub(super) fn new_motion(calibration: &Calibration) -> Vec<&str> {
+/// Joints of which training says less on a tenth of the held-out moving rows or more, mostly because their motion is new.
+pub(super) fn new_motion(calibration: &Calibration) -> Vec<String> {
     let Validation { within, beyond, .. } = &calibration.validation;
     let pairs = within.joints.iter().zip(&beyond.joints);
     pairs
@@ -114,7 +114,7 @@ pub(super) fn new_motion(calibration: &Calibration) -> Vec<&str> {
         .filter(|(_, beyond)| beyond.rows > 0)
         .map(|(within, beyond)| Pair::of(calibration, within, beyond))
         .filter(|pair| pair.cause == Cause::NewMotion)
-        .map(|pair| pair.beyond.joint.as_str())
+        .map(|pair| pair.beyond.joint.clone())
         .collect()
 }
 

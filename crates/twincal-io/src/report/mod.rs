@@ -72,7 +72,7 @@ pub struct FileHash {
 pub use grounds::friction_only;
 pub use honesty::stretched;
 pub use limits::{decisive, has_standstill};
-pub use standing::why_suspected;
+pub use standing::{of_halves, why_suspected};
 
 /// Whether the calibrated torque can be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -81,7 +81,7 @@ pub struct Answer {
     pub headline: String,
     /// What it rests on.
     pub grounds: Vec<String>,
-    /// What held-out torque and the effects say against it: what matters most.
+    /// What log, sampler, held-out torque and the effects say against it: what matters most.
     pub limits: Vec<String>,
     /// And the rest of that.
     pub folded: Vec<String>,

@@ -27,9 +27,6 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
             }
         ));
     }
-    if hardly_at_rest(calibration, joints).is_some() {
-        holds.push("with pauses in several poses, for standstill".into());
-    }
     let findings = || calibration.findings.iter();
     let mut more: Vec<String> = findings()
         .filter(|f| f.code == "unseen_motion" && !f.subject.is_empty())
@@ -46,7 +43,7 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
     if !new.is_empty() {
         holds.push(format!(
             "with the motion of {} that only the held-out logs have",
-            list(&new)
+            list(&first_of(new, NAMED))
         ));
     }
     let apart: Vec<String> = (calibration.groups.iter())
@@ -56,7 +53,7 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
     if !apart.is_empty() {
         holds.push(format!(
             "of another motion, so that {} can be told from what is alike in these",
-            list(&apart)
+            list(&first_of(apart, NAMED))
         ));
     }
     if findings().any(|f| f.code == "quantised_encoder") {
@@ -65,12 +62,22 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
     let untried = calibration.validation.split == Split::LastThirty;
     let few = independent_rows(calibration, joints) < FEW;
     let fitted = (!holds.is_empty()).then(|| format!("to fit with these, {}", holds.join("; ")));
-    let test = match (untried, few) {
-        (true, _) => Some(
-            "another motion, given with --heldout, as the test: so far only later parts of the fitted motion were tried",
-        ),
-        (false, true) => Some("another motion, given with --heldout, for a longer test"),
-        (false, false) => None,
+    // Standstill is no part of a fit.
+    let pauses = match hardly_at_rest(calibration, joints) {
+        Some(_) => " with pauses in several poses",
+        None => "",
+    };
+    let test = match (untried, few, pauses) {
+        (true, ..) => Some(format!(
+            "another motion{pauses}, given with --heldout, as the test: so far only later parts of the fitted motion were tried"
+        )),
+        (false, true, _) => Some(format!(
+            "another motion{pauses}, given with --heldout, for a longer test"
+        )),
+        (false, false, "") => None,
+        (false, false, _) => Some(format!(
+            "another motion{pauses}, given with --heldout, to test standstill"
+        )),
     };
     match (fitted, test) {
         (None, None) => None,
@@ -124,6 +131,20 @@ mod tests {
             joint.as_deref(),
             Some("one to fit with these, with more motion of elbow.")
         );
+        let pauses = of(&|c| {
+            for log in &mut c.logs {
+                log.standstill.iter_mut().for_each(|rows| *rows = 500);
+            }
+            c.validation.moving = c.validation.filtered.clone();
+        });
+        let said = "another motion with pauses in several poses, given with --heldout, to test standstill.";
+        assert_eq!(pauses.as_deref(), Some(said));
+        let encoder = of(&|c| {
+            let code = "quantised_encoder";
+            c.findings = vec![Finding::new(Severity::Warning, code, "elbow", "", 1)];
+        });
+        let said = "one to fit with these, with the encoder’s full resolution.";
+        assert_eq!(encoder.as_deref(), Some(said));
         let group = |alike| Group {
             members: vec!["elbow.spring".into(), "elbow.offset".into()],
             pip: 1.0,

@@ -98,7 +98,7 @@ pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) ->
         true => "do not read it as mass or inertia",
         false => "these logs leave its inertia open",
     };
-    out.extend(no_body(component).map(|share| format!("{share}: {open}")));
+    out.extend(no_body(component, calibration).map(|share| format!("{share}: {open}")));
     out.extend(few_rows(component, calibration));
     out.extend(of_a_point_mass(component, calibration));
     out.extend(rivals(component, calibration));
@@ -119,7 +119,7 @@ pub(super) fn doubts(component: &ComponentSummary, calibration: &Calibration) ->
     out
 }
 
-/// Friction that is told together with a change of it of which the data do not say whether it is there.
+/// Friction that is told together with a change of it that is undecided, only suspected, or another one in both halves.
 fn hangs_on(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
     let changes = [
         Family::QuadraticFriction,
@@ -424,6 +424,15 @@ mod tests {
         assert_eq!(viscous(Verdict::Undecided, "lift"), said);
         assert_eq!(viscous(Verdict::Found, "lift"), [""; 0]);
         assert_eq!(viscous(Verdict::Undecided, "elbow"), [""; 0]);
+        let suspected = of(|c| {
+            (c.components[0].name, c.components[0].family) =
+                ("lift.viscous".into(), Family::Viscous);
+            let other = &mut c.components[1];
+            (other.name, other.family) = ("lift.stribeck".into(), Family::Stribeck);
+            (other.selected, other.no_rigid_body) = (true, true);
+        });
+        let said = ["its value hangs on lift.stribeck, which is only suspected"];
+        assert_eq!(suspected, said);
         let body = |share: Option<f64>| {
             of(|c| {
                 c.components[0].selected = true;

@@ -338,6 +338,31 @@ pub(super) mod tests {
         assert!(all.iter().any(|s| s == said), "{all:?}");
     }
 
+    #[test]
+    fn joints_off_to_either_side_are_one_sentence() {
+        let of = |own: &[(Shape, &str)], slightly| {
+            let own: Vec<(Shape, &str, String)> = own
+                .iter()
+                .map(|(shape, name)| (*shape, *name, "70 %".to_owned()))
+                .collect();
+            off_to_sides(&own, slightly).unwrap_or_default()
+        };
+        let (above, below) = (Shape::Above, Shape::Below);
+        assert_eq!(of(&[], false), "");
+        assert_eq!(
+            of(&[(above, "a")], true),
+            "Joint a: its torque lies above the prediction a little too often (70 %)."
+        );
+        assert_eq!(
+            of(&[(below, "a"), (below, "b")], false),
+            "Joints a and b: their torque lies below the prediction too often (a: 70 %; b: 70 %)."
+        );
+        assert_eq!(
+            of(&[(below, "a"), (above, "b")], false),
+            "Joints a and b: their torque lies to one side of the prediction too often (a below: 70 %; b above: 70 %)."
+        );
+    }
+
     /// PIT with this many of 20 bins' share inside the middle ten, and a slope.
     pub(in crate::report) fn pit(middle: f64, slope: f64) -> Pit {
         let bin = |i: usize| {

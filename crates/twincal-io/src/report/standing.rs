@@ -38,7 +38,7 @@ pub fn why_suspected(component: &ComponentSummary, calibration: &Calibration) ->
     if !component.selected {
         return Vec::new();
     }
-    let mut out: Vec<String> = no_body(component).into_iter().collect();
+    let mut out: Vec<String> = no_body(component, calibration).into_iter().collect();
     out.extend(size_of_gravity(component, calibration));
     if of_halves(component, calibration) == Repeated::InNeitherHalf {
         out.push(Repeated::InNeitherHalf.words().into());
@@ -70,17 +70,24 @@ pub(super) fn by_another_prior(
 }
 
 /// "no rigid body in 97.2 % of the draws": what was found of its link, all of it together. Results of earlier versions have no share.
-pub(super) fn no_body(component: &ComponentSummary) -> Option<String> {
+pub(super) fn no_body(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
+    let link = ["mass_moments", "tensor"]
+        .iter()
+        .find_map(|word| component.name.strip_suffix(word)?.strip_suffix('.'));
+    let mut findings = calibration.findings.iter();
+    let open = findings.any(|f| f.code == "unphysical_inertia_found" && Some(&*f.subject) == link);
     let share = match component.rigid_share {
         Some(share) => percent(1.0 - share),
         None if component.no_rigid_body => "more than 95 %".into(),
+        None if open => "more than half".into(),
         None => return None,
     };
     (component.selected).then(|| format!("no rigid body in {share} of the draws"))
 }
 
 /// What the two halves of the data say of a component.
-pub(super) fn of_halves(component: &ComponentSummary, calibration: &Calibration) -> Repeated {
+#[must_use]
+pub fn of_halves(component: &ComponentSummary, calibration: &Calibration) -> Repeated {
     let all = &calibration.repeatability;
     let mut effects = all.chunk_by(|a, b| a.component == b.component);
     let own = effects.find(|own| own[0].component == component.name);
@@ -91,6 +98,7 @@ pub(super) fn of_halves(component: &ComponentSummary, calibration: &Calibration)
 mod tests {
     use super::*;
     use crate::report::fixture;
+    use twincal::{Finding, Severity};
 
     #[test]
     fn what_speaks_against_an_effect_makes_it_suspected_and_what_speaks_against_a_number_does_not()
@@ -115,6 +123,12 @@ mod tests {
         let body = of(&|c| c.components[0].rigid_share = Some(0.028));
         let said = "no rigid body in 97.2\u{202f}% of the draws";
         assert_eq!(body, (Some(Standing::Suspected), reasons(&[said])));
+        let earlier = of(&|c| {
+            let code = "unphysical_inertia_found";
+            c.components[0].name = "fore.tensor".into();
+            c.findings = vec![Finding::new(Severity::Note, code, "fore", "", 0)];
+        });
+        assert_eq!(earlier.1, ["no rigid body in more than half of the draws"]);
         let undecided = of(&|c| c.components[0].verdict = Some(Verdict::Undecided));
         assert_eq!(undecided.1, ["undecided"]);
         let repeat = |c: &mut Calibration, pip: f64, z: f64| {

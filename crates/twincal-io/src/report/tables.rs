@@ -359,14 +359,11 @@ fn standstill_rule(pipeline: &Pipeline) -> String {
         [first, rest @ ..] if rest.iter().all(|v| v == first) => number(*first, 2),
         each => list(&each.iter().map(|v| number(*v, 2)).collect::<Vec<_>>()),
     };
-    match pipeline.shortest_standstill() {
-        long if long.is_finite() => format!(
-            "A joint stands still where it stays below {slow} (rad/s or m/s) for longer than {} s; such rows are left out of its fit, shorter \
-             stops are not.",
-            number(long, 2)
-        ),
-        _ => "Without a filter no row counts as standstill.".into(),
-    }
+    format!(
+        "A joint stands still where it stays below {slow} (rad/s or m/s) for longer than {} s; such rows are left out of its fit, shorter \
+         stops are not.",
+        number(pipeline.shortest_standstill(), 2)
+    )
 }
 
 pub(super) fn with_unit(x: f64, unit: &str) -> String {

@@ -78,27 +78,29 @@ pub(super) fn sentences(calibration: &Calibration) -> Vec<String> {
         let all: Vec<(&ComponentSummary, Standing)> = all
             .filter_map(|own| Some((own, standing(own, calibration)?)))
             .collect();
-        (!all.is_empty()).then(|| {
-            let sure = at_least_one(&all, calibration);
-            sentence(purpose.title(), &all, &sure)
-        })
+        (!all.is_empty())
+            .then(|| sentence(purpose.title(), &all, &at_least_one(purpose, calibration)))
     };
     Use::ALL.into_iter().filter_map(of).collect()
 }
 
-/// "at least one of a and b is there": what is sure of those that are only suspected.
-fn at_least_one(all: &[(&ComponentSummary, Standing)], calibration: &Calibration) -> Vec<String> {
-    let of = |name: &String| all.iter().find(|(own, _)| own.name == *name);
+/// "at least one of a and b is there": what is sure where each is only suspected, at the use of the first of them.
+fn at_least_one(purpose: Use, calibration: &Calibration) -> Vec<String> {
     let groups = calibration.groups.iter().filter(|group| group.pip > SURE);
-    let open = groups.filter(|group| {
-        let mut own = group.members.iter().filter_map(of).peekable();
-        own.peek().is_some() && own.all(|(_, standing)| *standing == Standing::Suspected)
+    let told = groups.filter_map(|group| {
+        let of = |name: &String| calibration.components.iter().find(|own| own.name == *name);
+        let likely = group.members.iter().filter_map(of);
+        let mut likely = likely
+            .filter_map(|own| Some((own, standing(own, calibration)?)))
+            .peekable();
+        let first = Use::of(likely.peek()?.0.family);
+        let open = likely.all(|(_, own)| own == Standing::Suspected);
+        (open && first == purpose).then(|| {
+            let named = first_of(group.members.clone(), NAMED);
+            format!("at least one of {} is there", list(&named))
+        })
     });
-    open.map(|group| {
-        let named = first_of(group.members.clone(), NAMED);
-        format!("at least one of {} is there", list(&named))
-    })
-    .collect()
+    told.collect()
 }
 
 /// "Friction: viscous friction (6) and Coulomb friction (6) found, 7 stand every check, 5 have a doubt; only suspected: a, b and c."
@@ -158,8 +160,8 @@ pub(super) fn suspected(calibration: &Calibration) -> Option<String> {
             Some((own, why))
         })
         .collect();
-    // A body that is none contradicts physics, the others only leave it open.
-    all.sort_by_key(|(own, _)| own.rigid_share.is_none());
+    // A body that is none contradicts physics; of others the data leave the inertia open.
+    all.sort_by_key(|(own, _)| (!own.no_rigid_body, own.rigid_share.is_none()));
     let bodies = no_bodies(calibration);
     let told: Vec<String> = (all.iter())
         .map(|(own, why)| format!("{} ({why})", own.name))
@@ -289,11 +291,15 @@ mod tests {
         let first = found.next().unwrap();
         first.verdict = Some(Verdict::Undecided);
         let first = first.name.clone();
+        found.next().unwrap().rigid_share = Some(0.4);
         let body = found.next().unwrap();
         (body.rigid_share, body.no_rigid_body) = (Some(0.01), true);
         let body = body.name.clone();
+        let open = calibration.components.iter();
+        let open = open.filter(|own| own.selected).nth(1).unwrap().name.clone();
         let said = format!(
-            "Only suspected, not to be rested on by themselves (predicted torque has them): {body} (no rigid body in 99.0\u{202f}% of the draws) and {first} (undecided). \
+            "Only suspected, not to be rested on by themselves (predicted torque has them): {body} (no rigid body in 99.0\u{202f}% of the draws), \
+             {open} (no rigid body in 60.0\u{202f}% of the draws) and {first} (undecided). \
              Hardly any body can have what was found of forearm: an effect is missing among the candidates, or the model’s inertias are wrong."
         );
         calibration.findings = vec![Finding::new(

@@ -57,7 +57,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
             grade: Grade::Bad,
             headline: "Not yet: there are no held-out rows to judge this twin by.".into(),
             grounds: grounds::effects_found(calibration),
-            limits: Vec::new(),
+            limits: not_to_rest_on(calibration),
             folded: Vec::new(),
             pointers: Vec::new(),
             next: Some(
@@ -82,7 +82,9 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         .iter()
         .any(|f| f.severity == Severity::Degraded)
         || !converged(calibration);
-    let (grade, headline) = if calibration.findings.iter().any(Finding::doubts_the_log) {
+    let doubted = calibration.findings.iter().any(Finding::doubts_the_log);
+    let broken = doubted || no_measurement(calibration);
+    let (grade, headline) = if doubted {
         (
             Grade::Bad,
             "Not yet: log and model contradict each other in sign, scale or order of joints.",
@@ -195,7 +197,10 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         limits,
         folded,
         pointers: pointers(calibration),
-        next: next_recording::next(calibration, joints),
+        // A log that is no measurement of this model has to be mended first.
+        next: (!broken)
+            .then(|| next_recording::next(calibration, joints))
+            .flatten(),
     }
 }
 

@@ -109,9 +109,7 @@ pub(in crate::report) fn instead_of(
             !found && each.any(|(own, other)| *own < 0.5 && *other >= 0.5)
         })
     };
-    let mut out: Vec<String> = others.filter(takes_over).cloned().collect();
-    out.dedup();
-    out
+    others.filter(takes_over).cloned().collect()
 }
 
 struct Row<'a> {

@@ -214,11 +214,15 @@ fn draw(
     panel.line(&mut svg, "c", thin(&calibrated, buckets));
     svg.finish(&format!(
         "Line chart over time of the torque of joint {} in {}: measured, nominal (error {} {unit}) and calibrated \
-         (error {} {unit}) with its 95 % interval.",
+         (error {} {unit}) with its 95 % interval{}.",
         joint.name,
         trace.log,
         number(rmse(trace, &trace.nominal), 3),
         number(rmse(trace, &trace.calibrated), 3),
+        match stands_still_between(trace) {
+            true => "; errors while it moves",
+            false => "",
+        },
         unit = joint.units.torque,
     ))
 }

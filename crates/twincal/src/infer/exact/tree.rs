@@ -25,8 +25,8 @@ struct Unvisited {
     /// ln of the share of a single model's weight below which a subtree is not visited, at first; where all those subtrees together
     /// may weigh more than `most`, what they weigh too much and so much more is taken off it.
     light: f64,
-    /// Share of the sum that all models that are not visited may weigh together, by their bounds; what they do weigh is a hundredth of that
-    /// or less.
+    /// Share of the sum that all models that are not visited may weigh together, by their bounds; what they did weigh in tests was a
+    /// hundredth of that or less.
     most: f64,
 }
 
