@@ -35,6 +35,16 @@ def test_held_out_torque_and_known_effects(split, tmp_path):
     for name, component in components.items():
         if component["verdict"] == "found":
             assert not name.endswith(tuple(split.absent) or "\0"), name
+    # Of a link with a found inertia that is a body in less than half of the draws: the share at each effect is that of its finding.
+    open_links = {f["subject"]: f["message"] for f in result["findings"] if f["code"] == "unphysical_inertia_found"}
+    of_links = [c for c in result["components"] if "rigid_share" in c]
+    assert bool(open_links) == bool(of_links) and (open_links or split.folder != "ur10")
+    for component in of_links:
+        assert component["pip"] >= 0.5 and component["rigid_share"] < 0.5
+        assert component["no_rigid_body"] == (component["rigid_share"] < 0.05)
+        if component["name"].endswith((".mass_moments", ".tensor")):
+            message = open_links[component["name"].rsplit(".", 1)[0]]
+            assert f"{100 * component['rigid_share']:.1f} %" in message, component["name"]
     # What a group tells is not lost: the KR300's `link1.tensor` is its first motor's inertia.
     told_by_others = {name for group in result["groups"] for name in group["members"]}
     for finding in result["findings"]:

@@ -393,6 +393,22 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn no_recording_is_advised_of_a_log_that_contradicts_the_model() {
+        use twincal::validate::Split;
+        let next = |codes: &[&str]| {
+            judged(|c| {
+                c.validation.split = Split::LastThirty;
+                let finding = |code: &&str| Finding::new(Severity::Degraded, code, "elbow", "", 0);
+                c.findings = codes.iter().map(finding).collect();
+            })
+            .next
+        };
+        assert!(next(&[]).is_some());
+        assert_eq!(next(&["constant_torque"]), None);
+        assert_eq!(next(&["sign_flip"]), None);
+    }
+
+    #[test]
     fn unfiltered_torque_that_gets_worse_is_said() {
         let raw =
             judged(|c| c.validation.raw.rmse_calibrated = 1.2 * c.validation.raw.rmse_nominal);
