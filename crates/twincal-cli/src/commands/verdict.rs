@@ -4,14 +4,11 @@ use twincal::calibrate::Calibration;
 use twincal::{Finding, Severity};
 use twincal_io::report::{Answer, answer};
 
-/// How the answer begins that nothing has to be added to.
-const PLAIN: &str = "Yes, on motions";
-
 /// The verdict where it is not a plain yes: the answer and its first reason. It is of the fit, not of what the command does, so that exit codes
 /// do not follow from it.
 pub(super) fn doubt(calibration: &Calibration) -> Option<Finding> {
     let answer = answer(calibration);
-    (!answer.headline.starts_with(PLAIN)).then(|| {
+    (!answer.plain).then(|| {
         let words = words(&answer);
         Finding::new(Severity::Warning, "verdict", "", words, 0)
     })
@@ -38,6 +35,7 @@ mod tests {
     fn the_first_reason_stands_behind_the_answer() {
         let told = |headline: &str, limits: &[&str]| {
             words(&Answer {
+                plain: false,
                 headline: headline.into(),
                 grounds: vec!["Torque error: 1 → 2 N·m.".into()],
                 limits: limits.iter().map(|&limit| limit.into()).collect(),

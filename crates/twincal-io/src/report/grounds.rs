@@ -50,6 +50,14 @@ pub(super) fn change([before, after]: [f64; 2], unit: &str) -> String {
     format!("{} → {} {unit}, {way}", number(before, 3), number(after, 3))
 }
 
+/// " below 5 Hz"; nothing without a filter.
+pub(super) fn below_cutoff(calibration: &Calibration) -> String {
+    match calibration.twin.pipeline.cutoff_hz {
+        cutoff if cutoff > 0.0 => format!(" below {} Hz", (100.0 * cutoff).round() / 100.0),
+        _ => String::new(),
+    }
+}
+
 /// RMSE before and after, of joints that move, for what the filter lets pass; beside it that of the torque as it was logged where that is another matter.
 fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
     let validation = &calibration.validation;
@@ -62,11 +70,7 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
             _ => "the last 30 % of each log, by a fit without them",
         },
     };
-    let cutoff = calibration.twin.pipeline.cutoff_hz;
-    let below = match cutoff > 0.0 {
-        true => format!(" below {} Hz", (100.0 * cutoff).round() / 100.0),
-        false => String::new(),
-    };
+    let below = below_cutoff(calibration);
     let which = match has_standstill(validation) {
         true => "; joints that move",
         false => "",
@@ -78,9 +82,9 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
     };
     let unit = pooled_unit(joints);
     let told = change([judged.rmse_nominal, judged.rmse_calibrated], unit);
-    let logged = match cutoff > 0.0 {
-        true => as_logged(calibration, unit),
-        false => None,
+    let logged = match below.is_empty() {
+        false => as_logged(calibration, unit),
+        true => None,
     };
     let logged = logged.unwrap_or_default();
     format!("Torque error (RMSE){below} on {split}{which}: {told}{logged}.")

@@ -77,6 +77,8 @@ pub use standing::{of_halves, why_suspected};
 /// Whether the calibrated torque can be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Answer {
+    /// True where it is a yes without exceptions.
+    pub plain: bool,
     /// One sentence.
     pub headline: String,
     /// What it rests on.
@@ -95,6 +97,7 @@ pub fn answer(calibration: &Calibration) -> Answer {
     let joints = view::joints(calibration);
     let verdict = verdict::judge(calibration, &joints);
     Answer {
+        plain: verdict.grade == verdict::Grade::Good,
         headline: verdict.headline,
         grounds: verdict.grounds,
         limits: verdict.limits,

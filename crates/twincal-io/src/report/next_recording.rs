@@ -39,6 +39,15 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
             list(&first_of(more, NAMED))
         ));
     }
+    if let Some((together, logs)) = driven_together(calibration) {
+        holds.push(format!(
+            "with all joints driven at once, as in {} of these {logs} logs",
+            match together {
+                0 => "none".to_owned(),
+                n => format!("only {n}"),
+            }
+        ));
+    }
     let new = beyond::new_motion(calibration);
     if !new.is_empty() {
         holds.push(format!(
@@ -87,11 +96,25 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
     }
 }
 
+/// In how many of the fitted logs, and of how many, no joint stands still or is hardly driven; `None` where these are half of them or more.
+fn driven_together(calibration: &Calibration) -> Option<(usize, usize)> {
+    let fitted = calibration.logs.iter().filter(|log| log.role == "fit");
+    let passive = |log: &str| {
+        let mut findings = calibration.findings.iter();
+        findings.any(|f| {
+            matches!(&f.code[..], "joint_not_driven" | "joint_stands_still") && f.subject == log
+        })
+    };
+    let (alone, together): (Vec<_>, Vec<_>) = fitted.partition(|log| passive(&log.name));
+    let (together, all) = (together.len(), alone.len() + together.len());
+    (all > 1 && 2 * together < all).then_some((together, all))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::report::{fixture, view};
-    use twincal::calibrate::Group;
+    use twincal::calibrate::{Group, LogSummary};
     use twincal::{Finding, Severity};
 
     #[test]
@@ -145,6 +168,29 @@ mod tests {
         });
         let said = "one to fit with these, with the encoder’s full resolution.";
         assert_eq!(encoder.as_deref(), Some(said));
+        let passive = |passive: usize| {
+            of(&|c| {
+                let one = c.logs[0].clone();
+                let log = |name: &str| LogSummary {
+                    name: name.to_owned(),
+                    role: "fit".into(),
+                    ..one.clone()
+                };
+                c.logs = ["a", "b", "c", "d"].map(log).to_vec();
+                let codes = ["joint_not_driven", "joint_stands_still"];
+                for (log, code) in c.logs.iter().zip(codes.into_iter().cycle()).take(passive) {
+                    c.findings
+                        .push(Finding::new(Severity::Note, code, log.name.as_str(), "", 1));
+                }
+            })
+        };
+        let said =
+            "one to fit with these, with all joints driven at once, as in only 1 of these 4 logs.";
+        assert_eq!(passive(3).as_deref(), Some(said));
+        let said =
+            "one to fit with these, with all joints driven at once, as in none of these 4 logs.";
+        assert_eq!(passive(4).as_deref(), Some(said));
+        assert_eq!(passive(2), None);
         let group = |alike| Group {
             members: vec!["elbow.spring".into(), "elbow.offset".into()],
             pip: 1.0,

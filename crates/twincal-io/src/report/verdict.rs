@@ -179,7 +179,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     } else if !serious && !off.single && !too_narrow && firm {
         (
             Grade::Good,
-            "Yes, on motions like the ones it was tested on.",
+            "Yes, to predict torque on motions like the ones it was tested on.",
         )
     } else {
         (
@@ -189,10 +189,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     };
     Verdict {
         grade,
-        headline: match has_standstill(&calibration.validation) {
-            true => headline.replace("The torque yes", "While joints move, the torque yes"),
-            false => headline.into(),
-        },
+        headline: in_band(calibration, headline),
         grounds: grounds::grounds(calibration, joints),
         limits,
         folded,
@@ -202,6 +199,19 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
             .then(|| next_recording::next(calibration, joints))
             .flatten(),
     }
+}
+
+/// The headline with what it is of: joints that move, and torque that the filter lets pass.
+fn in_band(calibration: &Calibration, headline: &str) -> String {
+    let headline = match has_standstill(&calibration.validation) {
+        true => headline.replace("The torque yes", "While joints move, the torque yes"),
+        false => headline.to_owned(),
+    };
+    let below = grounds::below_cutoff(calibration);
+    headline.replace(
+        "Yes, to predict torque",
+        &format!("Yes, to predict torque{below}"),
+    )
 }
 
 /// Whether a log has no torque that changes.

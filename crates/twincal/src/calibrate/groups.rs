@@ -18,6 +18,8 @@ const SURE: f64 = 0.98;
 const WORSE: f64 = 1.0;
 /// Nats by which a component must explain torque better than nothing before others can stand in for it.
 const CLEAR: f64 = 10.0;
+/// Standard deviations that a coefficient may be below its bound and still be a matter of noise.
+const BELOW: f64 = 2.0;
 /// Names that a sentence holds at most.
 const TOLD: usize = 6;
 
@@ -36,6 +38,9 @@ const TOLD: usize = 6;
 /// ```
 /// where B is one component or mass moments and tensor of one link, and A explains at least 10 nats. This holds also where
 /// the prior is sure which one it is; the set is `settled` then.
+///
+/// No component stands for another where a coefficient of its b would have to be below its bound by more than two standard
+/// deviations: a motor's inertia, which is never negative, is no name for a tensor that is.
 pub(super) fn groups(problem: &Problem, posterior: &Posterior, library: &Library) -> Vec<Group> {
     let all = Candidates::new(problem, posterior, library);
     let count = all.columns.len();
@@ -51,13 +56,16 @@ pub(super) fn groups(problem: &Problem, posterior: &Posterior, library: &Library
     for a in 0..count {
         for b in 0..a {
             let unsure = all.unsure(a) && all.unsure(b);
-            if unsure && (all.alike(a, b) || all.correlation(a, b) < EXCLUSIVE) {
+            let alike = || all.alike(a, b) || all.correlation(a, b) < EXCLUSIVE;
+            let forbidden = || all.is_forbidden(a, &[b]) || all.is_forbidden(b, &[a]);
+            if unsure && alike() && !forbidden() {
                 join(a, b, all.is_alias(a, b) || all.is_alias(b, a));
             }
         }
         if all.pip[a] >= WORTH_TELLING {
             for other in all.others(a) {
-                if all.same_span(a, &other) || all.stands_in(a, &other) {
+                let alike = all.same_span(a, &other) || all.stands_in(a, &other);
+                if alike && !all.is_forbidden(a, &other) {
                     other.iter().for_each(|&b| join(a, b, all.is_alias(a, b)));
                 }
             }
@@ -81,6 +89,30 @@ pub(super) fn groups(problem: &Problem, posterior: &Posterior, library: &Library
         .collect();
     groups.sort_by_key(|group| group.settled);
     groups
+}
+
+/// Per component of the library, if it is likelier in than not: those of [`ComponentSummary::alias_of`] that can have its torque
+/// without a coefficient below its bound.
+///
+/// [`ComponentSummary::alias_of`]: super::ComponentSummary::alias_of
+pub(super) fn told_as(
+    problem: &Problem,
+    posterior: &Posterior,
+    library: &Library,
+) -> Vec<Vec<String>> {
+    let all = Candidates::new(problem, posterior, library);
+    let mut told = vec![Vec::new(); library.components().len()];
+    let outer = (0..all.columns.len()).filter(|&k| !all.is_inner(k));
+    for own in outer.filter(|&k| all.pip[k] >= 0.5) {
+        let component = &library.components()[all.component[own]];
+        let may = |name: &&String| {
+            let mut others = 0..all.columns.len();
+            let other = others.find(|&k| all.name(k) == *name);
+            other.is_none_or(|other| !all.is_forbidden(own, &[other]))
+        };
+        told[all.component[own]] = component.alias_of.iter().filter(may).cloned().collect();
+    }
+    told
 }
 
 /// The components that have columns, numbered as in the problem's prior.
@@ -192,16 +224,9 @@ impl<'a> Candidates<'a> {
 
     /// Whether others would explain what a component explains.
     fn stands_in(&self, own: usize, others: &[usize]) -> bool {
-        let own = &self.columns[own];
-        // Given that it is in, about.
-        let inside = |&k: &usize| self.posterior.mean[k] / self.posterior.inclusion[k];
-        let beta: Vec<f64> = own.iter().map(inside).collect();
-        let columns: Vec<usize> = others
-            .iter()
-            .flat_map(|&k| self.columns[k].iter().copied())
-            .collect();
-        let loss = |columns: &[usize]| self.loss(own, &beta, columns);
-        match (loss(own), loss(&columns), loss(&[])) {
+        let columns = self.columns_of(others);
+        let loss = |columns: &[usize]| Some(self.instead(own, columns)?.loss);
+        match (loss(&self.columns[own]), loss(&columns), loss(&[])) {
             (Some(itself), Some(other), Some(nothing)) => {
                 other <= itself + WORSE && nothing > itself + CLEAR
             }
@@ -209,13 +234,36 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// Nats that are lost when `columns`, under their prior, explain the torque Φ_own β.
-    fn loss(&self, own: &[usize], beta: &[f64], columns: &[usize]) -> Option<f64> {
+    /// Whether others would need a coefficient that they cannot have.
+    fn is_forbidden(&self, own: usize, others: &[usize]) -> bool {
+        let columns = self.columns_of(others);
+        let bound = |k: usize| self.problem.prior.lower[k];
+        if columns.iter().all(|&k| bound(k) == f64::NEG_INFINITY) {
+            return false;
+        }
+        let Some(Instead { mean, sd, .. }) = self.instead(own, &columns) else {
+            return false;
+        };
+        let mut all = columns.iter().zip(mean.iter().zip(&sd));
+        all.any(|(&k, (mean, sd))| *mean < bound(k) - BELOW * sd)
+    }
+
+    fn columns_of(&self, components: &[usize]) -> Vec<usize> {
+        let columns = components.iter().flat_map(|&k| &self.columns[k]);
+        columns.copied().collect()
+    }
+
+    /// What `columns`, under their prior, make of the torque Φ_own β.
+    fn instead(&self, own: usize, columns: &[usize]) -> Option<Instead> {
+        let own = &self.columns[own];
+        // Given that it is in, about.
+        let inside = |&k: &usize| self.posterior.mean[k] / self.posterior.inclusion[k];
+        let beta: Vec<f64> = own.iter().map(inside).collect();
         let product = |k: usize| -> f64 {
-            let pairs = own.iter().zip(beta);
+            let pairs = own.iter().zip(&beta);
             pairs.map(|(&i, b)| self.gram(k, i) * b).sum()
         };
-        let energy: f64 = own.iter().zip(beta).map(|(&i, b)| b * product(i)).sum();
+        let energy: f64 = own.iter().zip(&beta).map(|(&i, b)| b * product(i)).sum();
         let mut normal = Vec::with_capacity(columns.len() * columns.len());
         for &i in columns {
             normal.extend(columns.iter().map(|&j| self.gram(i, j)));
@@ -223,12 +271,18 @@ impl<'a> Candidates<'a> {
         for (place, &k) in columns.iter().enumerate() {
             normal[place * columns.len() + place] += 1.0 / self.problem.prior.slab[k];
         }
-        let mut half: Vec<f64> = columns.iter().map(|&k| product(k)).collect();
-        Cholesky::new(&normal, columns.len())
-            .ok()?
-            .solve_lower(&mut half);
-        let explained: f64 = half.iter().map(|x| x * x).sum();
-        Some(0.5 * (energy - explained).max(0.0) / self.posterior.noise)
+        let noise = self.posterior.noise;
+        let factor = Cholesky::new(&normal, columns.len()).ok()?;
+        let mut mean: Vec<f64> = columns.iter().map(|&k| product(k)).collect();
+        factor.solve_lower(&mut mean);
+        let explained: f64 = mean.iter().map(|x| x * x).sum();
+        factor.solve_upper(&mut mean);
+        let variances = factor.inverse_diagonal();
+        Some(Instead {
+            loss: 0.5 * (energy - explained).max(0.0) / noise,
+            mean,
+            sd: variances.iter().map(|v| (noise * v).sqrt()).collect(),
+        })
     }
 
     fn group(&self, members: &[usize], every_motion: bool) -> Option<Group> {
@@ -279,6 +333,15 @@ impl<'a> Candidates<'a> {
     }
 }
 
+/// What columns make of another's torque.
+struct Instead {
+    /// Nats that are lost.
+    loss: f64,
+    /// Their coefficients.
+    mean: Vec<f64>,
+    sd: Vec<f64>,
+}
+
 impl Calibration {
     /// Groups of which the prior alone prefers a member, in a sentence for those alike in every motion and one for those alike in these logs:
     /// "told as either in every motion, which the prior alone decides (the first is preferred): payload or tool.tensor; …".
@@ -300,10 +363,10 @@ impl Calibration {
             let spanned = self.components.iter().filter(|own| {
                 alike == Alike::EveryMotion
                     && own.selected
-                    && !own.alias_of.is_empty()
+                    && !own.told_as.is_empty()
                     && !in_a_group(&own.name)
             });
-            told.extend(spanned.map(|own| format!("{} or {}", own.name, own.alias_of.join(" + "))));
+            told.extend(spanned.map(|own| format!("{} or {}", own.name, own.told_as.join(" + "))));
             (!told.is_empty()).then(|| {
                 format!(
                     "told as either {place}, which the prior alone decides (the first is preferred): {}",

@@ -69,6 +69,10 @@ pub struct ComponentSummary {
     pub verdict: Option<Verdict>,
     /// Components that no motion of this robot can tell from it.
     pub alias_of: Vec<String>,
+    /// Those of `alias_of` that can have what was found of it: a motor's inertia, which is never negative, is no name for a tensor that
+    /// is. Only of what is likelier in than not.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub told_as: Vec<String>,
     /// True where no rigid body has what was found of its link, whatever else is in: torque is right, the numbers are no mass or inertia.
     #[serde(default)]
     pub no_rigid_body: bool,

@@ -2,7 +2,7 @@
 
 use super::components::{NOT_SEEN, components};
 use super::data::Data;
-use super::groups::groups;
+use super::groups::{groups, told_as};
 use super::result::{
     Calibration, ComponentSummary, Draws, Group, LikelihoodUsed, PriorUsed, SweepPoint,
     TermSummary, Verdict,
@@ -87,7 +87,11 @@ pub(super) fn summarise(
         &fit.posterior,
         &conditional,
     ));
-    let components = components(library, &fit.posterior, &terms, settings.inference.seed);
+    let mut components = components(library, &fit.posterior, &terms, settings.inference.seed);
+    let told = told_as(&fit.problem, &fit.posterior, library);
+    for (component, told_as) in components.iter_mut().zip(told) {
+        component.told_as = told_as;
+    }
     let groups = groups(&fit.problem, &fit.posterior, library);
     let names = names(library, columns);
     let is_forced = |(_, forced): &(&String, &bool)| **forced;

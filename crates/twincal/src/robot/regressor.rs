@@ -65,6 +65,7 @@ impl RegressorBlock {
     ///
     /// # Panics
     /// If there is no such pair or parameter.
+    #[inline(always)]
     pub fn column(&self, pair: usize, parameter: usize) -> &[f64] {
         let start = pair * 10 * STRIDE + parameter * STRIDE;
         &self.values[start..start + BLOCK]

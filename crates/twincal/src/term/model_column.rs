@@ -455,6 +455,11 @@ impl WithSimd for Combine<'_, '_> {
             for (i, cells) in cells.chunks_mut(step).enumerate() {
                 let sum = combined(s, self.block, entries, i * SIDE_BY_SIDE);
                 let (whole, rest) = S::as_mut_simd_f64s(cells);
+                // All of them at once: sums that are picked by number are kept in memory.
+                if let Some(whole) = whole.first_chunk_mut() {
+                    *whole = sum;
+                    continue;
+                }
                 for (cells, sum) in whole.iter_mut().zip(sum) {
                     *cells = sum;
                 }

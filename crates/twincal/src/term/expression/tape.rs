@@ -4,7 +4,7 @@
 //! first-level cache); sine and cosine of one argument share one instruction.
 
 use super::graph::{Function, Graph, Id, Node, Variable};
-use crate::lanes::{LANES, Lane, sin_cos, tanh};
+use crate::lanes::{LANES, Lane, Line, sin_cos, tanh};
 use crate::robot::Motion;
 use std::collections::HashMap;
 use std::ops::DerefMut;
@@ -62,7 +62,7 @@ pub(crate) struct Tape {
 /// Working memory of one thread; grows to what the tape needs.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Scratch {
-    registers: Vec<Block>,
+    registers: Vec<Line<Block>>,
 }
 
 impl Tape {
@@ -105,7 +105,7 @@ impl Tape {
         if scratch.registers.len() < self.registers {
             scratch
                 .registers
-                .resize(self.registers, [[0.0; LANES]; GROUPS]);
+                .resize(self.registers, Line([[0.0; LANES]; GROUPS]));
         }
         let run = Run {
             tape: self,
@@ -359,7 +359,7 @@ struct Run<'a, T> {
     tape: &'a Tape,
     motion: Motion<'a>,
     outputs: Outputs<'a, T>,
-    registers: &'a mut [Block],
+    registers: &'a mut [Line<Block>],
 }
 
 impl<T: DerefMut<Target = [f64]>> pulp::WithSimd for Run<'_, T> {
@@ -388,9 +388,9 @@ impl<T: DerefMut<Target = [f64]>> pulp::WithSimd for Run<'_, T> {
 
 /// The registers of one instruction, which the allocator keeps apart.
 #[inline(always)]
-fn apart<const N: usize>(registers: &mut [Block], which: [u32; N]) -> [&mut Block; N] {
+fn apart<const N: usize>(registers: &mut [Line<Block>], which: [u32; N]) -> [&mut Block; N] {
     match registers.get_disjoint_mut(which.map(|register| register as usize)) {
-        Ok(blocks) => blocks,
+        Ok(blocks) => blocks.map(|Line(block)| block),
         Err(_) => unreachable!("an instruction reads the register that it writes"),
     }
 }
@@ -425,7 +425,7 @@ macro_rules! binary {
 fn step<S: pulp::Simd, T: DerefMut<Target = [f64]>>(
     simd: S,
     instruction: &Instruction,
-    registers: &mut [Block],
+    registers: &mut [Line<Block>],
     motion: Motion<'_>,
     start: usize,
     width: usize,
@@ -434,11 +434,11 @@ fn step<S: pulp::Simd, T: DerefMut<Target = [f64]>>(
     match *instruction {
         I::Load(r, variable) => {
             let source = samples(motion, variable, start, width);
-            let target = registers[r as usize].as_flattened_mut();
+            let target = registers[r as usize].0.as_flattened_mut();
             target[..width].copy_from_slice(source);
             target[width..].fill(source[width - 1]); // the tail of the last block repeats a real sample
         }
-        I::Fill(r, value) => registers[r as usize] = [[value; LANES]; GROUPS],
+        I::Fill(r, value) => registers[r as usize].0 = [[value; LANES]; GROUPS],
         I::Scale(r, a, c) => unary!(registers, r, a, |x| c * x),
         I::AddConstant(r, a, c) => unary!(registers, r, a, |x| x + c),
         I::Square(r, a) => unary!(registers, r, a, |x| x * x),
@@ -465,7 +465,11 @@ fn step<S: pulp::Simd, T: DerefMut<Target = [f64]>>(
             }
         }
         I::Store(a, slot) => {
-            outputs.store(slot, start, &registers[a as usize].as_flattened()[..width]);
+            outputs.store(
+                slot,
+                start,
+                &registers[a as usize].0.as_flattened()[..width],
+            );
         }
         I::StoreVariable(variable, slot) => {
             outputs.store(slot, start, samples(motion, variable, start, width));
