@@ -28,7 +28,7 @@ use twincal::term::{Family, Library, LibrarySettings, Scratch};
 
 /// Samples of one run, evaluated [`MAX_BLOCK`] at a time, as rows are streamed.
 const SAMPLES: usize = 64 * MAX_BLOCK;
-const REPEATS: usize = 20;
+const REPEATS: usize = 100;
 const ROBOTS: &str = include_str!("peers/robots.json");
 
 fn main() {

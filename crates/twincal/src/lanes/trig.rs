@@ -1,6 +1,6 @@
 //! Sine and cosine of eight samples at once.
 
-use super::{LANES, Lane, fuses};
+use super::{LANES, Lane, Line, fuses};
 
 /// Largest |x| of the vector path; larger and non-finite samples take the standard library's road, one by one.
 const VECTOR_LIMIT: f64 = 1.0e6;
@@ -66,19 +66,18 @@ pub fn sin_cos_fused<S: pulp::Simd>(_simd: S, x: &Lane) -> (Lane, Lane) {
 
 #[inline(always)]
 fn on_lanes(x: &Lane, reduced: impl Fn(f64) -> (f64, f64)) -> (Lane, Lane) {
-    let mut sin = [0.0; LANES];
-    let mut cos = [0.0; LANES];
+    let [mut sin, mut cos] = [Line([0.0; LANES]); 2];
     let mut inside = true;
     for lane in 0..LANES {
         inside &= x[lane].abs() <= VECTOR_LIMIT; // false for NaN
     }
     for lane in 0..LANES {
-        (sin[lane], cos[lane]) = reduced(x[lane]);
+        (sin.0[lane], cos.0[lane]) = reduced(x[lane]);
     }
     if !inside {
-        patch(x, &mut sin, &mut cos);
+        patch(x, &mut sin.0, &mut cos.0);
     }
-    (sin, cos)
+    (sin.0, cos.0)
 }
 
 /// The samples that the vector path cannot do.

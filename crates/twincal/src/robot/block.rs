@@ -5,7 +5,7 @@ use super::bodies::Body;
 use super::dynamics::Motion;
 use super::lane_vectors::{load, load_any, store};
 use super::recursion::State;
-use crate::lanes::{LANES, Lane, Line, sin_cos_fused};
+use crate::lanes::{LANES, Line, sin_cos_fused};
 use pulp::Simd;
 use std::any::Any;
 use std::ops::Range;
@@ -84,11 +84,11 @@ impl Angles {
             let row = body.coordinate * motion.len;
             let q = &motion.q[row + block.start..row + block.end];
             for (k, q) in q.chunks(LANES).enumerate() {
-                let mut angles: Lane = [0.0; LANES];
-                for (angle, q) in angles.iter_mut().zip(q) {
+                let mut angles = Line([0.0; LANES]);
+                for (angle, q) in angles.0.iter_mut().zip(q) {
                     *angle = body.multiplier * q + body.offset;
                 }
-                let (sine, cosine) = sin_cos_fused(s, &angles);
+                let (sine, cosine) = sin_cos_fused(s, &angles.0);
                 let group = k * LANES..(k + 1) * LANES;
                 self.sines[i].0[group.clone()].copy_from_slice(&sine);
                 self.cosines[i].0[group].copy_from_slice(&cosine);
@@ -100,12 +100,12 @@ impl Angles {
     #[inline(always)]
     fn fill_one<S: Simd>(&mut self, s: S, bodies: &[Body], motion: &Motion<'_>, sample: usize) {
         for (chunk, bodies) in bodies.chunks(LANES).enumerate() {
-            let mut angles: Lane = [0.0; LANES];
-            for (angle, body) in angles.iter_mut().zip(bodies) {
+            let mut angles = Line([0.0; LANES]);
+            for (angle, body) in angles.0.iter_mut().zip(bodies) {
                 let q = motion.q[body.coordinate * motion.len + sample];
                 *angle = body.multiplier * q + body.offset;
             }
-            let (sine, cosine) = sin_cos_fused(s, &angles);
+            let (sine, cosine) = sin_cos_fused(s, &angles.0);
             for (lane, body) in bodies.iter().enumerate() {
                 if !body.prismatic {
                     let i = chunk * LANES + lane;

@@ -453,13 +453,14 @@ impl WithSimd for Combine<'_, '_> {
             let cells = &mut cells[self.samples.clone()];
             let step = SIDE_BY_SIDE * S::F64_LANES;
             for (i, cells) in cells.chunks_mut(step).enumerate() {
-                let sum = combined(s, self.block, entries, i * SIDE_BY_SIDE);
                 let (whole, rest) = S::as_mut_simd_f64s(cells);
-                // All of them at once: sums that are picked by number are kept in memory.
+                let sum = || combined(s, self.block, entries, i * SIDE_BY_SIDE);
+                // Sums that are picked by number are kept in memory: those of whole steps are not.
                 if let Some(whole) = whole.first_chunk_mut() {
-                    *whole = sum;
+                    *whole = sum();
                     continue;
                 }
+                let sum = sum();
                 for (cells, sum) in whole.iter_mut().zip(sum) {
                     *cells = sum;
                 }
