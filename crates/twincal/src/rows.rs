@@ -73,7 +73,7 @@ pub struct RowBlock<'a> {
 }
 
 /// Most rows in one block.
-pub const MAX_BLOCK: usize = 256;
+pub const MAX_BLOCK: usize = 320;
 
 /// From one part to the next in a block of unfiltered rows: not so far that all are in the same places of the first-level cache.
 pub const PARTS_APART: usize = MAX_BLOCK + crate::lanes::LANES;
