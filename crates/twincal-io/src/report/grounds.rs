@@ -27,6 +27,7 @@ pub(super) const NAMED: usize = 3;
 
 pub(super) fn grounds(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
     let mut out = vec![torque_error(calibration, joints)];
+    out.extend(unfiltered(calibration, joints));
     // Where it got worse it is among what to mind.
     out.extend(at_standstill(calibration, joints).filter(|_| !rest_got_worse(calibration)));
     out.extend(friction_alone(calibration, joints));
@@ -58,7 +59,7 @@ pub(super) fn below_cutoff(calibration: &Calibration) -> String {
     }
 }
 
-/// RMSE before and after, of joints that move, for what the filter lets pass; beside it that of the torque as it was logged where that is another matter.
+/// RMSE before and after, of joints that move, for what the filter lets pass.
 fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
     let validation = &calibration.validation;
     let judged = decisive(validation);
@@ -82,16 +83,16 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
     };
     let unit = pooled_unit(joints);
     let told = change([judged.rmse_nominal, judged.rmse_calibrated], unit);
-    let logged = match below.is_empty() {
-        false => as_logged(calibration, unit),
-        true => None,
-    };
-    let logged = logged.unwrap_or_default();
-    format!("Torque error (RMSE){below} on {split}{which}: {told}{logged}.")
+    format!("Torque error (RMSE){below} on {split}{which}: {told}.")
 }
 
-/// "; as logged, unfiltered: 0.959 → 0.373 N·m, more than the torque's own standard deviation on Joint1 (137 %)", of the rows that the filtered error is of.
-fn as_logged(calibration: &Calibration, unit: &str) -> Option<String> {
+/// The same of torque as it was logged, of the same rows, where that is another matter: "Unfiltered, … : 0.959 → 0.373 N·m; there Joint1 has
+/// 0.467 left, 136 % of its torque's standard deviation."
+fn unfiltered(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
+    if below_cutoff(calibration).is_empty() {
+        return None;
+    }
+    let unit = pooled_unit(joints);
     let validation = &calibration.validation;
     let judged = decisive(validation);
     // Results of earlier versions do not have it; there rows at standstill are in it.
@@ -125,7 +126,7 @@ fn as_logged(calibration: &Calibration, unit: &str) -> Option<String> {
             false => format!("; there {}", list(&lost)),
         };
         format!(
-            "; as logged, unfiltered (noise of torque and motion included{ends}){which}: {} → {} {unit}{lost}",
+            "Unfiltered, as it was logged and as `twincal predict` gives it (noise of torque and motion included{ends}){which}: {} → {} {unit}{lost}.",
             number(raw.rmse_nominal, 3),
             number(raw.rmse_calibrated, 3)
         )
@@ -354,23 +355,18 @@ mod tests {
                 (raw.rmse_nominal, raw.rmse_calibrated) = (0.959, rmse);
                 (raw.joints[1].rmse_calibrated, raw.joints[1].torque_sd) = (0.4, sd);
             };
-            judged(change).grounds[0].clone()
+            judged(change).grounds
         };
         let told = of(0.373, 0.39, 5.0);
-        let said = "; as logged, unfiltered (noise of torque and motion included): 0.959 → 0.373 N·m; there elbow has 0.400 left, 102.6\u{202f}% of its torque's standard deviation.";
-        assert!(told.ends_with(said), "{told}");
-        assert!(
-            told.starts_with("Torque error (RMSE) below 5 Hz on"),
-            "{told}"
-        );
-        assert!(of(0.373, 0.41, 5.0).ends_with("0.959 → 0.373 N·m."));
-        assert!(!of(0.09, 0.41, 5.0).contains("as logged"));
+        let said = "Unfiltered, as it was logged and as `twincal predict` gives it (noise of torque and motion included): 0.959 → 0.373 N·m; there elbow has 0.400 left, 102.6\u{202f}% of its torque's standard deviation.";
+        assert_eq!(told[1], said);
+        assert!(told[0].starts_with("Torque error (RMSE) below 5 Hz on"));
+        assert!(of(0.373, 0.41, 5.0)[1].ends_with("0.959 → 0.373 N·m."));
+        let nothing_of_it = |told: &[String]| told.iter().all(|one| !one.contains("nfiltered"));
+        assert!(nothing_of_it(&of(0.09, 0.41, 5.0)));
         // Without a filter they are the same.
         let same = of(0.373, 0.39, 0.0);
-        assert!(
-            !same.contains("as logged") && !same.contains("below"),
-            "{same}"
-        );
+        assert!(nothing_of_it(&same) && !same[0].contains("below"));
     }
 
     #[test]

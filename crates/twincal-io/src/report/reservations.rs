@@ -57,9 +57,15 @@ pub(super) fn of_settings(calibration: &Calibration) -> Vec<String> {
         .filter(|component| !component.selected && !instead.contains(&component.name))
         .map(|component| component.name.clone())
         .collect();
-    if !added.is_empty() {
+    let which = sensitivity::priors_that_add(&added, calibration);
+    if !which.is_empty() {
+        let priors = match which.len() {
+            1 => "Another prior",
+            _ => "Other priors",
+        };
         out.push(format!(
-            "Another prior would add {}.",
+            "{priors} ({}) would add {}.",
+            which.join("; "),
             list(&first_of(added, NAMED))
         ));
     }
@@ -124,5 +130,31 @@ mod tests {
         assert_eq!(of_settings(&calibration), [said]);
         calibration.findings.clear();
         assert!(of_settings(&calibration).is_empty());
+    }
+
+    #[test]
+    fn priors_that_would_add_something_are_named() {
+        let told = |sensitivity: [f64; 5]| {
+            let mut calibration = fixture::two_joints();
+            calibration.findings.clear();
+            calibration.groups.clear();
+            let mut components = calibration.components.iter();
+            let own = components.find(|own| !own.selected && !own.is_unseen() && own.pip.is_some());
+            let own = own.expect("one that is not found").clone();
+            for term in &mut calibration.terms {
+                term.pip_sensitivity.clear();
+                if own.columns.contains(&term.term.name) {
+                    term.pip_sensitivity = sensitivity.to_vec();
+                }
+            }
+            (own.name, of_settings(&calibration))
+        };
+        let (name, one) = told([0.9, 0.1, 0.0, 0.1, 0.2]);
+        let said = "Another prior (the slab’s variance ten times smaller) would add";
+        assert_eq!(one, [format!("{said} {name}.")]);
+        let (_, two) = told([0.1, 0.1, 0.6, 0.1, 0.7]);
+        let said = "Other priors (the slab’s variance ten times larger; twice as many effects expected) would add";
+        assert_eq!(two, [format!("{said} {name}.")]);
+        assert!(told([0.1, 0.9, 0.1, 0.1, 0.1]).1.is_empty());
     }
 }

@@ -12,6 +12,14 @@ const ROW: f64 = 19.0;
 /// An effect is drawn if its probability reaches this under any of the priors.
 const LEAST: f64 = MENTIONED;
 
+/// The other priors, by their place in [`TermSummary::pip_sensitivity`].
+const OTHERS: [(usize, &str); 4] = [
+    (0, "the slab’s variance ten times smaller"),
+    (2, "the slab’s variance ten times larger"),
+    (3, "half as many effects expected"),
+    (4, "twice as many effects expected"),
+];
+
 /// The first live term of every component: a component is in or out with all its terms, which share its probabilities.
 pub(in crate::report) fn one_each(
     terms: &[TermSummary],
@@ -110,6 +118,30 @@ pub(in crate::report) fn instead_of(
         })
     };
     others.filter(takes_over).cloned().collect()
+}
+
+/// Under which of the priors any of these, which are not found, is likelier in than not.
+pub(in crate::report) fn priors_that_add(
+    names: &[String],
+    calibration: &Calibration,
+) -> Vec<&'static str> {
+    let components = calibration.components.iter();
+    let columns: Vec<&String> = components
+        .filter(|own| names.contains(&own.name))
+        .flat_map(|own| &own.columns)
+        .collect();
+    let own = calibration.terms.iter();
+    let own: Vec<&TermSummary> = own
+        .filter(|term| columns.contains(&&term.term.name))
+        .collect();
+    let adds = |prior: usize| {
+        let mut pips = own
+            .iter()
+            .filter_map(|term| term.pip_sensitivity.get(prior));
+        pips.any(|pip| *pip >= 0.5)
+    };
+    let named = OTHERS.iter().filter(|(prior, _)| adds(*prior));
+    named.map(|(_, words)| *words).collect()
 }
 
 struct Row<'a> {
