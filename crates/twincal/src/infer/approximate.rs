@@ -15,9 +15,6 @@ use std::collections::BTreeMap;
 const BUDGET: (usize, usize) = (64, 3000);
 /// That many times K² between the two.
 const WORK: usize = 1_000_000;
-/// Most models that a search starts from, and in how many components each differs from the others at most to be no start of its own.
-const STARTS: usize = 4;
-const NEAR: usize = 2;
 /// Share of the mass and most models in the list.
 const LISTED_MASS: f64 = 0.9999;
 const LISTED_MODELS: usize = 32;
@@ -79,18 +76,30 @@ pub(super) fn search(
 ) -> Found {
     let standard = &reduced.open;
     let active = &reduced.active;
-    let near = warm.filter(|warm| warm.component == standard.component);
-    let starts: Vec<Vec<usize>> = near.map_or_else(Vec::new, |warm| {
-        let sets = apart(warm, problem.prior.components());
-        let of = |holds: Vec<bool>| {
-            let own = active.iter().copied();
-            own.filter(|&b| holds[standard.blocks[b].component])
-                .collect()
-        };
-        let mut starts: Vec<Vec<usize>> = sets.into_iter().map(of).collect();
-        starts.dedup();
-        starts
-    });
+    let starts: Vec<Vec<usize>> = warm
+        .filter(|warm| warm.component == standard.component)
+        .map(|warm| {
+            let mut starts: Vec<Vec<usize>> = warm
+                .models
+                .iter()
+                .take(2)
+                .map(|model| {
+                    let mut holds = vec![false; problem.prior.components()];
+                    model
+                        .members
+                        .iter()
+                        .for_each(|&k| holds[standard.component[k as usize]] = true);
+                    active
+                        .iter()
+                        .copied()
+                        .filter(|&b| holds[standard.blocks[b].component])
+                        .collect()
+                })
+                .collect();
+            starts.dedup();
+            starts
+        })
+        .unwrap_or_default();
     search::run(
         reduced,
         &problem.prior,
@@ -100,28 +109,6 @@ pub(super) fn search(
             care,
         },
     )
-}
-
-/// Components of the heaviest listed model, and of the heaviest ones from which no flip and no exchange leads to those before: what
-/// is nearer the search finds by itself.
-fn apart(posterior: &Posterior, components: usize) -> Vec<Vec<bool>> {
-    let mut sets: Vec<Vec<bool>> = Vec::new();
-    for model in &posterior.models {
-        let mut holds = vec![false; components];
-        let members = model.members.iter();
-        members.for_each(|&k| holds[posterior.component[k as usize]] = true);
-        let far = |other: &Vec<bool>| {
-            let pairs = holds.iter().zip(other);
-            pairs.filter(|(a, b)| a != b).count() > NEAR
-        };
-        if sets.iter().all(far) {
-            sets.push(holds);
-        }
-        if sets.len() == STARTS {
-            break;
-        }
-    }
-    sets
 }
 
 /// (share of `total`, columns, positions) of the heaviest models found.

@@ -23,8 +23,6 @@ const NEGLIGIBLE_IN_LOOPS: f64 = -14.0;
 const EXCHANGED: f64 = -4.6;
 /// Nats that bounds cost a model from which on they are worth a closer look.
 const ACTING: f64 = 0.5;
-/// Nats from which bounds forbid a model.
-const FORBIDDEN: f64 = 10.0;
 /// Nats by which the guide may rate a model too high before that is said.
 const OVERRATED: f64 = 3.0;
 /// Share of the mass that may be missing.
@@ -224,9 +222,7 @@ impl Search<'_> {
         }
     }
 
-    /// Counts the given models and what a climb from each leads to; without any, climbs from the empty and the full one. A climb knows
-    /// no bounds: it may leave a heavy model for one that its bounds forbid, too light to be expanded. Then there is a second one, without
-    /// components that have bounds.
+    /// Climbs from the given models, or from the empty and the full one.
     #[inline(always)]
     fn begin<S: Simd>(&mut self, simd: S, warm: &[Vec<usize>]) {
         let words = self.walker.standard.blocks.len().div_ceil(64);
@@ -242,42 +238,15 @@ impl Search<'_> {
         let mut found: Vec<(f64, Set)> = Vec::new();
         for set in starts {
             self.go(simd, &set);
-            if !warm.is_empty() {
-                found.push((self.walker.log_weight(), set));
-            }
-            let start = self.set();
             climb(simd, &mut self.walker, self.active, self.exchanges);
             found.push((self.walker.log_weight(), self.set()));
-            let taken = present(&self.walker, self.reduced.shrinks());
-            if taken.log_mass(self.walker.standard) < -FORBIDDEN {
-                self.go(simd, &start);
-                let (free, standard) = (&self.free(), &self.reduced.open);
-                climb(
-                    simd,
-                    &mut self.walker,
-                    free,
-                    &exchanges(standard, free, true),
-                );
-                found.push((self.walker.log_weight(), self.set()));
-            }
         }
         found.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
-        found.dedup_by(|a, b| a.1 == b.1);
         self.sums.reference = f64::NEG_INFINITY;
         for (_, set) in found {
             self.go(simd, &set);
             self.add_present();
         }
-    }
-
-    /// Active components without bounds.
-    fn free(&self) -> Vec<usize> {
-        let standard = self.walker.standard;
-        let is_free = |block: &usize| {
-            let mut lower = standard.lower[standard.blocks[*block].range()].iter();
-            lower.all(|&lower| lower == f64::NEG_INFINITY)
-        };
-        self.active.iter().copied().filter(is_free).collect()
     }
 
     /// Counts the present model unless it is known.

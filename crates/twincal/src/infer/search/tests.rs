@@ -2,8 +2,8 @@
 
 use crate::infer::testing::{Densities, grouped, problem};
 use crate::infer::{approximate, exact};
-use crate::posterior::{Method, Problem};
-use crate::prior::{Inclusion, Prior};
+use crate::posterior::Method;
+use crate::prior::Inclusion;
 
 /// Hard problems: components nearly alike, all columns correlated by 0.99, weak effects everywhere.
 #[test]
@@ -72,54 +72,4 @@ fn a_warm_start_changes_nothing() {
     for k in 0..other.xy.len() {
         assert!((warm.inclusion[k] - again.inclusion[k]).abs() < 1e-5);
     }
-}
-
-/// y = −2 s + e. Column s is its best explanation; b, nearly the same with a cheaper slab, may not be negative; u + v + w, a multiple of
-/// s, are three columns that no exchange leads to. From s a climb that knows no bounds goes on to b, which the bound forbids.
-#[test]
-fn a_start_is_counted_that_a_climb_leaves_for_a_forbidden_model() {
-    let (s, b, parts, count) = (0, 1, [2, 3, 4], 31);
-    let third = 1.0 / 3.0_f64.sqrt();
-    let mut gram = vec![0.0; count * count];
-    let mut set = |i: usize, j: usize, value: f64| {
-        gram[i * count + j] = value;
-        gram[j * count + i] = value;
-    };
-    (0..count).for_each(|i| set(i, i, 1.0));
-    set(s, b, 0.9999);
-    parts.iter().for_each(|&k| set(s, k, third));
-    parts.iter().for_each(|&k| set(b, k, 0.9999 * third));
-    let mut xy = vec![0.0; count];
-    (xy[s], xy[b]) = (-2.0, -2.0 * 0.9999);
-    parts.iter().for_each(|&k| xy[k] = -2.0 * third);
-    let mut slab = vec![1e22; count];
-    slab[b] = 1e20;
-    parts.iter().for_each(|&k| slab[k] = 1e8);
-    let inclusion = Inclusion::Probability(0.5);
-    let mut prior = Prior::single(slab, vec![0; count], inclusion, (0.01, 1e-6));
-    prior.lower[b] = 0.0;
-    let problem = Problem {
-        gram,
-        xy,
-        yy: 5.0,
-        n: 1000.0,
-        log_constant: 0.0,
-        prior,
-        names: (0..count).map(|k| k.to_string()).collect(),
-    };
-    let cold = approximate(&problem, None).unwrap();
-    // s costs ½ ln 1e22 nats, the three parts 3/2 ln 1e8.
-    let parts_alone = 1.0 / (1.0 + 10.0_f64);
-    let mut near = cold.clone();
-    let known = |members: Vec<usize>| {
-        let mut model = cold.models[0].clone();
-        model.members = members.iter().map(|&k| k as u32).collect();
-        model
-    };
-    near.models = vec![known(vec![s]), known(parts.to_vec())];
-    let warm = approximate(&problem, Some(&near)).unwrap();
-    let off = (1.0 - warm.inclusion[s] - parts_alone).abs();
-    assert!(off < 1e-2, "{}", warm.inclusion[s]);
-    // Without a start there is nothing of the other explanation.
-    assert!(cold.inclusion[s] > 0.9, "{}", cold.inclusion[s]);
 }
