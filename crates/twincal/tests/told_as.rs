@@ -40,7 +40,7 @@ fn names(calibration: &Calibration) -> Vec<String> {
     let grouped = groups.filter(|group| group.members.contains(&own));
     let mut names: Vec<String> = grouped.flat_map(|group| group.members.clone()).collect();
     let component = calibration.components.iter().find(|c| c.name == own);
-    names.extend(component.expect("a tensor").told_as.clone());
+    names.extend(component.expect("a tensor").names_beside().to_vec());
     names.retain(|name| *name != own);
     names.sort();
     names.dedup();

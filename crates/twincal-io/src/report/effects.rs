@@ -124,7 +124,7 @@ pub(super) fn sort(calibration: &Calibration) -> Effects {
     let mut alike: Vec<&String> = likely.flat_map(|group| &group.members).collect();
     alike.extend(sensitivity::by_prior(calibration).map(|component| &component.name));
     let found = calibration.components.iter().filter(|c| c.selected);
-    alike.extend(found.flat_map(|component| &component.told_as));
+    alike.extend(found.flat_map(|component| component.names_beside()));
     let is_alike = |c: &ComponentSummary| c.is_unseen() || alike.contains(&&c.name);
     let rivals = pick(&|c, p| unlikely(c, p) && is_alike(c));
     let absent = pick(&|c, p| unlikely(c, p) && !is_alike(c));

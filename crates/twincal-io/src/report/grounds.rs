@@ -86,7 +86,7 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
     format!("Torque error (RMSE){below} on {split}{which}: {told}.")
 }
 
-/// The same of torque as it was logged, of the same rows, where that is another matter: "Unfiltered, … : 0.959 → 0.373 N·m; there Joint1 has
+/// The same of torque as it was logged, of moving joints as well, where that is another matter: "Unfiltered, … : 0.959 → 0.373 N·m; there Joint1 has
 /// 0.467 left, 136 % of its torque's standard deviation."
 fn unfiltered(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
     if below_cutoff(calibration).is_empty() {

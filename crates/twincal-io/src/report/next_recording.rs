@@ -41,7 +41,7 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
     }
     if let Some((together, logs)) = driven_together(calibration) {
         holds.push(format!(
-            "with all joints driven at once, as in {} of these {logs} logs",
+            "with no joint at rest or hardly driven, as in {} of these {logs} logs",
             match together {
                 0 => "none".to_owned(),
                 n => format!("only {n}"),
@@ -96,18 +96,29 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
     }
 }
 
-/// In how many of the fitted logs, and of how many, no joint stands still or is hardly driven; `None` where these are half of them or more.
+/// In how many of the fitted logs, and of how many, no joint stands still or is hardly driven that another one drives; `None` where these
+/// are half of them or more, with a single log, and with a single joint.
 fn driven_together(calibration: &Calibration) -> Option<(usize, usize)> {
-    let fitted = calibration.logs.iter().filter(|log| log.role == "fit");
-    let passive = |log: &str| {
+    let logs = calibration.logs.iter().filter(|log| log.role == "fit");
+    let logs: Vec<&str> = logs.map(|log| log.name.as_str()).collect();
+    let passive = |log: &str, joint: &str| {
         let mut findings = calibration.findings.iter();
         findings.any(|f| {
-            matches!(&f.code[..], "joint_not_driven" | "joint_stands_still") && f.subject == log
+            matches!(&f.code[..], "joint_not_driven" | "joint_stands_still")
+                && f.subject == log
+                && f.message.contains(&format!("`{joint}`"))
         })
     };
-    let (alone, together): (Vec<_>, Vec<_>) = fitted.partition(|log| passive(&log.name));
-    let (together, all) = (together.len(), alone.len() + together.len());
-    (all > 1 && 2 * together < all).then_some((together, all))
+    let all = calibration.twin.robot.joint_names();
+    let driven: Vec<&str> = (all.iter().copied())
+        .filter(|joint| logs.iter().any(|log| !passive(log, joint)))
+        .collect();
+    let together = logs
+        .iter()
+        .filter(|log| !driven.iter().any(|joint| passive(log, joint)))
+        .count();
+    (driven.len() > 1 && logs.len() > 1 && 2 * together < logs.len())
+        .then_some((together, logs.len()))
 }
 
 #[cfg(test)]
@@ -168,7 +179,7 @@ mod tests {
         });
         let said = "one to fit with these, with the encoder’s full resolution.";
         assert_eq!(encoder.as_deref(), Some(said));
-        let passive = |passive: usize| {
+        let passive = |joints: [&str; 4]| {
             of(&|c| {
                 let one = c.logs[0].clone();
                 let log = |name: &str| LogSummary {
@@ -178,19 +189,23 @@ mod tests {
                 };
                 c.logs = ["a", "b", "c", "d"].map(log).to_vec();
                 let codes = ["joint_not_driven", "joint_stands_still"];
-                for (log, code) in c.logs.iter().zip(codes.into_iter().cycle()).take(passive) {
-                    c.findings
-                        .push(Finding::new(Severity::Note, code, log.name.as_str(), "", 1));
+                let logs = c.logs.iter().zip(codes.into_iter().cycle());
+                for ((log, code), joint) in logs.zip(joints) {
+                    let words = format!("joint `{joint}` …");
+                    let own = Finding::new(Severity::Note, code, log.name.as_str(), words, 1);
+                    c.findings.extend((!joint.is_empty()).then_some(own));
                 }
             })
         };
-        let said =
-            "one to fit with these, with all joints driven at once, as in only 1 of these 4 logs.";
-        assert_eq!(passive(3).as_deref(), Some(said));
-        let said =
-            "one to fit with these, with all joints driven at once, as in none of these 4 logs.";
-        assert_eq!(passive(4).as_deref(), Some(said));
-        assert_eq!(passive(2), None);
+        let said = "one to fit with these, with no joint at rest or hardly driven, as in only 1 of these 4 logs.";
+        let three = passive(["elbow", "shoulder", "elbow", ""]);
+        assert_eq!(three.as_deref(), Some(said));
+        let none = said.replace("only 1", "none");
+        let four = passive(["elbow", "shoulder", "elbow", "shoulder"]);
+        assert_eq!(four, Some(none));
+        assert_eq!(passive(["elbow", "elbow", "", ""]), None);
+        // Parked in all of them it is not missed.
+        assert_eq!(passive(["elbow"; 4]), None);
         let group = |alike| Group {
             members: vec!["elbow.spring".into(), "elbow.offset".into()],
             pip: 1.0,

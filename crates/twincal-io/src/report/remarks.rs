@@ -187,11 +187,11 @@ fn rivals(component: &ComponentSummary, calibration: &Calibration) -> Option<Str
             let mut all = calibration.groups.iter();
             let Some(settled) = all.find(|group| own(&group.members)) else {
                 // Others have its torque together, and the prior prefers the one that does it alone.
-                let spanned = component.selected && !component.told_as.is_empty();
+                let spanned = component.selected && !component.names_beside().is_empty();
                 return spanned.then(|| {
                     format!(
                         "its torque is also that of {} in every motion; the prior prefers {}",
-                        others(&component.told_as),
+                        others(component.names_beside()),
                         component.name
                     )
                 });
@@ -270,7 +270,7 @@ mod tests {
             calibration.repeatability.clear();
             calibration.groups.clear();
             let mut own = calibration.components[0].clone();
-            own.told_as = aliases.iter().map(|&name| name.to_owned()).collect();
+            own.told_as = Some(aliases.iter().map(|&name| name.to_owned()).collect());
             own.selected = selected;
             doubts(&own, &calibration)
         };

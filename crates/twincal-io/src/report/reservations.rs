@@ -53,20 +53,32 @@ pub(super) fn of_settings(calibration: &Calibration) -> Vec<String> {
     let instead: Vec<String> = found
         .flat_map(|own| sensitivity::instead_of(own, calibration))
         .collect();
-    let added: Vec<String> = sensitivity::by_prior(calibration)
+    let added: Vec<(String, Vec<&str>)> = sensitivity::by_prior(calibration)
         .filter(|component| !component.selected && !instead.contains(&component.name))
-        .map(|component| component.name.clone())
+        .map(|own| {
+            (
+                own.name.clone(),
+                sensitivity::priors_that_hold(own, calibration),
+            )
+        })
+        .filter(|(_, priors)| !priors.is_empty())
         .collect();
-    let which = sensitivity::priors_that_add(&added, calibration);
-    if !which.is_empty() {
+    if !added.is_empty() {
+        let mut which: Vec<&str> = Vec::new();
+        for prior in added.iter().flat_map(|(_, priors)| priors) {
+            if !which.contains(prior) {
+                which.push(prior);
+            }
+        }
         let priors = match which.len() {
             1 => "Another prior",
             _ => "Other priors",
         };
+        let names = added.into_iter().map(|(name, _)| name).collect();
         out.push(format!(
             "{priors} ({}) would add {}.",
             which.join("; "),
-            list(&first_of(added, NAMED))
+            list(&first_of(names, NAMED))
         ));
     }
     // Findings have those first that move most.
@@ -153,7 +165,8 @@ mod tests {
         let said = "Another prior (the slab’s variance ten times smaller) would add";
         assert_eq!(one, [format!("{said} {name}.")]);
         let (_, two) = told([0.1, 0.1, 0.6, 0.1, 0.7]);
-        let said = "Other priors (the slab’s variance ten times larger; twice as many effects expected) would add";
+        let said =
+            "Other priors (the slab’s variance ten times larger; more effects expected) would add";
         assert_eq!(two, [format!("{said} {name}.")]);
         assert!(told([0.1, 0.9, 0.1, 0.1, 0.1]).1.is_empty());
     }

@@ -248,7 +248,7 @@ mod tests {
                 own.verdict = Some(Verdict::Undecided);
             }
             if index == 5 {
-                own.told_as = vec!["other".into()];
+                own.told_as = Some(vec!["other".into()]);
             }
         });
         assert_eq!(

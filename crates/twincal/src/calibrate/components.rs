@@ -88,7 +88,7 @@ fn summary(
         selected: false,
         verdict: None,
         alias_of: component.alias_of.clone(),
-        told_as: Vec::new(),
+        told_as: None,
         no_rigid_body: false,
         rigid_share: None,
         words: String::new(),

@@ -40,7 +40,7 @@ const TOLD: usize = 6;
 /// the prior is sure which one it is; the set is `settled` then.
 ///
 /// No component stands for another where a coefficient of its b would have to be below its bound by more than two standard
-/// deviations: a motor's inertia, which is never negative, is no name for a tensor that is.
+/// deviations: a motor's inertia, which is never negative, is no name for a tensor that is. Both may still be in one set by way of a third.
 pub(super) fn groups(problem: &Problem, posterior: &Posterior, library: &Library) -> Vec<Group> {
     let all = Candidates::new(problem, posterior, library);
     let count = all.columns.len();
@@ -56,9 +56,9 @@ pub(super) fn groups(problem: &Problem, posterior: &Posterior, library: &Library
     for a in 0..count {
         for b in 0..a {
             let unsure = all.unsure(a) && all.unsure(b);
-            let alike = || all.alike(a, b) || all.correlation(a, b) < EXCLUSIVE;
-            let forbidden = || all.is_forbidden(a, &[b]) || all.is_forbidden(b, &[a]);
-            if unsure && alike() && !forbidden() {
+            // Where models hold either, both have coefficients that they can have.
+            let alike = || all.alike(a, b) && !all.forbid(a, b);
+            if unsure && (alike() || all.correlation(a, b) < EXCLUSIVE) {
                 join(a, b, all.is_alias(a, b) || all.is_alias(b, a));
             }
         }
@@ -99,9 +99,9 @@ pub(super) fn told_as(
     problem: &Problem,
     posterior: &Posterior,
     library: &Library,
-) -> Vec<Vec<String>> {
+) -> Vec<Option<Vec<String>>> {
     let all = Candidates::new(problem, posterior, library);
-    let mut told = vec![Vec::new(); library.components().len()];
+    let mut told = vec![None; library.components().len()];
     let outer = (0..all.columns.len()).filter(|&k| !all.is_inner(k));
     for own in outer.filter(|&k| all.pip[k] >= 0.5) {
         let component = &library.components()[all.component[own]];
@@ -110,7 +110,8 @@ pub(super) fn told_as(
             let other = others.find(|&k| all.name(k) == *name);
             other.is_none_or(|other| !all.is_forbidden(own, &[other]))
         };
-        told[all.component[own]] = component.alias_of.iter().filter(may).cloned().collect();
+        let names = component.alias_of.iter().filter(may).cloned();
+        told[all.component[own]] = Some(names.collect());
     }
     told
 }
@@ -248,6 +249,11 @@ impl<'a> Candidates<'a> {
         all.any(|(&k, (mean, sd))| *mean < bound(k) - BELOW * sd)
     }
 
+    /// The same for either of two in the place of the other.
+    fn forbid(&self, a: usize, b: usize) -> bool {
+        self.is_forbidden(a, &[b]) || self.is_forbidden(b, &[a])
+    }
+
     fn columns_of(&self, components: &[usize]) -> Vec<usize> {
         let columns = components.iter().flat_map(|&k| &self.columns[k]);
         columns.copied().collect()
@@ -277,12 +283,32 @@ impl<'a> Candidates<'a> {
         factor.solve_lower(&mut mean);
         let explained: f64 = mean.iter().map(|x| x * x).sum();
         factor.solve_upper(&mut mean);
+        // Beside the noise what is open of β, at most: as if all of it went the same way.
+        let mut open = vec![0.0; columns.len()];
+        for &i in own {
+            let mut share: Vec<f64> = columns.iter().map(|&k| self.gram(k, i)).collect();
+            factor.solve(&mut share);
+            let spread = self.spread(i);
+            let shares = open.iter_mut().zip(&share);
+            shares.for_each(|(open, share)| *open += spread * share.abs());
+        }
         let variances = factor.inverse_diagonal();
+        let pairs = variances.iter().zip(&open);
         Some(Instead {
             loss: 0.5 * (energy - explained).max(0.0) / noise,
             mean,
-            sd: variances.iter().map(|v| (noise * v).sqrt()).collect(),
+            sd: pairs
+                .map(|(v, open)| (noise * v + open * open).sqrt())
+                .collect(),
         })
+    }
+
+    /// Standard deviation of a column's coefficient given that it is in.
+    fn spread(&self, column: usize) -> f64 {
+        let (mean, sd) = (self.posterior.mean[column], self.posterior.sd[column]);
+        let inside = self.posterior.inclusion[column];
+        let square = (sd * sd + mean * mean) / inside - (mean / inside).powi(2);
+        square.max(0.0).sqrt()
     }
 
     fn group(&self, members: &[usize], every_motion: bool) -> Option<Group> {
@@ -317,9 +343,9 @@ impl<'a> Candidates<'a> {
             || every_motion
                 && pairs.all(|(a, b)| {
                     let [left, right] = [a, b].map(|k| self.name(k));
-                    left == right
-                        || aliases(a).iter().any(|n| n == right)
-                        || aliases(b).iter().any(|n| n == left)
+                    let alias = aliases(a).iter().any(|n| n == right)
+                        || aliases(b).iter().any(|n| n == left);
+                    left == right || alias && !self.forbid(a, b)
                 });
         let words = words(&told, pip, (alike, whole), settled);
         let names = told.into_iter().map(str::to_owned).collect();
@@ -363,10 +389,12 @@ impl Calibration {
             let spanned = self.components.iter().filter(|own| {
                 alike == Alike::EveryMotion
                     && own.selected
-                    && !own.told_as.is_empty()
+                    && !own.names_beside().is_empty()
                     && !in_a_group(&own.name)
             });
-            told.extend(spanned.map(|own| format!("{} or {}", own.name, own.told_as.join(" + "))));
+            told.extend(
+                spanned.map(|own| format!("{} or {}", own.name, own.names_beside().join(" + "))),
+            );
             (!told.is_empty()).then(|| {
                 format!(
                     "told as either {place}, which the prior alone decides (the first is preferred): {}",

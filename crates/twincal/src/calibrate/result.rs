@@ -70,9 +70,9 @@ pub struct ComponentSummary {
     /// Components that no motion of this robot can tell from it.
     pub alias_of: Vec<String>,
     /// Those of `alias_of` that can have what was found of it: a motor's inertia, which is never negative, is no name for a tensor that
-    /// is. Only of what is likelier in than not.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub told_as: Vec<String>,
+    /// is. `None` for what is not likelier in than not, and in results of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub told_as: Option<Vec<String>>,
     /// True where no rigid body has what was found of its link, whatever else is in: torque is right, the numbers are no mass or inertia.
     #[serde(default)]
     pub no_rigid_body: bool,
@@ -177,6 +177,12 @@ impl ComponentSummary {
     #[must_use]
     pub fn is_unseen(&self) -> bool {
         !self.selected && self.verdict == Some(Verdict::NotSeen)
+    }
+
+    /// What else may be meant by it in every motion: [`told_as`](Self::told_as), or all of [`alias_of`](Self::alias_of) where that is not known.
+    #[must_use]
+    pub fn names_beside(&self) -> &[String] {
+        self.told_as.as_deref().unwrap_or(&self.alias_of)
     }
 }
 

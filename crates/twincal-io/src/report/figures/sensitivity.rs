@@ -16,8 +16,8 @@ const LEAST: f64 = MENTIONED;
 const OTHERS: [(usize, &str); 4] = [
     (0, "the slab’s variance ten times smaller"),
     (2, "the slab’s variance ten times larger"),
-    (3, "half as many effects expected"),
-    (4, "twice as many effects expected"),
+    (3, "fewer effects expected"),
+    (4, "more effects expected"),
 ];
 
 /// The first live term of every component: a component is in or out with all its terms, which share its probabilities.
@@ -120,27 +120,18 @@ pub(in crate::report) fn instead_of(
     others.filter(takes_over).cloned().collect()
 }
 
-/// Under which of the priors any of these, which are not found, is likelier in than not.
-pub(in crate::report) fn priors_that_add(
-    names: &[String],
+/// Under which of the other priors an effect is likelier in than not.
+pub(in crate::report) fn priors_that_hold(
+    component: &ComponentSummary,
     calibration: &Calibration,
 ) -> Vec<&'static str> {
-    let components = calibration.components.iter();
-    let columns: Vec<&String> = components
-        .filter(|own| names.contains(&own.name))
-        .flat_map(|own| &own.columns)
-        .collect();
-    let own = calibration.terms.iter();
-    let own: Vec<&TermSummary> = own
-        .filter(|term| columns.contains(&&term.term.name))
-        .collect();
-    let adds = |prior: usize| {
-        let mut pips = own
-            .iter()
-            .filter_map(|term| term.pip_sensitivity.get(prior));
-        pips.any(|pip| *pip >= 0.5)
+    let mut terms = one_each(&calibration.terms);
+    let own = terms.find(|term| component.columns.contains(&term.term.name));
+    let holds = |prior: usize| {
+        let pip = own.and_then(|term| term.pip_sensitivity.get(prior));
+        pip.is_some_and(|pip| *pip >= 0.5)
     };
-    let named = OTHERS.iter().filter(|(prior, _)| adds(*prior));
+    let named = OTHERS.iter().filter(|(prior, _)| holds(*prior));
     named.map(|(_, words)| *words).collect()
 }
 
