@@ -172,9 +172,7 @@ fn hardly_driven(names: &[String], calibration: &Calibration) -> &'static str {
     let own = findings.any(|f| {
         f.code == "joint_not_driven"
             && held_out(&f.subject)
-            && names
-                .iter()
-                .any(|name| f.message.contains(&format!("`{name}`")))
+            && names.iter().any(|name| findings::is_about(f, name))
     });
     match own {
         true => "; it is hardly driven in the held-out log",

@@ -1,6 +1,7 @@
 //! The recording to make next: what it has to hold so that this data's open questions get an answer.
 
 use super::beyond;
+use super::findings::is_about;
 use super::grounds::NAMED;
 use super::limits::FEW;
 use super::standing::of_halves;
@@ -106,7 +107,7 @@ fn driven_together(calibration: &Calibration) -> Option<(usize, usize)> {
         findings.any(|f| {
             matches!(&f.code[..], "joint_not_driven" | "joint_stands_still")
                 && f.subject == log
-                && f.message.contains(&format!("`{joint}`"))
+                && is_about(f, joint)
         })
     };
     let all = calibration.twin.robot.joint_names();

@@ -11,7 +11,7 @@ use crate::lanes::{Aligned, LANES};
 use pulp::Simd;
 
 /// Samples per block: enough that what a tile costs once does not count, few enough that a tile's columns and their differences stay in
-/// the first-level cache (two thirds of 32 KiB) while others come by, and a block's signals of all joints in the second (256 instead: 2 % slower).
+/// the first-level cache (25 of 32 KiB) while others come by, and a block's signals of all joints in the second (256 instead: 2 % slower).
 pub(super) const BLOCK: usize = 320;
 
 /// A column's samples.
