@@ -217,11 +217,11 @@ fn yes() -> bool {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// PIP ≥ 0.5, beyond Monte Carlo error.
+    /// PIP ≥ 0.8 and three Monte Carlo standard errors or more above 0.5.
     Found,
-    /// PIP < 0.5, beyond Monte Carlo error.
+    /// PIP < 0.2 and three Monte Carlo standard errors or more below 0.5.
     Absent,
-    /// Between 0.2 and 0.8, or within 3 Monte Carlo standard errors of 0.5.
+    /// PIP between, or within three Monte Carlo standard errors of 0.5.
     Undecided,
     /// The data leave the coefficient as wide as the prior (posterior sd > 0.9 prior sd).
     NotSeen,

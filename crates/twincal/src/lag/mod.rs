@@ -84,6 +84,13 @@ impl LogLag {
         let [lag, sd] = self.common?;
         (lag.abs() - self.interval > CLEARLY * sd).then_some(lag)
     }
+
+    /// The common lag where it is certainly there and longer than half a sample, but not clearly longer than one.
+    pub fn slight(&self) -> Option<f64> {
+        let [lag, sd] = self.common?;
+        let there = lag.abs() > CLEARLY * sd && lag.abs() > 0.5 * self.interval;
+        (there && self.clear().is_none()).then_some(lag)
+    }
 }
 
 /// Estimates the lag of a log, joint by joint; `None` without torque or for logs that are too short.
@@ -130,12 +137,15 @@ pub fn estimate_lag(robot: &Robot, pipeline: &Pipeline, trajectory: &Trajectory)
 }
 
 /// One finding per log whose torque is clearly off by more than a sample: degraded (exit code 3) unless the user has said
-/// what the lag is, or most of the logs, which are all moved alike, do not say the same.
+/// what the lag is, or most of the logs, which are all moved alike, do not say the same. A lag that is there and not
+/// clearly longer than a sample is a note, unless the user has said what it is.
 pub fn lag_findings(pipeline: &Pipeline, lags: &[LogLag]) -> Vec<Finding> {
     let said = pipeline.corrections.lag != Lag::Unsaid;
     lags.iter()
         .filter_map(|log| {
-            let (lag, [_, sd]) = (log.clear()?, log.common?);
+            let (Some(lag), [_, sd]) = (log.clear(), log.common?) else {
+                return slight_lag(log).filter(|_| !said);
+            };
             let order = if lag > 0.0 { "after" } else { "before" };
             let speak = log.joints.iter().filter(|joint| joint.speaks).count();
             let same = |other: &&LogLag| other.clear().is_some_and(|own| own * lag > 0.0);
@@ -169,6 +179,25 @@ pub fn lag_findings(pipeline: &Pipeline, lags: &[LogLag]) -> Vec<Finding> {
             ))
         })
         .collect()
+}
+
+/// The note on a lag that is there and not clearly longer than a sample.
+fn slight_lag(log: &LogLag) -> Option<Finding> {
+    let (lag, [_, sd]) = (log.slight()?, log.common?);
+    let order = if lag > 0.0 { "after" } else { "before" };
+    Some(Finding::new(
+        Severity::Note,
+        "torque_lag",
+        &log.log,
+        format!(
+            "torque comes {:.2} ± {:.2} ms ({:.2} samples) {order} the motion, not for certain more than one sample: nothing has to \
+             be done; [signal] lag = {lag:.4} takes it out, worth keeping if it predicts held-out torque better",
+            1e3 * lag.abs(),
+            1e3 * sd,
+            lag.abs() / log.interval,
+        ),
+        0,
+    ))
 }
 
 /// A run of samples whose torque is known `margin` samples further on either side.

@@ -55,6 +55,24 @@ fn case_17_a_planted_lag_comes_back_in_parts_of_a_sample() {
     }
 }
 
+/// One sample late, known to parts of it: there, and not longer than a sample by three standard deviations.
+#[test]
+fn a_lag_of_a_sample_is_a_note_until_the_lag_is_said() {
+    for lag in [1.0, -1.0] {
+        let found = estimate_lag(&arm(1.0), &pipeline(), &late(0.0, lag)).unwrap();
+        assert!(found.clear().is_none() && found.slight().is_some());
+        let note = &lag_findings(&pipeline(), std::slice::from_ref(&found))[0];
+        let order = if lag > 0.0 { "after" } else { "before" };
+        assert_eq!(note.severity, Severity::Note);
+        assert!(note.message.contains(order), "{}", note.message);
+        let mut said = pipeline();
+        said.corrections.lag = Lag::All(0.0);
+        assert_eq!(lag_findings(&said, &[found]), []);
+    }
+    let none = estimate_lag(&arm(1.0), &pipeline(), &late(0.0, 0.3)).unwrap();
+    assert_eq!(lag_findings(&pipeline(), &[none]), []);
+}
+
 #[test]
 fn a_lag_that_was_said_is_no_degraded_data() {
     let found = estimate_lag(&arm(1.0), &pipeline(), &late(0.0, 4.0)).unwrap();

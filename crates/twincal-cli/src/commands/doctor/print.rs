@@ -137,7 +137,7 @@ fn print_log(log: &LogRow, terminal: &mut Terminal) {
                     if mean < 0.0 { "before" } else { "after" }
                 );
                 match lag.clear() {
-                    None if mean.abs() > 3.0 * sd => format!(
+                    None if lag.slight().is_some() => format!(
                         "{told}: not for certain more than one sample, so that nothing has to be done; [signal] lag = {mean:.4} takes it out"
                     ),
                     None => format!("{told}: {}", no_clear_lag(lag)),
@@ -150,7 +150,7 @@ fn print_log(log: &LogRow, terminal: &mut Terminal) {
     }
 }
 
-/// What follows from a lag that is no more than three of its errors: nothing; and why it is so loose.
+/// What follows from a lag that is short or no more than three of its errors: nothing; and why it is so loose.
 fn no_clear_lag(lag: &LogLag) -> String {
     let sure = lag.joints.iter().filter(|joint| {
         let clear = |sd: f64| joint.lag.abs() > 3.0 * sd;
@@ -165,6 +165,8 @@ fn no_clear_lag(lag: &LogLag) -> String {
             1e3 * ends[0],
             1e3 * ends[1]
         )
+    } else if lag.common.is_some_and(|[mean, sd]| mean.abs() > 3.0 * sd) {
+        "less than half a sample, so that nothing has to be done".into()
     } else {
         "no more than its error, so that nothing has to be done".into()
     }
