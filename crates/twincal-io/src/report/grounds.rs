@@ -65,10 +65,10 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
     let judged = decisive(validation);
     let split = match validation.split {
         Split::HeldoutLogs => "held-out logs",
-        Split::LeaveOneLogOut => "logs left out one at a time, by fits without them",
+        Split::LeaveOneLogOut => "logs left out one at a time, by fits of the others",
         Split::LastThirty => match calibration.logs.len() {
-            1 => "the last 30 % of the log, by a fit without them",
-            _ => "the last 30 % of each log, by a fit without them",
+            1 => "the last 30 % of the log, by a fit of the rest",
+            _ => "the last 30 % of each log, by a fit of the rest",
         },
     };
     let below = below_cutoff(calibration);
@@ -307,7 +307,7 @@ mod tests {
         let verdict = |still: [[f64; 2]; 2]| judged(|c| with_standstill(c, still));
         let of = |still: [[f64; 2]; 2]| verdict(still).grounds;
         let both = of([[1.0, 0.25], [1.0, 9.0]]);
-        let moving = "below 10 Hz on logs left out one at a time, by fits without them; joints that move: 2.00 → 0.500 N·m, 75.0\u{202f}% less.";
+        let moving = "below 10 Hz on logs left out one at a time, by fits of the others; joints that move: 2.00 → 0.500 N·m, 75.0\u{202f}% less.";
         assert!(both[0].ends_with(moving), "{both:?}");
         // The mean squares are 1 before and 4.625 after.
         let still = "At standstill: 1.00 → 2.15 N·m, 115.1\u{202f}% more; worse on elbow (1.00 → 3.00 N·m).";

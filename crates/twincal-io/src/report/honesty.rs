@@ -5,7 +5,7 @@ use super::tables::{Table, with_unit};
 use super::text::{count, number, percent, probability};
 use super::verdict::plus_minus;
 use super::view::{Joint, pooled_unit};
-use twincal::calibrate::{Calibration, Halves};
+use twincal::calibrate::{Calibration, Halves, Verdict};
 use twincal::validate::Validation;
 
 /// Coverage at four levels and shape of the predictions per joint; no rows without held-out rows.
@@ -82,7 +82,7 @@ const WORTH_A_GUARANTEE: f64 = 0.9;
 /// What is guaranteed without believing the model, in one sentence.
 pub(super) fn guarantee(validation: &Validation) -> String {
     let Some(conformal) = &validation.conformal else {
-        return "No guarantee without believing the model: that needs whole held-out logs (--heldout, or three logs or more)."
+        return "No guarantee without believing the model: that needs whole held-out logs (--heldout); three logs or more, left out one at a time, give about the same, not guaranteed."
             .into();
     };
     let each: Vec<String> = conformal
@@ -128,7 +128,7 @@ pub fn stretched(factor: f64) -> &'static str {
     }
 }
 
-/// Every coefficient of the compact twin on the two halves of the data.
+/// Every coefficient of the compact twin that these data see, on the two halves of them.
 pub(super) fn repeats(calibration: &Calibration) -> Table {
     let mut table = Table::new([
         "coefficient",
@@ -140,15 +140,16 @@ pub(super) fn repeats(calibration: &Calibration) -> Table {
         "probability in each half",
     ]);
     for repeat in &calibration.repeatability {
+        let own = (calibration.terms.iter()).find(|t| t.term.name == repeat.term);
+        // All that is told of it elsewhere is that these data do not see it.
+        if own.is_some_and(|own| own.verdict == Some(Verdict::NotSeen)) {
+            continue;
+        }
         let words = repeat.repeated().words();
         let words = match repeat.z {
             None => words.to_owned(),
             Some(z) => format!("{words} ({})", apart(z.abs())),
         };
-        let own = calibration
-            .terms
-            .iter()
-            .find(|t| t.term.name == repeat.term);
         let mut compact = calibration
             .compact
             .iter()

@@ -18,10 +18,16 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
     let open = found.filter(|own| of_halves(own, calibration) == Repeated::InNeitherHalf);
     if let open @ 1.. = open.count() {
         let fitted = calibration.logs.iter().filter(|log| log.role == "fit");
-        let seconds: f64 = fitted.map(|log| log.duration).sum();
+        let (logs, seconds) = fitted.fold((0, 0.0), |(logs, seconds), log| {
+            (logs + 1, seconds + log.duration)
+        });
         holds.push(format!(
-            "at least {} s long, as these logs are: {} in all of the data only, in neither half of it",
+            "at least {} s long, as {} ({} in all of the data only, in neither half of it)",
             number(seconds, 3),
+            match logs {
+                1 => "this log is",
+                _ => "these logs are together",
+            },
             match open {
                 1 => "one effect shows".to_owned(),
                 n => format!("{n} effects show"),
@@ -155,7 +161,7 @@ mod tests {
         });
         let halves = halves.unwrap();
         assert!(
-            halves.starts_with("one to fit with these, at least 180 s long, as these logs are: one effect shows in all of the data only"),
+            halves.starts_with("one to fit with these, at least 180 s long, as these logs are together (one effect shows in all of the data only, in neither half of it)"),
             "{halves}"
         );
         let joint = of(&|c| {

@@ -67,16 +67,31 @@ pub(super) fn escape(text: &str) -> String {
 /// [`escape`]d text with places for line breaks after `_` and `.` before a letter: names break there or nowhere, and
 /// only words of more than `whole` letters.
 ///
-/// What stands between two backticks is code.
+/// What stands between two backticks is code; a flag is not broken at its hyphens.
 pub(super) fn breakable(text: &str, whole: usize) -> String {
     let text = clean(text);
     let parts: Vec<&str> = text.split('`').collect();
     if parts.len().is_multiple_of(2) {
-        return breaking(&text, whole);
+        return prose(&text, whole);
     }
     let tagged = parts.iter().enumerate().map(|(n, part)| match n % 2 {
-        0 => breaking(part, whole),
+        0 => prose(part, whole),
         _ => format!("<code>{}</code>", breaking(part, whole)),
+    });
+    tagged.collect()
+}
+
+/// What is no code.
+fn prose(text: &str, whole: usize) -> String {
+    let words = text.split_inclusive(char::is_whitespace);
+    let tagged = words.map(|word| match flag(word) {
+        None => breaking(word, whole),
+        Some((before, flag, after)) => format!(
+            "{}<code class=\"flag\">{}</code>{}",
+            escape(before),
+            escape(flag),
+            escape(after)
+        ),
     });
     tagged.collect()
 }
@@ -106,6 +121,15 @@ fn breaking(text: &str, whole: usize) -> String {
         out.push_str(&escape(&word[rest..]));
     }
     out
+}
+
+/// "(--heldout, " as "(", "--heldout" and ", ".
+fn flag(word: &str) -> Option<(&str, &str, &str)> {
+    let rest = word.trim_start_matches('(');
+    let is_flag = rest.starts_with("--") && rest[2..].starts_with(char::is_alphabetic);
+    let end = rest.find(|letter: char| letter != '-' && !letter.is_alphanumeric());
+    let (flag, after) = rest.split_at(end.unwrap_or(rest.len()));
+    is_flag.then(|| (&word[..word.len() - rest.len()], flag, after))
 }
 
 /// `text` cut to about `width` pixels at `size` pixels per em, with an ellipsis in the middle (names differ at their ends).
@@ -334,6 +358,10 @@ mod tests {
             "shoulder_<wbr/>pan.&lt;b&gt; 0.25 q_1.<wbr/>viscous: end."
         );
         assert_eq!(breakable("é_ü_", 0), "é_<wbr/>ü_");
+        assert_eq!(
+            breakable("logs (--held-out, or `--rate HZ`) -- no -3", 0),
+            "logs (<code class=\"flag\">--held-out</code>, or <code>--rate HZ</code>) -- no -3"
+        );
         assert_eq!(
             breakable("of elbow_joint and left_elbow_joint", 11),
             "of elbow_joint and left_<wbr/>elbow_<wbr/>joint"

@@ -190,8 +190,8 @@ fn slight_lag(log: &LogLag) -> Option<Finding> {
         "torque_lag",
         &log.log,
         format!(
-            "torque comes {:.2} ± {:.2} ms ({:.2} samples) {order} the motion, not for certain more than one sample: nothing has to \
-             be done; [signal] lag = {lag:.4} takes it out, worth keeping if it predicts held-out torque better",
+            "torque comes {:.2} ± {:.2} ms ({:.2} samples) {order} the motion, not for certain more than one sample, so that it is \
+             left as it is: try [signal] lag = {lag:.4}, and keep it if it predicts held-out torque better",
             1e3 * lag.abs(),
             1e3 * sd,
             lag.abs() / log.interval,

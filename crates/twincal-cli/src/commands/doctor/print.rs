@@ -138,7 +138,7 @@ fn print_log(log: &LogRow, terminal: &mut Terminal) {
                 );
                 match lag.clear() {
                     None if lag.slight().is_some() => format!(
-                        "{told}: not for certain more than one sample, so that nothing has to be done; [signal] lag = {mean:.4} takes it out"
+                        "{told}: not for certain more than one sample, so that fit leaves it as it is: try [signal] lag = {mean:.4}, and keep it if it predicts held-out torque better"
                     ),
                     None => format!("{told}: {}", no_clear_lag(lag)),
                     Some(_) => told,

@@ -31,6 +31,7 @@ pub(in crate::report) fn figure(pit: &[f64], independent_rows: f64) -> Option<Fi
         "predicted probability of a smaller torque",
         "share of rows (%)",
     );
+    panel.band(&mut svg, "still", &[(0.0, low, high), (1.0, low, high)]);
     for (i, share) in shares.iter().enumerate() {
         let corner = panel.at(i as f64 * flat, 100.0 * share);
         let opposite = panel.at((i + 1) as f64 * flat, 0.0);
@@ -47,12 +48,10 @@ pub(in crate::report) fn figure(pit: &[f64], independent_rows: f64) -> Option<Fi
             Some(&hint),
         );
     }
-    panel.band(&mut svg, "still", &[(0.0, low, high), (1.0, low, high)]);
-    svg.line(
-        "half",
-        panel.at(0.0, 100.0 * flat),
-        panel.at(1.0, 100.0 * flat),
-    );
+    // Over the bars its ends alone: a band would turn the colour of what stands below it.
+    for (class, height) in [("a", low), ("a", high), ("half", 100.0 * flat)] {
+        svg.line(class, panel.at(0.0, height), panel.at(1.0, height));
+    }
     let label = format!(
         "Histogram of {} probability integral transform values in {bins} bins.",
         count(pit.len() as u64)
