@@ -143,6 +143,31 @@ fn a_load_in_every_log_is_told_of_the_payload_and_not_of_its_link() {
     }
 }
 
+/// An empty log beside one with an unknown load decides which of the two it is: neither can be told as the other.
+#[test]
+fn a_load_in_one_of_two_logs_is_not_told_as_its_link() {
+    let families = [Family::Payload, Family::MassMoments, Family::Viscous];
+    let of = |empty: Payload| {
+        let logs = [
+            log("loaded", 0.3, 0.6, 0.0, Payload::Unknown),
+            log(
+                "empty",
+                1.1,
+                if empty == Payload::None { 0.0 } else { 0.6 },
+                0.0,
+                empty,
+            ),
+        ];
+        let heldout = log("held-out", 1.9, 0.6, 0.0, Payload::Unknown);
+        let result = calibrated(&logs, heldout, &families);
+        is(&result, "payload", 0.6);
+        let mut groups = result.groups.iter();
+        groups.any(|group| group.members.contains(&"payload".to_owned()))
+    };
+    assert!(!of(Payload::None));
+    assert!(of(Payload::Unknown));
+}
+
 /// On one joint mass at a distance and a tensor turn alike: then they are in or out together, and on two they are not.
 #[test]
 fn a_payload_of_one_joint_is_one() {

@@ -53,6 +53,8 @@ pub(super) struct Data {
     pub(super) findings: Vec<Finding>,
     /// See [`carry_something`].
     unknown: bool,
+    /// See [`tell_payload_apart`].
+    pub(super) payload_apart: bool,
 }
 
 impl Data {
@@ -83,6 +85,7 @@ impl Data {
             heldout,
             findings,
             unknown: reader.unknown,
+            payload_apart: in_some_only(logs.iter().map(ReadyLog::payload)),
         };
         let trajectories = Trajectories {
             fit: of_fit,
@@ -336,8 +339,12 @@ pub(super) fn carry_something(mut payloads: impl Iterator<Item = Payload>) -> bo
 
 /// True if the payload acts in some of the fit logs and not in others, which tells it from the link that carries it.
 pub(super) fn tell_payload_apart(logs: &[signal::Log<'_>]) -> bool {
-    let unknown = |log: &signal::Log<'_>| log.payload() == Payload::Unknown;
-    logs.iter().any(unknown) && !logs.iter().all(unknown)
+    in_some_only(logs.iter().map(|log| log.payload()))
+}
+
+fn in_some_only(payloads: impl Iterator<Item = Payload> + Clone) -> bool {
+    let unknown = |payload: Payload| payload == Payload::Unknown;
+    payloads.clone().any(unknown) && !payloads.clone().all(unknown)
 }
 
 /// Raw rows of a log that a standard deviation is measured on, and the times that they cover, s.

@@ -87,12 +87,14 @@ pub(super) fn summarise(
         &fit.posterior,
         &conditional,
     ));
-    let mut components = components(library, &fit.posterior, &terms, settings.inference.seed);
-    let told = told_as(&fit.problem, &fit.posterior, library);
+    let apart = data.payload_apart.then(|| library.with_payload_apart());
+    let told_apart = apart.as_ref().unwrap_or(library);
+    let mut components = components(told_apart, &fit.posterior, &terms, settings.inference.seed);
+    let told = told_as(&fit.problem, &fit.posterior, told_apart);
     for (component, told_as) in components.iter_mut().zip(told) {
         component.told_as = told_as;
     }
-    let groups = groups(&fit.problem, &fit.posterior, library);
+    let groups = groups(&fit.problem, &fit.posterior, told_apart);
     let names = names(library, columns);
     let is_forced = |(_, forced): &(&String, &bool)| **forced;
     let mut sure: Vec<String> = (names.iter().zip(&columns.forced))

@@ -30,6 +30,8 @@ const THOUSANDTH: f64 = 1e-3;
 const LIKE_A_THOUSAND: f64 = 0.4;
 /// Largest torque over the effort limit where torque is in thousandths of N·m: a drive uses between a fiftieth of its limit and all.
 const THOUSANDTHS: RangeInclusive<f64> = 20.0..=1500.0;
+/// The same where it is another unit or side, whichever: a drive's peak is two or three times what it may do for long.
+const BEYOND: f64 = 5.0;
 /// Independent samples below which a factor is not told: a second of motion looks like one of its five columns by chance.
 const LEAST_INDEPENDENT: f64 = 90.0;
 /// Share of torque that may be left where a factor is believed.
@@ -214,10 +216,14 @@ fn scales(robot: &Robot, sample: &Sample, explained: &[Option<Explained>]) -> Ve
                 Some([largest, limit]) => (
                     format!(
                         "torque reaches {largest:.0}, {:.0} times the effort limit of the model ({limit}), where other joints stay within \
-                         theirs: looks like N·mm for N·m",
-                        largest / limit
+                         theirs: looks like {}",
+                        largest / limit,
+                        match THOUSANDTHS.contains(&(largest / limit)) {
+                            true => "N·mm for N·m",
+                            false => "another unit or side (a current, counts, the motor's side)",
+                        }
                     ),
-                    Some(THOUSANDTH),
+                    (THOUSANDTHS.contains(&(largest / limit))).then_some(THOUSANDTH),
                 ),
                 None => continue,
             },
@@ -311,14 +317,14 @@ fn efforts(robot: &Robot, sample: &Sample) -> Vec<Option<[f64; 2]>> {
     (0..robot.dof()).map(of_joint).collect()
 }
 
-/// Largest torque and limit of a joint that is beyond what its drive can do by the factor that thousandths of N·m are. A model's
-/// limits may be made up: most of the others have to keep theirs.
+/// Largest torque and limit of a joint that is clearly beyond what its drive can do. A model's limits may be made up: most of the
+/// others have to keep theirs.
 fn beyond_effort(efforts: &[Option<[f64; 2]>], joint: usize) -> Option<[f64; 2]> {
     let others = efforts.iter().enumerate();
     let others = others.filter_map(|(other, effort)| effort.filter(|_| other != joint));
     let kept = others.filter(|other| used(*other) <= 1.0).count();
     let own = efforts[joint]?;
-    (2 * kept > efforts.len() && THOUSANDTHS.contains(&used(own))).then_some(own)
+    (2 * kept > efforts.len() && used(own) > BEYOND).then_some(own)
 }
 
 /// True where all joints are, by limits that are of each joint.

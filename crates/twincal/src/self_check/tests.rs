@@ -206,6 +206,17 @@ fn case_20_torque_far_beyond_the_models_effort_limit_is_in_another_unit() {
     };
     let robot = limited([100.0, 100.0, 100.0, 10.0]);
     assert_eq!(of(&robot, 1.0).findings, []);
+    // 5.3 N·m at most: three times the limit is a drive's peak, eighteen times is none.
+    assert_eq!(of(&robot, 6.0).findings, []);
+    let seen = of(&robot, 33.0);
+    assert_eq!(seen.findings.len(), 1, "{:#?}", seen.findings);
+    let message = &seen.findings[0].message;
+    assert!(message.contains("another unit or side"), "{message}");
+    assert!(
+        seen.joints
+            .iter()
+            .all(|joint| joint.torque_factor.is_none())
+    );
     let seen = of(&robot, 1000.0);
     assert_eq!(seen.findings.len(), 1, "{:#?}", seen.findings);
     let said = &seen.findings[0];

@@ -10,6 +10,7 @@ use super::expression::{Graph, Id, Slot, Tape, Variable, bounded_values};
 use super::model_column::{ModelColumn, ModelColumns};
 use super::overlaps;
 use super::parts::{self, Parts, Torque};
+use super::payload::NAME as PAYLOAD;
 use super::propose::{About, payload_mount, proposals};
 use super::recipes::Recipes;
 use super::sentence::{Estimate, sentence};
@@ -174,6 +175,18 @@ impl Library {
             component.alias_of = names;
         }
         Ok((library, findings))
+    }
+
+    /// As if motion told the payload from the link that carries it: where it acts in some of the logs alone.
+    pub(crate) fn with_payload_apart(&self) -> Self {
+        let mut apart = self.clone();
+        for component in &mut apart.components {
+            if component.name == PAYLOAD {
+                component.alias_of.clear();
+            }
+            component.alias_of.retain(|name| name != PAYLOAD);
+        }
+        apart
     }
 
     /// Numbers the columns and compiles their torque.

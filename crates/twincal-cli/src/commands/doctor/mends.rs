@@ -329,7 +329,8 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
                         "twincal.toml: [columns.factor] tau = {number} (twincal init writes it)"
                     )
                 }
-                Some((None, Some(gain))) => {
+                // Of all joints together no one joint's number speaks.
+                Some((None, Some(gain))) if !finding.subject.is_empty() => {
                     let number = 1.0 / gain;
                     format!(
                         "{}; here about {{ {joint} = {number:.2e} }}",
