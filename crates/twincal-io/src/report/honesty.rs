@@ -263,6 +263,20 @@ mod tests {
     }
 
     #[test]
+    fn a_number_that_these_data_do_not_see_is_not_compared() {
+        let mut calibration = fixture::two_joints();
+        let name = calibration.repeatability[0].term.clone();
+        let has = |calibration: &Calibration| {
+            let rows = repeats(calibration).rows;
+            rows.iter().any(|row| row[0] == name)
+        };
+        assert!(has(&calibration));
+        let term = calibration.terms.iter_mut().find(|t| t.term.name == name);
+        term.unwrap().verdict = Some(Verdict::NotSeen);
+        assert!(!has(&calibration));
+    }
+
+    #[test]
     fn a_guarantee_is_only_promised_with_held_out_logs() {
         let mut validation = fixture::two_joints().validation;
         assert!(guarantee(&validation).contains("not guaranteed"));

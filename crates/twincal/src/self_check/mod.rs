@@ -213,18 +213,19 @@ fn scales(robot: &Robot, sample: &Sample, explained: &[Option<Explained>]) -> Ve
             ),
             Some(_) => continue,
             None => match beyond_effort(&efforts, joint) {
-                Some([largest, limit]) => (
-                    format!(
-                        "torque reaches {largest:.0}, {:.0} times the effort limit of the model ({limit}), where other joints stay within \
+                Some([largest, limit]) => {
+                    let times = used([largest, limit]);
+                    let thousandths = THOUSANDTHS.contains(&times);
+                    let problem = format!(
+                        "torque reaches {largest:.0}, {times:.0} times the effort limit of the model ({limit}), where other joints stay within \
                          theirs: looks like {}",
-                        largest / limit,
-                        match THOUSANDTHS.contains(&(largest / limit)) {
+                        match thousandths {
                             true => "N·mm for N·m",
                             false => "another unit or side (a current, counts, the motor's side)",
                         }
-                    ),
-                    (THOUSANDTHS.contains(&(largest / limit))).then_some(THOUSANDTH),
-                ),
+                    );
+                    (problem, thousandths.then_some(THOUSANDTH))
+                }
                 None => continue,
             },
         };
