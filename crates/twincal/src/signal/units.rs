@@ -16,11 +16,14 @@ const ALIKE: f64 = 0.8;
 const HALF: usize = 3;
 /// How far beyond its stated range a joint must move to be in degrees for sure.
 const BEYOND: f64 = 3.0;
+/// Samples in a row that must reach an angle: fewer are a glitch and say nothing of a unit.
+const SUSTAINED: usize = 5;
 
 /// Refuses a log whose angles or angular velocities are in degrees.
 ///
 /// Told by a logged velocity that is 57.3 times larger or smaller than the change of position, and by a joint that moves
-/// through more than a turn and more than 3 times its stated range, all of which fits the range as degrees.
+/// through more than a turn and more than 3 times its stated range, all of which fits the range as degrees. What fewer than five samples
+/// in a row reach is no motion.
 ///
 /// # Errors
 /// [`Error::Log`] with the joint, the numbers and the remedy.
@@ -66,7 +69,7 @@ fn refuse_joint(facts: &JointFacts, channels: &Channels, log: &Recording) -> Res
             );
         }
     }
-    let (Some(range), [low, high]) = (facts.range, extremes(&channels.q)) else {
+    let (Some(range), [low, high]) = (facts.range, reached(&channels.q)) else {
         return Ok(());
     };
     let travel = high - low;
@@ -102,11 +105,13 @@ fn velocity_ratio(time: &[f64], channels: &Channels) -> Option<f64> {
     (explained > ALIKE).then(|| dv / dd)
 }
 
-/// Smallest and largest finite value.
-fn extremes(values: &[f64]) -> [f64; 2] {
-    let finite = values.iter().filter(|v| v.is_finite());
-    finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| {
-        [l.min(*v), h.max(*v)]
+/// Smallest and largest value that [`SUSTAINED`] finite samples in a row reach; low above high where there are fewer.
+fn reached(values: &[f64]) -> [f64; 2] {
+    let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    finite.windows(SUSTAINED).fold(none, |[low, high], run| {
+        let [least, most] = run.iter().fold(none, |[l, h], v| [l.min(*v), h.max(*v)]);
+        [low.min(most), high.max(least)]
     })
 }
 
@@ -115,6 +120,17 @@ mod tests {
     use super::*;
 
     fn said(kind: JointKind, range: Option<f64>, q: f64, qd: Option<f64>) -> String {
+        said_of(kind, range, q, qd, 0)
+    }
+
+    /// With that many samples of the position, from the 100th on, at 50.
+    fn said_of(
+        kind: JointKind,
+        range: Option<f64>,
+        q: f64,
+        qd: Option<f64>,
+        wrong: usize,
+    ) -> String {
         let facts = JointFacts {
             name: "elbow".into(),
             kind,
@@ -122,7 +138,7 @@ mod tests {
             effort: None,
         };
         let time: Vec<f64> = (0..400).map(|i| f64::from(i) * 0.01).collect();
-        let log = Recording {
+        let mut log = Recording {
             unfolded: false,
             name: "run".into(),
             joints: vec![Channels {
@@ -135,6 +151,7 @@ mod tests {
             time,
             payload: crate::signal::Payload::None,
         };
+        log.joints[0].q[100..100 + wrong].fill(50.0);
         refuse_degrees(&[facts], &log).map_or_else(|e| e.to_string(), |()| String::new())
     }
 
@@ -145,7 +162,8 @@ mod tests {
         assert!(
             turning(None, 57.3, Some(1.0)).contains("it is in degrees; export positions in rad")
         );
-        assert!(turning(Some(3.0), 80.0, Some(80.0)).contains("moves from -80.0 to 80.0"));
+        // five samples about the peak: 80 cos 0.04
+        assert!(turning(Some(3.0), 80.0, Some(80.0)).contains("moves from -79.9 to 79.9"));
         assert!(turning(Some(3.0), 80.0, None).contains("these are degrees"));
         for good in [
             turning(Some(3.0), 1.2, Some(1.2)),
@@ -161,5 +179,15 @@ mod tests {
         ] {
             assert_eq!(good, "");
         }
+    }
+
+    #[test]
+    fn case_18_a_glitch_is_no_unit_and_hides_none() {
+        let of = |q: f64, wrong: usize| said_of(JointKind::Revolute, Some(3.0), q, None, wrong);
+        assert_eq!(of(1.2, 1), "");
+        assert_eq!(of(1.2, 4), "");
+        assert!(of(1.2, 5).contains("these are degrees"));
+        let hidden = of(80.0, 1);
+        assert!(hidden.contains("moves from -79.9 to 79.9"), "{hidden}");
     }
 }
