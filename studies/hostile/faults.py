@@ -20,6 +20,7 @@ class Fault:
     apply: object  # function of (study, rng)
     codes: tuple = ()  # of findings; one of them must be there
     subject: str = "any"  # what the finding must name: "log", "joint" or anything
+    error: str = ""  # pattern of an error that names it as well, where the program refuses the log
     world: dict = None
     recorder: dict = None
 
@@ -330,26 +331,29 @@ def same_programme(study, rng):
 
 
 COPY = ("copied_log", "heldout_copy")
+LAG = ("torque_lag",)
+REPEATED = ("repeated_samples",)
+CONTACT = ("contact", "torque_spike")
 FAULTS = {
     "none": Fault("good logs", nothing),
     "same_programme": Fault("good logs of one programme", same_programme),
-    "copy_exact": Fault("held-out log is a training log", copy_exact, COPY, "log"),
+    "copy_exact": Fault("held-out log is a training log", copy_exact, COPY, "log", "fitted and held out"),
     "copy_shifted": Fault("the same, 0.3 s cut, clock + 1000 s", copy_shifted, COPY, "log"),
     "copy_cut": Fault("the middle 60 % of a training log", copy_cut, COPY, "log"),
     "copy_rounded": Fault("q to 1e-4 rad, torque to 0.01 N·m", copy_rounded, COPY, "log"),
     "copy_noisy": Fault("+ half the log's own torque noise", copy_noisy, COPY, "log"),
-    "copy_fitted": Fault("a training log twice, 0.3 s cut", copy_fitted, COPY, "log"),
-    "joint_degrees": Fault("one joint, all logs", joint_degrees, ("degrees",), "joint"),
+    "copy_fitted": Fault("a training log twice, 0.3 s cut", copy_fitted, COPY, "log", "given twice|same recording"),
+    "joint_degrees": Fault("one joint, all logs", joint_degrees, ("degrees",), "joint", "degrees"),
     "torque_other_column": Fault("one joint has its neighbour's torque", torque_other_column, ("torque_copied",), "joint"),
-    "torque_constant": Fault("one joint, all logs", torque_constant, ("torque_constant",), "joint"),
+    "torque_constant": Fault("one joint, all logs", torque_constant, ("constant_torque",), "joint"),
     "torque_held": Fault("one joint, one log, new every 200 ms", torque_held, ("torque_held",), "joint"),
     "turned_one_log": Fault("all joints of one log", in_one_log(turned), ("sign_flip",), "log"),
     "turned_one_joint": Fault("one joint, all logs", in_one_joint(turned), ("sign_flip",), "joint"),
     "scaled_one_log": Fault("× 1.2, all joints of one log", in_one_log(scaled(1.2)), ("torque_scale",), "log"),
     "scaled_one_joint": Fault("× 1.3, one joint, all logs", in_one_joint(scaled(1.3)), ("torque_scale",), "joint"),
-    "late_one_log": Fault("60 ms, all joints of one log", in_one_log(late(0.06)), ("lag",), "log"),
-    "late_one_joint": Fault("60 ms, one joint, all logs", in_one_joint(late(0.06)), ("lag",), "joint"),
-    "late_all": Fault("40 ms, all joints, all logs", in_all(late(0.04)), ("lag",)),
+    "late_one_log": Fault("60 ms, all joints of one log", in_one_log(late(0.06)), LAG, "log"),
+    "late_one_joint": Fault("60 ms, one joint, all logs", in_one_joint(late(0.06)), LAG, "joint"),
+    "late_all": Fault("40 ms, all joints, all logs", in_all(late(0.04)), LAG),
     "torque_drift": Fault("0.1 % over 60 s, all logs", in_all(drifting(0.001)), ("clock_drift",), recorder={"seconds": 60.0}),
     "less_model": Fault("measured minus model", in_all(less_model), ("model_torque",)),
     "less_gravity": Fault("gravity-compensated", in_all(less_gravity), ("gravity_compensated",)),
@@ -357,18 +361,19 @@ FAULTS = {
     "slow_clock": Fault("stamps × 1.1, all logs", slow_clock(1.1), ("clock_scale",)),
     "upside_down": Fault("base turned by 180° about x", nothing, ("base_orientation",), world={"base_rpy": (np.pi, 0.0, 0.0)}),
     "on_the_wall": Fault("base turned by 90° about y", nothing, ("base_orientation",), world={"base_rpy": (0.0, np.pi / 2, 0.0)}),
-    "zero_moved": Fault("0.1 rad, one joint, mid of one log", zero_moved(0.1), ("encoder_reset", "zero_moved"), "joint"),
+    "zero_moved": Fault("0.1 rad, one joint, mid of one log", zero_moved(0.1), ("position_step", "encoder_reset", "zero_moved"), "joint"),
     "encoder_stuck": Fault("1 s, one joint, one log", encoder_stuck(1.0), ("encoder_stuck",), "joint"),
     "other_friction": Fault("held-out log: friction × 1.5", heldout_of(friction_factor=1.5), ("another_state",), "log"),
     "other_payload": Fault("held-out log: payload 1.5 → 3 kg", heldout_of(payload=3.0), ("another_state",), "log"),
-    "polled": Fault("1 kHz, 6 % repeated, stamps 0.7–1.8 ms", polled_stream, ("repeated_samples",), recorder={"rate": 1000}),
-    "repeated_q": Fault("1 % of rows, q alone", repeated_rows(0.01, "q"), ("repeated_samples",)),
-    "repeated_all": Fault("1 % of rows, all columns", repeated_rows(0.01, "all"), ("repeated_samples",)),
-    "contact": Fault("0.3 s, 5 × Coulomb, one joint, one log", contact(0.3, 5.0), ("contact",), "joint"),
-    "pushed_by_hand": Fault("3 s, 6 N·m, every log", pushed_by_hand, ("contact",), "log"),
+    "polled": Fault("1 kHz, 6 % repeated, stamps 0.7–1.8 ms", polled_stream, REPEATED, recorder={"rate": 1000}),
+    "repeated_q": Fault("1 % of rows, q alone", repeated_rows(0.01, "q"), REPEATED),
+    "repeated_all": Fault("1 % of rows, all columns", repeated_rows(0.01, "all"), REPEATED),
+    "contact": Fault("0.3 s, 5 × Coulomb, one joint, one log", contact(0.3, 5.0), CONTACT, "joint"),
+    "pushed_by_hand": Fault("3 s, 6 N·m, every log", pushed_by_hand, CONTACT, "log"),
 }
-# Mistakes that are told and mended: the answer may be "Yes" beside their finding.
-MENDED = ("polled", "repeated_q", "repeated_all", "contact", "late_all", "same_programme", "none")
+# Mistakes that are repaired and said: the answer may be "Yes" beside their finding.
+REPAIRED = ("polled", "repeated_q", "repeated_all", "contact", "pushed_by_hand", "late_all")
+GOOD = ("none", "same_programme")
 
 
 def faulty_study(name, world=World(), recorder=Recorder(), count=2):

@@ -1,0 +1,224 @@
+"""How many plausible mistakes does `twincal fit` find, and how many wrong logs get a "Yes"?
+
+    python mistakes.py [--program twincal] [--seeds 1] [--first-seed 1] [--only joint_degrees,copy_noisy] [--good 20] [--keep runs.jsonl]
+
+Every mistake of `faults.py` on three robots x three motions x seeds; the seed also chooses friction and recorder. Good studies are all
+robots, motions and frictions in turn. Printed as Markdown, per mistake:
+
+    found      the share of runs with a finding of the mistake's codes on the right log or joint (or an error that names it)
+    "Yes"      runs whose answer begins with "Yes" though a mistake stands that is not repaired: must be 0
+    error ×    median of held-out error over that of the same study without the mistake
+
+and for good studies findings of these codes per 100 (severity note left out). `--keep` stores every run and goes on from there.
+"""
+
+import argparse
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections import defaultdict
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from faults import FAULTS, GOOD, REPAIRED, faulty_study
+from simulate import FRICTIONS, MOTIONS, ROBOTS, Arm, Recorder, World, write_study
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAM = Path(os.environ.get("TWINCAL", ROOT / "target/release/twincal"))
+LIMIT = 120.0  # s, for one fit
+
+
+@dataclass
+class Run:
+    """What one fit said."""
+
+    fault: str
+    robot: str
+    motion: str
+    seed: int
+    code: int  # exit code; -1: out of time
+    headline: str
+    error: str
+    findings: list  # of result.json
+    rmse: list  # held-out, joint by joint, of moving rows
+    seconds: float
+    log: str  # where the mistake is
+    joint: str
+    heldout: str = "heldout.csv"
+
+    @property
+    def key(self):
+        return (self.fault, self.robot, self.motion, self.seed)
+
+
+def world_of(robot, motion, seed):
+    """World and recorder of a cell: friction, rate and encoder go round with the seed."""
+    turn = seed + ROBOTS.index(robot) + MOTIONS.index(motion)
+    world = World(robot, motion, FRICTIONS[turn % 3], law=("quintic", "trapezoid")[turn % 2], seed=seed)
+    recorder = Recorder(rate=(250, 125, 500)[turn % 3], counts=2 ** (17 + turn % 4), at_rest=("silent", "dither")[turn // 2 % 2])
+    return world, recorder
+
+
+def headline(text):
+    """The answer to "Can this twin be used?" on the terminal."""
+    lines = text.splitlines()
+    for k, line in enumerate(lines):
+        if line.strip() == "Can this twin be used?":
+            return " ".join(part.strip() for part in lines[k + 1 : k + 3])
+    return ""
+
+
+def fit(program, folder):
+    """Runs `twincal fit` in a folder; exit code, terminal, errors, result.json or None, seconds."""
+    began = time.monotonic()
+    command = [str(program), "fit", "--config", "twincal.toml", "-o", "out", "--force"]
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=LIMIT)
+    except subprocess.TimeoutExpired:
+        return -1, "", "out of time", None, LIMIT
+    path = folder / "out" / "result.json"
+    result = json.loads(path.read_text()) if done.returncode in (0, 3) and path.exists() else None
+    return done.returncode, done.stdout, done.stderr, result, time.monotonic() - began
+
+
+def one(program, fault, robot, motion, seed):
+    """Simulates and fits one study."""
+    world, recorder = world_of(robot, motion, seed)
+    study = faulty_study(fault, world, recorder)
+    with tempfile.TemporaryDirectory() as name:
+        folder = write_study(Path(name), study)
+        code, out, error, result, seconds = fit(program, folder)
+    joint = study.truth.get("joint")
+    scores = (result or {}).get("validation") or {}
+    rmse = [row.get("rmse_calibrated") for row in (scores.get("moving") or scores).get("joints") or []]
+    findings = (result or {}).get("findings") or []
+    return Run(fault, robot, motion, seed, code, headline(out), "" if result else error[max(error.find("error:"), 0) :].strip()[:2000], findings, rmse, round(seconds, 2),
+               study.truth.get("log") or "", "" if joint is None else Arm(world).names[joint])  # fmt: skip
+
+
+def names_it(run, text):
+    """Whether a text names what `faults.py` wants named: the log, the joint, or nothing in particular."""
+    wanted = {"log": run.log, "joint": run.joint, "any": ""}[FAULTS[run.fault].subject]
+    return wanted.removesuffix(".csv") in text
+
+
+def found(run):
+    """The mistake is named: a finding of its codes (not a mere note) on the right log or joint, or an error that says so."""
+    fault = FAULTS[run.fault]
+    for finding in run.findings:
+        if finding["code"] in fault.codes and names_it(run, f"{finding['subject']} {finding['message']}"):
+            return True
+    return bool(run.error and fault.error and re.search(fault.error, run.error) and names_it(run, run.error))
+
+
+def said_yes(run):
+    """The answer begins with "Yes"."""
+    return run.headline.startswith("Yes")
+
+
+def alarms(run):
+    """Findings of a good study that a mistake's table has, notes left out; an error counts as well."""
+    codes = {code for fault in FAULTS.values() for code in fault.codes}
+    said = [f["code"] for f in run.findings if f["code"] in codes and f["severity"] != "note"]
+    return said + (["error"] if run.error else [])
+
+
+def worse(run, good):
+    """Held-out error over that of the good study, over all joints; None where one of them is missing."""
+    clean = good.get(("none", *run.key[1:]))
+    if clean is None or not clean.rmse or not run.rmse or None in run.rmse:
+        return None
+    return float(np.exp(np.mean(np.log(np.array(run.rmse) / np.array(clean.rmse)))))
+
+
+def read_kept(path):
+    """Runs that a file has from before."""
+    if path is None or not path.exists():
+        return {}
+    rows = [Run(**json.loads(line)) for line in path.read_text().splitlines() if line.strip()]
+    return {row.key: row for row in rows}
+
+
+def wanted_runs(given):
+    """Keys of the runs asked for: mistakes, their good counterparts, more good studies."""
+    only = given.only.split(",") if given.only else list(FAULTS)
+    seeds = range(given.first_seed, given.first_seed + given.seeds)
+    cells = [(robot, motion, seed) for seed in seeds for robot in ROBOTS for motion in MOTIONS]
+    cells = [cell for cell in cells if given.robot in cell[0] and given.motion in cell[1]]
+    keys = [(fault, *cell) for cell in cells for fault in (["none"] if given.clean else []) + [f for f in only if f not in GOOD]]
+    turns = [(robot, motion, 500 + given.first_seed + k // 9) for k, (robot, motion) in
+             enumerate([(r, m) for r in ROBOTS for m in MOTIONS] * (given.good // 9 + 1))][: given.good]  # fmt: skip
+    return keys + [(("none", "same_programme")[k % 4 == 3], *cell) for k, cell in enumerate(turns)]
+
+
+def table(runs):
+    """Markdown table of the mistakes."""
+    by_fault = defaultdict(list)
+    for run in runs.values():
+        by_fault[run.fault].append(run)
+    lines = ["| mistake | size | found | \"Yes\" | refused | error × |", "|---|---|---|---|---|---|"]
+    wrong = 0
+    for name, fault in FAULTS.items():
+        rows = by_fault.get(name, [])
+        if name in GOOD or not rows:
+            continue
+        yes = sum(said_yes(run) for run in rows)
+        wrong += yes if name not in REPAIRED else 0
+        ratios = [r for r in (worse(run, runs) for run in rows) if r is not None]
+        ratio = f"{np.median(ratios):.2f}" if ratios else "–"
+        mark = " (repaired)" if name in REPAIRED else ""
+        refused = sum(run.code not in (0, 3) for run in rows)
+        lines.append(f"| `{name}` | {fault.size} | {sum(map(found, rows))}/{len(rows)} | {yes}{mark} | {refused} | {ratio} |")
+    return lines, wrong
+
+
+def good_table(runs):
+    """Lines on good studies: false alarms by code and the runs that have them."""
+    good = [run for run in runs.values() if run.fault in GOOD]
+    if not good:
+        return [], 0.0
+    with_alarm = [run for run in good if alarms(run)]
+    count = defaultdict(int)
+    for run in with_alarm:
+        for code in set(alarms(run)):
+            count[code] += 1
+    share = 100.0 * len(with_alarm) / len(good)
+    what = ", ".join(f"`{code}` {n}" for code, n in sorted(count.items(), key=lambda item: -item[1])) or "none"
+    yes = sum(said_yes(run) for run in good)
+    return [f"Good studies: {len(good)}; with a false alarm: {len(with_alarm)} ({share:.1f} of 100): {what}. Answer \"Yes\": {yes}."], share
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("--program", type=Path, default=PROGRAM)
+    arguments.add_argument("--seeds", type=int, default=1)
+    arguments.add_argument("--first-seed", type=int, default=1)
+    arguments.add_argument("--only", default="", help="mistakes, with commas")
+    arguments.add_argument("--robot", default="")
+    arguments.add_argument("--motion", default="")
+    arguments.add_argument("--good", type=int, default=18, help="good studies for false alarms")
+    arguments.add_argument("--no-clean", dest="clean", action="store_false", help="no good counterpart of each cell")
+    arguments.add_argument("--keep", type=Path, help="JSON lines with every run; runs that are there are not repeated")
+    arguments.add_argument("--strict", action="store_true", help="exit 1 if a wrong study gets a Yes")
+    given = arguments.parse_args()
+    runs = read_kept(given.keep)
+    for key in wanted_runs(given):
+        if key in runs:
+            continue
+        runs[key] = one(given.program.resolve(), *key)
+        if given.keep:
+            with given.keep.open("a") as file:
+                file.write(json.dumps(asdict(runs[key])) + "\n")
+    lines, wrong = table(runs)
+    good, _ = good_table(runs)
+    print("\n".join([*lines, "", *good]))
+    return 1 if given.strict and wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
