@@ -162,7 +162,7 @@ def metadata_values(text):
     changes += [
         (path, "- ../bag_0.mcap"), (path, "- /dev/zero"), (path, "- /etc/passwd"), ("    - bag_0.mcap", listed), (path, "- bag_0.mcap\n    - bag_0.mcap"),
         ("storage_identifier: mcap", "storage_identifier: ../../x"), ('compression_mode: ""', "compression_mode: FILE"),
-        ("compression_format: \"\"", "compression_format: zstd"), ("message_count: 400", "message_count: 18446744073709551616"),
+        ("compression_format: \"\"", "compression_format: zstd"), ("message_count: 1500", "message_count: 18446744073709551616"),
         ("name: /joint_states", "name: &a [*a, *a, *a]"),
     ]  # fmt: skip
     return replaced(text, changes)

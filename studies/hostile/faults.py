@@ -354,7 +354,7 @@ FAULTS = {
     "late_one_log": Fault("60 ms, all joints of one log", in_one_log(late(0.06)), LAG, "log"),
     "late_one_joint": Fault("60 ms, one joint, all logs", in_one_joint(late(0.06)), LAG, "joint"),
     "late_all": Fault("40 ms, all joints, all logs", in_all(late(0.04)), LAG),
-    "torque_drift": Fault("0.1 % over 60 s, all logs", in_all(drifting(0.001)), ("clock_drift",), recorder={"seconds": 60.0}),
+    "torque_drift": Fault("0.1 % over 60 s, all logs", in_all(drifting(0.001)), ("clock_drift",), recorder={"seconds": 60.0, "rate": 125}),
     "less_model": Fault("measured minus model", in_all(less_model), ("model_torque",)),
     "less_gravity": Fault("gravity-compensated", in_all(less_gravity), ("gravity_compensated",)),
     "scaled_all": Fault("× 1.2, all joints, all logs", in_all(scaled(1.2)), ("torque_scale",)),

@@ -15,7 +15,7 @@ from mcap.writer import CompressionType, Writer
 
 ASSETS = Path(__file__).resolve().parents[1] / "planar_arm" / "assets"
 JOINTS = ("shoulder", "elbow")
-ROWS = 400
+ROWS = 1500
 SCHEMA = """std_msgs/Header header
 string[] name
 float64[] position
@@ -34,17 +34,17 @@ METADATA = """rosbag2_bagfile_information:
   version: 5
   storage_identifier: mcap
   duration:
-    nanoseconds: 399000000
+    nanoseconds: 1499000000
   starting_time:
     nanoseconds_since_epoch: 0
-  message_count: 400
+  message_count: 1500
   topics_with_message_count:
     - topic_metadata:
         name: /joint_states
         type: sensor_msgs/msg/JointState
         serialization_format: cdr
         offered_qos_profiles: ""
-      message_count: 400
+      message_count: 1500
   compression_format: ""
   compression_mode: ""
   relative_file_paths:
@@ -54,8 +54,8 @@ METADATA = """rosbag2_bagfile_information:
       starting_time:
         nanoseconds_since_epoch: 0
       duration:
-        nanoseconds: 399000000
-      message_count: 400
+        nanoseconds: 1499000000
+      message_count: 1500
 """
 
 
