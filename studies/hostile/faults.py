@@ -101,7 +101,7 @@ def joint_degrees(study, rng):
 
 
 def torque_other_column(study, rng):
-    """One joint's torque column is a copy of the next joint's, in all logs."""
+    """One joint's torque column is a copy of the joint's before it, in all logs."""
     j = elbow(study)
     for log in logs(study):
         log.tau[:, j] = log.tau[:, j - 1]

@@ -53,6 +53,7 @@ class Run:
     payload: float = None  # kg
     rows: int = 0  # of training, over all joints
     truth: dict = None  # of the training logs: repeats, contact
+    rest: list = None  # share of training rows masked at rest, and the share of samples truly at rest
 
     @property
     def key(self):
@@ -102,11 +103,13 @@ def one(program, fault, robot, motion, seed):
     findings = (result or {}).get("findings") or []
     components = (result or {}).get("components") or []
     masses = [p["mean"] for c in components if c["name"] == "payload" for p in c["parameters"] if p["name"] == "mass"]
-    rows = sum(sum(log["rows"]) for log in (result or {}).get("logs") or [] if log["role"] == "fit")
+    fitted = [log for log in (result or {}).get("logs") or [] if log["role"] == "fit"]
+    rows, masked = (sum(sum(log[key]) for log in fitted) for key in ("rows", "standstill"))
+    rest = [masked / max(rows + masked, 1), float(np.mean([log.truth["rest"] for log in study.train]))]
     truth = {key: [log.truth[key] for log in study.train if key in log.truth] for key in ("repeats", "missing", "contact")}
     return Run(fault, robot, motion, seed, code, headline(out), "" if result else error[max(error.find("error:"), 0) :].strip()[:2000],
                findings, rmse, round(seconds, 2), study.truth.get("log") or "", "" if joint is None else Arm(world).names[joint],
-               sorted(c["name"] for c in components if c["verdict"] == "found"), masses[0] if masses else None, rows, truth)  # fmt: skip
+               sorted(c["name"] for c in components if c["verdict"] == "found"), masses[0] if masses else None, rows, truth, rest)  # fmt: skip
 
 
 def names_it(run, text):
@@ -219,7 +222,12 @@ def good_table(runs):
     share = 100.0 * len(with_alarm) / len(good)
     what = ", ".join(f"`{code}` {n}" for code, n in sorted(count.items(), key=lambda item: -item[1])) or "none"
     yes = sum(said_yes(run) for run in good)
-    return [f"Good studies: {len(good)}; with a false alarm: {len(with_alarm)} ({share:.1f} of 100): {what}. Answer \"Yes\": {yes}."], share
+    moved = [run for run in good if run.rest and run.rows]
+    fourier = [run.rest[0] - run.rest[1] for run in moved if run.motion == "fourier"]
+    dwells = [run.rest[0] - run.rest[1] for run in moved if run.motion != "fourier"]
+    rest = "".join(f" Masked as rest less truly at rest, {name}: median {np.median(x):+.3f}, worst {max(x, key=abs):+.3f}."
+                   for name, x in (("Fourier", fourier), ("with dwells", dwells)) if x)  # fmt: skip
+    return [f"Good studies: {len(good)}; with a false alarm: {len(with_alarm)} ({share:.1f} of 100): {what}. Answer \"Yes\": {yes}.{rest}"], share
 
 
 def main():

@@ -13,6 +13,7 @@ import argparse
 import json
 import sys
 from dataclasses import asdict, dataclass, field, replace
+from functools import lru_cache
 from math import exp, pi
 from pathlib import Path
 
@@ -267,13 +268,20 @@ def make_log(world, recorder, which=0, programme=None):
     noise = recorder.noise * arm.coulomb * 0.5**0.5
     tau = rigid + friction + noise * (rng.normal(size=q.shape) + colored(rng, q.shape, recorder.rate, recorder.noise_time))
     q_shown, qd_shown = encode(recorder, rng, q, qd)
-    truth = {"coulomb": arm.coulomb.tolist(), "viscous": arm.viscous.tolist(), "noise": (recorder.noise * arm.coulomb).tolist()}
+    truth = {"coulomb": arm.coulomb.tolist(), "viscous": arm.viscous.tolist(), "noise": (recorder.noise * arm.coulomb).tolist(),
+             "rest": (qd == 0).mean(0).tolist()}  # fmt: skip
     return Log(t, q_shown, qd_shown if recorder.velocity else None, tau, qdd, truth)
+
+
+@lru_cache(maxsize=8)
+def kept_log(world, recorder, which):
+    """A log, made once for the mistakes that are tried on it."""
+    return make_log(world, recorder, which)
 
 
 def make_study(world, recorder=Recorder(), logs=2):
     """A study without a fault: training logs and one held-out log, each with a motion of its own."""
-    made = [make_log(world, recorder, which) for which in range(logs + 1)]
+    made = [kept_log(world, recorder, which).copy() for which in range(logs + 1)]
     return Study(world, recorder, made[:-1], made[-1])
 
 
