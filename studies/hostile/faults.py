@@ -330,7 +330,7 @@ def same_programme(study, rng):
     names(study, None)
 
 
-COPY = ("copied_log", "heldout_copy")
+COPY = ("copied_log",)
 LAG = ("torque_lag",)
 REPEATED = ("repeated_samples",)
 CONTACT = ("contact", "torque_spike")
@@ -345,20 +345,20 @@ FAULTS = {
     "copy_fitted": Fault("a training log twice, 0.3 s cut", copy_fitted, COPY, "log", "given twice|same recording"),
     "joint_degrees": Fault("one joint, all logs", joint_degrees, ("degrees",), "joint", "degrees"),
     "torque_other_column": Fault("one joint has its neighbour's torque", torque_other_column, ("torque_copied",), "joint"),
-    "torque_constant": Fault("one joint, all logs", torque_constant, ("constant_torque",), "joint"),
-    "torque_held": Fault("one joint, one log, new every 200 ms", torque_held, ("torque_held",), "joint"),
-    "turned_one_log": Fault("all joints of one log", in_one_log(turned), ("sign_flip",), "log"),
-    "turned_one_joint": Fault("one joint, all logs", in_one_joint(turned), ("sign_flip",), "joint"),
-    "scaled_one_log": Fault("× 1.2, all joints of one log", in_one_log(scaled(1.2)), ("torque_scale",), "log"),
-    "scaled_one_joint": Fault("× 1.3, one joint, all logs", in_one_joint(scaled(1.3)), ("torque_scale",), "joint"),
-    "late_one_log": Fault("60 ms, all joints of one log", in_one_log(late(0.06)), LAG, "log"),
-    "late_one_joint": Fault("60 ms, one joint, all logs", in_one_joint(late(0.06)), LAG, "joint"),
+    "torque_constant": Fault("one joint, all logs", torque_constant, ("constant_torque", "torque_constant"), "joint"),
+    "torque_held": Fault("one joint, one log, new every 200 ms", torque_held, ("torque_held", "stale_torque"), "joint"),
+    "turned_one_log": Fault("all joints of one log", in_one_log(turned), ("sign_flip", "log_torque_factor"), "log"),
+    "turned_one_joint": Fault("one joint, all logs", in_one_joint(turned), ("sign_flip", "joint_torque_factor"), "joint"),
+    "scaled_one_log": Fault("× 1.2, all joints of one log", in_one_log(scaled(1.2)), ("torque_scale", "log_torque_factor"), "log"),
+    "scaled_one_joint": Fault("× 1.3, one joint, all logs", in_one_joint(scaled(1.3)), ("torque_scale", "joint_torque_factor"), "joint"),
+    "late_one_log": Fault("60 ms, all joints of one log", in_one_log(late(0.06)), ("torque_lag", "log_torque_lag"), "log"),
+    "late_one_joint": Fault("60 ms, one joint, all logs", in_one_joint(late(0.06)), ("torque_lag", "joint_torque_lag"), "joint"),
     "late_all": Fault("40 ms, all joints, all logs", in_all(late(0.04)), LAG),
     "torque_drift": Fault("0.1 % over 60 s, all logs", in_all(drifting(0.001)), ("clock_drift",), recorder={"seconds": 60.0, "rate": 125}),
     "less_model": Fault("measured minus model", in_all(less_model), ("model_torque",)),
     "less_gravity": Fault("gravity-compensated", in_all(less_gravity), ("gravity_compensated",)),
-    "scaled_all": Fault("× 1.2, all joints, all logs", in_all(scaled(1.2)), ("torque_scale",)),
-    "slow_clock": Fault("stamps × 1.1, all logs", slow_clock(1.1), ("clock_scale",)),
+    "scaled_all": Fault("× 1.2, all joints, all logs", in_all(scaled(1.2)), ("torque_scale", "common_factor")),
+    "slow_clock": Fault("stamps × 1.1, all logs", slow_clock(1.1), ("clock_scale", "common_factor")),
     "upside_down": Fault("base turned by 180° about x", nothing, ("base_orientation",), world={"base_rpy": (np.pi, 0.0, 0.0)}),
     "on_the_wall": Fault("base turned by 90° about y", nothing, ("base_orientation",), world={"base_rpy": (0.0, np.pi / 2, 0.0)}),
     "zero_moved": Fault("0.1 rad, one joint, mid of one log", zero_moved(0.1), ("position_step", "encoder_reset", "zero_moved"), "joint"),

@@ -7,6 +7,7 @@ robots, motions and frictions in turn. Printed as Markdown, per mistake:
 
     found      the share of runs with a finding of the mistake's codes on the right log or joint (or an error that names it)
     "Yes"      runs whose answer begins with "Yes" though a mistake stands that is not repaired: must be 0
+    "… yes"    runs whose answer says yes further behind ("While joints move, the torque yes, …")
     change ×   median of what the mistake changes: held-out error of the worst joint, or the payload's mass
 
 and for good studies findings of these codes per 100 (severity note left out). `--keep` stores every run and goes on from there.
@@ -132,6 +133,11 @@ def said_yes(run):
     return run.headline.startswith("Yes")
 
 
+def half_yes(run):
+    """The answer says yes further behind."""
+    return not said_yes(run) and re.search(r"\byes\b", run.headline.split(". ")[0]) is not None
+
+
 def alarms(run):
     """Findings of a good study that a mistake's table has, notes left out; an error counts as well."""
     codes = {code for fault in FAULTS.values() for code in fault.codes}
@@ -193,7 +199,7 @@ def table(runs):
     by_fault = defaultdict(list)
     for run in runs.values():
         by_fault[run.fault].append(run)
-    lines = ["| mistake | size | found | \"Yes\" | refused | change × |", "|---|---|---|---|---|---|"]
+    lines = ["| mistake | size | found | \"Yes\" | \"… yes\" | refused | change × |", "|---|---|---|---|---|---|---|"]
     wrong = 0
     for name, fault in FAULTS.items():
         rows = by_fault.get(name, [])
@@ -205,7 +211,7 @@ def table(runs):
         ratio = f"{np.median(ratios):.2f}" if ratios else "–"
         mark = " (repaired)" if name in REPAIRED else ""
         refused = sum(run.code not in (0, 3) for run in rows)
-        lines.append(f"| `{name}` | {fault.size} | {sum(map(found, rows))}/{len(rows)} | {yes}{mark} | {refused} | {ratio} |")
+        lines.append(f"| `{name}` | {fault.size} | {sum(map(found, rows))}/{len(rows)} | {yes}{mark} | {sum(map(half_yes, rows))} | {refused} | {ratio} |")
     return lines, wrong
 
 
