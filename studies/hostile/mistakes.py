@@ -107,7 +107,7 @@ def one(program, fault, robot, motion, seed):
     fitted = [log for log in (result or {}).get("logs") or [] if log["role"] == "fit"]
     rows, masked = (sum(sum(log[key]) for log in fitted) for key in ("rows", "standstill"))
     rest = [masked / max(rows + masked, 1), float(np.mean([log.truth["rest"] for log in study.train]))]
-    truth = {key: [log.truth[key] for log in study.train if key in log.truth] for key in ("repeats", "missing", "contact")}
+    truth = {key: [log.truth.get(key) for log in study.train] for key in ("repeats", "missing", "contact")}
     return Run(fault, robot, motion, seed, code, headline(out), "" if result else error[max(error.find("error:"), 0) :].strip()[:2000],
                findings, rmse, round(seconds, 2), study.truth.get("log") or "", "" if joint is None else Arm(world).names[joint],
                sorted(c["name"] for c in components if c["verdict"] == "found"), masses[0] if masses else None, rows, truth, rest)  # fmt: skip
@@ -155,21 +155,36 @@ def worse(run, good):
     return max(ratio, 1 + mass)
 
 
+def timed(run):
+    """Contacts of the training logs whose begin and end are both right within 0.1 s, and how many there are."""
+    right = total = 0
+    for number, contact in enumerate((run.truth or {}).get("contact") or [], 1):
+        if contact is None:
+            continue
+        total += 1
+        said = [f["message"] for f in run.findings if f["code"] in FAULTS[run.fault].codes and f["subject"] == f"train{number}.csv"]
+        spans = [tuple(map(float, span)) for message in said for span in re.findall(r"from (-?[\d.]+) s to (-?[\d.]+) s", message)]
+        right += any(abs(begin - contact[0]) <= 0.1 and abs(end - contact[1]) <= 0.1 for begin, end in spans)
+    return right, total
+
+
 def repaired(runs):
     """Lines on mistakes that are repaired: what the repair costs beside the study without the mistake."""
-    lines = ["| repaired | counted / true | rows / clean | error × (90 %) | same effects |", "|---|---|---|---|---|"]
+    lines = ["| repaired | counted / true | rows / clean | error × (90 %) | same effects | begin and end ± 0.1 s |", "|---|---|---|---|---|---|"]
     for name in REPAIRED:
         rows = [(run, runs[("none", *run.key[1:])]) for run in runs.values() if run.fault == name and ("none", *run.key[1:]) in runs]
         rows = [(run, clean) for run, clean in rows if run.rmse and clean.rmse and run.rows and clean.rows]
         if not rows:
             continue
-        true = sum(sum((run.truth or {}).get("repeats", [])) for run, _ in rows)
+        true = sum(sum(n or 0 for n in (run.truth or {}).get("repeats") or []) for run, _ in rows)
+        right, contacts = (sum(part) for part in zip(*(timed(run) for run, _ in rows)))
         counted = sum(f["count"] for run, _ in rows for f in run.findings if f["code"] in FAULTS[name].codes and f["subject"] != "heldout.csv")
         ratios = np.array([np.sqrt(np.mean(np.square(run.rmse)) / np.mean(np.square(clean.rmse))) for run, clean in rows])
         kept = np.median([run.rows / clean.rows for run, clean in rows])
         same = sum(run.found == clean.found for run, clean in rows)
         share = f"{counted / true:.2f}" if true else "–"
-        lines.append(f"| `{name}` | {share} | {kept:.2f} | {np.median(ratios):.2f} ({np.quantile(ratios, 0.9):.2f}) | {same}/{len(rows)} |")
+        times = f"{right}/{contacts}" if contacts else "–"
+        lines.append(f"| `{name}` | {share} | {kept:.2f} | {np.median(ratios):.2f} ({np.quantile(ratios, 0.9):.2f}) | {same}/{len(rows)} | {times} |")
     return lines
 
 

@@ -181,6 +181,9 @@ def cell(place, kind, number, clean):
     """Runs the program on the file that lies in place."""
     before = place.target.read_bytes()
     ended = run(place.command(kind), place.folder)
+    if ended.code in GOOD_CODES and ended.seconds > SECONDS:
+        # a loaded machine counts more CPU time for the same work
+        ended = min(ended, run(place.command(kind), place.folder), key=lambda e: e.seconds)
     more = said(ended) - clean
     if ended.code not in GOOD_CODES or ended.seconds > SECONDS or ended.megabytes > MEGABYTES or place.target.read_bytes() != before:
         answer = "broken"
