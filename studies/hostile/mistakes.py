@@ -120,9 +120,11 @@ def names_it(run, text):
 
 
 def found(run):
-    """The mistake is named: a finding of its codes (not a mere note) on the right log or joint, or an error that says so."""
+    """The mistake is named: a finding of its codes (a note only where it is repaired) on the right log or joint, or an error that says so."""
     fault = FAULTS[run.fault]
     for finding in run.findings:
+        if finding["severity"] == "note" and run.fault not in REPAIRED:
+            continue
         if finding["code"] in fault.codes and names_it(run, f"{finding['subject']} {finding['message']}"):
             return True
     return bool(run.error and fault.error and re.search(fault.error, run.error) and names_it(run, run.error))
