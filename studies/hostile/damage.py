@@ -168,24 +168,31 @@ def metadata_values(text):
     return replaced(text, changes)
 
 
+def json_places(tree):
+    """Where values stand in a JSON tree, by kind of place: lists of (holder, key), all entries of a list being one kind."""
+    kinds = {}
+
+    def walk(node, path):
+        for key, child in node.items() if isinstance(node, dict) else enumerate(node):
+            here = path + (key if isinstance(node, dict) else "*",)
+            kinds.setdefault(here, []).append((node, key))
+            if isinstance(child, (dict, list)):
+                walk(child, here)
+
+    walk(tree, ())
+    return list(kinds.values())
+
+
 def json_values(text, seed):
-    """Twenty hostile values in place of random numbers, texts and lists of a JSON file."""
+    """Twenty hostile values, each in place of one value of a JSON file; the kind of place is drawn first."""
     values = [None, True, -1, 0, 1e308, -1e308, 2**63, 1e-320, "", "x" * 1_000_000, "\x00\x1b[2J", "../../etc/passwd", [], {}, [[]] * 1000,
               [1e308] * 10_000, "nan", -(2**63), 18446744073709551615, {"a": {"b": []}}]  # fmt: skip
     rng = np.random.default_rng(seed)
     out = []
     for value in values:
         tree = json.loads(text)
-        places = []
-
-        def walk(node):
-            items = node.items() if isinstance(node, dict) else enumerate(node)
-            for key, child in items:
-                places.append((node, key))
-                if isinstance(child, (dict, list)):
-                    walk(child)
-
-        walk(tree)
+        kinds = json_places(tree)
+        places = kinds[rng.integers(len(kinds))]
         node, key = places[rng.integers(len(places))]
         node[key] = value
         out.append(json.dumps(tree).encode())
