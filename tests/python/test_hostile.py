@@ -1,6 +1,6 @@
 """The hostile study in short: damaged files end in words, and a plausible mistake gets a finding and no "Yes".
 
-The whole study is `studies/hostile/run` (docs/hostile.md). Seeds are fixed and are none that the program was tuned on.
+The whole study is `studies/hostile/run` (docs/hostile.md). Seeds are fixed; those from 1001 on are kept for this study, so that nothing is tuned on them.
 """
 
 import sys
@@ -16,7 +16,7 @@ import readers  # noqa: E402
 import simulate  # noqa: E402
 from faults import polled  # noqa: E402
 
-SEED = 301
+SEED = 1301
 
 
 @pytest.mark.parametrize("reader", readers.READERS)
