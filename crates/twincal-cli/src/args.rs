@@ -124,7 +124,8 @@ impl Command {
 /// Flags of every command that reads logs.
 #[derive(Debug, Args)]
 pub(crate) struct LogFlags {
-    /// Settings; a flag overrides its key.
+    /// Settings; a flag overrides its key. fit, doctor and inspect read
+    /// ./twincal.toml where there is one.
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
     /// Sampling rate in Hz that replaces missing or wrong time stamps.
@@ -177,7 +178,7 @@ pub(crate) struct Demo {
 pub(crate) struct Inspect {
     /// Logs (CSV, Parquet, Arrow, NPZ, MCAP, rosbag2); without --model the first
     /// path is the model.
-    #[arg(value_name = "PATH", required_unless_present = "model")]
+    #[arg(value_name = "PATH")]
     pub(crate) paths: Vec<PathBuf>,
     /// Robot model (URDF, MJCF).
     #[arg(long, value_name = "MODEL")]
@@ -185,6 +186,9 @@ pub(crate) struct Inspect {
     /// Accept with a warning what would be refused.
     #[arg(long, value_name = "WHAT", value_enum)]
     pub(crate) allow: Vec<AllowModel>,
+    /// Leave out ./twincal.toml.
+    #[arg(long, conflicts_with = "config")]
+    pub(crate) no_config: bool,
     #[command(flatten)]
     pub(crate) log: LogFlags,
 }
@@ -205,6 +209,9 @@ pub(crate) struct Doctor {
     /// Accept with a warning what would be refused.
     #[arg(long, value_name = "WHAT", value_enum)]
     pub(crate) allow: Vec<AllowModel>,
+    /// Leave out ./twincal.toml.
+    #[arg(long, conflicts_with = "config")]
+    pub(crate) no_config: bool,
     #[command(flatten)]
     pub(crate) log: LogFlags,
 }
@@ -262,6 +269,9 @@ pub(crate) struct Fit {
     /// Accept with a warning what would be refused.
     #[arg(long, value_name = "WHAT", value_enum)]
     pub(crate) allow: Vec<Allow>,
+    /// Leave out ./twincal.toml.
+    #[arg(long, conflicts_with = "config")]
+    pub(crate) no_config: bool,
     #[command(flatten)]
     pub(crate) log: LogFlags,
 }

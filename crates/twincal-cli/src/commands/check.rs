@@ -11,7 +11,7 @@ use crate::terminal::{Terminal, clean};
 use serde::Serialize;
 use twincal::twin::Twin;
 use twincal::validate::{HeldOut, Scores, Split, Validation};
-use twincal::words::significant;
+use twincal::words::{listed, significant};
 use twincal::{Finding, Result, Severity};
 use twincal_io::artifact::Artifact;
 use twincal_io::config::Gates;
@@ -170,7 +170,7 @@ fn judged(gates: &[Gate], validation: &Validation, terminal: &mut Terminal) {
     if !still.is_empty() {
         let text = format!(
             "by all of their rows, as they do not move: {}",
-            still.join(", ")
+            listed(&still, ", ")
         );
         paragraph(&text, terminal);
     }

@@ -5,6 +5,7 @@ use crate::failure::{Failure, Outcome};
 use crate::names::display_names;
 use crate::progress::Progress;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use twincal::Finding;
 use twincal::robot::Robot;
 use twincal::signal::{Auto, Log};
@@ -132,15 +133,11 @@ impl LogInput {
         let mut input = Self::new(paths.to_vec());
         for (path, name) in paths.iter().zip(display_names(paths)) {
             progress.step(&format!("reading {}", path.to_string_lossy()));
-            let read = || read_one(path);
-            let (log, checksum) = if path.is_file() || path.is_dir() {
-                let (log, checksum) = rayon::join(read, || sha256_of_log(path));
-                (log?, checksum)
-            } else {
-                // A pipe can be read once: what was in it nobody can check.
-                (read()?, Ok(String::new()))
-            };
-            let (log, findings) = log;
+            // The checksum of a log that is refused is of no use, and may take long.
+            let refused = AtomicBool::new(false);
+            let read = || read_one(path).inspect_err(|_| refused.store(true, Ordering::Relaxed));
+            let (log, checksum) = rayon::join(read, || sha256_of_log(path, &refused));
+            let (log, findings) = log?;
             samples += in_memory(&log);
             let bytes = samples.saturating_mul(robot.dof() as u64 * 8 * DOUBLES_PER_SAMPLE);
             memory::require(
@@ -272,15 +269,15 @@ pub(super) fn refuse_input_as_output(output: &Path, inputs: &[&PathBuf]) -> Outc
     Ok(())
 }
 
-/// Checksum of a log; of a folder that of the lines `sha256sum` prints for its files, in the order of their recording.
-fn sha256_of_log(path: &Path) -> Result<String, Error> {
+/// Checksum of a log, given up once the log is `refused`; of a folder that of the lines `sha256sum` prints for its files, in the order of their recording.
+fn sha256_of_log(path: &Path, refused: &AtomicBool) -> Result<String, Error> {
     if !path.is_dir() {
-        return sha256_of_file(path);
+        return sha256_of_file(path, refused);
     }
     let mut lines = String::new();
     for file in files_of(path)? {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
-        lines += &format!("{}  {name}\n", sha256_of_file(&file)?);
+        lines += &format!("{}  {name}\n", sha256_of_file(&file, refused)?);
     }
     Ok(sha256(lines.as_bytes()))
 }

@@ -3,6 +3,7 @@
 use self::library::{BaseRow, ComponentRow, base_row, component_rows};
 use super::checkup::{Checkup, checkup};
 use super::inputs::{LogInput, Long, RobotInput};
+use super::settings::{Look, Usual};
 use super::summary::{Notes, findings, paragraph};
 use super::table::{print_table, table};
 use super::{code_of, print_json, require_strict, settings, start_threads};
@@ -11,6 +12,7 @@ use crate::failure::Outcome;
 use crate::progress::Progress;
 use crate::terminal::{Terminal, clean};
 use serde::Serialize;
+use std::path::Path;
 use twincal::Finding;
 use twincal::calibrate::{Outlook, outlook};
 use twincal::excitation::Unseen;
@@ -69,14 +71,30 @@ struct UnseenRow {
     words: String,
 }
 
+/// Whether a path is called as a model is, and no log.
+fn is_model(path: &Path) -> bool {
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    matches!(ending, Some("urdf" | "xml" | "mjcf"))
+}
+
 pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
-    let config = settings::of_look(&flags.model, &flags.allow, &flags.log, terminal)?;
+    let look = Look {
+        model: &flags.model,
+        allow: &flags.allow,
+        log: &flags.log,
+        usual: Usual::unless(flags.no_config),
+    };
+    let config = settings::of_look(&look, terminal)?;
     let settings = config.settings()?;
     start_threads(settings.threads)?;
     let progress = Progress::new();
-    // Without a model by flag or config the first path is the model.
+    // Without paths those of the config are looked at.
+    let named = settings.log.named();
     let (model, logs) = match (&settings.model_file, flags.paths.split_first()) {
-        (Some(model), _) => (model, &flags.paths[..]),
+        (_, Some((first, logs))) if flags.model.is_none() && is_model(first) => (first, logs),
+        (Some(model), Some(_)) => (model, &flags.paths[..]),
+        (Some(model), None) => (model, &named[..]),
+        // Without a model by flag or config the first path is the model.
         (None, Some((model, logs))) => (model, logs),
         (None, None) => return Err(super::no_model()),
     };

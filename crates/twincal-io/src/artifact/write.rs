@@ -2,8 +2,10 @@
 
 use super::beside::{Beside, Lock};
 use super::manifest::{Maker, Manifest};
+use super::read::MAX_MANIFEST;
 use super::{MANIFEST, NAMES};
 use crate::error::{Error, Place, Result};
+use crate::open::InputFile;
 use rustix::fs::{CWD, RenameFlags, renameat_with};
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -110,7 +112,10 @@ fn check(target: &Path, shown: &str, replace: Replace) -> Result<bool> {
     if metadata.permissions().readonly() {
         return refuse("the folder is read-only", other);
     }
-    let manifest = fs::read(target.join(MANIFEST)).ok();
+    let manifest = InputFile::new(&target.join(MANIFEST), MAX_MANIFEST)
+        .inside(target)
+        .read()
+        .ok();
     let manifest = manifest.and_then(|bytes| Manifest::parse(MANIFEST, &bytes).ok());
     let ours = |name: &OsStr| {
         let listed = manifest.iter().flat_map(|manifest| manifest.files.keys());

@@ -148,6 +148,7 @@ impl Proposal {
 /// The entries `[[log]]`.
 #[derive(Serialize)]
 struct Logs<'a> {
+    #[serde(serialize_with = "super::log_forms::serialize_entries")]
     log: &'a [LogEntry],
 }
 

@@ -3,6 +3,7 @@
 use super::ModelSettings;
 use super::xml::{Document, Element, shorten};
 use crate::error::Result;
+use std::collections::BTreeSet;
 use twincal::robot::spatial::{IDENTITY, roll_pitch_yaw, rotate_tensor};
 use twincal::robot::{
     Inertia, JointDescription, JointKind, Limits, LinkDescription, Mimic, Placement,
@@ -218,13 +219,14 @@ fn report_shapes_without_inertia(
     joints: &[JointDescription],
     findings: &mut Vec<Finding>,
 ) {
+    let moved: BTreeSet<&str> = (joints.iter())
+        .filter(|joint| joint.kind != JointKind::Fixed)
+        .map(|joint| joint.child.as_str())
+        .collect();
     for link in document.children(root, "link") {
         let has = |child: &str| document.child(link, child).is_some();
         let name = link.text("name").unwrap_or("");
-        let moves = joints
-            .iter()
-            .any(|joint| joint.kind != JointKind::Fixed && joint.child == name);
-        if moves && (has("visual") || has("collision")) && !has("inertial") {
+        if moved.contains(name) && (has("visual") || has("collision")) && !has("inertial") {
             let message = format!(
                 "link `{name}` has a shape but no <inertial>: it weighs nothing in the nominal torque; compute mass, centre of mass \
                  and inertia from its mesh (MeshLab, or the CAD program) and add them"

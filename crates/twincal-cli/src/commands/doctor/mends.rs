@@ -66,7 +66,7 @@ const ORDER: [(&str, &str); 49] = [
     ("sign_flip", "twincal.toml: [columns.factor]"),
     (
         "torque_scale",
-        "say what the torque is ([log] torque, gear_ratio, drive_constant), or give [columns.factor] tau",
+        "say what the torque is ([[log]] torque, gear_ratio, drive_constant), or give [columns.factor] tau",
     ),
     (
         "unphysical_inertia",

@@ -9,6 +9,7 @@ mod propose;
 mod units;
 
 use super::inspect::library::{ComponentRow, component_rows};
+use super::settings::{Look, Usual};
 use super::{code_of, print_json, require_strict, settings, start_threads};
 use crate::args;
 use crate::failure::{Failure, Outcome};
@@ -79,8 +80,19 @@ struct Asked {
 }
 
 impl Asked {
+    /// `verb` is the command; `init` leaves out the file that it may be about to write.
     fn of(flags: &args::Doctor, verb: &str, terminal: &mut Terminal) -> Outcome<Self> {
-        let config = settings::of_look(&flags.model, &flags.allow, &flags.log, terminal)?;
+        let usual = match (verb, flags.no_config) {
+            ("init", false) => Usual::Named,
+            (_, no_config) => Usual::unless(no_config),
+        };
+        let look = Look {
+            model: &flags.model,
+            allow: &flags.allow,
+            log: &flags.log,
+            usual,
+        };
+        let config = settings::of_look(&look, terminal)?;
         let settings = config.settings()?;
         let logs = if flags.logs.is_empty() {
             settings.log.named()
@@ -97,8 +109,8 @@ impl Asked {
             ));
         }
         Ok(Self {
+            given: config.read_from().map(|(file, _)| file.to_owned()),
             config,
-            given: flags.log.config.clone(),
             settings,
             model,
             logs,

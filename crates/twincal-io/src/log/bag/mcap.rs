@@ -18,7 +18,9 @@ use twincal::{Finding, Severity};
 /// Largest record, and largest chunk when unpacked, bytes.
 pub(in super::super) const MAX_RECORD: u64 = 256 << 20;
 /// Most bytes of all definitions that are kept.
-const MAX_DEFINITIONS: usize = 64 << 20;
+pub(super) const MAX_DEFINITIONS: usize = 64 << 20;
+/// Most channels of a file.
+const MAX_CHANNELS: usize = 10_000;
 /// Most chunks that are unpacked side by side, and the unpacked bytes from which on no further one joins them.
 const SIDE_BY_SIDE: (usize, u64) = (4, 32 << 20);
 /// Where a chunk says how large it is when unpacked.
@@ -415,6 +417,12 @@ impl Reader<'_, '_> {
                     former.map_or(0, |former| former.text.len().min(self.definitions));
             }
             Ok(Record::Channel(channel)) if !self.channels.contains_key(&channel.id) => {
+                if self.channels.len() == MAX_CHANNELS {
+                    return Err(Damage::File(self.refuse(
+                        format!("has more than {MAX_CHANNELS} channels"),
+                        "keep the topics that are needed: `mcap filter -y TOPIC`",
+                    )));
+                }
                 let schema = self.schemas.get(&channel.schema_id).cloned();
                 let topic = (self.sink).topic(&channel.topic, schema, &channel.message_encoding)?;
                 self.channels.insert(channel.id, topic);
@@ -450,8 +458,10 @@ impl Reader<'_, '_> {
     }
 }
 
+/// Opcode and length; none at the end and where no record is: 0 is no opcode, and a file with a hole would be walked without end.
 fn record_head(head: &[u8]) -> Option<(u8, u64)> {
     let (&opcode, length) = head.split_first()?;
+    (opcode != 0).then_some(())?;
     Some((opcode, u64::from_le_bytes(length.try_into().ok()?)))
 }
 

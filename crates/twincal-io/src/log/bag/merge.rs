@@ -12,6 +12,7 @@ use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::io;
 use twincal::robot::{JointKind, Robot};
+use twincal::words::{listed, quoted};
 use twincal::{Finding, Severity};
 
 /// Neighbours further apart than this many median steps are not joined by a line.
@@ -161,8 +162,8 @@ pub(super) fn merge<'t>(
     let describe = |Used { part, rows, step }: &Used| {
         let joints: Vec<&str> = parts[*part].joints.iter().map(|&j| names[j]).collect();
         format!(
-            "`{}` of `{}` ({} messages, every {:.3} ms)",
-            joints.join("`, `"),
+            "{} of `{}` ({} messages, every {:.3} ms)",
+            quoted(&joints),
             topic(*part),
             rows.len(),
             step / 1e6
@@ -194,7 +195,7 @@ pub(super) fn merge<'t>(
     }
     let others = used.iter().enumerate().filter(|(k, _)| *k != slowest);
     let others: Vec<String> = others.map(|(_, used)| describe(used)).collect();
-    let (others, slowest) = (others.join(" and "), describe(&used[slowest]));
+    let (others, slowest) = (listed(&others, " and "), describe(&used[slowest]));
     if (lost as f64) > (1.0 - COVERED) * rows as f64 {
         return Err(Error::content(
             Place::file(file),
