@@ -194,6 +194,60 @@ fn case_114_and_115_newer_and_damaged_artefacts_are_refused() {
 }
 
 #[test]
+fn a_twin_is_made_of_its_own_files_and_of_no_more_than_a_twin_needs() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("out");
+    write(&target, "good", Replace::Never).unwrap();
+    let manifest = fs::read_to_string(target.join(MANIFEST)).unwrap();
+    let refused = |artifact: crate::Result<Artifact>| {
+        let read = artifact.and_then(|artifact| artifact.verify_except(&[]));
+        read.unwrap_err().to_string()
+    };
+    // A link to the right bytes in another folder.
+    let result = target.join(RESULT);
+    let outside = folder.path().join("outside.json");
+    fs::rename(&result, &outside).unwrap();
+    std::os::unix::fs::symlink(&outside, &result).unwrap();
+    let error = refused(Artifact::open(&target));
+    assert!(
+        error.contains("result.json: is a link that leads outside"),
+        "{error}"
+    );
+    fs::remove_file(&result).unwrap();
+    fs::rename(&outside, &result).unwrap();
+    // The manifest too.
+    fs::rename(target.join(MANIFEST), &outside).unwrap();
+    std::os::unix::fs::symlink(&outside, target.join(MANIFEST)).unwrap();
+    let error = refused(Artifact::open(&target));
+    assert!(
+        error.contains("manifest.json: is a link that leads outside"),
+        "{error}"
+    );
+    fs::remove_file(target.join(MANIFEST)).unwrap();
+    // Sizes are compared with their limits before anything is read.
+    let claims = manifest.replace("\"bytes\": 100000", "\"bytes\": 1000000000");
+    assert_ne!(claims, manifest);
+    fs::write(target.join(MANIFEST), &claims).unwrap();
+    let report = fs::File::options()
+        .write(true)
+        .open(target.join(REPORT))
+        .unwrap();
+    report.set_len(1_000_000_000).unwrap();
+    let error = refused(Artifact::open(&target));
+    assert!(
+        error.contains("has 1000000000 bytes by the manifest"),
+        "{error}"
+    );
+    let file = fs::File::create(target.join(MANIFEST)).unwrap();
+    file.set_len(1 << 40).unwrap();
+    let error = refused(Artifact::open(&target));
+    assert!(
+        error.contains("manifest.json: has 1099511627776 bytes"),
+        "{error}"
+    );
+}
+
+#[test]
 fn case_108_any_file_name_works() {
     use std::os::unix::ffi::OsStrExt as _;
     let folder = tempfile::tempdir().unwrap();

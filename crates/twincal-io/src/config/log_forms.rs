@@ -218,3 +218,120 @@ pub(super) fn serialize_entries<S: Serializer>(
     let keys: Vec<LogKeys> = entries.iter().cloned().map(LogKeys::from).collect();
     keys.serialize(serializer)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Config;
+    use crate::log::TorqueSource;
+    use std::path::{Path, PathBuf};
+
+    const MOTOR: &str = "torque = \"motor\"\ngear_ratio = { elbow = 50.0 }\n";
+
+    #[test]
+    fn a_table_is_read_as_the_first_entry() {
+        for header in ["[log]", "[[log]]"] {
+            let text = format!("{header}\nfile = \"a.csv\"\nheldout = [\"b.csv\"]\n{MOTOR}");
+            let config = Config::parse("x", &text).unwrap();
+            let log = config.settings().unwrap().log;
+            assert_eq!(log.named(), [PathBuf::from("a.csv")]);
+            assert_eq!(log.heldout, [PathBuf::from("b.csv")]);
+            let source = |name: &str| log.options(Path::new(name)).torque.source;
+            assert_eq!(source("a.csv"), Some(TorqueSource::Motor));
+            assert_eq!(source("b.csv"), None);
+            let wrong = text.replace("50.0", "0.0");
+            let error = Config::parse("x", &wrong).unwrap().settings().unwrap_err();
+            assert!(
+                error
+                    .to_string()
+                    .starts_with("x:5:24: key `log.0.gear_ratio.elbow`"),
+                "{error}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_entry_without_a_file_holds_for_logs_without_an_entry() {
+        for (header, line) in [("[log]", 3), ("[[log]]\nfile = \"own.csv\"\n[[log]]", 5)] {
+            let text = format!("{header}\nrate_hz = 100\n{MOTOR}");
+            let config = Config::parse("x", &text).unwrap();
+            let log = config.settings().unwrap().log;
+            let any = log.options(Path::new("any.csv"));
+            assert_eq!(any.rate_hz, Some(100.0));
+            assert_eq!(any.torque.source, Some(TorqueSource::Motor));
+            if header.contains("own") {
+                assert_eq!(log.options(Path::new("own.csv")).rate_hz, None);
+            }
+            // The report's settings say the same.
+            let again = Config::parse("x", &config.in_force()).unwrap();
+            assert_eq!(again.file, config.file);
+            assert!(
+                !config.in_force().contains("\n[log]"),
+                "{}",
+                config.in_force()
+            );
+            let error = (Config::parse("x", &text.replace("50.0", "0.0")).unwrap())
+                .settings()
+                .unwrap_err()
+                .to_string();
+            let place = format!("x:{}:", line + 1);
+            assert!(error.starts_with(&place), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_only_another_entry_can_say_is_refused() {
+        for (text, words) in [
+            (
+                "[[log]]\ntorque = \"none\"\n[[log]]\nrate_hz = 5\n",
+                "two entries [[log]] have no `file`",
+            ),
+            ("[[log]]\npayload = \"unknown\"\n", "name it with `file`"),
+            ("[log]\nheldout = true\n", "name it with `file`"),
+            (
+                "[log]\nheldout = \"a.csv\"\n",
+                "expected true, false or a list of logs",
+            ),
+        ] {
+            let error = Config::parse("x", text).unwrap_err().to_string();
+            assert!(error.contains(words), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn both_forms_are_one_error_with_both_lines() {
+        for (text, place, lines) in [
+            (
+                "[log]\nrate_hz = 5\n\n[[log]] # a\nfile = \"a\"\n",
+                "x:4:",
+                ["line 1", "line 4"],
+            ),
+            (
+                "[[log]]\nfile = \"a\"\n[ log ]\nrate_hz = 5\n",
+                "x:3:",
+                ["line 3", "line 1"],
+            ),
+        ] {
+            let error = Config::parse("x", text).unwrap_err().to_string();
+            assert!(error.starts_with(place), "{error}");
+            let words = ["write [[log]] in both lines", lines[0], lines[1]];
+            assert!(words.iter().all(|word| error.contains(word)), "{error}");
+        }
+    }
+
+    #[test]
+    fn more_entries_than_any_fit_has_are_refused_by_their_number() {
+        let entries: String = (0..10_001)
+            .map(|i| format!("[[log]]\nfile = \"{i}\"\n"))
+            .collect();
+        let error = Config::parse("x", &entries)
+            .unwrap()
+            .settings()
+            .unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .contains("10001 entries, the limit is 10000"),
+            "{error}"
+        );
+    }
+}

@@ -25,6 +25,7 @@ pub fn read_header(path: &Path) -> Result<Option<Vec<String>>> {
     file.seek(SeekFrom::Start(0)).map_err(|e| system(&e))?;
     match Kind::of(&head) {
         Kind::Parquet => {
+            super::parquet::check_footer(&file, &name)?;
             // What is wrong with the file is said when it is read.
             let Ok(reader) = SerializedFileReader::new(file) else {
                 return Ok(None);

@@ -22,6 +22,31 @@ const BATCH: usize = 8192;
 /// Largest page, packed and unpacked, bytes, of files whose columns are decoded side by side: writers make pages of 1 MiB.
 const SIDE_BY_SIDE: u64 = 1 << 24;
 
+/// Largest footer, bytes: 24 hours of 4000 channels in row groups of a million rows have 20 MB.
+const MAX_FOOTER: u32 = 32 << 20;
+
+/// Refuses a footer that would take more memory than any log's: it is taken apart as a whole.
+///
+/// # Errors
+/// [`Error::Content`] with its bytes.
+pub(super) fn check_footer(chunks: &impl ChunkReader, name: &str) -> Result<()> {
+    let Some(at) = chunks.len().checked_sub(8) else {
+        return Ok(());
+    };
+    let tail = chunks.get_bytes(at, 8).map_err(|e| broken(name, &e))?;
+    let claimed = tail
+        .first_chunk()
+        .map_or(0, |four| u32::from_le_bytes(*four));
+    if tail.ends_with(b"PAR1") && claimed > MAX_FOOTER {
+        return Err(Error::content(
+            Place::file(name),
+            format!("its footer has {claimed} bytes, the limit is {MAX_FOOTER}"),
+            "write it with larger row groups, or export only the columns that are needed",
+        ));
+    }
+    Ok(())
+}
+
 fn broken(name: &str, error: &ParquetError) -> Error {
     Error::content(
         Place::file(name),
@@ -37,6 +62,7 @@ pub(super) fn read(
     request: Request<'_>,
 ) -> Result<(Log<'static>, Vec<Finding>)> {
     let name = request.name;
+    check_footer(&chunks, name)?;
     let reader = SerializedFileReader::new(chunks).map_err(|e| broken(name, &e))?;
     let metadata = reader.metadata();
     let columns: Vec<_> = metadata.file_metadata().schema_descr().columns().to_vec();

@@ -8,6 +8,7 @@ pub(crate) mod mjcf;
 mod urdf;
 
 use crate::error::{Error, Place, Result};
+use crate::log::MAX_NAME;
 use crate::open::{InputFile, Refusal};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,6 +17,19 @@ use twincal::robot::spatial::{apply, roll_pitch_yaw, transpose};
 use twincal::robot::{Robot, RobotDescription};
 use xml::{Document, Element};
 
+/// Attributes that are names.
+const NAMES: [&str; 10] = [
+    "name",
+    "model",
+    "link",
+    "joint",
+    "joint1",
+    "joint2",
+    "class",
+    "childclass",
+    "type",
+    "file",
+];
 /// Most links of a model.
 const MAX_LINKS: usize = 10_000;
 
@@ -166,6 +180,7 @@ fn parse(
         include::expand(&mut document, path)?;
     }
     refuse_too_many(&document)?;
+    refuse_long_names(&document)?;
     let root = &document.elements[0];
     let mut sites = mjcf::Sites::default();
     let (mut description, findings) = match root.name.as_str() {
@@ -218,6 +233,26 @@ fn refuse_too_many(document: &Document) -> Result<()> {
         Some(first_beyond) => Err(too_many(first_beyond, document, links().count())),
         None => Ok(()),
     }
+}
+
+/// Refuses names that no program writes: they would fill every message and table.
+fn refuse_long_names(document: &Document) -> Result<()> {
+    for element in &document.elements {
+        let names = element.attributes.iter().filter(|attribute| {
+            attribute.value.len() > MAX_NAME && NAMES.contains(&attribute.name.as_str())
+        });
+        if let Some(long) = names.into_iter().next() {
+            let problem = format!(
+                "<{}> {}=\"{}\" has {} bytes, the limit is {MAX_NAME}",
+                xml::shorten(&element.name),
+                long.name,
+                xml::shorten(&long.value),
+                long.value.len()
+            );
+            return Err(document.attribute_error(element, long, problem, "give it a shorter name"));
+        }
+    }
+    Ok(())
 }
 
 fn too_many(at: &Element, document: &Document, links: usize) -> Error {
