@@ -486,7 +486,7 @@ fn wrong_entries_and_bases_name_key_and_place() {
         (
             "[[log]]\npayload = \"unknown\"\n",
             "twincal.toml:1:1",
-            "missing field `file`",
+            "name it with `file`",
         ),
         ("log = 3\n", "twincal.toml:1:7", "entries [[log]]"),
         (

@@ -5,10 +5,11 @@
 //! one of its columns, `positions[:,2]` (`npz/arrays.rs`).
 
 mod arrays;
+mod directory;
 
 use super::cells::{Sink, disk_failure};
 use super::columns::is_channel;
-use super::{Cells, Request, assemble};
+use super::{Cells, MAX_COLUMNS, Request, assemble};
 use crate::error::{Error, Place, Result};
 use std::io::{BufReader, Read, Seek};
 use twincal::Finding;
@@ -94,11 +95,12 @@ struct Array {
 
 /// Reads an NPZ log.
 pub(super) fn read(
-    source: impl Read + Seek,
+    mut source: impl Read + Seek,
     request: Request<'_>,
 ) -> Result<(Log<'static>, Vec<Finding>)> {
     let name = request.name;
     let refuse = |problem: String, remedy: &str| Error::content(Place::file(name), problem, remedy);
+    directory::check(&mut source, MAX_ARRAYS, name)?;
     let mut archive = ZipArchive::new(source)
         .map_err(|e| refuse(format!("is not a whole NPZ file: {e}"), "write it again"))?;
     if archive.len() > MAX_ARRAYS {
@@ -129,7 +131,8 @@ pub(super) fn read(
         array.first = columns.len();
         match array.header.shape[..] {
             [_] => columns.push(array.key.clone()),
-            [_, width] if width <= MAX_JOINTS => {
+            // Beyond the limit of columns there is nothing but the error.
+            [_, width] if width <= MAX_JOINTS && columns.len() <= MAX_COLUMNS => {
                 let joint = |number: usize| match names.get(number) {
                     Some(joint) if names.len() == width => format!("{joint}.{}", array.key),
                     _ => format!("{}{}", array.key, number + 1),

@@ -52,7 +52,7 @@ fn time_and_torque_are_header_stamp_and_effort_and_both_are_said() {
     );
     contains(
         &says(&findings, "effort_is_joint_torque").message,
-        &["joint's side", "[log] torque"],
+        &["joint's side", "[[log]] torque"],
     );
 }
 
@@ -273,7 +273,7 @@ fn more_than_one_topic_has_to_be_chosen() {
             "more than one topic",
             "`/commands` (sensor_msgs/msg/JointState, cdr, 200 messages)",
             "`/joint_states`",
-            "[log] topic",
+            "[[log]] topic",
         ],
     );
     let (recording, _) = read_bytes_with(&bytes, &topics(&["/joint_states"])).unwrap();

@@ -19,6 +19,8 @@ use twincal::{Finding, Severity};
 pub(in super::super) const MAX_RECORD: u64 = 256 << 20;
 /// Most bytes of all definitions that are kept.
 pub(super) const MAX_DEFINITIONS: usize = 64 << 20;
+/// Largest record of a schema or a channel, bytes.
+const MAX_DECLARATION: usize = 16 << 20;
 /// Most channels of a file.
 const MAX_CHANNELS: usize = 10_000;
 /// Most chunks that are unpacked side by side, and the unpacked bytes from which on no further one joins them.
@@ -399,6 +401,15 @@ impl Reader<'_, '_> {
     fn record(&mut self, opcode: u8, body: &[u8]) -> std::result::Result<(), Damage> {
         if opcode == op::MESSAGE {
             return self.message(body);
+        }
+        if matches!(opcode, op::SCHEMA | op::CHANNEL) && body.len() > MAX_DECLARATION {
+            return Err(Damage::File(self.refuse(
+                format!(
+                    "a schema or channel has {} bytes, the limit is {MAX_DECLARATION}",
+                    body.len()
+                ),
+                "record it again with the message's own definition",
+            )));
         }
         match parse(opcode, body) {
             Ok(Record::Schema { header, data }) => {

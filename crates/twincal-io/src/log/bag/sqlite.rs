@@ -68,7 +68,10 @@ pub(super) fn read(
     let mut definitions = definitions(&bag).map_err(broken)?;
     let mut topics: BTreeMap<i64, TopicId> = BTreeMap::new();
     let mut query = bag
-        .prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id")
+        .prepare(
+            "SELECT id, substr(name, 1, 5000), substr(type, 1, 5000), substr(serialization_format, 1, 5000) \
+             FROM topics ORDER BY id",
+        )
         .map_err(broken)?;
     let mut rows = query.query([]).map_err(broken)?;
     while let Some(row) = rows.next().map_err(broken)? {
