@@ -225,17 +225,17 @@ fn a_twin_is_made_of_its_own_files_and_of_no_more_than_a_twin_needs() {
     );
     fs::remove_file(target.join(MANIFEST)).unwrap();
     // Sizes are compared with their limits before anything is read.
-    let claims = manifest.replace("\"bytes\": 100000", "\"bytes\": 1000000000");
+    let claims = manifest.replace("\"bytes\": 100000", "\"bytes\": 5000000000");
     assert_ne!(claims, manifest);
     fs::write(target.join(MANIFEST), &claims).unwrap();
     let report = fs::File::options()
         .write(true)
         .open(target.join(REPORT))
         .unwrap();
-    report.set_len(1_000_000_000).unwrap();
+    report.set_len(5_000_000_000).unwrap();
     let error = refused(Artifact::open(&target));
     assert!(
-        error.contains("has 1000000000 bytes by the manifest"),
+        error.contains("has 5000000000 bytes by the manifest"),
         "{error}"
     );
     let file = fs::File::create(target.join(MANIFEST)).unwrap();

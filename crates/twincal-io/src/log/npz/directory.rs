@@ -41,9 +41,7 @@ fn claims(source: &mut (impl Read + Seek)) -> io::Result<Option<(u64, u64)>> {
     let from = length.saturating_sub(COMMENT + (END + LOCATOR) as u64);
     source.seek(SeekFrom::Start(from))?;
     let mut tail = Vec::new();
-    (&mut *source)
-        .take(length - from)
-        .read_to_end(&mut tail)?;
+    (&mut *source).take(length - from).read_to_end(&mut tail)?;
     let end = (tail.windows(4)).rposition(|four| four == b"PK\x05\x06");
     let found = match end.filter(|end| tail.len() - end >= END) {
         None => None,
@@ -64,9 +62,7 @@ fn claims(source: &mut (impl Read + Seek)) -> io::Result<Option<(u64, u64)>> {
 fn large(source: &mut (impl Read + Seek), at: u64) -> io::Result<Option<(u64, u64)>> {
     source.seek(SeekFrom::Start(at))?;
     let mut end = Vec::new();
-    (&mut *source)
-        .take(END_64 as u64)
-        .read_to_end(&mut end)?;
+    (&mut *source).take(END_64 as u64).read_to_end(&mut end)?;
     let whole = end.len() == END_64 && end.starts_with(b"PK\x06\x06");
     Ok(whole.then(|| (number(&end, 32, 8), number(&end, 40, 8))))
 }
