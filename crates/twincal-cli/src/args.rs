@@ -51,7 +51,7 @@ Examples:
     #[command(before_help = "\
 Examples:
   twincal init run*.csv --model arm.urdf
-  twincal fit --config twincal.toml
+  twincal fit                                reads ./twincal.toml
 ")]
     Init(Init),
     /// Discover what the model misses, estimate it, validate on held-out data.
