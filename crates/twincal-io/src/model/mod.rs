@@ -238,10 +238,10 @@ fn refuse_too_many(document: &Document) -> Result<()> {
 /// Refuses names that no program writes: they would fill every message and table.
 fn refuse_long_names(document: &Document) -> Result<()> {
     for element in &document.elements {
-        let names = element.attributes.iter().filter(|attribute| {
+        let mut names = element.attributes.iter().filter(|attribute| {
             attribute.value.len() > MAX_NAME && NAMES.contains(&attribute.name.as_str())
         });
-        if let Some(long) = names.into_iter().next() {
+        if let Some(long) = names.next() {
             let problem = format!(
                 "<{}> {}=\"{}\" has {} bytes, the limit is {MAX_NAME}",
                 xml::shorten(&element.name),
