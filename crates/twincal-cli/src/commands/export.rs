@@ -1,9 +1,9 @@
 //! `twincal export`: the calibrated model as a file of the user's own kind, or as code.
 
-use super::print_json;
 use super::summary::{self, paragraph, wrapped};
 use super::table::{print_table, table};
 use super::verdict::doubt;
+use super::{print_json, reads};
 use crate::args::{Beyond as BeyondFormat, Export, ExportFormat};
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
@@ -139,9 +139,12 @@ fn target(format: ExportFormat) -> Target {
 }
 
 /// The file that takes the result; standard output where there is none.
-fn open(flags: &Export) -> Outcome<Option<OutputFile>> {
+fn open(flags: &Export, stored: &StoredTwin) -> Outcome<Option<OutputFile>> {
     match &flags.output {
-        Some(path) => Ok(Some(OutputFile::create(path, flags.force)?)),
+        Some(path) => {
+            let inputs = reads::of_twin(&flags.twin, stored);
+            Ok(Some(OutputFile::create(path, flags.force, &inputs)?))
+        }
         None => Ok(None),
     }
 }
@@ -171,8 +174,8 @@ fn shown(flags: &Export) -> String {
 
 /// Code that computes torque and interval.
 fn code(flags: &Export, language: Language, terminal: &mut Terminal) -> Outcome<u8> {
-    let output = open(flags)?;
     let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, true)?;
+    let output = open(flags, &stored)?;
     let twin = &stored.calibration.twin;
     let mut about = vec![
         format!(
@@ -245,8 +248,8 @@ fn code(flags: &Export, language: Language, terminal: &mut Terminal) -> Outcome<
 
 /// The model average.
 fn one(flags: &Export, kind: Kind, terminal: &mut Terminal) -> Outcome<u8> {
-    let output = open(flags)?;
     let (stored, model) = read(flags, kind)?;
+    let output = open(flags, &stored)?;
     let change = Writer::new(&stored.calibration, kind.holds)?.mean()?;
     let bytes = write_model(&model, &change)?;
     let findings = doubts(&stored, terminal);
@@ -293,8 +296,8 @@ fn draws(
     } else {
         Replace::Never
     };
-    let claim = Claim::new(folder, replace)?;
     let (stored, model) = read(flags, kind)?;
+    let claim = Claim::new(folder, replace, &reads::of_twin(&flags.twin, &stored))?;
     let findings = doubts(&stored, terminal);
     let writer = Writer::new(&stored.calibration, kind.holds)?;
     let seed = flags.seed.unwrap_or(stored.context.seed);

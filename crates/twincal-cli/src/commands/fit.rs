@@ -2,14 +2,14 @@
 
 use super::calibration::{Job, command, say_where};
 use super::inputs::{LogInput, Long, RobotInput};
-use super::{settings, start_threads};
+use super::{reads, settings, start_threads};
 use crate::args::Fit;
 use crate::clock::Stopwatch;
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::path::PathBuf;
-use twincal_io::artifact::{Claim, Maker, Replace};
+use twincal_io::artifact::{Claim, Inputs, Maker, Replace};
 use twincal_io::report::FileHash;
 
 pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
@@ -33,6 +33,13 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     let Some(model) = &settings.model_file else {
         return Err(super::no_model());
     };
+    let mut inputs = Inputs::default();
+    let read = reads::Given {
+        flags: &flags.log,
+        config: &config,
+        settings: &settings,
+    };
+    reads::add_given(&mut inputs, &read, given);
     let claim = Claim::new(
         &settings.output,
         if settings.force {
@@ -40,6 +47,7 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
         } else {
             Replace::Never
         },
+        &inputs,
     )?;
     start_threads(settings.threads)?;
     let progress = Progress::new();

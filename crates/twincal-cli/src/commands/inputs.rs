@@ -1,7 +1,7 @@
 //! Model and logs as the commands need them: read, named, hashed, and small enough for the memory there is.
 
 use super::as_fitted::AsFitted;
-use crate::failure::{Failure, Outcome};
+use crate::failure::Outcome;
 use crate::names::display_names;
 use crate::progress::Progress;
 use std::path::{Path, PathBuf};
@@ -246,30 +246,6 @@ fn in_memory(log: &Log<'_>) -> u64 {
         Log::Whole(_) => log.samples(),
         Log::Long(long) => long.samples().iter().copied().max().unwrap_or(0) as u64,
     }
-}
-
-/// Refuses an output that is one of the inputs or lies in one of their folders: `--force` means an earlier result.
-pub(super) fn refuse_input_as_output(output: &Path, inputs: &[&PathBuf]) -> Outcome<()> {
-    // An output that does not exist yet replaces nothing.
-    let Ok(real) = output.canonicalize() else {
-        return Ok(());
-    };
-    for input in inputs {
-        if input
-            .canonicalize()
-            .is_ok_and(|input| real.starts_with(input))
-        {
-            return Err(Failure::usage(
-                format!(
-                    "{} is read by this command ({}) and would be overwritten",
-                    output.to_string_lossy(),
-                    input.to_string_lossy()
-                ),
-                "give another output with -o",
-            ));
-        }
-    }
-    Ok(())
 }
 
 /// Checksum of a log; of a folder that of the lines `sha256sum` prints for its files, in the order of their recording.

@@ -15,7 +15,7 @@ fn files(word: &str) -> Vec<(&'static str, Vec<u8>)> {
 }
 
 fn write(target: &Path, word: &str, replace: Replace) -> crate::Result<()> {
-    Claim::new(target, replace)?.commit(Maker::Fit, files(word))
+    Claim::new(target, replace, &Inputs::default())?.commit(Maker::Fit, files(word))
 }
 
 fn word(target: &Path) -> String {
@@ -82,7 +82,7 @@ fn case_97_killed_after_each_step_the_artefact_is_whole() {
             assert_eq!(word(&target), "{\"is\":\"old\"}", "step {number}");
         }
         // The next run cleans up, and brings the old artefact back before it does its own work.
-        drop(Claim::new(&target, Replace::Artifact).unwrap());
+        drop(Claim::new(&target, Replace::Artifact, &Inputs::default()).unwrap());
         assert_eq!(word(&target), "{\"is\":\"old\"}", "step {number}");
         assert!(leftovers(folder.path()).is_empty(), "step {number}");
     }
@@ -143,8 +143,8 @@ fn case_99_file_symlink_read_only_and_foreign_folders_are_refused() {
 fn case_101_second_writer_is_refused_while_the_first_works() {
     let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("out");
-    let first = Claim::new(&target, Replace::Never).unwrap();
-    let second = Claim::new(&target, Replace::Artifact)
+    let first = Claim::new(&target, Replace::Never, &Inputs::default()).unwrap();
+    let second = Claim::new(&target, Replace::Artifact, &Inputs::default())
         .unwrap_err()
         .to_string();
     assert!(second.contains("another twincal is writing"), "{second}");
@@ -218,16 +218,16 @@ fn only_its_own_maker_replaces_a_demo() {
     let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("twincal-demo");
     write(&target, "fit", Replace::Never).unwrap();
-    let error = Claim::new(&target, Replace::MadeBy(Maker::Demo))
+    let error = Claim::new(&target, Replace::MadeBy(Maker::Demo), &Inputs::default())
         .unwrap_err()
         .to_string();
     assert!(error.contains("not written by this command"), "{error}");
     fs::remove_dir_all(&target).unwrap();
-    Claim::new(&target, Replace::Never)
+    Claim::new(&target, Replace::Never, &Inputs::default())
         .unwrap()
         .commit(Maker::Demo, files("demo"))
         .unwrap();
-    Claim::new(&target, Replace::MadeBy(Maker::Demo))
+    Claim::new(&target, Replace::MadeBy(Maker::Demo), &Inputs::default())
         .unwrap()
         .commit(Maker::Demo, files("again"))
         .unwrap();
@@ -238,18 +238,18 @@ fn only_its_own_maker_replaces_a_demo() {
 fn output_file_appears_only_when_complete() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("p.csv");
-    let mut output = OutputFile::create(&path, false).unwrap();
+    let mut output = OutputFile::create(&path, false, &Inputs::default()).unwrap();
     let written = output.file().unwrap().write_all(b"t\n");
     assert!(!path.exists());
     output.commit(written).unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"t\n");
     assert!(
-        OutputFile::create(&path, false)
+        OutputFile::create(&path, false, &Inputs::default())
             .unwrap_err()
             .to_string()
             .contains("--force")
     );
-    let output = OutputFile::create(&path, true).unwrap();
+    let output = OutputFile::create(&path, true, &Inputs::default()).unwrap();
     let error = output
         .commit(Err(std::io::Error::other("disk full")))
         .unwrap_err()

@@ -81,6 +81,11 @@ impl Config {
         Ok(config)
     }
 
+    /// The file that it was read from; `None` for settings of flags alone.
+    pub fn path(&self) -> Option<&Path> {
+        self.source.as_ref().map(|source| Path::new(&source.name))
+    }
+
     /// Reads a config from its text; `name` is used in messages.
     ///
     /// # Errors

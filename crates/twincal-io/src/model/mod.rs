@@ -9,7 +9,7 @@ mod urdf;
 
 use crate::error::{Error, Place, Result};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::robot::spatial::{apply, roll_pitch_yaw, transpose};
 use twincal::robot::{Robot, RobotDescription};
@@ -138,6 +138,24 @@ pub fn read_model(path: &Path, settings: &ModelSettings) -> Result<Model> {
     refuse_by_extension(&name, path)?;
     let bytes = read_limited(path, &name)?;
     parse(&name, bytes, Some(path), settings)
+}
+
+/// The files that a model consists of: itself and what an MJCF includes, as far as it can be read.
+pub fn files_of(path: &Path) -> Vec<PathBuf> {
+    let mut files = vec![path.to_owned()];
+    let name = path.display().to_string();
+    // A pipe can be read once.
+    if path.is_file()
+        && let Ok(bytes) = read_limited(path, &name)
+    {
+        let mut document = Document::default();
+        // What is wrong with it is said when the model is read.
+        let _ = (document.parse(&name, &bytes))
+            .and_then(|_| include::expand(&mut document, Some(path)));
+        let included = document.files.iter().skip(1);
+        files.extend(included.map(|file| path.with_file_name("").join(&file.name)));
+    }
+    files
 }
 
 /// Reads a model from memory; `name` stands in messages. MJCF includes are refused.

@@ -9,7 +9,7 @@ mod propose;
 mod units;
 
 use super::inspect::library::{ComponentRow, component_rows};
-use super::{code_of, print_json, require_strict, settings, start_threads};
+use super::{code_of, print_json, reads, require_strict, settings, start_threads};
 use crate::args;
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
@@ -24,7 +24,7 @@ use twincal::incidents::Incident;
 use twincal::lag::LogLag;
 use twincal::self_check::JointCheck;
 use twincal::signal::{Agreement, LogOverview, Pipeline, Steps};
-use twincal_io::artifact::OutputFile;
+use twincal_io::artifact::{Inputs, OutputFile};
 use twincal_io::config::{Config, Settings};
 
 /// Where `init` writes.
@@ -131,7 +131,14 @@ pub(super) fn run(flags: &args::Doctor, terminal: &mut Terminal) -> Outcome<u8> 
 pub(super) fn init(flags: &args::Init, terminal: &mut Terminal) -> Outcome<u8> {
     let asked = Asked::of(&flags.look, "init", terminal)?;
     let target = flags.output.clone().unwrap_or_else(|| USUAL.into());
-    let mut output = OutputFile::create(&target, flags.force)?;
+    let mut inputs = Inputs::default();
+    let given = reads::Given {
+        flags: &flags.look.log,
+        config: &asked.config,
+        settings: &asked.settings,
+    };
+    reads::add_given(&mut inputs, &given, &asked.logs);
+    let mut output = OutputFile::create(&target, flags.force, &inputs)?;
     start_threads(asked.settings.threads)?;
     let progress = Progress::new();
     let examination = examine(
