@@ -27,7 +27,7 @@ mod parquet;
 mod preset;
 mod scratch;
 mod shared_file;
-mod stamps;
+pub(crate) mod stamps;
 mod torque;
 
 pub(crate) use assemble::assemble;

@@ -176,7 +176,8 @@ pub(super) fn read(
             .collect();
         let (key, mut file) = open(&mut archive, array.entry, name)?;
         header(&mut file, name, &key)?;
-        if let Err(e) = values(file, array, rows, &targets, &mut sinks) {
+        let read = values(&mut file, array, rows, &targets, &mut sinks);
+        if let Err(e) = read.and_then(|()| end(&mut file)) {
             let damaged = || refuse(format!("array `{key}` is damaged: {e}"), "write it again");
             return Err(disk_failure(name, &sinks).unwrap_or_else(damaged));
         }
@@ -317,9 +318,17 @@ fn parse(text: &str) -> std::result::Result<Header, String> {
     })
 }
 
+/// Reads an entry to its end, where its checksum is compared.
+fn end(file: &mut impl Read) -> std::io::Result<()> {
+    match file.read(&mut [0])? {
+        0 => Ok(()),
+        _ => Err(std::io::Error::other("it goes on behind its last number")),
+    }
+}
+
 /// Text of an array of names.
 fn text<R: Read + Seek>(
-    file: BufReader<ZipFile<'_, R>>,
+    mut file: BufReader<ZipFile<'_, R>>,
     header: &Header,
     name: &str,
     key: &str,
@@ -330,8 +339,10 @@ fn text<R: Read + Seek>(
         return Ok(Vec::new());
     }
     let mut bytes = Vec::new();
-    file.take((count * cell) as u64)
+    (&mut file)
+        .take((count * cell) as u64)
         .read_to_end(&mut bytes)
+        .and_then(|_| end(&mut file))
         .map_err(|e| {
             Error::content(
                 Place::file(name),
@@ -355,7 +366,7 @@ fn text<R: Read + Seek>(
 
 /// Reads the data behind the header into the columns that are wanted.
 fn values<R: Read + Seek>(
-    mut file: BufReader<ZipFile<'_, R>>,
+    file: &mut BufReader<ZipFile<'_, R>>,
     array: &Array,
     rows: usize,
     targets: &[Option<usize>],

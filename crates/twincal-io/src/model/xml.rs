@@ -436,6 +436,13 @@ fn decode(name: &str, bytes: &[u8]) -> Result<String> {
     if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
         return fail("the file is UTF-16".into(), "save it as UTF-8");
     }
+    if let Some(at) = bytes.iter().position(|byte| *byte == 0) {
+        return Err(Error::content(
+            Place::of_offset(name, bytes, at),
+            "there is a NUL byte in the text",
+            "save the file as UTF-8 text without it",
+        ));
+    }
     match std::str::from_utf8(bytes) {
         Ok(text) => Ok(text.into()),
         Err(error) => Err(Error::content(

@@ -522,6 +522,7 @@ fn a_coarser_clock_changes_no_row() {
     let of_joint = |values: &[f64], joint: usize| values[joint * len..(joint + 1) * len].to_vec();
     let recording = Recording {
         unfolded: false,
+        start_ns: 0,
         name: "run".into(),
         joints: (0..dof)
             .map(|joint| Channels {

@@ -150,6 +150,7 @@ impl<'a> PreparedLog<'a> {
         PreparedLog {
             log: Cow::Owned(Recording {
                 unfolded: self.log.unfolded,
+                start_ns: self.log.start_ns,
                 name: self.log.name.clone(),
                 time: Vec::new(),
                 joints: channels.collect(),

@@ -124,8 +124,11 @@ pub struct Recording {
     pub unfolded: bool,
     /// Name as given by the user.
     pub name: String,
-    /// Time stamps as logged, s.
+    /// Time stamps, s from [`Recording::start_ns`] on.
     pub time: Vec<f64>,
+    /// Where time counts from, ns: 0 for a log whose stamps are in `time` as they are, of a bag the first stamp (ns since 1970), which
+    /// a double would round to 0.2 µs.
+    pub start_ns: i64,
     /// One entry per moving joint of the robot, in order.
     pub joints: Vec<Channels>,
     /// What the robot carried.

@@ -68,6 +68,7 @@ fn recording(
         .collect();
     Recording {
         unfolded: false,
+        start_ns: 0,
         name: "run".into(),
         time,
         joints,

@@ -58,6 +58,7 @@ fn recording() -> Recording {
     });
     Recording {
         unfolded: false,
+        start_ns: 0,
         name: "run".into(),
         time,
         joints: joints.to_vec(),
@@ -91,6 +92,7 @@ impl ReadChapter for Cut {
         };
         Ok(Recording {
             unfolded: false,
+            start_ns: 0,
             name: String::new(),
             time: part(&self.recording.time),
             joints: self.recording.joints.iter().map(joint).collect(),

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Place, Result};
 use saphyr_parser::{Event, Parser};
+use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 use twincal::{Finding, Severity};
 
@@ -42,8 +43,20 @@ pub(super) fn files(folder: &Path) -> Result<(Vec<PathBuf>, Vec<Finding>)> {
                 "write it anew with `ros2 bag reindex`, or remove it: the files are then taken by name",
             ));
         }
-        let files = listed.iter().map(|path| inside(folder, &place, path));
-        return Ok((files.collect::<Result<_>>()?, Vec::new()));
+        let mut files = Vec::with_capacity(listed.len());
+        let mut known = BTreeSet::new();
+        for path in &listed {
+            let file = inside(folder, &place, path)?;
+            if !known.insert(file.canonicalize().map_err(|e| system(&e))?) {
+                return Err(Error::content(
+                    Place::file(place),
+                    format!("names the file `{path}` twice: its messages would count twice"),
+                    "write it anew with `ros2 bag reindex`, or name every file once in relative_file_paths",
+                ));
+            }
+            files.push(file);
+        }
+        return Ok((files, Vec::new()));
     }
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|e| system(&e))? {

@@ -6,7 +6,7 @@ use super::part::{IN_TABLES, LISTS, Part, Rows, Stored};
 use crate::error::{Error, Place, Result};
 use crate::log::Cells;
 use crate::log::cells::unreadable;
-use crate::log::stamps::seconds;
+use crate::log::stamps::{since, start};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
@@ -261,6 +261,8 @@ fn fill(
     }
     let (own, wanted) = (&used[slowest].rows, wanted(slowest));
     let (mut rows, mut lost) = (0_usize, 0);
+    let origin = start(&own.block(0, &[]).map_err(of_disk)?.stamps);
+    cells.origin = Some(origin);
     for number in 0..own.blocks() {
         let block = own.block(number, &wanted).map_err(of_disk)?;
         for (row, &stamp) in block.stamps.iter().enumerate() {
@@ -268,7 +270,7 @@ fn fill(
                 walk.to(stamp).map_err(of_disk)?;
             }
             let mut is_whole = true;
-            cells.columns[0].push(seconds(stamp));
+            cells.columns[0].push(since(origin, stamp));
             for (column, source) in cells.columns[1..].iter_mut().zip(sources) {
                 let value = match &walks[source.of] {
                     Some(walk) => walk.value(source.column, source.is_angle, stamp),

@@ -4,6 +4,7 @@ use super::definition::MAX_TEXT;
 use super::joint_states::{JointStates, TopicId};
 use super::mapping::Schema;
 use super::mcap::MAX_RECORD;
+use super::unpack::PackedMessages;
 use crate::error::{Error, Place, Result};
 use rusqlite::limits::Limit;
 use rusqlite::{Connection, OpenFlags};
@@ -11,11 +12,6 @@ use std::collections::BTreeMap;
 use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 use std::rc::Rc;
-
-/// First bytes of a Zstandard frame: rosbag2 can pack messages one by one.
-const ZSTD: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
-/// Largest message when unpacked, bytes.
-const MAX_MESSAGE: usize = 1 << 20;
 
 /// Hands all messages of topics that are read in the file at `path` to `sink`; `file` is what messages call it.
 ///
@@ -67,6 +63,7 @@ pub(super) fn read(path: &Path, file: &str, sink: &mut JointStates<'_>) -> Resul
         .prepare("SELECT topic_id, timestamp, data FROM messages ORDER BY id")
         .map_err(broken)?;
     let mut rows = query.query([]).map_err(broken)?;
+    let mut packed = PackedMessages::default();
     while let Some(row) = rows.next().map_err(broken)? {
         let (topic, time): (i64, i64) = (row.get(0).map_err(broken)?, row.get(1).map_err(broken)?);
         let Some(&topic) = topics.get(&topic) else {
@@ -81,13 +78,12 @@ pub(super) fn read(path: &Path, file: &str, sink: &mut JointStates<'_>) -> Resul
             .as_bytes()
             .map_err(|_| broken(rusqlite::Error::InvalidQuery))?;
         let time = time.cast_unsigned();
-        if data.starts_with(&ZSTD) && sink.reads(topic) {
-            // What cannot be unpacked is dropped and counted like any message that cannot be read.
-            let unpacked = zstd::bulk::decompress(data, MAX_MESSAGE).unwrap_or_default();
-            sink.message(topic, time, &unpacked)?;
+        let data = if sink.reads(topic) {
+            packed.unpack(data)
         } else {
-            sink.message(topic, time, data)?;
-        }
+            data
+        };
+        sink.message(topic, time, data)?;
     }
     Ok(())
 }
