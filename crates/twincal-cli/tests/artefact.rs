@@ -151,7 +151,7 @@ fn case_100_existing_output_needs_force_and_foreign_files_are_kept() {
         ["predict", "run.csv", "--twin", "twin", "-o", "run.csv"],
     )
     .expect(2)
-    .says(&["run.csv is read by this command"]);
+    .says(&["run.csv: is read by this command"]);
     fs::write(folder.path().join("p.csv"), "mine").unwrap();
     run(
         folder.path(),

@@ -258,3 +258,23 @@ fn a_link_beside_the_output_is_not_followed() {
     run(folder.path(), line).expect(0);
     assert!(fs::read(folder.path().join("run.csv")).unwrap() == log);
 }
+
+/// A link or a pipe in the place of the lock ends the command; it waits for nobody.
+#[test]
+fn a_lock_that_is_no_file_is_refused() {
+    let folder = fitted_copy();
+    let digest = twincal_io::artifact::sha256(b"new.c");
+    let lock = folder
+        .path()
+        .join(format!(".twincal-{}.lock", &digest[..16]));
+    let line = ["export", "--twin", "twin", "--to", "c", "-o", "new.c"];
+    std::os::unix::fs::symlink("run.csv", &lock).unwrap();
+    let log = fs::read(folder.path().join("run.csv")).unwrap();
+    run(folder.path(), line).expect(2);
+    assert!(fs::read(folder.path().join("run.csv")).unwrap() == log);
+    fs::remove_file(&lock).unwrap();
+    let made = std::process::Command::new("mkfifo").arg(&lock).status();
+    assert!(made.unwrap().success());
+    run(folder.path(), line).expect(2);
+    assert!(!folder.path().join("new.c").exists());
+}

@@ -56,9 +56,8 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
                 settings: &settings,
             };
             reads::add_given(&mut inputs, &given, &flags.logs);
-            let format = TableFormat::of_path(path)?;
             let output = OutputFile::create(path, flags.force, &inputs)?;
-            Some((format, path, output))
+            Some((TableFormat::of_path(path)?, path, output))
         }
         None => None,
     };

@@ -91,7 +91,7 @@ mod tests {
         let last = table.trim_end().rfind('\n').unwrap() + 1;
         for end in last..=table.len() {
             let read = read_csv(
-                table[..end].as_bytes(),
+                &table.as_bytes()[..end],
                 0,
                 "run.csv",
                 &robot,
