@@ -1,5 +1,4 @@
 //! Rows against brute force: a stand-in model whose columns are known functions of the motion.
-
 use super::evaluate::Source;
 use super::*;
 use crate::lanes::Aligned;
