@@ -35,4 +35,4 @@ pub mod calibrate;
 pub mod evaluator;
 pub mod write_back;
 
-pub use error::{Error, Finding, Result, Severity};
+pub use error::{Error, Finding, Mistake, Result, Severity};
