@@ -31,6 +31,7 @@ pub mod plug_in;
 pub mod twin;
 pub mod compare;
 pub mod validate;
+pub mod cross_check;
 pub mod calibrate;
 pub mod evaluator;
 pub mod write_back;

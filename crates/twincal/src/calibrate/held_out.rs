@@ -1,5 +1,6 @@
 //! Held-out truth: what to leave out, fit without it, predict it, score it.
 
+use super::another_state;
 use super::data::{Data, Log, Trajectories};
 use super::independent_rows::LEAST_EFFECTIVE_ROWS;
 use super::{CalibrationSettings, Fitted, Stage, compact, estimate, friction_only, noise_of};
@@ -123,8 +124,9 @@ pub(super) fn validate(
         };
         for left_out in &fold.held_out {
             let LeftOut { rows, motion, from } = *left_out;
-            held_out.score_kept(predictors, rows, from);
-            held_out.score_raw(
+            let mut own = HeldOut::new(twin.robot.joint_names());
+            own.score_kept(predictors, rows, from);
+            own.score_raw(
                 &twin.robot,
                 library,
                 &twin.pipeline,
@@ -132,6 +134,11 @@ pub(super) fn validate(
                 motion,
                 from,
             )?;
+            if plan.split == Split::HeldoutLogs {
+                let memory: Vec<f64> = average.noise.iter().map(JointNoise::memory).collect();
+                findings.extend(another_state::finding(&rows.log, &own.within(), &memory));
+            }
+            held_out += own;
         }
     }
     Ok((held_out.finish(plan.split), findings))

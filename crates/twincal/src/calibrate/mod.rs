@@ -1,8 +1,10 @@
 //! The whole road, from a robot and its logs to a calibrated twin, in one function that reads like the paper.
 
 mod again;
+mod another_state;
 mod compact;
 mod components;
+mod cross_checked;
 mod curves;
 mod data;
 mod drift;
@@ -49,6 +51,7 @@ pub use result::{
 pub use ripples::UnaskedRipple;
 pub use stopped::Stopped;
 
+use crate::cross_check::odd_torque;
 use crate::error::{Error, Finding, Result};
 use crate::infer::{Choice, Given, InferenceSettings, infer, sample, sampled_likelihood};
 use crate::lag::{LogLag, estimate_lag, lag_findings};
@@ -62,8 +65,8 @@ use crate::prior::PriorSettings;
 use crate::robot::Robot;
 use crate::self_check::self_check;
 use crate::signal::{
-    Auto, Corrections, Log, Logs, ReadyLog, SignalSettings, choose_and_prepare, constant_torque,
-    hardly_driven, ready,
+    Auto, Corrections, Log, Logs, ReadyLog, SignalSettings, Trajectory, choose_and_prepare,
+    constant_torque, hardly_driven, ready,
 };
 use crate::term::{Family, Library, LibrarySettings};
 use crate::twin::Twin;
@@ -176,14 +179,27 @@ pub fn calibrate<'a>(
     let mut findings = Vec::new();
     let recordings = (logs.into(), heldout.into());
     let every_log = recordings.0.0.iter().chain(&recordings.1.0);
-    let shelves: Vec<_> = every_log.filter_map(Log::shelf).collect();
+    let shelves: Vec<_> = every_log.clone().filter_map(Log::shelf).collect();
+    let every_log: Vec<Log<'_>> = every_log.map(Log::lent).collect();
+    let as_recorded = cross_checked::as_recorded(robot, &every_log);
+    drop(every_log);
+    let as_recorded = as_recorded.map_err(|error| Stopped {
+        error,
+        findings: Vec::new(),
+    })?;
     let calibration = whole_road(robot, recordings, settings, progress, &mut findings);
     // Numbers that could not be read back are behind whatever came out.
     let calibration = match shelves.iter().find_map(|shelf| shelf.failure()) {
         Some(failure) => Err(failure),
         None => calibration,
     };
-    calibration.map_err(|error| Stopped { error, findings })
+    match calibration {
+        Ok(calibration) => Ok(cross_checked::told(calibration, as_recorded)),
+        Err(error) => {
+            findings.extend(as_recorded);
+            Err(Stopped { error, findings })
+        }
+    }
 }
 
 /// From logs to a calibration; `recordings` are gone as soon as nobody needs them.
@@ -236,7 +252,12 @@ fn road(
     let elsewhere = sweep::pipelines(&pipeline, settings);
     let pipelines = (&pipeline, &elsewhere[..]);
     let (mut data, trajectories) = Data::read(robot, &library, pipelines, &prepared, &others)?;
-    findings.extend(self_check(robot, &pipeline, trajectories.all())?);
+    let compared = self_check(robot, &pipeline, trajectories.all())?;
+    if goal != Goal::Count {
+        let all: Vec<&Trajectory> = trajectories.all().collect();
+        findings.extend(odd_torque(robot, &pipeline, &all, compared.is_empty()));
+    }
+    findings.extend(compared);
     let lags: Vec<LogLag> = trajectories
         .all()
         .filter_map(|trajectory| estimate_lag(robot, &pipeline, trajectory))

@@ -2,8 +2,8 @@
 
 use super::conformal::stretch;
 use super::{
-    ConformalKeeper, PitKeeper, Reliability, RivalKeeper, ScoreKeeper, Split, Trace, TraceRows,
-    Validation,
+    ConformalKeeper, PitKeeper, Reliability, RivalKeeper, ScoreKeeper, Scores, Split, Trace,
+    TraceRows, Validation,
 };
 use crate::error::{Finding, Result};
 use crate::observations::Observations;
@@ -285,6 +285,11 @@ impl HeldOut {
             );
         }
         collected.rows += block.len;
+    }
+
+    /// Scores of the moving rows within the training motion, see [`Validation::within`].
+    pub(crate) fn within(&self) -> Scores {
+        self.within.scores()
     }
 
     /// The scores of everything seen.

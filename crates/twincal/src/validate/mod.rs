@@ -6,6 +6,7 @@ mod pit;
 mod rivals;
 mod scores;
 mod trace;
+mod trend;
 
 pub use conformal::{Conformal, ConformalKeeper, JointFactor};
 pub use heldout::{HeldOut, Predictors};
@@ -13,6 +14,7 @@ pub use pit::{Pit, PitKeeper, Reliability};
 pub use rivals::{Loss, RivalKeeper};
 pub use scores::{CoverageKeeper, ScoreKeeper};
 pub use trace::{MAX_POINTS, TraceRows};
+pub use trend::{TREND_ALARM, TREND_FEWEST, Trend};
 
 use serde::{Deserialize, Deserializer, Serialize};
 

@@ -1,0 +1,265 @@
+//! Torque of one log or one joint that is scaled, turned, or on a clock of its own, by a common fit of all logs and joints.
+
+use super::common_fit::{CommonFit, Effect, Fitted};
+use super::rows::{Block, blocks, parameters};
+use crate::error::{Finding, Severity};
+use crate::robot::Robot;
+use crate::signal::{Pipeline, Trajectory};
+use crate::words::significant;
+
+/// Standard deviations from which a factor is believed. Real logs without a fault reach 10 (double pendulum, whose friction is not the same in each run), simulated
+/// ones 6 (LuGre friction); a factor of 1.2 in one of three logs of 12 s has 40 and more.
+const CLEAR: f64 = 12.0;
+/// Difference of a factor from 1 from which it matters: held-out error or a mass changes by a tenth.
+const MATTERS: f64 = 0.1;
+/// What the factor explains at least, over what is left in its rows.
+const EXPLAINS: f64 = 0.15;
+/// Share of torque that may be left where a factor is believed: else this is not the robot of the model.
+const LEFT: f64 = 0.3;
+/// Sum of squares with a log turned, over that as it is, below which it is turned.
+const TURNED: f64 = 0.3;
+/// Factors that are looked for one after the other, and steps to each.
+const MOST: usize = 3;
+const STEPS: usize = 12;
+/// Change of a factor below which it is found.
+const FOUND: f64 = 0.002;
+/// Standard deviations from which a drift is believed: probability 6e-7, by Student's t with 20 seconds or more 7e-5.
+const DRIFTS: f64 = 5.0;
+const SECONDS: usize = 20;
+/// Share by which two clocks may differ: quartz keeps 1e-4.
+const CLOCKS: f64 = 3e-4;
+
+/// Whose torque.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Whose {
+    Log(usize),
+    Joint(usize),
+}
+
+impl Whose {
+    fn has(self, block: &Block) -> bool {
+        match self {
+            Self::Log(log) => block.log == log,
+            Self::Joint(joint) => block.joint == joint,
+        }
+    }
+}
+
+/// Findings on torque of one log, or one joint, that the others contradict, and on torque whose clock drifts against the motion's.
+///
+/// | finding | what was seen |
+/// |---|---|
+/// | `log_torque_factor` | all torque of a log is larger or smaller by a factor than the other logs' fit, or turned |
+/// | `joint_torque_factor` | torque of a joint is, by what the other joints say of the links that it moves |
+/// | `clock_drift` | the lag of torque behind the motion grows over the log |
+///
+/// Nothing is said of logs with different payloads. `signs_are_right`: [`self_check`](crate::self_check::self_check) found nothing; else joints are not compared.
+pub fn odd_torque(
+    robot: &Robot,
+    pipeline: &Pipeline,
+    logs: &[&Trajectory],
+    signs_are_right: bool,
+) -> Vec<Finding> {
+    let alike = logs
+        .windows(2)
+        .all(|pair| pair[0].payload == pair[1].payload);
+    let rows = if alike {
+        blocks(robot, pipeline, logs)
+    } else {
+        Vec::new()
+    };
+    let Some(mut fit) = CommonFit::new(rows, parameters(robot)) else {
+        return Vec::new();
+    };
+    let names = Names {
+        logs: logs.iter().map(|log| log.name.as_str()).collect(),
+        joints: robot.joint_names(),
+    };
+    let mut findings = Vec::new();
+    for _ in 0..MOST {
+        let Some((whose, factor, sd)) = next_factor(&mut fit, signs_are_right) else {
+            break;
+        };
+        findings.push(names.factor(whose, factor, sd));
+    }
+    findings.extend(drifts(&fit, &names));
+    findings
+}
+
+/// The factor that explains most, which the fit then has; `None` where none is clear.
+fn next_factor(fit: &mut CommonFit, joints_too: bool) -> Option<(Whose, f64, f64)> {
+    let (logs, joints) = (fit.logs(), fit.joints());
+    let mut factor = 1.0;
+    let mut whose = None;
+    if logs.len() > 1 {
+        let turned = logs.iter().map(|&log| (fit.turned(log), log));
+        if let Some((_, log)) = turned
+            .filter(|(share, _)| *share < TURNED)
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+        {
+            whose = Some(Whose::Log(log));
+            factor = -1.0;
+            fit.divide(|block| block.log == log, factor);
+        }
+    }
+    let of = |fit: &CommonFit, whose: Whose| fit.effect(|own| rigid(own, whose));
+    if whose.is_none() {
+        let logs = logs
+            .iter()
+            .filter(|_| logs.len() > 1)
+            .map(|log| Whose::Log(*log));
+        let joints = joints.iter().filter(|_| joints_too && joints.len() > 1);
+        let all = logs.chain(joints.map(|joint| Whose::Joint(*joint)));
+        let effects = all.filter_map(|whose| Some((whose, of(fit, whose)?)));
+        let (best, effect) = effects.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain))?;
+        if effect.size.abs() < 0.5 * MATTERS || effect.explains < EXPLAINS {
+            return None;
+        }
+        let judged = fit.judged(|own| rigid(own, best))?;
+        if judged.z() < CLEAR {
+            return None;
+        }
+        whose = Some(best);
+    }
+    let whose = whose?;
+    for _ in 0..STEPS {
+        let Some(effect) = of(fit, whose) else { break };
+        let step = (1.0 + effect.size).clamp(0.5, 2.0);
+        factor *= step;
+        fit.divide(|block| whose.has(block), step);
+        if (step - 1.0).abs() < FOUND {
+            break;
+        }
+    }
+    let sd = fit.judged(|own| rigid(own, whose))?.sd * factor.abs();
+    let clear = (factor - 1.0).abs() > CLEAR * sd && (factor - 1.0).abs() >= MATTERS;
+    if clear && fit.left(|block| whose.has(block)) < LEFT {
+        return Some((whose, factor, sd));
+    }
+    fit.divide(|block| whose.has(block), 1.0 / factor);
+    None
+}
+
+fn rigid(own: Fitted<'_>, whose: Whose) -> Option<Vec<f64>> {
+    whose.has(own.block()).then(|| own.rigid())
+}
+
+/// Lag that grows: in all logs by one share, or in single ones.
+fn drifts(fit: &CommonFit, names: &Names<'_>) -> Vec<Finding> {
+    let logs = fit.logs();
+    let of = |which: Option<usize>| {
+        let drift = fit.judged(|own| {
+            let block = own.block();
+            which
+                .is_none_or(|log| log == block.log)
+                .then(|| growing(own))
+        })?;
+        let clear = drift.clusters >= SECONDS && drift.z() > DRIFTS && drift.size.abs() > CLOCKS;
+        clear.then_some(drift)
+    };
+    if let Some(drift) = of(None) {
+        return vec![names.drift(None, &drift)];
+    }
+    // Of many logs only those that stand out are looked at closely.
+    let stands_out = |log: &&usize| {
+        let drift = fit.effect(|own| (own.block().log == **log).then(|| growing(own)));
+        logs.len() > 1 && drift.is_some_and(|drift| drift.size.abs() > CLOCKS)
+    };
+    let single = logs.iter().filter(stands_out);
+    single
+        .filter_map(|&log| Some(names.drift(Some(log), &of(Some(log))?)))
+        .collect()
+}
+
+/// What a lag that grows by 1 s per second from the middle of the log on does to torque.
+fn growing(own: Fitted<'_>) -> Vec<f64> {
+    let block = own.block();
+    let mean = block.time.iter().sum::<f64>() / block.rows() as f64;
+    let rate = own.rate();
+    let grown = rate.iter().zip(&block.time);
+    grown.map(|(rate, time)| -(time - mean) * rate).collect()
+}
+
+/// Names of logs and joints, and what is said with them.
+struct Names<'a> {
+    logs: Vec<&'a str>,
+    joints: Vec<&'a str>,
+}
+
+impl Names<'_> {
+    fn factor(&self, whose: Whose, factor: f64, sd: f64) -> Finding {
+        let size = format!("{factor:.2} ± {}", significant(sd.max(0.001), 1));
+        let (code, subject, what, others, columns) = match whose {
+            Whose::Log(log) => {
+                let name = self.logs[log];
+                let others = match &self.logs[..] {
+                    [a, b] => format!(
+                        "`{}` says of the same robot, or the other way round",
+                        if *a == name { b } else { a }
+                    ),
+                    _ => "the other logs say of the same robot".to_owned(),
+                };
+                (
+                    "log_torque_factor",
+                    name,
+                    format!("log `{name}`"),
+                    others,
+                    "its torque columns",
+                )
+            }
+            Whose::Joint(joint) => {
+                let name = self.joints[joint];
+                let others = "the other joints say of the links that it moves".to_owned();
+                (
+                    "joint_torque_factor",
+                    name,
+                    format!("joint `{name}`"),
+                    others,
+                    "its torque column",
+                )
+            }
+        };
+        let mistake = match factor < 0.0 {
+            true => "a sign, ",
+            false => "",
+        };
+        Finding::new(
+            Severity::Warning,
+            code,
+            subject,
+            format!(
+                "{what}: measured torque is {size} times what {others}: look for {mistake}a gain, gear ratio or torque constant there, and multiply \
+                 {columns} by {}",
+                significant(1.0 / factor, 3)
+            ),
+            0,
+        )
+    }
+
+    fn drift(&self, log: Option<usize>, drift: &Effect) -> Finding {
+        let (subject, what) = match log {
+            Some(log) => (self.logs[log], format!("log `{}`", self.logs[log])),
+            None => match &self.logs[..] {
+                [one] => (*one, format!("log `{one}`")),
+                all => ("", format!("all {} logs", all.len())),
+            },
+        };
+        let order = if drift.size > 0.0 { "slower" } else { "faster" };
+        Finding::new(
+            Severity::Warning,
+            "clock_drift",
+            subject,
+            format!(
+                "{what}: the clock of torque is {} % ± {} {order} than that of the motion, so that its lag grows by {} ms in 10 s: log both with one \
+                 clock, or bring the stamps of torque to that of the motion",
+                significant(100.0 * drift.size.abs(), 2),
+                significant(100.0 * drift.sd, 1),
+                significant(1e4 * drift.size.abs(), 2),
+            ),
+            0,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests;
