@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use twincal::calibrate::LookedAt;
+use twincal::cross_check::{copies, odd_torque, stuck_encoders};
 use twincal::incidents::{Incident, motion};
 use twincal::lag::{LogLag, estimate_lag, lag_findings};
 use twincal::robot::Robot;
@@ -54,6 +55,8 @@ pub(super) fn checkup(
     pipeline: &Pipeline,
 ) -> twincal::Result<Checkup> {
     let mut checkup = Checkup::default();
+    checkup.findings.extend(copies(logs)?);
+    checkup.findings.extend(stuck_encoders(robot, logs)?);
     for (place, log) in logs.iter().enumerate() {
         let (trajectory, happened, more) = match motion(robot, pipeline, log) {
             Ok(seen) => seen,
@@ -77,6 +80,9 @@ pub(super) fn checkup(
     }
     let found = look(robot, pipeline, &checkup.trajectories)?;
     checkup.joints = found.joints;
+    let all: Vec<&Trajectory> = checkup.trajectories.iter().collect();
+    let odd = odd_torque(robot, pipeline, &all, found.findings.is_empty());
+    checkup.findings.extend(odd);
     checkup.findings.extend(found.findings);
     let lags = checkup.trajectories.iter();
     let lags: Vec<LogLag> = lags

@@ -172,6 +172,7 @@ fn reliability(calibration: &Calibration) -> Vec<String> {
                 n => format!("{n} logs"),
             }
         ));
+        lines.push(report::drawn_alike(conformal));
     }
     if let (Some(compact), Some([average, own])) = (&calibration.compact, validation.compact) {
         lines.push(format!(

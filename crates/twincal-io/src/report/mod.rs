@@ -70,7 +70,7 @@ pub struct FileHash {
 }
 
 pub use grounds::friction_only;
-pub use honesty::stretched;
+pub use honesty::{drawn_alike, stretched};
 pub use limits::{decisive, has_standstill};
 pub use standing::{of_halves, why_suspected};
 

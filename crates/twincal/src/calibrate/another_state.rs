@@ -65,7 +65,8 @@ mod tests {
             log_density: zeros(),
             extrapolating: vec![false; rows],
         };
-        let outside = |row: usize| f64::from(u8::from(row as f64 >= inside * rows as f64));
+        let first_outside = (inside * rows as f64).round() as usize;
+        let outside = |row: usize| f64::from(u8::from(row >= first_outside));
         let measured: Vec<f64> = (0..rows).map(|row| 2.0 * outside(row)).collect();
         keeper.push(0, &measured, &torque);
         keeper.scores()

@@ -95,6 +95,19 @@ impl CommonFit {
         self.solve();
     }
 
+    /// Takes a lag of `lags[log]` s out of each log's torque, to first order, and fits again.
+    pub(super) fn advance(&mut self, lags: &BTreeMap<usize, f64>) {
+        for own in &mut self.rows {
+            let lag = lags.get(&own.block.log).copied().unwrap_or(0.0);
+            let rate = Fitted(own).rate();
+            for (tau, rate) in own.block.measured.iter_mut().zip(&rate) {
+                *tau += lag * own.factor * rate;
+            }
+            own.sum();
+        }
+        self.solve();
+    }
+
     /// Sum of squares with the torque of one log turned, over that as it is.
     pub(super) fn turned(&self, log: usize) -> f64 {
         let of = |turned: Option<usize>| {

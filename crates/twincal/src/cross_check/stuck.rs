@@ -17,7 +17,7 @@ const TRAVEL: f64 = 0.005;
 const STEPS: f64 = 10.0;
 /// How much further than in the samples after it the position goes where it lets go.
 const SUDDEN: f64 = 5.0;
-/// Share of the joint's rms velocity that its logged velocity has meanwhile: at rest a velocity has noise and some offset.
+/// Share of its rms velocity that a joint's logged velocity has meanwhile: at rest a velocity has noise and some offset.
 const MOVES: f64 = 0.25;
 /// Stamps further apart than this many intervals are a gap.
 const GAP: f64 = 3.0;
@@ -103,8 +103,8 @@ fn of_joint(recording: &Recording, channels: &Channels) -> Vec<Held> {
             continue;
         }
         let of_velocity = channels.qd.as_deref().and_then(|qd| {
-            let mean = qd[first..=last].iter().sum::<f64>() / run.len() as f64;
-            (mean.abs() > MOVES * usual).then_some(mean * lasts)
+            let qd = &qd[first..=last];
+            (rms(qd) > MOVES * usual).then(|| furthest(qd, lasts / (run.len() - 1) as f64))
         });
         let lost = let_go(time, q, last, interval)
             .or(of_velocity)
@@ -125,6 +125,20 @@ fn let_go(time: &[f64], q: &[f64], last: usize, interval: f64) -> Option<f64> {
     let next = (after[2] - after[1]).abs().max((after[3] - after[2]).abs());
     // A single wrong sample comes back.
     (no_gap && step.abs() > SUDDEN * next).then_some(step)
+}
+
+/// Largest distance from its first position that a velocity makes, rad or m.
+fn furthest(qd: &[f64], interval: f64) -> f64 {
+    let mut place = 0.0_f64;
+    let mut places = qd.iter().filter(|v| v.is_finite()).map(|v| {
+        place += v * interval;
+        place
+    });
+    let first = places.next().unwrap_or(0.0);
+    places.fold(
+        first,
+        |far, place| if place.abs() > far.abs() { place } else { far },
+    )
 }
 
 fn rms(values: &[f64]) -> f64 {

@@ -6,6 +6,7 @@ use crate::error::{Finding, Severity};
 use crate::robot::Robot;
 use crate::signal::{Pipeline, Trajectory};
 use crate::words::significant;
+use std::collections::BTreeMap;
 
 /// Standard deviations from which a factor is believed. Real logs without a fault reach 10 (double pendulum, whose friction is not the same in each run), simulated
 /// ones 6 (LuGre friction); a factor of 1.2 in one of three logs of 12 s has 40 and more.
@@ -26,8 +27,14 @@ const FOUND: f64 = 0.002;
 /// Standard deviations from which a drift is believed: probability 6e-7, by Student's t with 20 seconds or more 7e-5.
 const DRIFTS: f64 = 5.0;
 const SECONDS: usize = 20;
+/// Times that the lag of each log is taken out: the torque that is left says it anew.
+const ADVANCES: usize = 3;
 /// Share by which two clocks may differ: quartz keeps 1e-4.
 const CLOCKS: f64 = 3e-4;
+
+/// By how much the lag of a log differs from the others', s, from which it matters, and what that explains at least: LuGre friction looks like 29 ms with less.
+const LATE: f64 = 0.01;
+const EXPLAINS_LAG: f64 = 0.3;
 
 /// Whose torque.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,6 +58,7 @@ impl Whose {
 /// |---|---|
 /// | `log_torque_factor` | all torque of a log is larger or smaller by a factor than the other logs' fit, or turned |
 /// | `joint_torque_factor` | torque of a joint is, by what the other joints say of the links that it moves |
+/// | `log_torque_lag` | torque of a log is late or early, that of the others is not |
 /// | `clock_drift` | the lag of torque behind the motion grows over the log |
 ///
 /// Nothing is said of logs with different payloads. `signs_are_right`: [`self_check`](crate::self_check::self_check) found nothing; else joints are not compared.
@@ -82,8 +90,43 @@ pub fn odd_torque(
         };
         findings.push(names.factor(whose, factor, sd));
     }
-    findings.extend(drifts(&fit, &names));
+    findings.extend(late(&fit, &names));
+    findings.extend(drifts(fit, &names));
     findings
+}
+
+/// What a lag of 1 s of a log does to its torque.
+fn lagging(own: Fitted<'_>, log: usize) -> Option<Vec<f64>> {
+    let own = (own.block().log == log).then(|| own.rate())?;
+    Some(own.iter().map(|rate| -rate).collect())
+}
+
+/// The lag of each log, s.
+fn lags(fit: &CommonFit) -> BTreeMap<usize, f64> {
+    let of = |log: &usize| Some((*log, fit.effect(|own| lagging(own, *log))?.size));
+    fit.logs().iter().filter_map(of).collect()
+}
+
+/// The log whose lag differs most from that of the others, if that is clear.
+fn late(fit: &CommonFit, names: &Names<'_>) -> Option<Finding> {
+    let lags = lags(fit);
+    let apart = |(log, lag): (&usize, &f64)| {
+        let others = lags.iter().filter(|(other, _)| *other != log);
+        let mut others: Vec<f64> = others.map(|(_, lag)| *lag).collect();
+        others.sort_by(f64::total_cmp);
+        let middle = others.get(others.len() / 2)?;
+        Some((*log, *lag, (lag - middle).abs()))
+    };
+    // Of two logs that are as far apart the one with the larger lag.
+    let size = |(_, lag, apart): &(usize, f64, f64)| apart + lag.abs();
+    let all = lags.iter().filter_map(apart);
+    let (log, lag, apart) = all.max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    if apart < LATE {
+        return None;
+    }
+    let judged = fit.judged(|own| lagging(own, log))?;
+    let clear = judged.z() > CLEAR && judged.explains > EXPLAINS_LAG;
+    clear.then(|| names.lag(log, lag, judged.sd))
 }
 
 /// The factor that explains most, which the fit then has; `None` where none is clear.
@@ -144,9 +187,12 @@ fn rigid(own: Fitted<'_>, whose: Whose) -> Option<Vec<f64>> {
     whose.has(own.block()).then(|| own.rigid())
 }
 
-/// Lag that grows: in all logs by one share, or in single ones.
-fn drifts(fit: &CommonFit, names: &Names<'_>) -> Vec<Finding> {
-    let logs = fit.logs();
+/// Lag that grows: in all logs by one share, or in single ones. The lag itself is taken out before: it would hide what grows.
+fn drifts(mut fit: CommonFit, names: &Names<'_>) -> Vec<Finding> {
+    for _ in 0..ADVANCES {
+        fit.advance(&lags(&fit));
+    }
+    let (fit, logs) = (&fit, fit.logs());
     let of = |which: Option<usize>| {
         let drift = fit.judged(|own| {
             let block = own.block();
@@ -231,6 +277,26 @@ impl Names<'_> {
                 "{what}: measured torque is {size} times what {others}: look for {mistake}a gain, gear ratio or torque constant there, and multiply \
                  {columns} by {}",
                 significant(1.0 / factor, 3)
+            ),
+            0,
+        )
+    }
+
+    fn lag(&self, log: usize, lag: f64, sd: f64) -> Finding {
+        let name = self.logs[log];
+        Finding::new(
+            Severity::Warning,
+            "log_torque_lag",
+            name,
+            format!(
+                "log `{name}`: torque is written {:.0} ± {:.0} ms {} the motion than in the other logs: log it as the others, or move its stamps by that much",
+                1e3 * lag.abs(),
+                (1e3 * sd).max(1.0),
+                if lag > 0.0 {
+                    "later behind"
+                } else {
+                    "further ahead of"
+                },
             ),
             0,
         )

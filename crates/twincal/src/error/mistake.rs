@@ -35,8 +35,9 @@ const TABLE: &[(&str, Severity, Mistake)] = &[
     ("joint_torque_factor", Warning, Mistake::OddTorque),
     ("log_torque_lag", Warning, Mistake::OddTorque),
     ("clock_drift", Warning, Mistake::OddMotion),
-    ("zero_moved", Warning, Mistake::OddMotion),
     ("encoder_stuck", Warning, Mistake::OddMotion),
+    // signal/jumps.rs
+    ("position_step", Warning, Mistake::OddMotion),
     // calibrate/another_state.rs
     ("another_state", Warning, Mistake::AnotherState),
 ];
