@@ -295,9 +295,9 @@ impl Rows {
         };
         let shapes: Vec<Vec<f64>> = (0..FRICTION).map(masked).collect();
         let mut products = vec![0.0; FRICTION * FRICTION];
-        for i in 0..FRICTION {
-            for j in 0..FRICTION {
-                products[i * FRICTION + j] = dot(&shapes[i], &shapes[j]);
+        for (i, shape) in shapes.iter().enumerate() {
+            for (j, other) in shapes.iter().enumerate() {
+                products[i * FRICTION + j] = dot(shape, other);
             }
             products[i * FRICTION + i] *= 1.0 + 1e-9;
         }
@@ -341,9 +341,9 @@ impl Rows {
             .collect();
         self.right = [&tau, &nominal].map(|of| projected.iter().map(|x| dot(x, of)).collect());
         self.gram = vec![0.0; count * count];
-        for i in 0..count {
-            for j in 0..=i {
-                let product = dot(&projected[i], &projected[j]);
+        for (i, column) in projected.iter().enumerate() {
+            for (j, other) in projected[..=i].iter().enumerate() {
+                let product = dot(column, other);
                 self.gram[i * count + j] = product;
                 self.gram[j * count + i] = product;
             }

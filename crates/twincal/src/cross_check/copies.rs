@@ -7,7 +7,7 @@
 //! Recordings of one programme have the same path, and independent noise: correlation 0. A copy with noise of up to half its own has 0.8 and more.
 //! The limit of 0.5 is that of the median joint, so that repeatable ripple of a few joints makes no copy.
 
-use super::signature::Signature;
+use super::signature::{MOST_JOINTS, Signature};
 use crate::error::{Finding, Result, Severity};
 use crate::signal::{Log, Recording, median_step};
 use crate::words::significant;
@@ -130,17 +130,18 @@ fn matched(signatures: &[Signature], candidate: Candidate) -> Option<Match> {
     let from = usize::try_from(candidate.offset.max(0)).ok()?;
     let to = usize::try_from((-candidate.offset).max(0)).ok()?;
     let pairs = || (first.rows.iter().skip(from)).zip(second.rows.iter().skip(to));
-    let (mut known, mut agree) = ([0_u64; 32], [0_u64; 32]);
+    let (mut known, mut agree) = ([0_u64; MOST_JOINTS], [0_u64; MOST_JOINTS]);
     for (a, b) in pairs() {
         let both = a.known & b.known;
         let same = both & !(a.positive ^ b.positive);
-        for joint in 0..32 {
-            known[joint] += u64::from(both >> joint & 1);
-            agree[joint] += u64::from(same >> joint & 1);
+        for (joint, (known, agree)) in known.iter_mut().zip(&mut agree).enumerate() {
+            *known += u64::from(both >> joint & 1);
+            *agree += u64::from(same >> joint & 1);
         }
     }
-    let judged = || (0..32).filter(|&joint| known[joint] >= FEWEST);
-    let total = |counts: &[u64; 32]| judged().map(|joint| counts[joint]).sum::<u64>() as f64;
+    let judged = || (0..MOST_JOINTS).filter(|&joint| known[joint] >= FEWEST);
+    let total =
+        |counts: &[u64; MOST_JOINTS]| judged().map(|joint| counts[joint]).sum::<u64>() as f64;
     let (all, alike) = (total(&known), total(&agree));
     let clear = alike - 0.5 * all > CLEAR * 0.5 * (INFLATION * all).sqrt();
     let share = |joint: usize| agree[joint] as f64 / known[joint] as f64;

@@ -10,7 +10,7 @@ use crate::signal::{Log, Recording};
 /// Rows of a log whose signs are kept: 8 bytes each.
 const MOST_ROWS: usize = 1 << 22;
 /// Joints whose signs are kept.
-const MOST_JOINTS: usize = 32;
+pub(super) const MOST_JOINTS: usize = 32;
 /// Rows from one bit of a key to the next of the same joint: fourth differences of white noise that far apart have correlation −0.11.
 const SPACING: usize = 3;
 /// Samples of a fourth difference.

@@ -41,6 +41,11 @@ const EXPLAINS_LAG: f64 = 0.3;
 enum Whose {
     Log(usize),
     Joint(usize),
+    /// Of one joint in one log.
+    Block {
+        log: usize,
+        joint: usize,
+    },
 }
 
 impl Whose {
@@ -48,7 +53,22 @@ impl Whose {
         match self {
             Self::Log(log) => block.log == log,
             Self::Joint(joint) => block.joint == joint,
+            Self::Block { log, joint } => block.log == log && block.joint == joint,
         }
+    }
+
+    /// All that may have a factor of its own: with one log no log, with one joint no joint.
+    fn all(logs: &[usize], joints: &[usize], joints_too: bool) -> Vec<Self> {
+        let several = logs.len() > 1;
+        let logs = logs.iter().filter(|_| several).copied();
+        let of_logs = logs.clone().map(Self::Log);
+        let of_joints = joints.iter().filter(|_| joints_too && joints.len() > 1);
+        let of_joints = of_joints.copied().map(Self::Joint);
+        let of_both = logs.flat_map(|log| {
+            let joints = joints.iter().filter(|_| joints_too && joints.len() > 1);
+            joints.map(move |&joint| Self::Block { log, joint })
+        });
+        of_logs.chain(of_joints).chain(of_both).collect()
     }
 }
 
@@ -56,7 +76,7 @@ impl Whose {
 ///
 /// | finding | what was seen |
 /// |---|---|
-/// | `log_torque_factor` | all torque of a log is larger or smaller by a factor than the other logs' fit, or turned |
+/// | `log_torque_factor` | torque of a log, or of one joint in it, is larger or smaller by a factor than the other logs' fit, or turned |
 /// | `joint_torque_factor` | torque of a joint is, by what the other joints say of the links that it moves |
 /// | `log_torque_lag` | torque of a log is late or early, that of the others is not |
 /// | `clock_drift` | the lag of torque behind the motion grows over the log |
@@ -147,12 +167,7 @@ fn next_factor(fit: &mut CommonFit, joints_too: bool) -> Option<(Whose, f64, f64
     }
     let of = |fit: &CommonFit, whose: Whose| fit.effect(|own| rigid(own, whose));
     if whose.is_none() {
-        let logs = logs
-            .iter()
-            .filter(|_| logs.len() > 1)
-            .map(|log| Whose::Log(*log));
-        let joints = joints.iter().filter(|_| joints_too && joints.len() > 1);
-        let all = logs.chain(joints.map(|joint| Whose::Joint(*joint)));
+        let all = Whose::all(&logs, &joints, joints_too).into_iter();
         let effects = all.filter_map(|whose| Some((whose, of(fit, whose)?)));
         let (best, effect) = effects.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain))?;
         if effect.size.abs() < 0.5 * MATTERS || effect.explains < EXPLAINS {
@@ -167,7 +182,8 @@ fn next_factor(fit: &mut CommonFit, joints_too: bool) -> Option<(Whose, f64, f64
     let whose = whose?;
     for _ in 0..STEPS {
         let Some(effect) = of(fit, whose) else { break };
-        let step = (1.0 + effect.size).clamp(0.5, 2.0);
+        let full = 1.0 + effect.size;
+        let step = full.abs().clamp(0.5, 2.0).copysign(full);
         factor *= step;
         fit.divide(|block| whose.has(block), step);
         if (step - 1.0).abs() < FOUND {
@@ -206,10 +222,11 @@ fn drifts(mut fit: CommonFit, names: &Names<'_>) -> Vec<Finding> {
     if let Some(drift) = of(None) {
         return vec![names.drift(None, &drift)];
     }
-    // Of many logs only those that stand out are looked at closely.
+    // Of many logs only those that stand out are looked at closely: rows count as independent here.
     let stands_out = |log: &&usize| {
         let drift = fit.effect(|own| (own.block().log == **log).then(|| growing(own)));
-        logs.len() > 1 && drift.is_some_and(|drift| drift.size.abs() > CLOCKS)
+        let large = |drift: &Effect| drift.size.abs() > CLOCKS && drift.gain > DRIFTS * DRIFTS;
+        logs.len() > 1 && drift.as_ref().is_some_and(large)
     };
     let single = logs.iter().filter(stands_out);
     single
@@ -252,6 +269,12 @@ impl Names<'_> {
                     others,
                     "its torque columns",
                 )
+            }
+            Whose::Block { log, joint } => {
+                let (log, joint) = (self.logs[log], self.joints[joint]);
+                let what = format!("log `{log}`, joint `{joint}`");
+                let others = "the other logs and joints say of the same robot".to_owned();
+                ("log_torque_factor", log, what, others, "its torque column")
             }
             Whose::Joint(joint) => {
                 let name = self.joints[joint];

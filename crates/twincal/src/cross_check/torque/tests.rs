@@ -116,6 +116,22 @@ fn a_joint_whose_torque_is_scaled_is_named_with_its_factor() {
 }
 
 #[test]
+fn a_joint_whose_torque_is_scaled_or_turned_in_one_log_is_named_with_both() {
+    for factor in [1.4, -1.0] {
+        for seed in 0..3 {
+            let mut logs = logs(seed, 3);
+            torque(&mut logs[1], 2)
+                .iter_mut()
+                .for_each(|tau| *tau *= factor);
+            let found = said(&logs);
+            assert_eq!(places(&found), [("log_torque_factor", "run1")], "{found:?}");
+            assert!(found[0].message.contains("joint `j3`"), "{found:?}");
+            assert!((said_factor(&found[0]) - factor).abs() < 0.04, "{found:?}");
+        }
+    }
+}
+
+#[test]
 fn torque_whose_clock_drifts_is_found_in_all_logs_and_in_one() {
     let drift = |log: &mut Trajectory| {
         for joint in 0..4 {
