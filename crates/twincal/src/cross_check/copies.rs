@@ -61,6 +61,9 @@ struct Match {
 /// # Errors
 /// Of chapters that cannot be read.
 pub fn copies(logs: &[Log<'_>]) -> Result<Vec<Finding>> {
+    if logs.len() < 2 {
+        return Ok(Vec::new());
+    }
     let signatures: Vec<Signature> = logs.par_iter().map(Signature::of).collect::<Result<_>>()?;
     let mut found: Vec<Match> = candidates(&signatures)
         .par_iter()
