@@ -352,19 +352,11 @@ pub(super) mod tests {
     fn no_yes_stands_beside_a_mistake() {
         assert!(judged(|_| ()).headline.starts_with("Yes"));
         for (code, severity) in Mistake::codes() {
-            let verdict = judged(|c| {
-                c.findings = vec![Finding::new(severity, code, "elbow", "elbow: wrong", 1)]
-            });
-            assert!(
-                verdict.headline.starts_with("Not yet"),
-                "{code}: {verdict:?}"
-            );
-            assert_eq!(
-                (verdict.grade, &verdict.next),
-                (Grade::Bad, &None),
-                "{code}"
-            );
-            assert_eq!(verdict.limits[0], "elbow: wrong", "{code}");
+            let finding = Finding::new(severity, code, "elbow", "elbow: wrong", 1);
+            let said = judged(|c| c.findings = vec![finding.clone()]);
+            assert!(said.headline.starts_with("Not yet"), "{code}: {said:?}");
+            assert_eq!((said.grade, &said.next), (Grade::Bad, &None), "{code}");
+            assert_eq!(said.limits[0], "elbow: wrong", "{code}");
         }
     }
 

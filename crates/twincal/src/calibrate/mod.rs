@@ -16,6 +16,7 @@ mod heredity;
 mod independent_rows;
 mod lower_band;
 mod negative_friction;
+mod noise_of;
 mod outlook;
 mod prior_conflict;
 mod reader;
@@ -51,13 +52,10 @@ pub use result::{
 pub use ripples::UnaskedRipple;
 pub use stopped::Stopped;
 
-use crate::cross_check::odd_torque;
 use crate::error::{Error, Finding, Result};
 use crate::infer::{Choice, Given, InferenceSettings, infer, sample, sampled_likelihood};
 use crate::lag::{LogLag, estimate_lag, lag_findings};
-use crate::likelihood::{
-    Columns, JointNoise, NoiseInterval, NoiseModel, NoiseSettings, NoiseUncertainty, Spread,
-};
+use crate::likelihood::{Columns, NoiseInterval, NoiseModel, NoiseSettings, NoiseUncertainty};
 use crate::observations::Part;
 use crate::plug_in::{Fit, FitSettings, LeftOut, Moving, fit, fit_tempered, start};
 use crate::posterior::draws::Drawer;
@@ -65,8 +63,8 @@ use crate::prior::PriorSettings;
 use crate::robot::Robot;
 use crate::self_check::self_check;
 use crate::signal::{
-    Auto, Corrections, Log, Logs, ReadyLog, SignalSettings, Trajectory, choose_and_prepare,
-    constant_torque, hardly_driven, ready,
+    Auto, Corrections, Log, Logs, ReadyLog, SignalSettings, choose_and_prepare, constant_torque,
+    hardly_driven, ready,
 };
 use crate::term::{Family, Library, LibrarySettings};
 use crate::twin::Twin;
@@ -74,6 +72,7 @@ use again::{Goal, Road, whole_road};
 use data::Data;
 use heredity::Named;
 use lower_band::{Band, TooFew};
+use noise_of::noise_of;
 use ripples::Seen;
 use wider_band::wider;
 
@@ -179,27 +178,15 @@ pub fn calibrate<'a>(
     let mut findings = Vec::new();
     let recordings = (logs.into(), heldout.into());
     let every_log = recordings.0.0.iter().chain(&recordings.1.0);
-    let shelves: Vec<_> = every_log.clone().filter_map(Log::shelf).collect();
-    let every_log: Vec<Log<'_>> = every_log.map(Log::lent).collect();
-    let as_recorded = cross_checked::as_recorded(robot, &every_log);
-    drop(every_log);
-    let as_recorded = as_recorded.map_err(|error| Stopped {
-        error,
-        findings: Vec::new(),
-    })?;
+    let shelves: Vec<_> = every_log.filter_map(Log::shelf).collect();
+    let as_recorded = cross_checked::as_recorded(robot, &recordings)?;
     let calibration = whole_road(robot, recordings, settings, progress, &mut findings);
     // Numbers that could not be read back are behind whatever came out.
     let calibration = match shelves.iter().find_map(|shelf| shelf.failure()) {
         Some(failure) => Err(failure),
         None => calibration,
     };
-    match calibration {
-        Ok(calibration) => Ok(cross_checked::told(calibration, as_recorded)),
-        Err(error) => {
-            findings.extend(as_recorded);
-            Err(Stopped { error, findings })
-        }
-    }
+    cross_checked::told(calibration, as_recorded, findings)
 }
 
 /// From logs to a calibration; `recordings` are gone as soon as nobody needs them.
@@ -253,10 +240,12 @@ fn road(
     let pipelines = (&pipeline, &elsewhere[..]);
     let (mut data, trajectories) = Data::read(robot, &library, pipelines, &prepared, &others)?;
     let compared = self_check(robot, &pipeline, trajectories.all())?;
-    if goal != Goal::Count {
-        let all: Vec<&Trajectory> = trajectories.all().collect();
-        findings.extend(odd_torque(robot, &pipeline, &all, compared.is_empty()));
-    }
+    findings.extend(cross_checked::as_filtered(
+        robot,
+        &pipeline,
+        &trajectories,
+        (goal, &compared),
+    ));
     findings.extend(compared);
     let lags: Vec<LogLag> = trajectories
         .all()
@@ -573,43 +562,6 @@ fn columns_of(
                     .into(),
         }),
     }
-}
-
-/// Noise per joint as reported; σ_j = √E[φ/(w_j(1−ρ_j²)) | y].
-fn noise_of(
-    robot: &Robot,
-    fitted: &Fitted,
-    training: &[Part<'_>],
-    out_of_band: &[f64],
-    spreads: &[Spread],
-) -> Vec<JointNoise> {
-    let (plug_in, posterior) = (&fitted.fit.plug_in, &fitted.fit.posterior);
-    robot
-        .joint_names()
-        .into_iter()
-        .enumerate()
-        .map(|(j, name)| {
-            let [n, n_eff] = independent_rows::of_joint(&fitted.fit, training, j);
-            let rho = plug_in.rho[j];
-            let left = plug_in.variance.get(j).copied().unwrap_or(1.0);
-            JointNoise {
-                joint: name.to_owned(),
-                sigma: (left * posterior.noise / (plug_in.weight[j] * (1.0 - rho * rho))).sqrt(),
-                rho,
-                weight: plug_in.weight[j],
-                n,
-                n_eff,
-                autocorrelation_time: plug_in.autocorrelation_time[j],
-                interval_factor: fitted
-                    .left_out
-                    .as_ref()
-                    .map_or_else(|| left.sqrt(), |l| l.interval_factor[j]),
-                out_of_band: out_of_band[j],
-                spread: spreads[j].clone(),
-                sampled: fitted.sampled.get(j).copied(),
-            }
-        })
-        .collect()
 }
 
 /// The data cannot answer: fewer rows than the question needs (exit code 4).
