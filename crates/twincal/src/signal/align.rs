@@ -116,6 +116,7 @@ impl<'a> PreparedLog<'a> {
             log: Cow::Borrowed(&self.log),
             joints: self.joints.clone(),
             pieces: Prepared {
+                time: None,
                 interval: self.pieces.interval,
                 pieces: stretches.iter().map(piece).collect(),
             },
@@ -157,6 +158,7 @@ impl<'a> PreparedLog<'a> {
             }),
             joints: self.joints,
             pieces: Prepared {
+                time: None,
                 interval: self.pieces.interval,
                 pieces: (self.pieces.pieces.into_iter())
                     .map(Piece::into_owned)
@@ -235,12 +237,16 @@ fn align(
     }
     let (mut short, mut short_rows, mut total, mut used) = (0, 0, 0.0, 0.0);
     for piece in &prepared.pieces {
-        total += piece.rows.len() as f64 * prepared.interval;
+        // Rows that are missing on the grid are time, too.
+        let rows = piece.rows.len().saturating_sub(1) as f64 * prepared.interval;
+        let grid = piece.time.len().saturating_sub(1) as f64 * piece.interval;
+        total += rows.max(grid);
         let kept = Kept { with_tau, raw };
         match smoothed(ready, piece, pipeline, cutoff, kept) {
             Some(segment) => {
                 let border = 2.0 * column_half_seconds(pipeline.cutoff_hz);
-                used += (segment.time.len() as f64 * piece.interval - border).max(0.0);
+                let length = segment.time.len().saturating_sub(1) as f64 * piece.interval;
+                used += (length - border).max(0.0);
                 trajectory.segments.push(segment);
             }
             None => {
@@ -434,7 +440,8 @@ fn logged_samples(
     kept: Kept,
 ) -> LoggedSamples {
     let PreparedLog { log, joints, .. } = ready;
-    let stamps = pick(&log.time, &piece.rows);
+    let time_of_rows = ready.pieces.time.as_ref().unwrap_or(&log.time);
+    let stamps = pick(time_of_rows, &piece.rows);
     let logged: Vec<Values<'_>> = log
         .joints
         .iter()

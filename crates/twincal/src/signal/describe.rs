@@ -124,7 +124,7 @@ impl Sums {
         let (pieces, interval) = (&prepared.pieces, prepared.interval);
         self.duration += pieces
             .iter()
-            .map(|p| p.time.len() as f64 * p.interval)
+            .map(|p| p.time.len().saturating_sub(1) as f64 * p.interval)
             .sum::<f64>();
         self.segments += pieces.len() as u64;
         // A chapter is no cut of the log: what goes on in it was counted in the one before.

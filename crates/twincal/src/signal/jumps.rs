@@ -108,16 +108,16 @@ pub(crate) fn cut_jumps(
     let times: Vec<Vec<f64>> = clock
         .runs
         .iter()
-        .map(|run| run.rows.iter().map(|&row| log.time[row]).collect())
+        .map(|run| run.rows.iter().map(|&row| clock.stamp(log, row)).collect())
         .collect();
     let channels: Vec<(usize, &'static str, &'static str, &[f64])> = (0..joints.len())
         .flat_map(|joint| {
-            let own = &log.joints[joint];
-            let position = unfolded[joint].as_deref().unwrap_or(&own.q);
+            let position = clock.sampled.position(log, joint);
+            let [qd, qdd] = clock.sampled.derivatives(log, joint);
             [
-                ("position", "", Some(position)),
-                ("velocity", "/s", own.qd.as_deref()),
-                ("acceleration", "/s²", own.qdd.as_deref()),
+                ("position", "", unfolded[joint].as_deref().or(Some(position))),
+                ("velocity", "/s", qd),
+                ("acceleration", "/s²", qdd),
             ]
             .into_iter()
             .filter_map(move |(channel, per, values)| Some((joint, channel, per, values?)))

@@ -20,6 +20,7 @@ pub(crate) mod interpolate;
 mod mask;
 mod prepare;
 mod ready;
+mod repeats;
 mod saturation;
 mod shelf;
 mod spectrum;
@@ -29,7 +30,9 @@ mod steps;
 mod stretches;
 mod survey;
 mod thin;
+mod ticks;
 mod torque;
+mod travel;
 mod units;
 mod unwrap;
 
@@ -468,3 +471,5 @@ pub fn ready<'a>(robot: &Robot, log: &'a Log<'_>, pipeline: &Pipeline) -> Result
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod worlds;
