@@ -6,7 +6,7 @@ use super::convolve::{correlate, correlate_two};
 use super::fir::{MotionKernels, column_half_seconds, motion_half_samples, motion_half_seconds};
 use super::mask::Saturated;
 use super::prepare::{JointFacts, Piece, Prepared, Values, pick, prepare, report_short};
-use super::standstill::standstill;
+use super::standstill::{at_rest, slower_than};
 use super::thin::thin;
 use super::{Channels, DerivedFrom, LoggedSamples, Pipeline, Recording, Segment, Trajectory};
 use crate::error::{Error, Finding, Result, Severity};
@@ -45,6 +45,8 @@ pub struct PreparedLog<'a> {
     joints: Vec<JointFacts>,
     pieces: Prepared<'a>,
     saturated: Saturated,
+    /// What each joint's position spans at most at rest, rad or m.
+    at_rest: Vec<f64>,
     findings: Vec<Finding>,
 }
 
@@ -78,12 +80,14 @@ impl<'a> PreparedLog<'a> {
         mut findings: Vec<Finding>,
         pipeline: &Pipeline,
     ) -> Self {
+        let at_rest = pieces.at_rest(log);
         if !pipeline.is_off() {
             let (short, rows) = thin(&mut pieces, pipeline);
             report_short(log, short, rows, &mut findings);
         }
         Self {
             saturated: Saturated::find(&joints, log, pipeline),
+            at_rest,
             log: Cow::Borrowed(log),
             joints,
             pieces,
@@ -121,6 +125,7 @@ impl<'a> PreparedLog<'a> {
                 pieces: stretches.iter().map(piece).collect(),
             },
             saturated: self.saturated.clone(),
+            at_rest: self.at_rest.clone(),
             findings: Vec::new(),
         }
     }
@@ -165,6 +170,7 @@ impl<'a> PreparedLog<'a> {
                     .collect(),
             },
             saturated: self.saturated,
+            at_rest: self.at_rest,
             findings: self.findings,
         }
     }
@@ -359,13 +365,16 @@ fn smoothed(
         .zip(still.par_chunks_exact_mut(len))
         .for_each(|(((((joint, channels), q), qd), qdd), still)| {
             let travel = derivatives(&kernels, channels, pipeline.sources(joint), [q, qd, qdd]);
-            // Position tells standstill: a drive's velocity is often a difference of counts and far noisier at rest.
-            still.copy_from_slice(&standstill(
-                travel.as_deref().unwrap_or(qd),
-                pipeline.standstill_velocity[joint],
-                pipeline.shortest_standstill(),
-                piece.interval,
-            ));
+            // As logged: a filtered position rings where a move ends.
+            let rest = at_rest(&channels.q, ready.at_rest[joint], piece.interval);
+            still.copy_from_slice(&rest[half..half + len]);
+            if pipeline.hides_slow_motion(joint) {
+                let limit = pipeline.standstill_velocity[joint];
+                let travel = travel.as_deref().unwrap_or(qd);
+                let seconds = pipeline.shortest_standstill();
+                let slow = slower_than(travel, limit, seconds, piece.interval);
+                (still.iter_mut().zip(slow)).for_each(|(still, slow)| *still |= slow);
+            }
         });
     let torque = piece.joints.iter().filter_map(|c| c.tau.as_ref());
     let tau = torque

@@ -463,7 +463,13 @@ pub(crate) fn report_jitter(
         return;
     }
     let interval = clock.interval;
-    let dropped = |row: usize| clock.sampled.dropped.get(row).is_some_and(|dropped| *dropped);
+    let dropped = |row: usize| {
+        clock
+            .sampled
+            .dropped
+            .get(row)
+            .is_some_and(|dropped| *dropped)
+    };
     let mut deviations: Vec<f64> = runs
         .iter()
         .flat_map(|run| run.rows.windows(2))

@@ -4,9 +4,10 @@ use super::DerivedFrom;
 use super::clock::{Clock, Run, even_interval, read_clock, report_jitter};
 use super::jumps::cut_jumps;
 use super::spline::resample;
+use super::standstill::span;
 use super::units::refuse_degrees;
 use super::unwrap::{unfolded, unwrap_angle};
-use super::{Corrections, Recording};
+use super::{Channels, Corrections, Recording};
 use crate::error::{Error, Finding, Result, Severity};
 use crate::robot::{JointKind, Robot};
 use rayon::prelude::*;
@@ -174,6 +175,18 @@ pub(crate) struct Prepared<'a> {
     pub(crate) interval: f64,
     /// Stamps on the controller's clock, s, by row of the recording, where the logged ones are a receiver's.
     pub(crate) time: Option<Vec<f64>>,
+}
+
+impl Prepared<'_> {
+    /// What each joint's position spans at most at rest, rad or m; before anything is thinned.
+    pub(crate) fn at_rest(&self, log: &Recording) -> Vec<f64> {
+        let joints = log.joints.par_iter().enumerate();
+        let of_joint = |(joint, channels): (usize, &Channels)| {
+            let pieces = self.pieces.iter().map(|piece| &*piece.joints[joint].q);
+            span(&channels.q, pieces)
+        };
+        joints.map(of_joint).collect()
+    }
 }
 
 /// Step 1 of method section 1. With `every_row` (pipeline off) values stay as they are and only cuts are found.

@@ -14,8 +14,10 @@ use std::ops::Range;
 
 /// Share of a joint's rows in motion beyond which it is a slow channel.
 const MOST: f64 = 0.25;
-/// What the row after a repeat makes up for may be short by so many steps.
-const SHORT: f64 = 0.5;
+/// What the row after a repeat makes up for may be off by so many steps: a fresh reading is off by one.
+const OFF: f64 = 0.5;
+/// Steps beside both of them are at least this share of the usual one.
+const BESIDE: f64 = 0.3;
 
 /// What stands in place of the rows as logged.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -84,7 +86,12 @@ pub(crate) fn sampled(
         return Sampled::default();
     }
     let (mended, dropped) = mended(&rows, &held);
-    findings.push(held_positions(&rows, names, &held, (dropped, cut.every_row)));
+    findings.push(held_positions(
+        &rows,
+        names,
+        &held,
+        (dropped, cut.every_row),
+    ));
     if cut.every_row {
         Sampled::default()
     } else {
@@ -113,9 +120,16 @@ fn retimed(rows: &Rows<'_>, ticks: Ticks) -> Sampled {
 fn held(rows: &Rows<'_>, joint: &Travel) -> Vec<Range<usize>> {
     let makes_up = |run: &Range<usize>| {
         let next = run.end;
-        next < rows.len() && rows.joined[next] && joint.moves(next) && {
-            let steps = (rows.stamp(next) - rows.stamp(run.start - 1)) / rows.interval;
-            joint.step[next] / joint.usual[next] >= steps - SHORT
+        let joined = |k: usize| k > 0 && k < rows.len() && rows.joined[k];
+        let share = |k: usize| joint.step[k] / joint.usual[k];
+        // A reset seems fast, too, but not beside itself.
+        let before = run.start - 1;
+        let fast = |k: usize| joined(k) && share(k) >= BESIDE;
+        let beside =
+            fast(before) && (fast(next + 1) || joined(next + 1) && joint.step[next + 1] == 0.0);
+        beside && joined(next) && joint.moves(next) && {
+            let steps = (rows.stamp(next) - rows.stamp(before)) / rows.interval;
+            (share(next) - steps).abs() <= OFF
         }
     };
     let found: Vec<Range<usize>> = rows.held(joint).into_iter().filter(makes_up).collect();
@@ -132,7 +146,7 @@ fn mended(rows: &Rows<'_>, held: &[Vec<Range<usize>>]) -> (Sampled, usize) {
     let mut dropped = vec![false; rows.log.time.len()];
     let mut count = 0;
     let mut filled = Vec::with_capacity(held.len());
-    for (runs, channels) in held.iter().zip(&rows.log.joints) {
+    for (joint, (runs, channels)) in held.iter().zip(&rows.log.joints).enumerate() {
         let mut own: Option<Filled> = None;
         for run in runs {
             for k in run.clone() {
@@ -142,7 +156,7 @@ fn mended(rows: &Rows<'_>, held: &[Vec<Range<usize>>]) -> (Sampled, usize) {
                     dropped[row] = true;
                 } else {
                     let own = own.get_or_insert_with(|| Filled::of(channels));
-                    own.fill(rows, channels, run, k);
+                    own.fill(rows, joint, run, k);
                 }
             }
         }
@@ -167,10 +181,13 @@ impl Filled {
     }
 
     /// Row `k` of a run that repeats, by a cubic through two rows on either side of the run (a line where there are none).
-    fn fill(&mut self, rows: &Rows<'_>, channels: &Channels, run: &Range<usize>, k: usize) {
+    fn fill(&mut self, rows: &Rows<'_>, joint: usize, run: &Range<usize>, k: usize) {
+        let (travel, channels) = (&rows.joints[joint], &rows.log.joints[joint]);
         let (before, after) = (run.start - 1, run.end);
         let mut nodes = vec![before, after];
-        if before > 0 && rows.joined[before] && after + 1 < rows.len() && rows.joined[after + 1] {
+        // Not through a row that repeats itself.
+        let fresh = |k: usize| k < rows.len() && rows.joined[k] && travel.step[k] != 0.0;
+        if before > 0 && fresh(before) && fresh(before - 1) && fresh(after + 1) {
             nodes.extend([before - 1, after + 1]);
         }
         let (row, last) = (rows.rows[k], rows.rows[k - 1]);
@@ -197,7 +214,10 @@ fn interpolated(rows: &Rows<'_>, nodes: &[usize], values: &[f64], k: usize) -> f
             .map(|&b| (t - rows.stamp(b)) / (rows.stamp(a) - rows.stamp(b)))
             .product()
     };
-    nodes.iter().map(|&a| weight(a) * values[rows.rows[a]]).sum()
+    nodes
+        .iter()
+        .map(|&a| weight(a) * values[rows.rows[a]])
+        .sum()
 }
 
 fn on_controllers_clock(rows: &Rows<'_>, ticks: &Ticks, every_row: bool) -> Finding {

@@ -19,17 +19,21 @@ const NEAR: f64 = 0.15;
 const MOST: f64 = 0.9;
 /// How far the sum of steps and the stamps may be apart, relative.
 const APART: f64 = 0.05;
-/// Most steps between two rows.
-const LONGEST: usize = 5;
+/// Most steps between two rows: below a gap.
+const LONGEST: usize = 4;
 /// Standard deviation of travel over velocity at the least travel that counts, and of velocity itself, relative.
 const TRAVEL: f64 = 0.14;
 const VELOCITY: f64 = 0.03;
-/// Standard deviation of the receiver's stamps, in steps, and rows over which their mean is taken.
-const STAMPS: f64 = 0.7;
-const REMEMBERED: f64 = 200.0;
+/// Standard deviation of the receiver's stamps, in steps (a poll falls anywhere in a step: 0.29), and rows over which their mean is taken.
+const STAMPS: f64 = 0.4;
+const REMEMBERED: f64 = 2000.0;
+/// Fewest rows in motion, one after the other, whose stamps show how long a step is.
+const IN_A_ROW: usize = 50;
 /// Most that one row of travel and one stamp can weigh (χ²): travel above stamps.
-const TRAVEL_WEIGHS: f64 = 16.0;
-const STAMP_WEIGHS: f64 = 6.0;
+const TRAVEL_WEIGHS: f64 = 40.0;
+const STAMP_WEIGHS: f64 = 16.0;
+/// What counting may change of the step that rows in motion show, relative.
+const CHANGES: f64 = 1e-4;
 /// Rows on either side among which fewer than a quarter repeat where torque is noisy at rest.
 const BESIDE: usize = 50;
 const SILENT: f64 = 0.25;
@@ -123,7 +127,11 @@ fn find(rows: &Rows<'_>, travelled: &[Option<Travelled>]) -> Option<Clock> {
     let off = |a: f64| (a / step - (a / step).round()).abs();
     let stamped = |k: usize| (rows.stamp(k) - rows.stamp(k - 1)) / rows.interval;
     let whole = median(shown().map(|(_, a)| off(a)).collect());
-    let jitter = median(shown().map(|(k, a)| (a - stamped(k)).abs() / step).collect());
+    let jitter = median(
+        shown()
+            .map(|(k, a)| (a - stamped(k)).abs() / step)
+            .collect(),
+    );
     let all = shown().count() as f64;
     let near = shown().filter(|(_, a)| off(*a) <= NEAR).count() as f64;
     let steps: f64 = shown().map(|(_, a)| (a / step).round()).sum();
@@ -137,12 +145,53 @@ fn find(rows: &Rows<'_>, travelled: &[Option<Travelled>]) -> Option<Clock> {
         let steps = (a / step).round().clamp(0.0, LONGEST as f64);
         share[steps as usize] += 1.0 / all;
     }
-    is_controller.then_some(Clock {
-        // As the receiver has it.
-        step: seconds / steps,
+    is_controller.then(|| Clock {
+        step: as_received(rows, travelled, step).unwrap_or(seconds / steps),
         share,
         jitter,
     })
+}
+
+/// The controller's step as the receiver's stamps have it, in median steps: slope of the stamps over whole steps within stretches of motion.
+fn as_received(rows: &Rows<'_>, travelled: &[Option<Travelled>], step: f64) -> Option<f64> {
+    let shows = |k: usize| travelled[k].is_some_and(|t| t.shows);
+    let mut line = Line::default();
+    for run in runs(rows.len(), shows) {
+        if run.len() < IN_A_ROW {
+            continue;
+        }
+        let start = rows.stamp(run.start);
+        let mut ticks = 0.0;
+        let points = run.map(|k| {
+            ticks += travelled[k].map_or(0.0, |t| (t.steps / step).round());
+            [ticks, (rows.stamp(k) - start) / rows.interval]
+        });
+        line.add(&points.collect::<Vec<_>>());
+    }
+    line.slope()
+}
+
+/// Least-squares slope of stretches that have an offset each.
+#[derive(Default)]
+struct Line {
+    product: f64,
+    square: f64,
+}
+
+impl Line {
+    /// A stretch of points `[x, y]`.
+    fn add(&mut self, points: &[[f64; 2]]) {
+        let mean = |i: usize| points.iter().map(|p| p[i]).sum::<f64>() / points.len() as f64;
+        let middle = [mean(0), mean(1)];
+        for [x, y] in points {
+            self.product += (x - middle[0]) * (y - middle[1]);
+            self.square += (x - middle[0]).powi(2);
+        }
+    }
+
+    fn slope(&self) -> Option<f64> {
+        (self.square > 0.0).then(|| self.product / self.square)
+    }
 }
 
 /// Rows in steps since the first of their stretch.
@@ -174,7 +223,14 @@ fn count(rows: &Rows<'_>, travelled: &[Option<Travelled>], clock: &Clock) -> Cou
         let cost = |steps: usize| {
             let of_stamp = ((stamp - before - steps as f64 - mean) / STAMPS).powi(2);
             let of_travel = travelled[k].map_or(0.0, |t| ((t.steps - steps as f64) / t.sd).powi(2));
-            of_stamp.min(STAMP_WEIGHS) + of_travel.min(TRAVEL_WEIGHS) - 2.0 * clock.share[steps].ln()
+            // At rest what is usual weighs half: rows that repeat would put all others late.
+            let usual = if travelled[k].is_some_and(|t| t.shows) {
+                2.0
+            } else {
+                1.0
+            };
+            of_stamp.min(STAMP_WEIGHS) + of_travel.min(TRAVEL_WEIGHS)
+                - usual * clock.share[steps].ln()
         };
         let fewest = usize::from(!repeated[k]);
         let steps = if shown[k] {
@@ -222,23 +278,18 @@ fn stamps(rows: &Rows<'_>, ticks: &[f64], step: f64) -> (Vec<f64>, f64) {
     let starts: Vec<usize> = (0..len).filter(|&k| !rows.joined[k]).collect();
     let ends = starts.iter().skip(1).copied().chain([len]);
     let stretches: Vec<(usize, usize)> = starts.iter().copied().zip(ends).collect();
-    let mean = |(from, to): (usize, usize), value: &dyn Fn(usize) -> f64| -> f64 {
-        (from..to).map(value).sum::<f64>() / (to - from) as f64
-    };
-    let (mut product, mut square) = (0.0, 0.0);
+    let mut line = Line::default();
     for &(from, to) in &stretches {
-        let off = |k: usize| rows.stamp(k) - rows.stamp(from) - step * ticks[k];
-        let (middle, apart) = (mean((from, to), &|k| ticks[k]), mean((from, to), &off));
-        for k in from..to {
-            product += (ticks[k] - middle) * (off(k) - apart);
-            square += (ticks[k] - middle).powi(2);
-        }
+        let off = |k: usize| [ticks[k], rows.stamp(k) - rows.stamp(from) - step * ticks[k]];
+        line.add(&(from..to).map(off).collect::<Vec<_>>());
     }
-    let step = if square > 0.0 { step + product / square } else { step };
+    let change = line.slope().filter(|change| change.abs() < CHANGES * step);
+    let step = step + change.unwrap_or(0.0);
     let mut time = vec![0.0; len];
     for &(from, to) in &stretches {
         let start = rows.stamp(from);
-        let offset = mean((from, to), &|k| rows.stamp(k) - start - step * ticks[k]);
+        let late = (from..to).map(|k| rows.stamp(k) - start - step * ticks[k]);
+        let offset = late.sum::<f64>() / (to - from) as f64;
         for k in from..to {
             time[k] = start + offset + step * ticks[k];
         }

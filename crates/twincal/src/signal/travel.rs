@@ -18,7 +18,7 @@ const COUNTS: f64 = 4.0;
 /// The same in standard deviations of the position noise: two readings agree all the same with a probability of 6e-12.
 const DEVIATIONS: f64 = 10.0;
 /// Changes below this share of the largest position are rounding.
-const ROUNDING: f64 = 1e-7;
+pub(super) const ROUNDING: f64 = 1e-7;
 /// Third differences that the noise is estimated from, about.
 const SAMPLED: usize = 1 << 16;
 /// Variance of a standard normal variable below its median modulus.
@@ -104,7 +104,8 @@ impl<'a> Rows<'a> {
     /// Short runs of rows in which a joint's position repeats while it moves.
     pub(super) fn held(&self, joint: &Travel) -> Vec<Range<usize>> {
         let held = runs(self.len(), |k| self.joined[k] && joint.step[k] == 0.0);
-        let shows = |run: &Range<usize>| run.len() <= LONGEST && run.clone().all(|k| joint.moves(k));
+        let shows =
+            |run: &Range<usize>| run.len() <= LONGEST && run.clone().all(|k| joint.moves(k));
         held.into_iter().filter(shows).collect()
     }
 
@@ -134,7 +135,8 @@ pub(super) fn runs(len: usize, inside: impl Fn(usize) -> bool) -> Vec<Range<usiz
 fn repeats(log: &Recording, a: usize, b: usize) -> bool {
     log.joints.iter().all(|joint| {
         let others = [&joint.qd, &joint.qdd, &joint.tau];
-        joint.q[a] == joint.q[b] && (others.into_iter().flatten()).all(|values| values[a] == values[b])
+        joint.q[a] == joint.q[b]
+            && (others.into_iter().flatten()).all(|values| values[a] == values[b])
     })
 }
 
@@ -214,19 +216,23 @@ fn least(q: &[f64], step: &[f64], usual: &[f64], joined: &[bool]) -> f64 {
     let third = |k: usize| step[k] - 2.0 * step[k - 1] + step[k - 2];
     let inside = |k: &usize| (k - 2..=*k).all(|k| joined[k]) && usual[*k].abs() >= fast;
     let stride = q.len().div_ceil(SAMPLED);
-    let mut squares: Vec<f64> = (3..q.len())
-        .step_by(stride)
+    let squares = (3..q.len())
+        .step_by(stride.max(1))
         .filter(inside)
-        .map(|k| third(k).powi(2))
-        .collect();
+        .map(|k| third(k).powi(2));
+    (COUNTS * count).max(DEVIATIONS * white_noise(squares.collect()))
+}
+
+/// Standard deviation of white noise from squares of third differences: the lower half of them, so that what happens now and then does
+/// not count. 0 of nothing.
+pub(super) fn white_noise(mut squares: Vec<f64>) -> f64 {
     let half = squares.len() / 2;
     if half == 0 {
-        return COUNTS * count;
+        return 0.0;
     }
     squares.select_nth_unstable_by(half, f64::total_cmp);
     let lower: f64 = squares[..half].iter().sum::<f64>() / half as f64;
-    let noise = (lower / LOWER_HALF / THIRD_DIFFERENCE).sqrt();
-    (COUNTS * count).max(DEVIATIONS * noise)
+    (lower / LOWER_HALF / THIRD_DIFFERENCE).sqrt()
 }
 
 /// Median; 0 of nothing.

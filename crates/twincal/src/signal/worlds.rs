@@ -53,7 +53,11 @@ impl Motion {
             // There and back.
             let phase = (t / period).rem_euclid(2.0);
             let (leg, share) = (phase.floor(), phase.fract() * period / moving);
-            let [p, v] = if share < 1.0 { profile(share) } else { [1.0, 0.0] };
+            let [p, v] = if share < 1.0 {
+                profile(share)
+            } else {
+                [1.0, 0.0]
+            };
             let sign = 1.0 - 2.0 * leg;
             [way * (leg + sign * p), way * sign * v / moving]
         };
@@ -130,12 +134,18 @@ impl World {
                 q: (state.iter())
                     .map(|[q, _]| (q / count + noisy(self.dither)).round() * count)
                     .collect(),
-                qd: (self.with_velocity)
-                    .then(|| state.iter().map(|[_, v]| v + noisy(1e-3 * self.dither)).collect()),
+                qd: (self.with_velocity).then(|| {
+                    state
+                        .iter()
+                        .map(|[_, v]| v + noisy(1e-3 * self.dither))
+                        .collect()
+                }),
                 qdd: None,
                 tau: Some(
                     (state.iter())
-                        .map(|[q, v]| 3.0 * q.cos() + 0.4 * (v / 0.02).tanh() + noisy(self.torque_noise))
+                        .map(|[q, v]| {
+                            3.0 * q.cos() + 0.4 * (v / 0.02).tanh() + noisy(self.torque_noise)
+                        })
                         .collect(),
                 ),
                 temperature: None,
@@ -177,7 +187,9 @@ pub(super) fn polled(log: &Recording, rate: f64, seed: u64) -> (Recording, Vec<u
     for i in 0..log.time.len() {
         // The poll wanders about the step, by a third of it and now and then more.
         phase += 0.05 * (0.5 - phase) + 0.06 * normal(&mut random);
-        let late = phase + 0.13 * normal(&mut random) + f64::from(u8::from(random.random::<f64>() < 0.01)) * 0.6;
+        let late = phase
+            + 0.2 * normal(&mut random)
+            + f64::from(u8::from(random.random::<f64>() < 0.01)) * 0.6;
         let at = i as f64 + late;
         let at = at.max(stamps.last().map_or(0.0, |last: &f64| last * rate + 0.2));
         let step = at.floor();
