@@ -47,6 +47,8 @@ pub struct PreparedLog<'a> {
     saturated: Saturated,
     /// What each joint's position spans at most at rest, rad or m.
     at_rest: Vec<f64>,
+    /// Time between cuts, before anything is thinned, s.
+    seconds: f64,
     findings: Vec<Finding>,
 }
 
@@ -80,7 +82,7 @@ impl<'a> PreparedLog<'a> {
         mut findings: Vec<Finding>,
         pipeline: &Pipeline,
     ) -> Self {
-        let at_rest = pieces.at_rest(log);
+        let (at_rest, seconds) = (pieces.at_rest(log), pieces.seconds());
         if !pipeline.is_off() {
             let (short, rows) = thin(&mut pieces, pipeline);
             report_short(log, short, rows, &mut findings);
@@ -88,6 +90,7 @@ impl<'a> PreparedLog<'a> {
         Self {
             saturated: Saturated::find(&joints, log, pipeline),
             at_rest,
+            seconds,
             log: Cow::Borrowed(log),
             joints,
             pieces,
@@ -126,6 +129,7 @@ impl<'a> PreparedLog<'a> {
             },
             saturated: self.saturated.clone(),
             at_rest: self.at_rest.clone(),
+            seconds: self.seconds,
             findings: Vec::new(),
         }
     }
@@ -171,6 +175,7 @@ impl<'a> PreparedLog<'a> {
             },
             saturated: self.saturated,
             at_rest: self.at_rest,
+            seconds: self.seconds,
             findings: self.findings,
         }
     }
@@ -241,12 +246,8 @@ fn align(
             0,
         ));
     }
-    let (mut short, mut short_rows, mut total, mut used) = (0, 0, 0.0, 0.0);
+    let (mut short, mut short_rows, mut used) = (0, 0, 0.0);
     for piece in &prepared.pieces {
-        // Rows that are missing on the grid are time, too.
-        let rows = piece.rows.len().saturating_sub(1) as f64 * prepared.interval;
-        let grid = piece.time.len().saturating_sub(1) as f64 * piece.interval;
-        total += rows.max(grid);
         let kept = Kept { with_tau, raw };
         match smoothed(ready, piece, pipeline, cutoff, kept) {
             Some(segment) => {
@@ -277,13 +278,17 @@ fn align(
         "borders",
         &log.name,
         format!(
-            "the filters need {:.3} s at either end of each segment: {used:.3} of {total:.3} s become rows",
-            column_half_seconds(pipeline.cutoff_hz) + pipeline.motion_half_length()
+            "the filters need {:.3} s at either end of each segment: {used:.3} of {:.3} s become rows",
+            column_half_seconds(pipeline.cutoff_hz) + pipeline.motion_half_length(),
+            ready.seconds
         ),
         0,
     ));
     let names: Vec<&str> = joints.iter().map(|facts| facts.name.as_str()).collect();
-    let agreement = velocity_agreement(&trajectory, &pipeline.standstill_velocity);
+    let mut agreement = velocity_agreement(&trajectory, &pipeline.standstill_velocity);
+    for (agreement, channels) in agreement.iter_mut().zip(&log.joints) {
+        *agreement = agreement.filter(|_| channels.qd.is_some());
+    }
     findings.extend(agreement::findings(&names, &log.name, &agreement));
     report_standstill(joints, log, (&trajectory, pipeline), findings);
     saturated.mask(log, pipeline, &mut trajectory, findings);

@@ -122,10 +122,7 @@ impl Sums {
     ) -> Result<()> {
         let prepared = prepare(facts, log, false, &Corrections::default(), findings)?;
         let (pieces, interval) = (&prepared.pieces, prepared.interval);
-        self.duration += pieces
-            .iter()
-            .map(|p| p.time.len().saturating_sub(1) as f64 * p.interval)
-            .sum::<f64>();
+        self.duration += prepared.seconds();
         self.segments += pieces.len() as u64;
         // A chapter is no cut of the log: what goes on in it was counted in the one before.
         let stamp = |row: usize| log.time[row];

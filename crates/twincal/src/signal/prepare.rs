@@ -178,6 +178,15 @@ pub(crate) struct Prepared<'a> {
 }
 
 impl Prepared<'_> {
+    /// Time between cuts, s: from the first to the last stamp of each piece.
+    pub(crate) fn seconds(&self) -> f64 {
+        let of_piece = |piece: &Piece<'_>| {
+            let ends = piece.time.first().zip(piece.time.last());
+            ends.map_or(0.0, |(first, last)| last - first)
+        };
+        self.pieces.iter().map(of_piece).sum()
+    }
+
     /// What each joint's position spans at most at rest, rad or m; before anything is thinned.
     pub(crate) fn at_rest(&self, log: &Recording) -> Vec<f64> {
         let joints = log.joints.par_iter().enumerate();

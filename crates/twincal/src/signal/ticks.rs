@@ -29,9 +29,12 @@ const STAMPS: f64 = 0.4;
 const REMEMBERED: f64 = 2000.0;
 /// Fewest rows in motion, one after the other, whose stamps show how long a step is.
 const IN_A_ROW: usize = 50;
-/// Most that one row of travel and one stamp can weigh (χ²): travel above stamps.
+/// Most that one row of travel can weigh (χ²).
 const TRAVEL_WEIGHS: f64 = 40.0;
+/// The same of one stamp where joints move.
 const STAMP_WEIGHS: f64 = 16.0;
+/// Deviation of a stamp, in standard deviations, beyond which it weighs by its size and no more by its square (Huber).
+const OUTLIER: f64 = 2.0;
 /// What counting may change of the step that rows in motion show, relative.
 const CHANGES: f64 = 1e-4;
 /// Rows on either side among which fewer than a quarter repeat where torque is noisy at rest.
@@ -220,17 +223,18 @@ fn count(rows: &Rows<'_>, travelled: &[Option<Travelled>], clock: &Clock) -> Cou
         }
         let stamp = (rows.stamp(k) - rows.stamp(start)) / (clock.step * rows.interval);
         let before = counted.ticks[k - 1];
+        let shows = travelled[k].filter(|t| t.shows);
+        // At rest what is usual weighs half: rows that repeat would put all others late.
+        let usual = if shows.is_some() { 2.0 } else { 1.0 };
         let cost = |steps: usize| {
-            let of_stamp = ((stamp - before - steps as f64 - mean) / STAMPS).powi(2);
-            let of_travel = travelled[k].map_or(0.0, |t| ((t.steps - steps as f64) / t.sd).powi(2));
-            // At rest what is usual weighs half: rows that repeat would put all others late.
-            let usual = if travelled[k].is_some_and(|t| t.shows) {
-                2.0
+            let of_stamp = huber((stamp - before - steps as f64 - mean) / STAMPS);
+            let of_travel = shows.map_or(0.0, |t| ((t.steps - steps as f64) / t.sd).powi(2));
+            let of_stamp = if shows.is_some() {
+                of_stamp.min(STAMP_WEIGHS)
             } else {
-                1.0
+                of_stamp
             };
-            of_stamp.min(STAMP_WEIGHS) + of_travel.min(TRAVEL_WEIGHS)
-                - usual * clock.share[steps].ln()
+            of_stamp + of_travel.min(TRAVEL_WEIGHS) - usual * clock.share[steps].ln()
         };
         let fewest = usize::from(!repeated[k]);
         let steps = if shown[k] {
@@ -248,6 +252,16 @@ fn count(rows: &Rows<'_>, travelled: &[Option<Travelled>], clock: &Clock) -> Cou
         mean += (stamp - counted.ticks[k] - mean) / REMEMBERED;
     }
     counted
+}
+
+/// Square of a deviation, of an outlier twice its size less the square of where outliers begin.
+fn huber(deviation: f64) -> f64 {
+    let size = deviation.abs();
+    if size <= OUTLIER {
+        size * size
+    } else {
+        OUTLIER * (2.0 * size - OUTLIER)
+    }
 }
 
 /// Rows that motion shows to be repeats, or, where all joints rest, torque that is noisy there.
