@@ -101,8 +101,12 @@ pub(crate) fn sampled(
 
 fn retimed(rows: &Rows<'_>, ticks: Ticks) -> Sampled {
     let mut time = rows.log.time.clone();
-    for (&row, stamp) in rows.rows.iter().zip(ticks.time) {
-        time[row] = stamp;
+    for (&row, stamp) in rows.rows.iter().zip(&ticks.time) {
+        time[row] = *stamp;
+    }
+    // A row that was written twice stays with the first of its kind.
+    for (pair, stamp) in rows.rows.windows(2).zip(&ticks.time) {
+        time[pair[0] + 1..pair[1]].fill(*stamp);
     }
     let mut dropped = vec![false; time.len()];
     for k in ticks.repeats {

@@ -130,6 +130,10 @@ const ORDER: [(&str, &str); 49] = [
         "resampled",
         "log the source's stamp, or give the rate: --rate HZ",
     ),
+    (
+        "repeated_samples",
+        "log each sample of the controller once, with the controller's stamp",
+    ),
     ("slower_channels", "log all channels at one rate"),
     ("short_segments", "record longer, or mend the gaps"),
     (

@@ -18,7 +18,8 @@ const NAMED: usize = 8;
 /// How lines begin that say what mends.
 const HOW: [&str; 2] = ["     → ", "       "];
 /// Notes on a log that are shown with it.
-const OF_LOG: [&str; 5] = [
+const OF_LOG: [&str; 6] = [
+    "controller_clock",
     "gaps",
     "duplicate_rows",
     "resampled",
