@@ -58,7 +58,7 @@ const FOR_THE_NEXT: &str = "nothing has to be done for this log; for the next on
 const NOT_USED: &str = "nothing, if it does not act in these logs; else write its effect into the model in a form that is read";
 
 /// Findings in the order in which they matter, with what mends them.
-const ORDER: [(&str, &str); 49] = [
+const ORDER: [(&str, &str); 50] = [
     (
         "joint_order",
         "map the columns in [columns.q], [columns.qd], [columns.tau] of twincal.toml; twincal init writes them",
