@@ -355,22 +355,14 @@ pub(super) fn pipeline(calibration: &Calibration) -> Vec<String> {
 
 /// Which rows count as standstill.
 fn standstill_rule(pipeline: &Pipeline) -> String {
-    let limits = pipeline.standstill_velocity.iter().enumerate();
-    let coarse: Vec<String> = limits
-        .filter(|(joint, _)| pipeline.hides_slow_motion(*joint))
-        .map(|(_, limit)| number(*limit, 2))
-        .collect();
-    let rest = format!(
-        "A joint is at rest where its position is constant for {} s or longer; such rows are left out of its fit.",
-        number(pipeline.shortest_rest(), 2)
-    );
-    if coarse.is_empty() {
-        return rest;
-    }
+    let slow = match pipeline.standstill_velocity.as_slice() {
+        [first, rest @ ..] if rest.iter().all(|v| v == first) => number(*first, 2),
+        each => list(&each.iter().map(|v| number(*v, 2)).collect::<Vec<_>>()),
+    };
     format!(
-        "{rest} The encoders of {} joints are coarse: rows below {} (rad/s or m/s) for longer than {} s are left out, too.",
-        coarse.len(),
-        list(&coarse),
+        "A joint is at rest where its position is constant for {} s or longer, or where it stays below {slow} (rad/s or m/s) for longer than \
+         {} s; such rows are left out of its fit.",
+        number(pipeline.shortest_rest(), 2),
         number(pipeline.shortest_standstill(), 2)
     )
 }

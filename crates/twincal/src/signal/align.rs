@@ -373,13 +373,11 @@ fn smoothed(
             // As logged: a filtered position rings where a move ends.
             let rest = at_rest(&channels.q, ready.at_rest[joint], piece.interval);
             still.copy_from_slice(&rest[half..half + len]);
-            if pipeline.hides_slow_motion(joint) {
-                let limit = pipeline.standstill_velocity[joint];
-                let travel = travel.as_deref().unwrap_or(qd);
-                let seconds = pipeline.shortest_standstill();
-                let slow = slower_than(travel, limit, seconds, piece.interval);
-                (still.iter_mut().zip(slow)).for_each(|(still, slow)| *still |= slow);
-            }
+            let limit = pipeline.standstill_velocity[joint];
+            let travel = travel.as_deref().unwrap_or(qd);
+            let seconds = pipeline.shortest_standstill();
+            let slow = slower_than(travel, limit, seconds, piece.interval);
+            (still.iter_mut().zip(slow)).for_each(|(still, slow)| *still |= slow);
         });
     let torque = piece.joints.iter().filter_map(|c| c.tau.as_ref());
     let tau = torque

@@ -8,7 +8,6 @@ use super::cutoff::{
 use super::encoder::{Encoder, velocity_resolution};
 use super::fir::{column_half_seconds, column_kernel, motion_half_seconds, noise_gain};
 use super::prepare::{JointFacts, prepare};
-use super::standstill::{HARDLY, SLOWEST};
 use super::survey::{Candidates, Chapters, Survey};
 use super::thin::{coarsest, factor};
 use super::{
@@ -407,7 +406,7 @@ fn on(
             };
             let spectra = of_joint(joint);
             let resolved = velocity_resolution(joint, &encoder, &spectra, &pipeline, &mut said);
-            (HARDLY.max(resolved), said)
+            (coulomb_velocity.max(resolved), said)
         })
         .collect();
     for (threshold, said) in resolved {
@@ -417,10 +416,7 @@ fn on(
     let thresholds = &pipeline.standstill_velocity;
     let moving = candidates.move_by(joints, thresholds, cutoff, settings)?;
     let still: Vec<bool> = moving.iter().map(|moves| !moves).collect();
-    let slowest = thresholds
-        .iter()
-        .map(|limit| if *limit > HARDLY { *limit } else { SLOWEST });
-    findings.extend(unexcited(joints, &still, &slowest.collect::<Vec<_>>())?);
+    findings.extend(unexcited(joints, &still, thresholds)?);
     let kept = pipeline.common_rate(
         intervals
             .iter()

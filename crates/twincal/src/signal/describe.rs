@@ -2,6 +2,7 @@
 
 use super::clock::GAP;
 use super::prepare::{JointFacts, Piece, Values, joint_facts, prepare};
+use super::travel::LONGEST;
 use super::{Corrections, Log, Logs, Recording};
 use crate::error::{Finding, Result, Severity};
 use crate::robot::Robot;
@@ -134,8 +135,9 @@ impl Sums {
         let last = log.time.len().saturating_sub(1);
         let ends = pieces.last().filter(|piece| {
             let row = piece.rows[piece.rows.len() - 1];
-            // Of several samples with one stamp the first is taken.
-            last - row < stride(piece) || stamp(last) <= stamp(row)
+            // Of several samples with one stamp the first is taken, and of a receiver's repeats.
+            let repeats = if prepared.time.is_some() { LONGEST } else { 0 };
+            last - row < stride(piece) + repeats || stamp(last) <= stamp(row)
         });
         self.end = ends.and_then(|piece| piece.rows.last().map(|&row| stamp(row)));
         self.intervals.push(interval);

@@ -78,7 +78,7 @@ pub struct SignalSettings {
     pub cutoff_hz: Auto,
     /// Rate of the kept rows, Hz; auto = 2.5 f_c.
     pub rate_hz: Auto,
-    /// v_s of Coulomb friction, rad/s or m/s; `None`: 0 with cut-off 0, else 0.02, of which a calibration
+    /// v_s of Coulomb friction and of the standstill mask, rad/s or m/s; `None`: 0 with cut-off 0, else 0.02, of which a calibration
     /// takes a quarter to four times for friction where training data clearly ask for it.
     pub coulomb_velocity: Option<f64>,
     /// What is put right in every log first.
@@ -178,8 +178,8 @@ pub struct Pipeline {
     pub motion_interval: f64,
     /// v_s, rad/s or m/s.
     pub coulomb_velocity: f64,
-    /// Velocity per joint below which it hardly moves: max(0.02, what the encoder resolves), rad/s or m/s. Rest is where position is
-    /// constant; only where the encoder resolves less than 0.02, slower motion counts as rest, too.
+    /// Standstill threshold per joint: max(v_s as stated or 0.02, what the encoder resolves), rad/s or m/s. A joint that is slower for long
+    /// counts as at rest, as one whose position is constant.
     pub standstill_velocity: Vec<f64>,
     /// What q̈ is derived from where it is not logged, per joint: the channel that leaves less noise.
     pub derived_from: Vec<DerivedFrom>,
@@ -302,17 +302,11 @@ impl Pipeline {
         standstill::SHORTEST
     }
 
-    /// How long a joint with a coarse encoder ([`Pipeline::hides_slow_motion`]) has to be slow to count as at rest, s: three periods of the
-    /// cut-off, so that the filter has forgotten what was before; infinite without a filter.
+    /// How long a joint has to be slow to count as at rest though its position changes, s: three periods of the cut-off, so that the filter
+    /// has forgotten what was before; infinite without a filter.
     #[must_use]
     pub fn shortest_standstill(&self) -> f64 {
         align::STANDSTILL_PERIODS / self.cutoff_hz
-    }
-
-    /// Whether a joint's encoder is so coarse that motion below its standstill threshold cannot be told from rest.
-    #[must_use]
-    pub fn hides_slow_motion(&self, joint: usize) -> bool {
-        self.standstill_velocity[joint] > standstill::HARDLY
     }
 
     /// The pipeline that changes nothing: every input row is one row.

@@ -7,8 +7,6 @@ use std::collections::VecDeque;
 pub(crate) const SHORTEST: f64 = 0.15;
 /// Slowest motion, rad/s or m/s: a third of the slowest at which friction of geared arms is measured.
 pub(crate) const SLOWEST: f64 = 1e-3;
-/// Velocity below which a joint hardly moves, rad/s or m/s; a coarse encoder tells only faster motion from rest.
-pub(crate) const HARDLY: f64 = 0.02;
 /// What a position at rest spans at most: in counts of its encoder (two on either side), and in standard deviations of noise beyond that
 /// of counting (150 readings of a normal variable span more than 8 of them with a probability of 2e-4).
 const COUNTS: f64 = 4.5;
@@ -68,7 +66,7 @@ pub(crate) fn at_rest(q: &[f64], span: f64, interval: f64) -> Vec<bool> {
     still
 }
 
-/// Marks the samples where |q̇| stays below `velocity` for longer than `seconds`: what a coarse encoder cannot tell from rest.
+/// Marks the samples where |q̇| stays below `velocity` for longer than `seconds`.
 pub(crate) fn slower_than(qd: &[f64], velocity: f64, seconds: f64, interval: f64) -> Vec<bool> {
     let mut still = vec![false; qd.len()];
     let mut start = 0;

@@ -3,7 +3,6 @@
 use super::cutoff::{JointSpectra, spectra};
 use super::encoder::quantum;
 use super::prepare::{JointFacts, Piece, Prepared, prepare};
-use super::standstill::{HARDLY, SHORTEST, at_rest};
 use super::steps::{changes, common_step};
 use super::{Channels, LongLog, Recording, SignalSettings};
 use crate::error::{Finding, Result};
@@ -128,21 +127,16 @@ impl Candidates<'_> {
         cutoff: f64,
         settings: &SignalSettings,
     ) -> Result<Vec<bool>> {
-        let see = |moving: &mut Vec<bool>, recording: &Recording, prepared: &Prepared<'_>| {
-            let spans = prepared.at_rest(recording);
+        let see = |moving: &mut Vec<bool>, prepared: &Prepared<'_>| {
             (moving.par_iter_mut().zip(thresholds).enumerate())
                 .filter(|(_, (moving, _))| !**moving)
                 .for_each(|(joint, (moving, threshold))| {
-                    *moving = if *threshold > HARDLY {
-                        moves(joint, prepared, *threshold, cutoff)
-                    } else {
-                        leaves_rest(joint, prepared, spans[joint], HARDLY * 0.5 / cutoff)
-                    };
+                    *moving = moves(joint, prepared, *threshold, cutoff);
                 });
         };
         let mut moving = vec![false; joints.len()];
-        for (recording, prepared, _) in &self.whole {
-            see(&mut moving, recording, prepared);
+        for (_, prepared, _) in &self.whole {
+            see(&mut moving, prepared);
         }
         for (long, _) in &self.long {
             // Nearly always the first chapter says it all.
@@ -155,32 +149,12 @@ impl Candidates<'_> {
                 if let Ok(prepared) =
                     prepare(joints, &recording, false, corrections, &mut Vec::new())
                 {
-                    see(&mut moving, &recording, &prepared);
+                    see(&mut moving, &prepared);
                 }
             }
         }
         Ok(moving)
     }
-}
-
-/// Whether a joint is anywhere not at rest for longer than a rest lasts at least, and travels further than one that trembles: `least`.
-fn leaves_rest(joint: usize, prepared: &Prepared<'_>, span: f64, least: f64) -> bool {
-    prepared.pieces.iter().any(|piece| {
-        let q = &piece.joints[joint].q;
-        let still = at_rest(q, span, piece.interval);
-        let moving = still.iter().filter(|still| !**still).count();
-        moving as f64 * piece.interval > SHORTEST && spread(q) > least.max(span)
-    })
-}
-
-/// Largest less smallest value.
-fn spread(values: &[f64]) -> f64 {
-    let (low, high) = values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(*v), h.max(*v))
-        });
-    high - low
 }
 
 /// Whether a joint is anywhere displaced by more than `threshold` times half a period of the cut-off in that time.
