@@ -42,9 +42,10 @@ Examples:
 Examples:
   twincal doctor run.csv --model arm.urdf
   twincal doctor run1.csv run2.csv --model arm.urdf --json
+  twincal doctor run.csv --model arm.urdf --trial   tries the fit as well
   twincal init run.csv --model arm.urdf      writes the proposed twincal.toml
 ",
-        after_help = "The exit code is what `twincal fit` would end with for the same reason."
+        after_help = "The exit code is what `twincal fit` would end with for the same reason. What only a\nfit can tell (too few independent rows) is found with --trial."
     )]
     Doctor(Doctor),
     /// Write the twincal.toml that `doctor` proposes.
@@ -109,7 +110,7 @@ impl Command {
         match self {
             Self::Demo(flags) => flags.json,
             Self::Inspect(flags) => flags.log.json,
-            Self::Doctor(flags) => flags.log.json,
+            Self::Doctor(flags) => flags.look.log.json,
             Self::Fit(flags) => flags.log.json,
             Self::Check(flags) => flags.log.json,
             Self::Predict(flags) => flags.log.json,
@@ -195,7 +196,7 @@ pub(crate) struct Inspect {
     rustdoc::broken_intra_doc_links,
     reason = "[[log]] is a table of twincal.toml, and this text is printed as help"
 )]
-pub(crate) struct Doctor {
+pub(crate) struct Look {
     /// Logs to look at (CSV, Parquet, Arrow, NPZ, MCAP, rosbag2) [default: those of [[log]] in the config].
     #[arg(value_name = "LOG")]
     pub(crate) logs: Vec<PathBuf>,
@@ -210,9 +211,18 @@ pub(crate) struct Doctor {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct Doctor {
+    #[command(flatten)]
+    pub(crate) look: Look,
+    /// Try the fit as well; it takes as long as `fit`.
+    #[arg(long)]
+    pub(crate) trial: bool,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct Init {
     #[command(flatten)]
-    pub(crate) look: Doctor,
+    pub(crate) look: Look,
     /// File to write [default: twincal.toml].
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,

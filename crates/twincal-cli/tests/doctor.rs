@@ -297,16 +297,17 @@ fn a_joint_that_is_not_logged_is_locked_for_the_look_and_in_the_config() {
     assert!(config.contains("locked = { elbow = 0.0 }"), "{config}");
 }
 
-/// Too few rows for the candidates, which only the filters' choice decides.
+/// Too few rows for the candidates, which only the filters' choice decides: told by a trial of the fit, which nobody gets without asking.
 #[test]
-fn what_only_a_fit_can_tell_is_told_as_well() {
+fn what_only_a_fit_can_tell_is_told_by_a_trial() {
     let folder = folder(GOOD);
     let short: Vec<String> = log(GOOD).lines().take(3500).map(str::to_owned).collect();
     fs::write(folder.path().join("run.csv"), short.join("\n")).unwrap();
     let slow = "[model]\ngravity = [0.0, -9.81, 0.0]\n[signal]\ncutoff_hz = 2.0\n";
     fs::write(folder.path().join("slow.toml"), slow).unwrap();
     let fit = with_config(folder.path(), "fit", "slow.toml", &["-o", "out"]).expect(4);
-    let done = with_config(folder.path(), "doctor", "slow.toml", &["--json"]).expect(4);
+    let trial = ["--json", "--trial"];
+    let done = with_config(folder.path(), "doctor", "slow.toml", &trial).expect(4);
     let diagnosis: Value = serde_json::from_str(&done.out).unwrap();
     let (problem, how) = first_mend(&diagnosis);
     assert!(diagnosis["verdict"].as_str().unwrap().contains("refuse"));
@@ -315,4 +316,7 @@ fn what_only_a_fit_can_tell_is_told_as_well() {
         "{}{problem}{how}",
         fit.err
     );
+    assert!(done.err.contains("trying the fit"), "{}", done.err);
+    let look = with_config(folder.path(), "doctor", "slow.toml", &["--json"]).expect(0);
+    assert!(!look.err.contains("fit"), "{}", look.err);
 }

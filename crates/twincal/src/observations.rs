@@ -4,8 +4,10 @@ mod blocks;
 mod columns;
 mod room;
 mod products;
+mod sum;
 
 pub(crate) use room::Room;
+pub(crate) use sum::GramSum;
 
 use crate::error::Result;
 use crate::gram::{Gram, JointAccumulator, Workspace};
@@ -319,20 +321,22 @@ impl Observations {
 impl Part<'_> {
     /// Sufficient statistics of these rows; standstill rows are left out and end a run.
     pub fn gram(&self) -> Gram {
-        let joints = (0..self.observations.joints.len())
-            .into_par_iter()
-            .map(|joint| self.joint_gram(joint))
-            .collect();
-        Gram { joints }
+        [self].into_iter().collect()
     }
 
-    fn joint_gram(&self, joint: usize) -> crate::gram::JointGram {
-        let (all, rows) = (self.observations, &self.observations.joints[joint]);
+    /// Sums of the kind that [`Part::add_joint`] adds to.
+    fn accumulator(&self, joint: usize) -> JointAccumulator {
+        let rows = &self.observations.joints[joint];
         let columns: Vec<u32> = rows.columns.iter().map(|&c| c as u32).collect();
-        let mut accumulator = match &rows.recipes {
+        match &rows.recipes {
             Some(recipes) => JointAccumulator::of_parts(columns, recipes),
             None => JointAccumulator::new(columns),
-        };
+        }
+    }
+
+    /// Adds these rows of a joint, as runs of their own.
+    fn add_joint(&self, joint: usize, accumulator: &mut JointAccumulator) {
+        let (all, rows) = (self.observations, &self.observations.joints[joint]);
         let signals = rows.signals();
         let mut workspace = Workspace::default();
         let keep: Vec<bool> = rows.standstill.iter().map(|still| !still).collect();
@@ -359,7 +363,6 @@ impl Part<'_> {
                 accumulator.push_block(&x, count, &y, keep, first, &mut workspace);
             });
         }
-        accumulator.finish()
     }
 
     /// The part's rows split at the starts of segments.

@@ -11,11 +11,13 @@ use crate::posterior::Posterior;
 use crate::signal::{Pipeline, Trajectory};
 use crate::term::Library;
 use crate::twin::Twin;
-use crate::validate::{HeldOut, Predictors, Split, Validation};
+use crate::validate::{HeldOut, LOG_GROUPS, Predictors, Split, Validation};
 use rayon::prelude::*;
 
 /// Share of a log that trains when there are one or two logs.
 const TRAINING_SHARE: f64 = 0.7;
+/// Logs at most that are left out one by one: every one costs a fit of all others. More are left out in groups.
+const MOST_ONE_BY_ONE: usize = 12;
 /// Least gap between training and held-out rows of one log, s.
 const LEAST_GAP: f64 = 1.0;
 
@@ -66,7 +68,7 @@ impl Plan<'_> {
     ) -> Result<Vec<Fitted>> {
         match self.split {
             Split::HeldoutLogs => Ok(Vec::new()),
-            Split::LeaveOneLogOut | Split::LastThirty => self
+            Split::LeaveOneLogOut | Split::LeaveLogGroupsOut | Split::LastThirty => self
                 .folds
                 .par_iter()
                 .map(|fold| estimate(&fold.training, columns, settings))
@@ -210,16 +212,23 @@ pub(super) fn plan<'a>(
             folds: vec![fold],
         };
     }
-    if data.fit.len() >= 3 {
-        let folds = (0..data.fit.len()).map(|out| Fold {
-            training: (0..data.fit.len())
-                .filter(|&log| log != out)
-                .map(|log| data.fit[log].observations.whole())
-                .collect(),
-            held_out: vec![whole((&data.fit[out], &trajectories.fit[out]))],
+    let count = data.fit.len();
+    if count >= 3 {
+        let (groups, split) = match count > MOST_ONE_BY_ONE {
+            true => (LOG_GROUPS, Split::LeaveLogGroupsOut),
+            false => (count, Split::LeaveOneLogOut),
+        };
+        let folds = (0..groups).map(|group| {
+            let out = group * count / groups..(group + 1) * count / groups;
+            let others = (0..count).filter(|log| !out.contains(log));
+            let left_out = data.fit[out.clone()].iter().zip(&trajectories.fit[out.clone()]);
+            Fold {
+                training: others.map(|log| data.fit[log].observations.whole()).collect(),
+                held_out: left_out.map(whole).collect(),
+            }
         });
         return Plan {
-            split: Split::LeaveOneLogOut,
+            split,
             folds: folds.collect(),
         };
     }

@@ -187,7 +187,7 @@ fn weighing(training: &[Part<'_>], joint: usize, robust: bool) -> f64 {
 
 /// What one fold knows, and what it predicts.
 struct LeaveOut<'a> {
-    /// Statistics of the kept pieces, added up in their order: no subtraction, no rounding but that of a sum.
+    /// Statistics of the kept pieces, added up fold by fold: no subtraction, no rounding but that of a sum.
     kept: Gram,
     out: Vec<Part<'a>>,
 }
@@ -205,21 +205,19 @@ fn folds<'a>(training: &[Part<'a>]) -> Vec<LeaveOut<'a>> {
             .collect()
     };
     let count = pieces.len().min(MOST_FOLDS);
-    let grams: Vec<Gram> = pieces.par_iter().map(Part::gram).collect();
-    (0..count)
-        .map(|fold| {
-            let mut own = LeaveOut {
-                kept: Gram::default(),
-                out: Vec::new(),
-            };
-            for (i, (piece, gram)) in pieces.iter().zip(&grams).enumerate() {
-                if i % count == fold {
-                    own.out.push(piece.clone());
-                } else {
-                    own.kept += gram;
-                }
-            }
-            own
+    let out: Vec<Vec<Part<'a>>> = (0..count)
+        .map(|fold| pieces.iter().skip(fold).step_by(count).cloned().collect())
+        .collect();
+    let grams: Vec<Gram> = out.par_iter().map(|out| total(out)).collect();
+    let folds = out.into_iter().enumerate();
+    folds
+        .map(|(fold, out)| {
+            let mut kept = Gram::default();
+            let others = grams.iter().enumerate();
+            others
+                .filter(|(other, _)| *other != fold)
+                .for_each(|(_, gram)| kept += gram);
+            LeaveOut { kept, out }
         })
         .collect()
 }

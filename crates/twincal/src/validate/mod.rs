@@ -93,6 +93,9 @@ impl Default for Scores {
     }
 }
 
+/// Groups that many logs are left out in.
+pub const LOG_GROUPS: usize = 10;
+
 /// How training and held-out data were separated.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -101,6 +104,8 @@ pub enum Split {
     HeldoutLogs,
     /// Each log predicted from the others.
     LeaveOneLogOut,
+    /// Many logs: [`LOG_GROUPS`] groups of logs that follow each other, each group predicted from the others.
+    LeaveLogGroupsOut,
     /// The last 30 % of each log after a gap.
     LastThirty,
 }

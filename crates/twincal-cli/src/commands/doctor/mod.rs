@@ -79,7 +79,7 @@ struct Asked {
 }
 
 impl Asked {
-    fn of(flags: &args::Doctor, verb: &str, terminal: &mut Terminal) -> Outcome<Self> {
+    fn of(flags: &args::Look, verb: &str, terminal: &mut Terminal) -> Outcome<Self> {
         let config = settings::of_look(&flags.model, &flags.allow, &flags.log, terminal)?;
         let settings = config.settings()?;
         let logs = if flags.logs.is_empty() {
@@ -107,15 +107,19 @@ impl Asked {
 }
 
 pub(super) fn run(flags: &args::Doctor, terminal: &mut Terminal) -> Outcome<u8> {
-    let asked = Asked::of(flags, "doctor", terminal)?;
+    let asked = Asked::of(&flags.look, "doctor", terminal)?;
     start_threads(asked.settings.threads)?;
     let progress = Progress::new();
+    let trial = match flags.trial {
+        true => Trial::Fit,
+        false => Trial::None,
+    };
     let examination = examine(
         &asked.model,
         &asked.logs,
         &asked.settings,
         &progress,
-        Trial::Fit,
+        trial,
     )?;
     drop(progress);
     let diagnosis = diagnosis(examination, &asked);
