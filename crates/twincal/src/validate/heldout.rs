@@ -6,6 +6,7 @@ use super::{
     Validation,
 };
 use crate::error::{Finding, Result};
+use crate::incidents::{Evidence, incident_findings, leave_out};
 use crate::observations::Observations;
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, slices, spread_raw, visit_slices};
@@ -85,24 +86,28 @@ impl HeldOut {
     }
 
     /// Predicts the rows of a log that was not used to fit the twin, and scores them: filtered rows all, raw rows of long logs in evenly
-    /// spread pieces, see [`spread_raw`].
+    /// spread pieces, see [`spread_raw`]. `seen` gets the motion of the log, or of chapter after chapter; contacts and stops are left out of a log
+    /// that is no longer than a chapter, as the fit leaves them out.
     ///
     /// # Errors
-    /// [`crate::Error::Log`] for a log without torque, those of [`Twin::align`] and [`visit_slices`], and of chapters that cannot be read.
+    /// Those of `seen`, [`crate::Error::Log`] for a log without torque, those of [`Twin::align`] and [`visit_slices`], and of chapters that cannot be read.
     pub fn score(
         &mut self,
-        twin: &Twin,
-        library: &Library,
-        predictor: &Predictor,
+        (twin, library, predictor): (&Twin, &Library, &Predictor),
         log: &Log<'_>,
         findings: &mut Vec<Finding>,
+        seen: &mut (dyn FnMut(&Trajectory) -> Result<()> + Send),
     ) -> Result<()> {
         let mut collected = self.collect(log.name(), rows_about(log, &twin.pipeline)?);
         let names = twin.robot.joint_names();
+        let whole = matches!(log, Log::Whole(_));
         let mut part = |recording: &Recording, said: &mut Vec<Finding>| -> Result<Trajectory> {
             recording.require_torque(&names)?;
-            let (trajectory, more) = twin.align(recording)?;
+            let (mut trajectory, more) = twin.align(recording)?;
             said.extend(more);
+            if whole {
+                said.extend(without_incidents(twin, &mut trajectory));
+            }
             let signal = RowSignal::Filtered;
             let slices = slices(
                 &twin.pipeline,
@@ -123,6 +128,7 @@ impl HeldOut {
                     Ok(())
                 },
             )?;
+            seen(&trajectory)?;
             Ok(trajectory)
         };
         let trajectory = match log {
@@ -314,6 +320,16 @@ impl HeldOut {
             traces: self.traces,
         }
     }
+}
+
+/// Leaves contacts and protective stops out of a log's motion, and says so.
+fn without_incidents(twin: &Twin, trajectory: &mut Trajectory) -> Vec<Finding> {
+    let (robot, pipeline) = (&twin.robot, &twin.pipeline);
+    let mut evidence = Evidence::default();
+    evidence.take(robot, pipeline, trajectory);
+    let incidents = evidence.incidents(robot, pipeline);
+    leave_out(pipeline, trajectory, &incidents);
+    incident_findings(&trajectory.name, &incidents)
 }
 
 /// Filtered rows of a log, and a few more: those at the ends of its stretches.

@@ -1,5 +1,6 @@
 //! Held-out scores: how good the twin's torque is on data it has not seen (method section 8).
 
+mod changes;
 mod conformal;
 mod heldout;
 mod pit;
@@ -7,6 +8,7 @@ mod rivals;
 mod scores;
 mod trace;
 
+pub use changes::{Change, ChangeKind, ChangeNumber, Changes, FALSE_ALARM, LEAST_SHARE};
 pub use conformal::{Conformal, ConformalKeeper, JointFactor};
 pub use heldout::{HeldOut, Predictors};
 pub use pit::{Pit, PitKeeper, Reliability};
