@@ -64,11 +64,18 @@ Examples:
 ")]
     Fit(Fit),
     /// Score a twin on new logs: exit code 0, or 1 where a gate says no.
-    #[command(before_help = "\
+    #[command(
+        before_help = "\
 Examples:
   twincal check today.csv --twin twincal-out
   twincal check today.csv --twin twincal-out --config gates.toml --json
-")]
+",
+        after_help = "\
+Gates of each joint: RMSE at most 1.2 times the twin's own, at least 90 % of rows
+in 95 % intervals ([check] of twincal.toml). Changes: friction of each joint, a
+payload, joint zeros; an unchanged robot fails these with probability 1 % at most.
+Exit code 3: the logs are too short to tell (fewer than 10 independent rows)."
+    )]
     Check(Check),
     /// Torque with 95 % intervals, row by row.
     #[command(before_help = "\

@@ -19,6 +19,8 @@ use twincal_io::{Error, memory};
 /// Doubles per sample and joint that alignment and filtering hold at once beside the recordings themselves: pieces on even clocks (4),
 /// smooth motion with torques (5), what passes by. What rows take is asked when it is known how many there are.
 const DOUBLES_PER_SAMPLE: u64 = 12;
+/// Logs that are named while they are read; of more every so many is.
+const MOST_SAID: usize = 20;
 
 /// The robot and what its file says.
 pub(super) struct RobotInput {
@@ -130,8 +132,15 @@ impl LogInput {
     ) -> Outcome<Self> {
         let mut samples = 0;
         let mut input = Self::new(paths.to_vec());
-        for (path, name) in paths.iter().zip(display_names(paths)) {
-            progress.step(&format!("reading {}", path.to_string_lossy()));
+        let said = paths.len().div_ceil(MOST_SAID).max(1);
+        for (number, (path, name)) in paths.iter().zip(display_names(paths)).enumerate() {
+            if number % said == 0 {
+                let of = match said {
+                    1 => String::new(),
+                    _ => format!(" ({} of {})", number + 1, paths.len()),
+                };
+                progress.step(&format!("reading {}{of}", path.to_string_lossy()));
+            }
             let read = || read_one(path);
             let (log, checksum) = if path.is_file() || path.is_dir() {
                 let (log, checksum) = rayon::join(read, || sha256_of_log(path));

@@ -89,7 +89,9 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
         Long::of_settings(&settings),
         &progress,
     )?;
-    drop(progress);
+    if !logs.logs.is_empty() {
+        progress.step("comparing logs and model");
+    }
     let mut found = robot.findings;
     found.append(&mut logs.findings);
     let mut overviews = Vec::new();
@@ -108,6 +110,7 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
     let aligned =
         (compared.as_mut()).map(|(pipeline, checkup)| (&*pipeline, checkup.looked_at(&logs.logs)));
     let outlook = outlook(&robot.robot, &settings.calibration.library, aligned)?;
+    drop(progress);
     found.extend(outlook.findings.iter().cloned());
     require_strict(settings.log.strict, &found)?;
     let code = code_of(&found);

@@ -88,7 +88,7 @@ fn validation(calibration: &Calibration, terminal: &mut Terminal) {
     let split = match &validation.split {
         Split::HeldoutLogs => "held-out logs",
         Split::LeaveOneLogOut => "each log predicted from the others",
-        Split::LeaveLogGroupsOut => "each tenth of the logs predicted from the others",
+        Split::LeaveLogGroupsOut => "each fifth of the logs predicted from the others",
         Split::LastThirty => "last 30 % of each log",
     };
     let judged = report::decisive(validation);

@@ -50,7 +50,7 @@ pub use ripples::UnaskedRipple;
 pub use stopped::Stopped;
 
 use crate::error::{Error, Finding, Result};
-use crate::infer::{Choice, Given, InferenceSettings, infer, sample, sampled_likelihood};
+use crate::infer::{Choice, Given, InferenceSettings, infer_near, sample, sampled_likelihood};
 use crate::lag::{LogLag, estimate_lag, lag_findings};
 use crate::likelihood::{
     Columns, JointNoise, NoiseInterval, NoiseModel, NoiseSettings, NoiseUncertainty, Spread,
@@ -157,8 +157,8 @@ pub enum Stage {
 
 /// Finds what the nominal robot misses in `logs` and says how well the calibrated twin predicts.
 ///
-/// With `heldout` recordings these are predicted; without, three or more logs are left out one by one, and otherwise
-/// the last 30 % of each log. The coefficients always come from all of `logs`. Recordings that are given away (as `Vec`) are
+/// With `heldout` recordings these are predicted; without, three or more logs are left out one by one (many in five groups), and
+/// otherwise the last 30 % of each log. The coefficients always come from all of `logs`. Recordings that are given away (as `Vec`) are
 /// dropped as soon as nobody needs them, which is what the largest of them cost in memory at the end.
 ///
 /// # Errors
@@ -291,7 +291,8 @@ fn road(
     }
     findings.extend(seen.iter().map(Seen::told));
     if fitted.sampled.is_empty() {
-        fitted.fit.posterior = infer(&fitted.fit.problem, &settings.inference)?;
+        let fit = &fitted.fit;
+        fitted.fit.posterior = infer_near(&fit.problem, &fit.posterior, &settings.inference)?;
     }
     findings.extend(unsettled::findings(robot, &fitted, settings, &training));
     let mean = &fitted.fit.posterior.mean;
@@ -339,7 +340,6 @@ fn road(
     drop((trajectories, others, every_log));
     let prepared: Vec<ReadyLog<'static>> = prepared.into_iter().map(ReadyLog::detached).collect();
     *recordings = None;
-
     progress(Stage::Sensitivity);
     let gap = (skeleton.pipeline.kernel_length() * skeleton.pipeline.rate_hz).ceil() as usize;
     let halves = repeat::cut(&training, gap);

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::gram::Gram;
 use crate::infer::approximate;
 use crate::likelihood::{Columns, PlugIn, assemble};
-use crate::observations::{Observations, Part};
+use crate::observations::{Observations, Part, QuadraticForm};
 use crate::posterior::Posterior;
 use rayon::prelude::*;
 
@@ -250,8 +250,15 @@ fn predict_left_out(
             let joint = |joint: usize| {
                 let noise = posterior.noise / plug_in.weight[joint];
                 let mut sums = LeftOutJoint::default();
+                let mut form: Option<QuadraticForm> = None;
                 for part in out {
-                    sums.add(part, joint, &posterior, &covariance, (noise, robust));
+                    if !form.as_ref().is_some_and(|form| part.has_form(joint, form)) {
+                        let count = posterior.mean.len();
+                        form = Some(part.quadratic_form(joint, &covariance, count));
+                    }
+                    if let Some(form) = &form {
+                        sums.add(part, joint, (&posterior, form), (noise, robust));
+                    }
                 }
                 sums
             };
@@ -269,13 +276,12 @@ impl LeftOutJoint {
         &mut self,
         part: &Part<'_>,
         joint: usize,
-        posterior: &Posterior,
-        covariance: &[f64],
+        (posterior, form): (&Posterior, &QuadraticForm),
         (noise, robust): (f64, bool),
     ) {
         let rows = &part.observations.joints[joint];
         let residual = part.residual(joint, &posterior.mean, part.rows.clone());
-        let epistemic = part.quadratic_forms(joint, covariance, posterior.mean.len());
+        let epistemic = part.forms(joint, form);
         for (row, (r, epistemic)) in part.rows.clone().zip(residual.iter().zip(epistemic)) {
             if rows.standstill[row] {
                 continue;

@@ -189,9 +189,15 @@ impl<'a> Changes<'a> {
         let is_change = |estimate: &Estimate| {
             estimate.chance < limit && estimate.share >= LEAST_SHARE
         };
-        // What explains most is a change; what else is one beside it.
-        let clear = estimates.iter().filter(|(_, own)| is_change(own));
-        let first = clear.max_by(|a, b| a.1.explained.total_cmp(&b.1.explained));
+        // What explains most, by Schwarz's criterion, is a change; what else is one beside it. A zero of the last joint acts like a first moment at
+        // the tool, which has four numbers for it.
+        let clear = || estimates.iter().filter(|(_, own)| is_change(own));
+        let inflation = clear().fold(1.0_f64, |most, (_, own)| most.max(own.inflation));
+        let rows = self.joints.iter().map(|joint| joint.rows).sum::<f64>();
+        let worth = |(suspect, own): &(&Suspect, Estimate)| {
+            own.explained / inflation - suspect.columns.len() as f64 * rows.max(1.0).ln()
+        };
+        let first = clear().max_by(|a, b| worth(a).total_cmp(&worth(b)));
         let changes = estimates.iter().map(|(suspect, own)| {
             let changed = is_change(own)
                 && first.is_some_and(|(other, most)| {

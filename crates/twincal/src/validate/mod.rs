@@ -96,7 +96,7 @@ impl Default for Scores {
 }
 
 /// Groups that many logs are left out in.
-pub const LOG_GROUPS: usize = 10;
+pub const LOG_GROUPS: usize = 5;
 
 /// How training and held-out data were separated.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

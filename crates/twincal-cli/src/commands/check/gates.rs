@@ -134,7 +134,7 @@ fn own_rows(split: &Split) -> &'static str {
     match split {
         Split::HeldoutLogs => "of the twin on its held-out logs",
         Split::LeaveOneLogOut => "of the twin on its logs, each left out in turn",
-        Split::LeaveLogGroupsOut => "of the twin on its logs, left out in ten groups",
+        Split::LeaveLogGroupsOut => "of the twin on its logs, left out in five groups",
         Split::LastThirty => "of the twin on the last 30 % of each of its logs",
     }
 }
