@@ -8,7 +8,7 @@ use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::posterior::random::Random;
 use twincal::signal::{Auto, Recording};
 use twincal::term::Family;
-use twincal::validate::{Change, ChangeKind, Changes};
+use twincal::validate::{Change, ChangeKind, Changes, least_share};
 
 /// Mass at the tip, and all that moves, kg.
 const TIP: f64 = 2.6;
@@ -62,7 +62,7 @@ fn changes(twin: &Calibration, log: &Recording) -> Vec<Change> {
     let mut changes = Changes::new(&twin.twin, &library, &error).expect("columns");
     let (trajectory, _) = twin.twin.align(log).expect("a motion");
     changes.take(&trajectory).expect("rows");
-    changes.finish()
+    changes.finish(least_share(1.2))
 }
 
 fn named(all: &[Change]) -> Vec<(ChangeKind, &str)> {

@@ -14,7 +14,7 @@ use crate::terminal::{Terminal, clean};
 use gates::{ALL, ENOUGH, Gate, Own, judge};
 use serde::Serialize;
 use twincal::twin::Twin;
-use twincal::validate::{Change, Changes, FALSE_ALARM, HeldOut, Scores, Split, Validation};
+use twincal::validate::{Change, Changes, FALSE_ALARM, HeldOut, Scores, Split, Validation, least_share};
 use twincal::words::significant;
 use twincal::{Finding, Result, Severity};
 use twincal_io::artifact::Artifact;
@@ -52,18 +52,19 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     let mut logs = LogInput::for_twin(&flags.logs, &stored, settings.log.clone(), &progress)?;
     progress.step("predicting the logs");
     let mut found = std::mem::take(&mut logs.findings);
-    let scored = score(&stored, &logs, &mut found).map_err(|error| logs.as_given(error))?;
-    let (validation, changes) = scored;
-    drop(progress);
-    require_strict(settings.log.strict, &found)?;
     // A gate that the config does not give stays as the twin was fitted with.
     let gates = config.gates_over(stored.gates)?;
+    let least = least_share(gates.rmse_ratio);
+    let scored = score(&stored, &logs, least, &mut found);
+    let (validation, changes) = scored.map_err(|error| logs.as_given(error))?;
+    drop(progress);
+    require_strict(settings.log.strict, &found)?;
     let known = known_logs(&logs.files, &stored);
     let fitted = known.iter().filter(|finding| finding.code == FITTED);
     let fitted = fitted.count() == logs.files.len();
     let own = Own::of(&stored, gates, fitted);
     let mut gates = judge(&validation, &own);
-    gates.extend(changes::gates(&changes));
+    gates.extend(changes::gates(&changes, least));
     found.splice(0..0, known.iter().cloned());
     let verdict = Verdict::of(&gates);
     let code = verdict.code(&found);
@@ -305,10 +306,11 @@ fn beyond(validation: &Validation) -> Option<String> {
     ))
 }
 
-/// Scores of all logs together, and what they say of changes.
+/// Scores of all logs together, and what they say of changes; `least`: share of the error from which on one matters.
 fn score(
     stored: &StoredTwin,
     logs: &LogInput,
+    least: f64,
     findings: &mut Vec<Finding>,
 ) -> Result<(Validation, Vec<Change>)> {
     let twin = &stored.calibration.twin;
@@ -322,7 +324,7 @@ fn score(
         let each = (twin, &library, &predictor);
         scores.score(each, log, findings, &mut |motion| changes.take(motion))?;
     }
-    Ok((scores.finish(Split::HeldoutLogs), changes.finish()))
+    Ok((scores.finish(Split::HeldoutLogs), changes.finish(least)))
 }
 
 #[cfg(test)]

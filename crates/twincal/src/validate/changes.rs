@@ -21,9 +21,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 /// Probability that the log of an unchanged robot is said to show any change.
 pub const FALSE_ALARM: f64 = 0.01;
-/// Torque of a change, as a share of the twin's own held-out error on some joint (root mean squares), below which it does not matter: what
-/// no candidate describes leaves as much in any log.
-pub const LEAST_SHARE: f64 = 0.5;
+/// Share of what a gate on the error lets pass from which on a change matters: what no candidate describes leaves as much in any log.
+const MATTERS: f64 = 0.75;
 /// Length of a block, in autocorrelation times.
 const TIMES: f64 = 4.0;
 /// Fewest blocks whose spread says something, and most of one log.
@@ -32,6 +31,13 @@ const BLOCKS: (usize, usize) = (8, 64);
 const LEAST_ERROR: f64 = 1e-9;
 /// Share of a column's own power below which other columns have all of it.
 const ROUNDING: f64 = 1e-9;
+
+/// Torque of a change, as a share of the twin's own held-out error on some joint (root mean squares), below which it does not matter. Where the
+/// error may grow by a factor r (`[check] rmse_ratio`), a torque of √(r² − 1) makes it do so; three quarters of that matter: 0.5 for 1.2.
+#[must_use]
+pub fn least_share(rmse_ratio: f64) -> f64 {
+    MATTERS * (rmse_ratio * rmse_ratio - 1.0).max(0.0).sqrt()
+}
 
 /// What may have changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -177,9 +183,9 @@ impl<'a> Changes<'a> {
         Ok(())
     }
 
-    /// What all rows say, change by change; those that cannot be seen in these logs are left out.
+    /// What all rows say, change by change; those that cannot be seen in these logs are left out. `least`: see [`least_share`].
     #[must_use]
-    pub fn finish(self) -> Vec<Change> {
+    pub fn finish(self, least: f64) -> Vec<Change> {
         let covariance = self.twin.posterior.covariance();
         let estimates = self.suspects.iter();
         let estimates: Vec<(&Suspect, Estimate)> = estimates
@@ -187,7 +193,7 @@ impl<'a> Changes<'a> {
             .collect();
         let limit = FALSE_ALARM / estimates.len().max(1) as f64;
         let is_change = |estimate: &Estimate| {
-            estimate.chance < limit && estimate.share >= LEAST_SHARE
+            estimate.chance < limit && estimate.share >= least
         };
         // What explains most, by Schwarz's criterion, is a change; what else is one beside it. A zero of the last joint acts like a first moment at
         // the tool, which has four numbers for it.
@@ -201,7 +207,7 @@ impl<'a> Changes<'a> {
         let changes = estimates.iter().map(|(suspect, own)| {
             let changed = is_change(own)
                 && first.is_some_and(|(other, most)| {
-                    std::ptr::eq(*other, *suspect) || self.beside((*suspect, own), (*other, most), limit)
+                    std::ptr::eq(*other, *suspect) || self.beside((*suspect, own), (*other, most), [limit, least])
                 });
             self.told(suspect, own, changed)
         });
@@ -363,7 +369,7 @@ impl<'a> Changes<'a> {
         &self,
         (suspect, own): (&Suspect, &Estimate),
         (other, most): (&Suspect, &Estimate),
-        limit: f64,
+        [limit, least]: [f64; 2],
     ) -> bool {
         let weight = |joint: usize| self.error[joint].powi(-2);
         let (a, b) = (&suspect.columns, &other.columns);
@@ -388,7 +394,7 @@ impl<'a> Changes<'a> {
         factor.solve(&mut value);
         let square = dot(&value, &score) / own.inflation.max(1.0);
         let chance = ChiSquared::new(a.len() as f64).map_or(1.0, |chi| chi.sf(square));
-        chance < limit && self.share(a, &value) >= LEAST_SHARE
+        chance < limit && self.share(a, &value) >= least
     }
 }
 

@@ -8,7 +8,7 @@ mod rivals;
 mod scores;
 mod trace;
 
-pub use changes::{Change, ChangeKind, ChangeNumber, Changes, FALSE_ALARM, LEAST_SHARE};
+pub use changes::{Change, ChangeKind, ChangeNumber, Changes, FALSE_ALARM, least_share};
 pub use conformal::{Conformal, ConformalKeeper, JointFactor};
 pub use heldout::{HeldOut, Predictors};
 pub use pit::{Pit, PitKeeper, Reliability};

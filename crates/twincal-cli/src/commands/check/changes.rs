@@ -3,11 +3,13 @@
 use super::gates::{Gate, MOVING};
 use crate::terminal::clean;
 use twincal::term::Family;
-use twincal::validate::{Change, ChangeKind, FALSE_ALARM, LEAST_SHARE};
+use twincal::validate::{Change, ChangeKind, FALSE_ALARM};
 use twincal::words::significant;
 
 /// One gate per change that these logs could show: passed where an unchanged robot may well look like this, or the change is too small to matter.
-pub(super) fn gates(changes: &[Change]) -> Vec<Gate> {
+///
+/// `least`: share of the twin's error from which on a change matters.
+pub(super) fn gates(changes: &[Change], least: f64) -> Vec<Gate> {
     let limit = FALSE_ALARM / changes.len().max(1) as f64;
     let gate = |change: &Change| Gate {
         rows: MOVING,
@@ -16,7 +18,7 @@ pub(super) fn gates(changes: &[Change]) -> Vec<Gate> {
         passed: !change.changed,
         value: change.chance,
         limit: [Some(limit), None],
-        words: words(change, limit),
+        words: words(change, [limit, least]),
         enough: true,
     };
     changes.iter().map(gate).collect()
@@ -35,7 +37,7 @@ pub(super) fn is_change(gate: &Gate) -> bool {
     !["rmse", "coverage"].contains(&gate.gate)
 }
 
-fn words(change: &Change, limit: f64) -> String {
+fn words(change: &Change, [limit, least]: [f64; 2]) -> String {
     let (subject, remedy) = match change.kind {
         ChangeKind::Friction => (
             format!("joint `{}`: friction", clean(&change.subject)),
@@ -62,9 +64,10 @@ fn words(change: &Change, limit: f64) -> String {
         );
     }
     format!(
-        "{subject}: no change, {numbers} (probability {}, gate {}; {share} of the twin's own error, gate {LEAST_SHARE})",
+        "{subject}: no change, {numbers} (probability {}, gate {}; {share} of the twin's own error, gate {})",
         probability(change.chance),
-        probability(limit)
+        probability(limit),
+        significant(least, 2)
     )
 }
 
