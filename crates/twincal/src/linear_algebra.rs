@@ -263,9 +263,15 @@ mod tests {
 
     #[test]
     fn products_are_their_definitions() {
-        let (a, b) = ([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [7.0, 8.0, 9.0, 10.0, 11.0, 12.0]);
+        let (a, b) = (
+            [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+            [7.0, 8.0, 9.0, 10.0, 11.0, 12.0],
+        );
         assert_eq!(product(&a, &b, [2, 3, 2]), [58.0, 64.0, 139.0, 154.0]);
-        assert_eq!(product_transposed(&a, &b, [2, 3, 2]), [50.0, 68.0, 122.0, 167.0]);
+        assert_eq!(
+            product_transposed(&a, &b, [2, 3, 2]),
+            [50.0, 68.0, 122.0, 167.0]
+        );
         assert!(product(&[], &b, [0, 3, 2]).is_empty());
         assert_eq!(product(&[], &[], [1, 0, 2]), [0.0; 2]);
     }

@@ -67,7 +67,9 @@ fn changes(twin: &Calibration, log: &Recording) -> Vec<Change> {
 
 fn named(all: &[Change]) -> Vec<(ChangeKind, &str)> {
     let changed = all.iter().filter(|change| change.changed);
-    changed.map(|change| (change.kind, change.subject.as_str())).collect()
+    changed
+        .map(|change| (change.kind, change.subject.as_str()))
+        .collect()
 }
 
 /// 40 logs of an unchanged robot at 1 % each: three alarms or more have probability 0.0075; the seeds are fixed. The log of the fit is
@@ -92,15 +94,38 @@ fn friction_payload_and_joint_zero_are_named_with_their_numbers() {
     let twin = fitted();
     let degree = 1f64.to_radians();
     let cases = [
-        (Robot { friction: 1.5, ..SAME }, (ChangeKind::Friction, "elbow"), 0.5 * FRICTION[0]),
-        (Robot { load: 0.05 * MOVED, ..SAME }, (ChangeKind::Payload, "payload"), 0.05 * MOVED),
-        (Robot { zero: degree, ..SAME }, (ChangeKind::JointZero, "elbow"), degree),
+        (
+            Robot {
+                friction: 1.5,
+                ..SAME
+            },
+            (ChangeKind::Friction, "elbow"),
+            0.5 * FRICTION[0],
+        ),
+        (
+            Robot {
+                load: 0.05 * MOVED,
+                ..SAME
+            },
+            (ChangeKind::Payload, "payload"),
+            0.05 * MOVED,
+        ),
+        (
+            Robot {
+                zero: degree,
+                ..SAME
+            },
+            (ChangeKind::JointZero, "elbow"),
+            degree,
+        ),
     ];
     for (robot, (kind, subject), truth) in cases {
         let mut found = 0;
         for seed in 200..210 {
             let all = changes(&twin, &log("new", 0.1 * (seed % 17) as f64, seed, robot));
-            let own = all.iter().find(|change| change.kind == kind && change.subject == subject);
+            let own = all
+                .iter()
+                .find(|change| change.kind == kind && change.subject == subject);
             let own = own.expect("a change of that name");
             if !own.changed {
                 continue;
@@ -109,7 +134,10 @@ fn friction_payload_and_joint_zero_are_named_with_their_numbers() {
             let number = &own.numbers[0];
             // An encoder that reads too much: the robot stands at less than it says.
             let off = number.value.abs() - truth;
-            assert!(off.abs() < 5.0 * number.sd.max(0.02 * truth), "{kind:?}: {own:?}");
+            assert!(
+                off.abs() < 5.0 * number.sd.max(0.02 * truth),
+                "{kind:?}: {own:?}"
+            );
         }
         assert!(found >= 9, "{kind:?} in {found} of 10 logs");
     }

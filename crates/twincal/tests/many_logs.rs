@@ -21,7 +21,10 @@ fn validation(count: u32) -> Validation {
         for joint in &mut log.joints {
             joint.q.truncate(100);
             let others = [&mut joint.qd, &mut joint.qdd, &mut joint.tau];
-            others.into_iter().flatten().for_each(|channel| channel.truncate(100));
+            others
+                .into_iter()
+                .flatten()
+                .for_each(|channel| channel.truncate(100));
         }
         log
     };
@@ -40,8 +43,15 @@ fn every_log_is_predicted_once_by_twins_that_do_not_know_it() {
     for (count, split) in [(12, Split::LeaveOneLogOut), (13, Split::LeaveLogGroupsOut)] {
         let validation = validation(count);
         assert_eq!(validation.split, split);
-        let logs: Vec<&str> = validation.traces.iter().map(|trace| trace.log.as_str()).collect();
-        let wanted: Vec<String> = (0..count).flat_map(|n| [n, n]).map(|n| format!("log {n:02}")).collect();
+        let logs: Vec<&str> = validation
+            .traces
+            .iter()
+            .map(|trace| trace.log.as_str())
+            .collect();
+        let wanted: Vec<String> = (0..count)
+            .flat_map(|n| [n, n])
+            .map(|n| format!("log {n:02}"))
+            .collect();
         assert_eq!(logs, wanted);
         assert_eq!(validation.filtered.joints[0].rows, u64::from(count) * 100);
         // Noise has 0.1 N·m; 1200 rows: within 5 % of it by 2.4 sd, and no better than it.

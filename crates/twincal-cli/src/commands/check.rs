@@ -14,7 +14,9 @@ use crate::terminal::{Terminal, clean};
 use gates::{ALL, ENOUGH, Gate, Own, judge};
 use serde::Serialize;
 use twincal::twin::Twin;
-use twincal::validate::{Change, Changes, FALSE_ALARM, HeldOut, Scores, Split, Validation, least_share};
+use twincal::validate::{
+    Change, Changes, FALSE_ALARM, HeldOut, Scores, Split, Validation, least_share,
+};
 use twincal::words::significant;
 use twincal::{Finding, Result, Severity};
 use twincal_io::artifact::Artifact;
@@ -169,9 +171,14 @@ fn too_short(validation: &Validation, twin: &Twin) -> String {
     let most = (0..twin.noise.len()).map(counts).fold(0.0, f64::max);
     let pipeline = &twin.pipeline;
     let (filter, rate) = (pipeline.kernel_length(), pipeline.rate_hz);
-    let memory = (twin.noise.iter()).map(|noise| noise.memory()).fold(f64::INFINITY, f64::min);
+    let memory = (twin.noise.iter())
+        .map(|noise| noise.memory())
+        .fold(f64::INFINITY, f64::min);
     let least = match rate > 0.0 {
-        true => format!("at least {:.0} s of motion", (filter + ENOUGH * memory / rate).ceil()),
+        true => format!(
+            "at least {:.0} s of motion",
+            (filter + ENOUGH * memory / rate).ceil()
+        ),
         false => "more motion".to_owned(),
     };
     format!(

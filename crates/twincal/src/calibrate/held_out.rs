@@ -221,9 +221,13 @@ pub(super) fn plan<'a>(
         let folds = (0..groups).map(|group| {
             let out = group * count / groups..(group + 1) * count / groups;
             let others = (0..count).filter(|log| !out.contains(log));
-            let left_out = data.fit[out.clone()].iter().zip(&trajectories.fit[out.clone()]);
+            let left_out = data.fit[out.clone()]
+                .iter()
+                .zip(&trajectories.fit[out.clone()]);
             Fold {
-                training: others.map(|log| data.fit[log].observations.whole()).collect(),
+                training: others
+                    .map(|log| data.fit[log].observations.whole())
+                    .collect(),
                 held_out: left_out.map(whole).collect(),
             }
         });

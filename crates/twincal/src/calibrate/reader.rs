@@ -81,7 +81,9 @@ impl Reader<'_> {
         let mut room = Room::new(long.rows_at_most(self.pipeline), long.log.shelf().cloned());
         let mut summaries = Vec::new();
         let mut ends: Option<[f64; 2]> = None;
-        let mut elsewhere: Vec<_> = (role.elsewhere().iter()).map(|_| Some(GramSum::default())).collect();
+        let mut elsewhere: Vec<_> = (role.elsewhere().iter())
+            .map(|_| Some(GramSum::default()))
+            .collect();
         long.visit(self.pipeline, findings, |number, chapter, said| {
             let (log, trajectory) = self.recording(chapter, role, evidence, said)?;
             if let Some(shelf) = long.log.shelf() {
@@ -120,7 +122,9 @@ impl Reader<'_> {
             observations,
             summary,
             ends,
-            elsewhere: (elsewhere.into_iter()).map(|sum| sum.map(GramSum::finish)).collect(),
+            elsewhere: (elsewhere.into_iter())
+                .map(|sum| sum.map(GramSum::finish))
+                .collect(),
         };
         Ok((log, trajectory))
     }

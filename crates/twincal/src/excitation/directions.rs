@@ -196,7 +196,12 @@ impl Directions {
         let all = self.count();
         let flat = self.vectors.concat();
         let vectors = product(weights, &flat, [weights.len() / all.max(1), all, self.size]);
-        self.like(vectors.chunks_exact(self.size.max(1)).map(<[f64]>::to_vec).collect())
+        self.like(
+            vectors
+                .chunks_exact(self.size.max(1))
+                .map(<[f64]>::to_vec)
+                .collect(),
+        )
     }
 
     fn like(&self, vectors: Vec<Vec<f64>>) -> Self {

@@ -256,8 +256,7 @@ impl Search<'_> {
             let moments = present(&self.walker, self.reduced.shrinks());
             let bounds = -moments.log_mass(self.walker.standard);
             let log_weight = self.walker.log_weight() - bounds;
-            self.sums
-                .add(self.walker.standard, log_weight, &moments);
+            self.sums.add(self.walker.standard, log_weight, &moments);
             self.keep(set, log_weight, bounds);
         }
     }

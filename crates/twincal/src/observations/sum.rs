@@ -72,7 +72,9 @@ impl<'a> FromIterator<&'a Part<'a>> for Gram {
     /// Sum over parts.
     fn from_iter<I: IntoIterator<Item = &'a Part<'a>>>(parts: I) -> Self {
         let parts: Vec<&Part<'_>> = parts.into_iter().collect();
-        let joints = parts.first().map_or(0, |part| part.observations.joints.len());
+        let joints = parts
+            .first()
+            .map_or(0, |part| part.observations.joints.len());
         let of_joint = |joint: usize| {
             let mut sum = JointSum::default();
             parts.iter().for_each(|part| sum.add(part, joint));

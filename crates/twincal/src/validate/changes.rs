@@ -75,7 +75,7 @@ pub struct Change {
     pub numbers: Vec<ChangeNumber>,
     /// Probability of such an estimate, or one further from 0, without a change.
     pub chance: f64,
-    /// Largest torque over the joints as a share of the twin's held-out error there (root mean squares).
+    /// Largest torque over the joints as a share of the twin's held-out error there, or of what else is left there where that is more (root mean squares).
     pub share: f64,
     /// Unlikely without a change, large enough to matter, and not what a larger change makes of it.
     pub changed: bool,
@@ -95,6 +95,8 @@ struct Suspect {
 #[derive(Default)]
 struct JointSums {
     rows: f64,
+    /// eᵀe.
+    square: f64,
     /// ZᵀZ of the columns that act on this joint, Zᵀe, and ZᵀX, row-major.
     gram: Vec<f64>,
     score: Vec<f64>,
@@ -170,8 +172,7 @@ impl<'a> Changes<'a> {
             suspect.blocks.extend((0..count).map(|_| nothing()));
         }
         for joint in 0..self.joints.len() {
-            let residual =
-                (rows.whole()).residual(joint, &self.twin.posterior.mean, 0..rows.len());
+            let residual = (rows.whole()).residual(joint, &self.twin.posterior.mean, 0..rows.len());
             let columns = dense(&changes, joint);
             self.joints[joint].add(&rows, joint, (&columns, &residual));
             let own = &changes.joints[joint];
@@ -192,9 +193,7 @@ impl<'a> Changes<'a> {
             .filter_map(|suspect| Some((suspect, self.estimate(suspect, &covariance)?)))
             .collect();
         let limit = FALSE_ALARM / estimates.len().max(1) as f64;
-        let is_change = |estimate: &Estimate| {
-            estimate.chance < limit && estimate.share >= least
-        };
+        let is_change = |estimate: &Estimate| estimate.chance < limit && estimate.share >= least;
         // What explains most, by Schwarz's criterion, is a change; what else is one beside it. A zero of the last joint acts like a first moment at
         // the tool, which has four numbers for it.
         let clear = || estimates.iter().filter(|(_, own)| is_change(own));
@@ -207,7 +206,8 @@ impl<'a> Changes<'a> {
         let changes = estimates.iter().map(|(suspect, own)| {
             let changed = is_change(own)
                 && first.is_some_and(|(other, most)| {
-                    std::ptr::eq(*other, *suspect) || self.beside((*suspect, own), (*other, most), [limit, least])
+                    std::ptr::eq(*other, *suspect)
+                        || self.beside((*suspect, own), (*other, most), [limit, least])
                 });
             self.told(suspect, own, changed)
         });
@@ -350,7 +350,8 @@ impl<'a> Changes<'a> {
         })
     }
 
-    /// Largest torque of a change over the joints, as a share of the error there.
+    /// Largest torque of a change over the joints, as a share of the error there, or of what it leaves of the residual where that is more: where a twin is
+    /// far off for other reasons, a little of it looks like any change.
     fn share(&self, columns: &[usize], value: &[f64]) -> f64 {
         let size = columns.len();
         let of_joint = |joint: usize| {
@@ -358,7 +359,9 @@ impl<'a> Changes<'a> {
             let gram = self.products(columns, columns, only);
             let row = |i: usize| dot(&gram[i * size..(i + 1) * size], value);
             let square: f64 = (0..size).map(|i| value[i] * row(i)).sum();
-            (square.max(0.0) / self.joints[joint].rows).sqrt() / self.error[joint]
+            let (sums, square) = (&self.joints[joint], square.max(0.0));
+            let left = ((sums.square - square).max(0.0) / sums.rows).sqrt();
+            (square / sums.rows).sqrt() / self.error[joint].max(left)
         };
         let moving = (0..self.joints.len()).filter(|&joint| self.joints[joint].rows > 0.0);
         moving.map(of_joint).fold(0.0, f64::max)
@@ -473,7 +476,15 @@ impl JointSums {
         self.gram.resize(count * count, 0.0);
         self.score.resize(count, 0.0);
         self.cross.resize(count * known, 0.0);
-        self.rows += own.standstill.iter().filter(|still| !**still).count() as f64;
+        let moving = residual
+            .iter()
+            .zip(&own.standstill)
+            .filter(|(_, still)| !**still);
+        let (square, rows) = moving.fold((0.0, 0.0), |(square, rows), (e, _)| {
+            (square + e * e, rows + 1.0)
+        });
+        self.square += square;
+        self.rows += rows;
         let column = |i: usize| &columns[i * len..(i + 1) * len];
         for i in 0..count {
             self.score[i] += dot(column(i), residual);

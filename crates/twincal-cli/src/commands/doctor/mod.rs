@@ -114,13 +114,7 @@ pub(super) fn run(flags: &args::Doctor, terminal: &mut Terminal) -> Outcome<u8> 
         true => Trial::Fit,
         false => Trial::None,
     };
-    let examination = examine(
-        &asked.model,
-        &asked.logs,
-        &asked.settings,
-        &progress,
-        trial,
-    )?;
+    let examination = examine(&asked.model, &asked.logs, &asked.settings, &progress, trial)?;
     drop(progress);
     let diagnosis = diagnosis(examination, &asked);
     if asked.settings.json {
