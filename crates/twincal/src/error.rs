@@ -100,11 +100,18 @@ pub struct Finding {
 
 impl Finding {
     /// Codes of findings after which log and model are not believed to speak of the same robot.
-    const NOT_THIS_ROBOT: [&str; 4] = [
+    const NOT_THIS_ROBOT: [&str; 11] = [
+        "base_orientation",
         "sign_flip",
         "joint_order",
         "torque_scale",
         "velocity_opposite",
+        "model_torque",
+        "gravity_compensated",
+        "clock_scale",
+        "torque_copied",
+        "torque_constant",
+        "torque_held",
     ];
 
     /// True if it says that log and model hardly speak of the same robot: turned signs, exchanged joints, torque of another scale. What

@@ -5,7 +5,7 @@ use twincal::calibrate::LookedAt;
 use twincal::incidents::{Incident, motion};
 use twincal::lag::{LogLag, estimate_lag, lag_findings};
 use twincal::robot::Robot;
-use twincal::self_check::{JointCheck, look};
+use twincal::self_check::{Base, JointCheck, look};
 use twincal::signal::{Agreement, Log, Pipeline, Trajectory, velocity_agreement};
 use twincal::{Error, Finding, Severity};
 
@@ -24,6 +24,8 @@ pub(super) struct Checkup {
     pub(super) agreement: BTreeMap<String, Vec<Option<Agreement>>>,
     /// By joint, over all logs.
     pub(super) joints: Vec<JointCheck>,
+    /// How the base stands, where the torque contradicts the model.
+    pub(super) base: Option<Base>,
     /// Warnings; notes of the filters are left to `fit`.
     pub(super) findings: Vec<Finding>,
 }
@@ -77,6 +79,7 @@ pub(super) fn checkup(
     }
     let found = look(robot, pipeline, &checkup.trajectories)?;
     checkup.joints = found.joints;
+    checkup.base = found.base;
     checkup.findings.extend(found.findings);
     let lags = checkup.trajectories.iter();
     let lags: Vec<LogLag> = lags

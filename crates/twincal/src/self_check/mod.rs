@@ -4,19 +4,29 @@
 //! is named only where another reading of the log explains by far more. Nothing is ever mended in silence: degrees are
 //! refused, all else counts as degraded data, with the mend to try.
 
+mod base;
+mod columns;
 mod explain;
+mod gravity_part;
 mod mend;
+mod parts;
 mod sample;
+mod shared;
+mod velocity;
 
 use crate::error::{Error, Finding, Result, Severity};
 use crate::robot::{JointKind, Robot};
 use crate::signal::{Pipeline, Trajectory};
 use crate::words::significant;
 use explain::{Explained, Reading, explain};
+use gravity_part::{Factors, factor_findings, missing_finding};
+use parts::Parts;
 use sample::Sample;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 use std::ops::RangeInclusive;
+
+pub use base::Base;
 
 /// Torque that differs by this factor from the model's is not of the joint's side, or not in N·m.
 const OTHER_UNIT: f64 = 5.0;
@@ -45,9 +55,14 @@ const PART: f64 = 0.3;
 ///
 /// | finding | what was seen |
 /// |---|---|
+/// | `base_orientation` | gravity acts in another direction than the model has it: a robot on a wall or ceiling |
 /// | `torque_scale` | a joint's torque has the model's shape, but is more than 5 times larger or smaller |
 /// | `sign_flip` | a joint's torque, or its motion, has the opposite sign |
 /// | `joint_order` | joints are exchanged |
+/// | `model_torque`, `gravity_compensated` | the torque holds no part of the model's, or none of its gravity |
+/// | `common_factor` | the torque of all joints has the same factor, which masses may have as well |
+/// | `clock_scale` | velocity, or all inertial torque, has a factor that a wrong clock would give it |
+/// | `torque_copied`, `torque_constant` | a torque column is another joint's, or one number |
 ///
 /// # Errors
 /// [`Error::Log`] for positions in degrees.
@@ -86,6 +101,8 @@ pub struct JointCheck {
 pub struct Look {
     /// Every moving joint; empty without torque.
     pub joints: Vec<JointCheck>,
+    /// How the base stands, where that explains more than the model's gravity.
+    pub base: Option<Base>,
     /// Those of [`self_check`].
     pub findings: Vec<Finding>,
 }
@@ -100,11 +117,13 @@ pub fn look<'a>(
     trajectories: impl IntoIterator<Item = &'a Trajectory>,
 ) -> Result<Look> {
     let mut samples = Vec::new();
+    let mut logs = Vec::new();
     for trajectory in trajectories {
         let Some(sample) = Sample::take(pipeline, trajectory) else {
             continue;
         };
         refuse_degrees(robot, &trajectory.name, &sample)?;
+        logs.push(&*trajectory.name);
         samples.push(sample);
     }
     let sample = Sample::pool(&samples);
@@ -112,8 +131,26 @@ pub fn look<'a>(
         return Ok(Look::default());
     }
     let as_logged = explain(robot, &sample, &Reading::as_logged(robot.dof()));
-    let (reading, explained) = mend::mend(robot, &sample, &as_logged);
-    let mut findings = signs_and_order(robot, &reading, &as_logged, &explained);
+    let parts = Parts::of(robot, &sample);
+    let turned =
+        mend::is_doubtful(&as_logged).then(|| base::turned(robot, &sample, &parts, &as_logged));
+    let turned = turned.flatten();
+    let (on_base, standing) = match &turned {
+        Some(turned) => (&turned.robot, &turned.explained),
+        None => (robot, &as_logged),
+    };
+    let mended = mend::mend(on_base, &sample, standing);
+    let (reading, explained) = Some(mended)
+        .filter(|(_, explained)| mend::none_less(&as_logged, explained))
+        .unwrap_or_else(|| (Reading::as_logged(robot.dof()), standing.clone()));
+    let base = turned.as_ref().map(|turned| turned.base);
+    let mut findings: Vec<Finding> = (turned.iter())
+        .map(|turned| turned.base.finding(robot, &as_logged, &turned.explained))
+        .collect();
+    findings.extend(signs_and_order(robot, &reading, standing, &explained));
+    let logs = || logs.iter().copied().zip(&samples);
+    findings.extend(logs().flat_map(|log| of_one_log(on_base, log, standing)));
+    findings.extend(velocity::findings(logs()));
     let scales = scales(robot, &sample, &explained);
     let torque_factor = |name: &str| {
         let whose = |scale: &&Scale| ["", name].contains(&&*scale.finding.subject);
@@ -136,37 +173,123 @@ pub fn look<'a>(
     });
     let joints = joints.collect();
     findings.extend(scales.into_iter().map(|scale| scale.finding));
-    Ok(Look { joints, findings })
+    if findings.is_empty() && sample.independent >= LEAST_INDEPENDENT {
+        let factors = Factors::of(robot, &sample, &parts);
+        findings.extend(factors.iter().flat_map(factor_findings));
+    }
+    Ok(Look {
+        joints,
+        base,
+        findings,
+    })
 }
 
-/// Angles beyond a turn whose torque only makes sense when they are taken as degrees.
+/// What one log's columns and the parts of its torque say.
+fn of_one_log(
+    robot: &Robot,
+    (log, sample): (&str, &Sample),
+    explained: &[Option<Explained>],
+) -> Vec<Finding> {
+    let parts = Parts::of(robot, sample);
+    let mut findings = columns::of_sample(robot, log, sample, &parts, explained);
+    if sample.independent >= LEAST_INDEPENDENT
+        && let Some(factors) = Factors::of(robot, sample, &parts)
+        && let Some(part) = factors.missing()
+    {
+        findings.push(missing_finding(log, part, &factors));
+    }
+    findings
+}
+
+/// Angles beyond a turn whose torque only makes sense when they are taken as degrees: all of them, else the joints with which most is explained.
 fn refuse_degrees(robot: &Robot, log: &str, sample: &Sample) -> Result<()> {
-    let largest = sample.largest_angle(robot);
-    if largest <= TAU {
-        return Ok(());
-    }
-    let factors = (0..robot.dof()).map(|joint| match robot.joint_kind(joint) {
-        JointKind::Prismatic => 1.0,
-        _ => PI / 180.0,
-    });
-    let radians = Reading {
-        motion: factors.clone().enumerate().collect(),
-        rates: factors.collect(),
-        ..Reading::as_logged(robot.dof())
+    let names = robot.joint_names();
+    let is_turning = |joint: &usize| robot.joint_kind(*joint) != JointKind::Prismatic;
+    let turning: Vec<usize> = (0..robot.dof()).filter(is_turning).collect();
+    let largest = |joint: usize| {
+        (sample.channels[0][joint].iter()).fold(0.0_f64, |most, q| most.max(q.abs()))
     };
-    let as_logged = explain(robot, sample, &Reading::as_logged(robot.dof()));
-    if !mend::overwhelming(&as_logged, &explain(robot, sample, &radians)) {
+    let beyond: Vec<usize> = turning
+        .iter()
+        .copied()
+        .filter(|joint| largest(*joint) > TAU)
+        .collect();
+    if beyond.is_empty() {
         return Ok(());
     }
-    Err(Error::Log {
-        log: log.into(),
-        problem: format!(
-            "positions look like degrees: they reach {largest:.1}, and as degrees the model explains the torque"
-        ),
-        remedy: "export positions, velocities and accelerations in radians: × π/180, as with [columns] factor = \
-                 { q = 0.017453292519943295, qd = 0.017453292519943295 }"
-            .into(),
-    })
+    let as_logged = explain(robot, sample, &Reading::as_logged(robot.dof()));
+    let explained = |joints: &[usize]| explain(robot, sample, &in_degrees(robot, joints));
+    let error = |joints: &[usize]| {
+        let reached = joints
+            .iter()
+            .fold(0.0_f64, |most, joint| most.max(largest(*joint)));
+        let (whose, factors) = match joints == turning {
+            true => (
+                String::new(),
+                "q = 0.017453292519943295, qd = 0.017453292519943295".to_owned(),
+            ),
+            false => {
+                let own: Vec<&str> = joints.iter().map(|joint| names[*joint]).collect();
+                let of = own
+                    .iter()
+                    .map(|name| format!("{name:?} = 0.017453292519943295"));
+                let table = format!("{{ {} }}", of.collect::<Vec<_>>().join(", "));
+                (
+                    format!(" of joint `{}`", own.join("`, `")),
+                    format!("q = {table}, qd = {table}"),
+                )
+            }
+        };
+        Err(Error::Log {
+            log: log.into(),
+            problem: format!(
+                "positions{whose} look like degrees: they reach {reached:.1}, and as degrees the model explains the torque"
+            ),
+            remedy: format!(
+                "export positions, velocities and accelerations in radians: × π/180, as with [columns] factor = {{ {factors} }}"
+            ),
+        })
+    };
+    if mend::overwhelming(&as_logged, &explained(&turning)) {
+        return error(&turning);
+    }
+    // Some joints only: one after the other, as long as another explains more.
+    let mut joints: Vec<usize> = Vec::new();
+    let mut current = as_logged.clone();
+    loop {
+        let others = beyond.iter().filter(|joint| !joints.contains(joint));
+        let tried = others.map(|joint| {
+            let mut with = joints.clone();
+            with.push(*joint);
+            with.sort_unstable();
+            let explained = explained(&with);
+            (mend::gain_of(&current, &explained), with, explained)
+        });
+        let best = tried.max_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, with, explained)) = best.filter(|(gain, ..)| *gain > 0.0) else {
+            break;
+        };
+        (joints, current) = (with, explained);
+    }
+    match !joints.is_empty() && mend::overwhelming(&as_logged, &current) {
+        true => error(&joints),
+        false => Ok(()),
+    }
+}
+
+/// The log with these joints in degrees.
+fn in_degrees(robot: &Robot, joints: &[usize]) -> Reading {
+    let factor = |joint: usize| match joints.contains(&joint) {
+        true => PI / 180.0,
+        false => 1.0,
+    };
+    Reading {
+        motion: (0..robot.dof())
+            .map(|joint| (joint, factor(joint)))
+            .collect(),
+        rates: (0..robot.dof()).map(factor).collect(),
+        ..Reading::as_logged(robot.dof())
+    }
 }
 
 /// Joints whose torque has the model's shape but another size, and those whose torque is far beyond what the model says that the
@@ -427,6 +550,8 @@ fn signs_and_order(
     findings
 }
 
+#[cfg(test)]
+mod readings_tests;
 #[cfg(test)]
 pub(crate) mod testing;
 #[cfg(test)]

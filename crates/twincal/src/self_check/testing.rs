@@ -56,6 +56,11 @@ pub(crate) fn arm(heavier: f64) -> Robot {
 
 /// What the log of a robot 15 % heavier than the model with friction looks like; joints are independent.
 pub(crate) fn log(seed: f64) -> Trajectory {
+    log_of(&arm(1.15), seed)
+}
+
+/// What the log of such a robot with friction looks like.
+pub(crate) fn log_of(robot: &Robot, seed: f64) -> Trajectory {
     let dof = 4;
     let wave = |k: usize| -> Vec<f64> {
         let mut all = Vec::new();
@@ -80,7 +85,7 @@ pub(crate) fn log(seed: f64) -> Trajectory {
         qd: &qd,
         qdd: &qdd,
     };
-    nominal_torque(&arm(1.15), motion, &mut tau);
+    nominal_torque(robot, motion, &mut tau);
     let mut state = 7_u64;
     for (i, tau) in tau.iter_mut().enumerate() {
         state = state

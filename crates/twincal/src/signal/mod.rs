@@ -9,6 +9,7 @@ pub(crate) mod convolve;
 pub(crate) mod decimate;
 mod correct;
 mod fourier;
+mod held;
 mod jumps;
 mod long;
 mod cutoff;

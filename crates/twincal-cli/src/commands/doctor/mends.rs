@@ -58,7 +58,32 @@ const FOR_THE_NEXT: &str = "nothing has to be done for this log; for the next on
 const NOT_USED: &str = "nothing, if it does not act in these logs; else write its effect into the model in a form that is read";
 
 /// Findings in the order in which they matter, with what mends them.
-const ORDER: [(&str, &str); 49] = [
+const ORDER: [(&str, &str); 57] = [
+    ("base_orientation", "twincal.toml: [model] base"),
+    (
+        "torque_copied",
+        "map the measured torque of that joint in [columns] tau, or log it again",
+    ),
+    (
+        "torque_constant",
+        "map the measured torque of that joint in [columns] tau, or leave this log out",
+    ),
+    (
+        "model_torque",
+        "log the measured torque of the drives, or add the model's to this one",
+    ),
+    (
+        "gravity_compensated",
+        "log the measured torque of the drives, or add the gravity that was taken off",
+    ),
+    (
+        "torque_held",
+        "log that joint's torque in every row, or leave this log out",
+    ),
+    (
+        "clock_scale",
+        "give the true rate: --rate HZ, or a factor for qd in [columns.factor]",
+    ),
     (
         "joint_order",
         "map the columns in [columns.q], [columns.qd], [columns.tau] of twincal.toml; twincal init writes them",
@@ -67,6 +92,10 @@ const ORDER: [(&str, &str); 49] = [
     (
         "torque_scale",
         "say what the torque is ([log] torque, gear_ratio, drive_constant), or give [columns.factor] tau",
+    ),
+    (
+        "common_factor",
+        "weigh a link or look up the drive constants; then twincal.toml: [columns.factor] tau, or correct the masses",
     ),
     (
         "unphysical_inertia",
@@ -245,12 +274,15 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
         let mut all = examination.findings.iter();
         all.any(|f| f.code == "sign_flip" && f.subject == joint)
     };
+    let is_said = |code: &str| examination.findings.iter().any(|f| f.code == code);
     for finding in examination
         .findings
         .iter()
         .filter(|f| f.severity > Severity::Note)
         // Which of the two is turned is said there.
         .filter(|f| f.code != "velocity_opposite" || !turned(&f.subject))
+        // That it is no measurement is said there.
+        .filter(|f| f.code != "constant_torque" || !is_said("torque_constant"))
     {
         // One of a kind is enough to know what to do.
         match said.iter_mut().find(|(code, _)| *code == finding.code) {
@@ -340,6 +372,13 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
                 _ => ORDER[place].1.into(),
             }
         }
+        ("base_orientation", _) => match &examination.checkup.base {
+            Some(base) => format!(
+                "twincal.toml: [model] {} (twincal init writes it)",
+                base.line()
+            ),
+            None => "twincal.toml: [model] base".into(),
+        },
         ("quantised_encoder", _) => match examination.lower_cutoff {
             Some(hz) => format!(
                 "twincal.toml: [signal] cutoff_hz = {hz:?}, or log the encoder's full resolution"
