@@ -316,3 +316,21 @@ fn what_only_a_fit_can_tell_is_told_as_well() {
         fit.err
     );
 }
+
+#[test]
+fn a_robot_that_hangs_gets_the_line_that_turns_its_gravity() {
+    let folder = folder(GOOD);
+    let hanging = LOOK.replace("-9.81", "9.81");
+    fs::write(folder.path().join("look.toml"), hanging).unwrap();
+    let diagnosis = doctor(&folder, 3);
+    assert_eq!(codes(&diagnosis)[0], "base_orientation");
+    let (problem, how) = first_mend(&diagnosis);
+    assert!(problem.contains("upside down"), "{problem}");
+    let line = "gravity = [0.0, -9.81, 0.0]";
+    assert!(
+        how.starts_with(&format!("twincal.toml: [model] {line}")),
+        "{how}"
+    );
+    let config = diagnosis["config"].as_str().unwrap();
+    assert!(config.contains(line), "{config}");
+}

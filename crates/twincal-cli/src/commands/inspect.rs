@@ -16,7 +16,8 @@ use twincal::calibrate::{Outlook, outlook};
 use twincal::excitation::Unseen;
 use twincal::robot::{JointKind, Mimic, Robot};
 use twincal::signal::{
-    LogOverview, Pipeline, SignalSettings, choose_and_prepare, describe, hardly_driven,
+    LogOverview, Pipeline, SignalSettings, choose_and_prepare, constant_torque, describe,
+    hardly_driven,
 };
 use twincal::words::significant;
 
@@ -99,6 +100,7 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
         found.extend(more);
     }
     found.extend(hardly_driven(&robot.robot, &logs.logs[..])?);
+    found.extend(constant_torque(&robot.robot, &logs.logs[..])?);
     let (mut compared, more) = compare(&robot.robot, &logs, &settings.calibration.signal)?;
     for finding in more {
         if !found.contains(&finding) {

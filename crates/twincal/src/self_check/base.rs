@@ -4,6 +4,7 @@
 //! them; a direction that no joint feels keeps the part of the model's gravity that the length leaves for it. What this reading explains is then
 //! compared with the log as it is, as every other reading is.
 
+use super::columns::is_constant;
 use super::explain::{Explained, Reading, explain};
 use super::mend::explains_more;
 use super::parts::Parts;
@@ -51,7 +52,8 @@ pub(super) struct Turned {
 impl Base {
     fn new(gravity: [f64; 3], nominal: [f64; 3]) -> Self {
         let size = length(gravity);
-        let up = gravity.map(|g| -g / size);
+        // Adding 0 makes −0 a 0: half a turn is π, not −π.
+        let up = gravity.map(|g| -g / size + 0.0);
         // upᵀ = (−sin p, sin r cos p, cos r cos p)
         let pitch = (-up[0]).clamp(-1.0, 1.0).asin();
         let roll = match up[1].hypot(up[2]) > 1e-9 {
@@ -153,7 +155,11 @@ pub(super) fn turned(
 /// Gravity in the base frame as the torque shows it, m/s²; a direction that no joint feels is filled up to the model's size, on the model's side.
 fn gravity(sample: &Sample, parts: &Parts, nominal: [f64; 3]) -> Option<[f64; 3]> {
     let [x, y, z] = &parts.directions;
-    let shared = shared::fit(sample, &[x, y, z, &parts.inertia], &parts.springs)?;
+    let columns = [x, y, z, &parts.inertia];
+    let with: Vec<bool> = (0..x.len())
+        .map(|joint| !is_constant(sample, joint))
+        .collect();
+    let shared = shared::fit(sample, &columns, &parts.springs, &with)?;
     // What the rows say of gravity once inertia is fitted beside it.
     let row = |i: usize| &shared.information[4 * i..4 * i + 4];
     let inertia = row(3)[3].max(f64::MIN_POSITIVE);

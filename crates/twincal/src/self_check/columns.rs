@@ -1,7 +1,7 @@
 //! Torque columns that hold no measurement of their joint: another joint's, or one constant number.
 
 use super::explain::Explained;
-use super::parts::Parts;
+use super::parts::{Parts, driven};
 use super::sample::Sample;
 use crate::error::{Finding, Severity};
 use crate::robot::Robot;
@@ -9,25 +9,19 @@ use crate::words::significant;
 
 /// Share of samples in which two columns must be the same number.
 const SAME: f64 = 0.99;
-/// Fewest samples in motion that say anything.
-const FEWEST: usize = 40;
 /// Range of a column, as a share of its size, up to which it is constant: resampling rounds.
 const CONSTANT: f64 = 1e-9;
-/// Share of gravity's and inertia's power that is left in their sum where a joint is driven: of one that swings freely they cancel.
-const DRIVEN: f64 = 0.25;
-/// Least nominal torque of a joint, as a share of the largest of all joints, that says whether it is driven.
-const SAYS: f64 = 1e-3;
 
 /// Findings on the columns of one log's sample.
 pub(super) fn of_sample(
     robot: &Robot,
-    log: &str,
-    sample: &Sample,
-    parts: &Parts,
+    (log, sample): (&str, &Sample),
     explained: &[Option<Explained>],
 ) -> Vec<Finding> {
     let mut findings = copied(robot, log, sample, explained);
-    findings.extend(constant(robot, log, sample, parts));
+    if (0..robot.dof()).any(|joint| is_constant(sample, joint)) {
+        findings.extend(constant(robot, log, sample, &Parts::of(robot, sample)));
+    }
     findings
 }
 
@@ -79,38 +73,18 @@ fn copied(
 /// Driven joints that move while their torque never changes.
 fn constant(robot: &Robot, log: &str, sample: &Sample, parts: &Parts) -> Vec<Finding> {
     let gravity = parts.gravity(robot.description().gravity);
-    let sizes: Vec<[f64; 2]> = (0..robot.dof())
-        .map(|joint| {
-            let rows: Vec<usize> = (0..sample.len)
-                .filter(|&i| sample.moves[joint][i])
-                .collect();
-            if rows.len() < FEWEST {
-                return [0.0; 2];
-            }
-            let (g, m) = (&gravity[joint], &parts.inertia[joint]);
-            let size = |part: &dyn Fn(usize) -> f64| spread(rows.iter().map(|&i| part(i)));
-            let (g_size, m_size) = (size(&|i| g[i]), size(&|i| m[i]));
-            let sum = size(&|i| g[i] + m[i]);
-            [sum, g_size + m_size]
-        })
-        .collect();
-    let largest = sizes.iter().fold(0.0_f64, |most, [sum, _]| most.max(*sum));
     let names = robot.joint_names();
-    let is_driven = |joint: &usize| {
-        let [sum, parts] = sizes[*joint];
-        sum > DRIVEN * parts && sum > SAYS * SAYS * largest
-    };
-    let wrong = (0..robot.dof())
-        .filter(|joint| is_constant(sample, *joint))
-        .filter(is_driven);
+    let driven = driven(sample, parts, &gravity).into_iter().enumerate();
+    let wrong = driven.filter(|(joint, _)| is_constant(sample, *joint));
     wrong
-        .map(|joint| {
+        .filter_map(|(joint, size)| Some((joint, size?)))
+        .map(|(joint, size)| {
             let message = format!(
                 "log `{log}`: the torque of joint `{}` is {} throughout while the model needs {} N·m (sd) for its motion: no measurement; map its \
                  torque in [columns] tau, or leave this log out",
                 names[joint],
                 significant(sample.channels[3][joint][0], 3),
-                significant(sizes[joint][0].sqrt(), 2)
+                significant(size, 2)
             );
             let count = sample.len as u64;
             Finding::new(Severity::Degraded, "torque_constant", names[joint], message, count)
@@ -118,16 +92,11 @@ fn constant(robot: &Robot, log: &str, sample: &Sample, parts: &Parts) -> Vec<Fin
         .collect()
 }
 
-fn is_constant(sample: &Sample, joint: usize) -> bool {
+/// True if a joint's torque never changes.
+pub(super) fn is_constant(sample: &Sample, joint: usize) -> bool {
     let values = sample.channels[3][joint].iter();
     let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
         [low.min(*x), high.max(*x)]
     });
     high - low <= CONSTANT * high.abs().max(low.abs())
-}
-
-fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
-    let count = values.clone().count().max(1) as f64;
-    let mean = values.clone().sum::<f64>() / count;
-    values.map(|x| (x - mean).powi(2)).sum::<f64>() / count
 }

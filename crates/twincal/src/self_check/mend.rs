@@ -18,6 +18,8 @@ const GREAT_GAIN: f64 = 6.0;
 const WORSE: f64 = 1.5;
 /// Share of torque by which a joint may be explained less and still counts as explained alike: half of the last digit that is shown.
 const ALIKE: f64 = 0.005;
+/// The same where only the free factor makes the difference: on a joint that friction rules it fits an unknown payload as well as it can.
+const BY_FACTOR: f64 = 0.03;
 /// Shares below this are alike.
 const FLOOR: f64 = 1e-3;
 /// Least gain of a single step on the way.
@@ -116,11 +118,16 @@ fn gain(before: &[Option<Explained>], after: &[Option<Explained>], left: Left) -
         .sum()
 }
 
-/// True if no joint's torque is explained less than before, with a free factor at the model's torque: no reading is proposed that does.
+/// True if no joint's torque is explained less than before: no reading is proposed that does. Less is what the model leaves both with a free factor
+/// and as it is, or with a free factor by far.
 pub(super) fn none_less(before: &[Option<Explained>], after: &[Option<Explained>]) -> bool {
     let mut joints = before.iter().zip(after);
     joints.all(|joint| match joint {
-        (Some(before), Some(after)) => after.left <= before.left + ALIKE,
+        (Some(before), Some(after)) => {
+            let less = |by: f64, left: Left| left(after) > left(before) + by;
+            let in_both = LEFT.into_iter().all(|left| less(ALIKE, left));
+            !in_both && !less(BY_FACTOR, LEFT[0])
+        }
         (Some(_), None) => false,
         (None, _) => true,
     })

@@ -60,7 +60,6 @@ const PART: f64 = 0.3;
 /// | `sign_flip` | a joint's torque, or its motion, has the opposite sign |
 /// | `joint_order` | joints are exchanged |
 /// | `model_torque`, `gravity_compensated` | the torque holds no part of the model's, or none of its gravity |
-/// | `common_factor` | the torque of all joints has the same factor, which masses may have as well |
 /// | `clock_scale` | velocity, or all inertial torque, has a factor that a wrong clock would give it |
 /// | `torque_copied`, `torque_constant` | a torque column is another joint's, or one number |
 ///
@@ -148,10 +147,20 @@ pub fn look<'a>(
         .map(|turned| turned.base.finding(robot, &as_logged, &turned.explained))
         .collect();
     findings.extend(signs_and_order(robot, &reading, standing, &explained));
+    let as_it_is = reading == Reading::as_logged(robot.dof());
     let logs = || logs.iter().copied().zip(&samples);
-    findings.extend(logs().flat_map(|log| of_one_log(on_base, log, standing)));
+    findings.extend(logs().flat_map(|log| columns::of_sample(on_base, log, standing)));
     findings.extend(velocity::findings(logs()));
-    let scales = scales(robot, &sample, &explained);
+    let lacking: Vec<Finding> = match as_it_is {
+        true => logs().filter_map(|log| lacking(on_base, log)).collect(),
+        false => Vec::new(),
+    };
+    // Torque without the model's part has no scale.
+    let scales = match lacking.is_empty() {
+        true => scales(robot, &sample, &explained),
+        false => Vec::new(),
+    };
+    findings.extend(lacking);
     let torque_factor = |name: &str| {
         let whose = |scale: &&Scale| ["", name].contains(&&*scale.finding.subject);
         scales.iter().find(whose)?.factor
@@ -184,21 +193,14 @@ pub fn look<'a>(
     })
 }
 
-/// What one log's columns and the parts of its torque say.
-fn of_one_log(
-    robot: &Robot,
-    (log, sample): (&str, &Sample),
-    explained: &[Option<Explained>],
-) -> Vec<Finding> {
-    let parts = Parts::of(robot, sample);
-    let mut findings = columns::of_sample(robot, log, sample, &parts, explained);
-    if sample.independent >= LEAST_INDEPENDENT
-        && let Some(factors) = Factors::of(robot, sample, &parts)
-        && let Some(part) = factors.missing()
-    {
-        findings.push(missing_finding(log, part, &factors));
+/// A finding where the torque of one log lacks the model's part.
+fn lacking(robot: &Robot, (log, sample): (&str, &Sample)) -> Option<Finding> {
+    if sample.independent < LEAST_INDEPENDENT {
+        return None;
     }
-    findings
+    let factors = Factors::of(robot, sample, &Parts::of(robot, sample))?;
+    let part = factors.missing()?;
+    Some(missing_finding(log, part, &factors))
 }
 
 /// Angles beyond a turn whose torque only makes sense when they are taken as degrees: all of them, else the joints with which most is explained.

@@ -5,6 +5,12 @@ use crate::robot::{Motion, Robot, nominal_torque};
 
 /// Mass and distance of the point masses whose torques an unknown payload is made of, kg and m.
 const POINT: (f64, f64) = (1.0, 0.1);
+/// Fewest samples in motion that say anything.
+const FEWEST: usize = 40;
+/// Share of gravity's and inertia's power that is left in their sum where a joint is driven: of one that swings freely they cancel.
+const DRIVEN: f64 = 0.25;
+/// Least nominal torque of a joint, as a share of the largest of all joints, that says whether it is driven.
+const SAYS: f64 = 1e-3;
 /// Unit gravity along x, y and z of the base.
 const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
@@ -72,6 +78,36 @@ pub(super) fn payload(robot: &Robot, sample: &Sample) -> Vec<[Torques; 2]> {
             [less(with_weight, &weight), less(with_inertia, &inertia)]
         })
         .collect()
+}
+
+/// Standard deviation of the torque that each joint's motion needs by the model; `None` for joints that hardly move, or swing freely.
+pub(super) fn driven(sample: &Sample, parts: &Parts, gravity: &Torques) -> Vec<Option<f64>> {
+    let sizes: Vec<[f64; 2]> = (0..gravity.len())
+        .map(|joint| {
+            let rows: Vec<usize> = (0..sample.len)
+                .filter(|&i| sample.moves[joint][i])
+                .collect();
+            if rows.len() < FEWEST {
+                return [0.0; 2];
+            }
+            let (g, m) = (&gravity[joint], &parts.inertia[joint]);
+            let size = |part: &dyn Fn(usize) -> f64| spread(rows.iter().map(|&i| part(i)));
+            let (g_size, m_size) = (size(&|i| g[i]), size(&|i| m[i]));
+            [size(&|i| g[i] + m[i]), g_size + m_size]
+        })
+        .collect();
+    let largest = sizes.iter().fold(0.0_f64, |most, [sum, _]| most.max(*sum));
+    let is_driven = |[sum, parts]: [f64; 2]| sum > DRIVEN * parts && sum > SAYS * SAYS * largest;
+    let sizes = sizes.into_iter();
+    sizes
+        .map(|size| is_driven(size).then(|| size[0].sqrt()))
+        .collect()
+}
+
+fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let count = values.clone().count().max(1) as f64;
+    let mean = values.clone().sum::<f64>() / count;
+    values.map(|x| (x - mean).powi(2)).sum::<f64>() / count
 }
 
 /// Motion with all joints in one slice, as the dynamics take it.

@@ -66,9 +66,16 @@ struct Rows {
 }
 
 /// Fits the shared coefficients of `columns`; `None` where no joint says anything.
-pub(super) fn fit(sample: &Sample, columns: &[&Torques], springs: &Torques) -> Option<Shared> {
+/// `with` says which joints take part.
+pub(super) fn fit(
+    sample: &Sample,
+    columns: &[&Torques],
+    springs: &Torques,
+    with: &[bool],
+) -> Option<Shared> {
     let width = columns.len();
-    let rows: Vec<Rows> = (0..sample.channels[0].len())
+    let rows: Vec<Rows> = (0..with.len())
+        .filter(|joint| with[*joint])
         .filter_map(|joint| of_joint(sample, columns, &springs[joint], joint))
         .collect();
     if rows.is_empty() || width == 0 {

@@ -58,7 +58,7 @@ const FOR_THE_NEXT: &str = "nothing has to be done for this log; for the next on
 const NOT_USED: &str = "nothing, if it does not act in these logs; else write its effect into the model in a form that is read";
 
 /// Findings in the order in which they matter, with what mends them.
-const ORDER: [(&str, &str); 57] = [
+const ORDER: [(&str, &str); 56] = [
     ("base_orientation", "twincal.toml: [model] base"),
     (
         "torque_copied",
@@ -92,10 +92,6 @@ const ORDER: [(&str, &str); 57] = [
     (
         "torque_scale",
         "say what the torque is ([log] torque, gear_ratio, drive_constant), or give [columns.factor] tau",
-    ),
-    (
-        "common_factor",
-        "weigh a link or look up the drive constants; then twincal.toml: [columns.factor] tau, or correct the masses",
     ),
     (
         "unphysical_inertia",
