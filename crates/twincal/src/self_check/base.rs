@@ -130,12 +130,11 @@ fn most_helped<'a>(
 pub(super) fn turned(
     robot: &Robot,
     sample: &Sample,
-    parts: &Parts,
     as_logged: &[Option<Explained>],
 ) -> Option<Turned> {
     let nominal = robot.description().gravity;
     let size = length(nominal);
-    let found = gravity(sample, parts, nominal)?;
+    let found = gravity(sample, &Parts::of(robot, sample), nominal)?;
     if !(size > 0.0 && BELIEVED.contains(&(length(found) / size))) {
         return None;
     }

@@ -24,11 +24,15 @@ const ALIKE: f64 = 0.095;
 const OTHER_CLOCK: f64 = 0.26; // ln 1.3
 
 /// Factors of the nominal gravity and inertia on all joints.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Factors {
     pub(super) gravity: Option<Estimate>,
     pub(super) inertia: Option<Estimate>,
     covariance: f64,
+    /// Factor of gravity on each joint that it could rule.
+    alone: Vec<f64>,
+    /// Friction shows on half of the joints.
+    with_friction: bool,
     /// Whether an unknown payload was told from the links.
     with_payload: bool,
 }
@@ -66,6 +70,8 @@ impl Factors {
             gravity: shared.estimates[0],
             inertia: shared.estimates[1],
             covariance: shared.covariance,
+            alone: shared.alone,
+            with_friction: 2 * shared.with_friction[0] >= shared.with_friction[1],
             with_payload,
         })
     }
@@ -77,12 +83,15 @@ impl Factors {
             false => MISSING_WITHOUT_PAYLOAD,
         };
         let gravity = self.gravity?;
-        if !(gravity.is_below(limit) && gravity.is_above(-limit)) {
+        let on_all =
+            !self.alone.is_empty() && self.alone.iter().all(|factor| factor.abs() < MISSING);
+        if !(on_all && gravity.is_below(limit) && gravity.is_above(-limit)) {
             return None;
         }
         match self.inertia {
             Some(inertia) if inertia.is_above(MISSING) => Some(Part::NoGravity),
-            _ => Some(Part::NoModel),
+            // Torque without friction either is no torque of this robot at all.
+            _ => self.with_friction.then_some(Part::NoModel),
         }
     }
 

@@ -6,6 +6,7 @@
 
 mod base;
 mod columns;
+mod degrees;
 mod explain;
 mod gravity_part;
 mod mend;
@@ -14,16 +15,16 @@ mod sample;
 mod shared;
 mod velocity;
 
-use crate::error::{Error, Finding, Result, Severity};
-use crate::robot::{JointKind, Robot};
+use crate::error::{Finding, Result, Severity};
+use crate::robot::Robot;
 use crate::signal::{Pipeline, Trajectory};
 use crate::words::significant;
+use degrees::refuse_degrees;
 use explain::{Explained, Reading, explain};
 use gravity_part::{Factors, factor_findings, missing_finding};
 use parts::Parts;
 use sample::Sample;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::{PI, TAU};
 use std::ops::RangeInclusive;
 
 pub use base::Base;
@@ -64,7 +65,7 @@ const PART: f64 = 0.3;
 /// | `torque_copied`, `torque_constant` | a torque column is another joint's, or one number |
 ///
 /// # Errors
-/// [`Error::Log`] for positions in degrees.
+/// [`crate::Error::Log`] for positions in degrees.
 pub fn self_check<'a>(
     robot: &Robot,
     pipeline: &Pipeline,
@@ -130,37 +131,121 @@ pub fn look<'a>(
         return Ok(Look::default());
     }
     let as_logged = explain(robot, &sample, &Reading::as_logged(robot.dof()));
-    let parts = Parts::of(robot, &sample);
-    let turned =
-        mend::is_doubtful(&as_logged).then(|| base::turned(robot, &sample, &parts, &as_logged));
-    let turned = turned.flatten();
-    let (on_base, standing) = match &turned {
-        Some(turned) => (&turned.robot, &turned.explained),
-        None => (robot, &as_logged),
-    };
-    let mended = mend::mend(on_base, &sample, standing);
-    let (reading, explained) = Some(mended)
-        .filter(|(_, explained)| mend::none_less(&as_logged, explained))
-        .unwrap_or_else(|| (Reading::as_logged(robot.dof()), standing.clone()));
-    let base = turned.as_ref().map(|turned| turned.base);
-    let mut findings: Vec<Finding> = (turned.iter())
-        .map(|turned| turned.base.finding(robot, &as_logged, &turned.explained))
-        .collect();
-    findings.extend(signs_and_order(robot, &reading, standing, &explained));
-    let as_it_is = reading == Reading::as_logged(robot.dof());
-    let logs = || logs.iter().copied().zip(&samples);
-    findings.extend(logs().flat_map(|log| columns::of_sample(on_base, log, standing)));
-    findings.extend(velocity::findings(logs()));
-    let lacking: Vec<Finding> = match as_it_is {
-        true => logs().filter_map(|log| lacking(on_base, log)).collect(),
-        false => Vec::new(),
-    };
-    // Torque without the model's part has no scale.
-    let scales = match lacking.is_empty() {
-        true => scales(robot, &sample, &explained),
-        false => Vec::new(),
-    };
-    findings.extend(lacking);
+    let read = Read::of(robot, &sample, &as_logged);
+    let mut findings = read.findings(robot, &as_logged);
+    let each = || logs.iter().copied().zip(&samples);
+    findings.extend(each().flat_map(|log| columns::of_sample(&read.robot, log, &read.standing)));
+    findings.extend(velocity::findings(each()));
+    let mut scales = scales(robot, &sample, &read.explained);
+    let of_all = scales.iter().any(|scale| scale.finding.subject.is_empty());
+    if read.is_as_logged() && !of_all {
+        let lacking: Vec<Finding> = each().filter_map(|log| lacking(&read.robot, log)).collect();
+        // Torque without the model's part has no scale.
+        if !lacking.is_empty() {
+            scales.clear();
+        }
+        findings.extend(lacking);
+    }
+    let joints = joint_checks(robot, &as_logged, &read.reading, &scales);
+    findings.extend(scales.into_iter().map(|scale| scale.finding));
+    if findings.is_empty() && sample.independent >= LEAST_INDEPENDENT {
+        let factors = Factors::of(robot, &sample, &Parts::of(robot, &sample));
+        findings.extend(factors.iter().flat_map(factor_findings));
+    }
+    Ok(Look {
+        joints,
+        base: read.base,
+        findings,
+    })
+}
+
+/// The reading of the logs that explains most: how the base stands, then signs and order of joints.
+struct Read {
+    base: Option<Base>,
+    /// The robot on that base.
+    robot: Robot,
+    /// What it explains with the joints as they are logged.
+    standing: Vec<Option<Explained>>,
+    reading: Reading,
+    explained: Vec<Option<Explained>>,
+}
+
+/// By how much, in Σ ln(share left), a reading of signs and order must explain more than a turned base alone.
+const RATHER_SIGNS: f64 = 1.0;
+
+impl Read {
+    /// The base comes first; signs and order on the base as the model has it where they explain more: a log whose joints are exchanged shows some
+    /// gravity, too.
+    fn of(robot: &Robot, sample: &Sample, as_logged: &[Option<Explained>]) -> Self {
+        let upright = Self::on(None, robot.clone(), (sample, as_logged), as_logged.to_vec());
+        let turned = match mend::is_doubtful(as_logged) {
+            true => base::turned(robot, sample, as_logged),
+            false => None,
+        };
+        let Some(turned) = turned else {
+            return upright;
+        };
+        let turned = Self::on(
+            Some(turned.base),
+            turned.robot,
+            (sample, as_logged),
+            turned.explained,
+        );
+        let [signs, base] =
+            [&upright, &turned].map(|read| mend::gain_of(as_logged, &read.explained));
+        let more = match turned.is_as_logged() {
+            true => RATHER_SIGNS,
+            false => -RATHER_SIGNS,
+        };
+        match !upright.is_as_logged() && signs > base + more {
+            true => upright,
+            false => turned,
+        }
+    }
+
+    /// The best reading of signs and order for a robot on a base.
+    fn on(
+        base: Option<Base>,
+        robot: Robot,
+        (sample, as_logged): (&Sample, &[Option<Explained>]),
+        standing: Vec<Option<Explained>>,
+    ) -> Self {
+        let mended = mend::mend(&robot, sample, &standing);
+        let (reading, explained) = Some(mended)
+            .filter(|(_, explained)| mend::none_less(as_logged, explained))
+            .unwrap_or_else(|| (Reading::as_logged(robot.dof()), standing.clone()));
+        Self {
+            base,
+            robot,
+            standing,
+            reading,
+            explained,
+        }
+    }
+
+    /// No sign is turned and no joint exchanged.
+    fn is_as_logged(&self) -> bool {
+        self.reading == Reading::as_logged(self.robot.dof())
+    }
+
+    fn findings(&self, robot: &Robot, as_logged: &[Option<Explained>]) -> Vec<Finding> {
+        let base = self.base.iter();
+        let mut findings: Vec<Finding> = base
+            .map(|base| base.finding(robot, as_logged, &self.standing))
+            .collect();
+        let signs = signs_and_order(robot, &self.reading, &self.standing, &self.explained);
+        findings.extend(signs);
+        findings
+    }
+}
+
+/// The numbers behind the findings, joint by joint.
+fn joint_checks(
+    robot: &Robot,
+    as_logged: &[Option<Explained>],
+    reading: &Reading,
+    scales: &[Scale],
+) -> Vec<JointCheck> {
     let torque_factor = |name: &str| {
         let whose = |scale: &&Scale| ["", name].contains(&&*scale.finding.subject);
         scales.iter().find(whose)?.factor
@@ -180,17 +265,7 @@ pub fn look<'a>(
             torque: named(reading.torque[joint]),
         }
     });
-    let joints = joints.collect();
-    findings.extend(scales.into_iter().map(|scale| scale.finding));
-    if findings.is_empty() && sample.independent >= LEAST_INDEPENDENT {
-        let factors = Factors::of(robot, &sample, &parts);
-        findings.extend(factors.iter().flat_map(factor_findings));
-    }
-    Ok(Look {
-        joints,
-        base,
-        findings,
-    })
+    joints.collect()
 }
 
 /// A finding where the torque of one log lacks the model's part.
@@ -201,97 +276,6 @@ fn lacking(robot: &Robot, (log, sample): (&str, &Sample)) -> Option<Finding> {
     let factors = Factors::of(robot, sample, &Parts::of(robot, sample))?;
     let part = factors.missing()?;
     Some(missing_finding(log, part, &factors))
-}
-
-/// Angles beyond a turn whose torque only makes sense when they are taken as degrees: all of them, else the joints with which most is explained.
-fn refuse_degrees(robot: &Robot, log: &str, sample: &Sample) -> Result<()> {
-    let names = robot.joint_names();
-    let is_turning = |joint: &usize| robot.joint_kind(*joint) != JointKind::Prismatic;
-    let turning: Vec<usize> = (0..robot.dof()).filter(is_turning).collect();
-    let largest = |joint: usize| {
-        (sample.channels[0][joint].iter()).fold(0.0_f64, |most, q| most.max(q.abs()))
-    };
-    let beyond: Vec<usize> = turning
-        .iter()
-        .copied()
-        .filter(|joint| largest(*joint) > TAU)
-        .collect();
-    if beyond.is_empty() {
-        return Ok(());
-    }
-    let as_logged = explain(robot, sample, &Reading::as_logged(robot.dof()));
-    let explained = |joints: &[usize]| explain(robot, sample, &in_degrees(robot, joints));
-    let error = |joints: &[usize]| {
-        let reached = joints
-            .iter()
-            .fold(0.0_f64, |most, joint| most.max(largest(*joint)));
-        let (whose, factors) = match joints == turning {
-            true => (
-                String::new(),
-                "q = 0.017453292519943295, qd = 0.017453292519943295".to_owned(),
-            ),
-            false => {
-                let own: Vec<&str> = joints.iter().map(|joint| names[*joint]).collect();
-                let of = own
-                    .iter()
-                    .map(|name| format!("{name:?} = 0.017453292519943295"));
-                let table = format!("{{ {} }}", of.collect::<Vec<_>>().join(", "));
-                (
-                    format!(" of joint `{}`", own.join("`, `")),
-                    format!("q = {table}, qd = {table}"),
-                )
-            }
-        };
-        Err(Error::Log {
-            log: log.into(),
-            problem: format!(
-                "positions{whose} look like degrees: they reach {reached:.1}, and as degrees the model explains the torque"
-            ),
-            remedy: format!(
-                "export positions, velocities and accelerations in radians: × π/180, as with [columns] factor = {{ {factors} }}"
-            ),
-        })
-    };
-    if mend::overwhelming(&as_logged, &explained(&turning)) {
-        return error(&turning);
-    }
-    // Some joints only: one after the other, as long as another explains more.
-    let mut joints: Vec<usize> = Vec::new();
-    let mut current = as_logged.clone();
-    loop {
-        let others = beyond.iter().filter(|joint| !joints.contains(joint));
-        let tried = others.map(|joint| {
-            let mut with = joints.clone();
-            with.push(*joint);
-            with.sort_unstable();
-            let explained = explained(&with);
-            (mend::gain_of(&current, &explained), with, explained)
-        });
-        let best = tried.max_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((_, with, explained)) = best.filter(|(gain, ..)| *gain > 0.0) else {
-            break;
-        };
-        (joints, current) = (with, explained);
-    }
-    match !joints.is_empty() && mend::overwhelming(&as_logged, &current) {
-        true => error(&joints),
-        false => Ok(()),
-    }
-}
-
-/// The log with these joints in degrees.
-fn in_degrees(robot: &Robot, joints: &[usize]) -> Reading {
-    let factor = |joint: usize| match joints.contains(&joint) {
-        true => PI / 180.0,
-        false => 1.0,
-    };
-    Reading {
-        motion: (0..robot.dof())
-            .map(|joint| (joint, factor(joint)))
-            .collect(),
-        rates: (0..robot.dof()).map(factor).collect(),
-        ..Reading::as_logged(robot.dof())
-    }
 }
 
 /// Joints whose torque has the model's shape but another size, and those whose torque is far beyond what the model says that the

@@ -21,6 +21,10 @@ const FEWEST: usize = 60;
 const MODEL_ERROR: f64 = 0.05;
 /// Share of a column that no other column may explain: else its coefficient is that of a collinear column.
 const OWN_SHARE: f64 = 1e-3;
+/// Power of a column over that of the torque from which it would show.
+const RULES: f64 = 0.1;
+/// Share of a joint's torque from which friction shows.
+const FRICTION: f64 = 0.2;
 /// Ridge, as a share of a column's mean square: for columns that are not there at all.
 const RIDGE: f64 = 1e-9;
 
@@ -50,6 +54,10 @@ pub(super) struct Shared {
     pub(super) estimates: Vec<Option<Estimate>>,
     /// All of them, whether the motion tells them or not.
     pub(super) values: Vec<f64>,
+    /// Factor at the first column of each joint whose torque it could rule, the other columns as they are shared.
+    pub(super) alone: Vec<f64>,
+    /// How many of the joints have friction or motor inertia in their torque, and how many there are.
+    pub(super) with_friction: [usize; 2],
     /// Covariance of the first two columns.
     pub(super) covariance: f64,
     /// Information on the coefficients by row and column: inverse of the covariance for white errors of the joints' own size.
@@ -63,6 +71,23 @@ struct Rows {
     torque: Vec<f64>,
     /// Which stretch each row is of.
     stretch: Vec<usize>,
+    /// Power of the first column over that of the torque, before friction was projected out.
+    rules: f64,
+    /// Share of the torque that friction and motor inertia explain.
+    friction: f64,
+}
+
+impl Rows {
+    /// Factor at the first column, the others as they are; `None` where that column is small beside the torque, so that other errors are as large.
+    fn alone(&self, values: &[f64]) -> Option<f64> {
+        let (mut square, mut product) = (0.0, 0.0);
+        for (row, torque) in self.matrix.chunks(values.len()).zip(&self.torque) {
+            let others: f64 = row[1..].iter().zip(&values[1..]).map(|(x, c)| x * c).sum();
+            square += row[0] * row[0];
+            product += row[0] * (torque - others);
+        }
+        (self.rules > RULES && square > 0.0).then(|| product / square)
+    }
 }
 
 /// Fits the shared coefficients of `columns`; `None` where no joint says anything.
@@ -118,6 +143,11 @@ pub(super) fn fit(
     });
     Some(Shared {
         estimates: estimates.collect(),
+        alone: rows.iter().filter_map(|rows| rows.alone(&values)).collect(),
+        with_friction: [
+            rows.iter().filter(|rows| rows.friction > FRICTION).count(),
+            rows.len(),
+        ],
         covariance: covariance(0, width.min(2) - 1),
         values,
         information: gram,
@@ -184,11 +214,13 @@ fn of_joint(sample: &Sample, columns: &[&Torques], springs: &[f64], joint: usize
         .collect();
     let measured = pick(&|i| tau[i] - springs[i]);
     let spread = variance(&measured);
+    let rules = variance(&pick(&|i| columns[0][joint][i])) / spread;
     let mut torque = project(&friction, measured);
     if !(spread > 0.0 && spread.is_finite()) {
         return None;
     }
     let basis = orthonormal(own.clone());
+    let friction = 1.0 - torque.iter().map(|x| x * x).sum::<f64>() / (torque.len() as f64 * spread);
     let left = project(&basis, torque.clone());
     let left = left.iter().map(|x| x * x).sum::<f64>() / left.len() as f64;
     let weight = 1.0 / (left + MODEL_ERROR.powi(2) * spread).sqrt();
@@ -205,6 +237,8 @@ fn of_joint(sample: &Sample, columns: &[&Torques], springs: &[f64], joint: usize
         matrix,
         torque,
         stretch: stretch.collect(),
+        rules,
+        friction,
     })
 }
 

@@ -15,7 +15,7 @@ const JUMP: f64 = 8.0;
 /// Change of a joint's velocity while a value is held, as a share of its largest: inertia then needs another torque.
 const FASTER: f64 = 0.05;
 /// Share of a joint's time in motion from which held values spoil a fit.
-const SPOILS: f64 = 0.01;
+const SPOILS: f64 = 0.02;
 /// Chapters of a long log that are looked at.
 const CHAPTERS: usize = 4;
 
@@ -23,7 +23,7 @@ const CHAPTERS: usize = 4;
 ///
 /// | finding | what was seen |
 /// |---|---|
-/// | `torque_held` | values are held for 1 % of the joint's time in motion or more (degraded) |
+/// | `torque_held` | values are held for 2 % of the joint's time in motion or more (degraded) |
 /// | `stale_torque` | values are held for less than that (note) |
 ///
 /// # Errors
