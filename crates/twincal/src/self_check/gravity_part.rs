@@ -16,6 +16,9 @@ use crate::words::significant;
 const MISSING: f64 = 0.5;
 /// The same where a payload cannot be told from the model's own links.
 const MISSING_WITHOUT_PAYLOAD: f64 = 0.3;
+/// Joints on which gravity rules that must agree, or driven joints where it rules one: a pendulum's only drive may well hold it by friction alone.
+const RULED: usize = 2;
+const JOINTS: usize = 4;
 /// ln of a factor on all torque beyond which it is no mistake in the masses: with every link 30 % wrong it is 0.7 to 1.45, on a real UR10 0.75.
 const NO_MASSES: f64 = 0.405; // ln 1.5
 /// ln by which the factors of gravity and inertia may differ and be one factor: 10 %.
@@ -33,6 +36,8 @@ pub(super) struct Factors {
     alone: Vec<f64>,
     /// Friction shows on half of the joints.
     with_friction: bool,
+    /// Driven joints.
+    joints: usize,
     /// Whether an unknown payload was told from the links.
     with_payload: bool,
 }
@@ -72,6 +77,7 @@ impl Factors {
             covariance: shared.covariance,
             alone: shared.alone,
             with_friction: 2 * shared.with_friction[0] >= shared.with_friction[1],
+            joints: shared.with_friction[1],
             with_payload,
         })
     }
@@ -83,9 +89,9 @@ impl Factors {
             false => MISSING_WITHOUT_PAYLOAD,
         };
         let gravity = self.gravity?;
-        let on_all =
-            !self.alone.is_empty() && self.alone.iter().all(|factor| factor.abs() < MISSING);
-        if !(on_all && gravity.is_below(limit) && gravity.is_above(-limit)) {
+        let enough = self.alone.len() >= RULED || self.joints >= JOINTS && !self.alone.is_empty();
+        let on_all = self.alone.iter().all(|factor| factor.abs() < MISSING);
+        if !(enough && on_all && gravity.is_below(limit) && gravity.is_above(-limit)) {
             return None;
         }
         match self.inertia {

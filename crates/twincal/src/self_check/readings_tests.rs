@@ -146,9 +146,9 @@ fn no_reading_is_proposed_that_explains_less_on_any_joint() {
         for (joint, (before, after)) in as_logged.iter().zip(&read.explained).enumerate() {
             let (before, after) = (before.unwrap(), after.unwrap());
             let less = after.left - before.left;
-            // Twice the tolerance of one step: base, then signs.
+            // BY_FACTOR of the search: what friction and an unknown payload may make of it.
             assert!(
-                less <= 0.06,
+                less <= 0.03,
                 "seed {seed}, joint {joint}: {before:?} → {after:?}"
             );
         }
