@@ -16,7 +16,7 @@ use crate::words::significant;
 const MISSING: f64 = 0.5;
 /// The same where a payload cannot be told from the model's own links.
 const MISSING_WITHOUT_PAYLOAD: f64 = 0.3;
-/// Joints on which gravity rules that must agree, or driven joints where it rules one: a pendulum's only drive may well hold it by friction alone.
+/// Joints that must agree: on which gravity rules, or on which friction shows; and driven joints where it rules one: a pendulum's only drive may well hold it by friction alone.
 const RULED: usize = 2;
 const JOINTS: usize = 4;
 /// ln of a factor on all torque beyond which it is no mistake in the masses: with every link 30 % wrong it is 0.7 to 1.45, on a real UR10 0.75.
@@ -34,7 +34,7 @@ pub(super) struct Factors {
     covariance: f64,
     /// Factor of gravity on each joint that it could rule.
     alone: Vec<f64>,
-    /// Friction shows on half of the joints.
+    /// Friction shows on two joints or more: an unknown payload hides it on those that carry it.
     with_friction: bool,
     /// Driven joints.
     joints: usize,
@@ -76,7 +76,7 @@ impl Factors {
             inertia: shared.estimates[1],
             covariance: shared.covariance,
             alone: shared.alone,
-            with_friction: 2 * shared.with_friction[0] >= shared.with_friction[1],
+            with_friction: shared.with_friction[0] >= RULED,
             joints: shared.with_friction[1],
             with_payload,
         })
