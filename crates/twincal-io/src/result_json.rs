@@ -11,6 +11,7 @@ use twincal::calibrate::{
     Calibration, CompactTerm, ComponentSummary, Curve, Group, Halves, LikelihoodUsed, LogSummary,
     Repeat, SweepPoint, TermSummary, Verdict,
 };
+use twincal::lag::Lags;
 use twincal::likelihood::JointNoise;
 use twincal::posterior::Method;
 use twincal::prior::Inclusion;
@@ -56,6 +57,7 @@ struct ResultFile<'a> {
     repeatability: &'a [Repeat],
     curves: &'a [Curve],
     logs: &'a [LogSummary],
+    lags: Option<&'a Lags>,
     findings: &'a [Finding],
 }
 
@@ -233,6 +235,7 @@ impl<'a> ResultFile<'a> {
             repeatability: &calibration.repeatability,
             curves: &calibration.curves,
             logs: &calibration.logs,
+            lags: calibration.lags.as_ref(),
             findings: &calibration.findings,
         }
     }

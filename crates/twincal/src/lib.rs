@@ -16,6 +16,7 @@ pub mod diagnostics;
 pub mod robot;
 pub mod signal;
 pub mod self_check;
+mod rigid_fit;
 pub mod lag;
 pub mod incidents;
 pub mod term;

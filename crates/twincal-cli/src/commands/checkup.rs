@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use twincal::calibrate::LookedAt;
 use twincal::incidents::{Incident, motion};
-use twincal::lag::{LogLag, estimate_lag, lag_findings};
+use twincal::lag::{Lags, lag_findings, lags};
 use twincal::robot::Robot;
 use twincal::self_check::{JointCheck, look};
 use twincal::signal::{Agreement, Log, Pipeline, Trajectory, velocity_agreement};
@@ -18,8 +18,9 @@ pub(super) struct Checkup {
     places: Vec<usize>,
     /// Why others could not.
     pub(super) refused: Vec<Error>,
+    /// How much later than the motion torque was logged; `None` where the logs do not say it.
+    pub(super) lags: Option<Lags>,
     /// By log.
-    pub(super) lags: BTreeMap<String, LogLag>,
     pub(super) incidents: BTreeMap<String, Vec<Incident>>,
     pub(super) agreement: BTreeMap<String, Vec<Option<Agreement>>>,
     /// By joint, over all logs.
@@ -78,11 +79,11 @@ pub(super) fn checkup(
     let found = look(robot, pipeline, &checkup.trajectories)?;
     checkup.joints = found.joints;
     checkup.findings.extend(found.findings);
-    let lags = checkup.trajectories.iter();
-    let lags: Vec<LogLag> = lags
-        .filter_map(|trajectory| estimate_lag(robot, pipeline, trajectory))
-        .collect();
-    checkup.findings.extend(lag_findings(pipeline, &lags));
-    checkup.lags = lags.into_iter().map(|lag| (lag.log.clone(), lag)).collect();
+    let trajectories: Vec<&Trajectory> = checkup.trajectories.iter().collect();
+    checkup.lags = lags(robot, pipeline, &trajectories);
+    if let Some(lags) = &checkup.lags {
+        let said = &pipeline.corrections.lag;
+        checkup.findings.extend(lag_findings(said, lags));
+    }
     Ok(checkup)
 }

@@ -349,6 +349,19 @@ pub enum NumberOrAuto {
     Auto(AutoWord),
 }
 
+/// A lag, or "auto".
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "expected \"auto\", seconds, or seconds by joint such as { elbow = 0.008 }"
+)]
+pub enum LagOrAuto {
+    /// Estimated from the training logs.
+    Auto(AutoWord),
+    /// As given.
+    Given(PerJoint),
+}
+
 /// `[signal]`
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
@@ -359,10 +372,9 @@ pub struct SignalTable {
     pub cutoff_hz: Option<NumberOrAuto>,
     /// Rate of the kept rows, Hz; default "auto" = 2.5 × cut-off.
     pub rate_hz: Option<NumberOrAuto>,
-    /// How much later than the motion torque was logged, s: torque is moved back by it. One number for all joints, or
-    /// { joint = seconds }; negative where torque comes first. 0 says that there is none: without this key a lag of more than one
-    /// sample counts as degraded data.
-    pub lag: Option<PerJoint>,
+    /// How much later than the motion torque was logged, s: torque is moved back by it. Default "auto": estimated from the training logs and
+    /// applied where it is clear. One number for all joints, or { joint = seconds }; negative where torque comes first; 0 leaves torque as logged.
+    pub lag: Option<LagOrAuto>,
     /// Default true: where what is left of the torque is noise of one memory (an AR(1)) on every joint, the fit goes on up to four
     /// times the automatic cut-off with `noise.model = "ar1"`; a note says so. false: never. Nor does it where `cutoff_hz`, `rate_hz` or
     /// `noise.model` is stated, rows are weighed (`noise.robust`, `varies_with_…`) or the noise is sampled.

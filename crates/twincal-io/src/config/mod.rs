@@ -21,9 +21,9 @@ pub use channel_names::{ChannelNames, ColumnsTable, TimeUnit};
 pub use factors::FactorTable;
 pub use file::{
     Allow, AutoWord, BaseTable, CheckTable, ConfigFile, FamilyWord, Friction, InclusionTable,
-    InferenceTable, LibraryTable, LogEntry, LogTable, MethodWord, ModelTable, NoisePrior,
-    NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PresetWord, PriorTable,
-    SignalTable, Slab, Topics, TorqueWord, UncertaintyWord, UnknownWord, VelocityWord,
+    InferenceTable, LagOrAuto, LibraryTable, LogEntry, LogTable, MethodWord, ModelTable,
+    NoisePrior, NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PresetWord,
+    PriorTable, SignalTable, Slab, Topics, TorqueWord, UncertaintyWord, UnknownWord, VelocityWord,
 };
 pub use kept_columns::Attempt;
 pub use log_form::LogForm;

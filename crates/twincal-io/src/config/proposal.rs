@@ -198,7 +198,7 @@ pub fn key(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Config, FactorTable, TimeUnit, TorqueWord, VelocityWord};
+    use super::super::{Config, FactorTable, LagOrAuto, TimeUnit, TorqueWord, VelocityWord};
     use super::*;
 
     #[test]
@@ -251,7 +251,10 @@ mod tests {
         let file = &config.file;
         assert_eq!(file.model.locked, proposal.locked);
         assert_eq!(file.columns, proposal.columns);
-        assert_eq!(file.signal.lag, Some(PerJoint::All(0.008)));
+        assert_eq!(
+            file.signal.lag,
+            Some(LagOrAuto::Given(PerJoint::All(0.008)))
+        );
         assert_eq!(file.signal.velocity, Some(VelocityWord::Position));
         assert_eq!(file.log.entries, proposal.logs);
     }

@@ -1,8 +1,8 @@
 //! From keys to settings: defaults filled in, ranges checked.
 
 use super::{
-    Allow, Config, LogForm, MethodWord, NoisePrior, NoiseWord, NumberOrAuto, PayloadKey, PerJoint,
-    Slab, UncertaintyWord, VelocityWord,
+    Allow, Config, LagOrAuto, LogForm, MethodWord, NoisePrior, NoiseWord, NumberOrAuto, PayloadKey,
+    PerJoint, Slab, UncertaintyWord, VelocityWord,
 };
 use crate::error::Result;
 use crate::log::LogOptions;
@@ -332,9 +332,9 @@ impl Config {
         let range = "seconds between -1 and 1";
         let number = |key: &str, lag: f64| self.number(key, lag, |lag| lag.abs() <= 1.0, range);
         Ok(match &self.file.signal.lag {
-            None => Lag::Unsaid,
-            Some(PerJoint::All(lag)) => Lag::All(number("signal.lag", *lag)?),
-            Some(PerJoint::ByJoint(joints)) => {
+            None | Some(LagOrAuto::Auto(_)) => Lag::Unsaid,
+            Some(LagOrAuto::Given(PerJoint::All(lag))) => Lag::All(number("signal.lag", *lag)?),
+            Some(LagOrAuto::Given(PerJoint::ByJoint(joints))) => {
                 for (joint, lag) in joints {
                     number(&format!("signal.lag.{joint}"), *lag)?;
                 }

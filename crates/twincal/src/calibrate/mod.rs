@@ -1,6 +1,7 @@
 //! The whole road, from a robot and its logs to a calibrated twin, in one function that reads like the paper.
 
 mod again;
+mod aligned;
 mod compact;
 mod components;
 mod curves;
@@ -51,7 +52,6 @@ pub use stopped::Stopped;
 
 use crate::error::{Error, Finding, Result};
 use crate::infer::{Choice, Given, InferenceSettings, infer, sample, sampled_likelihood};
-use crate::lag::{LogLag, estimate_lag, lag_findings};
 use crate::likelihood::{
     Columns, JointNoise, NoiseInterval, NoiseModel, NoiseSettings, NoiseUncertainty, Spread,
 };
@@ -211,6 +211,7 @@ fn road(
     let every_log: Vec<Log<'_>> = logs.iter().chain(heldout).map(Log::lent).collect();
     findings.extend(constant_torque(robot, every_log.clone())?);
     findings.extend(hardly_driven(robot, every_log.clone())?);
+    let mut lags = aligned::align(robot, logs, &mut pipeline, &mut prepared, findings)?;
     let mut library_settings = LibrarySettings {
         coulomb_velocity: pipeline.coulomb_velocity,
         ..settings.library.clone()
@@ -237,11 +238,7 @@ fn road(
     let pipelines = (&pipeline, &elsewhere[..]);
     let (mut data, trajectories) = Data::read(robot, &library, pipelines, &prepared, &others)?;
     findings.extend(self_check(robot, &pipeline, trajectories.all())?);
-    let lags: Vec<LogLag> = trajectories
-        .all()
-        .filter_map(|trajectory| estimate_lag(robot, &pipeline, trajectory))
-        .collect();
-    findings.extend(lag_findings(&pipeline, &lags));
+    lags = aligned::of_every_log(robot, &pipeline, settings, &trajectories, findings).or(lags);
     let every_candidate = library.clone();
     let (library, zero_columns) = data.drop_zero_columns(library);
     let columns = columns_of(robot, &library, settings, data::tell_payload_apart(logs))?;
@@ -404,7 +401,7 @@ fn road(
         || curves::curves(robot, &library, &calibration, &drawer, seed),
         || unphysical::findings(robot, &library, &calibration, &drawer, seed),
     );
-    calibration.curves = curves;
+    (calibration.curves, calibration.lags) = (curves, lags);
     let components = &calibration.components;
     let negative = negative_friction::findings(&calibration.twin, &library, components);
     let tilt = tilt_beside_mass::finding(robot, &library, &calibration);

@@ -60,10 +60,11 @@ impl Reader<'_> {
             ReadyLog::Whole(log) => self.recording(log, role, &mut evidence, findings)?,
             ReadyLog::Long(long) => self.chapters(long, role, &mut evidence, findings)?,
         };
-        log.incidents = evidence.incidents(robot, pipeline);
+        log.incidents = evidence.incidents(robot);
         leave_out(pipeline, &mut trajectory, &log.incidents);
         log.observations
             .leave_out(&left_out(pipeline, &log.incidents));
+        log.summary.incidents.clone_from(&log.incidents);
         log.summary.count_rows(&log.observations);
         findings.extend(incident_findings(&log.summary.name, &log.incidents));
         Ok((log, trajectory))
@@ -241,5 +242,6 @@ fn summary(
         segments: trajectory.segments.len() as u64,
         rows: Vec::new(),
         standstill: Vec::new(),
+        incidents: Vec::new(),
     }
 }

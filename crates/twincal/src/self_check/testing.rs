@@ -109,3 +109,19 @@ pub(crate) fn log(seed: f64) -> Trajectory {
         payload_acts: true,
     }
 }
+
+/// Makes friction of this size remember the motion before a velocity reversal over a way of `length`, rad: presliding.
+pub(crate) fn remember(trajectory: &mut Trajectory, size: f64, length: f64) {
+    let segment = &mut trajectory.segments[0];
+    for joint in 0..trajectory.dof {
+        let (mut way, mut before) = (f64::INFINITY, segment.qd[joint * LEN]);
+        for i in joint * LEN..(joint + 1) * LEN {
+            if segment.qd[i] * before < 0.0 {
+                way = 0.0;
+            }
+            before = segment.qd[i];
+            way += before.abs() * INTERVAL;
+            segment.tau[i] -= 2.0 * size * before.signum() * (-way / length).exp();
+        }
+    }
+}

@@ -291,6 +291,22 @@ pub struct Trajectory {
     pub payload_acts: bool,
 }
 
+impl Trajectory {
+    /// The same between two times, s.
+    pub(crate) fn between(&self, from: f64, to: f64) -> Self {
+        let cut = |segment: &Segment| {
+            let first = segment.time.partition_point(|t| *t < from);
+            let end = segment.time.partition_point(|t| *t < to);
+            (first < end).then(|| segment.cut(self.dof, first..end))
+        };
+        Self {
+            name: self.name.clone(),
+            segments: self.segments.iter().filter_map(cut).collect(),
+            ..*self
+        }
+    }
+}
+
 impl Pipeline {
     /// How long a joint has to be slow to stand still, s: three periods of the cut-off, so that the filter has forgotten what was before;
     /// infinite without a filter.

@@ -80,7 +80,7 @@ const ORDER: [(&str, &str); 49] = [
         "moves_no_mass",
         "give the link an <inertial>, or fix the joint with [model] locked",
     ),
-    ("torque_lag", "twincal.toml: [signal] lag = …"),
+    ("torque_lag", "record torque by the clock of the motion"),
     (
         "velocity_opposite",
         "twincal.toml: [columns.factor] with q or qd of that joint, whichever is turned; the torque does not tell",
@@ -132,10 +132,7 @@ const ORDER: [(&str, &str); 49] = [
     ),
     ("slower_channels", "log all channels at one rate"),
     ("short_segments", "record longer, or mend the gaps"),
-    (
-        "torque_spike",
-        "nothing: left out; cut the log there to be sure",
-    ),
+    ("contact", "nothing: left out; cut the log there to be sure"),
     (
         "drives_off",
         "nothing: left out; cut the log there to be sure",
@@ -296,10 +293,9 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
 fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
     let place = ORDER.iter().position(|(code, _)| *code == finding.code);
     let how = match (finding.code.as_str(), place) {
-        ("torque_lag", _) => match lag(examination) {
-            Some(lag) => format!("twincal.toml: [signal] lag = {lag:?}"),
-            None => "one [signal] lag cannot mend logs that differ: fit them apart".into(),
-        },
+        ("torque_lag", _) if finding.subject.is_empty() => {
+            "twincal.toml: [signal] lag = \"auto\"".into()
+        }
         ("sign_flip", _) => match of_joint(examination, &finding.subject) {
             Some(check) => {
                 let or_the_axis = if is_axis(check) {
@@ -379,20 +375,11 @@ fn of_joint<'a>(examination: &'a Examination, joint: &str) -> Option<&'a JointCh
     joints.find(|check| check.joint == joint)
 }
 
-/// The lag to write into the config, s to a tenth of a millisecond: the mean of the logs that clearly have one, if they agree.
+/// The lag to write into the config, s to a tenth of a millisecond, where it is clear.
 pub(super) fn lag(examination: &Examination) -> Option<f64> {
-    let logs = examination.checkup.lags.values();
-    let clear: Vec<(f64, f64)> = logs
-        .filter_map(|log| Some((log.clear()?, log.interval)))
-        .collect();
-    if clear.is_empty() {
-        return None;
-    }
-    let mean = clear.iter().map(|(lag, _)| lag).sum::<f64>() / clear.len() as f64;
-    let agree = clear
-        .iter()
-        .all(|(lag, interval)| (lag - mean).abs() <= *interval);
-    agree.then_some((mean * 1e4).round() / 1e4)
+    let lags = examination.checkup.lags.as_ref()?;
+    let [lag, _] = lags.common.filter(|_| lags.clear)?;
+    Some((lag * 1e4).round() / 1e4)
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::incidents::Incident;
-use twincal::lag::LogLag;
+use twincal::lag::{Lags, LogLag};
 use twincal::self_check::JointCheck;
 use twincal::signal::{Agreement, LogOverview, Pipeline, Steps};
 use twincal_io::artifact::OutputFile;
@@ -42,6 +42,8 @@ struct Diagnosis {
     /// Units that were converted for the look alone.
     converted: Vec<String>,
     logs: Vec<LogRow>,
+    /// How much later than the motion torque was logged, over all logs.
+    lags: Option<Lags>,
     /// Log against model, over all logs.
     joints: Vec<JointCheck>,
     /// Filters as `fit` would choose them; null where it could not.
@@ -244,12 +246,15 @@ fn diagnosis(examination: Examination, asked: &Asked) -> Diagnosis {
             .map(|(overview, steps)| LogRow {
                 columns: mappings.remove(&overview.name),
                 velocity: checkup.agreement.remove(&overview.name).unwrap_or_default(),
-                lag: checkup.lags.remove(&overview.name),
+                lag: (checkup.lags.iter().flat_map(|lags| &lags.logs))
+                    .find(|log| log.log == overview.name)
+                    .cloned(),
                 incidents: checkup.incidents.remove(&overview.name).unwrap_or_default(),
                 overview,
                 steps,
             })
             .collect(),
+        lags: checkup.lags,
         joints: checkup.joints,
         pipeline,
         components,

@@ -43,11 +43,9 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
         .filter(|finding| finding.code == "velocity_mismatch");
     let velocity: Vec<&str> = velocity.map(|finding| finding.message.as_str()).collect();
     let lag = lag(examination).map(|lag| {
-        let samples: Vec<String> = examination
-            .checkup
-            .lags
-            .values()
-            .filter_map(|log| Some(format!("{:.1} in {}", log.clear()? / log.interval, log.log)))
+        let logs = (examination.checkup.lags.iter()).flat_map(|lags| &lags.logs);
+        let samples: Vec<String> = logs
+            .map(|log| format!("{:.1} in {}", lag / log.interval, log.log))
             .collect();
         let order = if lag > 0.0 { "after" } else { "before" };
         let words = format!(
