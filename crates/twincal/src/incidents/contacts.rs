@@ -22,8 +22,8 @@ const REVERSING: f64 = 3.0;
 const REVERSING_SPREADS: f64 = 3.0;
 /// Share of the torque's own standard deviation that it reaches at least.
 const MATTERS: f64 = 0.2;
-/// What lasts for a bin or two is this many times as large.
-const SHORT: usize = 2;
+/// What lasts for no more than these bins is this many times as large.
+const SHORT: usize = 3;
 const SHORT_TIMES: f64 = 2.0;
 /// A contact begins and ends at this share of its peak, or at this many standard deviations.
 const FOOT: f64 = 0.4;

@@ -86,17 +86,22 @@ pub(super) fn repeats(
             from = range.end;
         }
     }
-    let came_again = |(peak, passes): (&Peak, &mut Vec<Pass>)| {
-        passes.sort_by(|a, b| a.distance.total_cmp(&b.distance));
-        passes.truncate(PASSES);
-        let size = left[peak.joint][peak.segment][peak.bin].abs();
-        let alike = passes
-            .iter()
-            .filter(|pass| pass.left > SHARE * size)
-            .count();
-        2 * alike > passes.len()
-    };
-    peaks.iter().zip(&mut passes).map(came_again).collect()
+    let size = |peak: &Peak| left[peak.joint][peak.segment][peak.bin].abs();
+    let looked_at = peaks.iter().zip(passes);
+    looked_at
+        .map(|(peak, passes)| most_alike(passes, size(peak)))
+        .collect()
+}
+
+/// Whether most of the nearest passes show a share of a peak of this size.
+fn most_alike(mut passes: Vec<Pass>, size: f64) -> bool {
+    passes.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+    passes.truncate(PASSES);
+    let alike = passes
+        .iter()
+        .filter(|pass| pass.left > SHARE * size)
+        .count();
+    2 * alike > passes.len()
 }
 
 /// Positions, then velocities of all joints.

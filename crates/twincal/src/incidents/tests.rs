@@ -59,13 +59,23 @@ fn case_30_drives_that_are_off_are_told_from_drives_that_hold() {
         let mut trajectory = log(0.0);
         let segment = &mut trajectory.segments[0];
         let held: Vec<usize> = (2000..2400).collect();
+        // Holding takes the torque of gravity.
+        let q: Vec<f64> = (0..4).map(|j| segment.q[j * LEN + 2000]).collect();
+        let (rest, mut holding) = ([0.0; 4], [0.0; 4]);
+        let pose = Motion {
+            len: 1,
+            q: &q,
+            qd: &rest,
+            qdd: &rest,
+        };
+        nominal_torque(&arm(1.15), pose, &mut holding);
         for joint in 0..4 {
             for &i in &held {
                 let (at, first) = (joint * LEN + i, joint * LEN + 2000);
                 segment.q[at] = segment.q[first];
                 (segment.qd[at], segment.qdd[at]) = (0.0, 0.0);
                 segment.standstill[at] = true;
-                segment.tau[at] = if torque { segment.tau[first] } else { 0.0 };
+                segment.tau[at] = if torque { holding[joint] } else { 0.0 };
             }
         }
         found(&trajectory)

@@ -20,7 +20,7 @@ use crate::error::{Finding, Severity};
 use crate::robot::Robot;
 use crate::signal::{Lag, Pipeline, Trajectory};
 use crate::words::significant;
-use estimate::estimate;
+use estimate::{Estimate, estimate};
 use pool::agreed;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -28,8 +28,11 @@ use std::collections::BTreeMap;
 /// A lag is there beyond this many standard deviations, and where this share of what is left of left-out rows goes with it.
 const CLEARLY: f64 = 3.0;
 const IMPROVES: f64 = 0.02;
-/// A lag with a larger standard deviation says nothing, s.
+/// A lag with a larger standard deviation says nothing, s; nor that of one joint that differs.
 const VAGUE: f64 = 0.02;
+const SHARP: f64 = 0.005;
+/// Share of what is left of its rows that goes with the lag of one joint or log that is called a mistake.
+const MISTAKE: f64 = 0.1;
 
 /// Lag of one joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -72,70 +75,93 @@ pub struct Lags {
     pub logs: Vec<LogLag>,
 }
 
+/// What joints and logs say of their lags.
+struct Votes {
+    /// Joints that say it, with their lag and its standard deviation, s.
+    joints: Vec<(usize, [f64; 2])>,
+    /// Which of them differ from the others.
+    apart: Vec<bool>,
+    /// Which of the logs that say it differ from the others.
+    logs_apart: Vec<bool>,
+    /// What most joints agree on, without the logs that differ.
+    common: Option<[f64; 2]>,
+}
+
+/// The lag of a joint or log that says it.
+fn said_lag(lag: &Option<[f64; 2]>) -> Option<[f64; 2]> {
+    lag.filter(|[_, sd]| *sd < VAGUE)
+}
+
+impl Votes {
+    fn new(found: &Estimate<'_>) -> Self {
+        let own = found.joints.iter().enumerate();
+        let joints: Vec<(usize, [f64; 2])> = own
+            .filter_map(|(joint, lag)| Some((joint, said_lag(lag)?)))
+            .collect();
+        let values: Vec<[f64; 2]> = joints.iter().map(|(_, lag)| *lag).collect();
+        let of_logs: Vec<[f64; 2]> = found.logs.iter().filter_map(said_lag).collect();
+        let (agree, mut several) = (agreed(&values), agreed(&of_logs));
+        // Joints that do not agree say nothing of a log either.
+        if agree.common.is_none() {
+            several.differs.fill(false);
+        }
+        // One log that differs must not pull what is applied to all.
+        let common = match several.differs.contains(&true) {
+            true => agree.common.and(several.common),
+            false => agree.common,
+        };
+        // Of two joints nobody knows which is right, and a log that differs pulls joints apart.
+        let alike = joints.len() > 2 && !several.differs.contains(&true);
+        let sharp = joints.iter().map(|(_, [_, sd])| alike && *sd < SHARP);
+        let apart = (agree.differs.iter().zip(sharp)).map(|(apart, sharp)| *apart && sharp);
+        Self {
+            apart: apart.collect(),
+            logs_apart: several.differs,
+            joints,
+            common,
+        }
+    }
+}
+
 /// Estimates the lags of logs together; `None` without torque or with too little motion.
 pub fn lags(robot: &Robot, pipeline: &Pipeline, logs: &[&Trajectory]) -> Option<Lags> {
     let mut found = estimate(robot, pipeline, logs)?;
     let names = robot.joint_names();
-    let speaks = |lag: &Option<[f64; 2]>| lag.filter(|[_, sd]| *sd < VAGUE);
-    let of_joints: Vec<(usize, [f64; 2])> = (found.joints.iter().enumerate())
-        .filter_map(|(joint, lag)| Some((joint, speaks(lag)?)))
-        .collect();
-    let values: Vec<[f64; 2]> = of_joints.iter().map(|(_, lag)| *lag).collect();
-    let of_logs: Vec<[f64; 2]> = found.logs.iter().filter_map(speaks).collect();
-    let (mut joints, mut several) = (agreed(&values), agreed(&of_logs));
-    if values.len() < 3 {
-        joints.differs.fill(false);
-    }
-    // Joints that do not agree say nothing of a log either.
-    if joints.common.is_none() {
-        several.differs.fill(false);
-    }
-    // One log that differs must not pull what is applied to all.
-    let common = match several.differs.contains(&true) {
-        true => joints.common.and(several.common),
-        false => joints.common,
-    };
-    let mut moved = vec![0.0; names.len()];
-    let clear = common.filter(|[lag, sd]| lag.abs() > CLEARLY * sd);
-    if let Some([lag, _]) = clear {
-        moved.fill(lag);
-    }
-    for ((joint, [lag, _]), differs) in of_joints.iter().zip(&joints.differs) {
-        if *differs {
-            moved[*joint] = *lag;
-        }
+    let votes = Votes::new(&found);
+    let clear = votes.common.filter(|[lag, sd]| lag.abs() > CLEARLY * sd);
+    let mut moved = vec![clear.map_or(0.0, |[lag, _]| lag); names.len()];
+    let apart = || votes.joints.iter().zip(&votes.apart);
+    for ((joint, [lag, _]), _) in apart().filter(|(_, apart)| **apart) {
+        moved[*joint] = *lag;
     }
     let (gain, gains) = match moved.iter().any(|lag| *lag != 0.0) {
         true => found.gain(&moved)?,
         false => (0.0, vec![0.0; names.len()]),
     };
-    let joint = |((joint, [lag, sd]), differs): (&(usize, [f64; 2]), &bool)| JointLag {
+    let joint = |((joint, [lag, sd]), apart): (&(usize, [f64; 2]), &bool)| JointLag {
         joint: names[*joint].to_owned(),
         lag: *lag,
         sd: *sd,
-        differs: *differs && gains[*joint] > IMPROVES,
+        differs: *apart && gains[*joint] > MISTAKE,
     };
-    let joints: Vec<JointLag> = of_joints.iter().zip(&joints.differs).map(joint).collect();
-    let of_logs = found.gain_of_logs(common.map_or(0.0, |[lag, _]| lag));
-    let mut differs = several.differs.into_iter();
-    let log = |((trajectory, lag), gain): ((&&Trajectory, &Option<[f64; 2]>), &f64)| LogLag {
-        log: trajectory.name.clone(),
-        interval: (trajectory.segments.first()).map_or(0.0, |segment| segment.logged_interval),
-        common: *lag,
-        differs: speaks(lag).is_some() && differs.next().unwrap_or(false) && *gain > IMPROVES,
+    let of_logs = found.gain_of_logs(votes.common.map_or(0.0, |[lag, _]| lag));
+    let mut logs_apart = votes.logs_apart.iter();
+    let log = |((trajectory, lag), gain): ((&&Trajectory, &Option<[f64; 2]>), &f64)| {
+        let apart = said_lag(lag).and_then(|_| logs_apart.next());
+        LogLag {
+            log: trajectory.name.clone(),
+            interval: (trajectory.segments.first()).map_or(0.0, |s| s.logged_interval),
+            common: *lag,
+            differs: apart.is_some_and(|apart| *apart) && *gain > MISTAKE,
+        }
     };
-    let logs = logs
-        .iter()
-        .zip(&found.logs)
-        .zip(&of_logs)
-        .map(log)
-        .collect();
+    let own = logs.iter().zip(&found.logs).zip(&of_logs);
     Some(Lags {
-        common,
+        common: votes.common,
         gain,
         clear: clear.is_some() && gain > IMPROVES,
-        joints,
-        logs,
+        joints: apart().map(joint).collect(),
+        logs: own.map(log).collect(),
     })
 }
 
@@ -195,11 +221,11 @@ pub fn lag_findings(said: &Lag, lags: &Lags) -> Vec<Finding> {
     let common = lags.common.map_or(0.0, |[lag, _]| lag);
     for joint in lags.joints.iter().filter(|joint| joint.differs) {
         let message = format!(
-            "joint `{}`: torque is logged {}, other joints {} ms. It is moved back before the fit. Look at how this joint's torque is recorded; [signal] \
+            "joint `{}`: torque is logged {}, other joints {:.1} ms. It is moved back before the fit. Look at how this joint's torque is recorded; [signal] \
              lag = {{ {} = {:.4} }} says that it is right",
             joint.joint,
             behind([joint.lag, joint.sd]),
-            significant(1e3 * common, 2),
+            1e3 * common,
             joint.joint,
             joint.lag
         );
@@ -224,11 +250,8 @@ pub fn late_logs(lags: &Lags) -> Vec<Finding> {
     let late = lags.logs.iter().filter(|log| log.differs);
     let finding = |log: &LogLag| {
         let own = log.common?;
-        let others = lags
-            .common
-            .map_or("–".into(), |[lag, _]| significant(1e3 * lag, 2));
         let message = format!(
-            "log `{}`: torque is logged {}, in the other logs {others} ms. Leave this log out, or move its torque to the time of its motion",
+            "log `{}`: torque is logged {}, unlike the other logs. Leave this log out, or move its torque to the time of its motion",
             log.log,
             behind(own)
         );
