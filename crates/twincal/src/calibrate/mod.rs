@@ -3,6 +3,7 @@
 mod again;
 mod compact;
 mod components;
+mod correlate;
 mod curves;
 mod data;
 mod drift;
@@ -23,6 +24,7 @@ mod ripples;
 mod result;
 mod room;
 mod sandwich;
+mod smaller_library;
 mod stopped;
 mod summary;
 mod sweep;
