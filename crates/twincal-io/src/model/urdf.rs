@@ -186,9 +186,11 @@ fn joint(
     if let Some(dynamics) = document.child(element, "dynamics") {
         let damping = document.number(dynamics, "damping")?.unwrap_or(0.0);
         let friction = document.number(dynamics, "friction")?.unwrap_or(0.0);
-        if settings.use_urdf_friction {
-            joint.damping = damping;
+        match settings.use_urdf_friction {
+            true => joint.damping = damping,
+            false => joint.unused_damping = damping,
         }
+        joint.unused_friction = friction;
         if damping != 0.0 || friction != 0.0 {
             let used = if settings.use_urdf_friction {
                 "its damping counts as nominal torque, its dry friction does not"

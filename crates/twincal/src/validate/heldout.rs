@@ -2,11 +2,11 @@
 
 use super::conformal::stretch;
 use super::{
-    ConformalKeeper, PitKeeper, Reliability, RivalKeeper, ScoreKeeper, Split, Trace, TraceRows,
-    Validation,
+    ConformalKeeper, Moments, PitKeeper, Reliability, RivalKeeper, ScoreKeeper, Split, Trace,
+    TraceRows, Validation,
 };
 use crate::error::{Finding, Result};
-use crate::observations::Observations;
+use crate::observations::{Observations, Part};
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, slices, spread_raw, visit_slices};
 use crate::signal::{FewChapters, Log, Pipeline, Recording, Trajectory, median_step};
@@ -30,6 +30,8 @@ pub struct HeldOut {
     pit: Vec<PitKeeper>,
     conformal: ConformalKeeper,
     rivals: RivalKeeper,
+    /// Per joint; empty where rows are not kept.
+    moments: Vec<Moments>,
     traces: Vec<Trace>,
 }
 
@@ -80,6 +82,7 @@ impl HeldOut {
             raw_moving: keeper,
             conformal: ConformalKeeper::default(),
             rivals: RivalKeeper::default(),
+            moments: Vec::new(),
             traces: Vec::new(),
         }
     }
@@ -164,6 +167,13 @@ impl HeldOut {
             self.push_filtered(block, predictors, &mut collected);
         });
         self.add(collected);
+        let begin = observations.time.partition_point(|t| *t < from);
+        let rows = begin..observations.len();
+        self.moments.resize(self.names.len(), Moments::default());
+        let gram = Part { observations, rows }.gram();
+        for (moments, gram) in self.moments.iter_mut().zip(&gram.joints) {
+            moments.add(gram);
+        }
     }
 
     /// The raw rows of [`HeldOut::score`] alone.
@@ -311,6 +321,7 @@ impl HeldOut {
             pit: pooled.pit(),
             reliability: self.names.iter().zip(&self.pit).map(reliability).collect(),
             compact: self.rivals.losses(),
+            moments: self.moments,
             traces: self.traces,
         }
     }

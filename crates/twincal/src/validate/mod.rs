@@ -2,6 +2,7 @@
 
 mod conformal;
 mod heldout;
+mod moments;
 mod pit;
 mod rivals;
 mod scores;
@@ -9,6 +10,7 @@ mod trace;
 
 pub use conformal::{Conformal, ConformalKeeper, JointFactor};
 pub use heldout::{HeldOut, Predictors};
+pub use moments::Moments;
 pub use pit::{Pit, PitKeeper, Reliability};
 pub use rivals::{Loss, RivalKeeper};
 pub use scores::{CoverageKeeper, ScoreKeeper};
@@ -172,6 +174,9 @@ pub struct Validation {
     /// The model average against the compact twin on moving filtered rows; `None` if it was not asked for.
     #[serde(default)]
     pub compact: Option<[Loss; 2]>,
+    /// Second moments of the moving held-out rows, joint by joint; empty where rows were not kept.
+    #[serde(default)]
+    pub moments: Vec<Moments>,
     /// For figures.
     pub traces: Vec<Trace>,
 }
