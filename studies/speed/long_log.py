@@ -120,7 +120,7 @@ def main():
         locked = ", ".join(f'"{joint}" = 0.0' for joint in arms.ROBOTS[given.robot].locked)
         config = f"[model]\nlocked = {{ {locked} }}\n"
         if given.apart:
-            config += '[log]\ntopic = ["/motion", "/torque"]\n'
+            config += '[[log]]\ntopic = ["/motion", "/torque"]\n'
         if given.families:
             config += f"[library]\nfamilies = {json.dumps(given.families.split(','))}\n"
         (folder / "twincal.toml").write_text(config)

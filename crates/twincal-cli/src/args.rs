@@ -42,16 +42,17 @@ Examples:
 Examples:
   twincal doctor run.csv --model arm.urdf
   twincal doctor run1.csv run2.csv --model arm.urdf --json
+  twincal doctor run.csv --model arm.urdf --trial   tries the fit as well
   twincal init run.csv --model arm.urdf      writes the proposed twincal.toml
 ",
-        after_help = "The exit code is what `twincal fit` would end with for the same reason."
+        after_help = "The exit code is what `twincal fit` would end with for the same reason. What only a\nfit can tell (too few independent rows) is found with --trial."
     )]
     Doctor(Doctor),
     /// Write the twincal.toml that `doctor` proposes.
     #[command(before_help = "\
 Examples:
   twincal init run*.csv --model arm.urdf
-  twincal fit --config twincal.toml
+  twincal fit                                reads ./twincal.toml
 ")]
     Init(Init),
     /// Discover what the model misses, estimate it, validate on held-out data.
@@ -63,11 +64,18 @@ Examples:
 ")]
     Fit(Fit),
     /// Score a twin on new logs: exit code 0, or 1 where a gate says no.
-    #[command(before_help = "\
+    #[command(
+        before_help = "\
 Examples:
   twincal check today.csv --twin twincal-out
   twincal check today.csv --twin twincal-out --config gates.toml --json
-")]
+",
+        after_help = "\
+Gates of each joint: RMSE at most 1.2 times the twin's own, at least 90 % of rows
+in 95 % intervals ([check] of twincal.toml). Changes: friction of each joint, a
+payload, joint zeros; an unchanged robot fails these with probability 1 % at most.
+Exit code 3: the logs are too short to tell (fewer than 10 independent rows)."
+    )]
     Check(Check),
     /// Torque with 95 % intervals, row by row.
     #[command(before_help = "\
@@ -109,7 +117,7 @@ impl Command {
         match self {
             Self::Demo(flags) => flags.json,
             Self::Inspect(flags) => flags.log.json,
-            Self::Doctor(flags) => flags.log.json,
+            Self::Doctor(flags) => flags.look.log.json,
             Self::Fit(flags) => flags.log.json,
             Self::Check(flags) => flags.log.json,
             Self::Predict(flags) => flags.log.json,
@@ -124,7 +132,8 @@ impl Command {
 /// Flags of every command that reads logs.
 #[derive(Debug, Args)]
 pub(crate) struct LogFlags {
-    /// Settings; a flag overrides its key.
+    /// Settings; a flag overrides its key. fit, doctor and inspect read
+    /// ./twincal.toml where there is one.
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
     /// Sampling rate in Hz that replaces missing or wrong time stamps.
@@ -177,7 +186,7 @@ pub(crate) struct Demo {
 pub(crate) struct Inspect {
     /// Logs (CSV, Parquet, Arrow, NPZ, MCAP, rosbag2); without --model the first
     /// path is the model.
-    #[arg(value_name = "PATH", required_unless_present = "model")]
+    #[arg(value_name = "PATH")]
     pub(crate) paths: Vec<PathBuf>,
     /// Robot model (URDF, MJCF).
     #[arg(long, value_name = "MODEL")]
@@ -185,6 +194,9 @@ pub(crate) struct Inspect {
     /// Accept with a warning what would be refused.
     #[arg(long, value_name = "WHAT", value_enum)]
     pub(crate) allow: Vec<AllowModel>,
+    /// Leave out ./twincal.toml.
+    #[arg(long, conflicts_with = "config")]
+    pub(crate) no_config: bool,
     #[command(flatten)]
     pub(crate) log: LogFlags,
 }
@@ -195,7 +207,7 @@ pub(crate) struct Inspect {
     rustdoc::broken_intra_doc_links,
     reason = "[[log]] is a table of twincal.toml, and this text is printed as help"
 )]
-pub(crate) struct Doctor {
+pub(crate) struct Look {
     /// Logs to look at (CSV, Parquet, Arrow, NPZ, MCAP, rosbag2) [default: those of [[log]] in the config].
     #[arg(value_name = "LOG")]
     pub(crate) logs: Vec<PathBuf>,
@@ -205,14 +217,26 @@ pub(crate) struct Doctor {
     /// Accept with a warning what would be refused.
     #[arg(long, value_name = "WHAT", value_enum)]
     pub(crate) allow: Vec<AllowModel>,
+    /// Leave out ./twincal.toml.
+    #[arg(long, conflicts_with = "config")]
+    pub(crate) no_config: bool,
     #[command(flatten)]
     pub(crate) log: LogFlags,
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct Doctor {
+    #[command(flatten)]
+    pub(crate) look: Look,
+    /// Try the fit as well; it takes as long as `fit`.
+    #[arg(long)]
+    pub(crate) trial: bool,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct Init {
     #[command(flatten)]
-    pub(crate) look: Doctor,
+    pub(crate) look: Look,
     /// File to write [default: twincal.toml].
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
@@ -262,6 +286,9 @@ pub(crate) struct Fit {
     /// Accept with a warning what would be refused.
     #[arg(long, value_name = "WHAT", value_enum)]
     pub(crate) allow: Vec<Allow>,
+    /// Leave out ./twincal.toml.
+    #[arg(long, conflicts_with = "config")]
+    pub(crate) no_config: bool,
     #[command(flatten)]
     pub(crate) log: LogFlags,
 }

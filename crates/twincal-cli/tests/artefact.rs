@@ -151,7 +151,7 @@ fn case_100_existing_output_needs_force_and_foreign_files_are_kept() {
         ["predict", "run.csv", "--twin", "twin", "-o", "run.csv"],
     )
     .expect(2)
-    .says(&["run.csv is read by this command"]);
+    .says(&["run.csv: is read by this command"]);
     fs::write(folder.path().join("p.csv"), "mine").unwrap();
     run(
         folder.path(),
@@ -161,16 +161,26 @@ fn case_100_existing_output_needs_force_and_foreign_files_are_kept() {
     .says(&["exists already"]);
 }
 
+/// Starts a fit of a long log as `$first`, and goes on once it has locked its output.
+const FIRST: &str = "\"$TWINCAL\" fit long.csv --model arm.urdf --config quick.toml -o out & first=$!; \
+                     until compgen -G '.twincal-*.lock' >/dev/null; do :; done; ";
+
+fn with_long_log() -> tempfile::TempDir {
+    let folder = folder();
+    let long = common::csv(100_000, &|_, row| row);
+    fs::write(folder.path().join("long.csv"), long).unwrap();
+    folder
+}
+
 #[test]
 fn case_101_second_run_on_the_same_output_is_refused() {
-    let folder = folder();
-    // The first run waits for a log that comes through a pipe; the second must not wait for it.
-    let line = "mkfifo slow.csv; exec 9<>slow.csv; \
-                \"$TWINCAL\" fit slow.csv --model arm.urdf --config quick.toml -o out 2>first.txt & first=$!; \
-                until grep -q 'reading slow.csv' first.txt 2>/dev/null; do sleep 0.02; done; \
-                \"$TWINCAL\" fit run.csv --model arm.urdf --config quick.toml -o out; code=$?; \
-                kill -9 $first; exit $code";
-    shell(folder.path(), line)
+    let folder = with_long_log();
+    let line = format!(
+        "{FIRST} kill -STOP $first; \
+         \"$TWINCAL\" fit run.csv --model arm.urdf --config quick.toml -o out; code=$?; \
+         kill -9 $first; exit $code"
+    );
+    shell(folder.path(), &line)
         .expect(2)
         .says(&["out: another twincal is writing to it"]);
     // The lock of a killed run locks nothing.
@@ -180,12 +190,9 @@ fn case_101_second_run_on_the_same_output_is_refused() {
 
 #[test]
 fn case_102_interrupt_ends_at_once_with_130() {
-    let line = "mkfifo slow.csv; exec 9<>slow.csv; \
-                \"$TWINCAL\" fit slow.csv --model arm.urdf --config quick.toml -o out 2>first.txt & first=$!; \
-                until grep -q 'reading slow.csv' first.txt 2>/dev/null; do sleep 0.02; done; \
-                kill -INT $first; wait $first";
     // A shell starts background jobs with SIGINT ignored; `set -m` gives them their own reaction.
-    shell(folder().path(), &format!("set -m; {line}")).expect(130);
+    let line = format!("set -m; {FIRST} kill -INT $first; wait $first");
+    shell(with_long_log().path(), &line).expect(130);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Files in, files and reports out: robot models, logs, settings, results. No mathematics here.
 
 pub mod error;
+pub mod open;
 pub mod model;
 pub mod memory;
 pub mod config;

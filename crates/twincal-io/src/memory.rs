@@ -1,6 +1,7 @@
 //! How much memory may be used: asked before anything large is allocated, so that a limit ends in a message.
 
 use crate::error::{Error, Place, Result};
+use crate::open::system_text;
 use rustix::process::{Resource, getrlimit};
 
 /// What inference, threads and the allocator take besides what is counted, bytes.
@@ -69,21 +70,15 @@ pub fn require(subject: &str, bytes: u64, remedy: &str) -> Result<()> {
 
 /// Field of `/proc/self/statm`, in bytes (pages × page size); field 0 is the size of the address space.
 fn statm_field(field: usize) -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/self/statm").ok()?;
+    let text = system_text("/proc/self/statm")?;
     let pages: u64 = text.split_whitespace().nth(field)?.parse().ok()?;
     Some(pages * rustix::param::page_size() as u64)
 }
 
 /// Limit minus use of the tightest control group (version 2, or the memory controller of version 1).
 fn cgroup_headroom() -> Option<u64> {
-    let groups = std::fs::read_to_string("/proc/self/cgroup").ok()?;
-    let number = |path: &str| {
-        std::fs::read_to_string(path)
-            .ok()?
-            .trim()
-            .parse::<u64>()
-            .ok()
-    };
+    let groups = system_text("/proc/self/cgroup")?;
+    let number = |path: &str| system_text(path)?.trim().parse::<u64>().ok();
     let mut tightest = None;
     for line in groups.lines() {
         let mut parts = line.splitn(3, ':').skip(1);
@@ -117,7 +112,7 @@ fn cgroup_headroom() -> Option<u64> {
 
 /// Cached file pages of a control group: they count as used and are given back on demand, bytes.
 fn file_cache(group: &str) -> u64 {
-    let text = std::fs::read_to_string(format!("{group}/memory.stat")).unwrap_or_default();
+    let text = system_text(&format!("{group}/memory.stat")).unwrap_or_default();
     let value = |key: String| -> Option<u64> {
         let field = text
             .lines()
@@ -132,7 +127,7 @@ fn file_cache(group: &str) -> u64 {
 
 /// `MemAvailable`, bytes.
 fn machine_free() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let text = system_text("/proc/meminfo")?;
     let line = text
         .lines()
         .find(|line| line.starts_with("MemAvailable:"))?;

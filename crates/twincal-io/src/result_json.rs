@@ -4,6 +4,7 @@
 //! seed give the same bytes. Numbers are the shortest that read back the same; what is not a number is `null`.
 
 use crate::error::{Error, Result};
+use crate::report::ReportContext;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use twincal::Finding;
@@ -11,6 +12,7 @@ use twincal::calibrate::{
     Calibration, CompactTerm, ComponentSummary, Curve, Group, Halves, LikelihoodUsed, LogSummary,
     Repeat, SweepPoint, TermSummary, Verdict,
 };
+use twincal::lag::Lags;
 use twincal::likelihood::JointNoise;
 use twincal::posterior::Method;
 use twincal::prior::Inclusion;
@@ -21,17 +23,17 @@ use twincal::validate::{Conformal, JointScore, Loss, Pit, Reliability, Scores, S
 /// Version of this layout.
 pub const SCHEMA: u64 = 1;
 
-/// The text of `result.json`; `model` is the model's file name, `seed` that of all random numbers.
+/// The text of `result.json`; `context` has names of model and config and the seed of all random numbers.
 ///
 /// # Errors
 /// [`Error::Internal`] if the values cannot be written.
-pub fn result_json(calibration: &Calibration, model: &str, seed: u64) -> Result<String> {
+pub fn result_json(calibration: &Calibration, context: &ReportContext) -> Result<String> {
     let internal = |e: serde_json::Error| Error::Internal {
         what: crate::artifact::RESULT.into(),
         problem: e.to_string(),
     };
-    let mut text = serde_json::to_string_pretty(&ResultFile::of(calibration, model, seed))
-        .map_err(internal)?;
+    let mut text =
+        serde_json::to_string_pretty(&ResultFile::of(calibration, context)).map_err(internal)?;
     text.push('\n');
     Ok(text)
 }
@@ -41,6 +43,7 @@ struct ResultFile<'a> {
     schema: u64,
     twincal: &'static str,
     model: &'a str,
+    config: Option<ConfigRow<'a>>,
     components: &'a [ComponentSummary],
     terms: Vec<TermRow<'a>>,
     groups: &'a [Group],
@@ -56,7 +59,15 @@ struct ResultFile<'a> {
     repeatability: &'a [Repeat],
     curves: &'a [Curve],
     logs: &'a [LogSummary],
+    lags: Option<&'a Lags>,
     findings: &'a [Finding],
+}
+
+/// The config that was read: path as given, without the folders of an absolute one.
+#[derive(Serialize)]
+struct ConfigRow<'a> {
+    path: &'a str,
+    sha256: &'a str,
 }
 
 #[derive(Serialize)]
@@ -206,11 +217,15 @@ struct ScoresRow<'a> {
 }
 
 impl<'a> ResultFile<'a> {
-    fn of(calibration: &'a Calibration, model: &'a str, seed: u64) -> Self {
+    fn of(calibration: &'a Calibration, context: &'a ReportContext) -> Self {
         Self {
             schema: SCHEMA,
             twincal: env!("CARGO_PKG_VERSION"),
-            model,
+            model: &context.model,
+            config: context.config.as_ref().map(|config| ConfigRow {
+                path: &config.name,
+                sha256: &config.sha256,
+            }),
             components: &calibration.components,
             terms: calibration.terms.iter().map(TermRow::of).collect(),
             groups: &calibration.groups,
@@ -226,13 +241,14 @@ impl<'a> ResultFile<'a> {
                 },
                 cutoff_sweep: &calibration.sweep,
             },
-            inference: InferenceRow::of(&calibration.twin.posterior.method, seed),
+            inference: InferenceRow::of(&calibration.twin.posterior.method, context.seed),
             validation: ValidationRow::of(&calibration.validation),
             compact: CompactRow::of(calibration),
             repeatability_halves: calibration.halves,
             repeatability: &calibration.repeatability,
             curves: &calibration.curves,
             logs: &calibration.logs,
+            lags: calibration.lags.as_ref(),
             findings: &calibration.findings,
         }
     }

@@ -4,6 +4,7 @@ mod mcap;
 
 use self::mcap::McapTable;
 use crate::error::{Error, Result};
+use crate::log::stamps;
 use parquet::basic::{Compression, Repetition, Type as Physical, ZstdLevel};
 use parquet::data_type::{BoolType, DoubleType};
 use parquet::errors::ParquetError;
@@ -63,6 +64,8 @@ pub enum ColumnKind {
 pub enum Values<'a> {
     /// For [`ColumnKind::Number`].
     Numbers(&'a [f64]),
+    /// For [`ColumnKind::Number`]: times in s from a stamp in ns on. CSV and MCAP hold every nanosecond, Parquet the nearest double.
+    Stamps(i64, &'a [f64]),
     /// For [`ColumnKind::Flag`].
     Flags(&'a [bool]),
 }
@@ -70,7 +73,7 @@ pub enum Values<'a> {
 impl Values<'_> {
     fn len(&self) -> usize {
         match self {
-            Self::Numbers(v) => v.len(),
+            Self::Numbers(v) | Self::Stamps(_, v) => v.len(),
             Self::Flags(v) => v.len(),
         }
     }
@@ -196,6 +199,12 @@ impl<W: Write + Send> TableWriter<W> {
                 for (column, values) in waiting.iter_mut().zip(blocks) {
                     match (column, values) {
                         (Column::Numbers(all), Values::Numbers(new)) => all.extend_from_slice(new),
+                        (Column::Numbers(all), Values::Stamps(start, new)) => {
+                            all.extend(
+                                new.iter()
+                                    .map(|s| stamps::seconds(stamps::of_seconds(*start, *s))),
+                            );
+                        }
                         (Column::Flags(all), Values::Flags(new)) => all.extend_from_slice(new),
                         _ => {}
                     }
@@ -306,6 +315,10 @@ fn csv_line(line: &mut String, blocks: &[Values<'_>], row: usize) {
                 } else {
                     write!(line, "{}", v[row])
                 }
+            }
+            Values::Stamps(start, v) => {
+                let stamp = stamps::of_seconds(*start, v[row]);
+                write!(line, "{}", stamps::digits(stamp))
             }
             Values::Flags(v) => write!(line, "{}", v[row]),
         };

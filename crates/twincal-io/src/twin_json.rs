@@ -49,7 +49,7 @@ impl StoredTwin {
     /// # Errors
     /// [`Error::Internal`] if the values cannot be written.
     pub fn result_json(&self) -> Result<String> {
-        result_json(&self.calibration, &self.context.model, self.context.seed)
+        result_json(&self.calibration, &self.context)
     }
 
     /// Writes the whole artefact with result, report, twin, log and `more` files.

@@ -201,3 +201,25 @@ fn real_logs_read_as_pyarrow_reads_them() {
         -0.3594208816320139
     );
 }
+
+/// Files of pyarrow: `tests/fixtures/parquet/make_parquet.py` wrote the same numbers as half floats, decimals of 5, 15 and 38 digits,
+/// and doubles.
+#[test]
+fn half_floats_and_decimals_are_numbers() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/parquet");
+    let read = |name: &str| {
+        let path = Path::new(folder).join(name);
+        let mut recording = read_log(&path, &arm(), &LogOptions::default()).unwrap().0;
+        recording.name = "run".into();
+        recording
+    };
+    let expected = read("doubles.parquet");
+    assert_eq!(expected.joints[1].q[3], -1.375);
+    let found = read("short.parquet");
+    assert_eq!(found.time, expected.time);
+    for (found, expected) in found.joints.iter().zip(&expected.joints) {
+        assert_eq!(found.q[1..], expected.q[1..]);
+        assert!(found.q[0].is_nan(), "a null");
+        assert_eq!(found.tau, expected.tau);
+    }
+}

@@ -302,6 +302,30 @@ fn case_51_an_entry_that_grows_without_measure_is_refused() {
     );
 }
 
+/// A changed number in an array, also in its last block, and a changed name: the CRC is compared at the end of an entry.
+#[test]
+fn a_changed_byte_in_an_array_is_refused() {
+    let table: Vec<f64> = (0..20_000).map(f64::from).collect();
+    let time: Vec<f64> = (0..10_000).map(|k| f64::from(k) / 100.0).collect();
+    let entries = [
+        ("t", doubles("(10000,)", &time)),
+        ("q", doubles("(10000, 2)", &table)),
+        ("tau", doubles("(10000, 2)", &table)),
+    ];
+    let whole = zipped(&entries, CompressionMethod::Stored);
+    assert!(read_npz(whole.clone(), &LogOptions::default()).is_ok());
+    for value in [12_345.0_f64, 19_999.0] {
+        let mut changed = whole.clone();
+        let bytes = value.to_le_bytes();
+        let at = changed.windows(8).position(|eight| eight == bytes).unwrap();
+        changed[at + 5] ^= 0x10;
+        contains(
+            &refused(read_npz(changed, &LogOptions::default())),
+            &["array `q` is damaged", "checksum", "write it again"],
+        );
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 

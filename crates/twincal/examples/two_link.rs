@@ -61,6 +61,7 @@ pub(crate) fn log(name: &str, phase: f64, real: &Robot, noise: &mut Random) -> R
     let (name, joints) = (name.into(), joints.to_vec());
     Recording {
         unfolded: false,
+        start_ns: 0,
         name,
         time,
         joints,

@@ -1,5 +1,9 @@
 //! What can go wrong (`Error`: cannot go on) and what must be said (`Finding`: go on, but say so).
 
+mod mistake;
+
+pub use mistake::Mistake;
+
 use serde::{Deserialize, Serialize};
 
 /// `Result` with this crate's [`Error`].
@@ -99,21 +103,6 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// Codes of findings after which log and model are not believed to speak of the same robot.
-    const NOT_THIS_ROBOT: [&str; 4] = [
-        "sign_flip",
-        "joint_order",
-        "torque_scale",
-        "velocity_opposite",
-    ];
-
-    /// True if it says that log and model hardly speak of the same robot: turned signs, exchanged joints, torque of another scale. What
-    /// is fitted all the same explains the mistake, with high probability and small errors.
-    #[must_use]
-    pub fn doubts_the_log(&self) -> bool {
-        Self::NOT_THIS_ROBOT.contains(&self.code.as_str())
-    }
-
     /// A finding of the given severity about `subject`, counting `count` items.
     pub fn new(
         severity: Severity,

@@ -16,6 +16,7 @@ pub mod diagnostics;
 pub mod robot;
 pub mod signal;
 pub mod self_check;
+mod rigid_fit;
 pub mod lag;
 pub mod incidents;
 pub mod term;
@@ -31,8 +32,9 @@ pub mod plug_in;
 pub mod twin;
 pub mod compare;
 pub mod validate;
+pub mod cross_check;
 pub mod calibrate;
 pub mod evaluator;
 pub mod write_back;
 
-pub use error::{Error, Finding, Result, Severity};
+pub use error::{Error, Finding, Mistake, Result, Severity};

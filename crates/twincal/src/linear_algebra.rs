@@ -1,6 +1,7 @@
 //! Dense linear algebra: the one module that knows the linear-algebra crate (faer). Slices in, slices out, row-major.
 
-use faer::{MatRef, Side};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef, Par, Side};
 
 /// aᵀb in eight running sums, which the compiler keeps in vectors.
 #[must_use]
@@ -14,6 +15,32 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
         }
     }
     sums.iter().sum::<f64>() + a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>()
+}
+
+/// `A B`, row-major: A has `rows × inner` numbers, B `inner × columns`.
+pub(crate) fn product(a: &[f64], b: &[f64], [rows, inner, columns]: [usize; 3]) -> Vec<f64> {
+    multiplied(a, MatRef::from_row_major_slice(b, inner, columns), rows)
+}
+
+/// `A Bᵀ`, row-major: A has `rows × inner` numbers, B `columns × inner`.
+pub(crate) fn product_transposed(
+    a: &[f64],
+    b: &[f64],
+    [rows, inner, columns]: [usize; 3],
+) -> Vec<f64> {
+    let right = MatRef::from_row_major_slice(b, columns, inner);
+    multiplied(a, right.transpose(), rows)
+}
+
+fn multiplied(a: &[f64], right: MatRef<'_, f64>, rows: usize) -> Vec<f64> {
+    let (inner, columns) = (right.nrows(), right.ncols());
+    let mut out = vec![0.0; rows * columns];
+    if inner > 0 && !out.is_empty() {
+        let to = MatMut::from_row_major_slice_mut(&mut out, rows, columns);
+        let left = MatRef::from_row_major_slice(a, rows, inner);
+        matmul(to, Accum::Replace, left, right, 1.0, Par::Seq);
+    }
+    out
 }
 
 /// A symmetric matrix has no Cholesky factor: the first pivot that is not a positive number.
@@ -232,6 +259,21 @@ mod tests {
         bad[0] = f64::NAN;
         assert_eq!(Cholesky::new(&bad, 3).unwrap_err().pivot, 0);
         assert!(Cholesky::new(&[], 0).unwrap().lower().is_empty());
+    }
+
+    #[test]
+    fn products_are_their_definitions() {
+        let (a, b) = (
+            [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+            [7.0, 8.0, 9.0, 10.0, 11.0, 12.0],
+        );
+        assert_eq!(product(&a, &b, [2, 3, 2]), [58.0, 64.0, 139.0, 154.0]);
+        assert_eq!(
+            product_transposed(&a, &b, [2, 3, 2]),
+            [50.0, 68.0, 122.0, 167.0]
+        );
+        assert!(product(&[], &b, [0, 3, 2]).is_empty());
+        assert_eq!(product(&[], &[], [1, 0, 2]), [0.0; 2]);
     }
 
     #[test]

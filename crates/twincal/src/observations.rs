@@ -4,8 +4,10 @@ mod blocks;
 mod columns;
 mod room;
 mod products;
+mod sum;
 
 pub(crate) use room::Room;
+pub(crate) use sum::GramSum;
 
 use crate::error::Result;
 use crate::gram::{Gram, JointAccumulator, Workspace};
@@ -319,20 +321,22 @@ impl Observations {
 impl Part<'_> {
     /// Sufficient statistics of these rows; standstill rows are left out and end a run.
     pub fn gram(&self) -> Gram {
-        let joints = (0..self.observations.joints.len())
-            .into_par_iter()
-            .map(|joint| self.joint_gram(joint))
-            .collect();
-        Gram { joints }
+        [self].into_iter().collect()
     }
 
-    fn joint_gram(&self, joint: usize) -> crate::gram::JointGram {
-        let (all, rows) = (self.observations, &self.observations.joints[joint]);
+    /// Sums of the kind that [`Part::add_joint`] adds to.
+    fn accumulator(&self, joint: usize) -> JointAccumulator {
+        let rows = &self.observations.joints[joint];
         let columns: Vec<u32> = rows.columns.iter().map(|&c| c as u32).collect();
-        let mut accumulator = match &rows.recipes {
+        match &rows.recipes {
             Some(recipes) => JointAccumulator::of_parts(columns, recipes),
             None => JointAccumulator::new(columns),
-        };
+        }
+    }
+
+    /// Adds these rows of a joint, as runs of their own.
+    fn add_joint(&self, joint: usize, accumulator: &mut JointAccumulator) {
+        let (all, rows) = (self.observations, &self.observations.joints[joint]);
         let signals = rows.signals();
         let mut workspace = Workspace::default();
         let keep: Vec<bool> = rows.standstill.iter().map(|still| !still).collect();
@@ -359,7 +363,6 @@ impl Part<'_> {
                 accumulator.push_block(&x, count, &y, keep, first, &mut workspace);
             });
         }
-        accumulator.finish()
     }
 
     /// The part's rows split at the starts of segments.
@@ -426,22 +429,53 @@ impl Part<'_> {
 
     /// `xᵀ C x` of every row of a joint; C: `covariance[a * count + b]` of columns a and b out of `count`.
     pub fn quadratic_forms(&self, joint: usize, covariance: &[f64], count: usize) -> Vec<f64> {
-        let (len, rows) = (self.observations.len(), &self.observations.joints[joint]);
+        self.forms(joint, &self.quadratic_form(joint, covariance, count))
+    }
+
+    /// What [`Part::forms`] takes, for all parts whose columns are made alike.
+    pub(crate) fn quadratic_form(
+        &self,
+        joint: usize,
+        covariance: &[f64],
+        count: usize,
+    ) -> QuadraticForm {
+        let rows = &self.observations.joints[joint];
         let columns = || rows.columns.iter();
-        let mut own: Vec<f64> = columns()
+        let mut matrix: Vec<f64> = columns()
             .flat_map(|a| columns().map(move |b| covariance[a * count + b]))
             .collect();
         if let Some(recipes) = &rows.recipes {
-            own = recipes.to_parts(&own);
+            matrix = recipes.to_parts(&matrix);
         }
+        QuadraticForm {
+            recipes: rows.recipes.clone(),
+            matrix,
+        }
+    }
+
+    /// Whether a form is that of these columns, too.
+    pub(crate) fn has_form(&self, joint: usize, form: &QuadraticForm) -> bool {
+        self.observations.joints[joint].recipes == form.recipes
+    }
+
+    /// `xᵀ C x` of every row of a joint.
+    pub(crate) fn forms(&self, joint: usize, form: &QuadraticForm) -> Vec<f64> {
+        let (len, rows) = (self.observations.len(), &self.observations.joints[joint]);
         let mut forms = vec![0.0; self.rows.len()];
         let first = self.rows.start;
         rows.visit_signals(len, self.rows.clone(), &mut |piece, columns| {
             let forms = &mut forms[piece.start - first..piece.end - first];
-            products::quadratic(columns, &own, forms);
+            products::quadratic(columns, &form.matrix, forms);
         });
         forms
     }
+}
+
+/// A quadratic form of a joint's columns as one of what they are made of.
+#[derive(Debug)]
+pub(crate) struct QuadraticForm {
+    recipes: Option<Arc<Recipes>>,
+    matrix: Vec<f64>,
 }
 
 impl JointObservations {

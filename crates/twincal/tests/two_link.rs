@@ -194,11 +194,10 @@ fn a_twin_from_json_predicts_the_same_bytes_and_scores_like_the_calibration() {
         let mut scores = HeldOut::new(twin.robot.joint_names());
         scores
             .score(
-                twin,
-                &library,
-                &predictor,
+                (twin, &library, &predictor),
                 &Log::from(&heldout),
                 &mut Vec::new(),
+                &mut |_| Ok(()),
             )
             .expect("scores");
         scores.finish(Split::HeldoutLogs)

@@ -98,6 +98,7 @@ fn log(dof: usize, sd: f64) -> Recording {
         .collect();
     Recording {
         unfolded: false,
+        start_ns: 0,
         name: "encoder".into(),
         time,
         joints,

@@ -70,16 +70,9 @@ impl<'a> AsFitted<'a> {
         let Some(read_as) = &self.stored.read_as else {
             return long.read(path, robot, &options);
         };
-        // What is wrong with a header is said when the log is read. A pipe can be opened once.
-        let header = if path.is_file() {
-            read_header(path).ok().flatten()
-        } else {
-            None
-        };
-        let mut attempts = read_as.attempts(&options, header.as_deref(), &robot.joint_names());
-        if !path.is_file() && !path.is_dir() {
-            attempts.truncate(1);
-        }
+        // What is wrong with a file or its header is said when the log is read.
+        let header = read_header(path).ok().flatten();
+        let attempts = read_as.attempts(&options, header.as_deref(), &robot.joint_names());
         let (mut refusal, mut kept_names) = (None, false);
         for attempt in attempts {
             match long.read(path, robot, &attempt.options) {

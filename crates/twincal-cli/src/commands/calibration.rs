@@ -13,7 +13,8 @@ use twincal::calibrate::{Calibration, CalibrationSettings, Stage, Stopped, calib
 use twincal_io::artifact::{Claim, Maker, REPORT};
 use twincal_io::config::{Config, ReadAs, Settings};
 use twincal_io::memory;
-use twincal_io::report::ReportContext;
+use twincal_io::open::system_text;
+use twincal_io::report::{FileHash, ReportContext};
 use twincal_io::twin_json::StoredTwin;
 
 /// One calibration, ready to run.
@@ -103,6 +104,10 @@ impl Job<'_> {
             command: self.command.clone(),
             settings: self.config.in_force(),
             seed: self.settings.calibration.inference.seed,
+            config: self.config.read_from().map(|(path, sha256)| FileHash {
+                name: display_names(&[path]).remove(0),
+                sha256,
+            }),
             files: std::iter::once(&self.robot.file)
                 .chain(logs)
                 .cloned()
@@ -117,7 +122,7 @@ impl Job<'_> {
             .collect();
         let folder = std::env::current_dir()
             .map_or_else(|e| e.to_string(), |d| d.to_string_lossy().into_owned());
-        let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+        let host = system_text("/proc/sys/kernel/hostname").unwrap_or_default();
         let mut text = format!(
             "twincal {}\nfinished {}\nseconds {:.3}\nthreads {}\nhost {}\nfolder {folder}\ncommand {}\n",
             env!("CARGO_PKG_VERSION"),

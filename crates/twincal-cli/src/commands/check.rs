@@ -1,20 +1,25 @@
-//! `twincal check`: scores of a twin on new logs against its gates.
+//! `twincal check`: scores of a twin on new logs against its gates, and what they say of a change.
+
+mod changes;
+mod gates;
 
 use super::inputs::LogInput;
 use super::summary::{Notes, findings, paragraph, percent};
 use super::table::{print_table, table};
 use super::{code_of, print_json, require_strict, settings, start_threads};
 use crate::args::Check;
-use crate::failure::{GATE, Outcome};
+use crate::failure::{DEGRADED, GATE, Outcome};
 use crate::progress::Progress;
 use crate::terminal::{Terminal, clean};
+use gates::{ALL, ENOUGH, Gate, Own, judge};
 use serde::Serialize;
 use twincal::twin::Twin;
-use twincal::validate::{HeldOut, Scores, Split, Validation};
-use twincal::words::significant;
+use twincal::validate::{
+    Change, Changes, FALSE_ALARM, HeldOut, Scores, Split, Validation, least_share,
+};
+use twincal::words::{listed, significant};
 use twincal::{Finding, Result, Severity};
 use twincal_io::artifact::Artifact;
-use twincal_io::config::Gates;
 use twincal_io::report::FileHash;
 use twincal_io::twin_json::StoredTwin;
 
@@ -22,8 +27,12 @@ use twincal_io::twin_json::StoredTwin;
 #[derive(Serialize)]
 struct Checked {
     schema: u64,
+    verdict: Verdict,
+    /// The verdict is `passed`.
     passed: bool,
     gates: Vec<Gate>,
+    /// What may have changed, with numbers.
+    changes: Vec<Change>,
     signal: &'static str,
     #[serde(flatten)]
     filtered: Scores,
@@ -32,19 +41,6 @@ struct Checked {
     beyond: Scores,
     raw: Scores,
     findings: Vec<Finding>,
-}
-
-/// One gate of one joint.
-#[derive(Serialize)]
-struct Gate {
-    /// `moving`, or `all` where the joint does not move, here or in the twin's own scores.
-    rows: &'static str,
-    joint: String,
-    gate: &'static str,
-    passed: bool,
-    value: f64,
-    limit: [Option<f64>; 2],
-    words: String,
 }
 
 pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
@@ -58,18 +54,22 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     let mut logs = LogInput::for_twin(&flags.logs, &stored, settings.log.clone(), &progress)?;
     progress.step("predicting the logs");
     let mut found = std::mem::take(&mut logs.findings);
-    let validation = score(twin, &logs, &mut found).map_err(|error| logs.as_given(error))?;
-    drop(progress);
-    require_strict(settings.log.strict, &found)?;
     // A gate that the config does not give stays as the twin was fitted with.
     let gates = config.gates_over(stored.gates)?;
+    let least = least_share(gates.rmse_ratio);
+    let scored = score(&stored, &logs, least, &mut found);
+    let (validation, changes) = scored.map_err(|error| logs.as_given(error))?;
+    drop(progress);
+    require_strict(settings.log.strict, &found)?;
     let known = known_logs(&logs.files, &stored);
     let fitted = known.iter().filter(|finding| finding.code == FITTED);
     let fitted = fitted.count() == logs.files.len();
-    let gates = judge(&validation, &stored.calibration.validation, &gates, fitted);
+    let own = Own::of(&stored, gates, fitted);
+    let mut gates = judge(&validation, &own);
+    gates.extend(changes::gates(&changes, least));
     found.splice(0..0, known.iter().cloned());
-    let passed = gates.iter().all(|gate| gate.passed);
-    let code = if passed { code_of(&found) } else { GATE };
+    let verdict = Verdict::of(&gates);
+    let code = verdict.code(&found);
     if settings.json {
         let Validation {
             filtered,
@@ -81,8 +81,10 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
         } = validation;
         let checked = Checked {
             schema: 1,
-            passed,
+            verdict,
+            passed: verdict == Verdict::Passed,
             gates,
+            changes,
             signal: "filtered",
             filtered,
             moving,
@@ -94,20 +96,94 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
         print_json(terminal, &checked)?;
         return Ok(code);
     }
-    terminal.heading(if passed { "passed" } else { "failed" });
-    for gate in gates.iter().filter(|gate| !gate.passed) {
-        paragraph(&gate.words, terminal);
+    terminal.heading(verdict.word());
+    match verdict {
+        Verdict::Inconclusive => paragraph(&too_short(&validation, twin), terminal),
+        _ => {
+            let failed = gates.iter().filter(|gate| !gate.passed);
+            failed.for_each(|gate| paragraph(&gate.words, terminal));
+        }
     }
     known
         .iter()
         .for_each(|finding| paragraph(&finding.message, terminal));
-    judged(&gates, &validation, terminal);
+    let (of_changes, of_joints): (Vec<Gate>, Vec<Gate>) =
+        gates.into_iter().partition(changes::is_change);
+    judged(&of_joints, &validation, terminal);
+    let tested = format!(
+        "Changes tested: {} (friction of each joint, payload, joint zeros). An unchanged robot fails with probability {} % at most.",
+        of_changes.len(),
+        100.0 * FALSE_ALARM
+    );
+    paragraph(&tested, terminal);
     if let Some(text) = beyond(&validation) {
         paragraph(&text, terminal);
     }
     terminal.say("");
     findings(&found, Notes::In("the output of --json"), terminal);
     Ok(code)
+}
+
+/// What all gates say together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Verdict {
+    Passed,
+    Failed,
+    /// Too few rows to say either.
+    Inconclusive,
+}
+
+impl Verdict {
+    /// A gate fails on rows that are enough; otherwise too few of them say nothing.
+    fn of(gates: &[Gate]) -> Self {
+        let fails = |gate: &&Gate| !gate.passed;
+        if gates.iter().filter(fails).any(|gate| gate.enough) {
+            Self::Failed
+        } else if gates.iter().any(|gate| fails(&gate)) || !gates.iter().any(|gate| gate.enough) {
+            Self::Inconclusive
+        } else {
+            Self::Passed
+        }
+    }
+
+    fn code(self, findings: &[Finding]) -> u8 {
+        match self {
+            Self::Passed => code_of(findings),
+            Self::Failed => GATE,
+            Self::Inconclusive => DEGRADED,
+        }
+    }
+
+    fn word(self) -> &'static str {
+        match self {
+            Self::Passed => "passed",
+            Self::Failed => "failed",
+            Self::Inconclusive => "inconclusive",
+        }
+    }
+}
+
+/// Where rows are too few: how many there are, and what to record.
+fn too_short(validation: &Validation, twin: &Twin) -> String {
+    let rows = |joint: usize| validation.moving.joints[joint].rows as f64;
+    let counts = |joint: usize| rows(joint) / twin.noise[joint].memory();
+    let most = (0..twin.noise.len()).map(counts).fold(0.0, f64::max);
+    let pipeline = &twin.pipeline;
+    let (filter, rate) = (pipeline.kernel_length(), pipeline.rate_hz);
+    let memory = (twin.noise.iter())
+        .map(|noise| noise.memory())
+        .fold(f64::INFINITY, f64::min);
+    let least = match rate > 0.0 {
+        true => format!(
+            "at least {:.0} s of motion",
+            (filter + ENOUGH * memory / rate).ceil()
+        ),
+        false => "more motion".to_owned(),
+    };
+    format!(
+        "The rows in which joints move count as {most:.1} independent rows at most, {ENOUGH} are needed: these logs are too short to tell. Record {least}."
+    )
 }
 
 /// Code of logs that the twin was fitted to.
@@ -170,7 +246,7 @@ fn judged(gates: &[Gate], validation: &Validation, terminal: &mut Terminal) {
     if !still.is_empty() {
         let text = format!(
             "by all of their rows, as they do not move: {}",
-            still.join(", ")
+            listed(&still, ", ")
         );
         paragraph(&text, terminal);
     }
@@ -211,15 +287,6 @@ fn standstill<'a>(all: &'a Scores, moving: &Scores) -> Vec<(&'a str, u64, f64, f
     .collect()
 }
 
-/// Which rows the twin's own error was measured on.
-fn own_rows(split: &Split) -> &'static str {
-    match split {
-        Split::HeldoutLogs => "of the twin on its held-out logs",
-        Split::LeaveOneLogOut => "of the twin on its logs, each left out in turn",
-        Split::LastThirty => "of the twin on the last 30 % of each of its logs",
-    }
-}
-
 /// How much of the motion is new to the twin, and how it does there.
 fn beyond(validation: &Validation) -> Option<String> {
     let rows = |scores: &Scores| scores.joints.iter().map(|joint| joint.rows).sum::<u64>();
@@ -246,79 +313,25 @@ fn beyond(validation: &Validation) -> Option<String> {
     ))
 }
 
-/// Scores of all logs together.
-fn score(twin: &Twin, logs: &LogInput, findings: &mut Vec<Finding>) -> Result<Validation> {
+/// Scores of all logs together, and what they say of changes; `least`: share of the error from which on one matters.
+fn score(
+    stored: &StoredTwin,
+    logs: &LogInput,
+    least: f64,
+    findings: &mut Vec<Finding>,
+) -> Result<(Validation, Vec<Change>)> {
+    let twin = &stored.calibration.twin;
     let library = twin.library()?;
     let predictor = twin.predictor(&library)?;
     let mut scores = HeldOut::new(twin.robot.joint_names());
+    let own = stored.calibration.validation.moving.joints.iter();
+    let errors: Vec<f64> = own.map(|joint| joint.rmse_calibrated).collect();
+    let mut changes = Changes::new(twin, &library, &errors)?;
     for log in &logs.logs {
-        scores.score(twin, &library, &predictor, log, findings)?;
+        let each = (twin, &library, &predictor);
+        scores.score(each, log, findings, &mut |motion| changes.take(motion))?;
     }
-    Ok(scores.finish(Split::HeldoutLogs))
-}
-
-/// Rows of joints that move.
-const MOVING: &str = "moving";
-/// All rows.
-const ALL: &str = "all";
-
-/// Two gates per joint: on rows in which it moves, where there are some here and in the twin's own scores. What holds a joint at rest no
-/// friction tells, and how long it rests is another thing in every log.
-///
-/// Of rows that were `fitted` the gate is the same, but says nothing of a change: it is said so.
-fn judge(scores: &Validation, stored: &Validation, gates: &Gates, fitted: bool) -> Vec<Gate> {
-    let mut judged = Vec::new();
-    let own = own_rows(&stored.split);
-    let seen = "; the twin was fitted to such rows, so that this is no change of the robot: they are harder than those that the gate comes from";
-    let all = scores.filtered.joints.iter().zip(&stored.filtered.joints);
-    let moving = scores.moving.joints.iter().zip(&stored.moving.joints);
-    for (all, moving) in all.zip(moving) {
-        let ((joint, stored), rows, which) = match moving {
-            (joint, stored) if joint.rows > 0 && stored.rows > 0 => (moving, "moving rows", MOVING),
-            _ => (all, "rows", ALL),
-        };
-        let limit = gates.rmse_ratio * stored.rmse_calibrated;
-        let (rmse, name) = (joint.rmse_calibrated, &joint.joint);
-        judged.push(Gate {
-            rows: which,
-            joint: name.clone(),
-            gate: "rmse",
-            // Without rows, or without a stored score, nothing was shown: not a pass.
-            passed: rmse <= limit,
-            value: rmse,
-            limit: [None, Some(limit)],
-            words: format!(
-                "joint `{name}`: RMSE {} of {rows} is {} the gate {} ({} × {} {own}){}",
-                significant(rmse, 4),
-                if rmse <= limit { "within" } else { "above" },
-                significant(limit, 4),
-                gates.rmse_ratio,
-                significant(stored.rmse_calibrated, 4),
-                if fitted && rmse > limit { seen } else { "" }
-            ),
-        });
-        let [low, high] = gates.coverage;
-        let cautious = if joint.coverage95 > high {
-            ": wider than these rows need; where that does no harm, say [check] coverage with 1 at the top"
-        } else {
-            ""
-        };
-        judged.push(Gate {
-            rows: which,
-            joint: name.clone(),
-            gate: "coverage",
-            passed: low <= joint.coverage95 && joint.coverage95 <= high,
-            value: joint.coverage95,
-            limit: [Some(low), Some(high)],
-            words: format!(
-                "joint `{name}`: the 95 % interval holds {} of the {rows}, the gate is {} to {}{cautious}",
-                percent(joint.coverage95),
-                percent(low),
-                percent(high)
-            ),
-        });
-    }
-    judged
+    Ok((scores.finish(Split::HeldoutLogs), changes.finish(least)))
 }
 
 #[cfg(test)]
@@ -361,18 +374,6 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_joint_that_does_not_move_is_judged_by_all_of_its_rows() {
-        let mut still = scores(0.1, 0.95);
-        still.moving.joints[0].rows = 0;
-        let gates = Gates::default();
-        let judged = judge(&still, &scores(0.1, 0.95), &gates, false);
-        assert!(judged.iter().all(|gate| gate.rows == ALL));
-        let values: Vec<f64> = judged.iter().map(|gate| gate.value).collect();
-        assert_eq!(values, [9.0, 0.1]);
-        assert!(judged[1].words.contains("10.0 % of the rows"));
-    }
-
     /// 10 moving rows with squares of 1 and 30 at standstill with 9: 40 rows with a mean square of 7; 9 and 15 of them in the interval.
     #[test]
     fn standstill_is_what_is_left_of_all_rows() {
@@ -388,39 +389,5 @@ mod tests {
         assert_eq!((joint, rows), ("elbow", 30));
         assert!((rmse - 3.0).abs() < 1e-12 && (coverage - 0.5).abs() < 1e-12);
         assert!(standstill(&all, &all).is_empty());
-    }
-
-    #[test]
-    fn gates_stand_at_their_limits() {
-        let gates = Gates {
-            rmse_ratio: 1.2,
-            coverage: [0.9, 0.99],
-        };
-        let passed = |rmse, coverage| -> Vec<bool> {
-            judge(&scores(rmse, coverage), &scores(0.1, 0.95), &gates, false)
-                .iter()
-                .map(|gate| gate.passed)
-                .collect()
-        };
-        let words = |rmse, fitted| {
-            judge(&scores(rmse, 0.95), &scores(0.1, 0.95), &gates, fitted)
-                .swap_remove(0)
-                .words
-        };
-        assert_eq!(
-            words(0.1199, true),
-            "joint `elbow`: RMSE 0.1199 of moving rows is within the gate 0.1200 (1.2 × 0.1000 of the twin on its held-out logs)"
-        );
-        assert_eq!(
-            words(0.1201, false),
-            "joint `elbow`: RMSE 0.1201 of moving rows is above the gate 0.1200 (1.2 × 0.1000 of the twin on its held-out logs)"
-        );
-        assert!(words(0.1201, true).contains("no change of the robot"));
-        assert_eq!(passed(0.1199, 0.95), [true, true]);
-        assert_eq!(passed(0.1201, 0.95), [false, true]);
-        assert_eq!(passed(0.1, 0.90), [true, true]);
-        assert_eq!(passed(0.1, 0.899), [true, false]);
-        assert_eq!(passed(0.1, 0.991), [true, false]);
-        assert_eq!(passed(f64::NAN, f64::NAN), [false, false]);
     }
 }

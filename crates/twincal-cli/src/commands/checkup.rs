@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 use twincal::calibrate::LookedAt;
+use twincal::cross_check::{copies, odd_torque, stuck_encoders};
 use twincal::incidents::{Incident, motion};
-use twincal::lag::{LogLag, estimate_lag, lag_findings};
+use twincal::lag::{Lags, lag_findings, lags};
 use twincal::robot::Robot;
-use twincal::self_check::{JointCheck, look};
+use twincal::self_check::{Base, JointCheck, look};
 use twincal::signal::{Agreement, Log, Pipeline, Trajectory, velocity_agreement};
 use twincal::{Error, Finding, Severity};
 
@@ -18,12 +19,15 @@ pub(super) struct Checkup {
     places: Vec<usize>,
     /// Why others could not.
     pub(super) refused: Vec<Error>,
+    /// How much later than the motion torque was logged; `None` where the logs do not say it.
+    pub(super) lags: Option<Lags>,
     /// By log.
-    pub(super) lags: BTreeMap<String, LogLag>,
     pub(super) incidents: BTreeMap<String, Vec<Incident>>,
     pub(super) agreement: BTreeMap<String, Vec<Option<Agreement>>>,
     /// By joint, over all logs.
     pub(super) joints: Vec<JointCheck>,
+    /// How the base stands, where the torque contradicts the model.
+    pub(super) base: Option<Base>,
     /// Warnings; notes of the filters are left to `fit`.
     pub(super) findings: Vec<Finding>,
 }
@@ -54,6 +58,8 @@ pub(super) fn checkup(
     pipeline: &Pipeline,
 ) -> twincal::Result<Checkup> {
     let mut checkup = Checkup::default();
+    checkup.findings.extend(copies(logs)?);
+    checkup.findings.extend(stuck_encoders(robot, logs)?);
     for (place, log) in logs.iter().enumerate() {
         let (trajectory, happened, more) = match motion(robot, pipeline, log) {
             Ok(seen) => seen,
@@ -77,12 +83,16 @@ pub(super) fn checkup(
     }
     let found = look(robot, pipeline, &checkup.trajectories)?;
     checkup.joints = found.joints;
+    checkup.base = found.base;
+    let all: Vec<&Trajectory> = checkup.trajectories.iter().collect();
+    let odd = odd_torque(robot, pipeline, &all, found.findings.is_empty());
+    checkup.findings.extend(odd);
     checkup.findings.extend(found.findings);
-    let lags = checkup.trajectories.iter();
-    let lags: Vec<LogLag> = lags
-        .filter_map(|trajectory| estimate_lag(robot, pipeline, trajectory))
-        .collect();
-    checkup.findings.extend(lag_findings(pipeline, &lags));
-    checkup.lags = lags.into_iter().map(|lag| (lag.log.clone(), lag)).collect();
+    let trajectories: Vec<&Trajectory> = checkup.trajectories.iter().collect();
+    checkup.lags = lags(robot, pipeline, &trajectories);
+    if let Some(lags) = &checkup.lags {
+        let said = &pipeline.corrections.lag;
+        checkup.findings.extend(lag_findings(said, lags));
+    }
     Ok(checkup)
 }

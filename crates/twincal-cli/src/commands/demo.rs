@@ -10,7 +10,7 @@ use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::path::{Path, PathBuf};
 use twincal_io::Error;
-use twincal_io::artifact::{Claim, Maker, Replace};
+use twincal_io::artifact::{Claim, Inputs, Maker, Replace};
 use twincal_io::config::Config;
 use twincal_io::model::parse_model;
 
@@ -52,7 +52,9 @@ pub(super) fn run(flags: &Demo, terminal: &mut Terminal) -> Outcome<u8> {
     config.file.output.json = flags.json.then_some(true);
     let settings = config.settings()?;
     let output = Path::new(FOLDER);
-    let claim = Claim::new(output, Replace::MadeBy(Maker::Demo)).map_err(elsewhere)?;
+    // Its model and logs are in the program: it reads no file.
+    let replace = Replace::MadeBy(Maker::Demo);
+    let claim = Claim::new(output, replace, &Inputs::default()).map_err(elsewhere)?;
     start_threads(settings.threads)?;
     terminal
         .note("A simulated two-joint arm (MuJoCo) whose model lacks a payload, friction and more:");

@@ -1,9 +1,10 @@
 //! `twincal export`: the calibrated model as a file of the user's own kind, or as code.
 
-use super::print_json;
+mod torque_error;
+
 use super::summary::{self, paragraph, wrapped};
-use super::table::{print_table, table};
 use super::verdict::doubt;
+use super::{print_json, reads};
 use crate::args::{Beyond as BeyondFormat, Export, ExportFormat};
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
@@ -12,17 +13,14 @@ use serde::Serialize;
 use std::io::Write as _;
 use std::path::Path;
 use twincal::Finding;
-use twincal::calibrate::Calibration;
 use twincal::evaluator::{Beyond, Evaluator};
 use twincal::posterior::draws::draw;
 use twincal::robot::Inertia;
-use twincal::validate::WORSE;
 use twincal::write_back::{Holds, LinkChange, Residual, WriteBack, Writer, Written};
 use twincal_io::artifact::{Artifact, Claim, MODEL_MJCF, MODEL_URDF, Maker, OutputFile, Replace};
 use twincal_io::export::code::{Language, source};
 use twincal_io::export::write_model;
 use twincal_io::model::{Model, ModelSettings, parse_model};
-use twincal_io::report::decisive;
 use twincal_io::twin_json::StoredTwin;
 
 /// Random stream of the draws that are written.
@@ -139,9 +137,12 @@ fn target(format: ExportFormat) -> Target {
 }
 
 /// The file that takes the result; standard output where there is none.
-fn open(flags: &Export) -> Outcome<Option<OutputFile>> {
+fn open(flags: &Export, stored: &StoredTwin) -> Outcome<Option<OutputFile>> {
     match &flags.output {
-        Some(path) => Ok(Some(OutputFile::create(path, flags.force)?)),
+        Some(path) => {
+            let inputs = reads::of_twin(&flags.twin, stored);
+            Ok(Some(OutputFile::create(path, flags.force, &inputs)?))
+        }
         None => Ok(None),
     }
 }
@@ -171,8 +172,8 @@ fn shown(flags: &Export) -> String {
 
 /// Code that computes torque and interval.
 fn code(flags: &Export, language: Language, terminal: &mut Terminal) -> Outcome<u8> {
-    let output = open(flags)?;
     let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, true)?;
+    let output = open(flags, &stored)?;
     let twin = &stored.calibration.twin;
     let mut about = vec![
         format!(
@@ -245,8 +246,8 @@ fn code(flags: &Export, language: Language, terminal: &mut Terminal) -> Outcome<
 
 /// The model average.
 fn one(flags: &Export, kind: Kind, terminal: &mut Terminal) -> Outcome<u8> {
-    let output = open(flags)?;
     let (stored, model) = read(flags, kind)?;
+    let output = open(flags, &stored)?;
     let change = Writer::new(&stored.calibration, kind.holds)?.mean()?;
     let bytes = write_model(&model, &change)?;
     let findings = doubts(&stored, terminal);
@@ -264,7 +265,7 @@ fn one(flags: &Export, kind: Kind, terminal: &mut Terminal) -> Outcome<u8> {
         print_json(terminal, &exported)?;
     } else {
         say(&change, kind.holds, terminal);
-        how_good(&change, &stored.calibration, kind.holds, terminal);
+        torque_error::print(&change, &stored.calibration, kind.holds, terminal);
         if stored.calibration.twin.payload_where_unknown {
             paragraph(CARRIED, terminal);
             terminal.say("");
@@ -293,8 +294,8 @@ fn draws(
     } else {
         Replace::Never
     };
-    let claim = Claim::new(folder, replace)?;
     let (stored, model) = read(flags, kind)?;
+    let claim = Claim::new(folder, replace, &reads::of_twin(&flags.twin, &stored))?;
     let findings = doubts(&stored, terminal);
     let writer = Writer::new(&stored.calibration, kind.holds)?;
     let seed = flags.seed.unwrap_or(stored.context.seed);
@@ -470,70 +471,12 @@ fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
     terminal.say("");
 }
 
-/// What the file alone lacks of the twin's torque, beside what all effects are and how far the twin itself is from held-out torque.
-fn how_good(change: &WriteBack, calibration: &Calibration, holds: Holds, terminal: &mut Terminal) {
-    let (robot, format) = (&calibration.twin.robot, holds.format);
-    terminal.heading(&format!("How good the {format} is alone"));
-    let mut rows = table(&[
-        "joint",
-        "nominal lacks",
-        &format!("this {format} lacks"),
-        "twin, held out",
-    ]);
-    let scores = decisive(&calibration.validation);
-    for (joint, name) in robot.joint_names().into_iter().enumerate() {
-        let number = |values: &[f64]| values.get(joint).map_or("–".into(), |x| short(*x));
-        let own = scores.joints.get(joint).map(|own| own.rmse_calibrated);
-        rows.add_row([
-            &*clean(name),
-            &*number(&change.correction),
-            &number(&change.lacks),
-            &own.filter(|own| own.is_finite()).map_or("–".into(), short),
-        ]);
-    }
-    print_table(&rows, terminal);
-    if let Some(text) = worse_alone(
-        &change.correction,
-        &change.lacks,
-        robot.joint_names(),
-        format,
-    ) {
-        warn(&format!("warning: {text}"), terminal);
-    }
-    let text = "lacks: rms of the twin's torque that is not in the file, all effects together, over states within the training range; held \
-                out: RMSE of the twin itself on held-out rows, which are other states. N·m, of sliders N.";
-    paragraph(text, terminal);
-    terminal.say("");
-}
-
 /// A warning in its place among what is said, at most 80 columns wide.
 fn warn(text: &str, terminal: &mut Terminal) {
     for (number, line) in wrapped(text, 76).iter().enumerate() {
         let begin = if number == 0 { "  " } else { "    " };
         terminal.warning(&format!("{begin}{line}"));
     }
-}
-
-/// Joints on which the file alone is further from the twin than the nominal model is: what cannot be in it held the rest in balance.
-fn worse_alone<'a>(
-    nominal: &[f64],
-    file: &[f64],
-    joints: impl IntoIterator<Item = &'a str>,
-    format: &str,
-) -> Option<String> {
-    let each = nominal.iter().zip(file).zip(joints);
-    let worse: Vec<String> = each
-        .filter(|((nominal, file), _)| **file > WORSE * **nominal)
-        .map(|((nominal, file), joint)| {
-            format!("{} ({} -> {})", clean(joint), short(*nominal), short(*file))
-        })
-        .collect();
-    (!worse.is_empty()).then(|| {
-        format!(
-            "this {format} alone is WORSE than your model on {}: add what stays beside it (--to c, rust, python or json)",
-            worse.join(", ")
-        )
-    })
 }
 
 /// "upper_arm_link: 12.9 -> 6.28 kg, centre (-0.28, 0, 0.136) -> (-0.31, 0, 0.14) m"; `None` for a link of its own.
@@ -578,18 +521,5 @@ fn short(value: f64) -> String {
         format!("{value:.*}", decimals as usize)
     } else {
         format!("{value:.1e}")
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn joints_that_a_file_alone_makes_worse_are_named() {
-        let of = |file: &[f64]| worse_alone(&[10.0, 20.0], file, ["a", "b"], "URDF");
-        assert_eq!(of(&[1.0, 20.1]), None);
-        let said = "this URDF alone is WORSE than your model on b (20.0 -> 30.0): add what stays beside it (--to c, rust, python or json)";
-        assert_eq!(of(&[1.0, 30.0]).as_deref(), Some(said));
     }
 }

@@ -2,15 +2,15 @@
 
 use super::calibration::{Job, command, say_where};
 use super::inputs::{LogInput, Long, RobotInput};
-use super::{settings, start_threads};
+use super::{reads, settings, start_threads};
 use crate::args::Fit;
 use crate::clock::Stopwatch;
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
-use twincal_io::artifact::{Claim, Maker, Replace};
-use twincal_io::report::FileHash;
+use twincal_io::artifact::{Claim, Inputs, Maker, Replace};
 
 pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     let watch = Stopwatch::start();
@@ -33,6 +33,13 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     let Some(model) = &settings.model_file else {
         return Err(super::no_model());
     };
+    let mut inputs = Inputs::default();
+    let read = reads::Given {
+        flags: &flags.log,
+        config: &config,
+        settings: &settings,
+    };
+    reads::add_given(&mut inputs, &read, given);
     let claim = Claim::new(
         &settings.output,
         if settings.force {
@@ -40,6 +47,7 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
         } else {
             Replace::Never
         },
+        &inputs,
     )?;
     start_threads(settings.threads)?;
     let progress = Progress::new();
@@ -67,23 +75,21 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     Ok(code)
 }
 
-/// A log that is fitted says nothing of what was not, and counts for one experiment only. What came through a pipe has no checksum.
+/// A log that is fitted says nothing of what was not, and counts for one experiment only.
 fn every_log_once(logs: &LogInput, heldout: &LogInput) -> Outcome<()> {
-    let same = |a: &FileHash, b: &FileHash| !a.sha256.is_empty() && a.sha256 == b.sha256;
-    for (i, file) in heldout.files.iter().enumerate() {
-        if logs.files.iter().any(|log| same(log, file)) {
-            return Err(Failure::usage(
-                format!("`{}` is fitted and held out", file.name),
-                "hold out a log that the fit does not see, or leave --heldout away",
-            ));
-        }
-        if heldout.files[..i].iter().any(|log| same(log, file)) {
-            return Err(twice(&file.name));
-        }
-    }
-    for (i, file) in logs.files.iter().enumerate() {
-        if logs.files[..i].iter().any(|log| same(log, file)) {
-            return Err(twice(&file.name));
+    let fitted: BTreeSet<&str> = logs.files.iter().map(|file| file.sha256.as_str()).collect();
+    for files in [&heldout.files, &logs.files] {
+        let mut seen = BTreeSet::new();
+        for file in files {
+            if std::ptr::eq(files, &heldout.files) && fitted.contains(file.sha256.as_str()) {
+                return Err(Failure::usage(
+                    format!("`{}` is fitted and held out", file.name),
+                    "hold out a log that the fit does not see, or leave --heldout away",
+                ));
+            }
+            if !seen.insert(&file.sha256) {
+                return Err(twice(&file.name));
+            }
         }
     }
     Ok(())

@@ -1,14 +1,15 @@
 //! Model and logs as the commands need them: read, named, hashed, and small enough for the memory there is.
 
 use super::as_fitted::AsFitted;
-use crate::failure::{Failure, Outcome};
+use crate::failure::Outcome;
 use crate::names::display_names;
 use crate::progress::Progress;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use twincal::Finding;
 use twincal::robot::Robot;
 use twincal::signal::{Auto, Log};
-use twincal_io::artifact::{MODEL_MJCF, MODEL_URDF, sha256, sha256_of_file};
+use twincal_io::artifact::{MODEL_MJCF, MODEL_URDF, sha256, sha256_unless};
 use twincal_io::config::{LogSettings, Settings};
 use twincal_io::log::{LogOptions, files_of, open_log, parse_log, read_log};
 use twincal_io::model::{Model, ModelFormat, read_model};
@@ -19,6 +20,8 @@ use twincal_io::{Error, memory};
 /// Doubles per sample and joint that alignment and filtering hold at once beside the recordings themselves: pieces on even clocks (4),
 /// smooth motion with torques (5), what passes by. What rows take is asked when it is known how many there are.
 const DOUBLES_PER_SAMPLE: u64 = 12;
+/// Logs that are named while they are read; of more every so many is.
+const MOST_SAID: usize = 20;
 
 /// The robot and what its file says.
 pub(super) struct RobotInput {
@@ -130,17 +133,20 @@ impl LogInput {
     ) -> Outcome<Self> {
         let mut samples = 0;
         let mut input = Self::new(paths.to_vec());
-        for (path, name) in paths.iter().zip(display_names(paths)) {
-            progress.step(&format!("reading {}", path.to_string_lossy()));
-            let read = || read_one(path);
-            let (log, checksum) = if path.is_file() || path.is_dir() {
-                let (log, checksum) = rayon::join(read, || sha256_of_log(path));
-                (log?, checksum)
-            } else {
-                // A pipe can be read once: what was in it nobody can check.
-                (read()?, Ok(String::new()))
-            };
-            let (log, findings) = log;
+        let said = paths.len().div_ceil(MOST_SAID).max(1);
+        for (number, (path, name)) in paths.iter().zip(display_names(paths)).enumerate() {
+            if number % said == 0 {
+                let of = match said {
+                    1 => String::new(),
+                    _ => format!(" ({} of {})", number + 1, paths.len()),
+                };
+                progress.step(&format!("reading {}{of}", path.to_string_lossy()));
+            }
+            // The checksum of a log that is refused is of no use, and may take long.
+            let refused = AtomicBool::new(false);
+            let read = || read_one(path).inspect_err(|_| refused.store(true, Ordering::Relaxed));
+            let (log, checksum) = rayon::join(read, || sha256_of_log(path, &refused));
+            let (log, findings) = log?;
             samples += in_memory(&log);
             let bytes = samples.saturating_mul(robot.dof() as u64 * 8 * DOUBLES_PER_SAMPLE);
             memory::require(
@@ -248,39 +254,15 @@ fn in_memory(log: &Log<'_>) -> u64 {
     }
 }
 
-/// Refuses an output that is one of the inputs or lies in one of their folders: `--force` means an earlier result.
-pub(super) fn refuse_input_as_output(output: &Path, inputs: &[&PathBuf]) -> Outcome<()> {
-    // An output that does not exist yet replaces nothing.
-    let Ok(real) = output.canonicalize() else {
-        return Ok(());
-    };
-    for input in inputs {
-        if input
-            .canonicalize()
-            .is_ok_and(|input| real.starts_with(input))
-        {
-            return Err(Failure::usage(
-                format!(
-                    "{} is read by this command ({}) and would be overwritten",
-                    output.to_string_lossy(),
-                    input.to_string_lossy()
-                ),
-                "give another output with -o",
-            ));
-        }
-    }
-    Ok(())
-}
-
-/// Checksum of a log; of a folder that of the lines `sha256sum` prints for its files, in the order of their recording.
-fn sha256_of_log(path: &Path) -> Result<String, Error> {
+/// Checksum of a log, given up once the log is `refused`; of a folder that of the lines `sha256sum` prints for its files, in the order of their recording.
+fn sha256_of_log(path: &Path, refused: &AtomicBool) -> Result<String, Error> {
     if !path.is_dir() {
-        return sha256_of_file(path);
+        return sha256_unless(path, refused);
     }
     let mut lines = String::new();
     for file in files_of(path)? {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
-        lines += &format!("{}  {name}\n", sha256_of_file(&file)?);
+        lines += &format!("{}  {name}\n", sha256_unless(&file, refused)?);
     }
     Ok(sha256(lines.as_bytes()))
 }

@@ -3,6 +3,7 @@
 use self::library::{BaseRow, ComponentRow, base_row, component_rows};
 use super::checkup::{Checkup, checkup};
 use super::inputs::{LogInput, Long, RobotInput};
+use super::settings::{Look, Usual};
 use super::summary::{Notes, findings, paragraph};
 use super::table::{print_table, table};
 use super::{code_of, print_json, require_strict, settings, start_threads};
@@ -11,12 +12,14 @@ use crate::failure::Outcome;
 use crate::progress::Progress;
 use crate::terminal::{Terminal, clean};
 use serde::Serialize;
+use std::path::Path;
 use twincal::Finding;
 use twincal::calibrate::{Outlook, outlook};
 use twincal::excitation::Unseen;
 use twincal::robot::{JointKind, Mimic, Robot};
 use twincal::signal::{
-    LogOverview, Pipeline, SignalSettings, choose_and_prepare, describe, hardly_driven,
+    LogOverview, Pipeline, SignalSettings, choose_and_prepare, constant_torque, describe,
+    hardly_driven,
 };
 use twincal::words::significant;
 
@@ -69,14 +72,30 @@ struct UnseenRow {
     words: String,
 }
 
+/// Whether a path is called as a model is, and no log.
+fn is_model(path: &Path) -> bool {
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    matches!(ending, Some("urdf" | "xml" | "mjcf"))
+}
+
 pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
-    let config = settings::of_look(&flags.model, &flags.allow, &flags.log, terminal)?;
+    let look = Look {
+        model: &flags.model,
+        allow: &flags.allow,
+        log: &flags.log,
+        usual: Usual::unless(flags.no_config),
+    };
+    let config = settings::of_look(&look, terminal)?;
     let settings = config.settings()?;
     start_threads(settings.threads)?;
     let progress = Progress::new();
-    // Without a model by flag or config the first path is the model.
+    // Without paths those of the config are looked at.
+    let named = settings.log.named();
     let (model, logs) = match (&settings.model_file, flags.paths.split_first()) {
-        (Some(model), _) => (model, &flags.paths[..]),
+        (_, Some((first, logs))) if flags.model.is_none() && is_model(first) => (first, logs),
+        (Some(model), Some(_)) => (model, &flags.paths[..]),
+        (Some(model), None) => (model, &named[..]),
+        // Without a model by flag or config the first path is the model.
         (None, Some((model, logs))) => (model, logs),
         (None, None) => return Err(super::no_model()),
     };
@@ -89,7 +108,9 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
         Long::of_settings(&settings),
         &progress,
     )?;
-    drop(progress);
+    if !logs.logs.is_empty() {
+        progress.step("comparing logs and model");
+    }
     let mut found = robot.findings;
     found.append(&mut logs.findings);
     let mut overviews = Vec::new();
@@ -99,6 +120,7 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
         found.extend(more);
     }
     found.extend(hardly_driven(&robot.robot, &logs.logs[..])?);
+    found.extend(constant_torque(&robot.robot, &logs.logs[..])?);
     let (mut compared, more) = compare(&robot.robot, &logs, &settings.calibration.signal)?;
     for finding in more {
         if !found.contains(&finding) {
@@ -108,6 +130,7 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
     let aligned =
         (compared.as_mut()).map(|(pipeline, checkup)| (&*pipeline, checkup.looked_at(&logs.logs)));
     let outlook = outlook(&robot.robot, &settings.calibration.library, aligned)?;
+    drop(progress);
     found.extend(outlook.findings.iter().cloned());
     require_strict(settings.log.strict, &found)?;
     let code = code_of(&found);

@@ -13,6 +13,7 @@ mod inputs;
 mod inspect;
 mod not_kept;
 mod predict;
+mod reads;
 mod repeats;
 mod report;
 mod settings;

@@ -1,9 +1,9 @@
 //! `twincal predict`: torque with intervals, one row per input row.
 
-use super::inputs::{LogInput, refuse_input_as_output};
+use super::inputs::LogInput;
 use super::summary::{Notes, paragraph};
 use super::verdict::doubt;
-use super::{code_of, print_json, require_strict, settings, start_threads};
+use super::{code_of, print_json, reads, require_strict, settings, start_threads};
 use crate::args::Predict;
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
@@ -44,22 +44,24 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
             "give -o FILE.csv, FILE.parquet or FILE.mcap",
         ));
     }
+    let progress = Progress::new();
+    progress.step(&format!("reading {}", flags.twin.to_string_lossy()));
+    let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, false)?;
     let output = match &flags.output {
         Some(path) => {
-            let mut inputs = vec![&flags.twin];
-            inputs.extend(&flags.logs);
-            inputs.extend(&flags.log.config);
-            inputs.extend(&settings.model_file);
-            refuse_input_as_output(path, &inputs)?;
-            let format = TableFormat::of_path(path)?;
-            Some((format, path, OutputFile::create(path, flags.force)?))
+            let mut inputs = reads::of_twin(&flags.twin, &stored);
+            let given = reads::Given {
+                flags: &flags.log,
+                config: &config,
+                settings: &settings,
+            };
+            reads::add_given(&mut inputs, &given, &flags.logs);
+            let output = OutputFile::create(path, flags.force, &inputs)?;
+            Some((TableFormat::of_path(path)?, path, output))
         }
         None => None,
     };
     start_threads(settings.threads)?;
-    let progress = Progress::new();
-    progress.step(&format!("reading {}", flags.twin.to_string_lossy()));
-    let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, false)?;
     let twin = &stored.calibration.twin;
     let mut logs = LogInput::for_twin(&flags.logs, &stored, settings.log.clone(), &progress)?;
     progress.step("predicting the logs");
@@ -285,7 +287,8 @@ impl Prediction {
                     .input_rows
                     .partition_point(|&row| row < stretch.own.end);
                 let rows = &block.input_rows[first..end];
-                let times = rows.iter().map(|&row| stretch.motion.time[row]);
+                let start = stretch.motion.start_ns as f64 / 1e9;
+                let times = rows.iter().map(|&row| start + stretch.motion.time[row]);
                 refuse_times(&stretch.motion.name, times, &table.times())?;
                 if first < end {
                     written = self.write_rows(model, stretch, (block, first..end), table);
@@ -319,7 +322,10 @@ impl Prediction {
         let outside: Vec<bool> = (range.clone())
             .map(|row| torques.iter().any(|torque| torque.extrapolating[row]))
             .collect();
-        let mut values = vec![Values::Numbers(&time)];
+        let mut values = vec![match stretch.motion.start_ns {
+            0 => Values::Numbers(&time),
+            start => Values::Stamps(start, &time),
+        }];
         for (measured, torque) in measured.iter().zip(&torques) {
             values.push(Values::Numbers(measured));
             let of_joint = [

@@ -4,7 +4,7 @@ use super::calibration::{say_where, say_where_in_json};
 use crate::args::Report;
 use crate::failure::Outcome;
 use crate::terminal::Terminal;
-use twincal_io::artifact::{Artifact, Claim, REPORT, Replace};
+use twincal_io::artifact::{Artifact, Claim, Inputs, REPORT, Replace};
 use twincal_io::twin_json::StoredTwin;
 
 pub(super) fn run(flags: &Report, terminal: &mut Terminal) -> Outcome<u8> {
@@ -12,7 +12,8 @@ pub(super) fn run(flags: &Report, terminal: &mut Terminal) -> Outcome<u8> {
     // A missing report is what this command is for; a changed one may hold somebody's notes.
     let rewrite = flags.force || !flags.twin.join(REPORT).exists();
     let stored = StoredTwin::read(&artifact, rewrite)?;
-    let claim = Claim::new(&flags.twin, Replace::Artifact)?;
+    // The one command whose output is its twin: every other file of it is written again as it was.
+    let claim = Claim::new(&flags.twin, Replace::Artifact, &Inputs::default())?;
     stored.rewrite_report(&artifact, claim)?;
     terminal.complete(&flags.twin);
     if flags.json {

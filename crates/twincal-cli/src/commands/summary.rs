@@ -17,18 +17,26 @@ pub(super) const ENDS: &str =
     "a (b … c): median and both ends of the 95 % interval, where ± would mislead";
 /// Prints the whole summary.
 pub(super) fn print(calibration: &Calibration, terminal: &mut Terminal) {
-    let doubts = || calibration.findings.iter().filter(|f| f.doubts_the_log());
-    if doubts().next().is_some() {
-        terminal.heading("Log and model contradict each other in sign, scale or order of joints");
-        doubts().for_each(|finding| paragraph(&finding.message, terminal));
-        paragraph(MENDS, terminal);
-        terminal.say("");
-    }
+    mistakes(calibration, terminal);
     effects(calibration, terminal);
     others(calibration, terminal);
     validation(calibration, terminal);
     verdict(calibration, terminal);
     findings(&calibration.findings, Notes::In("the report"), terminal);
+}
+
+/// What forbids a "Yes" stands before any number.
+fn mistakes(calibration: &Calibration, terminal: &mut Terminal) {
+    let all = || calibration.findings.iter().filter(|f| f.forbids_yes());
+    if all().next().is_none() {
+        return;
+    }
+    terminal.heading(&report::answer(calibration).headline);
+    all().for_each(|finding| paragraph(&finding.message, terminal));
+    if all().any(Finding::doubts_the_log) {
+        paragraph(MENDS, terminal);
+    }
+    terminal.say("");
 }
 
 fn effects(calibration: &Calibration, terminal: &mut Terminal) {
@@ -88,6 +96,7 @@ fn validation(calibration: &Calibration, terminal: &mut Terminal) {
     let split = match &validation.split {
         Split::HeldoutLogs => "held-out logs",
         Split::LeaveOneLogOut => "each log predicted from the others",
+        Split::LeaveLogGroupsOut => "each fifth of the logs predicted from the others",
         Split::LastThirty => "last 30 % of each log",
     };
     let judged = report::decisive(validation);
@@ -164,6 +173,7 @@ fn reliability(calibration: &Calibration) -> Vec<String> {
                 n => format!("{n} logs"),
             }
         ));
+        lines.push(report::drawn_alike(conformal));
     }
     if let (Some(compact), Some([average, own])) = (&calibration.compact, validation.compact) {
         lines.push(format!(

@@ -2,9 +2,10 @@
 
 use super::manifest::sha256;
 use crate::error::{Error, Place, Result};
+use rustix::fs::OFlags;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::os::unix::ffi::OsStrExt as _;
-use std::os::unix::fs::MetadataExt as _;
+use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _};
 use std::path::{Path, PathBuf};
 
 /// Paths that belong to the target `parent/name`. Their names are made from a digest of the target's, so that a
@@ -107,6 +108,8 @@ impl Lock {
                 .create(true)
                 .truncate(false)
                 .write(true)
+                // A link leads nowhere, and nobody waits for a reader of a pipe.
+                .custom_flags((OFlags::NOFOLLOW | OFlags::NONBLOCK).bits().cast_signed())
                 .open(&beside.lock)
                 .map_err(|e| denied(&e))?;
             match file.try_lock() {

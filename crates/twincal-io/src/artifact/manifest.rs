@@ -1,14 +1,15 @@
 //! `manifest.json`: format version, who wrote the artefact, and the checksum of every file.
 
 use crate::error::{Error, Place, Result};
+use crate::open::open_log_file;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Version of the layout that this program writes and the newest that it reads.
 pub const FORMAT: u64 = 1;
@@ -121,22 +122,28 @@ pub fn sha256(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
 }
 
-/// SHA-256 of a file of any size.
+/// SHA-256 of a file.
 ///
 /// # Errors
 /// The file cannot be read.
-pub fn sha256_of_file(path: &Path) -> Result<String> {
-    let refused = |e: std::io::Error| {
-        Error::system(
-            path.to_string_lossy(),
-            "read",
-            &e,
-            "give a file that can be read",
-        )
-    };
-    let mut file = File::open(path).map_err(refused)?;
+pub(super) fn sha256_of_file(path: &Path) -> Result<String> {
+    sha256_unless(path, &AtomicBool::new(false))
+}
+
+/// SHA-256 of a log; what it is does not matter any more once `stop` is set.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn sha256_unless(path: &Path, stop: &AtomicBool) -> Result<String> {
+    let name = path.to_string_lossy();
+    let refused =
+        |e: std::io::Error| Error::system(&*name, "read", &e, "give a file that can be read");
+    let mut file = open_log_file(path, &name)?;
     let (mut digest, mut buffer) = (Sha256::new(), vec![0; 1 << 16]);
     loop {
+        if stop.load(Ordering::Relaxed) {
+            return Ok(String::new());
+        }
         match file.read(&mut buffer).map_err(refused)? {
             0 => return Ok(hexadecimal(&digest.finalize())),
             length => digest.update(&buffer[..length]),

@@ -11,15 +11,17 @@
 //!
 //! A new artefact is staged in a hidden folder beside DIR and takes its place in one atomic exchange, so that a
 //! program killed at any moment leaves the old artefact or the new one. A lock beside DIR keeps a second writer out;
-//! what a killed writer left behind is removed by the next one.
+//! what a killed writer left behind is removed by the next one. Nothing is written over what the command reads (`inputs.rs`).
 
 mod beside;
+mod inputs;
 mod manifest;
 mod output_file;
 mod read;
 mod write;
 
-pub use manifest::{FORMAT, FileEntry, Maker, Manifest, sha256, sha256_of_file};
+pub use inputs::Inputs;
+pub use manifest::{FORMAT, FileEntry, Maker, Manifest, sha256, sha256_unless};
 pub use output_file::OutputFile;
 pub use read::Artifact;
 pub use write::{Claim, Replace};

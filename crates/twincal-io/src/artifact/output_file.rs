@@ -1,8 +1,11 @@
 //! One output file (predictions): written beside its place and renamed into it, complete or absent.
 
 use super::beside::{Beside, Lock};
-use super::write::sync_folder;
+use super::inputs::{Inputs, refuse_original};
+use super::manifest::sha256_of_file;
+use super::write::{remove, sync_folder};
 use crate::error::{Error, Place, Result};
+use crate::report::FileHash;
 use std::fs::{self, File};
 use std::io;
 use std::path::Path;
@@ -13,6 +16,8 @@ pub struct OutputFile {
     beside: Beside,
     shown: String,
     file: Option<File>,
+    /// What the target holds now, if a twin was made from it.
+    original: Option<FileHash>,
     _lock: Lock,
 }
 
@@ -20,12 +25,13 @@ impl OutputFile {
     /// Checks and locks `target`, and opens the file to write.
     ///
     /// # Errors
-    /// A target that exists (unless `force`), is a folder or a symbolic link, or cannot be written.
-    pub fn create(target: &Path, force: bool) -> Result<Self> {
+    /// A target that exists (unless `force`), is one of the `inputs`, a folder or a symbolic link, or cannot be written.
+    pub fn create(target: &Path, force: bool, inputs: &Inputs) -> Result<Self> {
         let shown = target.to_string_lossy().into_owned();
         let refuse =
             |problem: &str, remedy: &str| Err(Error::content(Place::file(&shown), problem, remedy));
         let beside = Beside::new(target)?;
+        inputs.refuse(target)?;
         beside.check_parent()?;
         match fs::symlink_metadata(&beside.target) {
             Ok(metadata) if metadata.is_symlink() => {
@@ -42,11 +48,15 @@ impl OutputFile {
             }
             _ => {}
         }
+        let original = inputs.original(&beside.target)?;
         let lock = Lock::take(&beside)?;
         let remedy = "give an output that you may write with -o";
-        let file = File::create(&beside.staging)
+        // A new file: a link that lies there leads nowhere.
+        let file = remove(&beside.staging)
+            .and_then(|()| File::create_new(&beside.staging))
             .map_err(|e| Error::system(&shown, "write", &e, remedy))?;
         Ok(Self {
+            original,
             beside,
             shown,
             file: Some(file),
@@ -62,8 +72,13 @@ impl OutputFile {
     /// Syncs the file and gives it its name; `written` is what became of the writing.
     ///
     /// # Errors
-    /// The system's refusal; then nothing is left behind.
+    /// A target from which a twin was made, unless the same bytes were written; the system's refusal. Then nothing is left behind.
     pub fn commit(mut self, written: io::Result<()>) -> Result<()> {
+        if let (Some(original), true) = (&self.original, written.is_ok())
+            && sha256_of_file(&self.beside.staging)? != original.sha256
+        {
+            return Err(refuse_original(&self.beside.target, original));
+        }
         let done = written.and_then(|()| {
             if let Some(file) = self.file.take() {
                 file.sync_all()?;

@@ -3,7 +3,15 @@
 use super::manifest::{Manifest, sha256};
 use super::{MANIFEST, Maker, REPORT};
 use crate::error::{Error, Place, Result};
+use crate::memory;
+use crate::open::{InputFile, Refusal};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+
+/// Largest manifest, bytes: 100 000 files.
+pub(super) const MAX_MANIFEST: u64 = 16 << 20;
+/// Largest file of an artefact, bytes: the twin of an arm of 6 joints has 18 MB, one of 44 joints some 50 times as much.
+const MAX_FILE: u64 = 4 << 30;
 
 /// An artefact whose manifest has been read; each file is verified when it is read.
 #[derive(Debug, Clone)]
@@ -19,13 +27,19 @@ impl Artifact {
     /// No artefact there, a damaged manifest, or one that needs a newer program.
     pub fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(MANIFEST);
-        let bytes = std::fs::read(&path).map_err(|e| {
+        let manifest = InputFile::new(&path, MAX_MANIFEST).inside(folder);
+        let bytes = manifest.read().map_err(|refusal| {
             let remedy = "give the folder that `twincal fit` wrote";
-            if e.kind() == std::io::ErrorKind::NotFound && folder.is_dir() {
-                let problem = format!("is no twin: there is no {MANIFEST} in it");
-                return Error::content(Place::file(folder.to_string_lossy()), problem, remedy);
+            match refusal {
+                Refusal::System(e) if e.kind() == ErrorKind::NotFound && folder.is_dir() => {
+                    let problem = format!("is no twin: there is no {MANIFEST} in it");
+                    Error::content(Place::file(folder.to_string_lossy()), problem, remedy)
+                }
+                Refusal::System(e) => {
+                    Error::system(folder.to_string_lossy(), "open as a twin", &e, remedy)
+                }
+                other => other.into_error(&path.to_string_lossy(), remedy),
             }
-            Error::system(folder.to_string_lossy(), "open as a twin", &e, remedy)
         })?;
         let manifest = Manifest::parse(&path.to_string_lossy(), &bytes)?;
         Ok(Self {
@@ -71,17 +85,28 @@ impl Artifact {
                 anew,
             ));
         }
-        let size = std::fs::metadata(&path)
-            .map_err(|e| Error::system(&*shown, "read", &e, anew))?
-            .len();
         let damaged = |problem: String| Error::content(Place::file(&*shown), problem, anew);
-        if size != entry.bytes {
+        let changed = |bytes: u64| {
+            damaged(format!(
+                "was changed after it was written (checksum): {bytes} bytes instead of {}",
+                entry.bytes
+            ))
+        };
+        if entry.bytes > MAX_FILE {
             return Err(damaged(format!(
-                "was changed after it was written (checksum): {size} bytes instead of {}",
+                "has {} bytes by the manifest, the limit is {MAX_FILE}",
                 entry.bytes
             )));
         }
-        let bytes = std::fs::read(&path).map_err(|e| Error::system(&*shown, "read", &e, anew))?;
+        memory::require(&shown, entry.bytes, "read it on a machine with more memory")?;
+        let file = InputFile::new(&path, entry.bytes).inside(&self.folder);
+        let bytes = file.read().map_err(|refusal| match refusal {
+            Refusal::TooLarge { bytes, .. } => changed(bytes),
+            other => other.into_error(&shown, anew),
+        })?;
+        if bytes.len() as u64 != entry.bytes {
+            return Err(changed(bytes.len() as u64));
+        }
         if sha256(&bytes) != entry.sha256 {
             return Err(damaged(
                 "was changed after it was written (checksum)".into(),

@@ -15,7 +15,7 @@ fn files(word: &str) -> Vec<(&'static str, Vec<u8>)> {
 }
 
 fn write(target: &Path, word: &str, replace: Replace) -> crate::Result<()> {
-    Claim::new(target, replace)?.commit(Maker::Fit, files(word))
+    Claim::new(target, replace, &Inputs::default())?.commit(Maker::Fit, files(word))
 }
 
 fn word(target: &Path) -> String {
@@ -82,7 +82,7 @@ fn case_97_killed_after_each_step_the_artefact_is_whole() {
             assert_eq!(word(&target), "{\"is\":\"old\"}", "step {number}");
         }
         // The next run cleans up, and brings the old artefact back before it does its own work.
-        drop(Claim::new(&target, Replace::Artifact).unwrap());
+        drop(Claim::new(&target, Replace::Artifact, &Inputs::default()).unwrap());
         assert_eq!(word(&target), "{\"is\":\"old\"}", "step {number}");
         assert!(leftovers(folder.path()).is_empty(), "step {number}");
     }
@@ -143,8 +143,8 @@ fn case_99_file_symlink_read_only_and_foreign_folders_are_refused() {
 fn case_101_second_writer_is_refused_while_the_first_works() {
     let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("out");
-    let first = Claim::new(&target, Replace::Never).unwrap();
-    let second = Claim::new(&target, Replace::Artifact)
+    let first = Claim::new(&target, Replace::Never, &Inputs::default()).unwrap();
+    let second = Claim::new(&target, Replace::Artifact, &Inputs::default())
         .unwrap_err()
         .to_string();
     assert!(second.contains("another twincal is writing"), "{second}");
@@ -194,6 +194,60 @@ fn case_114_and_115_newer_and_damaged_artefacts_are_refused() {
 }
 
 #[test]
+fn a_twin_is_made_of_its_own_files_and_of_no_more_than_a_twin_needs() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("out");
+    write(&target, "good", Replace::Never).unwrap();
+    let manifest = fs::read_to_string(target.join(MANIFEST)).unwrap();
+    let refused = |artifact: crate::Result<Artifact>| {
+        let read = artifact.and_then(|artifact| artifact.verify_except(&[]));
+        read.unwrap_err().to_string()
+    };
+    // A link to the right bytes in another folder.
+    let result = target.join(RESULT);
+    let outside = folder.path().join("outside.json");
+    fs::rename(&result, &outside).unwrap();
+    std::os::unix::fs::symlink(&outside, &result).unwrap();
+    let error = refused(Artifact::open(&target));
+    assert!(
+        error.contains("result.json: is a link that leads outside"),
+        "{error}"
+    );
+    fs::remove_file(&result).unwrap();
+    fs::rename(&outside, &result).unwrap();
+    // The manifest too.
+    fs::rename(target.join(MANIFEST), &outside).unwrap();
+    std::os::unix::fs::symlink(&outside, target.join(MANIFEST)).unwrap();
+    let error = refused(Artifact::open(&target));
+    assert!(
+        error.contains("manifest.json: is a link that leads outside"),
+        "{error}"
+    );
+    fs::remove_file(target.join(MANIFEST)).unwrap();
+    // Sizes are compared with their limits before anything is read.
+    let claims = manifest.replace("\"bytes\": 100000", "\"bytes\": 5000000000");
+    assert_ne!(claims, manifest);
+    fs::write(target.join(MANIFEST), &claims).unwrap();
+    let report = fs::File::options()
+        .write(true)
+        .open(target.join(REPORT))
+        .unwrap();
+    report.set_len(5_000_000_000).unwrap();
+    let error = refused(Artifact::open(&target));
+    assert!(
+        error.contains("has 5000000000 bytes by the manifest"),
+        "{error}"
+    );
+    let file = fs::File::create(target.join(MANIFEST)).unwrap();
+    file.set_len(1 << 40).unwrap();
+    let error = refused(Artifact::open(&target));
+    assert!(
+        error.contains("manifest.json: has 1099511627776 bytes"),
+        "{error}"
+    );
+}
+
+#[test]
 fn case_108_any_file_name_works() {
     use std::os::unix::ffi::OsStrExt as _;
     let folder = tempfile::tempdir().unwrap();
@@ -218,16 +272,16 @@ fn only_its_own_maker_replaces_a_demo() {
     let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("twincal-demo");
     write(&target, "fit", Replace::Never).unwrap();
-    let error = Claim::new(&target, Replace::MadeBy(Maker::Demo))
+    let error = Claim::new(&target, Replace::MadeBy(Maker::Demo), &Inputs::default())
         .unwrap_err()
         .to_string();
     assert!(error.contains("not written by this command"), "{error}");
     fs::remove_dir_all(&target).unwrap();
-    Claim::new(&target, Replace::Never)
+    Claim::new(&target, Replace::Never, &Inputs::default())
         .unwrap()
         .commit(Maker::Demo, files("demo"))
         .unwrap();
-    Claim::new(&target, Replace::MadeBy(Maker::Demo))
+    Claim::new(&target, Replace::MadeBy(Maker::Demo), &Inputs::default())
         .unwrap()
         .commit(Maker::Demo, files("again"))
         .unwrap();
@@ -238,18 +292,18 @@ fn only_its_own_maker_replaces_a_demo() {
 fn output_file_appears_only_when_complete() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("p.csv");
-    let mut output = OutputFile::create(&path, false).unwrap();
+    let mut output = OutputFile::create(&path, false, &Inputs::default()).unwrap();
     let written = output.file().unwrap().write_all(b"t\n");
     assert!(!path.exists());
     output.commit(written).unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"t\n");
     assert!(
-        OutputFile::create(&path, false)
+        OutputFile::create(&path, false, &Inputs::default())
             .unwrap_err()
             .to_string()
             .contains("--force")
     );
-    let output = OutputFile::create(&path, true).unwrap();
+    let output = OutputFile::create(&path, true, &Inputs::default()).unwrap();
     let error = output
         .commit(Err(std::io::Error::other("disk full")))
         .unwrap_err()

@@ -1,9 +1,12 @@
 //! Writing an artefact: claimed before any work, committed in one atomic step after it.
 
 use super::beside::{Beside, Lock};
+use super::inputs::Inputs;
 use super::manifest::{Maker, Manifest};
+use super::read::MAX_MANIFEST;
 use super::{MANIFEST, NAMES};
 use crate::error::{Error, Place, Result};
+use crate::open::InputFile;
 use rustix::fs::{CWD, RenameFlags, renameat_with};
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -34,11 +37,12 @@ impl Claim {
     /// Checks that `target` may be written, locks it and removes what a killed run left behind.
     ///
     /// # Errors
-    /// A target that exists (unless `replace` allows it), is a file, a symbolic link or read-only, holds files that are
-    /// not ours, or is being written by another program.
-    pub fn new(target: &Path, replace: Replace) -> Result<Self> {
+    /// A target that exists (unless `replace` allows it), is or holds one of the `inputs`, is a file, a symbolic link or
+    /// read-only, holds files that are not ours, or is being written by another program.
+    pub fn new(target: &Path, replace: Replace, inputs: &Inputs) -> Result<Self> {
         let shown = target.to_string_lossy().into_owned();
         let beside = Beside::new(target)?;
+        inputs.refuse(target)?;
         beside.check_parent()?;
         // A wrong target is said before the lock, which may have no place (a read-only disk).
         check(&beside.target, &shown, replace)?;
@@ -110,7 +114,10 @@ fn check(target: &Path, shown: &str, replace: Replace) -> Result<bool> {
     if metadata.permissions().readonly() {
         return refuse("the folder is read-only", other);
     }
-    let manifest = fs::read(target.join(MANIFEST)).ok();
+    let manifest = InputFile::new(&target.join(MANIFEST), MAX_MANIFEST)
+        .inside(target)
+        .read()
+        .ok();
     let manifest = manifest.and_then(|bytes| Manifest::parse(MANIFEST, &bytes).ok());
     let ours = |name: &OsStr| {
         let listed = manifest.iter().flat_map(|manifest| manifest.files.keys());
@@ -121,10 +128,9 @@ fn check(target: &Path, shown: &str, replace: Replace) -> Result<bool> {
             .any(|known| name == known)
     };
     for entry in fs::read_dir(target).map_err(|e| Error::system(shown, "list", &e, other))? {
-        let name = entry
-            .map_err(|e| Error::system(shown, "list", &e, other))?
-            .file_name();
-        if !ours(&name) {
+        let entry = entry.map_err(|e| Error::system(shown, "list", &e, other))?;
+        let (name, is_folder) = (entry.file_name(), entry.path().is_dir());
+        if is_folder || !ours(&name) {
             let problem = format!(
                 "holds `{}`, which twincal did not write",
                 name.to_string_lossy()
@@ -228,7 +234,7 @@ pub(super) fn sync_folder(folder: &Path) -> io::Result<()> {
     }
 }
 
-fn remove(path: &Path) -> io::Result<()> {
+pub(super) fn remove(path: &Path) -> io::Result<()> {
     let removed = match fs::symlink_metadata(path) {
         Ok(metadata) if metadata.is_dir() => fs::remove_dir_all(path),
         Ok(_) => fs::remove_file(path),

@@ -15,7 +15,7 @@ use twincal::term::Family;
 pub struct ConfigFile {
     /// The robot model.
     pub model: ModelTable,
-    /// The logs: settings for all of them, `[log]`, or one entry per log, `[[log]]`.
+    /// The logs, one entry each, `[[log]]`; a table `[log]` is read as the first entry.
     #[serde(
         deserialize_with = "super::log_forms::deserialize",
         serialize_with = "super::log_forms::serialize"
@@ -78,71 +78,73 @@ pub enum Allow {
     DisagreeingChains,
 }
 
-/// `[log]`
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(default)]
-#[schemars(deny_unknown_fields)]
+/// The logs, as `log_forms` reads them: what holds for all logs without an entry of their own, and the entries.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct LogTable {
     /// Logs to score on instead of a split of the fitted ones, relative to this config (flag `--heldout`).
     pub heldout: Option<Vec<PathBuf>>,
-    /// Sampling rate, Hz: replaces time stamps that are missing or wrong (flag `--rate`).
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    /// Sampling rate, Hz, that replaces the time stamps.
     pub rate_hz: Option<f64>,
-    /// Drop and count rows that cannot be read instead of refusing the file (flag `--lenient`).
+    /// Drop and count rows that cannot be read.
     pub lenient: Option<bool>,
-    /// Refuse a log (exit code 2) where data was lost or degraded beyond the stated limit (flag `--strict`).
+    /// Refuse a log where data was lost or degraded beyond the stated limit (flag `--strict`).
     pub strict: Option<bool>,
-    /// Topics of a bag that are read: one, or a list from which each joint's channel is taken from the first that has it.
-    /// Default: the only one with joint states.
+    /// Topics of a bag that are read.
     pub topic: Option<Topics>,
-    /// Whose recorder wrote the table: its column names are then known. `[columns]` goes first.
+    /// Whose recorder wrote the table.
     pub preset: Option<PresetWord>,
-    /// What the logged torque is; default "joint", with the preset ur-rtde "current".
+    /// What the logged torque is.
     pub torque: Option<TorqueWord>,
-    /// Turns of the motor per turn of the joint, by joint name; for torque = "motor" and "current".
+    /// Turns of the motor per turn of the joint, by joint name.
     pub gear_ratio: BTreeMap<String, f64>,
-    /// Motor torque per current, N·m/A, by joint name, for torque = "current"; without gear_ratio joint torque per current.
+    /// Motor torque per current, N·m/A, by joint name.
     pub drive_constant: BTreeMap<String, f64>,
-    /// Take a column that holds the controller's own model of the torque, such as target_moment, for a measurement;
-    /// default false.
+    /// Take a column that holds the controller's own model of the torque for a measurement.
     pub accept_model_torque: Option<bool>,
-    /// The entries, where the file has `[[log]]` instead.
-    #[serde(skip)]
+    /// The entries with a file.
     pub entries: Vec<LogEntry>,
 }
 
-/// `[[log]]`: one log and what is known of it. Without LOG on the command line these are the logs; with LOG an entry
-/// speaks of the log that is the same file.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-#[schemars(deny_unknown_fields)]
+impl LogTable {
+    /// Has all logs read at this rate, Hz, whatever their entries say (flag `--rate`).
+    pub fn set_rate(&mut self, rate_hz: f64) {
+        self.rate_hz = Some(rate_hz);
+        let entries = self.entries.iter_mut();
+        entries.for_each(|entry| entry.rate_hz = Some(rate_hz));
+    }
+
+    /// Has rows of all logs that cannot be read dropped and counted (flag `--lenient`).
+    pub fn set_lenient(&mut self) {
+        self.lenient = Some(true);
+        let entries = self.entries.iter_mut();
+        entries.for_each(|entry| entry.lenient = Some(true));
+    }
+}
+
+/// One log and what is known of it; see `LogKeys` for the keys.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct LogEntry {
     /// The log, relative to this config.
     pub file: PathBuf,
-    /// What the robot carried beyond its model: { mass = kg, com = [x, y, z] } in the payload frame, m; "unknown": to be
-    /// found. Default: nothing.
+    /// What the robot carried beyond its model.
     pub payload: Option<PayloadKey>,
-    /// Score on this log instead of fitting it; default false.
+    /// Score on this log instead of fitting it.
     pub heldout: Option<bool>,
-    /// Sampling rate, Hz: replaces time stamps that are missing or wrong (flag `--rate`).
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    /// Sampling rate, Hz, that replaces the time stamps.
     pub rate_hz: Option<f64>,
-    /// Drop and count rows that cannot be read instead of refusing the file (flag `--lenient`).
+    /// Drop and count rows that cannot be read.
     pub lenient: Option<bool>,
-    /// Topics of a bag that are read: one, or a list from which each joint's channel is taken from the first that has it.
-    /// Default: the only one with joint states.
+    /// Topics of a bag that are read.
     pub topic: Option<Topics>,
-    /// Whose recorder wrote the table: its column names are then known. `[columns]` goes first.
+    /// Whose recorder wrote the table.
     pub preset: Option<PresetWord>,
-    /// What the logged torque is; default "joint", with the preset ur-rtde "current".
+    /// What the logged torque is.
     pub torque: Option<TorqueWord>,
-    /// Turns of the motor per turn of the joint, by joint name; for torque = "motor" and "current".
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    /// Turns of the motor per turn of the joint, by joint name.
     pub gear_ratio: BTreeMap<String, f64>,
-    /// Motor torque per current, N·m/A, by joint name, for torque = "current"; without gear_ratio joint torque per current.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    /// Motor torque per current, N·m/A, by joint name.
     pub drive_constant: BTreeMap<String, f64>,
-    /// Take a column that holds the controller's own model of the torque, such as target_moment, for a measurement;
-    /// default false.
+    /// Take a column that holds the controller's own model of the torque for a measurement.
     pub accept_model_torque: Option<bool>,
 }
 
@@ -349,6 +351,19 @@ pub enum NumberOrAuto {
     Auto(AutoWord),
 }
 
+/// A lag, or "auto".
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "expected \"auto\", seconds, or seconds by joint such as { elbow = 0.008 }"
+)]
+pub enum LagOrAuto {
+    /// Estimated from the training logs.
+    Auto(AutoWord),
+    /// As given.
+    Given(PerJoint),
+}
+
 /// `[signal]`
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
@@ -359,10 +374,9 @@ pub struct SignalTable {
     pub cutoff_hz: Option<NumberOrAuto>,
     /// Rate of the kept rows, Hz; default "auto" = 2.5 × cut-off.
     pub rate_hz: Option<NumberOrAuto>,
-    /// How much later than the motion torque was logged, s: torque is moved back by it. One number for all joints, or
-    /// { joint = seconds }; negative where torque comes first. 0 says that there is none: without this key a lag of more than one
-    /// sample counts as degraded data.
-    pub lag: Option<PerJoint>,
+    /// How much later than the motion torque was logged, s: torque is moved back by it. Default "auto": estimated from the training logs and
+    /// applied where it is clear. One number for all joints, or { joint = seconds }; negative where torque comes first; 0 leaves torque as logged.
+    pub lag: Option<LagOrAuto>,
     /// Default true: where what is left of the torque is noise of one memory (an AR(1)) on every joint, the fit goes on up to four
     /// times the automatic cut-off with `noise.model = "ar1"`; a note says so. false: never. Nor does it where `cutoff_hz`, `rate_hz` or
     /// `noise.model` is stated, rows are weighed (`noise.robust`, `varies_with_…`) or the noise is sampled.

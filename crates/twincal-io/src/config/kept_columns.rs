@@ -3,6 +3,7 @@
 
 use super::{ChannelNames, ColumnsTable, FactorTable, PerJoint, ReadAs};
 use crate::log::{LogOptions, has_columns};
+use twincal::words::listed;
 use twincal::{Finding, Severity};
 
 /// Channels that a log may lack.
@@ -139,7 +140,7 @@ impl ReadAs {
             let from_fit: Vec<(String, f64)> = from_fit.collect();
             told.extend((from_fit.chunk_by(|a, b| a.1 == b.1)).map(|group| {
                 let names: Vec<&str> = group.iter().map(|(joint, _)| joint.as_str()).collect();
-                format!("{key} of {} by {}", names.join(", "), group[0].1)
+                format!("{key} of {} by {}", listed(&names, ", "), group[0].1)
             }));
             *own = own.or(fitted, joints);
             *kept = PerJoint::ByJoint(from_fit.into_iter().collect());
@@ -149,7 +150,7 @@ impl ReadAs {
         }
         let message = format!(
             "logged numbers are multiplied as in the fit: {}; [columns] factor of a --config says otherwise (1.0: as it is logged)",
-            told.join("; ")
+            listed(&told, "; ")
         );
         let finding = Finding::new(Severity::Note, "factor_as_fitted", "", message, 0);
         Some((kept, finding))

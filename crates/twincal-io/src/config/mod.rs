@@ -21,9 +21,9 @@ pub use channel_names::{ChannelNames, ColumnsTable, TimeUnit};
 pub use factors::FactorTable;
 pub use file::{
     Allow, AutoWord, BaseTable, CheckTable, ConfigFile, FamilyWord, Friction, InclusionTable,
-    InferenceTable, LibraryTable, LogEntry, LogTable, MethodWord, ModelTable, NoisePrior,
-    NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PresetWord, PriorTable,
-    SignalTable, Slab, Topics, TorqueWord, UncertaintyWord, UnknownWord, VelocityWord,
+    InferenceTable, LagOrAuto, LibraryTable, LogEntry, LogTable, MethodWord, ModelTable,
+    NoisePrior, NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PresetWord,
+    PriorTable, SignalTable, Slab, Topics, TorqueWord, UncertaintyWord, UnknownWord, VelocityWord,
 };
 pub use kept_columns::Attempt;
 pub use log_form::LogForm;
@@ -32,7 +32,9 @@ pub use proposal::{Proposal, key};
 pub use read_as::ReadAs;
 pub use settings::{Gates, LogSettings, OneLog, Settings};
 
+use crate::artifact::sha256;
 use crate::error::{Error, Place, Result};
+use crate::open::{InputFile, Refusal};
 use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
 
@@ -51,6 +53,8 @@ pub struct Config {
 struct Source {
     name: String,
     text: String,
+    /// Where the config was read from; none: from memory.
+    path: Option<PathBuf>,
 }
 
 impl Config {
@@ -61,24 +65,31 @@ impl Config {
     pub fn read(path: &Path) -> Result<Self> {
         let name = path.to_string_lossy().into_owned();
         let remedy = "give an existing file with --config";
-        let size = std::fs::metadata(path)
-            .map_err(|e| Error::system(&name, "read", &e, remedy))?
-            .len();
-        if size > SIZE_LIMIT {
-            return Err(Error::content(
-                Place::file(name),
-                format!("{size} bytes, the limit for a config is {SIZE_LIMIT}"),
-                "this is not a twincal.toml",
-            ));
-        }
-        let bytes = std::fs::read(path).map_err(|e| Error::system(&name, "read", &e, remedy))?;
+        let bytes = (InputFile::new(path, SIZE_LIMIT).read()).map_err(|refusal| match refusal {
+            Refusal::TooLarge { .. } => refusal.into_error(&name, "this is not a twincal.toml"),
+            other => other.into_error(&name, remedy),
+        })?;
         let text = String::from_utf8(bytes).map_err(|e| {
             let place = Place::of_offset(&name, e.as_bytes(), e.utf8_error().valid_up_to());
             Error::content(place, "not UTF-8", "save the file as UTF-8")
         })?;
         let mut config = Self::parse(&name, &text)?;
+        if let Some(source) = &mut config.source {
+            source.path = Some(path.to_owned());
+        }
         config.relative_to(path.parent().unwrap_or(Path::new("")));
         Ok(config)
+    }
+
+    /// The file that it was read from, as given, and its SHA-256; none for defaults.
+    pub fn read_from(&self) -> Option<(&Path, String)> {
+        let source = self.source.as_ref()?;
+        Some((source.path.as_deref()?, sha256(source.text.as_bytes())))
+    }
+
+    /// The file that it was read from; `None` for settings of flags alone.
+    pub fn path(&self) -> Option<&Path> {
+        self.source.as_ref()?.path.as_deref()
     }
 
     /// Reads a config from its text; `name` is used in messages.
@@ -91,6 +102,9 @@ impl Config {
             None => Place::file(name),
         };
         let document = DeTable::parse(text).map_err(|e| {
+            if let Some(error) = both_forms(name, text) {
+                return error;
+            }
             Error::content(
                 place(e.span()),
                 one_line(e.message()),
@@ -119,6 +133,7 @@ impl Config {
             source: Some(Source {
                 name: name.into(),
                 text: text.into(),
+                path: None,
             }),
         })
     }
@@ -136,6 +151,9 @@ impl Config {
         file.output = OutputTable::default();
         match toml::Table::try_from(&file) {
             Ok(mut table) => {
+                if file.log == LogTable::default() {
+                    table.remove("log");
+                }
                 prune(&mut table);
                 table.to_string()
             }
@@ -157,7 +175,7 @@ impl Config {
     fn place(&self, key: &str) -> Option<Place> {
         let source = self.source.as_ref()?;
         let document = DeTable::parse(&source.text).ok()?;
-        let offset = offset_of(document.get_ref(), key)?;
+        let offset = offset_of(document.get_ref(), &as_written(document.get_ref(), key))?;
         Some(Place::of_offset(
             &source.name,
             source.text.as_bytes(),
@@ -206,6 +224,50 @@ impl Config {
             }
             .into(),
         }
+    }
+}
+
+/// The error for `[log]` beside `[[log]]`, which no TOML can have, at the second of them.
+fn both_forms(name: &str, text: &str) -> Option<Error> {
+    let line_of = |header: &str| {
+        let is_header =
+            |line: &str| line.split('#').next().unwrap_or("").replace(' ', "") == header;
+        text.lines().position(|line| is_header(line.trim()))
+    };
+    let (table, entry) = (line_of("[log]")? + 1, line_of("[[log]]")? + 1);
+    let problem =
+        format!("has a table [log] in line {table} and entries [[log]] from line {entry} on");
+    Some(Error::content(
+        Place::line(name, table.max(entry) as u64),
+        problem,
+        "write [[log]] in both lines: an entry without `file` holds for all logs without an entry of their own",
+    ))
+}
+
+/// The key of an entry `log.N`, counted among those with a file, or of what holds for all logs, as it stands in the file.
+fn as_written(document: &DeTable<'_>, key: &str) -> String {
+    let Some(rest) = key.strip_prefix("log.") else {
+        return key.into();
+    };
+    let log = document.iter().find(|(name, _)| name.get_ref() == "log");
+    let Some(DeValue::Array(items)) = log.map(|(_, value)| value.get_ref()) else {
+        // The only entry, as a table.
+        return format!("log.{}", rest.strip_prefix("0.").unwrap_or(rest));
+    };
+    let has_file = |place: &usize| match items.get(*place).map(toml::Spanned::get_ref) {
+        Some(DeValue::Table(entry)) => entry.iter().any(|(name, _)| name.get_ref() == "file"),
+        _ => false,
+    };
+    let (first, after) = rest.split_once('.').unwrap_or((rest, ""));
+    match first.parse::<usize>() {
+        Ok(number) => match (0..items.len()).filter(has_file).nth(number) {
+            Some(place) => format!("log.{place}.{after}"),
+            None => key.into(),
+        },
+        Err(_) => match (0..items.len()).find(|place| !has_file(place)) {
+            Some(place) => format!("log.{place}.{rest}"),
+            None => key.into(),
+        },
     }
 }
 

@@ -18,6 +18,8 @@ pub struct Proposal {
     pub model: PathBuf,
     /// Joints without a column, and where they are taken to stand.
     pub locked: BTreeMap<String, f64>,
+    /// The line of `[model]` that says how the base stands, and why.
+    pub base: Option<(String, String)>,
     /// Accept inertia tensors that no body has.
     pub allow_unphysical: bool,
     /// Logs with what is known of each.
@@ -62,6 +64,10 @@ impl Proposal {
                 "The log has no column for these; they are taken to stand still here (rad or m).",
             );
             let _ = writeln!(text, "locked = {{ {} }}", joints.join(", "));
+        }
+        if let Some((line, why)) = &self.base {
+            comment(&mut text, why);
+            let _ = writeln!(text, "{line}");
         }
         if self.allow_unphysical {
             text.push_str("allow = [\"unphysical_inertia\"]\n");
@@ -148,6 +154,7 @@ impl Proposal {
 /// The entries `[[log]]`.
 #[derive(Serialize)]
 struct Logs<'a> {
+    #[serde(serialize_with = "super::log_forms::serialize_entries")]
     log: &'a [LogEntry],
 }
 
@@ -198,7 +205,7 @@ pub fn key(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Config, FactorTable, TimeUnit, TorqueWord, VelocityWord};
+    use super::super::{Config, FactorTable, LagOrAuto, TimeUnit, TorqueWord, VelocityWord};
     use super::*;
 
     #[test]
@@ -208,6 +215,10 @@ mod tests {
             command: "twincal init run.csv\n[evil]".into(),
             model: "arm.urdf".into(),
             locked: BTreeMap::from([("finger".into(), 0.0), (odd.into(), 0.5)]),
+            base: Some((
+                "base = { rpy = [0.0, 1.5, 0.0] }".into(),
+                "on a wall".into(),
+            )),
             allow_unphysical: true,
             logs: vec![
                 LogEntry {
@@ -250,8 +261,12 @@ mod tests {
         config.settings().unwrap();
         let file = &config.file;
         assert_eq!(file.model.locked, proposal.locked);
+        assert_eq!(file.model.base.unwrap().rpy, [0.0, 1.5, 0.0]);
         assert_eq!(file.columns, proposal.columns);
-        assert_eq!(file.signal.lag, Some(PerJoint::All(0.008)));
+        assert_eq!(
+            file.signal.lag,
+            Some(LagOrAuto::Given(PerJoint::All(0.008)))
+        );
         assert_eq!(file.signal.velocity, Some(VelocityWord::Position));
         assert_eq!(file.log.entries, proposal.logs);
     }

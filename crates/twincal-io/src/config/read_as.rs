@@ -29,9 +29,9 @@ impl ReadAs {
         for mut options in options {
             options.torque.source = Some(options.torque_source());
             let said = [
-                ("[log] preset", options.preset.is_some()),
-                ("[log] topic", !options.topics.is_empty()),
-                ("[log] rate_hz", options.rate_hz.is_some()),
+                ("[[log]] preset", options.preset.is_some()),
+                ("[[log]] topic", !options.topics.is_empty()),
+                ("[[log]] rate_hz", options.rate_hz.is_some()),
             ];
             for (key, _) in said.into_iter().filter(|(_, said)| *said) {
                 if !keys.iter().any(|known| known == key) {
@@ -75,10 +75,10 @@ impl ReadAs {
                     .filter(|form| is_silent(&form.torque, form.preset))
                     .for_each(|form| form.torque = torque.clone());
                 format!(
-                    "the logged torque counts as {taken} that the logs of the fit had; [log] torque of a --config says otherwise (\"joint\": as it is logged)"
+                    "the logged torque counts as {taken} that the logs of the fit had; [[log]] torque of a --config says otherwise (\"joint\": as it is logged)"
                 )
             }
-            None => "the torque of the fit's logs was not of one kind ([[log]] torque): here it counts as joint torque; [log] torque of a --config says otherwise".into(),
+            None => "the torque of the fit's logs was not of one kind ([[log]] torque): here it counts as joint torque; [[log]] torque of a --config says otherwise".into(),
         };
         let code = "torque_as_fitted";
         Some(Finding::new(Severity::Warning, code, "", message, 0))

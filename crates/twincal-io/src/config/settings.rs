@@ -1,14 +1,14 @@
 //! From keys to settings: defaults filled in, ranges checked.
 
 use super::{
-    Allow, Config, LogForm, MethodWord, NoisePrior, NoiseWord, NumberOrAuto, PayloadKey, PerJoint,
-    Slab, UncertaintyWord, VelocityWord,
+    Allow, Config, LagOrAuto, LogForm, MethodWord, NoisePrior, NoiseWord, NumberOrAuto, PayloadKey,
+    PerJoint, Slab, UncertaintyWord, VelocityWord,
 };
 use crate::error::Result;
 use crate::log::LogOptions;
 use crate::model::ModelSettings;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use twincal::calibrate::CalibrationSettings;
 use twincal::infer::{Choice, InferenceSettings, LEAST_CHAINS, LEAST_DRAWS};
@@ -17,7 +17,10 @@ use twincal::prior::{Inclusion, PriorSettings};
 use twincal::signal::{Auto, Corrections, DerivedFrom, Lag, Payload, SignalSettings};
 use twincal::term::{Family, LibrarySettings};
 
-/// `[log]` and `[columns]` with defaults.
+/// Most entries `[[log]]`.
+const MAX_LOGS: usize = 10_000;
+
+/// `[[log]]` and `[columns]` with defaults.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LogSettings {
     /// Held-out logs.
@@ -41,6 +44,8 @@ pub struct LogSettings {
 pub struct OneLog {
     /// The log.
     pub file: PathBuf,
+    /// Where it lies when all links are followed; none where there is no such file.
+    pub real: Option<PathBuf>,
     /// What the robot carried.
     pub payload: Payload,
     /// Scored on instead of fitted.
@@ -56,18 +61,19 @@ pub struct OneLog {
 impl LogSettings {
     /// How a log is read: what its entry says (the same file by any path), else what holds for all.
     pub fn options(&self, path: &Path) -> LogOptions {
-        let same = |entry: &&OneLog| {
-            entry.file == path
-                || matches!((entry.file.canonicalize(), path.canonicalize()), (Ok(a), Ok(b)) if a == b)
-        };
-        let entry = self.entries.iter().find(same);
+        let by_name = self.entries.iter().find(|entry| entry.file == path);
+        let entry = by_name.or_else(|| {
+            let real = path.canonicalize().ok()?;
+            let mut entries = self.entries.iter();
+            entries.find(|entry| entry.real.as_ref() == Some(&real))
+        });
         let form = entry.map_or(&self.form, |entry| &entry.form).clone();
         LogOptions {
             preset: form.preset,
             topics: form.topics,
             torque: form.torque,
-            rate_hz: self.rate_hz.or(entry.and_then(|entry| entry.rate_hz)),
-            lenient: self.lenient || entry.is_some_and(|entry| entry.lenient),
+            rate_hz: entry.map_or(self.rate_hz, |entry| entry.rate_hz),
+            lenient: entry.map_or(self.lenient, |entry| entry.lenient),
             columns: self.columns.clone(),
             payload: entry.map_or(Payload::None, |entry| entry.payload),
         }
@@ -215,10 +221,16 @@ impl Config {
     }
 
     fn entries(&self) -> Result<Vec<OneLog>> {
+        let given = &self.file.log.entries;
+        if given.len() > MAX_LOGS {
+            let problem = format!("{} entries, the limit is {MAX_LOGS}", given.len());
+            return Err(self.out_of_range("log", problem, "fit fewer logs at a time"));
+        }
         let mut entries: Vec<OneLog> = Vec::new();
-        for (index, entry) in self.file.log.entries.iter().enumerate() {
+        let mut files = BTreeSet::new();
+        for (index, entry) in given.iter().enumerate() {
             let key = |name: &str| format!("log.{index}.{name}");
-            if entries.iter().any(|other| other.file == entry.file) {
+            if !files.insert(&entry.file) {
                 let problem = format!("`{}` has two entries", entry.file.display());
                 return Err(self.out_of_range(&key("file"), problem, "keep one of them"));
             }
@@ -241,6 +253,7 @@ impl Config {
             };
             entries.push(OneLog {
                 file: entry.file.clone(),
+                real: entry.file.canonicalize().ok(),
                 payload,
                 heldout: entry.heldout.unwrap_or(false),
                 rate_hz: entry.rate_hz,
@@ -332,9 +345,9 @@ impl Config {
         let range = "seconds between -1 and 1";
         let number = |key: &str, lag: f64| self.number(key, lag, |lag| lag.abs() <= 1.0, range);
         Ok(match &self.file.signal.lag {
-            None => Lag::Unsaid,
-            Some(PerJoint::All(lag)) => Lag::All(number("signal.lag", *lag)?),
-            Some(PerJoint::ByJoint(joints)) => {
+            None | Some(LagOrAuto::Auto(_)) => Lag::Unsaid,
+            Some(LagOrAuto::Given(PerJoint::All(lag))) => Lag::All(number("signal.lag", *lag)?),
+            Some(LagOrAuto::Given(PerJoint::ByJoint(joints))) => {
                 for (joint, lag) in joints {
                     number(&format!("signal.lag.{joint}"), *lag)?;
                 }

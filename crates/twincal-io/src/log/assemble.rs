@@ -167,6 +167,10 @@ impl Make {
             .collect();
         let mut recording = Recording {
             unfolded: false,
+            start_ns: self
+                .origin
+                .filter(|_| self.options.rate_hz.is_none())
+                .unwrap_or(0),
             name: self.name.clone(),
             time,
             joints,
@@ -216,8 +220,18 @@ impl Make {
         }
         let mut time = stamps.unwrap_or_default();
         if let Some(origin) = self.origin {
-            time.iter_mut()
-                .for_each(|time| *time = stamps::seconds(stamps::at(origin, *time)));
+            time.iter_mut().for_each(|ns| *ns /= 1e9);
+            let message = format!(
+                "time counts from the stamp {} s, the first of the log",
+                stamps::digits(origin)
+            );
+            findings.push(Finding::new(
+                Severity::Note,
+                "time_origin",
+                name,
+                message,
+                0,
+            ));
         }
         if let Some(unit) = options.columns.time_unit.filter(|unit| unit.ticks() != 1.0) {
             time.iter_mut().for_each(|time| *time /= unit.ticks());

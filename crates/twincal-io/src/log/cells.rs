@@ -19,7 +19,7 @@ const BYTES: usize = size_of::<f64>();
 pub(crate) struct Cells {
     /// Rows in memory: all of them, or the last ones of a long table.
     pub(crate) columns: Vec<Vec<f64>>,
-    /// Where the time in the first column counts from in ns; none: it is what the file says.
+    /// Where the time in the first column counts from, both in ns; none: it is what the file says.
     pub(crate) origin: Option<i64>,
     /// What the numbers of each column are divided by; empty: by 1.
     pub(crate) scales: Vec<f64>,

@@ -12,14 +12,17 @@
 //! free where that leaves one column.
 
 mod configured;
+mod named;
 
-use super::{LogOptions, MAX_COLUMNS, preset};
+use super::{LogOptions, preset};
 use crate::error::{Error, Place, Result};
 use configured::by_joint_name;
 pub(crate) use configured::has_columns;
 pub(super) use configured::refuse_unknown_joints;
-use std::collections::BTreeMap;
+use named::Header;
+use std::collections::{BTreeMap, BTreeSet};
 use twincal::robot::{Robot, did_you_mean};
+use twincal::words::{listed, quoted};
 use twincal::{Finding, Severity};
 
 /// Words for position, velocity, acceleration, torque.
@@ -109,81 +112,6 @@ impl Selection {
     }
 }
 
-/// Names of a file's columns, exact and without letter case.
-struct Header<'a> {
-    file: &'a str,
-    names: &'a [String],
-    exact: BTreeMap<&'a str, usize>,
-    folded: BTreeMap<String, Vec<usize>>,
-}
-
-impl<'a> Header<'a> {
-    fn new(file: &'a str, names: &'a [String]) -> Result<Self> {
-        if names.len() > MAX_COLUMNS {
-            return Err(Error::content(
-                Place::line(file, 1),
-                format!("{} columns, the limit is {MAX_COLUMNS}", names.len()),
-                "export only the columns that are needed",
-            ));
-        }
-        let (mut exact, mut folded) = (BTreeMap::new(), BTreeMap::<String, Vec<usize>>::new());
-        for (index, name) in names
-            .iter()
-            .enumerate()
-            .filter(|(_, name)| !name.is_empty())
-        {
-            if let Some(first) = exact.insert(name.as_str(), index) {
-                return Err(Error::content(
-                    Place::line(file, 1),
-                    format!(
-                        "two columns are called `{name}` (number {} and {})",
-                        first + 1,
-                        index + 1
-                    ),
-                    "give every column its own name",
-                ));
-            }
-            folded.entry(name.to_lowercase()).or_default().push(index);
-        }
-        Ok(Self {
-            file,
-            names,
-            exact,
-            folded,
-        })
-    }
-
-    fn channel(&self, index: usize) -> Channel {
-        Channel {
-            index,
-            name: self.names[index].clone(),
-        }
-    }
-
-    /// The column of that name; letter case is free if it leaves one.
-    fn find(&self, name: &str) -> Option<usize> {
-        if let Some(&index) = self.exact.get(name) {
-            return Some(index);
-        }
-        match self.folded.get(&name.to_lowercase()).map(Vec::as_slice) {
-            Some([index]) => Some(*index),
-            _ => None,
-        }
-    }
-
-    /// A column that the config names.
-    fn mapped(&self, key: &str, name: &str) -> Result<Channel> {
-        let index = self.exact.get(name).ok_or_else(|| {
-            Error::content(
-                Place::file(self.file),
-                format!("has no column `{name}`, which [columns] {key} names"),
-                did_you_mean(name, self.names.iter().map(String::as_str)),
-            )
-        })?;
-        Ok(self.channel(*index))
-    }
-}
-
 /// Decides which column of `header` is which channel; see the table at the top of this file.
 ///
 /// # Errors
@@ -207,7 +135,7 @@ pub fn match_columns(
         ) => {
             let name = preset.name();
             let remedy = format!(
-                "the columns are those of a recorder: say [log] preset = \"{name}\"; else {remedy}"
+                "the columns are those of a recorder: say [[log]] preset = \"{name}\"; else {remedy}"
             );
             Error::content(place, problem, remedy)
         }
@@ -314,12 +242,11 @@ fn find_time(header: &Header<'_>, options: &LogOptions) -> Result<Option<Channel
         .find_map(|word| header.find(word))
         .or_else(|| header.names.iter().position(|name| is_time(name)));
     if found.is_none() && options.rate_hz.is_none() {
-        let shown: Vec<&str> = header.names.iter().take(8).map(String::as_str).collect();
         return Err(Error::content(
             Place::file(header.file),
             format!(
-                "has no time column (`t` or `time`); its columns begin `{}`",
-                shown.join("`, `")
+                "has no time column (`t` or `time`); its columns are {}",
+                quoted(header.names)
             ),
             "name it in [columns] time, or give the sampling rate with --rate HZ",
         ));
@@ -416,24 +343,23 @@ fn refuse_foreign_joints(
     robot: &Robot,
     matched: &[[Option<Channel>; 4]],
 ) -> Result<()> {
-    let used = |index: usize| matched.iter().flatten().flatten().any(|c| c.index == index);
+    let used: BTreeSet<usize> = (matched.iter().flatten().flatten())
+        .map(|channel| channel.index)
+        .collect();
     let moving = robot.joint_names();
-    let known = |name: &str| {
-        robot
-            .description()
-            .joints
-            .iter()
-            .any(|j| j.name.eq_ignore_ascii_case(name))
-    };
+    let known: BTreeSet<String> = (robot.description().joints.iter())
+        .map(|joint| joint.name.to_ascii_lowercase())
+        .collect();
     let numbered_used = matched
         .iter()
         .filter_map(|joint| joint[0].as_ref())
         .any(|c| numbered_position(&c.name).is_some());
     for (index, name) in header.names.iter().enumerate() {
-        if used(index) {
+        if used.contains(&index) {
             continue;
         }
-        if let Some(joint) = dotted_joint(name).filter(|joint| !known(joint)) {
+        let unknown = |joint: &&str| !known.contains(&joint.to_ascii_lowercase());
+        if let Some(joint) = dotted_joint(name).filter(unknown) {
             return Err(Error::content(
                 Place::file(header.file),
                 format!("column `{name}`: the model has no joint `{joint}`"),
@@ -459,8 +385,8 @@ fn refuse_foreign_joints(
                         matched.len()
                     ),
                     format!(
-                        "they are `{}`; name columns after joints, or map them in [columns]",
-                        moving.join("`, `")
+                        "they are {}; name columns after joints, or map them in [columns]",
+                        quoted(&moving)
                     ),
                 ));
             }
@@ -489,37 +415,27 @@ fn refuse_missing_joints(
         }
         return Err(Error::content(
             Place::file(header.file),
-            format!(
-                "has torque columns, but none for joint `{}`",
-                silent.join("`, `")
-            ),
+            format!("has torque columns, but none for joint {}", quoted(&silent)),
             "add them, map them in [columns] tau, or fix the joint with [model] locked",
         ));
     };
     let (problem, remedy);
     if missing.len() == joints.len() {
-        let shown: Vec<&str> = header.names.iter().take(12).map(String::as_str).collect();
         problem = format!(
-            "has no position column for any joint of the model; its columns begin `{}`",
-            shown.join("`, `")
+            "has no position column for any joint of the model; its columns are {}",
+            quoted(header.names)
         );
         remedy = format!(
             "name columns `q1`, `qd1`, `tau1` … or `{}.q` …, or map them in [columns]",
             joints[first]
         );
     } else {
-        let names: Vec<String> = missing
-            .iter()
-            .map(|&j| format!("`{}` (q{})", joints[j], j + 1))
-            .collect();
-        let locked: Vec<String> = missing
-            .iter()
-            .map(|&j| format!("{} = 0.0", key(joints[j])))
-            .collect();
-        problem = format!("has no position column for joint {}", names.join(", "));
+        let named = (missing.iter()).map(|&j| format!("`{}` (q{})", joints[j], j + 1));
+        let locked = (missing.iter()).map(|&j| format!("{} = 0.0", key(joints[j])));
+        problem = format!("has no position column for joint {}", listed(named, ", "));
         remedy = format!(
             "if it does not move, fix it with [model] locked = {{ {} }}; else add the column or map it in [columns] q",
-            locked.join(", ")
+            listed(locked, ", ")
         );
     }
     Err(Error::content(Place::file(header.file), problem, remedy))
@@ -547,7 +463,7 @@ pub(super) fn refuse_model_torque(
                     "column `{}`, the torque of joint `{joint}`, is the controller's own model of the robot, not a measurement: fitted to it, a twin learns that model",
                     torque.name
                 ),
-                "use measured torque, or motor currents with [log] torque = \"current\" and drive_constant; if you mean it, say [log] accept_model_torque = true",
+                "use measured torque, or motor currents with [[log]] torque = \"current\" and drive_constant; if you mean it, say [[log]] accept_model_torque = true",
             ));
         }
     }

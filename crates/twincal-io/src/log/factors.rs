@@ -5,6 +5,7 @@ use crate::config::PerJoint;
 use crate::error::Result;
 use twincal::robot::{Robot, did_you_mean};
 use twincal::signal::Recording;
+use twincal::words::listed;
 use twincal::{Finding, Severity};
 
 /// Refuses factors that turn no number into another one, and joints that do not move in the model.
@@ -75,7 +76,7 @@ pub(super) fn apply(
         &recording.name,
         format!(
             "logged numbers are multiplied, as told: {}",
-            told.join(", ")
+            listed(&told, ", ")
         ),
         0,
     ));

@@ -2,12 +2,12 @@
 
 use super::{Kind, arrow, csv};
 use crate::error::{Error, Result};
+use crate::open::open_log_file;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
-use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
-/// Column names of a CSV, Parquet or Arrow file; `None` for what cannot be read twice (a pipe) or holds them otherwise.
+/// Column names of a CSV, Parquet or Arrow file; `None` for what holds them otherwise.
 ///
 /// # Errors
 /// [`Error::System`] if the file cannot be read, [`Error::Content`] if it has no header.
@@ -15,11 +15,8 @@ pub fn read_header(path: &Path) -> Result<Option<Vec<String>>> {
     let name = path.display().to_string();
     let system =
         |e: &std::io::Error| Error::system(&name, "read", e, "check the path and its permissions");
-    let mut file = File::open(path).map_err(|e| system(&e))?;
-    let metadata = file.metadata().map_err(|e| system(&e))?;
-    if !metadata.is_file() {
-        return Ok(None);
-    }
+    let mut file = open_log_file(path, &name)?;
+    let bytes = file.metadata().map_err(|e| system(&e))?.len();
     let mut head = Vec::new();
     (&mut file)
         .take(Kind::HEAD as u64)
@@ -28,6 +25,7 @@ pub fn read_header(path: &Path) -> Result<Option<Vec<String>>> {
     file.seek(SeekFrom::Start(0)).map_err(|e| system(&e))?;
     match Kind::of(&head) {
         Kind::Parquet => {
+            super::parquet::check_footer(&file, &name)?;
             // What is wrong with the file is said when it is read.
             let Ok(reader) = SerializedFileReader::new(file) else {
                 return Ok(None);
@@ -41,6 +39,6 @@ pub fn read_header(path: &Path) -> Result<Option<Vec<String>>> {
         Kind::Text => {}
         _ => return Ok(None),
     }
-    let table = csv::Table::open(file, metadata.len(), &name)?;
+    let table = csv::Table::open(file, bytes, &name)?;
     Ok(Some(table.header().to_vec()))
 }

@@ -27,7 +27,7 @@ mod parquet;
 mod preset;
 mod scratch;
 mod shared_file;
-mod stamps;
+pub(crate) mod stamps;
 mod torque;
 
 pub(crate) use assemble::assemble;
@@ -40,7 +40,7 @@ pub use torque::{TorqueOptions, TorqueSource};
 
 use crate::config::ColumnsTable;
 use crate::error::{Error, Place, Result};
-use std::fs::File;
+use crate::open::open_log_file;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use twincal::Finding;
@@ -49,6 +49,8 @@ use twincal::signal::{Log, Payload, Recording};
 
 /// Most columns of a table.
 pub const MAX_COLUMNS: usize = 100_000;
+/// Longest name of a column, a topic or a joint, bytes.
+pub const MAX_NAME: usize = 4096;
 
 /// How logs are read.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -59,11 +61,11 @@ pub struct LogOptions {
     pub lenient: bool,
     /// Which column is which channel where the names do not say it (`[columns]`).
     pub columns: ColumnsTable,
-    /// Whose recorder wrote the table (`[log] preset`).
+    /// Whose recorder wrote the table (`[[log]] preset`).
     pub preset: Option<Preset>,
-    /// Topics of a bag (`[log] topic`); none: the only one with joint states.
+    /// Topics of a bag (`[[log]] topic`); none: the only one with joint states.
     pub topics: Vec<String>,
-    /// What the logged torque is (`[log] torque`).
+    /// What the logged torque is (`[[log]] torque`).
     pub torque: TorqueOptions,
     /// What the robot carried (`[[log]] payload`); handed on as it is.
     pub payload: Payload,
@@ -72,7 +74,7 @@ pub struct LogOptions {
 /// Reads one log: CSV with any delimiter, Parquet, Arrow, NPZ, MCAP, a SQLite bag (told by their first bytes, not by their names) or the folder
 /// of a rosbag2.
 ///
-/// Values are taken as they are, NaN included, and torque as `[log] torque` says; joints come out in the robot's order.
+/// Values are taken as they are, NaN included, and torque as `[[log]] torque` says; joints come out in the robot's order.
 ///
 /// # Errors
 /// [`Error::System`] if the file cannot be read; [`Error::Content`] with `file:line[:column]` for everything in it that cannot
@@ -132,38 +134,26 @@ fn read(
     chapters: bool,
 ) -> Result<(Log<'static>, Vec<Finding>)> {
     let name = path.display().to_string();
-    let remedy = if name.contains(['*', '?']) {
-        "no file is called so: a pattern that matches nothing comes as it was typed"
-    } else {
-        "check the path and its permissions"
-    };
-    let system = |e: &std::io::Error| Error::system(&name, "read", e, remedy);
+    let system = |e: &std::io::Error| Error::system(&name, "read", e, "check the disk");
     let request = Request {
         name: &name,
         robot,
         options,
         chapters,
     };
-    let mut file = File::open(path).map_err(|e| system(&e))?;
-    let metadata = file.metadata().map_err(|e| system(&e))?;
-    if metadata.is_dir() {
+    if path.is_dir() {
         return bag::read(path, request);
     }
+    let mut file = open_log_file(path, &name)?;
+    let bytes = file.metadata().map_err(|e| system(&e))?.len();
     let mut head = Vec::new();
     (&mut file)
         .take(Kind::HEAD as u64)
         .read_to_end(&mut head)
         .map_err(|e| system(&e))?;
-    // A pipe cannot be rewound: it is text.
-    let kind = if metadata.is_file() {
-        Kind::of(&head)
-    } else {
-        Kind::Text
-    };
+    let kind = Kind::of(&head);
     refuse_false_name(path, &name, &head, kind)?;
-    if kind != Kind::Text {
-        file.seek(SeekFrom::Start(0)).map_err(|e| system(&e))?;
-    }
+    file.seek(SeekFrom::Start(0)).map_err(|e| system(&e))?;
     match kind {
         Kind::Parquet => {
             let pages = file.try_clone().map_err(|e| system(&e))?;
@@ -175,11 +165,7 @@ fn read(
         Kind::Mcap | Kind::Sqlite | Kind::Zstd => bag::read(path, request),
         Kind::FirstFeather => Err(first_feather(&name)),
         Kind::LfsPointer => Err(lfs_pointer(&name)),
-        // The bytes already taken go first.
-        Kind::Text => {
-            let head = std::io::Cursor::new(head);
-            csv_table(head.chain(file), metadata.len(), request)
-        }
+        Kind::Text => csv_table(file, bytes, request),
     }
 }
 

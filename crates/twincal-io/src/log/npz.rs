@@ -5,10 +5,11 @@
 //! one of its columns, `positions[:,2]` (`npz/arrays.rs`).
 
 mod arrays;
+mod directory;
 
 use super::cells::{Sink, disk_failure};
 use super::columns::is_channel;
-use super::{Cells, Request, assemble};
+use super::{Cells, MAX_COLUMNS, Request, assemble};
 use crate::error::{Error, Place, Result};
 use std::io::{BufReader, Read, Seek};
 use twincal::Finding;
@@ -94,11 +95,12 @@ struct Array {
 
 /// Reads an NPZ log.
 pub(super) fn read(
-    source: impl Read + Seek,
+    mut source: impl Read + Seek,
     request: Request<'_>,
 ) -> Result<(Log<'static>, Vec<Finding>)> {
     let name = request.name;
     let refuse = |problem: String, remedy: &str| Error::content(Place::file(name), problem, remedy);
+    directory::check(&mut source, MAX_ARRAYS, name)?;
     let mut archive = ZipArchive::new(source)
         .map_err(|e| refuse(format!("is not a whole NPZ file: {e}"), "write it again"))?;
     if archive.len() > MAX_ARRAYS {
@@ -129,7 +131,8 @@ pub(super) fn read(
         array.first = columns.len();
         match array.header.shape[..] {
             [_] => columns.push(array.key.clone()),
-            [_, width] if width <= MAX_JOINTS => {
+            // Beyond the limit of columns there is nothing but the error.
+            [_, width] if width <= MAX_JOINTS && columns.len() <= MAX_COLUMNS => {
                 let joint = |number: usize| match names.get(number) {
                     Some(joint) if names.len() == width => format!("{joint}.{}", array.key),
                     _ => format!("{}{}", array.key, number + 1),
@@ -176,7 +179,8 @@ pub(super) fn read(
             .collect();
         let (key, mut file) = open(&mut archive, array.entry, name)?;
         header(&mut file, name, &key)?;
-        if let Err(e) = values(file, array, rows, &targets, &mut sinks) {
+        let read = values(&mut file, array, rows, &targets, &mut sinks);
+        if let Err(e) = read.and_then(|()| end(&mut file)) {
             let damaged = || refuse(format!("array `{key}` is damaged: {e}"), "write it again");
             return Err(disk_failure(name, &sinks).unwrap_or_else(damaged));
         }
@@ -317,9 +321,17 @@ fn parse(text: &str) -> std::result::Result<Header, String> {
     })
 }
 
+/// Reads an entry to its end, where its checksum is compared.
+fn end(file: &mut impl Read) -> std::io::Result<()> {
+    match file.read(&mut [0])? {
+        0 => Ok(()),
+        _ => Err(std::io::Error::other("it goes on behind its last number")),
+    }
+}
+
 /// Text of an array of names.
 fn text<R: Read + Seek>(
-    file: BufReader<ZipFile<'_, R>>,
+    mut file: BufReader<ZipFile<'_, R>>,
     header: &Header,
     name: &str,
     key: &str,
@@ -330,8 +342,10 @@ fn text<R: Read + Seek>(
         return Ok(Vec::new());
     }
     let mut bytes = Vec::new();
-    file.take((count * cell) as u64)
+    (&mut file)
+        .take((count * cell) as u64)
         .read_to_end(&mut bytes)
+        .and_then(|_| end(&mut file))
         .map_err(|e| {
             Error::content(
                 Place::file(name),
@@ -355,7 +369,7 @@ fn text<R: Read + Seek>(
 
 /// Reads the data behind the header into the columns that are wanted.
 fn values<R: Read + Seek>(
-    mut file: BufReader<ZipFile<'_, R>>,
+    file: &mut BufReader<ZipFile<'_, R>>,
     array: &Array,
     rows: usize,
     targets: &[Option<usize>],

@@ -317,11 +317,16 @@ fn bags_in_parts_come_in_chapters() {
         ..LogOptions::default()
     };
     let long = compare(&bag_in_parts(["/left", "/right"]), "mcap", &options);
-    let Recording { time, joints, .. } = long.whole().unwrap();
+    let Recording {
+        start_ns,
+        time,
+        joints,
+        ..
+    } = long.whole().unwrap();
     assert_eq!(time.len(), 30_000 - 5_500);
-    let start = 1_700_000_000.0;
+    let start = (start_ns - 1_700_000_000_000_000_000) as f64 / 1e6;
     for (row, time) in time.iter().enumerate() {
-        let ms = (time - start) * 1e3;
+        let ms = start + time * 1e3;
         let lost = (11_999.1..16_999.9).contains(&ms) || ms > 59_999.1;
         let q = joints[0].q[row];
         assert_eq!(q.is_nan(), lost, "{ms} ms");

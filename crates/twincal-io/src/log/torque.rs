@@ -1,7 +1,7 @@
 //! What the logged torque is: joint torque, motor torque before the gear, or a motor current; turned into joint torque only by numbers
 //! that the user gave.
 //!
-//! | `[log] torque` | joint torque |
+//! | `[[log]] torque` | joint torque |
 //! |---|---|
 //! | `joint` (default) | as logged |
 //! | `motor` | `gear_ratio` · logged |
@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use twincal::robot::{Robot, did_you_mean};
 use twincal::signal::Recording;
+use twincal::words::listed;
 use twincal::{Finding, Severity};
 
 /// What the logged torque is.
@@ -31,7 +32,7 @@ pub enum TorqueSource {
     None,
 }
 
-/// `[log] torque`, `gear_ratio`, `drive_constant`, `accept_model_torque`.
+/// `[[log]] torque`, `gear_ratio`, `drive_constant`, `accept_model_torque`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct TorqueOptions {
     /// As stated; `None`: `Current` with the preset `ur-rtde`, else `Joint`.
@@ -69,7 +70,7 @@ fn of_joint(key: &str, table: &BTreeMap<String, f64>, joint: &str, example: &str
         setting(
             key,
             format!("has no number for joint `{joint}`"),
-            format!("state it: [log] {key} = {{ \"{joint}\" = {example} }}"),
+            format!("state it: [[log]] {key} = {{ \"{joint}\" = {example} }}"),
         )
     })
 }
@@ -134,7 +135,7 @@ pub(super) fn to_joint_torque(
     if !factors.is_empty() {
         let message = format!(
             "joint torque is {what}, as told: {}{unit}",
-            factors.join(", ")
+            listed(&factors, ", ")
         );
         findings.push(Finding::new(
             Severity::Note,

@@ -2,6 +2,7 @@
 
 use super::xml::{Document, Element, MAX_BYTES, MAX_DEPTH, shorten};
 use crate::error::{Error, Result};
+use crate::open::{InputFile, Refusal};
 use std::path::{Path, PathBuf};
 
 /// Deepest chain of files.
@@ -145,22 +146,21 @@ fn open(
         );
     }
     budget.files += 1;
-    let size = match path.metadata() {
-        Ok(metadata) if metadata.is_file() => metadata.len(),
-        Ok(_) => {
-            return fail(
-                document,
-                format!("cannot include `{shown}`: it is not a file"),
-                "check the path",
-            );
+    let cannot = |refusal: Refusal| {
+        let problem = format!("cannot include `{shown}`: it {refusal}");
+        document.error(&element, problem, "check the path")
+    };
+    let limit = MAX_BYTES as u64;
+    let included = InputFile::new(&path, limit).inside(&folder.root);
+    let mut bytes = Vec::new();
+    let size = match included.read() {
+        Ok(read) => {
+            bytes = read;
+            bytes.len() as u64
         }
-        Err(error) => {
-            return fail(
-                document,
-                format!("cannot include `{shown}`: {error}"),
-                "check the path",
-            );
-        }
+        // Told below, with what the others have.
+        Err(Refusal::TooLarge { bytes, .. }) => bytes,
+        Err(refusal) => return Err(cannot(refusal)),
     };
     budget.bytes = budget
         .bytes
@@ -175,7 +175,6 @@ fn open(
             "no robot needs this: is it the right model?",
         );
     }
-    let bytes = super::read_limited(&path, file)?;
     let start = document.elements.len();
     let root = document.parse(file, &bytes)?;
     let name = &document.elements[root].name;

@@ -8,12 +8,30 @@ pub(crate) mod mjcf;
 mod urdf;
 
 use crate::error::{Error, Place, Result};
+use crate::log::MAX_NAME;
+use crate::open::{InputFile, Refusal};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::robot::spatial::{apply, roll_pitch_yaw, transpose};
 use twincal::robot::{Robot, RobotDescription};
 use xml::{Document, Element};
+
+/// Attributes that are names.
+const NAMES: [&str; 10] = [
+    "name",
+    "model",
+    "link",
+    "joint",
+    "joint1",
+    "joint2",
+    "class",
+    "childclass",
+    "type",
+    "file",
+];
+/// Most links of a model.
+const MAX_LINKS: usize = 10_000;
 
 /// What the user may say about a model.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -140,6 +158,24 @@ pub fn read_model(path: &Path, settings: &ModelSettings) -> Result<Model> {
     parse(&name, bytes, Some(path), settings)
 }
 
+/// The files that a model consists of: itself and what an MJCF includes, as far as it can be read.
+pub fn files_of(path: &Path) -> Vec<PathBuf> {
+    let mut files = vec![path.to_owned()];
+    let name = path.display().to_string();
+    // A pipe can be read once.
+    if path.is_file()
+        && let Ok(bytes) = read_limited(path, &name)
+    {
+        let mut document = Document::default();
+        // What is wrong with it is said when the model is read.
+        let _ = (document.parse(&name, &bytes))
+            .and_then(|_| include::expand(&mut document, Some(path)));
+        let included = document.files.iter().skip(1);
+        files.extend(included.map(|file| path.with_file_name("").join(&file.name)));
+    }
+    files
+}
+
 /// Reads a model from memory; `name` stands in messages. MJCF includes are refused.
 ///
 /// # Errors
@@ -161,6 +197,8 @@ fn parse(
     if document.elements[0].name == "mujoco" {
         include::expand(&mut document, path)?;
     }
+    refuse_too_many(&document)?;
+    refuse_long_names(&document)?;
     let root = &document.elements[0];
     let mut sites = mjcf::Sites::default();
     let (mut description, findings) = match root.name.as_str() {
@@ -185,6 +223,9 @@ fn parse(
             ));
         }
     };
+    if description.links.len() > MAX_LINKS {
+        return Err(too_many(root, &document, description.links.len()));
+    }
     if let Some(gravity) = settings.gravity {
         description.gravity = gravity;
     }
@@ -202,21 +243,48 @@ fn parse(
     })
 }
 
-/// A file's bytes, never more than the limit (a device or a pipe may have no end).
-fn read_limited(path: &Path, name: &str) -> Result<Vec<u8>> {
-    use std::io::Read;
-    let fail =
-        |error: &std::io::Error| Error::system(name, "read", error, "give a URDF or MJCF file");
-    let file = std::fs::File::open(path).map_err(|e| fail(&e))?;
-    let metadata = file.metadata().map_err(|e| fail(&e))?;
-    if metadata.is_file() && metadata.len() > xml::MAX_BYTES as u64 {
-        return xml::too_large(name, metadata.len());
+/// Refuses links and bodies beyond the limit before anything is made of them.
+fn refuse_too_many(document: &Document) -> Result<()> {
+    let is_link = |element: &&Element| matches!(element.name.as_str(), "link" | "body");
+    let links = || document.elements.iter().filter(is_link);
+    match links().nth(MAX_LINKS) {
+        Some(first_beyond) => Err(too_many(first_beyond, document, links().count())),
+        None => Ok(()),
     }
-    let mut bytes = Vec::new();
-    file.take(xml::MAX_BYTES as u64 + 1)
-        .read_to_end(&mut bytes)
-        .map_err(|e| fail(&e))?;
-    Ok(bytes)
+}
+
+/// Refuses names that no program writes: they would fill every message and table.
+fn refuse_long_names(document: &Document) -> Result<()> {
+    for element in &document.elements {
+        let mut names = element.attributes.iter().filter(|attribute| {
+            attribute.value.len() > MAX_NAME && NAMES.contains(&attribute.name.as_str())
+        });
+        if let Some(long) = names.next() {
+            let problem = format!(
+                "<{}> {}=\"{}\" has {} bytes, the limit is {MAX_NAME}",
+                xml::shorten(&element.name),
+                long.name,
+                xml::shorten(&long.value),
+                long.value.len()
+            );
+            return Err(document.attribute_error(element, long, problem, "give it a shorter name"));
+        }
+    }
+    Ok(())
+}
+
+fn too_many(at: &Element, document: &Document, links: usize) -> Error {
+    let problem = format!("the model has {links} links, the limit is {MAX_LINKS}");
+    document.error(at, problem, "no robot has so many: is it the right model?")
+}
+
+/// A file's bytes, never more than the limit.
+fn read_limited(path: &Path, name: &str) -> Result<Vec<u8>> {
+    match InputFile::new(path, xml::MAX_BYTES as u64).read() {
+        Ok(bytes) => Ok(bytes),
+        Err(Refusal::TooLarge { bytes, .. }) => xml::too_large(name, bytes),
+        Err(refusal) => Err(refusal.into_error(name, "give a URDF or MJCF file")),
+    }
 }
 
 /// Files that must be turned into URDF or MJCF first, by their name.

@@ -3,6 +3,7 @@
 use super::ModelSettings;
 use super::xml::{Document, Element, shorten};
 use crate::error::Result;
+use std::collections::BTreeSet;
 use twincal::robot::spatial::{IDENTITY, roll_pitch_yaw, rotate_tensor};
 use twincal::robot::{
     Inertia, JointDescription, JointKind, Limits, LinkDescription, Mimic, Placement,
@@ -34,6 +35,7 @@ pub(super) fn read(
             _ => {}
         }
     }
+    take_frames(&mut links, &joints, &mut findings);
     report_shapes_without_inertia(document, root, &joints, &mut findings);
     define_world(&mut links, &joints, &mut findings);
     let name = root.text("name").unwrap_or("robot").to_string();
@@ -73,12 +75,20 @@ fn refuse_xacro(document: &Document) -> Result<()> {
 
 fn link(document: &Document, element: &Element) -> Result<LinkDescription> {
     let name = name(document, element)?;
-    let Some(inertial) = document.child(element, "inertial") else {
+    let mut inertials = document.children(element, "inertial");
+    let Some(inertial) = inertials.next() else {
         return Ok(LinkDescription {
             name,
             inertia: None,
         });
     };
+    if let Some(second) = inertials.next() {
+        return Err(document.error(
+            second,
+            format!("link `{name}` has a second <inertial>"),
+            "keep one of them: readers disagree which one counts",
+        ));
+    }
     let Some(mass) = document.child(inertial, "mass") else {
         return Err(document.error(
             inertial,
@@ -186,9 +196,11 @@ fn joint(
     if let Some(dynamics) = document.child(element, "dynamics") {
         let damping = document.number(dynamics, "damping")?.unwrap_or(0.0);
         let friction = document.number(dynamics, "friction")?.unwrap_or(0.0);
-        if settings.use_urdf_friction {
-            joint.damping = damping;
+        match settings.use_urdf_friction {
+            true => joint.damping = damping,
+            false => joint.unused_damping = damping,
         }
+        joint.unused_friction = friction;
         if damping != 0.0 || friction != 0.0 {
             let used = if settings.use_urdf_friction {
                 "its damping counts as nominal torque, its dry friction does not"
@@ -211,6 +223,43 @@ fn joint(
     Ok(joint)
 }
 
+/// A link that no joint moves by itself and whose `<inertial>` says mass 0 is a frame (of a tool, of a sensor): it weighs nothing.
+fn take_frames(
+    links: &mut [LinkDescription],
+    joints: &[JointDescription],
+    findings: &mut Vec<Finding>,
+) {
+    for link in links {
+        let finite =
+            |inertia: &Inertia| inertia.tensor.as_flattened().iter().all(|v| v.is_finite());
+        let massless = |inertia: &Inertia| inertia.mass == 0.0 && finite(inertia);
+        let Some(inertia) = link.inertia.filter(massless) else {
+            continue;
+        };
+        let moves =
+            |joint: &JointDescription| joint.kind != JointKind::Fixed && joint.child == link.name;
+        if joints.iter().any(moves) {
+            continue;
+        }
+        let largest = inertia.tensor.as_flattened().iter();
+        let largest = largest.fold(0.0_f64, |largest, v| largest.max(v.abs()));
+        let (severity, rest) = match largest {
+            0.0 => (Severity::Note, String::new()),
+            _ => (
+                Severity::Warning,
+                format!(
+                    "; its inertia tensor (up to {largest:.3e} kg·m²) is left out, give the link its mass if it has one"
+                ),
+            ),
+        };
+        let name = &link.name;
+        let message =
+            format!("link `{name}`: mass 0 and no moving joint of its own, taken as a frame{rest}");
+        findings.push(Finding::new(severity, "massless_frame", name, message, 1));
+        link.inertia = None;
+    }
+}
+
 /// A moving link that has a shape but no `<inertial>` weighs nothing here; meshes are never opened.
 fn report_shapes_without_inertia(
     document: &Document,
@@ -218,13 +267,14 @@ fn report_shapes_without_inertia(
     joints: &[JointDescription],
     findings: &mut Vec<Finding>,
 ) {
+    let moved: BTreeSet<&str> = (joints.iter())
+        .filter(|joint| joint.kind != JointKind::Fixed)
+        .map(|joint| joint.child.as_str())
+        .collect();
     for link in document.children(root, "link") {
         let has = |child: &str| document.child(link, child).is_some();
         let name = link.text("name").unwrap_or("");
-        let moves = joints
-            .iter()
-            .any(|joint| joint.kind != JointKind::Fixed && joint.child == name);
-        if moves && (has("visual") || has("collision")) && !has("inertial") {
+        if moved.contains(name) && (has("visual") || has("collision")) && !has("inertial") {
             let message = format!(
                 "link `{name}` has a shape but no <inertial>: it weighs nothing in the nominal torque; compute mass, centre of mass \
                  and inertia from its mesh (MeshLab, or the CAD program) and add them"

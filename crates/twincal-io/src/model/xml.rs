@@ -11,6 +11,8 @@ use std::ops::Range;
 pub(crate) const MAX_BYTES: usize = 32 << 20;
 /// Deepest nesting of elements.
 pub(crate) const MAX_DEPTH: usize = 256;
+/// Most elements and attributes of a model, all files together: a robot of 10 000 links has half as many.
+const MAX_ITEMS: usize = 1_000_000;
 /// Most attributes of one element.
 pub(crate) const MAX_ATTRIBUTES: usize = 64;
 
@@ -53,6 +55,8 @@ pub(crate) struct Source {
 pub(crate) struct Document {
     pub(crate) files: Vec<Source>,
     pub(crate) elements: Vec<Element>,
+    /// Elements and attributes so far.
+    items: usize,
 }
 
 impl Document {
@@ -112,6 +116,14 @@ impl Document {
                         close: skip + reader.buffer_position() as usize,
                         end: skip + reader.buffer_position() as usize,
                     };
+                    self.items += 1 + element.attributes.len();
+                    if self.items > MAX_ITEMS {
+                        return fail(
+                            offset,
+                            format!("more than {MAX_ITEMS} elements and attributes"),
+                            "no robot needs this: is it the right file?",
+                        );
+                    }
                     let index = self.elements.len();
                     match open.last() {
                         Some(&parent) => self.elements[parent].children.push(index),
@@ -435,6 +447,13 @@ fn decode(name: &str, bytes: &[u8]) -> Result<String> {
     }
     if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
         return fail("the file is UTF-16".into(), "save it as UTF-8");
+    }
+    if let Some(at) = bytes.iter().position(|byte| *byte == 0) {
+        return Err(Error::content(
+            Place::of_offset(name, bytes, at),
+            "there is a NUL byte in the text",
+            "save the file as UTF-8 text without it",
+        ));
     }
     match std::str::from_utf8(bytes) {
         Ok(text) => Ok(text.into()),

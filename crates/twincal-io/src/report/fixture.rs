@@ -219,6 +219,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
     Calibration {
         draws: draws(&terms, &mut noise),
         curves: curves(names),
+        lags: None,
         twin: Twin {
             robot: robot(names),
             library: LibrarySettings::default(),
@@ -283,6 +284,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
                 segments: 1 + log as u64,
                 rows: (0..names.len()).map(|j| 1500 - 140 * j as u64).collect(),
                 standstill: (0..names.len()).map(|j| 140 * j as u64).collect(),
+                incidents: Vec::new(),
             })
             .collect(),
         findings: vec![

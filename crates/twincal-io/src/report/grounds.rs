@@ -66,6 +66,7 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
     let split = match validation.split {
         Split::HeldoutLogs => "held-out logs",
         Split::LeaveOneLogOut => "logs left out one at a time, by fits of the others",
+        Split::LeaveLogGroupsOut => "logs left out in five groups, by fits of the others",
         Split::LastThirty => match calibration.logs.len() {
             1 => "the last 30 % of the log, by a fit of the rest",
             _ => "the last 30 % of each log, by a fit of the rest",

@@ -6,7 +6,9 @@ use super::text::{count, number, percent, probability};
 use super::verdict::plus_minus;
 use super::view::{Joint, pooled_unit};
 use twincal::calibrate::{Calibration, Halves, Verdict};
-use twincal::validate::Validation;
+use twincal::validate::{Conformal, TREND_ALARM, TREND_FEWEST, Trend, Validation};
+use twincal::words::significant;
+use twincal::{Finding, Mistake};
 
 /// Coverage at four levels and shape of the predictions per joint; no rows without held-out rows.
 pub(super) fn reliability(validation: &Validation) -> Table {
@@ -79,8 +81,12 @@ pub(super) fn beyond(validation: &Validation, joints: &[Joint<'_>]) -> Table {
 /// Probability below which it is said why there is no more.
 const WORTH_A_GUARANTEE: f64 = 0.9;
 
-/// What is guaranteed without believing the model, in one sentence.
-pub(super) fn guarantee(validation: &Validation) -> String {
+/// What is guaranteed without believing the model, in one sentence, and for which next log.
+pub(super) fn guarantee(validation: &Validation, findings: &[Finding]) -> String {
+    if findings.iter().any(|f| f.mistake() == Some(Mistake::Copy)) {
+        return "No guarantee without believing the model: a log is a copy of another, so that nothing was tested by a recording of its own."
+            .into();
+    }
     let Some(conformal) = &validation.conformal else {
         return "No guarantee without believing the model: that needs whole held-out logs (--heldout); three logs or more, left out one at a time, give about the same, not guaranteed."
             .into();
@@ -92,7 +98,7 @@ pub(super) fn guarantee(validation: &Validation) -> String {
         .collect();
     format!(
         "Without believing the model: {} by {}, the 95 % intervals of all joints hold {} of all rows of the next log \
-         like these{}, with probability {}/{} = {} {}.{} Joint by joint: {}.",
+         like these{}, with probability {}/{} = {} {}.{} {} Joint by joint: {}.",
         stretched(conformal.factor),
         number(conformal.factor, 3),
         percent(conformal.rows),
@@ -114,8 +120,30 @@ pub(super) fn guarantee(validation: &Validation) -> String {
             n if conformal.level < WORTH_A_GUARANTEE => format!(" {n} logs allow no more."),
             _ => String::new(),
         },
+        drawn_alike(conformal),
         each.join(", ")
     )
+}
+
+/// For which next log that holds, and what the trend of the factors says.
+#[must_use]
+pub fn drawn_alike(conformal: &Conformal) -> String {
+    let holds = "It holds if the next log is drawn like these, not if it is recorded later and the robot changes";
+    let level = format!("tested at {:.0} %", 100.0 * TREND_ALARM);
+    match conformal.trend {
+        None => format!(
+            "{holds}; a trend over the recording order is tested from {TREND_FEWEST} logs on."
+        ),
+        Some(Trend { tau, p }) if p < TREND_ALARM => format!(
+            "{holds}: the factors {} over the recording order (Kendall's τ {tau:+.2}, p = {}, {level}).",
+            if tau > 0.0 { "rise" } else { "fall" },
+            significant(p, 2)
+        ),
+        Some(Trend { tau, p }) => format!(
+            "{holds}; the factors show no trend over the recording order (Kendall's τ {tau:+.2}, p = {}, {level}).",
+            significant(p, 2)
+        ),
+    }
 }
 
 /// What a factor does to intervals.
@@ -276,9 +304,12 @@ mod tests {
         assert!(!has(&calibration));
     }
 
+    use twincal::Severity;
+
     #[test]
     fn a_guarantee_is_only_promised_with_held_out_logs() {
         let mut validation = fixture::two_joints().validation;
+        let guarantee = |validation: &Validation| guarantee(validation, &[]);
         assert!(guarantee(&validation).contains("not guaranteed"));
         validation.conformal.as_mut().unwrap().guaranteed = true;
         let text = guarantee(&validation);
@@ -287,7 +318,7 @@ mod tests {
             "{text}"
         );
         assert!(
-            text.contains("guaranteed). 3 logs allow no more. Joint"),
+            text.contains("guaranteed). 3 logs allow no more. It holds if"),
             "{text}"
         );
         let conformal = validation.conformal.as_mut().unwrap();
@@ -295,5 +326,29 @@ mod tests {
         assert!(!guarantee(&validation).contains("no more"));
         validation.conformal = None;
         assert!(guarantee(&validation).starts_with("No guarantee"));
+        let copy = Finding::new(Severity::Degraded, "copied_log", "run", "", 0);
+        let text = super::guarantee(&fixture::two_joints().validation, &[copy]);
+        assert!(
+            text.starts_with("No guarantee") && !text.contains("guaranteed"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn a_trend_of_the_factors_is_said_with_its_level() {
+        let mut validation = fixture::two_joints().validation;
+        let mut of = |trend| {
+            let conformal = validation.conformal.as_mut().unwrap();
+            conformal.trend = trend;
+            drawn_alike(conformal)
+        };
+        assert!(of(None).contains("from 5 logs on"));
+        let rising = of(Some(Trend {
+            tau: 1.0,
+            p: 0.0167,
+        }));
+        assert!(rising.contains("rise over the recording order"), "{rising}");
+        assert!(rising.contains("p = 0.017, tested at 5 %"), "{rising}");
+        assert!(of(Some(Trend { tau: -0.2, p: 0.8 })).contains("show no trend"));
     }
 }

@@ -7,10 +7,10 @@ use super::shape;
 use super::standstill::{at_standstill, hardly_at_rest, rest_got_worse};
 use super::text::{THIN, list, number, percent, subject};
 use super::view::{Joint, independent_rows, memory, pooled_unit, standard_deviation};
-use twincal::Severity;
 use twincal::calibrate::Calibration;
 use twincal::posterior::Method;
 use twincal::validate::{JointScore, Scores, Validation, WORSE};
+use twincal::{Finding, Severity};
 
 /// A 95 % interval is honest if it holds this share of the held-out rows.
 pub(super) const COVERAGE: (f64, f64) = (0.90, 0.99);
@@ -34,24 +34,30 @@ const AS_WELL: f64 = 1.05;
 
 /// Where the twin does not hold and what to mind, in the order of the report.
 pub(super) fn limits(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
-    let doubts = calibration.findings.iter().filter(|f| f.doubts_the_log());
-    let mut out: Vec<String> = doubts.map(|f| f.message.clone()).collect();
+    let mistakes = calibration.findings.iter().filter(|f| f.forbids_yes());
+    let mut out: Vec<String> = mistakes.map(|f| said(f, calibration)).collect();
     if !converged(calibration) {
         out.push("The sampler has not converged: run it with more draws before relying on the probabilities.".into());
     }
     let degraded = calibration
         .findings
         .iter()
-        .filter(|f| f.severity == Severity::Degraded && !f.doubts_the_log());
-    out.extend(degraded.map(|f| {
-        let log = calibration.logs.iter().any(|log| log.name == f.subject);
-        match log && calibration.logs.len() > 1 && !f.message.contains(&f.subject) {
-            true => format!("{}: {}", f.subject, f.message),
-            false => f.message.clone(),
-        }
-    }));
+        .filter(|f| f.severity == Severity::Degraded && !f.forbids_yes());
+    out.extend(degraded.map(|f| said(f, calibration)));
     out.extend(of_results(calibration, joints));
     out
+}
+
+/// The message of a finding, with the log that it is about where there are several.
+fn said(finding: &Finding, calibration: &Calibration) -> String {
+    let log = calibration
+        .logs
+        .iter()
+        .any(|log| log.name == finding.subject);
+    match log && calibration.logs.len() > 1 && !finding.message.contains(&finding.subject) {
+        true => format!("{}: {}", finding.subject, finding.message),
+        false => finding.message.clone(),
+    }
 }
 
 /// Where on the page more of it stands.

@@ -56,6 +56,9 @@ pub struct ReportContext {
     pub settings: String,
     /// Seed of all random numbers.
     pub seed: u64,
+    /// The config, as given without the folders of an absolute path; none where only flags and defaults hold.
+    #[serde(default)]
+    pub config: Option<FileHash>,
     /// Input files, in the order given.
     pub files: Vec<FileHash>,
 }
@@ -65,12 +68,12 @@ pub struct ReportContext {
 pub struct FileHash {
     /// File name as given; the caller leaves out the folder of an absolute one.
     pub name: String,
-    /// SHA-256, hexadecimal; empty for what can be read only once (a pipe).
+    /// SHA-256, hexadecimal; empty for what came through a pipe, which earlier versions read.
     pub sha256: String,
 }
 
 pub use grounds::friction_only;
-pub use honesty::stretched;
+pub use honesty::{drawn_alike, stretched};
 pub use limits::{decisive, has_standstill};
 pub use standing::{of_halves, why_suspected};
 

@@ -153,7 +153,7 @@ fn gather<'a>(
         // Traces may be thinned: then there are fewer values than rows.
         pit: figures::pit::figure(&pit, independent.min(pit.len() as f64)),
         reliability: honesty::reliability(validation),
-        guarantee: honesty::guarantee(validation),
+        guarantee: honesty::guarantee(validation, &calibration.findings),
         repeats: honesty::repeats(calibration),
         halves: honesty::halves(calibration),
         compact: honesty::compact(calibration, joints),

@@ -360,8 +360,9 @@ fn standstill_rule(pipeline: &Pipeline) -> String {
         each => list(&each.iter().map(|v| number(*v, 2)).collect::<Vec<_>>()),
     };
     format!(
-        "A joint stands still where it stays below {slow} (rad/s or m/s) for longer than {} s; such rows are left out of its fit, shorter \
-         stops are not.",
+        "A joint is at rest where its position is constant for {} s or longer, or where it stays below {slow} (rad/s or m/s) for longer than \
+         {} s; such rows are left out of its fit.",
+        number(pipeline.shortest_rest(), 2),
         number(pipeline.shortest_standstill(), 2)
     )
 }

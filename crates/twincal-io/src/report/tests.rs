@@ -6,6 +6,7 @@ use twincal::calibrate::Calibration;
 
 fn context() -> ReportContext {
     ReportContext {
+        config: None,
         version: "0.1.0".into(),
         robot: "planar arm".into(),
         model: "planar_arm.urdf".into(),

@@ -15,7 +15,7 @@ use super::view::{Joint, independent_rows, memory};
 use serde::Serialize;
 use twincal::calibrate::Calibration;
 use twincal::validate::WORSE;
-use twincal::{Finding, Severity};
+use twincal::{Finding, Mistake, Severity};
 
 /// Ratio of errors from which calibration counts as an improvement.
 const BETTER: f64 = 0.95;
@@ -82,18 +82,13 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         .iter()
         .any(|f| f.severity == Severity::Degraded)
         || !converged(calibration);
-    let doubted = calibration.findings.iter().any(Finding::doubts_the_log);
-    let broken = doubted || no_measurement(calibration);
-    let (grade, headline) = if doubted {
-        (
-            Grade::Bad,
-            "Not yet: log and model contradict each other in sign, scale or order of joints.",
-        )
-    } else if no_measurement(calibration) {
-        (
-            Grade::Bad,
-            "Not yet: torque that never changes while joints move is no measurement.",
-        )
+    let mistake = calibration
+        .findings
+        .iter()
+        .filter_map(Finding::mistake)
+        .min();
+    let (grade, headline) = if let Some(mistake) = mistake {
+        (Grade::Bad, mistake_words(mistake))
     } else if independent_rows(calibration, joints) < FEW {
         (
             Grade::Care,
@@ -195,7 +190,8 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         folded,
         pointers: pointers(calibration),
         // A log that is no measurement of this model has to be mended first.
-        next: (!broken)
+        next: mistake
+            .is_none()
             .then(|| next_recording::next(calibration, joints))
             .flatten(),
     }
@@ -214,10 +210,22 @@ fn in_band(calibration: &Calibration, headline: &str) -> String {
     )
 }
 
-/// Whether a log has no torque that changes.
-fn no_measurement(calibration: &Calibration) -> bool {
-    let mut findings = calibration.findings.iter();
-    findings.any(|f| f.code == "constant_torque" && f.severity == Severity::Degraded)
+/// The headline where a mistake stands: never "Yes".
+fn mistake_words(mistake: Mistake) -> &'static str {
+    match mistake {
+        Mistake::Contradiction => {
+            "Not yet: log and model contradict each other in orientation, sign, scale or order of joints."
+        }
+        Mistake::NoMeasurement => {
+            "Not yet: torque that never changes while joints move is no measurement."
+        }
+        Mistake::Copy => "Not yet: one log is a copy of another.",
+        Mistake::OddTorque => "Not yet: the torque of one log or joint contradicts the others.",
+        Mistake::OddMotion => "Not yet: positions or their clock are wrong in a log.",
+        Mistake::AnotherState => {
+            "Not yet: a held-out log is of another robot, or of another state of it."
+        }
+    }
 }
 
 /// "mean ± sd" with matching digits.
@@ -337,6 +345,18 @@ pub(super) mod tests {
             let verdict = judged(change);
             assert_eq!(verdict.grade, grade, "{verdict:?}");
             assert!(verdict.headline.contains(words), "{verdict:?}");
+        }
+    }
+
+    #[test]
+    fn no_yes_stands_beside_a_mistake() {
+        assert!(judged(|_| ()).headline.starts_with("Yes"));
+        for (code, severity) in Mistake::codes() {
+            let finding = Finding::new(severity, code, "elbow", "elbow: wrong", 1);
+            let said = judged(|c| c.findings = vec![finding.clone()]);
+            assert!(said.headline.starts_with("Not yet"), "{code}: {said:?}");
+            assert_eq!((said.grade, &said.next), (Grade::Bad, &None), "{code}");
+            assert_eq!(said.limits[0], "elbow: wrong", "{code}");
         }
     }
 

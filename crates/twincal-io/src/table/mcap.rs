@@ -8,6 +8,7 @@
 //! | flags | `/twincal/<name>`, `std_msgs/msg/Bool` |
 
 use super::{ColumnKind, Values};
+use crate::log::stamps::of_seconds;
 use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use mcap::{Compression, McapError, WriteOptions, Writer};
@@ -114,18 +115,22 @@ impl<W: Write> McapTable<W> {
 
     /// Adds rows.
     pub(super) fn push(&mut self, blocks: &[Values<'_>], rows: usize) -> io::Result<()> {
-        let Some(Values::Numbers(time)) = blocks.first() else {
-            return Err(io::Error::new(
-                io::ErrorKind::InvalidInput,
-                "the first column is not time",
-            ));
+        let (start, time) = match blocks.first() {
+            Some(Values::Numbers(time)) => (0, time),
+            Some(Values::Stamps(start, time)) => (*start, time),
+            _ => {
+                return Err(io::Error::new(
+                    io::ErrorKind::InvalidInput,
+                    "the first column is not time",
+                ));
+            }
         };
         for row in 0..rows {
-            let stamp = (time[row] * 1e9).round() as i64;
+            let stamp = of_seconds(start, time[row]);
             for topic in &self.topics {
                 let number = |column: &usize| match blocks[*column] {
                     Values::Numbers(values) => values[row],
-                    Values::Flags(_) => f64::NAN,
+                    Values::Stamps(..) | Values::Flags(_) => f64::NAN,
                 };
                 if !topic.is_flag && topic.columns.iter().all(|column| number(column).is_nan()) {
                     continue;

@@ -188,3 +188,72 @@ fn an_empty_bag_is_refused() {
         &["has no message of joint states"],
     );
 }
+
+/// rosbag2's `compression_mode: MESSAGE`: every message is a Zstandard frame of its own. One that is broken is dropped and counted.
+#[test]
+fn messages_that_are_packed_one_by_one_are_read() {
+    let mut packed = Bag::new(None);
+    packed.topic("/joint_states", Some(super::write::JOINT_STATE), "cdr");
+    for message in both() {
+        let data = zstd::bulk::compress(&message.cdr(), 3).unwrap();
+        packed.raw("/joint_states", message.stamp, &data);
+    }
+    let broken = &zstd::bulk::compress(&both()[0].cdr(), 3).unwrap()[..40];
+    packed.raw("/joint_states", 9_000_000_000, broken);
+    let (recording, findings) = read_bytes(&packed.finish()).unwrap();
+    is_the_motion(&recording, 200, 1.0);
+    assert_eq!(says(&findings, "unreadable_rows").count, 1);
+}
+
+/// Without chunks there is only the checksum of the whole data section. Between chunks that have their own nothing is lost.
+#[test]
+fn the_checksum_of_the_data_section_is_compared() {
+    use mcap::{WriteOptions, Writer};
+    const DATA_END: u8 = 0x0F;
+    let options = WriteOptions::new().use_chunks(false);
+    let mut writer: Writer<_> = options.create(std::io::Cursor::new(Vec::new())).unwrap();
+    let schema = writer
+        .add_schema(super::write::JOINT_STATE, "ros2msg", b"")
+        .unwrap();
+    let channel = writer
+        .add_channel(schema, "/joint_states", "cdr", &Default::default())
+        .unwrap();
+    for message in both() {
+        let header = mcap::records::MessageHeader {
+            channel_id: channel,
+            sequence: 0,
+            log_time: message.stamp,
+            publish_time: message.stamp,
+        };
+        writer
+            .write_to_known_channel(&header, &message.cdr())
+            .unwrap();
+    }
+    writer.finish().unwrap();
+    let whole = writer.into_inner().into_inner();
+    let (recording, findings) = read_bytes(&whole).unwrap();
+    is_the_motion(&recording, 200, 1.0);
+    assert!(!findings.iter().any(|f| f.code == "damaged_data"));
+    let mut changed = whole.clone();
+    let end = records(&whole, DATA_END)[0].start - 9;
+    changed[end - 3] ^= 0x10;
+    let (_, findings) = read_bytes(&changed).unwrap();
+    let said = says(&findings, "damaged_data");
+    assert_eq!(said.severity, Severity::Degraded);
+    contains(
+        &said.message,
+        &["bytes of the file were changed", "copy the file again"],
+    );
+    // No checksum is none that is wrong.
+    let claim = records(&whole, DATA_END)[0].clone();
+    changed[claim].copy_from_slice(&[0; 4]);
+    let (_, findings) = read_bytes(&changed).unwrap();
+    assert!(!findings.iter().any(|f| f.code == "damaged_data"));
+
+    let mut chunks = bag(&both());
+    let index = records(&chunks, 0x07)[0].clone();
+    chunks[index.end - 1] ^= 0x10;
+    let (recording, findings) = read_bytes(&chunks).unwrap();
+    is_the_motion(&recording, 200, 1.0);
+    assert_eq!(says(&findings, "damaged_data").severity, Severity::Warning);
+}

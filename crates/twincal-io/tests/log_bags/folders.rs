@@ -69,6 +69,22 @@ fn case_62_a_folder_without_metadata_is_read_by_names() {
 }
 
 #[test]
+fn a_file_that_is_named_twice_is_refused() {
+    let folder = parts();
+    for again in ["run_9.mcap", "./run_9.mcap", "run_9.mcap.zstd"] {
+        metadata(folder.path(), &["run_2.mcap", "run_9.mcap", again]);
+        contains(
+            &refused(read(folder.path())),
+            &[
+                "metadata.yaml",
+                &format!("`{again}` twice"),
+                "every file once",
+            ],
+        );
+    }
+}
+
+#[test]
 fn case_63_metadata_that_leads_outside_is_refused() {
     let folder = parts();
     let inner = folder.path().join("inner");

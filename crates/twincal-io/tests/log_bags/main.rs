@@ -14,6 +14,7 @@ mod folders;
 mod mapped;
 mod messages;
 mod mutations;
+mod same_as_csv;
 mod write;
 
 use logs::{arm, motion};
@@ -53,6 +54,11 @@ fn read_bytes_with(bytes: &[u8], options: &LogOptions) -> Result<(Recording, Vec
     read_with(&path, options)
 }
 
+/// Stamp of a row, s.
+fn stamp(recording: &Recording, row: usize) -> f64 {
+    recording.start_ns as f64 / 1e9 + recording.time[row]
+}
+
 #[track_caller]
 fn says<'a>(findings: &'a [Finding], code: &str) -> &'a Finding {
     findings
@@ -65,9 +71,11 @@ fn says<'a>(findings: &'a [Finding], code: &str) -> &'a Finding {
 #[track_caller]
 fn is_the_motion(recording: &Recording, count: usize, start: f64) {
     assert_eq!(recording.time.len(), count);
+    assert_eq!(recording.start_ns, (start * 1e9) as i64);
     for (i, time) in recording.time.iter().enumerate() {
         let t = i as f64 / 100.0;
-        assert!((time - start - t).abs() < 3e-7, "row {i} at {time}");
+        // The doubles of a CSV that counts from 0.
+        assert_eq!(*time, t, "row {i}");
         for (joint, channels) in recording.joints.iter().enumerate() {
             let [q, qd, qdd] = motion(joint, t);
             let read = [

@@ -1,9 +1,10 @@
 //! Faults that only a file can have: what is opened, how large it is, what its name says.
 
-use super::{MJCF, URDF, build, read, refusal, says};
+use super::{MJCF, URDF, build, codes, read, refusal, says};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
+use twincal::robot::{Robot, Workspace, inverse_dynamics};
 
 fn write(folder: &TempDir, name: &str, text: &str) -> PathBuf {
     let path = folder.path().join(name);
@@ -240,4 +241,112 @@ fn case_82_xacro_says_how_to_expand() {
         "name=\"arm\" xmlns:xacro=\"http://www.ros.org/wiki/xacro\"",
     );
     assert!(build("arm.urdf", expanded.as_bytes()).is_ok());
+}
+
+#[test]
+fn a_second_inertial_and_a_nul_byte_are_refused() {
+    let second = "<inertial><mass value=\"3\"/></inertial></link>\n  <joint name=\"shoulder\"";
+    let text = URDF.replacen("</link>\n  <joint name=\"shoulder\"", second, 1);
+    says(
+        &build("arm.urdf", text.as_bytes()).unwrap_err(),
+        &[
+            "arm.urdf:8:",
+            "link `finger` has a second <inertial>",
+            "keep one",
+        ],
+    );
+    let inertial = "<inertial pos=\"0 0 0.1\" mass=\"1\" diaginertia=\"0.02 0.02 0.01\"/>";
+    let text = MJCF.replacen(inertial, &format!("{inertial}{inertial}"), 1);
+    says(
+        &build("arm.xml", text.as_bytes()).unwrap_err(),
+        &["body `lower` has a second <inertial>"],
+    );
+    let text = URDF.replacen("name=\"upper\"", "name=\"up\0per\"", 1);
+    says(
+        &build("arm.urdf", text.as_bytes()).unwrap_err(),
+        &["arm.urdf:4:", "NUL byte"],
+    );
+}
+
+/// Numbers whose products overflow, at the link or joint that has them.
+#[test]
+fn a_mass_or_length_beyond_all_machines_is_refused() {
+    for (from, to, words) in [
+        (
+            "value=\"2\"",
+            "value=\"1e308\"",
+            "link `upper`: mass is 1e308 kg",
+        ),
+        (
+            "xyz=\"0 0 0.2\"",
+            "xyz=\"0 0 1e308\"",
+            "link `upper`: centre of mass is 1e308 m",
+        ),
+        (
+            "izz=\"0.001\"",
+            "izz=\"1e200\"",
+            "link `lower`: an entry of the inertia tensor is 1e200",
+        ),
+        (
+            "xyz=\"0 0 0.4\"",
+            "xyz=\"0 0 -1e308\"",
+            "joint `elbow`: its origin is -1e308 m away",
+        ),
+    ] {
+        says(
+            &refusal(URDF, from, to),
+            &["arm.urdf:", words, "limit is 1e12", "unit"],
+        );
+    }
+    says(
+        &refusal(MJCF, "mass=\"1\"", "mass=\"1e308\""),
+        &["arm.xml:8:", "mass is 1e308 kg"],
+    );
+    says(
+        &refusal(MJCF, "damping=\"0.1\"", "damping=\"1e308\""),
+        &["damping is 1e308"],
+    );
+}
+
+/// A tool frame at the end of the chain, with mass 0, with a tensor of its own, or with nothing: the torque is that without it.
+#[test]
+fn a_massless_frame_behind_a_fixed_joint_is_read() {
+    let (plain, _) = build("arm.urdf", URDF.as_bytes()).unwrap();
+    for (inside, code) in [
+        ("", None),
+        (
+            "<inertial><mass value=\"0\"/></inertial>",
+            Some("massless_frame"),
+        ),
+        (
+            "<inertial><mass value=\"0\"/><inertia ixx=\"1e-3\" iyy=\"1e-3\" izz=\"1e-3\"/></inertial>",
+            Some("massless_frame"),
+        ),
+    ] {
+        let tool = format!(
+            "  <link name=\"tool\">{inside}</link>\n  <joint name=\"mount\" type=\"fixed\"><origin xyz=\"0 0 0.1\"/><parent \
+             link=\"finger\"/><child link=\"tool\"/></joint>\n</robot>"
+        );
+        let text = URDF.replacen("</robot>", &tool, 1);
+        let (robot, findings) = build("arm.urdf", text.as_bytes()).unwrap();
+        let said: Vec<&str> = codes(&findings)
+            .into_iter()
+            .filter(|code| *code == "massless_frame")
+            .collect();
+        assert_eq!(said.first().copied(), code, "{inside}");
+        let (q, qd, qdd) = ([0.3, -0.7], [0.5, 1.1], [2.0, -3.0]);
+        let torque = |robot: &Robot| {
+            let mut workspace = Workspace::new(robot);
+            let mut tau = [0.0; 2];
+            inverse_dynamics(robot, &mut workspace, &q, &qd, &qdd, &mut tau);
+            tau
+        };
+        assert_eq!(torque(&robot), torque(&plain));
+    }
+    // A tensor without mass that moves by itself is a mistake as before.
+    let text = URDF.replacen("<mass value=\"1\"/>", "<mass value=\"0\"/>", 1);
+    says(
+        &build("arm.urdf", text.as_bytes()).unwrap_err(),
+        &["link `lower`", "mass is 0 kg"],
+    );
 }

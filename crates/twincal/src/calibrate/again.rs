@@ -1,10 +1,11 @@
 //! The road from logs to a calibration, gone once more where its fit says so: with gear ripple among the candidates, in a wider band, or
-//! in a lower one where a coarse encoder leaves too few rows or drowns the torque of the model.
+//! in a lower one where a coarse encoder leaves too few rows or drowns the torque of the model, and with fewer candidates where rows are too few
+//! for all of them.
 
 use super::lower_band::{Band, TooFew, clear, lower, lowered, most_rows};
 use super::ripples::Seen;
 use super::wider_band::{Wider, not_wider};
-use super::{Calibration, CalibrationSettings, Stage, road};
+use super::{Calibration, CalibrationSettings, Stage, road, smaller_library};
 use crate::error::{Finding, Result};
 use crate::robot::Robot;
 use crate::signal::{Auto, Logs};
@@ -99,12 +100,16 @@ pub(super) fn whole_road(
         }
         let logs = &mut recordings;
         let bands = lower_bands(robot, logs, &settings, lower(&few, findings, asked));
-        let Some(cutoff_hz) = most_rows(&bands) else {
+        if let Some(cutoff_hz) = most_rows(&bands) {
+            settings.signal.cutoff_hz = Auto::Value(cutoff_hz);
+            added.push(lowered(&few, cutoff_hz));
+        } else if let Some(smaller) = smaller_library::smaller(&few.error, &settings) {
+            settings = smaller.settings;
+            added.push(smaller.finding);
+        } else {
             return Err(few.error);
-        };
+        }
         goal = Goal::Anyway;
-        settings.signal.cutoff_hz = Auto::Value(cutoff_hz);
-        added.push(lowered(&few, cutoff_hz));
         first = Some((few.error, findings.clone()));
     }
 }

@@ -7,7 +7,7 @@ use crate::error::{Finding, Result, Severity};
 use crate::gram::Gram;
 use crate::incidents::Incident;
 use crate::likelihood::Columns;
-use crate::observations::{Observations, Part};
+use crate::observations::{GramSum, Observations, Part};
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, Slice, count_rows, spread_raw, visit_slices};
 use crate::signal::{self, Auto, Payload, Pipeline, ReadyLog, Trajectory};
@@ -306,11 +306,13 @@ pub(super) fn grams_at(
         pipeline: &twin.pipeline,
         unknown: data.unknown,
     };
+    // Of logs that were summed when they were read, and of those that are gone through now.
     let mut sums = vec![Some(Gram::default()); pipelines.len()];
+    let mut now: Vec<_> = pipelines.iter().map(|_| Some(GramSum::default())).collect();
     for (log, own) in logs.iter().zip(&data.fit) {
         match log {
             ReadyLog::Whole(log) => {
-                reader.add_at(pipelines, log, (&own.incidents, false), &mut sums);
+                reader.add_at(pipelines, log, (&own.incidents, false), &mut now);
             }
             ReadyLog::Long(_) if own.incidents.is_empty() => {
                 for (sum, gram) in sums.iter_mut().zip(&own.elsewhere) {
@@ -322,14 +324,18 @@ pub(super) fn grams_at(
             }
             ReadyLog::Long(long) => {
                 long.visit(&twin.pipeline, &mut Vec::new(), |_, chapter, _| {
-                    reader.add_at(pipelines, chapter, (&own.incidents, true), &mut sums);
+                    reader.add_at(pipelines, chapter, (&own.incidents, true), &mut now);
                     Ok(())
                 })?
             }
         }
     }
-    let with_rows = |sum: Option<Gram>| sum.filter(|sum| sum.joints.iter().any(|j| j.n > 0.0));
-    Ok(sums.into_iter().map(with_rows).collect())
+    let both = sums.into_iter().zip(now).map(|(sum, now)| {
+        let mut sum = sum?;
+        sum += &now?.finish();
+        sum.joints.iter().any(|j| j.n > 0.0).then_some(sum)
+    });
+    Ok(both.collect())
 }
 
 /// True if some log says that the robot carried something unknown: then the payload component acts in those logs only.

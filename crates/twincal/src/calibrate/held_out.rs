@@ -1,5 +1,6 @@
 //! Held-out truth: what to leave out, fit without it, predict it, score it.
 
+use super::another_state;
 use super::data::{Data, Log, Trajectories};
 use super::independent_rows::LEAST_EFFECTIVE_ROWS;
 use super::{CalibrationSettings, Fitted, Stage, compact, estimate, friction_only, noise_of};
@@ -11,11 +12,13 @@ use crate::posterior::Posterior;
 use crate::signal::{Pipeline, Trajectory};
 use crate::term::Library;
 use crate::twin::Twin;
-use crate::validate::{HeldOut, Predictors, Split, Validation};
+use crate::validate::{HeldOut, LOG_GROUPS, Predictors, Split, Validation};
 use rayon::prelude::*;
 
 /// Share of a log that trains when there are one or two logs.
 const TRAINING_SHARE: f64 = 0.7;
+/// Logs at most that are left out one by one: every one costs a fit of all others. More are left out in groups.
+const MOST_ONE_BY_ONE: usize = 12;
 /// Least gap between training and held-out rows of one log, s.
 const LEAST_GAP: f64 = 1.0;
 
@@ -66,7 +69,7 @@ impl Plan<'_> {
     ) -> Result<Vec<Fitted>> {
         match self.split {
             Split::HeldoutLogs => Ok(Vec::new()),
-            Split::LeaveOneLogOut | Split::LastThirty => self
+            Split::LeaveOneLogOut | Split::LeaveLogGroupsOut | Split::LastThirty => self
                 .folds
                 .par_iter()
                 .map(|fold| estimate(&fold.training, columns, settings))
@@ -123,8 +126,9 @@ pub(super) fn validate(
         };
         for left_out in &fold.held_out {
             let LeftOut { rows, motion, from } = *left_out;
-            held_out.score_kept(predictors, rows, from);
-            held_out.score_raw(
+            let mut own = HeldOut::new(twin.robot.joint_names());
+            own.score_kept(predictors, rows, from);
+            own.score_raw(
                 &twin.robot,
                 library,
                 &twin.pipeline,
@@ -132,6 +136,11 @@ pub(super) fn validate(
                 motion,
                 from,
             )?;
+            if plan.split == Split::HeldoutLogs {
+                let memory: Vec<f64> = average.noise.iter().map(JointNoise::memory).collect();
+                findings.extend(another_state::finding(&rows.log, &own.within(), &memory));
+            }
+            held_out += own;
         }
     }
     Ok((held_out.finish(plan.split), findings))
@@ -210,16 +219,27 @@ pub(super) fn plan<'a>(
             folds: vec![fold],
         };
     }
-    if data.fit.len() >= 3 {
-        let folds = (0..data.fit.len()).map(|out| Fold {
-            training: (0..data.fit.len())
-                .filter(|&log| log != out)
-                .map(|log| data.fit[log].observations.whole())
-                .collect(),
-            held_out: vec![whole((&data.fit[out], &trajectories.fit[out]))],
+    let count = data.fit.len();
+    if count >= 3 {
+        let (groups, split) = match count > MOST_ONE_BY_ONE {
+            true => (LOG_GROUPS, Split::LeaveLogGroupsOut),
+            false => (count, Split::LeaveOneLogOut),
+        };
+        let folds = (0..groups).map(|group| {
+            let out = group * count / groups..(group + 1) * count / groups;
+            let others = (0..count).filter(|log| !out.contains(log));
+            let left_out = data.fit[out.clone()]
+                .iter()
+                .zip(&trajectories.fit[out.clone()]);
+            Fold {
+                training: others
+                    .map(|log| data.fit[log].observations.whole())
+                    .collect(),
+                held_out: left_out.map(whole).collect(),
+            }
         });
         return Plan {
-            split: Split::LeaveOneLogOut,
+            split,
             folds: folds.collect(),
         };
     }

@@ -1,5 +1,6 @@
 //! How many independent rows a fit rests on, and what is said where they are few.
 
+use super::correlate::strongest;
 use super::data::Data;
 use super::refuse;
 use crate::error::{Finding, Result, Severity};
@@ -52,10 +53,22 @@ pub(super) fn require(
                 format!("the {rows} rows of joint `{joint}` count as {independent:.1}")
             })
             .collect();
+        let best = (few.iter()).max_by(|a, b| a.1[1].total_cmp(&b.1[1]));
+        let joint = best.and_then(|best| names.iter().position(|name| *name == best.0));
+        let goes = joint.and_then(|joint| {
+            let strongest = strongest(training, joint, &fit.posterior.mean)?;
+            let share = (100.0 * strongest.share).round();
+            let cause = strongest.cause;
+            Some(format!(
+                "; the residual of joint `{}` goes most with {cause} ({share} % of its variance)",
+                names[joint]
+            ))
+        });
         return Err(refuse(
             format!(
-                "{} independent rows once the residual's autocorrelation is counted, {LEAST_EFFECTIVE_ROWS} are needed",
-                counts.join(", ")
+                "{} independent rows once the residual's autocorrelation is counted, {LEAST_EFFECTIVE_ROWS} are needed{}",
+                counts.join(", "),
+                goes.unwrap_or_default()
             ),
             "log longer and faster motion, or give candidates for what the residual still holds ([library])",
         ));

@@ -1,8 +1,12 @@
 //! The whole road, from a robot and its logs to a calibrated twin, in one function that reads like the paper.
 
 mod again;
+mod aligned;
+mod another_state;
 mod compact;
 mod components;
+mod correlate;
+mod cross_checked;
 mod curves;
 mod data;
 mod drift;
@@ -14,6 +18,7 @@ mod heredity;
 mod independent_rows;
 mod lower_band;
 mod negative_friction;
+mod noise_of;
 mod outlook;
 mod prior_conflict;
 mod reader;
@@ -23,6 +28,8 @@ mod ripples;
 mod result;
 mod room;
 mod sandwich;
+mod settings;
+mod smaller_library;
 mod stopped;
 mod summary;
 mod sweep;
@@ -47,23 +54,19 @@ pub use result::{
     Verdict,
 };
 pub use ripples::UnaskedRipple;
+pub use settings::CalibrationSettings;
 pub use stopped::Stopped;
 
 use crate::error::{Error, Finding, Result};
-use crate::infer::{Choice, Given, InferenceSettings, infer, sample, sampled_likelihood};
-use crate::lag::{LogLag, estimate_lag, lag_findings};
-use crate::likelihood::{
-    Columns, JointNoise, NoiseInterval, NoiseModel, NoiseSettings, NoiseUncertainty, Spread,
-};
+use crate::infer::{Given, infer_near, sample, sampled_likelihood};
+use crate::likelihood::{Columns, NoiseInterval, NoiseModel, NoiseUncertainty};
 use crate::observations::Part;
 use crate::plug_in::{Fit, FitSettings, LeftOut, Moving, fit, fit_tempered, start};
 use crate::posterior::draws::Drawer;
-use crate::prior::PriorSettings;
 use crate::robot::Robot;
 use crate::self_check::self_check;
 use crate::signal::{
-    Auto, Corrections, Log, Logs, ReadyLog, SignalSettings, choose_and_prepare, constant_torque,
-    hardly_driven, ready,
+    Log, Logs, ReadyLog, choose_and_prepare, constant_torque, hardly_driven, ready,
 };
 use crate::term::{Family, Library, LibrarySettings};
 use crate::twin::Twin;
@@ -71,76 +74,9 @@ use again::{Goal, Road, whole_road};
 use data::Data;
 use heredity::Named;
 use lower_band::{Band, TooFew};
+use noise_of::noise_of;
 use ripples::Seen;
 use wider_band::wider;
-
-/// Everything a calibration can be told; each field but the last two is a table of `twincal.toml`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CalibrationSettings {
-    /// `[library]`.
-    pub library: LibrarySettings,
-    /// `[signal]`.
-    pub signal: SignalSettings,
-    /// `[prior]`.
-    pub prior: PriorSettings,
-    /// `[noise]`.
-    pub noise: NoiseSettings,
-    /// `[inference]`.
-    pub inference: InferenceSettings,
-    /// What becomes of gear ripple that nobody asked for: what `[library]` families and ripple say beside `library`.
-    pub unasked_ripple: UnaskedRipple,
-    /// `[signal] wider_band` with no `[noise] model`: where nobody chose a cut-off either and the noise allows it, the fit goes on in a wider
-    /// band with `ar1`.
-    pub may_widen: bool,
-    /// Bytes that are free for what is made of the recordings (no key of `twincal.toml`); `None`: any number.
-    pub most_bytes: Option<u64>,
-}
-
-impl Default for CalibrationSettings {
-    /// What an empty `twincal.toml` means: every candidate family, everything else chosen from the data.
-    fn default() -> Self {
-        Self {
-            library: LibrarySettings {
-                families: Family::DEFAULT.to_vec(),
-                nonnegative: true,
-                ..LibrarySettings::default()
-            },
-            signal: SignalSettings {
-                cutoff_hz: Auto::Auto,
-                rate_hz: Auto::Auto,
-                coulomb_velocity: None,
-                corrections: Corrections::default(),
-                every_sample: false,
-            },
-            prior: PriorSettings {
-                scaled_variance: Auto::Auto,
-                inclusion: None,
-                noise: None,
-                families: Vec::new(),
-                forced: Vec::new(),
-                heredity: None,
-            },
-            noise: NoiseSettings {
-                model: NoiseModel::Tempered,
-                per_joint: true,
-                robust: false,
-                varies_with_speed: false,
-                varies_with_load: false,
-                uncertainty: NoiseUncertainty::PlugIn,
-            },
-            inference: InferenceSettings {
-                method: Choice::Auto,
-                chains: 4,
-                draws: 5000,
-                seed: 1,
-                allow_disagreement: false,
-            },
-            unasked_ripple: UnaskedRipple::Candidate,
-            may_widen: true,
-            most_bytes: None,
-        }
-    }
-}
 
 /// How far a calibration has come; for progress bars.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -157,8 +93,8 @@ pub enum Stage {
 
 /// Finds what the nominal robot misses in `logs` and says how well the calibrated twin predicts.
 ///
-/// With `heldout` recordings these are predicted; without, three or more logs are left out one by one, and otherwise
-/// the last 30 % of each log. The coefficients always come from all of `logs`. Recordings that are given away (as `Vec`) are
+/// With `heldout` recordings these are predicted; without, three or more logs are left out one by one (many in five groups), and
+/// otherwise the last 30 % of each log. The coefficients always come from all of `logs`. Recordings that are given away (as `Vec`) are
 /// dropped as soon as nobody needs them, which is what the largest of them cost in memory at the end.
 ///
 /// # Errors
@@ -177,13 +113,14 @@ pub fn calibrate<'a>(
     let recordings = (logs.into(), heldout.into());
     let every_log = recordings.0.0.iter().chain(&recordings.1.0);
     let shelves: Vec<_> = every_log.filter_map(Log::shelf).collect();
+    let as_recorded = cross_checked::as_recorded(robot, &recordings)?;
     let calibration = whole_road(robot, recordings, settings, progress, &mut findings);
     // Numbers that could not be read back are behind whatever came out.
     let calibration = match shelves.iter().find_map(|shelf| shelf.failure()) {
         Some(failure) => Err(failure),
         None => calibration,
     };
-    calibration.map_err(|error| Stopped { error, findings })
+    cross_checked::told(calibration, as_recorded, findings)
 }
 
 /// From logs to a calibration; `recordings` are gone as soon as nobody needs them.
@@ -211,6 +148,7 @@ fn road(
     let every_log: Vec<Log<'_>> = logs.iter().chain(heldout).map(Log::lent).collect();
     findings.extend(constant_torque(robot, every_log.clone())?);
     findings.extend(hardly_driven(robot, every_log.clone())?);
+    let mut lags = aligned::align(robot, logs, &mut pipeline, &mut prepared, findings)?;
     let mut library_settings = LibrarySettings {
         coulomb_velocity: pipeline.coulomb_velocity,
         ..settings.library.clone()
@@ -236,12 +174,15 @@ fn road(
     let elsewhere = sweep::pipelines(&pipeline, settings);
     let pipelines = (&pipeline, &elsewhere[..]);
     let (mut data, trajectories) = Data::read(robot, &library, pipelines, &prepared, &others)?;
-    findings.extend(self_check(robot, &pipeline, trajectories.all())?);
-    let lags: Vec<LogLag> = trajectories
-        .all()
-        .filter_map(|trajectory| estimate_lag(robot, &pipeline, trajectory))
-        .collect();
-    findings.extend(lag_findings(&pipeline, &lags));
+    let compared = self_check(robot, &pipeline, trajectories.all())?;
+    findings.extend(cross_checked::as_filtered(
+        robot,
+        &pipeline,
+        &trajectories,
+        (goal, &compared),
+    ));
+    findings.extend(compared);
+    lags = aligned::of_every_log(robot, &pipeline, settings, &trajectories, findings).or(lags);
     let every_candidate = library.clone();
     let (library, zero_columns) = data.drop_zero_columns(library);
     let columns = columns_of(robot, &library, settings, data::tell_payload_apart(logs))?;
@@ -291,7 +232,8 @@ fn road(
     }
     findings.extend(seen.iter().map(Seen::told));
     if fitted.sampled.is_empty() {
-        fitted.fit.posterior = infer(&fitted.fit.problem, &settings.inference)?;
+        let fit = &fitted.fit;
+        fitted.fit.posterior = infer_near(&fit.problem, &fit.posterior, &settings.inference)?;
     }
     findings.extend(unsettled::findings(robot, &fitted, settings, &training));
     let mean = &fitted.fit.posterior.mean;
@@ -339,7 +281,6 @@ fn road(
     drop((trajectories, others, every_log));
     let prepared: Vec<ReadyLog<'static>> = prepared.into_iter().map(ReadyLog::detached).collect();
     *recordings = None;
-
     progress(Stage::Sensitivity);
     let gap = (skeleton.pipeline.kernel_length() * skeleton.pipeline.rate_hz).ceil() as usize;
     let halves = repeat::cut(&training, gap);
@@ -404,7 +345,7 @@ fn road(
         || curves::curves(robot, &library, &calibration, &drawer, seed),
         || unphysical::findings(robot, &library, &calibration, &drawer, seed),
     );
-    calibration.curves = curves;
+    (calibration.curves, calibration.lags) = (curves, lags);
     let components = &calibration.components;
     let negative = negative_friction::findings(&calibration.twin, &library, components);
     let tilt = tilt_beside_mass::finding(robot, &library, &calibration);
@@ -552,43 +493,6 @@ fn columns_of(
                     .into(),
         }),
     }
-}
-
-/// Noise per joint as reported; σ_j = √E[φ/(w_j(1−ρ_j²)) | y].
-fn noise_of(
-    robot: &Robot,
-    fitted: &Fitted,
-    training: &[Part<'_>],
-    out_of_band: &[f64],
-    spreads: &[Spread],
-) -> Vec<JointNoise> {
-    let (plug_in, posterior) = (&fitted.fit.plug_in, &fitted.fit.posterior);
-    robot
-        .joint_names()
-        .into_iter()
-        .enumerate()
-        .map(|(j, name)| {
-            let [n, n_eff] = independent_rows::of_joint(&fitted.fit, training, j);
-            let rho = plug_in.rho[j];
-            let left = plug_in.variance.get(j).copied().unwrap_or(1.0);
-            JointNoise {
-                joint: name.to_owned(),
-                sigma: (left * posterior.noise / (plug_in.weight[j] * (1.0 - rho * rho))).sqrt(),
-                rho,
-                weight: plug_in.weight[j],
-                n,
-                n_eff,
-                autocorrelation_time: plug_in.autocorrelation_time[j],
-                interval_factor: fitted
-                    .left_out
-                    .as_ref()
-                    .map_or_else(|| left.sqrt(), |l| l.interval_factor[j]),
-                out_of_band: out_of_band[j],
-                spread: spreads[j].clone(),
-                sampled: fitted.sampled.get(j).copied(),
-            }
-        })
-        .collect()
 }
 
 /// The data cannot answer: fewer rows than the question needs (exit code 4).

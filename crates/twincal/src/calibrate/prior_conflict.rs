@@ -59,9 +59,13 @@ pub(super) fn findings(
                 "prior_conflict",
                 name.clone(),
                 format!(
-                    "`{name}` = {} is {:.1} times as large as its prior expects (sd {}): look whether the model's \
-                     numbers there are right, or give a wider prior.slab",
-                    significant(mean, 4), z.abs(), significant(prior, 3)
+                    "`{name}` = {} ± {} is {} sd of its prior (sd {}) from 0, {:.1} sd of what the prior predicts for its estimate: look whether the \
+                     model's numbers there are right, or give a wider prior.slab",
+                    significant(mean, 4),
+                    significant(sd, 2),
+                    significant((mean / prior).abs(), 2),
+                    significant(prior, 3),
+                    z.abs()
                 ),
                 0,
             ));

@@ -3,9 +3,8 @@
 use super::data::Log;
 use super::result::LogSummary;
 use crate::error::{Finding, Result, Severity};
-use crate::gram::Gram;
 use crate::incidents::{Evidence, Incident, incident_findings, leave_out, left_out};
-use crate::observations::{JointObservations, Observations, Room, observe};
+use crate::observations::{GramSum, JointObservations, Observations, Room, observe};
 use crate::robot::Robot;
 use crate::signal::{
     FewChapters, LongReady, Payload, Pipeline, PreparedLog, Raw, ReadyLog, Recording, Trajectory,
@@ -60,10 +59,11 @@ impl Reader<'_> {
             ReadyLog::Whole(log) => self.recording(log, role, &mut evidence, findings)?,
             ReadyLog::Long(long) => self.chapters(long, role, &mut evidence, findings)?,
         };
-        log.incidents = evidence.incidents(robot, pipeline);
+        log.incidents = evidence.incidents(robot);
         leave_out(pipeline, &mut trajectory, &log.incidents);
         log.observations
             .leave_out(&left_out(pipeline, &log.incidents));
+        log.summary.incidents.clone_from(&log.incidents);
         log.summary.count_rows(&log.observations);
         findings.extend(incident_findings(&log.summary.name, &log.incidents));
         Ok((log, trajectory))
@@ -82,7 +82,9 @@ impl Reader<'_> {
         let mut room = Room::new(long.rows_at_most(self.pipeline), long.log.shelf().cloned());
         let mut summaries = Vec::new();
         let mut ends: Option<[f64; 2]> = None;
-        let mut elsewhere = vec![Some(Gram::default()); role.elsewhere().len()];
+        let mut elsewhere: Vec<_> = (role.elsewhere().iter())
+            .map(|_| Some(GramSum::default()))
+            .collect();
         long.visit(self.pipeline, findings, |number, chapter, said| {
             let (log, trajectory) = self.recording(chapter, role, evidence, said)?;
             if let Some(shelf) = long.log.shelf() {
@@ -121,7 +123,9 @@ impl Reader<'_> {
             observations,
             summary,
             ends,
-            elsewhere,
+            elsewhere: (elsewhere.into_iter())
+                .map(|sum| sum.map(GramSum::finish))
+                .collect(),
         };
         Ok((log, trajectory))
     }
@@ -166,24 +170,23 @@ impl Reader<'_> {
         pipelines: &[Pipeline],
         log: &PreparedLog<'_>,
         (incidents, part): (&[Incident], bool),
-        sums: &mut [Option<Gram>],
+        sums: &mut [Option<GramSum>],
     ) {
         for (pipeline, kept) in pipelines.iter().zip(sums) {
-            let gram = Reader { pipeline, ..*self }.gram(log, incidents);
-            match (kept.as_mut(), gram) {
-                (Some(sum), Ok(gram)) => *sum += &gram,
+            let rows = Reader { pipeline, ..*self }.rows(log, incidents);
+            match (kept.as_mut(), rows) {
+                (Some(sum), Ok(rows)) => sum.add(&rows.whole()),
                 (_, Err(_)) if part => {}
                 _ => *kept = None,
             }
         }
     }
 
-    /// Statistics of a recording's rows; the incidents stay left out.
-    fn gram(&self, log: &PreparedLog<'_>, incidents: &[Incident]) -> Result<Gram> {
+    /// Rows of a recording; the incidents stay left out.
+    fn rows(&self, log: &PreparedLog<'_>, incidents: &[Incident]) -> Result<Observations> {
         let (mut trajectory, _) = self.trajectory(log, Raw::None)?;
         leave_out(self.pipeline, &mut trajectory, incidents);
-        let rows = observe(self.robot, self.library, self.pipeline, &trajectory)?;
-        Ok(rows.whole().gram())
+        observe(self.robot, self.library, self.pipeline, &trajectory)
     }
 }
 
@@ -241,5 +244,6 @@ fn summary(
         segments: trajectory.segments.len() as u64,
         rows: Vec::new(),
         standstill: Vec::new(),
+        incidents: Vec::new(),
     }
 }

@@ -1,6 +1,8 @@
 //! What a calibration returns: plain values that can be printed, compared and written.
 
 use crate::error::Finding;
+use crate::incidents::Incident;
+use crate::lag::Lags;
 use crate::likelihood::{JointNoise, NoiseModel};
 use crate::prior::Inclusion;
 use crate::term::{Family, Term};
@@ -397,6 +399,9 @@ pub struct LogSummary {
     pub rows: Vec<u64>,
     /// Rows masked per joint: standstill and saturated torque.
     pub standstill: Vec<u64>,
+    /// Contacts and protective stops, which are left out for all joints.
+    #[serde(default)]
+    pub incidents: Vec<Incident>,
 }
 
 /// Kept coefficients' joint posterior draws, for the pair plot (paper fig. 3).
@@ -476,6 +481,8 @@ pub struct Calibration {
     pub curves: Vec<Curve>,
     /// Logs.
     pub logs: Vec<LogSummary>,
+    /// How much later than the motion torque was logged; `None` where the logs do not say it.
+    pub lags: Option<Lags>,
     /// Everything that must be said.
     pub findings: Vec<Finding>,
 }

@@ -119,6 +119,7 @@ pub(super) fn summarise(
     Ok(Calibration {
         noise: twin.noise.clone(),
         curves: Vec::new(),
+        lags: None,
         draws: Draws {
             terms: selected.iter().map(|&k| columns.names[k].clone()).collect(),
             values: selected

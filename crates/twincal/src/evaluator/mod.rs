@@ -15,7 +15,7 @@ mod tests;
 #[cfg(test)]
 pub(crate) mod testing;
 
-pub(crate) use states::{States, rms};
+pub(crate) use states::{STATES, States, rms};
 pub use trace::Step;
 
 use crate::error::{Error, Result};

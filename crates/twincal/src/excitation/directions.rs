@@ -1,7 +1,8 @@
 //! Subspaces of coefficient space: what the robot shows, what the logs show of it, and by which joint the rest appears.
 
 use super::{ROBOT_SHOWS, SHOWN, UNSEEN};
-use crate::linear_algebra::{dot, symmetric_eigen};
+use crate::linear_algebra::{dot, product, product_transposed, symmetric_eigen};
+use rayon::prelude::*;
 
 /// Squares below which a direction is in the span of others, to rounding.
 const ROUNDING: f64 = 1e-6;
@@ -68,12 +69,10 @@ impl Spectrum {
 
     /// Another power in the coordinates y.
     pub(super) fn whitened(&self, power: &[f64]) -> Vec<f64> {
-        let columns: Vec<Vec<f64>> = self.from.iter().map(|v| apply(power, v)).collect();
-        let mut out = Vec::with_capacity(self.rank() * self.rank());
-        for left in &self.from {
-            out.extend(columns.iter().map(|right| dot(left, right)));
-        }
-        out
+        let (rank, size) = (self.rank(), self.size);
+        let from: Vec<f64> = self.from.iter().flatten().copied().collect();
+        let half = product(&from, power, [rank, size, size]);
+        product_transposed(&half, &from, [rank, size, rank])
     }
 
     /// What the logs do not show.
@@ -145,21 +144,32 @@ impl Directions {
     }
 
     /// Which joint would show how much of these: the joint that shows most directions (of two, the one that shows them
-    /// more strongly), then the joint that shows most of the rest; `None` for what no single joint shows. `with_joint` has,
-    /// per joint, the power at the logs' states with that joint moving; `allowed` are the joints to choose from.
+    /// more strongly), then the joint that shows most of the rest; `None` for what no single joint shows. `shown` are [`shown`] of these
+    /// directions; `allowed` are the joints to choose from.
     pub(super) fn by_joint(
         &self,
-        with_joint: &[Vec<f64>],
+        shown: &[Vec<f64>],
         allowed: &[usize],
     ) -> Vec<(Option<usize>, Self)> {
         let mut found = Vec::new();
-        let mut rest = self.vectors.clone();
+        let all = self.count();
+        // What is left, as combinations of these directions, row by row.
+        let mut rest: Vec<f64> = (0..all * all)
+            .map(|i| f64::from(u8::from(i % (all + 1) == 0)))
+            .collect();
         while !rest.is_empty() {
+            let left = rest.len() / all;
             let mut best: Option<(usize, f64, usize, Vec<f64>)> = None;
             for &joint in allowed {
-                let inner = restricted(&with_joint[joint], &rest);
-                let shown = above(&inner, rest.len(), SHOWN).len();
-                let trace = (0..rest.len()).map(|i| inner[i * rest.len() + i]).sum();
+                let half = product(&rest, &shown[joint], [left, all, all]);
+                let inner = product_transposed(&half, &rest, [left, all, left]);
+                let trace: f64 = (0..left).map(|i| inner[i * left + i]).sum();
+                // No more eigenvalues are above the limit than go into their sum.
+                let most = best.as_ref().map_or(0, |best| best.0);
+                if trace < SHOWN * most.max(1) as f64 {
+                    continue;
+                }
+                let shown = above(&inner, left, SHOWN).len();
                 let better = best.as_ref().is_none_or(|(most, strength, ..)| {
                     shown > *most || shown == *most && trace > *strength
                 });
@@ -168,24 +178,30 @@ impl Directions {
                 }
             }
             let Some((_, _, joint, inner)) = best else {
-                found.push((None, self.like(rest)));
+                found.push((None, self.combined(&rest)));
                 break;
             };
-            let combine = |weights: Vec<f64>| -> Vec<f64> {
-                let mut sum = vec![0.0; self.size];
-                for (weight, vector) in weights.iter().zip(&rest) {
-                    sum.iter_mut()
-                        .zip(vector)
-                        .for_each(|(s, v)| *s += weight * v);
-                }
-                sum
+            let turned = |weights: Vec<Vec<f64>>| -> Vec<f64> {
+                product(&weights.concat(), &rest, [weights.len(), left, all])
             };
-            let shown = above(&inner, rest.len(), SHOWN).into_iter().map(combine);
-            found.push((Some(joint), self.like(shown.collect())));
-            let left = below(&inner, rest.len(), SHOWN).into_iter().map(combine);
-            rest = left.collect();
+            let shows = turned(above(&inner, left, SHOWN));
+            found.push((Some(joint), self.combined(&shows)));
+            rest = turned(below(&inner, left, SHOWN));
         }
         found
+    }
+
+    /// Combinations of these directions, row by row.
+    fn combined(&self, weights: &[f64]) -> Self {
+        let all = self.count();
+        let flat = self.vectors.concat();
+        let vectors = product(weights, &flat, [weights.len() / all.max(1), all, self.size]);
+        self.like(
+            vectors
+                .chunks_exact(self.size.max(1))
+                .map(<[f64]>::to_vec)
+                .collect(),
+        )
     }
 
     fn like(&self, vectors: Vec<Vec<f64>>) -> Self {
@@ -203,11 +219,27 @@ pub(super) fn block(matrix: &[f64], columns: &[usize]) -> Vec<f64> {
     columns.iter().flat_map(row).collect()
 }
 
-/// Vᵀ A V.
-fn restricted(matrix: &[f64], vectors: &[Vec<f64>]) -> Vec<f64> {
-    let images: Vec<Vec<f64>> = vectors.iter().map(|v| apply(matrix, v)).collect();
-    let row = |left: &Vec<f64>| -> Vec<f64> { images.iter().map(|v| dot(left, v)).collect() };
-    vectors.iter().flat_map(row).collect()
+/// VᵀAV of several sets of directions V: by set and joint, whose A is the power at the logs' states with that joint moving.
+pub(super) fn shown(sets: &[&Directions], with_joint: &[Vec<f64>]) -> Vec<Vec<Vec<f64>>> {
+    let size = sets.first().map_or(0, |set| set.size);
+    let vectors = sets.iter().flat_map(|set| set.vectors.iter().flatten());
+    let all: Vec<f64> = vectors.copied().collect();
+    let count: usize = sets.iter().map(|set| set.count()).sum();
+    let of_joint = |power: &Vec<f64>| -> Vec<Vec<f64>> {
+        // A is symmetric: rows of VᵀA.
+        let images = product(&all, power, [count, size, size]);
+        let mut from = 0;
+        let own = sets.iter().map(|set| {
+            let rows = from * size..(from + set.count()) * size;
+            from += set.count();
+            let dimensions = [set.count(), size, set.count()];
+            product_transposed(&images[rows.clone()], &all[rows], dimensions)
+        });
+        own.collect()
+    };
+    let of_joints: Vec<Vec<Vec<f64>>> = with_joint.par_iter().map(of_joint).collect();
+    let set = |set: usize| of_joints.iter().map(|joint| joint[set].clone()).collect();
+    (0..sets.len()).map(set).collect()
 }
 
 /// Eigenvectors with eigenvalues below a limit.

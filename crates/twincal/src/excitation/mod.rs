@@ -18,7 +18,8 @@ pub use words::{sentence, sentences};
 use crate::gram::Gram;
 use crate::robot::Robot;
 use crate::term::Library;
-use directions::{Directions, Spectrum};
+use directions::{Directions, Spectrum, shown};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Power of a direction's torque in the logs, as a share of its power at random states, below which the logs do not show
@@ -110,6 +111,7 @@ pub fn excitation(robot: &Robot, library: &Library, gram: &Gram, rows: &States) 
     let spectrum = Spectrum::new(&robot_shows, &logs_show, columns.len());
     // What one more joint would show, in the coordinates of the spectrum.
     let with_joint: Vec<Vec<f64>> = (0..robot.dof())
+        .into_par_iter()
         .map(|joint| {
             let moved = rows.with_random(joint, &all);
             spectrum.whitened(&reference.power(library, &columns, &moved))
@@ -119,7 +121,8 @@ pub fn excitation(robot: &Robot, library: &Library, gram: &Gram, rows: &States) 
     let hidden = spectrum.all_hidden();
     let every: Vec<usize> = (0..robot.dof()).collect();
     let mut plan = Plan::default();
-    for (joint, shown) in hidden.by_joint(&with_joint, &every) {
+    let of_all = shown(&[&hidden], &with_joint);
+    for (joint, shown) in hidden.by_joint(&of_all[0], &every) {
         plan.steps.push(Step {
             joint,
             directions: shown.count(),
@@ -130,14 +133,20 @@ pub fn excitation(robot: &Robot, library: &Library, gram: &Gram, rows: &States) 
 
     let mut components = Vec::with_capacity(count);
     let mut alone = Directions::empty(spectrum.rank());
-    for (index, columns) in own.iter().enumerate() {
+    let part = |columns: &Vec<usize>| {
         let part = Spectrum::new(
             &directions::block(&robot_shows, columns),
             &directions::block(&logs_show, columns),
             columns.len(),
         );
-        let hidden = part.hidden(columns, &spectrum);
-        let directions = [part.rank(), part.rank() - hidden.count()];
+        (part.rank(), part.hidden(columns, &spectrum))
+    };
+    let parts: Vec<(usize, Directions)> = own.iter().map(part).collect();
+    let sets: Vec<&Directions> = parts.iter().map(|(_, hidden)| hidden).collect();
+    let of_parts = shown(&sets, &with_joint);
+    for (index, columns) in own.iter().enumerate() {
+        let (rank, hidden) = &parts[index];
+        let directions = [*rank, rank - hidden.count()];
         let ratio = columns.iter().map(|&k| {
             let at = k * spectrum.size() + k;
             logs_show[at] / robot_shows[at]
@@ -154,13 +163,15 @@ pub fn excitation(robot: &Robot, library: &Library, gram: &Gram, rows: &States) 
             excitation,
             directions,
         });
-        for (joint, _) in hidden.by_joint(&with_joint, &allowed) {
+        for (joint, _) in hidden.by_joint(&of_parts[index], &allowed) {
             plan.add(joint, index, directions[1] == 0);
         }
-        alone.join(&hidden);
+        alone.join(hidden);
     }
     // What is left are directions in which several components cancel.
-    for (joint, shown) in hidden.without(&alone).by_joint(&with_joint, &allowed) {
+    let rest = hidden.without(&alone);
+    let of_rest = shown(&[&rest], &with_joint);
+    for (joint, shown) in rest.by_joint(&of_rest[0], &allowed) {
         let torque: Vec<f64> = own
             .iter()
             .map(|columns| spectrum.torque(&shown, columns))

@@ -2,7 +2,7 @@
 
 use super::ROBOT_SHOWS;
 use crate::gram::Gram;
-use crate::linear_algebra::dot;
+use crate::linear_algebra::product_transposed;
 use crate::robot::{JointKind, Motion, Robot, nominal_torque};
 use crate::term::Library;
 use rand::{RngExt, SeedableRng};
@@ -137,18 +137,20 @@ impl Reference<'_> {
         for joint in 0..dof {
             let weight = self.weight[joint] / len.max(1) as f64;
             let still = &states.still[joint * len..(joint + 1) * len];
-            let own: Vec<(usize, Vec<f64>)> = (library.columns_of_joint(joint).iter())
-                .zip(out[joint].chunks_exact(len.max(1)))
-                .filter_map(|(&column, values)| {
-                    let size = self.size[column];
-                    let kept =
-                        |(value, still): (&f64, &bool)| if *still { 0.0 } else { value / size };
-                    Some((place[column]?, values.iter().zip(still).map(kept).collect()))
-                })
-                .collect();
-            for (i, (a, left)) in own.iter().enumerate() {
-                for (b, right) in &own[..=i] {
-                    let sum = dot(left, right);
+            let (mut places, mut values) = (Vec::new(), Vec::new());
+            let columns = library.columns_of_joint(joint).iter();
+            for (&column, own) in columns.zip(out[joint].chunks_exact(len.max(1))) {
+                let Some(at) = place[column] else { continue };
+                let size = self.size[column];
+                let kept = |(value, still): (&f64, &bool)| if *still { 0.0 } else { value / size };
+                values.extend(own.iter().zip(still).map(kept));
+                places.push(at);
+            }
+            let own = places.len();
+            let sums = product_transposed(&values, &values, [own, len, own]);
+            for (i, &a) in places.iter().enumerate() {
+                for (j, &b) in places[..=i].iter().enumerate() {
+                    let sum = sums[i * own + j];
                     power[a * count + b] += weight * sum;
                     if a != b {
                         power[b * count + a] += weight * sum;

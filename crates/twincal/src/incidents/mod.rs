@@ -2,14 +2,15 @@
 //!
 //! Such stretches are told, listed and left out of the fit; the robot is not calibrated on a collision, nor on brakes.
 
-mod bins;
-mod spikes;
+mod contacts;
+mod repeats;
 mod stops;
 
 use crate::error::{Finding, Result, Severity};
+use crate::rigid_fit::{Bins, bins};
 use crate::robot::Robot;
 use crate::signal::{FewChapters, Log, Pipeline, Raw, Shelf, Trajectory, align, prepare};
-use bins::Bins;
+use crate::words::significant;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -20,8 +21,9 @@ const LISTED: usize = 5;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IncidentKind {
-    /// Torque that neither the model nor friction explains, for a short time: a contact or a collision.
-    Spike,
+    /// Torque that neither rigid bodies nor friction explain, for a short time: a contact, a collision or a push.
+    #[serde(alias = "spike")]
+    Contact,
     /// All joints stand still without the torque that holds them: brakes, or a protective stop.
     DrivesOff,
 }
@@ -35,7 +37,7 @@ pub struct Incident {
     pub joint: String,
     /// First and last stamp, s.
     pub span: [f64; 2],
-    /// Spike: largest torque that is not explained. Drives off: largest torque that holding would take. N·m or N.
+    /// Contact: largest torque that is not explained. Drives off: largest torque that holding would take. N·m or N.
     pub torque: f64,
     /// Samples from first to last.
     pub samples: u64,
@@ -58,8 +60,8 @@ impl Evidence {
         let stops = stops::stops(robot, pipeline, trajectory);
         let stopped: Vec<[f64; 2]> = stops.iter().map(|stop| stop.span).collect();
         self.stops.extend(stops);
-        let bins = bins::bins(robot, pipeline, trajectory, &stopped);
-        self.bins.extend(bins);
+        self.bins
+            .extend(bins(robot, pipeline, trajectory, &stopped));
     }
 
     /// Leaves most of what was taken on a shelf.
@@ -74,9 +76,9 @@ impl Evidence {
 
     /// The incidents, in time order for each kind.
     #[must_use]
-    pub fn incidents(self, robot: &Robot, pipeline: &Pipeline) -> Vec<Incident> {
+    pub fn incidents(self, robot: &Robot) -> Vec<Incident> {
         let mut found = self.stops;
-        found.extend(spikes::spikes(robot, pipeline, &self.bins));
+        found.extend(contacts::contacts(robot, &self.bins));
         found
     }
 }
@@ -117,7 +119,7 @@ pub fn motion(
                 .ok_or_else(|| long.without_chapters())?
         }
     };
-    let found = evidence.incidents(robot, pipeline);
+    let found = evidence.incidents(robot);
     leave_out(pipeline, &mut trajectory, &found);
     findings.extend(incident_findings(log.name(), &found));
     Ok((trajectory, found, findings))
@@ -148,23 +150,12 @@ pub fn left_out(pipeline: &Pipeline, incidents: &[Incident]) -> Vec<[f64; 2]> {
 /// One warning per log and kind.
 pub fn incident_findings(log: &str, incidents: &[Incident]) -> Vec<Finding> {
     let mut findings = Vec::new();
-    for kind in [IncidentKind::DrivesOff, IncidentKind::Spike] {
+    for kind in [IncidentKind::DrivesOff, IncidentKind::Contact] {
         let own: Vec<&Incident> = incidents.iter().filter(|i| i.kind == kind).collect();
         if own.is_empty() {
             continue;
         }
-        let list: Vec<String> = own
-            .iter()
-            .take(LISTED)
-            .map(|i| {
-                let [first, last] = i.span;
-                let digits = if last - first < 0.1 { 3 } else { 2 };
-                format!(
-                    "{first:.digits$} … {last:.digits$} s (`{}`, {:.3} N·m)",
-                    i.joint, i.torque
-                )
-            })
-            .collect();
+        let list: Vec<String> = own.iter().take(LISTED).map(|i| place(i)).collect();
         let more = match own.len().saturating_sub(LISTED) {
             0 => String::new(),
             more => format!(" and {more} more"),
@@ -176,18 +167,18 @@ pub fn incident_findings(log: &str, incidents: &[Incident]) -> Vec<Finding> {
         };
         let list = list.join(", ");
         let (code, message) = match kind {
-            IncidentKind::Spike => (
-                "torque_spike",
+            IncidentKind::Contact => (
+                "contact",
                 format!(
-                    "a contact or collision, {times}: torque that neither model nor friction explains at {list}{more}; left \
-                     out of the fit: look at what was hit, or cut the log there"
+                    "contact, collision or push, {times}: torque that no rigid body and no friction explains, {list}{more}. These samples are \
+                     left out of the fit, for all joints. Look at what touched the robot; nothing has to be done if that is known"
                 ),
             ),
             IncidentKind::DrivesOff => (
                 "drives_off",
                 format!(
-                    "brakes or a protective stop, {times}: all joints stand still without the torque that would hold them \
-                     (joint and torque in brackets) at {list}{more}; left out of the fit"
+                    "brakes or a protective stop, {times}: all joints are at rest without the torque that would hold them \
+                     (joint and torque in brackets), {list}{more}. These samples are left out of the fit"
                 ),
             ),
         };
@@ -195,6 +186,14 @@ pub fn incident_findings(log: &str, incidents: &[Incident]) -> Vec<Finding> {
         findings.push(Finding::new(Severity::Warning, code, log, message, samples));
     }
     findings
+}
+
+/// Begin, end, joint and torque of an incident.
+fn place(incident: &Incident) -> String {
+    let [first, last] = incident.span;
+    let digits = if last - first < 0.1 { 3 } else { 2 };
+    let (joint, torque) = (&incident.joint, significant(incident.torque, 3));
+    format!("from {first:.digits$} s to {last:.digits$} s (`{joint}`, {torque} N·m)")
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use crate::posterior::{Method, Model, Posterior, Problem};
 use std::collections::BTreeMap;
 
 /// Models that a search expands at most: many where the columns are few, so that the time is about the same.
-const BUDGET: (usize, usize) = (64, 3000);
+const BUDGET: (usize, usize) = (12, 3000);
 /// That many times K² between the two.
 const WORK: usize = 1_000_000;
 /// Share of the mass and most models in the list.
@@ -144,5 +144,5 @@ pub(super) fn averages(reduced: &Reduced<'_>, found: &Found) -> Averages {
         moment: share(&sums.moment),
         misfit: sums.misfit / total,
     };
-    reduced.widen(averages, &share(&sums.products))
+    reduced.widen(averages, &sums.products())
 }

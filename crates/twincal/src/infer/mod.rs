@@ -42,6 +42,9 @@ pub enum Choice {
 /// out (below e⁻⁴⁰ of a single model's weight) do not count.
 pub const EXACT_LIMIT: usize = 28;
 
+/// Columns from which on a walk from the model with everything in it, which loses digits at every step, is avoided where it can be.
+const MANY_COLUMNS: usize = 256;
+
 /// `[inference]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InferenceSettings {
@@ -63,7 +66,23 @@ pub struct InferenceSettings {
 /// [`crate::Error::Setting`] for an impossible setting, [`crate::Error::NotFinite`] naming the column,
 /// [`crate::Error::Refused`] when chains disagree.
 pub fn infer(problem: &Problem, settings: &InferenceSettings) -> Result<Posterior> {
-    let posterior = by_method(problem, settings)?;
+    checked(problem, by_method(problem, None, settings)?)
+}
+
+/// [`infer`] where an approximate posterior of the same problem is known: with very many columns a good model to start from is half of the work.
+///
+/// # Errors
+/// Those of [`infer`].
+pub fn infer_near(
+    problem: &Problem,
+    near: &Posterior,
+    settings: &InferenceSettings,
+) -> Result<Posterior> {
+    let near = Some(near).filter(|_| problem.names.len() > MANY_COLUMNS);
+    checked(problem, by_method(problem, near, settings)?)
+}
+
+fn checked(problem: &Problem, posterior: Posterior) -> Result<Posterior> {
     let wrong = posterior.mean.iter().position(|mean| !mean.is_finite());
     match wrong {
         None => Ok(posterior),
@@ -78,11 +97,15 @@ pub fn infer(problem: &Problem, settings: &InferenceSettings) -> Result<Posterio
 }
 
 /// The posterior by the chosen method, whatever its numbers are.
-fn by_method(problem: &Problem, settings: &InferenceSettings) -> Result<Posterior> {
+fn by_method(
+    problem: &Problem,
+    near: Option<&Posterior>,
+    settings: &InferenceSettings,
+) -> Result<Posterior> {
     if settings.method == Choice::Gibbs {
-        return gibbs::sample(problem, settings);
+        return gibbs::sample(problem, near, settings);
     }
-    let certain = certain::components(&Standard::new(problem)?, problem, None);
+    let certain = certain::components(&Standard::new(problem)?, problem, near);
     let open = certain.sure.iter().filter(|c| !**c).count();
     match settings.method {
         _ if open <= EXACT_LIMIT => exact::sum(problem, &certain),
@@ -93,7 +116,7 @@ fn by_method(problem: &Problem, settings: &InferenceSettings) -> Result<Posterio
                 "use `auto` or `gibbs`, or at most {EXACT_LIMIT} components that the data leave open"
             ),
         }),
-        Choice::Auto | Choice::Gibbs => gibbs::sample(problem, settings),
+        Choice::Auto | Choice::Gibbs => gibbs::sample(problem, near, settings),
     }
 }
 

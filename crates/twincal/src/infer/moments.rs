@@ -252,17 +252,59 @@ pub(super) struct Sums {
     /// Σ w E[δ], Σ w E[δ²] by position.
     pub(super) shift: Vec<f64>,
     pub(super) moment: Vec<f64>,
-    /// Σ w E[δ δᵀ], row-major; empty unless columns were integrated out.
-    pub(super) products: Vec<f64>,
     /// Σ w (1 + c).
     pub(super) misfit: f64,
+    /// `None` unless columns were integrated out.
+    joint: Option<Joint>,
+}
+
+/// Σ w E[γ γᵀ] of coefficients counted from those of the first model, γ = β − β₀: what is in neither model has γ = 0, so that a model costs the
+/// square of its own columns and not of all.
+#[derive(Debug, Clone)]
+struct Joint {
+    /// γ − δ = β̂ − β₀; empty before the first model.
+    offset: Vec<f64>,
+    /// Row-major.
+    products: Vec<f64>,
+}
+
+impl Joint {
+    /// One more model, by its share `weight` and that times φ.
+    fn add(&mut self, center: &[f64], moments: &Moments, weight: f64, spread: f64) {
+        let size = moments.delta.len();
+        if self.offset.is_empty() {
+            let outside = |(center, variance): (&f64, &f64)| match *variance > 0.0 {
+                true => 0.0,
+                false => *center,
+            };
+            let columns = center.iter().zip(&moments.variance);
+            self.offset = columns.map(outside).collect();
+        }
+        let gamma: Vec<(usize, f64)> = (moments.delta.iter().zip(&self.offset).enumerate())
+            .map(|(k, (delta, offset))| (k, delta + offset))
+            .filter(|(_, gamma)| *gamma != 0.0)
+            .collect();
+        for &(i, own) in &gamma {
+            let (row, scaled) = (&mut self.products[i * size..(i + 1) * size], weight * own);
+            for &(j, other) in &gamma {
+                row[j] += scaled * other;
+            }
+        }
+        let rows = moments.covariance.chunks_exact(moments.inside.len().max(1));
+        for (&i, covariances) in moments.inside.iter().zip(rows) {
+            let row = &mut self.products[i * size..(i + 1) * size];
+            for (&j, covariance) in moments.inside.iter().zip(covariances) {
+                row[j] += spread * covariance;
+            }
+        }
+    }
 }
 
 impl Sums {
     /// `joint`: with products.
     pub(super) fn new(standard: &Standard, joint: bool) -> Self {
         let factor = standard.noise_factor();
-        let products = if joint { standard.size() } else { 0 };
+        let products = vec![0.0; if joint { standard.size().pow(2) } else { 0 }];
         Self {
             reference: 0.0,
             factor: if factor.is_finite() { factor } else { 0.0 },
@@ -270,8 +312,11 @@ impl Sums {
             inclusion: vec![0.0; standard.blocks.len()],
             shift: vec![0.0; standard.size()],
             moment: vec![0.0; standard.size()],
-            products: vec![0.0; products * products],
             misfit: 0.0,
+            joint: joint.then(|| Joint {
+                offset: Vec::new(),
+                products,
+            }),
         }
     }
 
@@ -294,17 +339,41 @@ impl Sums {
         self.reference = log_weight;
         self.total *= factor;
         self.misfit *= factor;
-        let sums = [
-            &mut self.inclusion,
-            &mut self.shift,
-            &mut self.moment,
-            &mut self.products,
-        ];
-        sums.into_iter().flatten().for_each(|sum| *sum *= factor);
+        let sums = [&mut self.inclusion, &mut self.shift, &mut self.moment];
+        let joint = self.joint.iter_mut().map(|joint| &mut joint.products);
+        let sums = sums.into_iter().chain(joint).flatten();
+        sums.for_each(|sum| *sum *= factor);
     }
 
-    /// One more model.
-    pub(super) fn add(&mut self, log_weight: f64, moments: &Moments) {
+    /// E[δ δᵀ], row-major; empty unless columns were integrated out.
+    ///
+    /// ```text
+    /// E[δδᵀ] = E[γγᵀ] − E[γ]oᵀ − oE[γ]ᵀ + ooᵀ,     γ = δ + o
+    /// ```
+    pub(super) fn products(&self) -> Vec<f64> {
+        let Some(Joint { offset, products }) = &self.joint else {
+            return Vec::new();
+        };
+        let total = self.total;
+        let gamma: Vec<f64> = (self.shift.iter().zip(offset))
+            .map(|(shift, offset)| shift / total + offset)
+            .collect();
+        let size = gamma.len().max(1);
+        let mut out: Vec<f64> = products.iter().map(|sum| sum / total).collect();
+        for (i, row) in out.chunks_exact_mut(size).enumerate() {
+            if offset.is_empty() {
+                break;
+            }
+            let (own, along) = (offset[i], gamma[i]);
+            for ((value, offset), gamma) in row.iter_mut().zip(offset).zip(&gamma) {
+                *value += own * offset - own * gamma - along * offset;
+            }
+        }
+        out
+    }
+
+    /// One more model of `standard`.
+    pub(super) fn add(&mut self, standard: &Standard, log_weight: f64, moments: &Moments) {
         self.rebase(log_weight);
         let weight = self.weight(log_weight);
         let misfit = 1.0 + moments.excess;
@@ -321,23 +390,8 @@ impl Sums {
             *shift += weight * delta;
             *moment += weight * (delta * delta + phi * variance);
         }
-        if self.products.is_empty() {
-            return;
-        }
-        let size = moments.delta.len();
-        for (row, own) in self.products.chunks_exact_mut(size).zip(&moments.delta) {
-            let scaled = weight * own;
-            for (sum, other) in row.iter_mut().zip(&moments.delta) {
-                *sum += scaled * other;
-            }
-        }
-        let scaled = weight * phi;
-        let rows = moments.covariance.chunks_exact(moments.inside.len().max(1));
-        for (&i, covariances) in moments.inside.iter().zip(rows) {
-            let row = &mut self.products[i * size..(i + 1) * size];
-            for (&j, covariance) in moments.inside.iter().zip(covariances) {
-                row[j] += scaled * covariance;
-            }
+        if let Some(joint) = &mut self.joint {
+            joint.add(&standard.center, moments, weight, weight * phi);
         }
     }
 }

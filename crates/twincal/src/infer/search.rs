@@ -256,7 +256,7 @@ impl Search<'_> {
             let moments = present(&self.walker, self.reduced.shrinks());
             let bounds = -moments.log_mass(self.walker.standard);
             let log_weight = self.walker.log_weight() - bounds;
-            self.sums.add(log_weight, &moments);
+            self.sums.add(self.walker.standard, log_weight, &moments);
             self.keep(set, log_weight, bounds);
         }
     }
@@ -296,7 +296,7 @@ impl Search<'_> {
     fn add(&mut self, set: Set, free: f64, moments: &Moments) {
         let log_weight = free + moments.log_mass(self.walker.standard);
         if log_weight >= self.best + self.care.negligible() {
-            self.sums.add(log_weight, moments);
+            self.sums.add(self.walker.standard, log_weight, moments);
             self.keep(set, log_weight, free - log_weight);
         }
     }

@@ -1,68 +1,50 @@
 //! How much later than the motion torque was logged (case 17).
 //!
 //! ```text
-//! Δτ(t + L) ≈ Σ_c b_c Δx_c(t)       x: nominal torque, friction of four shapes, acceleration
+//! τ_j(t + L_j) = Y_j(q, q̇, q̈) π + f_j(q̇_j)        only where joint j slides
 //! ```
-//! Differences from sample to sample, because what the model misses is slow and a slow error looks like a lag of many
-//! samples; both sides have passed the motion filter. The share of Δτ that is left has its minimum at the lag; a parabola
-//! through the three lowest points gives parts of a sample, leaving out one piece of the log after the other its error.
-//! A lag is the same at all frequencies, what the model misses is not: differences over a quarter of the cut-off's period
-//! are looked at too, and what they disagree by counts as error.
+//! All inertial parameters π and the friction f of sliding joints are free, so that neither a wrong model nor a payload is a lag. At a
+//! velocity reversal friction remembers the motion before it (presliding), which looks like tens of milliseconds: rows within a tenth of a
+//! second of one are not used. What is left is the shift of torque that acceleration, gravity and speed ask for, joint by joint,
+//! by Gauss–Newton; its error comes from pieces of the logs. A lag is the recorder's, so that it is the same for all joints: what most joints
+//! agree on is applied where it is beyond three standard deviations and where left-out rows get better.
 //!
-//! Source: cross-correlation of prewhitened series (Box, Jenkins & Reinsel, ch. 12); delete-one jackknife (Efron 1982);
-//! joints are pooled with random effects (DerSimonian & Laird 1986).
+//! The torque that a twin predicts belongs to the motion of the same instant. A log's measured torque is moved back before it is fitted, scored or
+//! compared, by the lag of the training logs.
 
-mod profile;
+mod estimate;
+mod pool;
+mod rows;
 
 use crate::error::{Finding, Severity};
-use crate::robot::{Motion, Robot, nominal_torque};
-use crate::signal::convolve::correlate;
-use crate::signal::fir::MotionKernels;
-use crate::signal::{Lag, Pipeline, Segment, Trajectory};
-use profile::Products;
-use rayon::prelude::*;
+use crate::robot::Robot;
+use crate::signal::{Lag, Pipeline, Trajectory};
+use crate::words::significant;
+use estimate::{Estimate, estimate};
+use pool::agreed;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
-/// Longest lag that is looked for, s, and in samples at least and at most.
-const REACH: f64 = 0.05;
-const LEAST_REACH: usize = 10;
-const MOST_REACH: usize = 100;
-/// Samples of a piece at most, how many pieces are looked at, and how many there are at least.
-const PIECE: usize = 2048;
-const PIECES: usize = 16;
-const FEWEST_PIECES: usize = 8;
-/// Shortest piece that says anything, samples.
-const SHORTEST: usize = 30;
-/// A joint speaks if no more than this share of its torque's changes is left at the lag.
-const EXPLAINED: f64 = 0.4;
-/// The same where it is the only joint that speaks: no other can contradict it.
-const EXPLAINED_ALONE: f64 = 0.15;
-/// Error of the parabola, samples.
-const PARABOLA: f64 = 0.05;
-/// A lag must be longer than a sample by this many standard deviations.
+/// A lag is there beyond this many standard deviations, and where this share of what is left of left-out rows goes with it.
 const CLEARLY: f64 = 3.0;
-/// Step of the slow differences, in periods of the cut-off; in samples without filter, at least and at most.
-const SLOW: f64 = 0.25;
-const SLOW_SAMPLES: usize = 10;
-const SLOWEST: usize = 200;
-/// Velocities of the friction's shapes, rad/s or m/s.
-const DRY: [f64; 2] = [0.02, 0.2];
+const IMPROVES: f64 = 0.02;
+/// A lag with a larger standard deviation says nothing, s; nor that of one joint that differs.
+const VAGUE: f64 = 0.02;
+const SHARP: f64 = 0.005;
+/// Share of what is left of its rows that goes with the lag of one joint or log that is called a mistake.
+const MISTAKE: f64 = 0.1;
 
-/// Lag of one joint in one log.
+/// Lag of one joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct JointLag {
     /// Name of the joint.
     pub joint: String,
     /// How much later torque is logged than the motion, s; negative where it is first.
     pub lag: f64,
-    /// The same from slow differences, s; `None` where the log does not say it.
-    pub slow: Option<f64>,
-    /// Its standard deviation, s; `None` where the log does not say it.
-    pub sd: Option<f64>,
-    /// Share of the changes of torque that is not explained: as logged, and with torque moved back by the lag.
-    pub left: [f64; 2],
-    /// Whether enough is explained to believe it.
-    pub speaks: bool,
+    /// Its standard deviation, s.
+    pub sd: f64,
+    /// Whether it clearly differs from that of the other joints, and left-out rows of this joint get better with it.
+    pub differs: bool,
 }
 
 /// Lag of one log.
@@ -72,303 +54,249 @@ pub struct LogLag {
     pub log: String,
     /// Sampling interval, s.
     pub interval: f64,
-    /// Joints that move, in order.
-    pub joints: Vec<JointLag>,
-    /// What more than half of the joints agree on: mean and standard deviation over joints, s.
+    /// Lag and standard deviation over all joints, s; `None` where the log does not say it.
     pub common: Option<[f64; 2]>,
+    /// Whether it clearly differs from that of the other logs.
+    pub differs: bool,
 }
 
-impl LogLag {
-    /// The common lag if it is clearly longer than one sample.
-    pub fn clear(&self) -> Option<f64> {
-        let [lag, sd] = self.common?;
-        (lag.abs() - self.interval > CLEARLY * sd).then_some(lag)
-    }
-
-    /// The common lag where it is certainly there and longer than half a sample, but not clearly longer than one.
-    pub fn slight(&self) -> Option<f64> {
-        let [lag, sd] = self.common?;
-        let there = lag.abs() > CLEARLY * sd && lag.abs() > 0.5 * self.interval;
-        (there && self.clear().is_none()).then_some(lag)
-    }
+/// Lags of logs of one robot that are looked at together.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Lags {
+    /// What more than half of the joints agree on: mean and standard deviation, s.
+    pub common: Option<[f64; 2]>,
+    /// Share of the root mean square of left-out training rows that goes with the lags that are clear; 0 where none is.
+    pub gain: f64,
+    /// Whether the common lag is clear.
+    pub clear: bool,
+    /// Joints that slide enough, in order.
+    pub joints: Vec<JointLag>,
+    /// All logs, in order.
+    pub logs: Vec<LogLag>,
 }
 
-/// Estimates the lag of a log, joint by joint; `None` without torque or for logs that are too short.
-pub fn estimate_lag(robot: &Robot, pipeline: &Pipeline, trajectory: &Trajectory) -> Option<LogLag> {
-    let first = trajectory.segments.first()?;
-    if trajectory.segments.iter().any(|s| s.tau.is_empty()) {
-        return None;
-    }
-    let interval = first.interval;
-    let reach = ((REACH / interval).round() as usize).clamp(LEAST_REACH, MOST_REACH);
-    let kernel = if pipeline.is_off() {
-        vec![1.0]
-    } else {
-        let cutoff = pipeline.motion_cutoff_hz.min(0.45 / interval);
-        MotionKernels::new(cutoff, interval).smooth
-    };
-    let slow = if pipeline.is_off() {
-        SLOW_SAMPLES
-    } else {
-        let samples = SLOW / pipeline.cutoff_hz / interval;
-        (samples.round() as usize).clamp(2, SLOWEST)
-    };
-    let pieces = pieces(&trajectory.segments, reach + kernel.len() / 2, slow)?;
-    let products: Vec<Vec<[Products; 2]>> = pieces
-        .par_iter()
-        .map(|piece| piece.products(robot, reach, &kernel))
-        .collect();
-    let names = robot.joint_names();
-    let joints: Vec<JointLag> = (0..robot.dof())
-        .filter_map(|joint| {
-            let [fast, slow] = [0, 1].map(|step| -> Vec<&Products> {
-                products.iter().map(|piece| &piece[joint][step]).collect()
-            });
-            joint_lag(names[joint], &fast, &slow, reach, interval)
-        })
-        .collect();
-    let common = common(&joints, interval);
-    Some(LogLag {
-        log: trajectory.name.clone(),
-        interval: first.logged_interval,
-        joints,
-        common,
-    })
+/// What joints and logs say of their lags.
+struct Votes {
+    /// Joints that say it, with their lag and its standard deviation, s.
+    joints: Vec<(usize, [f64; 2])>,
+    /// Which of them differ from the others.
+    apart: Vec<bool>,
+    /// Which of the logs that say it differ from the others.
+    logs_apart: Vec<bool>,
+    /// What most joints agree on, without the logs that differ.
+    common: Option<[f64; 2]>,
 }
 
-/// One finding per log whose torque is clearly off by more than a sample: degraded (exit code 3) unless the user has said
-/// what the lag is, or most of the logs, which are all moved alike, do not say the same. A lag that is there and not
-/// clearly longer than a sample is a note, unless the user has said what it is.
-pub fn lag_findings(pipeline: &Pipeline, lags: &[LogLag]) -> Vec<Finding> {
-    let said = pipeline.corrections.lag != Lag::Unsaid;
-    lags.iter()
-        .filter_map(|log| {
-            let (Some(lag), [_, sd]) = (log.clear(), log.common?) else {
-                return slight_lag(log).filter(|_| !said);
-            };
-            let order = if lag > 0.0 { "after" } else { "before" };
-            let speak = log.joints.iter().filter(|joint| joint.speaks).count();
-            let same = |other: &&LogLag| other.clear().is_some_and(|own| own * lag > 0.0);
-            let (alike, all) = (lags.iter().filter(same).count(), lags.len());
-            let most = 2 * alike >= all;
-            let severity = match said || !most {
-                true => Severity::Warning,
-                false => Severity::Degraded,
-            };
-            let others = match most {
-                true => String::new(),
-                false => format!(
-                    "; only {alike} of {all} logs say so, and a lag moves all of them: try it, and keep what predicts held-out torque better"
-                ),
-            };
-            let still = if said { " still" } else { "" };
-            Some(Finding::new(
-                severity,
-                "torque_lag",
-                &log.log,
-                format!(
-                    "torque{still} comes {:.2} ± {:.2} ms ({:.1} samples) {order} the motion, as {speak} of {} moving joints say: rows \
-                     pair it with the wrong motion; move it with [signal] lag = {:.4}, or say lag = 0{others}",
-                    1e3 * lag.abs(),
-                    1e3 * sd,
-                    lag.abs() / log.interval,
-                    log.joints.len(),
-                    lag + pipeline.corrections.common_lag()
-                ),
-                0,
-            ))
-        })
-        .collect()
+/// The lag of a joint or log that says it.
+fn said_lag(lag: &Option<[f64; 2]>) -> Option<[f64; 2]> {
+    lag.filter(|[_, sd]| *sd < VAGUE)
 }
 
-/// The note on a lag that is there and not clearly longer than a sample.
-fn slight_lag(log: &LogLag) -> Option<Finding> {
-    let (lag, [_, sd]) = (log.slight()?, log.common?);
-    let order = if lag > 0.0 { "after" } else { "before" };
-    Some(Finding::new(
-        Severity::Note,
-        "torque_lag",
-        &log.log,
-        format!(
-            "torque comes {:.2} ± {:.2} ms ({:.2} samples) {order} the motion, not for certain more than one sample, so that it is \
-             left as it is: try [signal] lag = {lag:.4}, and keep it if it predicts held-out torque better",
-            1e3 * lag.abs(),
-            1e3 * sd,
-            lag.abs() / log.interval,
-        ),
-        0,
-    ))
-}
-
-/// A run of samples whose torque is known `margin` samples further on either side.
-struct Piece<'a> {
-    segment: &'a Segment,
-    from: usize,
-    len: usize,
-    margin: usize,
-    /// Step of the slow differences.
-    slow: usize,
-}
-
-/// Evenly spread pieces of one length.
-fn pieces(segments: &[Segment], margin: usize, slow: usize) -> Option<Vec<Piece<'_>>> {
-    let inner = |segment: &Segment| (segment.time.len()).saturating_sub(2 * margin + slow);
-    let total: usize = segments.iter().map(inner).sum();
-    let len = PIECE.min(total / FEWEST_PIECES);
-    if len < SHORTEST {
-        return None;
-    }
-    let all: Vec<Piece<'_>> = segments
-        .iter()
-        .flat_map(|segment| {
-            (0..inner(segment) / len).map(move |k| Piece {
-                segment,
-                from: margin + k * len,
-                len,
-                margin,
-                slow,
-            })
-        })
-        .collect();
-    let (count, wanted) = (all.len(), all.len().min(PIECES));
-    let mut chosen: Vec<Piece<'_>> = Vec::with_capacity(wanted);
-    for (index, piece) in all.into_iter().enumerate() {
-        if index * wanted / count >= chosen.len() {
-            chosen.push(piece);
+impl Votes {
+    fn new(found: &Estimate<'_>) -> Self {
+        let own = found.joints.iter().enumerate();
+        let joints: Vec<(usize, [f64; 2])> = own
+            .filter_map(|(joint, lag)| Some((joint, said_lag(lag)?)))
+            .collect();
+        let values: Vec<[f64; 2]> = joints.iter().map(|(_, lag)| *lag).collect();
+        let of_logs: Vec<[f64; 2]> = found.logs.iter().filter_map(said_lag).collect();
+        let (agree, mut several) = (agreed(&values), agreed(&of_logs));
+        // Joints that do not agree say nothing of a log either.
+        if agree.common.is_none() {
+            several.differs.fill(false);
         }
-    }
-    (chosen.len() >= FEWEST_PIECES / 2).then_some(chosen)
-}
-
-impl Piece<'_> {
-    /// Sums of products of every joint, of differences over one sample and of slow ones.
-    fn products(&self, robot: &Robot, reach: usize, kernel: &[f64]) -> Vec<[Products; 2]> {
-        let (dof, all, len) = (robot.dof(), self.segment.time.len(), self.len + self.slow);
-        let stacked = |values: &[f64]| -> Vec<f64> {
-            (0..dof)
-                .flat_map(|joint| &values[joint * all + self.from..joint * all + self.from + len])
-                .copied()
-                .collect()
+        // One log that differs must not pull what is applied to all.
+        let common = match several.differs.contains(&true) {
+            true => agree.common.and(several.common),
+            false => agree.common,
         };
-        let [q, qd, qdd] =
-            [&self.segment.q, &self.segment.qd, &self.segment.qdd].map(|v| stacked(v));
-        let mut nominal = vec![0.0; dof * len];
-        let (q, qd, qdd) = (&q[..], &qd[..], &qdd[..]);
-        nominal_torque(robot, Motion { len, q, qd, qdd }, &mut nominal);
-        (0..dof)
-            .map(|joint| {
-                let own = joint * len..(joint + 1) * len;
-                let (n, v, a) = (&nominal[own.clone()], &qd[own.clone()], &qdd[own]);
-                let still = &self.segment.standstill[joint * all + self.from..][..len];
-                let shapes: [&dyn Fn(usize) -> f64; profile::COLUMNS] = [
-                    &|i| n[i],
-                    &|i| v[i],
-                    &|i| (v[i] / DRY[0]).tanh(),
-                    &|i| (v[i] / DRY[1]).tanh(),
-                    &|i| v[i].abs() * v[i],
-                    &|i| a[i],
-                ];
-                let columns = shapes.map(|shape| (0..len).map(shape).collect::<Vec<f64>>());
-                let raw = self.from - self.margin..self.from + len + self.margin;
-                let raw = &self.segment.tau[joint * all..(joint + 1) * all][raw];
-                let mut tau = vec![0.0; len + 2 * reach];
-                correlate(kernel, raw, &mut tau);
-                [1, self.slow].map(|step| {
-                    let moves: Vec<f64> = (0..self.len)
-                        .map(|i| {
-                            if still[i] || still[i + step] {
-                                0.0
-                            } else {
-                                1.0
-                            }
-                        })
-                        .collect();
-                    let differences = |values: &[f64]| -> Vec<f64> {
-                        let pairs = values.iter().zip(&values[step..]);
-                        pairs.map(|(before, after)| after - before).collect()
-                    };
-                    let columns = columns.each_ref().map(|values| -> Vec<f64> {
-                        let moved = differences(values).into_iter().zip(&moves);
-                        moved.map(|(x, moves)| moves * x).collect()
-                    });
-                    Products::new(&columns, &moves, &differences(&tau), reach)
-                })
-            })
-            .collect()
+        // Of two joints nobody knows which is right, and a log that differs pulls joints apart.
+        let alike = joints.len() > 2 && !several.differs.contains(&true);
+        let sharp = joints.iter().map(|(_, [_, sd])| alike && *sd < SHARP);
+        let apart = (agree.differs.iter().zip(sharp)).map(|(apart, sharp)| *apart && sharp);
+        Self {
+            apart: apart.collect(),
+            logs_apart: several.differs,
+            joints,
+            common,
+        }
     }
 }
 
-/// The lag of one joint; `None` where it hardly moves.
-fn joint_lag(
-    name: &str,
-    parts: &[&Products],
-    slow: &[&Products],
-    reach: usize,
-    interval: f64,
-) -> Option<JointLag> {
-    let left = profile::left(parts, None)?;
-    let at = profile::lowest(&left);
-    let inside = at.filter(|at| (0.0..=2.0 * reach as f64).contains(at));
-    let without: Option<Vec<f64>> = (0..parts.len())
-        .map(|part| profile::lowest(&profile::left(parts, Some(part))?))
-        .collect();
-    let slow = profile::lowest(&profile::left(slow, None)?);
-    let lowest = left.iter().copied().fold(f64::INFINITY, f64::min);
-    let sd = inside.and(without).map(|at| {
-        let count = at.len() as f64;
-        let mean = at.iter().sum::<f64>() / count;
-        let squares: f64 = at.iter().map(|at| (at - mean).powi(2)).sum();
-        ((count - 1.0) / count * squares + PARABOLA * PARABOLA).sqrt()
-    });
-    let end = left.iter().position(|l| *l == lowest).unwrap_or(reach) as f64;
-    Some(JointLag {
-        joint: name.to_owned(),
-        lag: (inside.unwrap_or(end) - reach as f64) * interval,
-        slow: slow.map(|slow| (slow - reach as f64) * interval),
-        sd: sd.map(|sd| sd * interval),
-        left: [left[reach], lowest],
-        speaks: sd.is_some() && slow.is_some() && lowest < EXPLAINED,
+/// Estimates the lags of logs together; `None` without torque or with too little motion.
+pub fn lags(robot: &Robot, pipeline: &Pipeline, logs: &[&Trajectory]) -> Option<Lags> {
+    let mut found = estimate(robot, pipeline, logs)?;
+    let names = robot.joint_names();
+    let votes = Votes::new(&found);
+    let clear = votes.common.filter(|[lag, sd]| lag.abs() > CLEARLY * sd);
+    let mut moved = vec![clear.map_or(0.0, |[lag, _]| lag); names.len()];
+    let apart = || votes.joints.iter().zip(&votes.apart);
+    for ((joint, [lag, _]), _) in apart().filter(|(_, apart)| **apart) {
+        moved[*joint] = *lag;
+    }
+    let (gain, gains) = match moved.iter().any(|lag| *lag != 0.0) {
+        true => found.gain(&moved)?,
+        false => (0.0, vec![0.0; names.len()]),
+    };
+    let joint = |((joint, [lag, sd]), apart): (&(usize, [f64; 2]), &bool)| JointLag {
+        joint: names[*joint].to_owned(),
+        lag: *lag,
+        sd: *sd,
+        differs: *apart && gains[*joint] > MISTAKE,
+    };
+    let of_logs = found.gain_of_logs(votes.common.map_or(0.0, |[lag, _]| lag));
+    let mut logs_apart = votes.logs_apart.iter();
+    let log = |((trajectory, lag), gain): ((&&Trajectory, &Option<[f64; 2]>), &f64)| {
+        let apart = said_lag(lag).and_then(|_| logs_apart.next());
+        LogLag {
+            log: trajectory.name.clone(),
+            interval: (trajectory.segments.first()).map_or(0.0, |s| s.logged_interval),
+            common: *lag,
+            differs: apart.is_some_and(|apart| *apart) && *gain > MISTAKE,
+        }
+    };
+    let own = logs.iter().zip(&found.logs).zip(&of_logs);
+    Some(Lags {
+        common: votes.common,
+        gain,
+        clear: clear.is_some() && gain > IMPROVES,
+        joints: apart().map(joint).collect(),
+        logs: own.map(log).collect(),
     })
 }
 
-/// Mean over the joints that speak, if they are more than half of those that move; what they disagree by counts, and what
-/// slow differences say otherwise.
-fn common(joints: &[JointLag], interval: f64) -> Option<[f64; 2]> {
-    let speak: Vec<[f64; 3]> = joints
-        .iter()
-        .filter(|joint| joint.speaks)
-        .filter_map(|joint| Some([joint.lag, joint.sd?.max(PARABOLA * interval), joint.slow?]))
-        .collect();
-    let alone = speak.len() == 1;
-    let doubtful = |joint: &&JointLag| joint.speaks && joint.left[1] > EXPLAINED_ALONE;
-    if 2 * speak.len() <= joints.len() || alone && joints.iter().any(|j| doubtful(&j)) {
-        return None;
+/// Lag of each third of a log, with its standard deviation, s: a lag that grows is a torque clock that drifts. `None` where a third does not say it.
+pub fn lag_by_thirds(
+    robot: &Robot,
+    pipeline: &Pipeline,
+    trajectory: &Trajectory,
+) -> Option<[[f64; 2]; 3]> {
+    let first = trajectory.segments.first()?.time.first()?;
+    let last = trajectory.segments.last()?.time.last()?;
+    let third = |k: usize| {
+        let [from, to] = [k, k + 1].map(|k| first + (last - first) * k as f64 / 3.0);
+        trajectory.between(from, to)
+    };
+    let thirds = [0, 1, 2].map(third);
+    let found = estimate(robot, pipeline, &thirds.each_ref())?;
+    match found.logs[..] {
+        [Some(a), Some(b), Some(c)] => Some([a, b, c]),
+        _ => None,
     }
-    // Sum of weights and of their squares, mean lag and mean of the slow ones.
-    let pooled = |between: f64| -> [f64; 4] {
-        let mut sums = [0.0; 4];
-        for [lag, sd, slow] in &speak {
-            let weight = 1.0 / (sd * sd + between);
-            let terms = [weight, weight * weight, weight * lag, weight * slow];
-            sums.iter_mut()
-                .zip(terms)
-                .for_each(|(sum, term)| *sum += term);
+}
+
+impl Lags {
+    /// What moves torque back: the common lag where it is clear, that of each joint that differs. `None` where nothing is clear.
+    pub fn correction(&self, robot: &Robot) -> Option<Lag> {
+        let common = self
+            .common
+            .filter(|_| self.clear)
+            .map_or(0.0, |[lag, _]| lag);
+        let differ: Vec<&JointLag> = self.joints.iter().filter(|joint| joint.differs).collect();
+        if differ.is_empty() {
+            return (common != 0.0).then_some(Lag::All(common));
         }
-        [sums[0], sums[1], sums[2] / sums[0], sums[3] / sums[0]]
+        let names = robot.joint_names().into_iter();
+        let mut joints: BTreeMap<String, f64> =
+            names.map(|name| (name.to_owned(), common)).collect();
+        for joint in differ {
+            joints.insert(joint.joint.clone(), joint.lag);
+        }
+        Some(Lag::Joints(joints))
+    }
+}
+
+/// Findings on the lags of logs. `said`: what the user said of lags, which was applied before these were estimated.
+///
+/// | what is clear | finding |
+/// |---|---|
+/// | a lag of all joints and logs | a note that it is applied; a warning where the user said another |
+/// | that of one joint | degraded data, its subject is the joint; it is applied |
+/// | that of one log | degraded data, its subject is the log; it is not applied |
+pub fn lag_findings(said: &Lag, lags: &Lags) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    if let Some([lag, sd]) = lags.common.filter(|_| lags.clear) {
+        findings.push(common_finding(said, lags, [lag, sd]));
+    }
+    let common = lags.common.map_or(0.0, |[lag, _]| lag);
+    for joint in lags.joints.iter().filter(|joint| joint.differs) {
+        let message = format!(
+            "joint `{}`: torque is logged {}, other joints {:.1} ms. It is moved back before the fit. Look at how this joint's torque is recorded; [signal] \
+             lag = {{ {} = {:.4} }} says that it is right",
+            joint.joint,
+            behind([joint.lag, joint.sd]),
+            1e3 * common,
+            joint.joint,
+            joint.lag
+        );
+        let severity = match said {
+            Lag::Unsaid => Severity::Degraded,
+            _ => Severity::Warning,
+        };
+        findings.push(Finding::new(
+            severity,
+            "torque_lag",
+            &joint.joint,
+            message,
+            0,
+        ));
+    }
+    findings.extend(late_logs(lags));
+    findings
+}
+
+/// Findings on logs whose lag differs from that of the others: nothing moves a single log's torque.
+pub fn late_logs(lags: &Lags) -> Vec<Finding> {
+    let late = lags.logs.iter().filter(|log| log.differs);
+    let finding = |log: &LogLag| {
+        let own = log.common?;
+        let message = format!(
+            "log `{}`: torque is logged {}, unlike the other logs. Leave this log out, or move its torque to the time of its motion",
+            log.log,
+            behind(own)
+        );
+        Some(Finding::new(
+            Severity::Degraded,
+            "torque_lag",
+            &log.log,
+            message,
+            0,
+        ))
     };
-    let [sum, squares, mean, _] = pooled(0.0);
-    let q: f64 = speak
-        .iter()
-        .map(|[lag, sd, _]| ((lag - mean) / sd).powi(2))
-        .sum();
-    let beyond = q - (speak.len() - 1) as f64;
-    let between = if speak.len() > 1 {
-        (beyond / (sum - squares / sum)).max(0.0)
-    } else {
-        0.0
+    late.filter_map(finding).collect()
+}
+
+fn common_finding(said: &Lag, lags: &Lags, common: [f64; 2]) -> Finding {
+    let gain = significant(100.0 * lags.gain, 2);
+    let late = behind(common);
+    let (severity, message) = match said {
+        Lag::Unsaid => (
+            Severity::Note,
+            format!(
+                "torque is logged {late}, as most joints agree. It is moved back before the fit: left-out rows of the training logs have {gain} % less error. \
+                 [signal] lag = 0 leaves it as logged"
+            ),
+        ),
+        _ => (
+            Severity::Warning,
+            format!(
+                "with the [signal] lag that was given torque is still logged {late}; without this left-out rows of the training logs have {gain} % less \
+                 error. Give a lag that is {:.4} s longer, or \"auto\"",
+                common[0]
+            ),
+        ),
     };
-    let [sum, _, mean, slow] = pooled(between);
-    Some([mean, (1.0 / sum + (mean - slow).powi(2)).sqrt()])
+    Finding::new(severity, "torque_lag", "", message, 0)
+}
+
+/// A lag in words.
+fn behind([lag, sd]: [f64; 2]) -> String {
+    let order = if lag < 0.0 { "before" } else { "after" };
+    format!(
+        "{:.1} ± {:.1} ms {order} the motion",
+        1e3 * lag.abs(),
+        1e3 * sd
+    )
 }
 
 #[cfg(test)]

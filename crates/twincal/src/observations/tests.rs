@@ -12,6 +12,7 @@ fn temperatures(time: &[f64], logged: &[f64]) -> Vec<f64> {
     let len = time.len();
     observations.set_temperatures(&Recording {
         unfolded: false,
+        start_ns: 0,
         name: "run".into(),
         time: time.to_vec(),
         joints: vec![Channels {

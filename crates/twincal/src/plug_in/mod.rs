@@ -182,11 +182,7 @@ pub fn start(training: &[Part<'_>], columns: &Columns, prior: &PriorSettings) ->
 
 /// Sum of the statistics of several parts.
 pub fn total(parts: &[Part<'_>]) -> Gram {
-    let mut sum = Gram::default();
-    for part in parts {
-        sum += &part.gram();
-    }
-    sum
+    parts.iter().collect()
 }
 
 /// Moving rows of a joint over several parts: n of [`total`].

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::gram::Gram;
 use crate::infer::approximate;
 use crate::likelihood::{Columns, PlugIn, assemble};
-use crate::observations::{Observations, Part};
+use crate::observations::{Observations, Part, QuadraticForm};
 use crate::posterior::Posterior;
 use rayon::prelude::*;
 
@@ -187,7 +187,7 @@ fn weighing(training: &[Part<'_>], joint: usize, robust: bool) -> f64 {
 
 /// What one fold knows, and what it predicts.
 struct LeaveOut<'a> {
-    /// Statistics of the kept pieces, added up in their order: no subtraction, no rounding but that of a sum.
+    /// Statistics of the kept pieces, added up fold by fold: no subtraction, no rounding but that of a sum.
     kept: Gram,
     out: Vec<Part<'a>>,
 }
@@ -205,21 +205,19 @@ fn folds<'a>(training: &[Part<'a>]) -> Vec<LeaveOut<'a>> {
             .collect()
     };
     let count = pieces.len().min(MOST_FOLDS);
-    let grams: Vec<Gram> = pieces.par_iter().map(Part::gram).collect();
-    (0..count)
-        .map(|fold| {
-            let mut own = LeaveOut {
-                kept: Gram::default(),
-                out: Vec::new(),
-            };
-            for (i, (piece, gram)) in pieces.iter().zip(&grams).enumerate() {
-                if i % count == fold {
-                    own.out.push(piece.clone());
-                } else {
-                    own.kept += gram;
-                }
-            }
-            own
+    let out: Vec<Vec<Part<'a>>> = (0..count)
+        .map(|fold| pieces.iter().skip(fold).step_by(count).cloned().collect())
+        .collect();
+    let grams: Vec<Gram> = out.par_iter().map(|out| total(out)).collect();
+    let folds = out.into_iter().enumerate();
+    folds
+        .map(|(fold, out)| {
+            let mut kept = Gram::default();
+            let others = grams.iter().enumerate();
+            others
+                .filter(|(other, _)| *other != fold)
+                .for_each(|(_, gram)| kept += gram);
+            LeaveOut { kept, out }
         })
         .collect()
 }
@@ -252,8 +250,15 @@ fn predict_left_out(
             let joint = |joint: usize| {
                 let noise = posterior.noise / plug_in.weight[joint];
                 let mut sums = LeftOutJoint::default();
+                let mut form: Option<QuadraticForm> = None;
                 for part in out {
-                    sums.add(part, joint, &posterior, &covariance, (noise, robust));
+                    if !form.as_ref().is_some_and(|form| part.has_form(joint, form)) {
+                        let count = posterior.mean.len();
+                        form = Some(part.quadratic_form(joint, &covariance, count));
+                    }
+                    if let Some(form) = &form {
+                        sums.add(part, joint, (&posterior, form), (noise, robust));
+                    }
                 }
                 sums
             };
@@ -271,13 +276,12 @@ impl LeftOutJoint {
         &mut self,
         part: &Part<'_>,
         joint: usize,
-        posterior: &Posterior,
-        covariance: &[f64],
+        (posterior, form): (&Posterior, &QuadraticForm),
         (noise, robust): (f64, bool),
     ) {
         let rows = &part.observations.joints[joint];
         let residual = part.residual(joint, &posterior.mean, part.rows.clone());
-        let epistemic = part.quadratic_forms(joint, covariance, posterior.mean.len());
+        let epistemic = part.forms(joint, form);
         for (row, (r, epistemic)) in part.rows.clone().zip(residual.iter().zip(epistemic)) {
             if rows.standstill[row] {
                 continue;

@@ -1,7 +1,7 @@
 //! The layout for the algorithms: one rigid body per moving joint, its frame's z along the joint axis.
 
 use super::coordinates::Source;
-use super::inertia::{Moments, check};
+use super::inertia::{LARGEST, Moments, check};
 use super::spatial::{
     IDENTITY, Matrix, axis_angle, is_about_x, multiply, norm, scale, transpose, z_to,
 };
@@ -178,6 +178,13 @@ fn check_numbers(joint: &JointDescription) -> Result<()> {
             "give finite numbers",
         );
     }
+    if let Some(length) = translation.iter().find(|v| v.abs() > LARGEST) {
+        return refuse(
+            joint,
+            format!("its origin is {length:e} m away, the limit is {LARGEST:e}"),
+            "correct the number or its unit",
+        );
+    }
     let square = multiply(rotation, &transpose(rotation));
     let error = (0..3)
         .flat_map(|i| (0..3).map(move |k| (i, k)))
@@ -201,6 +208,13 @@ fn check_numbers(joint: &JointDescription) -> Result<()> {
     ] {
         if !value.is_finite() {
             return refuse(joint, format!("{what} is {value}"), "give a finite number");
+        }
+        if value.abs() > LARGEST {
+            return refuse(
+                joint,
+                format!("{what} is {value:e}, the limit is {LARGEST:e}"),
+                "correct the number or its unit",
+            );
         }
         if value < 0.0 && what != "spring reference" {
             return refuse(joint, format!("{what} is {value}"), "it cannot be negative");

@@ -103,6 +103,12 @@ pub struct JointDescription {
     pub stiffness: f64,
     /// Rest position of that spring, rad or m.
     pub spring_reference: f64,
+    /// Viscous damping that the file states and that does not count as nominal torque, N·m·s/rad or N·s/m.
+    #[serde(default)]
+    pub unused_damping: f64,
+    /// Dry friction that the file states, N·m or N; it never counts as nominal torque.
+    #[serde(default)]
+    pub unused_friction: f64,
     /// Set when the joint mimics another.
     pub mimic: Option<Mimic>,
     /// As far as stated.
@@ -123,6 +129,8 @@ impl JointDescription {
             damping: 0.0,
             stiffness: 0.0,
             spring_reference: 0.0,
+            unused_damping: 0.0,
+            unused_friction: 0.0,
             mimic: None,
             limits: Limits::default(),
         }

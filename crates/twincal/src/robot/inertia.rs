@@ -82,6 +82,10 @@ pub fn principal_axes(tensor: &Matrix) -> ([f64; 3], Matrix) {
     (order.map(|i| a[i][i]), r.map(|row| order.map(|i| row[i])))
 }
 
+/// Largest mass, length, moment of inertia or drive constant of a model, SI units: far above every machine, and far below numbers whose
+/// products overflow.
+pub(crate) const LARGEST: f64 = 1e12;
+
 /// Refuses what no body can have: a mass that is not positive, a tensor that is not positive definite or breaks the
 /// triangle inequality (one principal moment above the sum of the others). Thin rods, flat plates and point masses are
 /// the bounds and pass. With `allow_unphysical` an impossible tensor, or a tensor without mass, is a finding.
@@ -119,6 +123,17 @@ pub(crate) fn check(
         return refuse(
             format!("inertia tensor is {tensor:?}"),
             "give six finite numbers in kg·m²",
+        );
+    }
+    let numbers = [(mass, "mass", "kg")].into_iter();
+    let numbers = numbers.chain(com.iter().map(|v| (v, "centre of mass", "m")));
+    let tensor_entries = tensor.as_flattened().iter();
+    let mut numbers =
+        numbers.chain(tensor_entries.map(|v| (v, "an entry of the inertia tensor", "kg·m²")));
+    if let Some((value, what, unit)) = numbers.find(|(v, ..)| v.abs() > LARGEST) {
+        return refuse(
+            format!("{what} is {value:e} {unit}, the limit is {LARGEST:e}"),
+            "correct the number or its unit",
         );
     }
     for (i, j) in [(0, 1), (0, 2), (1, 2)] {

@@ -180,6 +180,13 @@ impl Robot {
         &self.description
     }
 
+    /// The same robot where gravity in the base frame is another, m/s².
+    pub(crate) fn with_gravity(&self, gravity: [f64; 3]) -> Self {
+        let mut robot = self.clone();
+        robot.description.gravity = gravity;
+        robot
+    }
+
     /// Positions of the joints that were locked, rad or m.
     pub fn locked(&self) -> &BTreeMap<String, f64> {
         &self.locked

@@ -1,12 +1,17 @@
 //! "Did you mean": the names nearest to one that does not exist.
 
+use crate::words::{listed, quoted, shortened};
+
 /// Up to three candidates nearest to `name` by edit distance (insert, delete, replace, swap neighbours; letter case is
 /// free; at most a third of the letters), nearest first, ties in the given order; none when nothing is near.
 pub fn nearest_names<'a>(
     name: &str,
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Vec<&'a str> {
-    let wanted: Vec<char> = name.to_lowercase().chars().take(64).collect();
+    let wanted: Vec<char> = (name.chars().take(64))
+        .flat_map(char::to_lowercase)
+        .take(64)
+        .collect();
     let limit = wanted.len().div_ceil(3).min(wanted.len().saturating_sub(1));
     let mut scored: Vec<(usize, &str)> = candidates
         .into_iter()
@@ -14,9 +19,8 @@ pub fn nearest_names<'a>(
             (
                 distance(
                     &wanted,
-                    &candidate
-                        .to_lowercase()
-                        .chars()
+                    &(candidate.chars().take(64))
+                        .flat_map(char::to_lowercase)
                         .take(64)
                         .collect::<Vec<_>>(),
                 ),
@@ -38,12 +42,12 @@ pub fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str
     let all: Vec<&str> = candidates.into_iter().collect();
     let near = nearest_names(name, all.iter().copied());
     if !near.is_empty() {
-        return format!("did you mean `{}`?", near.join("` or `"));
+        let near = near.iter().map(|name| format!("`{}`", shortened(name)));
+        return format!("did you mean {}?", listed(near, " or "));
     }
     match all.len() {
         0 => "there are none".into(),
-        n if n <= 12 => format!("there are `{}`", all.join("`, `")),
-        n => format!("there are {n}, the first `{}`", all[..8].join("`, `")),
+        _ => format!("there are {}", quoted(&all)),
     }
 }
 

@@ -1,5 +1,4 @@
 //! Rows against brute force: a stand-in model whose columns are known functions of the motion.
-
 use super::evaluate::Source;
 use super::*;
 use crate::lanes::Aligned;
@@ -522,6 +521,7 @@ fn a_coarser_clock_changes_no_row() {
     let of_joint = |values: &[f64], joint: usize| values[joint * len..(joint + 1) * len].to_vec();
     let recording = Recording {
         unfolded: false,
+        start_ns: 0,
         name: "run".into(),
         joints: (0..dof)
             .map(|joint| Channels {
@@ -587,10 +587,7 @@ fn a_coarser_clock_changes_no_row() {
                 Ok(())
             };
             visit_rows(&robot, &library, &pipeline, &trajectory, signal, &mut check).unwrap();
-            assert!(
-                worst < limit,
-                "{signal:?}, {motion_interval}: {worst:e} N·m"
-            );
+            assert!(worst < limit, "{signal:?}: {worst:e} N·m");
             times.push((first, rows));
         }
     }

@@ -7,7 +7,7 @@ use crate::robot::{Motion, Robot, nominal_torque};
 /// Fewest moving samples of a joint that say anything.
 const FEWEST: usize = 40;
 /// Velocity at which dry friction is taken as fully there, rad/s or m/s.
-const DRY: f64 = 0.02;
+pub(super) const DRY: f64 = 0.02;
 /// Share of the nominal torque's sd that a driven joint has at least.
 const DRIVEN: f64 = 0.7;
 /// Columns of the small regression: nominal torque, velocity, its sign, acceleration; behind them what gravity takes of the nominal

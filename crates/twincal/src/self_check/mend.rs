@@ -16,6 +16,10 @@ const LEAST_GAIN: f64 = 2.0;
 const GREAT_GAIN: f64 = 6.0;
 /// A joint may not get worse by more than this factor, unless it stays explained.
 const WORSE: f64 = 1.5;
+/// Share of torque by which a joint may be explained less and still counts as explained alike: half of the last digit that is shown.
+const ALIKE: f64 = 0.005;
+/// The same where only the free factor makes the difference: on a joint that friction rules it fits an unknown payload as well as it can.
+const BY_FACTOR: f64 = 0.03;
 /// Shares below this are alike.
 const FLOOR: f64 = 1e-3;
 /// Least gain of a single step on the way.
@@ -97,11 +101,50 @@ fn doubtful(joints: &[Option<Explained>], left: Left) -> bool {
     joints.iter().flatten().any(|joint| left(joint) > DOUBTFUL)
 }
 
+/// True where any joint's torque is not well explained, by either measure.
+pub(super) fn is_doubtful(joints: &[Option<Explained>]) -> bool {
+    LEFT.into_iter().any(|left| doubtful(joints, left))
+}
+
+/// Σ ln(share left) before less after, with a free factor at the model's torque.
+pub(super) fn gain_of(before: &[Option<Explained>], after: &[Option<Explained>]) -> f64 {
+    gain(before, after, LEFT[0])
+}
+
 /// Σ ln(share left) before less after.
 fn gain(before: &[Option<Explained>], after: &[Option<Explained>], left: Left) -> f64 {
     let both = before.iter().flatten().zip(after.iter().flatten());
     both.map(|(b, a)| (left(b).max(FLOOR) / left(a).max(FLOOR)).ln())
         .sum()
+}
+
+/// True if no joint's torque is explained less than before: no reading is proposed that does. Less is what the model leaves both with a free factor
+/// and as it is, or with a free factor by far.
+pub(super) fn none_less(before: &[Option<Explained>], after: &[Option<Explained>]) -> bool {
+    let mut joints = before.iter().zip(after);
+    joints.all(|joint| match joint {
+        (Some(before), Some(after)) => {
+            let less = |by: f64, left: Left| left(after) > left(before) + by;
+            let in_both = LEFT.into_iter().all(|left| less(ALIKE, left));
+            !in_both && !less(BY_FACTOR, LEFT[0])
+        }
+        (Some(_), None) => false,
+        (None, _) => true,
+    })
+}
+
+/// True if `after` explains more by `least` in Σ ln(share left) and half of what a driven joint had left, and no joint less.
+pub(super) fn explains_more(
+    before: &[Option<Explained>],
+    after: &[Option<Explained>],
+    least: f64,
+) -> bool {
+    let halves = |left: Left| {
+        let mut both = before.iter().zip(after).filter_map(|(b, a)| b.zip(*a));
+        both.any(|(b, a)| a.driven && left(&a) < 0.5 * left(&b))
+    };
+    let better = |left: Left| gain(before, after, left) >= least && halves(left);
+    none_less(before, after) && LEFT.into_iter().any(better)
 }
 
 /// True if `after` explains a driven joint by so much more that chance and model error are out of the question, and no joint
@@ -110,7 +153,7 @@ pub(super) fn overwhelming(before: &[Option<Explained>], after: &[Option<Explain
     let both = || before.iter().zip(after).filter_map(|(b, a)| b.zip(*a));
     let pays =
         |left: Left| both().any(|(b, a)| left(&a) > 0.5 * GOOD && left(&a) > WORSE * left(&b));
-    if pays(LEFT[0]) {
+    if pays(LEFT[0]) || !none_less(before, after) {
         return false;
     }
     let honest = || LEFT.into_iter().filter(|left| !pays(*left));
@@ -205,7 +248,8 @@ fn consistent(
                 clearest = Some((gain - other, joint, reading, explained));
             }
         }
-        let Some((_, joint, reading, explained)) = clearest else {
+        let better = clearest.filter(|(.., explained)| none_less(as_logged, explained));
+        let Some((_, joint, reading, explained)) = better else {
             break;
         };
         left.retain(|&other| other != joint);

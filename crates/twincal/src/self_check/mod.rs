@@ -4,19 +4,30 @@
 //! is named only where another reading of the log explains by far more. Nothing is ever mended in silence: degrees are
 //! refused, all else counts as degraded data, with the mend to try.
 
+mod base;
+mod columns;
+mod degrees;
 mod explain;
+mod gravity_part;
 mod mend;
+mod parts;
 mod sample;
+mod shared;
+mod velocity;
 
-use crate::error::{Error, Finding, Result, Severity};
-use crate::robot::{JointKind, Robot};
+use crate::error::{Finding, Result, Severity};
+use crate::robot::Robot;
 use crate::signal::{Pipeline, Trajectory};
 use crate::words::significant;
+use degrees::refuse_degrees;
 use explain::{Explained, Reading, explain};
+use gravity_part::{Factors, factor_findings, missing_finding};
+use parts::Parts;
 use sample::Sample;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::{PI, TAU};
 use std::ops::RangeInclusive;
+
+pub use base::Base;
 
 /// Torque that differs by this factor from the model's is not of the joint's side, or not in N·m.
 const OTHER_UNIT: f64 = 5.0;
@@ -45,12 +56,16 @@ const PART: f64 = 0.3;
 ///
 /// | finding | what was seen |
 /// |---|---|
+/// | `base_orientation` | gravity acts in another direction than the model has it: a robot on a wall or ceiling |
 /// | `torque_scale` | a joint's torque has the model's shape, but is more than 5 times larger or smaller |
 /// | `sign_flip` | a joint's torque, or its motion, has the opposite sign |
 /// | `joint_order` | joints are exchanged |
+/// | `model_torque`, `gravity_compensated` | the torque holds no part of the model's, or none of its gravity |
+/// | `clock_scale` | velocity, or all inertial torque, has a factor that a wrong clock would give it |
+/// | `torque_copied`, `torque_constant` | a torque column is another joint's, or one number |
 ///
 /// # Errors
-/// [`Error::Log`] for positions in degrees.
+/// [`crate::Error::Log`] for positions in degrees.
 pub fn self_check<'a>(
     robot: &Robot,
     pipeline: &Pipeline,
@@ -86,6 +101,8 @@ pub struct JointCheck {
 pub struct Look {
     /// Every moving joint; empty without torque.
     pub joints: Vec<JointCheck>,
+    /// How the base stands, where that explains more than the model's gravity.
+    pub base: Option<Base>,
     /// Those of [`self_check`].
     pub findings: Vec<Finding>,
 }
@@ -100,11 +117,13 @@ pub fn look<'a>(
     trajectories: impl IntoIterator<Item = &'a Trajectory>,
 ) -> Result<Look> {
     let mut samples = Vec::new();
+    let mut logs = Vec::new();
     for trajectory in trajectories {
         let Some(sample) = Sample::take(pipeline, trajectory) else {
             continue;
         };
         refuse_degrees(robot, &trajectory.name, &sample)?;
+        logs.push(&*trajectory.name);
         samples.push(sample);
     }
     let sample = Sample::pool(&samples);
@@ -112,9 +131,121 @@ pub fn look<'a>(
         return Ok(Look::default());
     }
     let as_logged = explain(robot, &sample, &Reading::as_logged(robot.dof()));
-    let (reading, explained) = mend::mend(robot, &sample, &as_logged);
-    let mut findings = signs_and_order(robot, &reading, &as_logged, &explained);
-    let scales = scales(robot, &sample, &explained);
+    let read = Read::of(robot, &sample, &as_logged);
+    let mut findings = read.findings(robot, &as_logged);
+    let each = || logs.iter().copied().zip(&samples);
+    findings.extend(each().flat_map(|log| columns::of_sample(&read.robot, log, &read.standing)));
+    findings.extend(velocity::findings(each()));
+    let mut scales = scales(robot, &sample, &read.explained);
+    let of_all = scales.iter().any(|scale| scale.finding.subject.is_empty());
+    if read.is_as_logged() && !of_all {
+        let lacking: Vec<Finding> = each().filter_map(|log| lacking(&read.robot, log)).collect();
+        // Torque without the model's part has no scale.
+        if !lacking.is_empty() {
+            scales.clear();
+        }
+        findings.extend(lacking);
+    }
+    let joints = joint_checks(robot, &as_logged, &read.reading, &scales);
+    findings.extend(scales.into_iter().map(|scale| scale.finding));
+    if findings.is_empty() && sample.independent >= LEAST_INDEPENDENT {
+        let factors = Factors::of(robot, &sample, &Parts::of(robot, &sample));
+        findings.extend(factors.iter().flat_map(factor_findings));
+    }
+    Ok(Look {
+        joints,
+        base: read.base,
+        findings,
+    })
+}
+
+/// The reading of the logs that explains most: how the base stands, then signs and order of joints.
+struct Read {
+    base: Option<Base>,
+    /// The robot on that base.
+    robot: Robot,
+    /// What it explains with the joints as they are logged.
+    standing: Vec<Option<Explained>>,
+    reading: Reading,
+    explained: Vec<Option<Explained>>,
+}
+
+/// By how much, in Σ ln(share left), a reading of signs and order must explain more than a turned base alone.
+const RATHER_SIGNS: f64 = 1.0;
+
+impl Read {
+    /// The base comes first; signs and order on the base as the model has it where they explain more: a log whose joints are exchanged shows some
+    /// gravity, too.
+    fn of(robot: &Robot, sample: &Sample, as_logged: &[Option<Explained>]) -> Self {
+        let upright = Self::on(None, robot.clone(), (sample, as_logged), as_logged.to_vec());
+        let turned = match mend::is_doubtful(as_logged) {
+            true => base::turned(robot, sample, as_logged),
+            false => None,
+        };
+        let Some(turned) = turned else {
+            return upright;
+        };
+        let turned = Self::on(
+            Some(turned.base),
+            turned.robot,
+            (sample, as_logged),
+            turned.explained,
+        );
+        let [signs, base] =
+            [&upright, &turned].map(|read| mend::gain_of(as_logged, &read.explained));
+        let more = match turned.is_as_logged() {
+            true => RATHER_SIGNS,
+            false => -RATHER_SIGNS,
+        };
+        match !upright.is_as_logged() && signs > base + more {
+            true => upright,
+            false => turned,
+        }
+    }
+
+    /// The best reading of signs and order for a robot on a base.
+    fn on(
+        base: Option<Base>,
+        robot: Robot,
+        (sample, as_logged): (&Sample, &[Option<Explained>]),
+        standing: Vec<Option<Explained>>,
+    ) -> Self {
+        let mended = mend::mend(&robot, sample, &standing);
+        let (reading, explained) = Some(mended)
+            .filter(|(_, explained)| mend::none_less(as_logged, explained))
+            .unwrap_or_else(|| (Reading::as_logged(robot.dof()), standing.clone()));
+        Self {
+            base,
+            robot,
+            standing,
+            reading,
+            explained,
+        }
+    }
+
+    /// No sign is turned and no joint exchanged.
+    fn is_as_logged(&self) -> bool {
+        self.reading == Reading::as_logged(self.robot.dof())
+    }
+
+    fn findings(&self, robot: &Robot, as_logged: &[Option<Explained>]) -> Vec<Finding> {
+        let base = self.base.iter();
+        let mut findings: Vec<Finding> = base
+            .map(|base| base.finding(robot, as_logged, &self.standing))
+            .collect();
+        let signs = signs_and_order(robot, &self.reading, &self.standing, &self.explained);
+        findings.extend(signs);
+        findings
+    }
+}
+
+/// The numbers behind the findings, joint by joint.
+fn joint_checks(
+    robot: &Robot,
+    as_logged: &[Option<Explained>],
+    reading: &Reading,
+    scales: &[Scale],
+) -> Vec<JointCheck> {
     let torque_factor = |name: &str| {
         let whose = |scale: &&Scale| ["", name].contains(&&*scale.finding.subject);
         scales.iter().find(whose)?.factor
@@ -134,39 +265,17 @@ pub fn look<'a>(
             torque: named(reading.torque[joint]),
         }
     });
-    let joints = joints.collect();
-    findings.extend(scales.into_iter().map(|scale| scale.finding));
-    Ok(Look { joints, findings })
+    joints.collect()
 }
 
-/// Angles beyond a turn whose torque only makes sense when they are taken as degrees.
-fn refuse_degrees(robot: &Robot, log: &str, sample: &Sample) -> Result<()> {
-    let largest = sample.largest_angle(robot);
-    if largest <= TAU {
-        return Ok(());
+/// A finding where the torque of one log lacks the model's part.
+fn lacking(robot: &Robot, (log, sample): (&str, &Sample)) -> Option<Finding> {
+    if sample.independent < LEAST_INDEPENDENT {
+        return None;
     }
-    let factors = (0..robot.dof()).map(|joint| match robot.joint_kind(joint) {
-        JointKind::Prismatic => 1.0,
-        _ => PI / 180.0,
-    });
-    let radians = Reading {
-        motion: factors.clone().enumerate().collect(),
-        rates: factors.collect(),
-        ..Reading::as_logged(robot.dof())
-    };
-    let as_logged = explain(robot, sample, &Reading::as_logged(robot.dof()));
-    if !mend::overwhelming(&as_logged, &explain(robot, sample, &radians)) {
-        return Ok(());
-    }
-    Err(Error::Log {
-        log: log.into(),
-        problem: format!(
-            "positions look like degrees: they reach {largest:.1}, and as degrees the model explains the torque"
-        ),
-        remedy: "export positions, velocities and accelerations in radians: × π/180, as with [columns] factor = \
-                 { q = 0.017453292519943295, qd = 0.017453292519943295 }"
-            .into(),
-    })
+    let factors = Factors::of(robot, sample, &Parts::of(robot, sample))?;
+    let part = factors.missing()?;
+    Some(missing_finding(log, part, &factors))
 }
 
 /// Joints whose torque has the model's shape but another size, and those whose torque is far beyond what the model says that the
@@ -427,6 +536,8 @@ fn signs_and_order(
     findings
 }
 
+#[cfg(test)]
+mod readings_tests;
 #[cfg(test)]
 pub(crate) mod testing;
 #[cfg(test)]

@@ -1,12 +1,14 @@
 //! A few hundred smoothed samples of a trajectory: enough to tell gross mistakes, cheap enough to try many readings.
 
-use crate::robot::{JointKind, Robot};
 use crate::signal::{Agreement, Pipeline, Segment, Trajectory, velocity_agreement};
 
 /// Samples that are taken of one trajectory at most.
 const MOST: usize = 800;
 /// Width of the moving average in periods of the cut-off.
 const WINDOW: f64 = 0.5;
+
+/// Squared correlation of velocity and change of position from which the two are one motion.
+const SAME_MOTION: f64 = 0.99;
 
 /// Motion and torque at a few samples, averaged alike over half a period of the cut-off.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -21,6 +23,8 @@ pub(super) struct Sample {
     pub(super) moves: Vec<Vec<bool>>,
     /// Whether a joint's velocity is minus the change of its position, in every log in which it moves; `None` where it moves in none.
     pub(super) opposite: Vec<Option<bool>>,
+    /// Slope of each joint's velocity over the change of its position, where the two are one motion; `None` elsewhere.
+    pub(super) slopes: Vec<Option<f64>>,
     /// ∫ q̈ dq̇ of each joint: negative where acceleration is that of the position and velocity the opposite of its change.
     pub(super) follows: Vec<f64>,
 }
@@ -34,15 +38,17 @@ impl Sample {
             return None;
         }
         let step = total.div_ceil(MOST);
+        let agreement = velocity_agreement(trajectory, &pipeline.standstill_velocity);
         let mut sample = Self {
             len: 0,
             independent: 0.0,
             channels: std::array::from_fn(|_| vec![Vec::new(); dof]),
             moves: vec![Vec::new(); dof],
-            opposite: velocity_agreement(trajectory, &pipeline.standstill_velocity)
-                .into_iter()
+            opposite: agreement
+                .iter()
                 .map(|agreement| agreement.map(Agreement::is_opposite))
                 .collect(),
+            slopes: agreement.iter().map(|a| a.and_then(one_motion)).collect(),
             follows: vec![0.0; dof],
         };
         for segment in &trajectory.segments {
@@ -101,6 +107,9 @@ impl Sample {
             for (to, from) in all.follows.iter_mut().zip(&sample.follows) {
                 *to += from;
             }
+            for (to, from) in all.slopes.iter_mut().zip(&sample.slopes) {
+                *to = to.or(*from);
+            }
             for (to, from) in all.opposite.iter_mut().zip(&sample.opposite) {
                 *to = match (*to, *from) {
                     (Some(a), Some(b)) => Some(a && b),
@@ -110,14 +119,13 @@ impl Sample {
         }
         all
     }
+}
 
-    /// Largest |q| of the joints that turn, rad.
-    pub(super) fn largest_angle(&self, robot: &Robot) -> f64 {
-        (0..robot.dof())
-            .filter(|&joint| robot.joint_kind(joint) != JointKind::Prismatic)
-            .flat_map(|joint| &self.channels[0][joint])
-            .fold(0.0, |largest, q| q.abs().max(largest))
-    }
+/// Slope of the velocity where it is the change of position times a number: their squared correlation is `slope² / (2 slope − R²)`.
+fn one_motion(agreement: Agreement) -> Option<f64> {
+    let Agreement { r2, slope } = agreement;
+    let correlation = slope * slope / (2.0 * slope - r2);
+    (slope > 0.0 && correlation > SAME_MOTION).then_some(slope)
 }
 
 fn mean(values: &[f64]) -> f64 {

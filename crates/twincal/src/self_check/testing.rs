@@ -56,6 +56,11 @@ pub(crate) fn arm(heavier: f64) -> Robot {
 
 /// What the log of a robot 15 % heavier than the model with friction looks like; joints are independent.
 pub(crate) fn log(seed: f64) -> Trajectory {
+    log_of(&arm(1.15), seed)
+}
+
+/// What the log of such a robot with friction looks like.
+pub(crate) fn log_of(robot: &Robot, seed: f64) -> Trajectory {
     let dof = 4;
     let wave = |k: usize| -> Vec<f64> {
         let mut all = Vec::new();
@@ -80,7 +85,7 @@ pub(crate) fn log(seed: f64) -> Trajectory {
         qd: &qd,
         qdd: &qdd,
     };
-    nominal_torque(&arm(1.15), motion, &mut tau);
+    nominal_torque(robot, motion, &mut tau);
     let mut state = 7_u64;
     for (i, tau) in tau.iter_mut().enumerate() {
         state = state
@@ -107,5 +112,21 @@ pub(crate) fn log(seed: f64) -> Trajectory {
         segments: vec![segment],
         payload: Payload::None,
         payload_acts: true,
+    }
+}
+
+/// Makes friction of this size remember the motion before a velocity reversal over a way of `length`, rad: presliding.
+pub(crate) fn remember(trajectory: &mut Trajectory, size: f64, length: f64) {
+    let segment = &mut trajectory.segments[0];
+    for joint in 0..trajectory.dof {
+        let (mut way, mut before) = (f64::INFINITY, segment.qd[joint * LEN]);
+        for i in joint * LEN..(joint + 1) * LEN {
+            if segment.qd[i] * before < 0.0 {
+                way = 0.0;
+            }
+            before = segment.qd[i];
+            way += before.abs() * INTERVAL;
+            segment.tau[i] -= 2.0 * size * before.signum() * (-way / length).exp();
+        }
     }
 }

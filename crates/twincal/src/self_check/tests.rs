@@ -3,6 +3,7 @@
 use super::testing::{INTERVAL, LEN, arm, log};
 use super::*;
 use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
 
 fn check(trajectory: &Trajectory) -> Result<Vec<Finding>> {
     let pipeline = Pipeline {

@@ -6,7 +6,7 @@ use super::convolve::{correlate, correlate_two};
 use super::fir::{MotionKernels, column_half_seconds, motion_half_samples, motion_half_seconds};
 use super::mask::Saturated;
 use super::prepare::{JointFacts, Piece, Prepared, Values, pick, prepare, report_short};
-use super::standstill::standstill;
+use super::standstill::{at_rest, slower_than};
 use super::thin::thin;
 use super::{Channels, DerivedFrom, LoggedSamples, Pipeline, Recording, Segment, Trajectory};
 use crate::error::{Error, Finding, Result, Severity};
@@ -45,6 +45,10 @@ pub struct PreparedLog<'a> {
     joints: Vec<JointFacts>,
     pieces: Prepared<'a>,
     saturated: Saturated,
+    /// What each joint's position spans at most at rest, rad or m.
+    at_rest: Vec<f64>,
+    /// Time between cuts, before anything is thinned, s.
+    seconds: f64,
     findings: Vec<Finding>,
 }
 
@@ -78,12 +82,15 @@ impl<'a> PreparedLog<'a> {
         mut findings: Vec<Finding>,
         pipeline: &Pipeline,
     ) -> Self {
+        let (at_rest, seconds) = (pieces.at_rest(log), pieces.seconds());
         if !pipeline.is_off() {
             let (short, rows) = thin(&mut pieces, pipeline);
             report_short(log, short, rows, &mut findings);
         }
         Self {
             saturated: Saturated::find(&joints, log, pipeline),
+            at_rest,
+            seconds,
             log: Cow::Borrowed(log),
             joints,
             pieces,
@@ -116,10 +123,13 @@ impl<'a> PreparedLog<'a> {
             log: Cow::Borrowed(&self.log),
             joints: self.joints.clone(),
             pieces: Prepared {
+                time: None,
                 interval: self.pieces.interval,
                 pieces: stretches.iter().map(piece).collect(),
             },
             saturated: self.saturated.clone(),
+            at_rest: self.at_rest.clone(),
+            seconds: self.seconds,
             findings: Vec::new(),
         }
     }
@@ -150,6 +160,7 @@ impl<'a> PreparedLog<'a> {
         PreparedLog {
             log: Cow::Owned(Recording {
                 unfolded: self.log.unfolded,
+                start_ns: self.log.start_ns,
                 name: self.log.name.clone(),
                 time: Vec::new(),
                 joints: channels.collect(),
@@ -157,12 +168,15 @@ impl<'a> PreparedLog<'a> {
             }),
             joints: self.joints,
             pieces: Prepared {
+                time: None,
                 interval: self.pieces.interval,
                 pieces: (self.pieces.pieces.into_iter())
                     .map(Piece::into_owned)
                     .collect(),
             },
             saturated: self.saturated,
+            at_rest: self.at_rest,
+            seconds: self.seconds,
             findings: self.findings,
         }
     }
@@ -233,14 +247,14 @@ fn align(
             0,
         ));
     }
-    let (mut short, mut short_rows, mut total, mut used) = (0, 0, 0.0, 0.0);
+    let (mut short, mut short_rows, mut used) = (0, 0, 0.0);
     for piece in &prepared.pieces {
-        total += piece.rows.len() as f64 * prepared.interval;
         let kept = Kept { with_tau, raw };
         match smoothed(ready, piece, pipeline, cutoff, kept) {
             Some(segment) => {
                 let border = 2.0 * column_half_seconds(pipeline.cutoff_hz);
-                used += (segment.time.len() as f64 * piece.interval - border).max(0.0);
+                let length = segment.time.len().saturating_sub(1) as f64 * piece.interval;
+                used += (length - border).max(0.0);
                 trajectory.segments.push(segment);
             }
             None => {
@@ -265,13 +279,17 @@ fn align(
         "borders",
         &log.name,
         format!(
-            "the filters need {:.3} s at either end of each segment: {used:.3} of {total:.3} s become rows",
-            column_half_seconds(pipeline.cutoff_hz) + pipeline.motion_half_length()
+            "the filters need {:.3} s at either end of each segment: {used:.3} of {:.3} s become rows",
+            column_half_seconds(pipeline.cutoff_hz) + pipeline.motion_half_length(),
+            ready.seconds
         ),
         0,
     ));
     let names: Vec<&str> = joints.iter().map(|facts| facts.name.as_str()).collect();
-    let agreement = velocity_agreement(&trajectory, &pipeline.standstill_velocity);
+    let mut agreement = velocity_agreement(&trajectory, &pipeline.standstill_velocity);
+    for (agreement, channels) in agreement.iter_mut().zip(&log.joints) {
+        *agreement = agreement.filter(|_| channels.qd.is_some());
+    }
     findings.extend(agreement::findings(&names, &log.name, &agreement));
     report_standstill(joints, log, (&trajectory, pipeline), findings);
     saturated.mask(log, pipeline, &mut trajectory, findings);
@@ -353,13 +371,14 @@ fn smoothed(
         .zip(still.par_chunks_exact_mut(len))
         .for_each(|(((((joint, channels), q), qd), qdd), still)| {
             let travel = derivatives(&kernels, channels, pipeline.sources(joint), [q, qd, qdd]);
-            // Position tells standstill: a drive's velocity is often a difference of counts and far noisier at rest.
-            still.copy_from_slice(&standstill(
-                travel.as_deref().unwrap_or(qd),
-                pipeline.standstill_velocity[joint],
-                pipeline.shortest_standstill(),
-                piece.interval,
-            ));
+            // As logged: a filtered position rings where a move ends.
+            let rest = at_rest(&channels.q, ready.at_rest[joint], piece.interval);
+            still.copy_from_slice(&rest[half..half + len]);
+            let limit = pipeline.standstill_velocity[joint];
+            let travel = travel.as_deref().unwrap_or(qd);
+            let seconds = pipeline.shortest_standstill();
+            let slow = slower_than(travel, limit, seconds, piece.interval);
+            (still.iter_mut().zip(slow)).for_each(|(still, slow)| *still |= slow);
         });
     let torque = piece.joints.iter().filter_map(|c| c.tau.as_ref());
     let tau = torque
@@ -434,7 +453,8 @@ fn logged_samples(
     kept: Kept,
 ) -> LoggedSamples {
     let PreparedLog { log, joints, .. } = ready;
-    let stamps = pick(&log.time, &piece.rows);
+    let time_of_rows = ready.pieces.time.as_ref().unwrap_or(&log.time);
+    let stamps = pick(time_of_rows, &piece.rows);
     let logged: Vec<Values<'_>> = log
         .joints
         .iter()

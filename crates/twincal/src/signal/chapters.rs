@@ -307,6 +307,7 @@ fn joined(parts: &[(&Recording, Range<usize>)]) -> Recording {
     };
     Recording {
         unfolded: first.unfolded,
+        start_ns: first.start_ns,
         name: first.name.clone(),
         time: join(&|log| Some(&log.time)).unwrap_or_default(),
         joints: (0..first.joints.len()).map(joint).collect(),

@@ -14,7 +14,7 @@ use super::{
     Auto, DerivedFrom, Log, LongLog, LongReady, Pipeline, ReadyLog, Recording, SignalSettings,
 };
 use crate::error::{Error, Finding, Result, Severity};
-use crate::words::significant;
+use crate::words::{listed, significant};
 use rayon::prelude::*;
 
 /// v_s where the pipeline is on and nothing is said, rad/s or m/s.
@@ -165,7 +165,7 @@ fn unexcited(joints: &[JointFacts], still: &[bool], limits: &[f64]) -> Result<Ve
         return Err(Error::Refused {
             problem: format!(
                 "no excitation: every joint stands still in all training logs ({})",
-                names(true).join(", ")
+                listed(names(true), ", ")
             ),
             remedy: if limits.iter().any(|limit| *limit > COULOMB_VELOCITY) {
                 "a coarse encoder cannot tell slower motion from standing still: record faster motion, log the velocity, or \

@@ -1,6 +1,7 @@
 //! The clock of one log: which rows go on, where time is cut, and whether what is left ticks evenly.
 
 use super::Recording;
+use super::repeats::{Sampled, sampled};
 use crate::error::{Error, Finding, Result, Severity};
 use rayon::prelude::*;
 
@@ -29,8 +30,29 @@ pub(crate) struct Run {
 pub(crate) struct Clock {
     /// In the log's order, none empty.
     pub(crate) runs: Vec<Run>,
+    /// Median step, or the controller's, s.
+    pub(crate) interval: f64,
+    /// What stands in place of the rows as logged.
+    pub(crate) sampled: Sampled,
+}
+
+impl Clock {
+    /// Stamp of a row, s.
+    pub(crate) fn stamp(&self, log: &Recording, row: usize) -> f64 {
+        self.sampled.time.as_ref().unwrap_or(&log.time)[row]
+    }
+}
+
+/// Rows that may go on.
+pub(crate) struct Cut<'a> {
+    /// Ascending indices into the recording.
+    pub(crate) kept: &'a [usize],
+    /// Whether rows were dropped right before each of them.
+    pub(crate) before: &'a [bool],
     /// Median step, s.
     pub(crate) interval: f64,
+    /// The pipeline is off.
+    pub(crate) every_row: bool,
 }
 
 fn log_error(log: &Recording, problem: impl Into<String>, remedy: impl Into<String>) -> Error {
@@ -103,10 +125,20 @@ pub(crate) fn read_clock(
     }
     let (kept, dropped) = finite_rows(log, &channels, findings);
     let interval = median_interval(log, &kept, every_row, findings)?;
-    let runs = cut(
-        log, &channels, &kept, &dropped, interval, every_row, findings,
-    );
-    Ok(Clock { runs, interval })
+    let mut rows = Cut {
+        kept: &kept,
+        before: &dropped,
+        interval,
+        every_row,
+    };
+    let sampled = sampled(log, names, &rows, findings);
+    rows.interval = sampled.interval.unwrap_or(interval);
+    let runs = cut(log, &channels, &rows, &sampled, findings);
+    Ok(Clock {
+        runs,
+        interval: rows.interval,
+        sampled,
+    })
 }
 
 /// Rows whose every channel is finite, and for each whether rows were dropped right before it.
@@ -274,22 +306,28 @@ fn median_interval(
 fn cut(
     log: &Recording,
     channels: &[(String, &[f64])],
-    kept: &[usize],
-    cut_before: &[bool],
-    interval: f64,
-    every_row: bool,
+    rows: &Cut<'_>,
+    sampled: &Sampled,
     findings: &mut Vec<Finding>,
 ) -> Vec<Run> {
+    let (interval, every_row) = (rows.interval, rows.every_row);
+    let time = sampled.time.as_ref().unwrap_or(&log.time);
     let (mut same, mut contradicting, mut crowded) = (0_u64, 0_u64, 0_u64);
     let (mut back, mut gaps, mut longest) = (0_u64, 0_u64, 0.0_f64);
     let mut runs = Vec::new();
     let mut run = Run::default();
-    for (&row, &cut) in kept.iter().zip(cut_before) {
+    let mut cut = false;
+    for (&row, &before) in rows.kept.iter().zip(rows.before) {
+        cut |= before;
+        if sampled.dropped.get(row).is_some_and(|dropped| *dropped) {
+            continue;
+        }
+        let cut = std::mem::take(&mut cut);
         let Some(&last) = run.rows.last() else {
             run.rows.push(row);
             continue;
         };
-        let step = log.time[row] - log.time[last];
+        let step = time[row] - time[last];
         if step == 0.0 && !every_row {
             if channels
                 .iter()
@@ -416,16 +454,29 @@ fn two_digits(value: f64) -> String {
 pub(crate) fn report_jitter(
     log: &Recording,
     runs: &[Run],
-    interval: f64,
+    clock: &Clock,
     resampled: u64,
     findings: &mut Vec<Finding>,
 ) {
+    // What was found on repeated rows says it.
+    if clock.sampled.time.is_some() {
+        return;
+    }
+    let interval = clock.interval;
+    let dropped = |row: usize| {
+        clock
+            .sampled
+            .dropped
+            .get(row)
+            .is_some_and(|dropped| *dropped)
+    };
     let mut deviations: Vec<f64> = runs
         .iter()
         .flat_map(|run| run.rows.windows(2))
+        .filter(|pair| !(pair[0]..pair[1]).any(dropped))
         .map(|pair| ((log.time[pair[1]] - log.time[pair[0]]) / interval - 1.0).abs())
         .collect();
-    if deviations.is_empty() || resampled == 0 {
+    if resampled == 0 || deviations.iter().all(|deviation| *deviation <= EVEN) {
         return;
     }
     let beyond = deviations.iter().filter(|d| **d > JITTER).count();

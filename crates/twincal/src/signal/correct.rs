@@ -16,7 +16,7 @@ const LARGEST: f64 = 1.0;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Lag {
-    /// Nothing was said: taken as none, and a lag that shows is a finding.
+    /// Nothing was said: estimated from the training logs, and applied where it is clear.
     #[default]
     Unsaid,
     /// Of every joint, s; negative where torque comes first.
@@ -57,14 +57,6 @@ impl Corrections {
     /// True if nothing is put right and nothing was said.
     pub fn is_default(&self) -> bool {
         *self == Self::default()
-    }
-
-    /// The lag that was said of all joints, s; 0 where it was said joint by joint.
-    pub(crate) fn common_lag(&self) -> f64 {
-        match self.lag {
-            Lag::All(lag) => lag,
-            _ => 0.0,
-        }
     }
 
     /// Lag of a joint, s.

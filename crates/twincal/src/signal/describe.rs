@@ -2,6 +2,7 @@
 
 use super::clock::GAP;
 use super::prepare::{JointFacts, Piece, Values, joint_facts, prepare};
+use super::travel::LONGEST;
 use super::{Corrections, Log, Logs, Recording};
 use crate::error::{Finding, Result, Severity};
 use crate::robot::Robot;
@@ -122,23 +123,24 @@ impl Sums {
     ) -> Result<()> {
         let prepared = prepare(facts, log, false, &Corrections::default(), findings)?;
         let (pieces, interval) = (&prepared.pieces, prepared.interval);
-        self.duration += pieces
-            .iter()
-            .map(|p| p.time.len() as f64 * p.interval)
-            .sum::<f64>();
+        self.duration += prepared.seconds();
         self.segments += pieces.len() as u64;
         // A chapter is no cut of the log: what goes on in it was counted in the one before.
         let stamp = |row: usize| log.time[row];
         let starts = pieces.first().filter(|piece| piece.rows[0] < stride(piece));
         if let (Some(piece), Some(end)) = (starts, self.end) {
             let step = stamp(piece.rows[0]) - end;
-            self.segments -= u64::from((0.0..=GAP * interval).contains(&step));
+            if (0.0..=GAP * interval).contains(&step) {
+                self.segments -= 1;
+                self.duration += step;
+            }
         }
         let last = log.time.len().saturating_sub(1);
         let ends = pieces.last().filter(|piece| {
             let row = piece.rows[piece.rows.len() - 1];
-            // Of several samples with one stamp the first is taken.
-            last - row < stride(piece) || stamp(last) <= stamp(row)
+            // Of several samples with one stamp the first is taken, and of a receiver's repeats.
+            let repeats = if prepared.time.is_some() { LONGEST } else { 0 };
+            last - row < stride(piece) + repeats || stamp(last) <= stamp(row)
         });
         self.end = ends.and_then(|piece| piece.rows.last().map(|&row| stamp(row)));
         self.intervals.push(interval);

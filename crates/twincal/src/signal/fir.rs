@@ -53,7 +53,7 @@ pub(crate) fn column_kernel(cutoff_hz: f64, interval: f64) -> Vec<f64> {
     let half = (column_half_seconds(cutoff_hz) / interval).round().max(1.0) as usize;
     let window = Window::new(COLUMN_ATTENUATION, half, interval);
     let mut taps = sampled(half, interval, |t| {
-        window.derivatives(t)[0] * sinc(cutoff_hz, t)[0] * interval
+        window.value(t) * sinc(cutoff_hz, t)[0] * interval
     });
     let sum: f64 = taps.iter().sum();
     for tap in &mut taps {
@@ -157,7 +157,7 @@ pub(crate) fn thinning_kernel(cutoff_hz: f64, coarse: f64, interval: f64) -> Vec
     let window = Window::new(THINNING_ATTENUATION, half, interval);
     let middle = 0.5 / coarse;
     let mut taps = sampled(half, interval, |t| {
-        window.derivatives(t)[0] * sinc(middle, t)[0] * interval
+        window.value(t) * sinc(middle, t)[0] * interval
     });
     let exact = [1.0, 0.0, 0.0, 0.0, 0.0];
     correct_moments(&mut taps, &window, interval, 0, &exact);
@@ -212,15 +212,26 @@ fn sinc(cutoff_hz: f64, t: f64) -> [f64; 3] {
 struct Window {
     beta: f64,
     half: f64,
+    /// 1 over I0(β).
+    norm: f64,
 }
 
 impl Window {
     /// Half a sample wider than the kernel, so that its first and last taps count.
     fn new(attenuation: f64, half: usize, interval: f64) -> Self {
+        let beta = kaiser_beta(attenuation);
         Self {
-            beta: kaiser_beta(attenuation),
+            beta,
             half: (half as f64 + 0.5) * interval,
+            norm: 1.0 / bessel_ratio(0, beta * beta),
         }
+    }
+
+    /// Value at time `t`: the first of [`Window::derivatives`].
+    fn value(&self, t: f64) -> f64 {
+        let u = t / self.half;
+        let z2 = self.beta * self.beta * (1.0 - u * u).max(0.0);
+        bessel_ratio(0, z2) * self.norm
     }
 
     /// Value, first and second derivative at time `t`, |t| < half.
@@ -230,7 +241,7 @@ impl Window {
         let u = t / self.half;
         let b2 = self.beta * self.beta;
         let z2 = b2 * (1.0 - u * u).max(0.0);
-        let norm = 1.0 / bessel_ratio(0, b2);
+        let norm = self.norm;
         let (i1, i2) = (bessel_ratio(1, z2), bessel_ratio(2, z2));
         [
             bessel_ratio(0, z2) * norm,
@@ -268,7 +279,7 @@ fn correct_moments(
         let mut system = vec![vec![0.0; order + 1]; order];
         for (i, &tap) in kernel.iter().enumerate() {
             let u = (i as f64 - half) / half;
-            let w = window.derivatives(u * half * interval)[0];
+            let w = window.value(u * half * interval);
             for r in 0..order {
                 let ur = u.powi(parity + 2 * r as i32);
                 for c in 0..order {
@@ -283,7 +294,7 @@ fn correct_moments(
         let c = solve(system);
         for (i, tap) in kernel.iter_mut().enumerate() {
             let u = (i as f64 - half) / half;
-            let w = window.derivatives(u * half * interval)[0];
+            let w = window.value(u * half * interval);
             *tap += w * c
                 .iter()
                 .enumerate()

@@ -6,6 +6,7 @@
 use super::Recording;
 use super::clock::{Clock, Run};
 use super::prepare::JointFacts;
+use super::travel::{ROUNDING, median};
 use crate::error::{Finding, Severity};
 use crate::robot::JointKind;
 use rayon::prelude::*;
@@ -14,6 +15,10 @@ use std::f64::consts::TAU;
 
 /// How many times the usual change of slope a jump has.
 const USUAL: f64 = 50.0;
+/// How many steps of its own a channel jumps by at least: fewer are quantisation.
+const COUNTS: f64 = 8.0;
+/// Share of a step of position that the logged velocity may explain.
+const EXPLAINED: f64 = 0.5;
 /// Slopes beside a jump are below this share of it.
 const QUIET: f64 = 0.2;
 /// The ways out and back of a spike differ by less than this share of it.
@@ -45,10 +50,11 @@ pub(crate) fn jumps(time: &[f64], values: &[f64], interval: f64) -> Jumps {
         let step = time[i] - time[i - 1];
         (values[i] - values[i - 1]) * (interval / step).min(1.0)
     };
-    let limit = USUAL * usual_change(values.len(), slope);
-    if limit == 0.0 {
+    let usual = usual_change(values.len(), slope);
+    if usual == 0.0 {
         return found;
     }
+    let limit = (USUAL * usual).max(COUNTS * count(values));
     let last = values.len() - 2;
     let mut i = 2;
     while i < last {
@@ -69,6 +75,25 @@ pub(crate) fn jumps(time: &[f64], values: &[f64], interval: f64) -> Jumps {
         i += 1;
     }
     found
+}
+
+/// Smallest change of a channel that is no rounding: one count of an encoder.
+fn count(values: &[f64]) -> f64 {
+    let scale = values
+        .iter()
+        .fold(0.0_f64, |scale, value| scale.max(value.abs()));
+    let changes = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let count = changes
+        .filter(|change| *change > ROUNDING * scale)
+        .fold(f64::INFINITY, f64::min);
+    if count.is_finite() { count } else { 0.0 }
+}
+
+/// Whether the velocity about sample `i` explains that position changes by `size` there. The median of four samples: a drive that differences
+/// its encoder logs a spike beside the step.
+fn explains(time: &[f64], velocity: &[f64], (i, size): (usize, f64)) -> bool {
+    let usual = median(velocity[i - 2..(i + 2).min(velocity.len())].to_vec());
+    (size - usual * (time[i] - time[i - 1])).abs() <= EXPLAINED * size.abs()
 }
 
 /// Median of what the slope changes by from one sample to the next, of those that are not zero.
@@ -108,16 +133,20 @@ pub(crate) fn cut_jumps(
     let times: Vec<Vec<f64>> = clock
         .runs
         .iter()
-        .map(|run| run.rows.iter().map(|&row| log.time[row]).collect())
+        .map(|run| run.rows.iter().map(|&row| clock.stamp(log, row)).collect())
         .collect();
     let channels: Vec<(usize, &'static str, &'static str, &[f64])> = (0..joints.len())
         .flat_map(|joint| {
-            let own = &log.joints[joint];
-            let position = unfolded[joint].as_deref().unwrap_or(&own.q);
+            let position = clock.sampled.position(log, joint);
+            let [qd, qdd] = clock.sampled.derivatives(log, joint);
             [
-                ("position", "", Some(position)),
-                ("velocity", "/s", own.qd.as_deref()),
-                ("acceleration", "/s²", own.qdd.as_deref()),
+                (
+                    "position",
+                    "",
+                    unfolded[joint].as_deref().or(Some(position)),
+                ),
+                ("velocity", "/s", qd),
+                ("acceleration", "/s²", qdd),
             ]
             .into_iter()
             .filter_map(move |(channel, per, values)| Some((joint, channel, per, values?)))
@@ -129,7 +158,15 @@ pub(crate) fn cut_jumps(
             let mut in_log = Jumps::default();
             for (run, time) in clock.runs.iter().zip(&times) {
                 let own: Vec<f64> = run.rows.iter().map(|&row| values[row]).collect();
-                let in_run = jumps(time, &own, clock.interval);
+                let mut in_run = jumps(time, &own, clock.interval);
+                if let (false, [Some(logged), _]) =
+                    (every_row, clock.sampled.derivatives(log, joint))
+                {
+                    let velocity: Vec<f64> = run.rows.iter().map(|&row| logged[row]).collect();
+                    in_run
+                        .steps
+                        .retain(|step| !explains(time, &velocity, *step));
+                }
                 let row = |(i, size): (usize, f64)| (run.rows[i], size);
                 in_log.spikes.extend(in_run.spikes.into_iter().map(row));
                 // Velocity steps where something is hit; a folded angle by a full turn, which is told elsewhere.
@@ -237,6 +274,8 @@ fn tell(joints: &[JointFacts], log: &Recording, found: &Found, every_row: bool) 
     kinds.into_iter().filter_map(of_kind).collect()
 }
 
+#[cfg(test)]
+mod grid;
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,6 +9,7 @@ pub(crate) mod convolve;
 pub(crate) mod decimate;
 mod correct;
 mod fourier;
+mod held;
 mod jumps;
 mod long;
 mod cutoff;
@@ -20,6 +21,7 @@ pub(crate) mod interpolate;
 mod mask;
 mod prepare;
 mod ready;
+mod repeats;
 mod saturation;
 mod shelf;
 mod spectrum;
@@ -29,7 +31,9 @@ mod steps;
 mod stretches;
 mod survey;
 mod thin;
+mod ticks;
 mod torque;
+mod travel;
 mod units;
 mod unwrap;
 
@@ -124,8 +128,11 @@ pub struct Recording {
     pub unfolded: bool,
     /// Name as given by the user.
     pub name: String,
-    /// Time stamps as logged, s.
+    /// Time stamps, s from [`Recording::start_ns`] on.
     pub time: Vec<f64>,
+    /// Where time counts from, ns: 0 for a log whose stamps are in `time` as they are, of a bag the first stamp (ns since 1970), which
+    /// a double would round to 0.2 µs.
+    pub start_ns: i64,
     /// One entry per moving joint of the robot, in order.
     pub joints: Vec<Channels>,
     /// What the robot carried.
@@ -175,7 +182,8 @@ pub struct Pipeline {
     pub motion_interval: f64,
     /// v_s, rad/s or m/s.
     pub coulomb_velocity: f64,
-    /// Standstill threshold per joint: max(v_s as stated or 0.02, what the encoder resolves), rad/s or m/s.
+    /// Standstill threshold per joint: max(v_s as stated or 0.02, what the encoder resolves), rad/s or m/s. A joint that is slower for long
+    /// counts as at rest, as one whose position is constant.
     pub standstill_velocity: Vec<f64>,
     /// What q̈ is derived from where it is not logged, per joint: the channel that leaves less noise.
     pub derived_from: Vec<DerivedFrom>,
@@ -291,9 +299,31 @@ pub struct Trajectory {
     pub payload_acts: bool,
 }
 
+impl Trajectory {
+    /// The same between two times, s.
+    pub(crate) fn between(&self, from: f64, to: f64) -> Self {
+        let cut = |segment: &Segment| {
+            let first = segment.time.partition_point(|t| *t < from);
+            let end = segment.time.partition_point(|t| *t < to);
+            (first < end).then(|| segment.cut(self.dof, first..end))
+        };
+        Self {
+            name: self.name.clone(),
+            segments: self.segments.iter().filter_map(cut).collect(),
+            ..*self
+        }
+    }
+}
+
 impl Pipeline {
-    /// How long a joint has to be slow to stand still, s: three periods of the cut-off, so that the filter has forgotten what was before;
-    /// infinite without a filter.
+    /// How long the position of a joint has to be constant for a rest, s.
+    #[must_use]
+    pub fn shortest_rest(&self) -> f64 {
+        standstill::SHORTEST
+    }
+
+    /// How long a joint has to be slow to count as at rest though its position changes, s: three periods of the cut-off, so that the filter
+    /// has forgotten what was before; infinite without a filter.
     #[must_use]
     pub fn shortest_standstill(&self) -> f64 {
         align::STANDSTILL_PERIODS / self.cutoff_hz
@@ -468,3 +498,5 @@ pub fn ready<'a>(robot: &Robot, log: &'a Log<'_>, pipeline: &Pipeline) -> Result
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod worlds;

@@ -1,12 +1,13 @@
 //! One log on even clocks: cut, unfolded, resampled where the clock is uneven; nothing filtered yet.
 
 use super::DerivedFrom;
-use super::clock::{Run, even_interval, read_clock, report_jitter};
+use super::clock::{Clock, Run, even_interval, read_clock, report_jitter};
 use super::jumps::cut_jumps;
 use super::spline::resample;
+use super::standstill::span;
 use super::units::refuse_degrees;
 use super::unwrap::{unfolded, unwrap_angle};
-use super::{Corrections, Recording};
+use super::{Channels, Corrections, Recording};
 use crate::error::{Error, Finding, Result, Severity};
 use crate::robot::{JointKind, Robot};
 use rayon::prelude::*;
@@ -172,6 +173,29 @@ pub(crate) struct Prepared<'a> {
     pub(crate) pieces: Vec<Piece<'a>>,
     /// Median step of the log, s.
     pub(crate) interval: f64,
+    /// Stamps on the controller's clock, s, by row of the recording, where the logged ones are a receiver's.
+    pub(crate) time: Option<Vec<f64>>,
+}
+
+impl Prepared<'_> {
+    /// Time between cuts, s: from the first to the last stamp of each piece.
+    pub(crate) fn seconds(&self) -> f64 {
+        let of_piece = |piece: &Piece<'_>| {
+            let ends = piece.time.first().zip(piece.time.last());
+            ends.map_or(0.0, |(first, last)| last - first)
+        };
+        self.pieces.iter().map(of_piece).sum()
+    }
+
+    /// What each joint's position spans at most at rest, rad or m; before anything is thinned.
+    pub(crate) fn at_rest(&self, log: &Recording) -> Vec<f64> {
+        let joints = log.joints.par_iter().enumerate();
+        let of_joint = |(joint, channels): (usize, &Channels)| {
+            let pieces = self.pieces.iter().map(|piece| &*piece.joints[joint].q);
+            span(&channels.q, pieces)
+        };
+        joints.map(of_joint).collect()
+    }
 }
 
 /// Step 1 of method section 1. With `every_row` (pipeline off) values stay as they are and only cuts are found.
@@ -197,20 +221,15 @@ pub(crate) fn prepare<'a>(
     let minimum = if every_row { 2 } else { MINIMUM_SAMPLES };
     let clock = read_clock(log, &names, minimum, every_row, findings)?;
     refuse_degrees(joints, log)?;
-    let unfolded = unfold(joints, log, &clock.runs, every_row, findings);
+    let unfolded = unfold(joints, log, &clock, every_row, findings);
     let runs = cut_jumps(joints, log, &unfolded, &clock, every_row, findings);
     let values = |joint: usize, run: &Run| {
-        let own = &log.joints[joint];
-        let channel = |values: &'a Option<Vec<f64>>| Some(pick(values.as_deref()?, &run.rows));
-        Values {
-            q: match &unfolded[joint] {
-                None => pick(&own.q, &run.rows),
-                Some(q) => run.rows.iter().map(|&row| q[row]).collect(),
-            },
-            qd: channel(&own.qd).filter(|_| corrections.velocity != Some(DerivedFrom::Position)),
-            qdd: channel(&own.qdd),
-            tau: channel(&own.tau),
+        let mut values = logged(log, &clock, joint, run);
+        if let Some(q) = &unfolded[joint] {
+            values.q = run.rows.iter().map(|&row| q[row]).collect();
         }
+        values.qd = (values.qd).filter(|_| corrections.velocity != Some(DerivedFrom::Position));
+        values
     };
     let mut pieces = Vec::with_capacity(runs.len());
     let (mut short, mut short_rows, mut resampled) = (0_u64, 0_u64, 0_u64);
@@ -222,7 +241,7 @@ pub(crate) fn prepare<'a>(
             short_rows += run.rows.len() as u64;
             continue;
         }
-        let stamps: Vec<f64> = run.rows.iter().map(|&row| log.time[row]).collect();
+        let stamps: Vec<f64> = run.rows.iter().map(|&row| clock.stamp(log, row)).collect();
         let values: Vec<Values<'a>> = (0..joints.len()).map(|joint| values(joint, run)).collect();
         let even = if every_row {
             Some(clock.interval)
@@ -256,12 +275,35 @@ pub(crate) fn prepare<'a>(
         }
         pieces.push(piece);
     }
-    report_jitter(log, &runs, clock.interval, resampled, findings);
+    report_jitter(log, &runs, &clock, resampled, findings);
     report_short(log, short, short_rows, findings);
     Ok(Prepared {
         pieces,
         interval: clock.interval,
+        time: clock.sampled.time,
     })
+}
+
+/// Channels of a joint in a run, single values interpolated where they repeat.
+fn logged<'a>(log: &'a Recording, clock: &Clock, joint: usize, run: &Run) -> Values<'a> {
+    let own = &log.joints[joint];
+    let channel = |values: &'a Option<Vec<f64>>| Some(pick(values.as_deref()?, &run.rows));
+    let tau = channel(&own.tau);
+    let Some(filled) = clock.sampled.filled.get(joint).and_then(Option::as_ref) else {
+        return Values {
+            q: pick(&own.q, &run.rows),
+            qd: channel(&own.qd),
+            qdd: channel(&own.qdd),
+            tau,
+        };
+    };
+    let of_run = |values: &[f64]| run.rows.iter().map(|&row| values[row]).collect();
+    Values {
+        q: of_run(&filled.q),
+        qd: filled.qd.as_deref().map(of_run),
+        qdd: filled.qdd.as_deref().map(of_run),
+        tau,
+    }
 }
 
 /// Says how many runs were too short to use.
@@ -315,10 +357,11 @@ fn on_grid<'a>(stamps: &[f64], run: &Run, values: &[Values<'a>], interval: f64) 
 fn unfold(
     joints: &[JointFacts],
     log: &Recording,
-    runs: &[Run],
+    clock: &Clock,
     every_row: bool,
     findings: &mut Vec<Finding>,
 ) -> Vec<Option<Vec<f64>>> {
+    let runs = &clock.runs;
     let mut cuts = Vec::with_capacity(runs.len());
     let mut rows = 0;
     for run in runs {
@@ -329,9 +372,10 @@ fn unfold(
         if log.unfolded || !matches!(facts.kind, JointKind::Revolute | JointKind::Continuous) {
             return None;
         }
+        let logged = clock.sampled.position(log, joint);
         let mut q: Vec<f64> = runs
             .iter()
-            .flat_map(|run| run.rows.iter().map(|&row| log.joints[joint].q[row]))
+            .flat_map(|run| run.rows.iter().map(|&row| logged[row]))
             .collect();
         let jumps = unwrap_angle(&mut q, &cuts);
         if jumps == 0 {
@@ -351,7 +395,7 @@ fn unfold(
             );
             return Some((finding, None));
         }
-        let mut all = log.joints[joint].q.clone();
+        let mut all = logged.to_vec();
         for (row, value) in runs.iter().flat_map(|run| run.rows.iter()).zip(q) {
             all[*row] = value;
         }

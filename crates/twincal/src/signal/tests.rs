@@ -68,6 +68,7 @@ fn recording(
         .collect();
     Recording {
         unfolded: false,
+        start_ns: 0,
         name: "run".into(),
         time,
         joints,
@@ -334,4 +335,69 @@ fn a_noisy_velocity_gives_way_to_a_better_position() {
     let [from_position, logged] =
         [pipeline(&log), as_logged].map(|pipeline| errors(&log, &pipeline, fundamental)[0]);
     assert!(from_position < 0.05 * logged, "{from_position} {logged}");
+}
+
+/// The two numbers of "a of b s become rows".
+fn kept_and_all(findings: &[Finding]) -> [f64; 2] {
+    let said = findings.iter().find(|finding| finding.code == "borders");
+    let (_, numbers) = said.unwrap().message.split_once("segment: ").unwrap();
+    let numbers: Vec<f64> = numbers
+        .split_whitespace()
+        .filter_map(|word| word.parse().ok())
+        .collect();
+    [numbers[0], numbers[1]]
+}
+
+/// Rows that are missing, repeat or cut the log: never are more seconds kept than there are.
+#[test]
+fn kept_seconds_do_not_exceed_those_of_the_log() {
+    use super::worlds::{Motion, World, polled};
+    let even = World::new(Motion::PointToPoint, 3).clean();
+    let missing: Vec<usize> = (0..even.time.len()).filter(|i| i % 3 != 1).collect();
+    let time = missing.iter().map(|&row| even.time[row]).collect();
+    let mut cut = even.clone();
+    for row in (3000..16_000).step_by(4000) {
+        cut.joints[0].q[row] = f64::NAN;
+    }
+    let logs = [
+        super::worlds::rows_of(&even, &missing, time),
+        polled(&even, 1000.0, 5).0,
+        cut,
+        even,
+    ];
+    for log in &logs {
+        let (trajectory, findings) = aligned(log, &pipeline(log)).unwrap();
+        let [kept, all] = kept_and_all(&findings);
+        let seconds = log.time[log.time.len() - 1] - log.time[0];
+        assert!(
+            0.5 * all < kept && kept <= all && all <= seconds + 1e-3,
+            "{kept} of {all} of {seconds}"
+        );
+        let segments = trajectory.segments.iter();
+        let held: f64 = segments.map(|s| s.time[s.time.len() - 1] - s.time[0]).sum();
+        assert!(held <= seconds);
+    }
+}
+
+/// A finding on a logged velocity needs one.
+#[test]
+fn without_a_logged_velocity_nothing_is_said_of_it() {
+    use super::worlds::{Motion, World};
+    for motion in [Motion::Fourier, Motion::PointToPoint, Motion::Trapezoid] {
+        let world = World {
+            counts: 4096.0,
+            with_velocity: false,
+            ..World::new(motion, 4)
+        };
+        let log = world.clean();
+        let (pipeline, mut findings) = chosen(&log, &settings(Auto::Value(8.0))).unwrap();
+        findings.extend(aligned(&log, &pipeline).unwrap().1);
+        for finding in &findings {
+            assert!(
+                !finding.code.starts_with("velocity_")
+                    && !finding.message.contains("logged velocity"),
+                "{finding:?}"
+            );
+        }
+    }
 }

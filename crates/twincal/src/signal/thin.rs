@@ -154,6 +154,7 @@ mod tests {
         );
         let rows: Vec<usize> = (10..10 + len as usize).collect();
         let mut prepared = Prepared {
+            time: None,
             interval: 0.001,
             pieces: vec![Piece {
                 time: (0..len).map(|i| 3.0 + 0.001 * f64::from(i)).collect(),

@@ -1,5 +1,6 @@
 //! What measured torque lacks: samples of it, or any change in it.
 
+use super::held::held_torque;
 use super::{Channels, Log, Logs, Recording};
 use crate::error::{Finding, Result, Severity};
 use crate::robot::Robot;
@@ -55,14 +56,16 @@ pub fn missing_torque(robot: &Robot, log: &Log<'_>) -> Result<Option<Finding>> {
 }
 
 /// Torque that never changes while its joint moves: drives off, or a column that was not recorded. One joint like that may be
-/// a passive one; a log in which every moving joint is like that is degraded, unless the robot swung freely.
+/// a passive one; a log in which every moving joint is like that is degraded, unless the robot swung freely. Torque that is held for a while is
+/// said as well (`held.rs`).
 ///
 /// # Errors
 /// Of chapters that cannot be read.
 pub fn constant_torque<'a>(robot: &Robot, logs: impl Into<Logs<'a>>) -> Result<Vec<Finding>> {
     let names = robot.joint_names();
-    let mut findings = Vec::new();
-    for log in logs.into().0 {
+    let logs = logs.into();
+    let mut findings = held_torque(robot, &logs)?;
+    for log in logs.0 {
         let mut seen = vec![Seen::default(); names.len()];
         log.until(|recording| {
             for (seen, channels) in seen.iter_mut().zip(&recording.joints) {

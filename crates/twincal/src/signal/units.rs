@@ -140,6 +140,7 @@ mod tests {
         let time: Vec<f64> = (0..400).map(|i| f64::from(i) * 0.01).collect();
         let mut log = Recording {
             unfolded: false,
+            start_ns: 0,
             name: "run".into(),
             joints: vec![Channels {
                 q: time.iter().map(|t| q * (2.0 * t).sin()).collect(),

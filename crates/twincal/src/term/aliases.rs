@@ -1,7 +1,7 @@
 //! Which candidates say nothing, or nothing new: judged at random states, so for every motion and not for one log.
 
 use super::candidate::Candidate;
-use super::expression::{Bounded, Graph, Variable, bounded_values};
+use super::expression::{Bounded, Graph, Id, Variable, bounded_values};
 use crate::linear_algebra::dot;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -15,6 +15,13 @@ const SMALLEST_SHARE: f64 = 1e-6;
 const REACHES: [f64; 3] = [3.2, 30.0, 1000.0];
 /// States that are tried in each range, per state that is wanted.
 const PATIENCE: usize = 6;
+
+/// Rows per random sum of them from which on sums do.
+const MANY_ROWS: usize = 8;
+/// Sums that a row is added to.
+const HASHES: usize = 4;
+/// States whose torques are held at a time.
+const CHUNK: usize = 64;
 
 /// What the random states say about one candidate.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,10 +53,42 @@ pub(super) fn channels<S: Borrow<Motions>>(states: &[S], joints: usize) -> [Vec<
 /// Torque of the candidates that are made from the robot model, `(candidate, torque)` with `torque[state * joints + joint]`.
 pub(super) type ModelTorques<'a> = dyn Fn(&[&Motions]) -> Vec<(usize, Vec<f64>)> + 'a;
 
-/// One random state: its motion and the torque of all candidates, `[candidate * joints + joint]`.
+/// One random state: its motion and the torque of all candidates that are expressions, by [`Entries`].
 struct State {
     motion: Motions,
     torque: Vec<Bounded>,
+    /// log(-q1) has a torque at q1 > 0 but does not exist there.
+    exists: Vec<bool>,
+}
+
+/// Where the torque of a candidate on a joint stands in [`State::torque`]: of hundreds of candidates on dozens of joints few act.
+struct Entries {
+    /// Of each candidate, first entry and the joints of its entries.
+    of: Vec<(usize, Vec<usize>)>,
+    count: usize,
+}
+
+impl Entries {
+    fn new(candidates: &[Candidate]) -> Self {
+        let (mut of, mut count) = (Vec::with_capacity(candidates.len()), 0);
+        for candidate in candidates {
+            let joints: Vec<usize> = candidate.image.iter().map(|entry| entry.0).collect();
+            of.push((count, joints));
+            count += candidate.image.len();
+        }
+        Self { of, count }
+    }
+
+    fn range(&self, k: usize) -> std::ops::Range<usize> {
+        let (first, joints) = &self.of[k];
+        *first..first + joints.len()
+    }
+}
+
+impl State {
+    fn is_finite(&self, entries: &Entries, k: usize) -> bool {
+        self.exists[k] && (self.torque[entries.range(k)].iter()).all(|entry| entry.is_finite())
+    }
 }
 
 /// Judges all candidates, and removes the image entries that are zero at every state.
@@ -65,10 +104,9 @@ pub(super) fn judge(
     model: &ModelTorques<'_>,
 ) -> Vec<Verdict> {
     let wanted = candidates.len() + 32;
-    let pool = pool(graph, candidates, joints, wanted);
-    let rows = |k: usize| k * joints..(k + 1) * joints;
-    let finite =
-        |state: &State, k: usize| state.torque[rows(k)].iter().all(|entry| entry.is_finite());
+    let entries = Entries::new(candidates);
+    let pool = pool(graph, candidates, &entries, (joints, wanted));
+    let finite = |state: &State, k: usize| state.is_finite(&entries, k);
 
     let mut verdicts = Vec::with_capacity(candidates.len());
     for (k, candidate) in candidates.iter_mut().enumerate() {
@@ -81,9 +119,10 @@ pub(super) fn judge(
             verdicts.push(Verdict::NeverFinite(pool.len()));
             continue;
         }
-        candidate.image.retain(|&(joint, _)| {
-            own.iter()
-                .any(|state| !state.torque[k * joints + joint].may_be_zero())
+        let mut entry = entries.range(k);
+        candidate.image.retain(|_| {
+            let at = entry.next().unwrap_or_default();
+            own.iter().any(|state| !state.torque[at].may_be_zero())
         });
         verdicts.push(if candidate.image.is_empty() {
             Verdict::Null
@@ -116,15 +155,25 @@ pub(super) fn judge(
     };
 
     let usable = &usable[..usable.len().min(wanted)];
-    let mut columns: Vec<(usize, Vec<f64>)> = live
-        .iter()
-        .map(|&k| {
-            let torque = usable.iter().flat_map(|state| &state.torque[rows(k)]);
-            (k, torque.map(|entry| entry.value).collect())
-        })
-        .collect();
-    let motions: Vec<&Motions> = usable.iter().map(|state| &state.motion).collect();
-    columns.extend(model(&motions));
+    let mut rows = Sketch::new(usable.len() * joints, candidates.len());
+    for (chunk, states) in usable.chunks(CHUNK).enumerate() {
+        let first = chunk * CHUNK * joints;
+        for &k in &live {
+            let (start, acting) = &entries.of[k];
+            for (state, own) in states.iter().enumerate() {
+                for (joint, entry) in acting.iter().zip(&own.torque[*start..]) {
+                    rows.add(k, first + state * joints + joint, entry.value);
+                }
+            }
+        }
+        let motions: Vec<&Motions> = states.iter().map(|state| &state.motion).collect();
+        for (k, torque) in model(&motions) {
+            for (row, value) in torque.into_iter().enumerate() {
+                rows.add(k, first + row, value);
+            }
+        }
+    }
+    let mut columns = rows.columns;
     columns.sort_by_key(|&(k, _)| (candidates[k].family.preference(), k));
     let (order, columns): (Vec<usize>, Vec<Vec<f64>>) = columns.into_iter().unzip();
     for (position, combination) in dependent(columns) {
@@ -145,7 +194,12 @@ pub(super) fn judge(
 }
 
 /// Random states, until all candidates exist at `wanted` of them; at most a bounded number where they do not.
-fn pool(graph: &Graph, candidates: &[Candidate], joints: usize, wanted: usize) -> Vec<State> {
+fn pool(
+    graph: &Graph,
+    candidates: &[Candidate],
+    entries: &Entries,
+    (joints, wanted): (usize, usize),
+) -> Vec<State> {
     let mut random = ChaCha8Rng::seed_from_u64(2);
     let mut uniform = move || (random.next_u64() >> 11) as f64 / 2.0_f64.powi(52) - 1.0;
     let (mut pool, mut complete, mut partial) = (Vec::new(), 0, 0);
@@ -162,29 +216,16 @@ fn pool(graph: &Graph, candidates: &[Candidate], joints: usize, wanted: usize) -
                 Variable::Velocity(joint) => motion[joint][1],
                 Variable::Acceleration(joint) => motion[joint][2],
             });
-            let mut torque = vec![
-                Bounded {
-                    value: 0.0,
-                    error: 0.0
-                };
-                candidates.len() * joints
-            ];
-            for (k, candidate) in candidates.iter().enumerate() {
-                // log(-q1) has a torque at q1 > 0 but does not exist there
-                let exists = candidate
-                    .lagrangian
-                    .is_none_or(|phi| values[phi.0 as usize].value.is_finite());
-                for &(joint, image) in &candidate.image {
-                    torque[k * joints + joint] = values[image.0 as usize];
-                }
-                if !exists {
-                    torque[k * joints] = Bounded {
-                        value: f64::NAN,
-                        error: 0.0,
-                    };
-                }
+            let mut torque = Vec::with_capacity(entries.count);
+            let mut exists = Vec::with_capacity(candidates.len());
+            for candidate in candidates {
+                let finite = |phi: Id| values[phi.0 as usize].value.is_finite();
+                exists.push(candidate.lagrangian.is_none_or(finite));
+                let images = candidate.image.iter();
+                torque.extend(images.map(|&(_, image)| values[image.0 as usize]));
             }
-            let whole = torque.iter().all(|entry| entry.is_finite());
+            let whole = exists.iter().all(|exists| *exists)
+                && torque.iter().all(|entry: &Bounded| entry.is_finite());
             if whole {
                 complete += 1;
             } else if partial < wanted * (stage + 1) {
@@ -192,10 +233,68 @@ fn pool(graph: &Graph, candidates: &[Candidate], joints: usize, wanted: usize) -
             } else {
                 continue;
             }
-            pool.push(State { motion, torque });
+            pool.push(State {
+                motion,
+                torque,
+                exists,
+            });
         }
     }
     pool
+}
+
+/// The rows of all columns, or where they are far more than columns random sums of them.
+///
+/// Each row is added with a random sign to [`HASHES`] of `2 K + 64` sums. What depends on others does so in the sums as well, and what does not keeps
+/// its distance from their span up to a factor near 1 (Nelson & Nguyên 2013, OSNAP): far from where [`TOLERANCE`] decides.
+struct Sketch {
+    columns: Vec<(usize, Vec<f64>)>,
+    /// Place of each candidate in `columns`.
+    place: Vec<Option<usize>>,
+    rows: usize,
+    /// Sums; `None`: rows as they are.
+    sums: Option<usize>,
+}
+
+impl Sketch {
+    fn new(rows: usize, columns: usize) -> Self {
+        let sums = 2 * columns + 64;
+        Self {
+            columns: Vec::new(),
+            place: vec![None; columns],
+            rows,
+            sums: (rows > MANY_ROWS * sums).then_some(sums),
+        }
+    }
+
+    fn add(&mut self, column: usize, row: usize, value: f64) {
+        let at = *self.place[column].get_or_insert_with(|| {
+            self.columns
+                .push((column, vec![0.0; self.sums.unwrap_or(self.rows)]));
+            self.columns.len() - 1
+        });
+        let own = &mut self.columns[at].1;
+        let Some(sums) = self.sums else {
+            own[row] = value;
+            return;
+        };
+        if value == 0.0 {
+            return;
+        }
+        for hash in 0..HASHES {
+            let number = mixed((row * HASHES + hash) as u64);
+            let sign = if number >> 63 == 1 { -1.0 } else { 1.0 };
+            own[(number % sums as u64) as usize] += sign * value;
+        }
+    }
+}
+
+/// Random bits of a number: the output function of SplitMix64 (Steele, Lea & Flood 2014).
+fn mixed(number: u64) -> u64 {
+    let z = number.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
 }
 
 /// Columns in the span of those before them, `(position, Σ factor · earlier kept column)`: modified Gram–Schmidt, twice
@@ -270,6 +369,45 @@ fn norm(column: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// 40 columns of 8000 rows, each on some rows only; the last two are combinations: sums of rows say the same as the rows, and factors agree to 1e-9.
+    #[test]
+    fn random_sums_of_rows_say_what_the_rows_say() {
+        let (count, rows) = (40, 8000);
+        let number = |i: usize| (1.0 + 0.37 * (i as f64).powf(1.3)).sin();
+        let acts = |k: usize, row: usize| row % 8 == k % 8 || (k.is_multiple_of(3) && row % 8 < 4);
+        let mut columns: Vec<Vec<f64>> = (0..count)
+            .map(|k| {
+                let value = |row: usize| match acts(k, row) {
+                    true => number(k * rows + row),
+                    false => 0.0,
+                };
+                (0..rows).map(value).collect()
+            })
+            .collect();
+        for (to, from) in [(38, [3, 17]), (39, [0, 9])] {
+            columns[to] = (0..rows)
+                .map(|row| 2.0 * columns[from[0]][row] - 0.5 * columns[from[1]][row])
+                .collect();
+        }
+        let mut sketch = Sketch::new(rows, count);
+        assert!(sketch.sums.is_some());
+        for (k, column) in columns.iter().enumerate() {
+            for (row, value) in column.iter().enumerate() {
+                sketch.add(k, row, *value);
+            }
+        }
+        let sums: Vec<Vec<f64>> = sketch.columns.into_iter().map(|(_, sums)| sums).collect();
+        let (of_rows, of_sums) = (dependent(columns), dependent(sums));
+        assert_eq!(of_rows.len(), 2);
+        for ((a, rows), (b, sums)) in of_rows.iter().zip(&of_sums) {
+            assert_eq!((a, rows.len()), (b, sums.len()));
+            for ((x, i), (y, j)) in rows.iter().zip(sums) {
+                assert!(i == j && (x - y).abs() < 1e-9, "{x} {y}");
+            }
+        }
+        assert_eq!(of_sums.len(), 2);
+    }
 
     #[test]
     fn a_column_in_the_span_is_told_with_its_factors() {

@@ -15,6 +15,8 @@ use crate::robot::{Placement, Robot, did_you_mean, to_body_frame};
 
 /// Most columns a library may have.
 const TERM_LIMIT: usize = 1000;
+/// Moving joints at most: the time of a fit grows with their cube, and 44 take a minute.
+const MOST_JOINTS: usize = 64;
 /// Joints up to which the generic family is proposed unasked.
 const GENERIC_JOINTS: usize = 3;
 /// Prior sd of what a link's mass is off, as a share of it.
@@ -69,6 +71,17 @@ pub(super) fn proposals(
         });
     }
     let joints = about.joints;
+    if joints.len() > MOST_JOINTS {
+        return Err(Error::Setting {
+            key: "model.locked".to_owned(),
+            problem: format!(
+                "the model has {} moving joints, more than the {MOST_JOINTS} that a fit can have",
+                joints.len()
+            ),
+            remedy: "lock joints that do not move in these logs: [model] locked = { finger = 0.0 }"
+                .to_owned(),
+        });
+    }
     let generic = wants_generic(about, settings, findings)?;
     let mut all: Vec<Proposal> = Vec::new();
     for text in &settings.terms {

@@ -4,8 +4,11 @@
 //! factor by which all its 95 % intervals must be stretched to hold at least 95 % of its rows. Of n + 1 exchangeable
 //! trajectories the last has the largest score with probability at most 1/(n + 1), so that the largest of n scores
 //! is enough for the next one with probability at least n/(n + 1) (Vovk et al. 2005; Lei et al. 2018).
+//!
+//! Exchangeable is a next log that is drawn like these, not one that is recorded later while the robot changes: that is tested by a trend of the
+//! scores over the order in which the logs are given.
 
-use super::Split;
+use super::{Split, Trend};
 use serde::{Deserialize, Serialize};
 
 /// Share of the rows of a trajectory that its stretched intervals hold.
@@ -27,6 +30,9 @@ pub struct Conformal {
     pub factor: f64,
     /// Factor per joint, each by itself with that probability.
     pub joints: Vec<JointFactor>,
+    /// Trend of the trajectories' factors (the largest joint's of each) over the order in which they are given; `None` of fewer than five.
+    #[serde(default)]
+    pub trend: Option<Trend>,
 }
 
 /// Factor of one joint.
@@ -78,7 +84,10 @@ impl ConformalKeeper {
                 factor: largest(index),
             })
             .collect();
+        let factors = self.trajectories.iter();
+        let factors = factors.map(|scores| scores.iter().copied().fold(0.0, f64::max));
         Some(Conformal {
+            trend: Trend::of(&factors.collect::<Vec<f64>>()),
             trajectories: count,
             rows: ROWS,
             level: count as f64 / (count as f64 + 1.0),
@@ -140,6 +149,19 @@ mod tests {
         let left_out = keeper.finish(&Split::LeaveOneLogOut, &names).unwrap();
         assert!(!left_out.guaranteed);
         assert_eq!(keeper.finish(&Split::LastThirty, &names), None);
+    }
+
+    #[test]
+    fn factors_that_rise_from_log_to_log_are_a_trend() {
+        let names = ["a".to_owned(), "b".to_owned()];
+        let of = |factors: &[f64]| {
+            let mut keeper = ConformalKeeper::default();
+            (factors.iter()).for_each(|f| keeper.push(vec![vec![*f; 10], vec![0.1; 10]]));
+            keeper.finish(&Split::HeldoutLogs, &names).unwrap().trend
+        };
+        assert_eq!(of(&[1.0, 2.0, 3.0, 4.0]), None);
+        assert!(of(&[0.8, 0.9, 1.1, 1.2, 1.5]).is_some_and(|trend| trend.is_clear()));
+        assert!(of(&[0.9, 0.8, 1.5, 1.1, 1.2]).is_some_and(|trend| !trend.is_clear()));
     }
 
     /// The guarantee itself, with a wrong model: 4 trajectories of rows that are all alike within one, each with a heavy

@@ -2,11 +2,12 @@
 
 use super::conformal::stretch;
 use super::{
-    ConformalKeeper, PitKeeper, Reliability, RivalKeeper, ScoreKeeper, Split, Trace, TraceRows,
-    Validation,
+    ConformalKeeper, Moments, PitKeeper, Reliability, RivalKeeper, ScoreKeeper, Scores, Split,
+    Trace, TraceRows, Validation,
 };
 use crate::error::{Finding, Result};
-use crate::observations::Observations;
+use crate::incidents::{Evidence, incident_findings, leave_out};
+use crate::observations::{Observations, Part};
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, slices, spread_raw, visit_slices};
 use crate::signal::{FewChapters, Log, Pipeline, Recording, Trajectory, median_step};
@@ -30,6 +31,8 @@ pub struct HeldOut {
     pit: Vec<PitKeeper>,
     conformal: ConformalKeeper,
     rivals: RivalKeeper,
+    /// Per joint; empty where rows are not kept.
+    moments: Vec<Moments>,
     traces: Vec<Trace>,
 }
 
@@ -80,29 +83,34 @@ impl HeldOut {
             raw_moving: keeper,
             conformal: ConformalKeeper::default(),
             rivals: RivalKeeper::default(),
+            moments: Vec::new(),
             traces: Vec::new(),
         }
     }
 
     /// Predicts the rows of a log that was not used to fit the twin, and scores them: filtered rows all, raw rows of long logs in evenly
-    /// spread pieces, see [`spread_raw`].
+    /// spread pieces, see [`spread_raw`]. `seen` gets the motion of the log, or of chapter after chapter; contacts and stops are left out of a log
+    /// that is no longer than a chapter, as the fit leaves them out.
     ///
     /// # Errors
-    /// [`crate::Error::Log`] for a log without torque, those of [`Twin::align`] and [`visit_slices`], and of chapters that cannot be read.
+    /// Those of `seen`, [`crate::Error::Log`] for a log without torque, those of [`Twin::align`] and [`visit_slices`], and of chapters that cannot be read.
     pub fn score(
         &mut self,
-        twin: &Twin,
-        library: &Library,
-        predictor: &Predictor,
+        (twin, library, predictor): (&Twin, &Library, &Predictor),
         log: &Log<'_>,
         findings: &mut Vec<Finding>,
+        seen: &mut (dyn FnMut(&Trajectory) -> Result<()> + Send),
     ) -> Result<()> {
         let mut collected = self.collect(log.name(), rows_about(log, &twin.pipeline)?);
         let names = twin.robot.joint_names();
+        let whole = matches!(log, Log::Whole(_));
         let mut part = |recording: &Recording, said: &mut Vec<Finding>| -> Result<Trajectory> {
             recording.require_torque(&names)?;
-            let (trajectory, more) = twin.align(recording)?;
+            let (mut trajectory, more) = twin.align(recording)?;
             said.extend(more);
+            if whole {
+                said.extend(without_incidents(twin, &mut trajectory));
+            }
             let signal = RowSignal::Filtered;
             let slices = slices(
                 &twin.pipeline,
@@ -123,6 +131,7 @@ impl HeldOut {
                     Ok(())
                 },
             )?;
+            seen(&trajectory)?;
             Ok(trajectory)
         };
         let trajectory = match log {
@@ -164,6 +173,13 @@ impl HeldOut {
             self.push_filtered(block, predictors, &mut collected);
         });
         self.add(collected);
+        let begin = observations.time.partition_point(|t| *t < from);
+        let rows = begin..observations.len();
+        self.moments.resize(self.names.len(), Moments::default());
+        let gram = Part { observations, rows }.gram();
+        for (moments, gram) in self.moments.iter_mut().zip(&gram.joints) {
+            *moments += Moments::of(gram);
+        }
     }
 
     /// The raw rows of [`HeldOut::score`] alone.
@@ -287,6 +303,11 @@ impl HeldOut {
         collected.rows += block.len;
     }
 
+    /// Scores of the moving rows within the training motion, see [`Validation::within`].
+    pub(crate) fn within(&self) -> Scores {
+        self.within.scores()
+    }
+
     /// The scores of everything seen.
     #[must_use]
     pub fn finish(self, split: Split) -> Validation {
@@ -311,9 +332,20 @@ impl HeldOut {
             pit: pooled.pit(),
             reliability: self.names.iter().zip(&self.pit).map(reliability).collect(),
             compact: self.rivals.losses(),
+            moments: self.moments,
             traces: self.traces,
         }
     }
+}
+
+/// Leaves contacts and protective stops out of a log's motion, and says so.
+fn without_incidents(twin: &Twin, trajectory: &mut Trajectory) -> Vec<Finding> {
+    let (robot, pipeline) = (&twin.robot, &twin.pipeline);
+    let mut evidence = Evidence::default();
+    evidence.take(robot, pipeline, trajectory);
+    let incidents = evidence.incidents(robot);
+    leave_out(pipeline, trajectory, &incidents);
+    incident_findings(&trajectory.name, &incidents)
 }
 
 /// Filtered rows of a log, and a few more: those at the ends of its stretches.
@@ -340,6 +372,11 @@ impl AddAssign for HeldOut {
         }
         self.conformal.join(other.conformal);
         self.rivals += other.rivals;
+        let joints = self.moments.len().max(other.moments.len());
+        self.moments.resize(joints, Moments::default());
+        for (own, more) in self.moments.iter_mut().zip(other.moments) {
+            *own += more;
+        }
         self.traces.extend(other.traces);
     }
 }

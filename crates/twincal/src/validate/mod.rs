@@ -1,18 +1,24 @@
 //! Held-out scores: how good the twin's torque is on data it has not seen (method section 8).
 
+mod changes;
 mod conformal;
 mod heldout;
+mod moments;
 mod pit;
 mod rivals;
 mod scores;
 mod trace;
+mod trend;
 
+pub use changes::{Change, ChangeKind, ChangeNumber, Changes, FALSE_ALARM, least_share};
 pub use conformal::{Conformal, ConformalKeeper, JointFactor};
 pub use heldout::{HeldOut, Predictors};
+pub use moments::Moments;
 pub use pit::{Pit, PitKeeper, Reliability};
 pub use rivals::{Loss, RivalKeeper};
 pub use scores::{CoverageKeeper, ScoreKeeper};
 pub use trace::{MAX_POINTS, TraceRows};
+pub use trend::{TREND_ALARM, TREND_FEWEST, Trend};
 
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -93,6 +99,9 @@ impl Default for Scores {
     }
 }
 
+/// Groups that many logs are left out in.
+pub const LOG_GROUPS: usize = 5;
+
 /// How training and held-out data were separated.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -101,6 +110,8 @@ pub enum Split {
     HeldoutLogs,
     /// Each log predicted from the others.
     LeaveOneLogOut,
+    /// Many logs: [`LOG_GROUPS`] groups of logs that follow each other, each group predicted from the others.
+    LeaveLogGroupsOut,
     /// The last 30 % of each log after a gap.
     LastThirty,
 }
@@ -172,6 +183,9 @@ pub struct Validation {
     /// The model average against the compact twin on moving filtered rows; `None` if it was not asked for.
     #[serde(default)]
     pub compact: Option<[Loss; 2]>,
+    /// Second moments of the moving held-out rows, joint by joint; empty where rows were not kept.
+    #[serde(default)]
+    pub moments: Vec<Moments>,
     /// For figures.
     pub traces: Vec<Trace>,
 }

@@ -11,7 +11,7 @@ pub struct JointChange {
     pub joint: String,
     /// Change of viscous friction against the nominal torque's, N·m·s/rad (N·s/m); the sum is not negative.
     pub damping: Option<f64>,
-    /// Dry friction, N·m (N), not negative; the nominal torque has none.
+    /// Dry friction, N·m (N), not negative; the nominal torque has none. 0 where the file states one and none was found.
     pub friction: Option<f64>,
     /// Change of motor inertia, kg·m² (kg); the sum is not negative.
     pub armature: Option<f64>,
@@ -30,13 +30,20 @@ impl JointChange {
     }
 }
 
-/// Changes of all joints that have one.
-pub(super) fn changes(
-    robot: &Robot,
-    held: &[Option<Place>],
-    beta: &[f64],
-    holds: Holds,
-) -> Vec<JointChange> {
+/// What columns say of places in a file.
+#[derive(Clone, Copy)]
+pub(super) struct Said<'a> {
+    /// Where each column goes, if it goes into the file.
+    pub(super) held: &'a [Option<Place>],
+    /// Coefficients of all columns.
+    pub(super) beta: &'a [f64],
+    /// Places at which the data see nothing.
+    pub(super) absent: &'a [Place],
+}
+
+/// Changes of all joints that have one; friction that the file states and the data see to be absent becomes 0.
+pub(super) fn changes(robot: &Robot, said: Said<'_>, holds: Holds) -> Vec<JointChange> {
+    let Said { held, beta, absent } = said;
     let mut changes = Vec::new();
     for (index, name) in robot.joint_names().into_iter().enumerate() {
         let sum = |wanted: Place| -> Option<f64> {
@@ -45,10 +52,14 @@ pub(super) fn changes(
             own.map(|(_, beta)| *beta).reduce(|a, b| a + b)
         };
         let nominal = robot.joint(index);
+        let none =
+            |place: Place, stated: f64| (stated != 0.0 && absent.contains(&place)).then_some(0.0);
+        let damping = sum(Place::Viscous(index)).map(|beta| beta.max(-nominal.damping));
+        let friction = sum(Place::Coulomb(index)).map(|beta| beta.max(0.0));
         let change = JointChange {
             joint: name.to_owned(),
-            damping: sum(Place::Viscous(index)).map(|beta| beta.max(-nominal.damping)),
-            friction: sum(Place::Coulomb(index)).map(|beta| beta.max(0.0)),
+            damping: damping.or_else(|| none(Place::Viscous(index), nominal.unused_damping)),
+            friction: friction.or_else(|| none(Place::Coulomb(index), nominal.unused_friction)),
             armature: sum(Place::Armature(index)).map(|beta| beta.max(-nominal.armature)),
             spring: spring(
                 nominal,

@@ -10,12 +10,14 @@ mod metric;
 mod pseudo_inertia;
 mod projection;
 mod lost;
+mod torque_error;
 #[cfg(test)]
 mod tests;
 
 pub use joints::JointChange;
 pub use links::LinkChange;
 pub use projection::Projection;
+pub use torque_error::JointTorqueError;
 
 use crate::calibrate::{Calibration, Verdict};
 use crate::error::Result;
@@ -104,6 +106,8 @@ pub struct WriteBack {
     /// RMS of the torque that the twin has and the file has not, per joint, N·m (N): that of all residual components and of what is lost,
     /// summed state by state.
     pub lacks: Vec<f64>,
+    /// Error of the user's file and of the written one on held-out rows, joint by joint, with the friction that they state.
+    pub torque_error: Vec<JointTorqueError>,
 }
 
 /// Everything that a write-back needs of a calibration, worked out once for mean and draws.
@@ -195,7 +199,13 @@ impl<'a> Writer<'a> {
         let file = linear_part::written(beta, &shares);
         let gravity = gravity(robot, &held, &file);
         let (links, projection) = links::changes(self, &held, &file, gravity)?;
-        let joints = joints::changes(robot, &held, &file, self.holds);
+        let absent = self.absent(&held);
+        let said = joints::Said {
+            held: &held,
+            beta: &file,
+            absent: &absent,
+        };
+        let joints = joints::changes(robot, said, self.holds);
         let mut change = WriteBack {
             links,
             joints,
@@ -206,6 +216,7 @@ impl<'a> Writer<'a> {
             lost: Vec::new(),
             correction: Vec::new(),
             lacks: Vec::new(),
+            torque_error: Vec::new(),
         };
         let difference = |change: &WriteBack| -> Result<Vec<f64>> {
             let robots = [robot, &change.robot(robot)?];
@@ -219,13 +230,29 @@ impl<'a> Writer<'a> {
         };
         let rest = difference(&change)?;
         change.gravity = lost::fitted_gravity(&self.states, robot, &change, &rest)?;
-        change.lost = rms(&difference(&change)?);
+        let lost = difference(&change)?;
+        change.lost = rms(&lost);
+        change.torque_error = self.torque_error(&change, &held, &file, &lost);
         change.correction = self.states.rms(beta);
         let robots = [robot, &change.robot(robot)?];
         let lacks = lost::lacks(&self.states, robots, &change.joints, &held, beta);
         change.lacks = rms(&lacks);
         self.tell(&mut change, (&whole, chosen), (beta, &file), &held, &shares);
         Ok(change)
+    }
+
+    /// Places of columns that the data see and that are not `held`: what a file states there was not found.
+    fn absent(&self, held: &[Option<Place>]) -> Vec<Place> {
+        let components = &self.calibration.components;
+        let judged = |column: usize| {
+            let own = &components[self.component(column)];
+            own.pip.is_some() && own.verdict != Some(Verdict::NotSeen)
+        };
+        let columns = held.iter().enumerate();
+        let absent = columns.filter(|(column, place)| place.is_none() && judged(*column));
+        absent
+            .filter_map(|(column, _)| self.place(column))
+            .collect()
     }
 
     /// Index of a column's component.

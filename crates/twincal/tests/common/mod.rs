@@ -13,6 +13,7 @@ pub(crate) fn recording<const N: usize>(time: Vec<f64>, joints: [[Vec<f64>; 4]; 
     });
     Recording {
         unfolded: false,
+        start_ns: 0,
         name: "log".into(),
         time,
         joints: joints.into(),

@@ -30,6 +30,7 @@ fn swinging(time: Vec<f64>) -> Recording {
     };
     Recording {
         unfolded: false,
+        start_ns: 0,
         name: "run".into(),
         joints: vec![joint(0.31), joint(0.47)],
         payload: Payload::None,

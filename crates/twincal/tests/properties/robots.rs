@@ -3,8 +3,7 @@
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use twincal::robot::{
-    Inertia, JointDescription, JointKind, Limits, LinkDescription, Placement, Robot,
-    RobotDescription,
+    Inertia, JointDescription, JointKind, LinkDescription, Placement, Robot, RobotDescription,
 };
 
 type Matrix = [[f64; 3]; 3];
@@ -122,11 +121,9 @@ pub(crate) fn robot(most: usize) -> impl Strategy<Value = Robot> {
                 placement: piece.placement,
                 axis: piece.axis,
                 armature: piece.motor,
-                damping: 0.0,
                 stiffness: piece.spring.0,
                 spring_reference: piece.spring.1,
-                mimic: None,
-                limits: Limits::default(),
+                ..JointDescription::new("", JointKind::Continuous, "", "")
             });
         }
         let gravity = gravity.map(|g| 9.81 * g);

@@ -5,6 +5,7 @@ use super::units::Degrees;
 use std::collections::BTreeMap;
 use twincal::Finding;
 use twincal::self_check::JointCheck;
+use twincal::words::listed;
 use twincal_io::config::{ChannelNames, ColumnsTable, PerJoint, Settings, key};
 
 /// `[columns]` of a proposed config.
@@ -88,7 +89,7 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
         let names: Vec<&str> = scaled.iter().map(|check| check.joint.as_str()).collect();
         let whose = match names.len() == joints.len() {
             true => "All torque".to_owned(),
-            false => format!("Torque of {}", names.join(", ")),
+            false => format!("Torque of {}", listed(&names, ", ")),
         };
         whys.push(format!("{whose} looks like thousandths of N·m."));
     }

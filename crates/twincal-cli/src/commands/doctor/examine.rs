@@ -18,6 +18,7 @@ use twincal::signal::{
     Auto, Chosen, Log, LogOverview, Pipeline, Steps, choose_and_prepare, constant_torque, describe,
     hardly_driven, steps,
 };
+use twincal::words::{listed, quoted};
 use twincal_io::config::{Settings, TimeUnit};
 use twincal_io::log::{
     LogOptions, Preset, TorqueSource, joints_without_column, match_columns, read_header,
@@ -191,13 +192,13 @@ impl Examination {
             .collect();
         self.refusals.push(Refusal {
             problem: format!(
-                "the log has no position for {} moving joints of the model: `{}`",
+                "the log has no position for {} moving joints of the model: {}",
                 missing.len(),
-                missing.join("`, `")
+                quoted(&missing)
             ),
             remedy: format!(
                 "where they stand still, say so: [model] locked = {{ {} }}; here they are taken to",
-                entries.join(", ")
+                listed(&entries, ", ")
             ),
             exit_code: crate::failure::INPUT,
             time_unit: None,
@@ -423,7 +424,7 @@ fn finds_all(lower: &Calibration, usual: &Calibration) -> bool {
     usual.all(|component| found.contains(&component.name.as_str()))
 }
 
-/// What `[log] torque` makes of the torque columns.
+/// What `[[log]] torque` makes of the torque columns.
 fn taken_as(options: &LogOptions) -> &'static str {
     let unsaid = match options.preset {
         Some(Preset::UrRtde) => TorqueSource::Current,

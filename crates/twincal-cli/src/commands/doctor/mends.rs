@@ -58,7 +58,32 @@ const FOR_THE_NEXT: &str = "nothing has to be done for this log; for the next on
 const NOT_USED: &str = "nothing, if it does not act in these logs; else write its effect into the model in a form that is read";
 
 /// Findings in the order in which they matter, with what mends them.
-const ORDER: [(&str, &str); 49] = [
+const ORDER: &[(&str, &str)] = &[
+    ("base_orientation", "twincal.toml: [model] base"),
+    (
+        "torque_copied",
+        "map the measured torque of that joint in [columns] tau, or log it again",
+    ),
+    (
+        "torque_constant",
+        "map the measured torque of that joint in [columns] tau, or leave this log out",
+    ),
+    (
+        "model_torque",
+        "log the measured torque of the drives, or add the model's to this one",
+    ),
+    (
+        "gravity_compensated",
+        "log the measured torque of the drives, or add the gravity that was taken off",
+    ),
+    (
+        "torque_held",
+        "log that joint's torque in every row, or leave this log out",
+    ),
+    (
+        "clock_scale",
+        "give the true rate: --rate HZ, or a factor for qd in [columns.factor]",
+    ),
     (
         "joint_order",
         "map the columns in [columns.q], [columns.qd], [columns.tau] of twincal.toml; twincal init writes them",
@@ -66,7 +91,7 @@ const ORDER: [(&str, &str); 49] = [
     ("sign_flip", "twincal.toml: [columns.factor]"),
     (
         "torque_scale",
-        "say what the torque is ([log] torque, gear_ratio, drive_constant), or give [columns.factor] tau",
+        "say what the torque is ([[log]] torque, gear_ratio, drive_constant), or give [columns.factor] tau",
     ),
     (
         "unphysical_inertia",
@@ -80,7 +105,7 @@ const ORDER: [(&str, &str); 49] = [
         "moves_no_mass",
         "give the link an <inertial>, or fix the joint with [model] locked",
     ),
-    ("torque_lag", "twincal.toml: [signal] lag = …"),
+    ("torque_lag", "record torque by the clock of the motion"),
     (
         "velocity_opposite",
         "twincal.toml: [columns.factor] with q or qd of that joint, whichever is turned; the torque does not tell",
@@ -130,12 +155,13 @@ const ORDER: [(&str, &str); 49] = [
         "resampled",
         "log the source's stamp, or give the rate: --rate HZ",
     ),
+    (
+        "repeated_samples",
+        "log each sample of the controller once, with the controller's stamp",
+    ),
     ("slower_channels", "log all channels at one rate"),
     ("short_segments", "record longer, or mend the gaps"),
-    (
-        "torque_spike",
-        "nothing: left out; cut the log there to be sure",
-    ),
+    ("contact", "nothing: left out; cut the log there to be sure"),
     (
         "drives_off",
         "nothing: left out; cut the log there to be sure",
@@ -245,12 +271,15 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
         let mut all = examination.findings.iter();
         all.any(|f| f.code == "sign_flip" && f.subject == joint)
     };
+    let is_said = |code: &str| examination.findings.iter().any(|f| f.code == code);
     for finding in examination
         .findings
         .iter()
         .filter(|f| f.severity > Severity::Note)
         // Which of the two is turned is said there.
         .filter(|f| f.code != "velocity_opposite" || !turned(&f.subject))
+        // That it is no measurement is said there.
+        .filter(|f| f.code != "constant_torque" || !is_said("torque_constant"))
     {
         // One of a kind is enough to know what to do.
         match said.iter_mut().find(|(code, _)| *code == finding.code) {
@@ -296,10 +325,9 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
 fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
     let place = ORDER.iter().position(|(code, _)| *code == finding.code);
     let how = match (finding.code.as_str(), place) {
-        ("torque_lag", _) => match lag(examination) {
-            Some(lag) => format!("twincal.toml: [signal] lag = {lag:?}"),
-            None => "one [signal] lag cannot mend logs that differ: fit them apart".into(),
-        },
+        ("torque_lag", _) if finding.subject.is_empty() => {
+            "twincal.toml: [signal] lag = \"auto\"".into()
+        }
         ("sign_flip", _) => match of_joint(examination, &finding.subject) {
             Some(check) => {
                 let or_the_axis = if is_axis(check) {
@@ -340,6 +368,13 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
                 _ => ORDER[place].1.into(),
             }
         }
+        ("base_orientation", _) => match &examination.checkup.base {
+            Some(base) => format!(
+                "twincal.toml: [model] {} (twincal init writes it)",
+                base.line()
+            ),
+            None => "twincal.toml: [model] base".into(),
+        },
         ("quantised_encoder", _) => match examination.lower_cutoff {
             Some(hz) => format!(
                 "twincal.toml: [signal] cutoff_hz = {hz:?}, or log the encoder's full resolution"
@@ -379,20 +414,11 @@ fn of_joint<'a>(examination: &'a Examination, joint: &str) -> Option<&'a JointCh
     joints.find(|check| check.joint == joint)
 }
 
-/// The lag to write into the config, s to a tenth of a millisecond: the mean of the logs that clearly have one, if they agree.
+/// The lag to write into the config, s to a tenth of a millisecond, where it is clear.
 pub(super) fn lag(examination: &Examination) -> Option<f64> {
-    let logs = examination.checkup.lags.values();
-    let clear: Vec<(f64, f64)> = logs
-        .filter_map(|log| Some((log.clear()?, log.interval)))
-        .collect();
-    if clear.is_empty() {
-        return None;
-    }
-    let mean = clear.iter().map(|(lag, _)| lag).sum::<f64>() / clear.len() as f64;
-    let agree = clear
-        .iter()
-        .all(|(lag, interval)| (lag - mean).abs() <= *interval);
-    agree.then_some((mean * 1e4).round() / 1e4)
+    let lags = examination.checkup.lags.as_ref()?;
+    let [lag, _] = lags.common.filter(|_| lags.clear)?;
+    Some((lag * 1e4).round() / 1e4)
 }
 
 #[cfg(test)]

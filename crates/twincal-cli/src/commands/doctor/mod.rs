@@ -9,7 +9,8 @@ mod propose;
 mod units;
 
 use super::inspect::library::{ComponentRow, component_rows};
-use super::{code_of, print_json, require_strict, settings, start_threads};
+use super::settings::{Look, Usual};
+use super::{code_of, print_json, reads, require_strict, settings, start_threads};
 use crate::args;
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
@@ -21,10 +22,10 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::incidents::Incident;
-use twincal::lag::LogLag;
+use twincal::lag::{Lags, LogLag};
 use twincal::self_check::JointCheck;
 use twincal::signal::{Agreement, LogOverview, Pipeline, Steps};
-use twincal_io::artifact::OutputFile;
+use twincal_io::artifact::{Inputs, OutputFile};
 use twincal_io::config::{Config, Settings};
 
 /// Where `init` writes.
@@ -42,6 +43,8 @@ struct Diagnosis {
     /// Units that were converted for the look alone.
     converted: Vec<String>,
     logs: Vec<LogRow>,
+    /// How much later than the motion torque was logged, over all logs.
+    lags: Option<Lags>,
     /// Log against model, over all logs.
     joints: Vec<JointCheck>,
     /// Filters as `fit` would choose them; null where it could not.
@@ -79,8 +82,19 @@ struct Asked {
 }
 
 impl Asked {
-    fn of(flags: &args::Doctor, verb: &str, terminal: &mut Terminal) -> Outcome<Self> {
-        let config = settings::of_look(&flags.model, &flags.allow, &flags.log, terminal)?;
+    /// `verb` is the command; `init` leaves out the file that it may be about to write.
+    fn of(flags: &args::Look, verb: &str, terminal: &mut Terminal) -> Outcome<Self> {
+        let usual = match (verb, flags.no_config) {
+            ("init", false) => Usual::Named,
+            (_, no_config) => Usual::unless(no_config),
+        };
+        let look = Look {
+            model: &flags.model,
+            allow: &flags.allow,
+            log: &flags.log,
+            usual,
+        };
+        let config = settings::of_look(&look, terminal)?;
         let settings = config.settings()?;
         let logs = if flags.logs.is_empty() {
             settings.log.named()
@@ -97,8 +111,8 @@ impl Asked {
             ));
         }
         Ok(Self {
+            given: config.read_from().map(|(file, _)| file.to_owned()),
             config,
-            given: flags.log.config.clone(),
             settings,
             model,
             logs,
@@ -107,16 +121,14 @@ impl Asked {
 }
 
 pub(super) fn run(flags: &args::Doctor, terminal: &mut Terminal) -> Outcome<u8> {
-    let asked = Asked::of(flags, "doctor", terminal)?;
+    let asked = Asked::of(&flags.look, "doctor", terminal)?;
     start_threads(asked.settings.threads)?;
     let progress = Progress::new();
-    let examination = examine(
-        &asked.model,
-        &asked.logs,
-        &asked.settings,
-        &progress,
-        Trial::Fit,
-    )?;
+    let trial = match flags.trial {
+        true => Trial::Fit,
+        false => Trial::None,
+    };
+    let examination = examine(&asked.model, &asked.logs, &asked.settings, &progress, trial)?;
     drop(progress);
     let diagnosis = diagnosis(examination, &asked);
     if asked.settings.json {
@@ -131,7 +143,14 @@ pub(super) fn run(flags: &args::Doctor, terminal: &mut Terminal) -> Outcome<u8> 
 pub(super) fn init(flags: &args::Init, terminal: &mut Terminal) -> Outcome<u8> {
     let asked = Asked::of(&flags.look, "init", terminal)?;
     let target = flags.output.clone().unwrap_or_else(|| USUAL.into());
-    let mut output = OutputFile::create(&target, flags.force)?;
+    let mut inputs = Inputs::default();
+    let given = reads::Given {
+        flags: &flags.look.log,
+        config: &asked.config,
+        settings: &asked.settings,
+    };
+    reads::add_given(&mut inputs, &given, &asked.logs);
+    let mut output = OutputFile::create(&target, flags.force, &inputs)?;
     start_threads(asked.settings.threads)?;
     let progress = Progress::new();
     let examination = examine(
@@ -244,12 +263,15 @@ fn diagnosis(examination: Examination, asked: &Asked) -> Diagnosis {
             .map(|(overview, steps)| LogRow {
                 columns: mappings.remove(&overview.name),
                 velocity: checkup.agreement.remove(&overview.name).unwrap_or_default(),
-                lag: checkup.lags.remove(&overview.name),
+                lag: (checkup.lags.iter().flat_map(|lags| &lags.logs))
+                    .find(|log| log.log == overview.name)
+                    .cloned(),
                 incidents: checkup.incidents.remove(&overview.name).unwrap_or_default(),
                 overview,
                 steps,
             })
             .collect(),
+        lags: checkup.lags,
         joints: checkup.joints,
         pipeline,
         components,

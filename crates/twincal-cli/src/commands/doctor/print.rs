@@ -8,7 +8,7 @@ use super::examine::Mapping;
 use super::{Diagnosis, LogRow};
 use crate::terminal::{Terminal, clean};
 use twincal::Severity;
-use twincal::lag::LogLag;
+use twincal::lag::{Lags, LogLag};
 use twincal::words::significant;
 
 /// Mends that come first.
@@ -18,7 +18,8 @@ const NAMED: usize = 8;
 /// How lines begin that say what mends.
 const HOW: [&str; 2] = ["     → ", "       "];
 /// Notes on a log that are shown with it.
-const OF_LOG: [&str; 5] = [
+const OF_LOG: [&str; 6] = [
+    "controller_clock",
     "gaps",
     "duplicate_rows",
     "resampled",
@@ -49,7 +50,7 @@ pub(super) fn print(diagnosis: &Diagnosis, terminal: &mut Terminal) {
         paragraph(&text, terminal);
     }
     for log in &diagnosis.logs {
-        print_log(log, terminal);
+        print_log(log, diagnosis.lags.as_ref(), terminal);
         for finding in &diagnosis.findings {
             let own = finding.subject == log.overview.name && finding.severity == Severity::Note;
             let code = finding.code.as_str();
@@ -88,7 +89,7 @@ pub(super) fn print(diagnosis: &Diagnosis, terminal: &mut Terminal) {
     }
 }
 
-fn print_log(log: &LogRow, terminal: &mut Terminal) {
+fn print_log(log: &LogRow, lags: Option<&Lags>, terminal: &mut Terminal) {
     log_heading(&log.overview, terminal);
     if let Some(columns) = &log.columns {
         mapping(columns, terminal);
@@ -107,12 +108,11 @@ fn print_log(log: &LogRow, terminal: &mut Terminal) {
         let step = |step: Option<f64>| step.map_or(NOTHING.into(), |step| significant(step, 2));
         let [low, high] = joint.q_range;
         let agreement = log.velocity.get(index).copied().flatten();
-        // One joint alone says nothing of the log's lag.
-        let told = log.lag.iter().filter(|lag| lag.common.is_some());
-        let lag = told.flat_map(|lag| &lag.joints);
+        let lag = lags.iter().flat_map(|lags| &lags.joints);
         let lag = lag
-            .filter(|lag| lag.joint == joint.joint && lag.speaks)
-            .find_map(|lag| Some((lag.lag, lag.sd?)));
+            .filter(|lag| lag.joint == joint.joint)
+            .map(|lag| [lag.lag, lag.sd])
+            .next();
         rows.add_row([
             &*clean(&joint.joint),
             &format!("{}…{}", significant(low, 3), significant(high, 3)),
@@ -120,55 +120,38 @@ fn print_log(log: &LogRow, terminal: &mut Terminal) {
             &agreement.map_or(NOTHING.into(), |a| format!("{:.3}", a.r2)),
             &(joint.tau_rms).map_or("not logged".into(), |tau| significant(tau, 3)),
             &step(steps.and_then(|steps| steps.torque)),
-            &lag.map_or(NOTHING.into(), |(lag, sd)| {
+            &lag.map_or(NOTHING.into(), |[lag, sd]| {
                 format!("{:+.1}±{:.1}", 1e3 * lag, 1e3 * sd)
             }),
         ]);
     }
     print_table(&rows, terminal);
     if let Some(lag) = &log.lag {
-        let text = match lag.common {
-            Some([mean, sd]) => {
-                let told = format!(
-                    "torque is logged {:.2} ± {:.2} ms ({:.2} samples) {} the motion",
-                    1e3 * mean.abs(),
-                    1e3 * sd,
-                    mean.abs() / lag.interval,
-                    if mean < 0.0 { "before" } else { "after" }
-                );
-                match lag.clear() {
-                    None if lag.slight().is_some() => format!(
-                        "{told}: not for certain more than one sample, so that fit leaves it as it is: try [signal] lag = {mean:.4}, and keep it if it predicts held-out torque better"
-                    ),
-                    None => format!("{told}: {}", no_clear_lag(lag)),
-                    Some(_) => told,
-                }
-            }
-            None => "the lag between motion and torque cannot be told: too few joints whose torque the model explains".into(),
-        };
-        paragraph(&text, terminal);
+        paragraph(&lag_words(lag, lags), terminal);
     }
 }
 
-/// What follows from a lag that is short or no more than three of its errors: nothing; and why it is so loose.
-fn no_clear_lag(lag: &LogLag) -> String {
-    let sure = lag.joints.iter().filter(|joint| {
-        let clear = |sd: f64| joint.lag.abs() > 3.0 * sd;
-        joint.speaks && joint.sd.is_some_and(clear)
-    });
-    let ends = sure.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], joint| {
-        [low.min(joint.lag), high.max(joint.lag)]
-    });
-    if ends[0] < ends[1] {
-        format!(
-            "the joints differ ({:+.1} to {:+.1} ms), so that no one lag is at work and nothing has to be done",
-            1e3 * ends[0],
-            1e3 * ends[1]
-        )
-    } else if lag.common.is_some_and(|[mean, sd]| mean.abs() > 3.0 * sd) {
-        "less than half a sample, so that nothing has to be done".into()
-    } else {
-        "no more than its error, so that nothing has to be done".into()
+/// What a log says of its lag, and what becomes of it.
+fn lag_words(log: &LogLag, lags: Option<&Lags>) -> String {
+    let Some([lag, sd]) = log
+        .common
+        .filter(|_| lags.is_some_and(|lags| lags.common.is_some()))
+    else {
+        return "the lag between motion and torque is inconclusive: no more than half of the joints agree on one, so that torque stays as logged".into();
+    };
+    let found = format!(
+        "torque is logged {:.2} ± {:.2} ms ({:.2} samples) {} the motion",
+        1e3 * lag.abs(),
+        1e3 * sd,
+        lag.abs() / log.interval,
+        if lag < 0.0 { "before" } else { "after" }
+    );
+    match lags {
+        _ if log.differs => format!("{found}, unlike the other logs"),
+        Some(lags) if lags.clear => format!("{found}; fit moves it back"),
+        _ => format!(
+            "{found}: too little to change what left-out rows leave, so that torque stays as logged"
+        ),
     }
 }
 

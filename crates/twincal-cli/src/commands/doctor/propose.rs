@@ -43,11 +43,9 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
         .filter(|finding| finding.code == "velocity_mismatch");
     let velocity: Vec<&str> = velocity.map(|finding| finding.message.as_str()).collect();
     let lag = lag(examination).map(|lag| {
-        let samples: Vec<String> = examination
-            .checkup
-            .lags
-            .values()
-            .filter_map(|log| Some(format!("{:.1} in {}", log.clear()? / log.interval, log.log)))
+        let logs = (examination.checkup.lags.iter()).flat_map(|lags| &lags.logs);
+        let samples: Vec<String> = logs
+            .map(|log| format!("{:.1} in {}", lag / log.interval, log.log))
             .collect();
         let order = if lag > 0.0 { "after" } else { "before" };
         let words = format!(
@@ -58,7 +56,10 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
         (lag, words)
     });
     let columns = columns(examination, logs.len(), settings);
-    let is_mended = |code: &str| columns.mended.contains(&code);
+    let base = examination.checkup.base;
+    let is_mended = |code: &str| {
+        columns.mended.contains(&code) || (code == "base_orientation" && base.is_some())
+    };
     let mends_refusal = |refusal: &Refusal| {
         (is_mended(TICKS) && refusal.time_unit.is_some())
             || (is_mended(DEGREES) && refusal.degrees.is_some())
@@ -92,6 +93,14 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
         command: format!("twincal init {} --model {}", names.join(" "), shown(model)),
         model: seen_from(model),
         locked,
+        base: base.map(|base| {
+            let said = examination
+                .findings
+                .iter()
+                .find(|f| f.code == "base_orientation");
+            let why = said.map_or_else(String::new, |finding| finding.message.clone());
+            (base.line(), why)
+        }),
         allow_unphysical: settings.model.allow_unphysical,
         logs: logs
             .iter()

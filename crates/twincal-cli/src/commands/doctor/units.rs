@@ -4,6 +4,7 @@ use super::examine::filtered;
 use std::sync::Arc;
 use twincal::robot::{JointKind, Robot};
 use twincal::signal::{Log, LongLog, ReadChapter, Recording, describe};
+use twincal::words::listed;
 use twincal_io::config::{Settings, TimeUnit};
 
 /// Radians per degree.
@@ -161,7 +162,7 @@ pub(super) fn converted(
         let of = if found.joints == turning {
             String::new()
         } else {
-            format!(" of {}", own.join(", "))
+            format!(" of {}", listed(&own, ", "))
         };
         return Some(Converted {
             words: format!("{}: {what}{of} were taken as degrees", log.name()),

@@ -1,6 +1,7 @@
 //! The steps as JSON: what is needed to evaluate the twin in a language of one's own.
 
 use super::notes;
+use super::text::json_text;
 use crate::error::{Error, Result};
 use serde_json::{Value, json};
 use twincal::evaluator::{Evaluator, Step};
@@ -31,7 +32,7 @@ pub(super) fn source(evaluator: &Evaluator, about: &[String]) -> Result<String> 
         "joints": joints,
         "steps": steps,
     });
-    serde_json::to_string(&all)
+    json_text(&all)
         .map(|text| text + "\n")
         .map_err(|e| Error::Internal {
             what: "export as JSON".into(),

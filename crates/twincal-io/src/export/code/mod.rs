@@ -1,9 +1,11 @@
 //! The calibrated twin as source code: one file, no dependencies, no allocation; the same steps in every language.
+//! What stands in it beside numbers goes through `text.rs`.
 
 mod c;
 mod json;
 mod python;
 mod rust;
+mod text;
 
 use crate::error::Result;
 use twincal::evaluator::{Evaluator, Step};
@@ -34,34 +36,22 @@ pub fn source(evaluator: &Evaluator, language: Language, about: &[String]) -> Re
     }
 }
 
-/// What every file says of itself.
+/// What every file says of itself: lines of a comment in any language.
 fn notes(evaluator: &Evaluator, about: &[String]) -> Vec<String> {
-    let mut lines = about.to_vec();
-    let names: Vec<String> = (evaluator.joints.iter())
-        .map(|joint| clean(&format!("{} ({})", joint.name, joint.unit)))
-        .collect();
-    lines.push("In: position, velocity, acceleration per joint; rad or m, SI units.".into());
-    lines.push("Out: calibrated torque, and the ends of its 95 % interval for torque as".into());
-    lines.push("measured. 1 (true) outside the data that the twin was fitted to, else 0.".into());
-    lines.push("While a joint stands still, stiction may add up to its Coulomb friction.".into());
-    lines.push("Joints:".into());
-    lines.extend(
-        names
-            .iter()
-            .enumerate()
-            .map(|(k, name)| format!("  {k}: {name}")),
-    );
+    let joints = (evaluator.joints.iter().enumerate())
+        .map(|(k, joint)| format!("  {k}: {} ({})", joint.name, joint.unit));
+    let told = [
+        "In: position, velocity, acceleration per joint; rad or m, SI units.",
+        "Out: calibrated torque, and the ends of its 95 % interval for torque as",
+        "measured. 1 (true) outside the data that the twin was fitted to, else 0.",
+        "While a joint stands still, stiction may add up to its Coulomb friction.",
+        "Joints:",
+    ];
+    let lines = about.iter().cloned().chain(told.map(str::to_owned));
     lines
-}
-
-/// Text that cannot end a comment or steer a terminal.
-fn clean(text: &str) -> String {
-    text.chars()
-        .map(|c| if c.is_control() { ' ' } else { c })
-        .collect::<String>()
-        .replace("*/", "* /")
-        .replace("\"\"\"", "'''")
-        .replace('\\', "/")
+        .chain(joints)
+        .map(|line| text::comment_text(&line))
+        .collect()
 }
 
 /// Every digit, read as a double in all languages.

@@ -1,5 +1,6 @@
 //! Python with NumPy: one state or whole arrays of them.
 
+use super::text::python_string;
 use super::{INPUTS, arithmetic, bounds, literal, notes, operand};
 use std::fmt::Write as _;
 use twincal::evaluator::{Evaluator, Step};
@@ -21,7 +22,7 @@ pub(super) fn source(evaluator: &Evaluator, about: &[String]) -> String {
         evaluator
             .joints
             .iter()
-            .map(|joint| serde_json::Value::from(joint.name.as_str()).to_string())
+            .map(|joint| python_string(&joint.name))
             .collect::<Vec<_>>()
             .join(", ")
     );

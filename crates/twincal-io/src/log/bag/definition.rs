@@ -5,7 +5,7 @@
 //! `Time`, `Duration`, `Header`, and a few that carry joints in bags without definitions.
 
 use super::joint_state::Encoding;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 /// Longest text of a definition, bytes.
@@ -230,9 +230,10 @@ impl Parser {
         self.records.push(Record::default());
         self.open.push(name.to_owned());
         let mut fields: Vec<Field> = Vec::new();
+        let mut names = BTreeSet::new();
         for line in text.lines() {
             if let Some(field) = self.field(name, line)? {
-                if fields.iter().any(|other| other.name == field.name) {
+                if !names.insert(field.name.clone()) {
                     return Err(format!("type `{name}` has two fields `{}`", field.name));
                 }
                 fields.push(field);

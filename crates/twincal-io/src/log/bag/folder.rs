@@ -1,7 +1,9 @@
 //! A rosbag2 folder: which files belong to it, from `metadata.yaml` or, without one, by their names.
 
 use crate::error::{Error, Place, Result};
+use crate::open::{InputFile, Refusal};
 use saphyr_parser::{Event, Parser};
+use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 use twincal::{Finding, Severity};
 
@@ -9,6 +11,8 @@ const METADATA: &str = "metadata.yaml";
 /// Largest metadata, bytes, and deepest nesting in it.
 const MAX_METADATA: u64 = 16 << 20;
 const MAX_DEPTH: usize = 32;
+/// Most files of a bag: 24 hours in files of 10 s are 8640.
+const MAX_FILES: usize = 10_000;
 /// Endings of files that hold messages.
 const ENDINGS: [&str; 4] = [".mcap", ".db3", ".mcap.zstd", ".db3.zstd"];
 
@@ -23,18 +27,9 @@ pub(super) fn files(folder: &Path) -> Result<(Vec<PathBuf>, Vec<Finding>)> {
     let system = |e: &std::io::Error| Error::system(&name, "read", e, "check its permissions");
     if metadata.exists() {
         let place = metadata.display().to_string();
-        let size = std::fs::metadata(&metadata).map_err(|e| system(&e))?.len();
-        if size > MAX_METADATA {
-            return Err(Error::content(
-                Place::file(place),
-                format!("{size} bytes, the limit is {MAX_METADATA}"),
-                "write it anew with `ros2 bag reindex`",
-            ));
-        }
-        let text = std::fs::read_to_string(&metadata).map_err(|e| {
-            Error::system(&place, "read", &e, "write it anew with `ros2 bag reindex`")
-        })?;
+        let text = text_of(folder, &metadata, &place)?;
         let listed = listed_files(&place, &text)?;
+        too_many(&place, listed.len())?;
         if listed.is_empty() {
             return Err(Error::content(
                 Place::file(place),
@@ -42,8 +37,20 @@ pub(super) fn files(folder: &Path) -> Result<(Vec<PathBuf>, Vec<Finding>)> {
                 "write it anew with `ros2 bag reindex`, or remove it: the files are then taken by name",
             ));
         }
-        let files = listed.iter().map(|path| inside(folder, &place, path));
-        return Ok((files.collect::<Result<_>>()?, Vec::new()));
+        let mut files = Vec::with_capacity(listed.len());
+        let mut known = BTreeSet::new();
+        for path in &listed {
+            let file = inside(folder, &place, path)?;
+            if !known.insert(file.canonicalize().map_err(|e| system(&e))?) {
+                return Err(Error::content(
+                    Place::file(place),
+                    format!("names the file `{path}` twice: its messages would count twice"),
+                    "write it anew with `ros2 bag reindex`, or name every file once in relative_file_paths",
+                ));
+            }
+            files.push(file);
+        }
+        return Ok((files, Vec::new()));
     }
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|e| system(&e))? {
@@ -58,6 +65,7 @@ pub(super) fn files(folder: &Path) -> Result<(Vec<PathBuf>, Vec<Finding>)> {
         }
     }
     files.sort();
+    too_many(&name, files.len())?;
     if files.is_empty() {
         return Err(Error::content(
             Place::file(name),
@@ -73,6 +81,29 @@ pub(super) fn files(folder: &Path) -> Result<(Vec<PathBuf>, Vec<Finding>)> {
     Ok((
         files.into_iter().map(|(_, path)| path).collect(),
         vec![finding],
+    ))
+}
+
+/// The text of the metadata, which is a file of the folder.
+fn text_of(folder: &Path, metadata: &Path, place: &str) -> Result<String> {
+    let remedy = "write it anew with `ros2 bag reindex`";
+    let bytes = InputFile::new(metadata, MAX_METADATA)
+        .inside(folder)
+        .read()
+        .map_err(|refusal| refusal.into_error(place, remedy))?;
+    let not_text = |_| Error::content(Place::file(place), "is not UTF-8", remedy);
+    String::from_utf8(bytes).map_err(not_text)
+}
+
+/// Refuses a bag of more files than any recorder makes.
+fn too_many(place: &str, files: usize) -> Result<()> {
+    if files <= MAX_FILES {
+        return Ok(());
+    }
+    Err(Error::content(
+        Place::file(place),
+        format!("names {files} files, the limit of a bag is {MAX_FILES}"),
+        "record larger files, or make several bags of it",
     ))
 }
 
@@ -127,12 +158,13 @@ fn inside(folder: &Path, place: &str, listed: &str) -> Result<PathBuf> {
             "copy the whole bag again, or remove metadata.yaml to read the files that are there",
         );
     };
-    match (path.canonicalize(), folder.canonicalize()) {
-        (Ok(real), Ok(folder)) if real.starts_with(&folder) => Ok(path),
-        _ => refuse(
+    match InputFile::new(&path, u64::MAX).inside(folder).open() {
+        Err(Refusal::Outside) => refuse(
             format!("names the file `{listed}`, a link that leads outside the bag's folder"),
             "copy the file into the folder",
         ),
+        // What else is wrong with it is said when it is read.
+        _ => Ok(path),
     }
 }
 

@@ -14,13 +14,17 @@ use super::part::{IN_TABLES, LISTS as PART_LISTS, Part};
 use super::path::is_source;
 use crate::error::{Error, Place, Result};
 use crate::log::columns::{refuse_model_torque, say as say_columns};
-use crate::log::{Cells, Channel, LogOptions, Request, Selection, TorqueSource, assemble};
+use crate::log::{
+    Cells, Channel, LogOptions, MAX_NAME, Request, Selection, TorqueSource, assemble,
+};
 use crate::memory;
 use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 use topics::CONVERT;
 use twincal::robot::Robot;
 use twincal::signal::Log;
+use twincal::words::{quoted, shortened};
 use twincal::{Finding, Severity};
 
 /// Message types that are read.
@@ -36,6 +40,8 @@ const LATE_MESSAGES: usize = 1024;
 const LATE_SHARE: f64 = 0.01;
 /// Rows between two looks at the memory that is left; tests of this crate look more often.
 const LOOK: usize = if cfg!(test) { 1 << 12 } else { 1 << 16 };
+/// Most topics of a log.
+const MAX_TOPICS: usize = 10_000;
 /// Most lists of names of one topic.
 const MAX_LAYOUTS: usize = 256;
 /// Words for the lists of a message.
@@ -69,6 +75,14 @@ struct Layout {
     joints_named: usize,
 }
 
+/// Names of joints that do not move in the model.
+#[derive(Default)]
+struct Foreign {
+    /// As they came.
+    in_order: Vec<String>,
+    names: BTreeSet<String>,
+}
+
 /// Gathers the messages of one log.
 pub(super) struct JointStates<'a> {
     file: &'a str,
@@ -80,9 +94,11 @@ pub(super) struct JointStates<'a> {
     wanted: Vec<String>,
     mapping: Option<Mapping>,
     topics: Vec<Topic>,
+    /// Numbers of the topics.
+    by_name: BTreeMap<String, usize>,
     parts: Vec<Part>,
     part_topics: Vec<usize>,
-    foreign: Vec<String>,
+    foreign: Foreign,
     ambiguous: bool,
     rows: usize,
     /// Of them those of joint states.
@@ -120,9 +136,10 @@ impl<'a> JointStates<'a> {
             wanted,
             mapping: Mapping::new(file, robot, options)?,
             topics: Vec::new(),
+            by_name: BTreeMap::new(),
             parts: Vec::new(),
             part_topics: Vec::new(),
-            foreign: Vec::new(),
+            foreign: Foreign::default(),
             ambiguous: false,
             rows: 0,
             states: 0,
@@ -150,10 +167,17 @@ impl<'a> JointStates<'a> {
     ) -> Result<TopicId> {
         let kind = schema.as_ref().map(|schema| schema.kind.as_str());
         let clean = |text: &str| text.chars().filter(|c| !c.is_control()).collect::<String>();
+        self.refuse_long("topic", name)?;
         let name = clean(name);
-        if let Some(known) = self.topics.iter().position(|topic| topic.name == name) {
+        if let Some(&known) = self.by_name.get(&name) {
             self.same_kind(known, kind)?;
             return Ok(TopicId(known));
+        }
+        if self.topics.len() == MAX_TOPICS {
+            return Err(self.refuse(
+                format!("has more than {MAX_TOPICS} topics"),
+                "record the topics with joint states alone",
+            ));
         }
         let asked = self.options.topics.contains(&name);
         let joint_state = kind.is_some_and(|kind| KINDS.contains(&kind));
@@ -179,8 +203,24 @@ impl<'a> JointStates<'a> {
             layouts: Vec::new(),
             last: 0,
         };
+        self.by_name.insert(topic.name.clone(), self.topics.len());
         self.topics.push(topic);
         Ok(TopicId(self.topics.len() - 1))
+    }
+
+    /// Refuses a name that no recorder writes.
+    fn refuse_long(&self, what: &str, name: &str) -> Result<()> {
+        if name.len() <= MAX_NAME {
+            return Ok(());
+        }
+        Err(self.refuse(
+            format!(
+                "the name of {what} `{}` has {} bytes, the limit is {MAX_NAME}",
+                shortened(name),
+                name.len()
+            ),
+            "record it under a shorter name",
+        ))
     }
 
     /// Whether messages of a topic are read.
@@ -340,6 +380,9 @@ impl<'a> JointStates<'a> {
             ))?;
             return Ok(None);
         }
+        for joint in named {
+            self.refuse_long("joint", joint)?;
+        }
         let mut sorted: Vec<&String> = named.iter().collect();
         sorted.sort_unstable();
         if let Some(twice) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
@@ -362,9 +405,11 @@ impl<'a> JointStates<'a> {
                 entries.push(entry);
             }
         }
-        for name in named {
-            if !self.wanted.contains(name) && !self.foreign.contains(name) {
-                self.foreign.push(name.clone());
+        let wanted: BTreeSet<&String> = self.wanted.iter().collect();
+        for name in named.iter().filter(|name| !wanted.contains(name)) {
+            if !self.foreign.names.contains(name) {
+                self.foreign.in_order.push(name.clone());
+                self.foreign.names.insert(name.clone());
             }
         }
         let same = |(part, of): (&Part, &usize)| {
@@ -500,7 +545,7 @@ impl<'a> JointStates<'a> {
             say(
                 Severity::Note,
                 "effort_is_joint_torque",
-                "the logged torque (effort[], or what [columns] tau names) counts as torque on the joint's side of the gear, N·m (N for sliders); if it is of the motor or a current, say so with [log] torque".into(),
+                "the logged torque (effort[], or what [columns] tau names) counts as torque on the joint's side of the gear, N·m (N for sliders); if it is of the motor or a current, say so with [[log]] torque".into(),
                 0,
             );
         }
@@ -521,16 +566,16 @@ impl<'a> JointStates<'a> {
                 self.late,
             );
         }
-        if !self.foreign.is_empty() {
-            let shown: Vec<&str> = self.foreign.iter().take(16).map(String::as_str).collect();
+        let foreign = &self.foreign.in_order;
+        if !foreign.is_empty() {
             say(
                 Severity::Note,
                 "joints_left_out",
                 format!(
-                    "joints that do not move in the model were left out: `{}`",
-                    shown.join("`, `")
+                    "joints that do not move in the model were left out: {}",
+                    quoted(foreign)
                 ),
-                self.foreign.len() as u64,
+                foreign.len() as u64,
             );
         }
     }

@@ -15,6 +15,7 @@ use crate::log::LogOptions;
 use crate::log::columns::refuse_unknown_joints;
 use std::collections::BTreeSet;
 use twincal::robot::{Robot, did_you_mean};
+use twincal::words::quoted;
 use twincal::{Finding, Severity};
 
 pub(super) use read::Problem;
@@ -405,11 +406,10 @@ impl Mapping {
             let ordered = ordered.filter(|(by_name, _)| **by_name == Some(false));
             let paths: BTreeSet<&str> = ordered.map(|(_, t)| t.source.text.as_str()).collect();
             if !paths.is_empty() {
-                let paths: Vec<&str> = paths.into_iter().collect();
                 let message = format!(
-                    "`{}`: nothing in the messages says whose the entries are, so they were taken in the model's order: `{}`",
-                    paths.join("`, `"),
-                    self.joints.join("`, `")
+                    "{}: nothing in the messages says whose the entries are, so they were taken in the model's order: {}",
+                    quoted(paths),
+                    quoted(&self.joints)
                 );
                 findings.push(Finding::new(
                     Severity::Note,

@@ -1,10 +1,12 @@
 //! The container MCAP: records one by one, a few chunks unpacked at a time, limits before allocations, damaged chunks skipped and counted.
+//! Checksums of chunks and of the whole data section are compared where they are given.
 //!
 //! Format: <https://mcap.dev/spec>. A record is an opcode, a length of 8 bytes and the content.
 
 use super::definition::MAX_TEXT;
 use super::joint_states::{JointStates, TopicId};
 use super::mapping::Schema;
+use super::unpack::PackedMessages;
 use crate::error::{Error, Place, Result};
 use mcap::records::{Record, op};
 use rayon::prelude::*;
@@ -18,7 +20,11 @@ use twincal::{Finding, Severity};
 /// Largest record, and largest chunk when unpacked, bytes.
 pub(in super::super) const MAX_RECORD: u64 = 256 << 20;
 /// Most bytes of all definitions that are kept.
-const MAX_DEFINITIONS: usize = 64 << 20;
+pub(super) const MAX_DEFINITIONS: usize = 64 << 20;
+/// Largest record of a schema or a channel, bytes.
+const MAX_DECLARATION: usize = 16 << 20;
+/// Most channels of a file.
+const MAX_CHANNELS: usize = 10_000;
 /// Most chunks that are unpacked side by side, and the unpacked bytes from which on no further one joins them.
 const SIDE_BY_SIDE: (usize, u64) = (4, 32 << 20);
 /// Where a chunk says how large it is when unpacked.
@@ -51,6 +57,8 @@ struct Chunk {
     unpacked: Vec<u8>,
     /// Where its records are in `body`; `None`: in `unpacked`.
     plain: Option<Range<usize>>,
+    /// Whether it has a checksum of its own.
+    is_checked: bool,
 }
 
 impl Chunk {
@@ -118,7 +126,10 @@ impl Chunk {
                 records.len()
             )));
         }
-        if header.uncompressed_crc != 0 && crc32fast::hash(records) != header.uncompressed_crc {
+        let claimed = header.uncompressed_crc;
+        let is_right = claimed == 0 || crc32fast::hash(records) == claimed;
+        self.is_checked = claimed != 0;
+        if !is_right {
             return Err(Damage::Chunk("its checksum is wrong".into()));
         }
         Ok(())
@@ -145,13 +156,19 @@ struct Reader<'a, 'b> {
     chunks: u64,
     damaged: u64,
     first_damage: Option<String>,
+    packed: PackedMessages,
+    /// Of all bytes so far; the end of the data says what it is there, or 0.
+    checksum: crc32fast::Hasher,
+    is_changed: bool,
+    /// Messages without another checksum.
+    unchecked: bool,
 }
 
 /// Hands all messages of topics that are read in `source` to `sink`.
 ///
 /// # Errors
 /// [`Error::System`] if reading fails; [`Error::Content`] for what is no MCAP file, for records and chunks above 256 MiB and unknown
-/// compressions. Damaged chunks and a missing end are findings.
+/// compressions. Damaged chunks, a wrong checksum and a missing end are findings.
 pub(super) fn read(
     source: &mut (impl Read + Seek),
     file: &str,
@@ -169,6 +186,10 @@ pub(super) fn read(
         chunks: 0,
         damaged: 0,
         first_damage: None,
+        packed: PackedMessages::default(),
+        checksum: crc32fast::Hasher::new(),
+        is_changed: false,
+        unchecked: false,
     };
     let end = reader.records(source)?;
     let mut findings = Vec::new();
@@ -186,6 +207,19 @@ pub(super) fn read(
             message,
             reader.damaged,
         ));
+    }
+    if reader.damaged == 0 && reader.is_changed {
+        let (severity, values) = match reader.unchecked {
+            true => (Severity::Degraded, "values may be wrong"),
+            false => (
+                Severity::Warning,
+                "those of all chunks are right, and so are the values",
+            ),
+        };
+        let message = format!(
+            "some bytes of the file were changed, its checksum over all data is wrong: {values}; copy the file again"
+        );
+        findings.push(Finding::new(severity, "damaged_data", file, message, 1));
     }
     let cut = match end {
         End::Whole => None,
@@ -237,6 +271,7 @@ impl Reader<'_, '_> {
                 "give an MCAP file, a rosbag2 folder, CSV, Parquet, Arrow or NPZ",
             ));
         }
+        self.checksum.update(&magic);
         let mut position = magic.len() as u64;
         let (mut body, mut head) = (Vec::new(), Vec::with_capacity(RECORD_HEAD));
         let mut behind_data = false;
@@ -260,10 +295,10 @@ impl Reader<'_, '_> {
             };
             let wanted = matches!(
                 opcode,
-                op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK | op::HEADER
+                op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK | op::HEADER | op::DATA_END
             );
             // What stands between chunks otherwise, their indexes, changes nothing.
-            if opcode != op::CHUNK && (wanted || matches!(opcode, op::DATA_END | op::FOOTER)) {
+            if opcode != op::CHUNK && (wanted || opcode == op::FOOTER) {
                 self.chunks(source, position)?;
             }
             if wanted && length > MAX_RECORD {
@@ -272,6 +307,9 @@ impl Reader<'_, '_> {
                     "copy the file again, or write smaller chunks",
                 ));
             }
+            if opcode != op::DATA_END {
+                self.checksum.update(&head);
+            }
             body.clear();
             let read = if wanted {
                 (&mut *source)
@@ -279,12 +317,17 @@ impl Reader<'_, '_> {
                     .read_to_end(&mut body)
                     .map(|n| n as u64)
             } else {
-                std::io::copy(&mut (&mut *source).take(length), &mut std::io::sink())
+                let mut passed = Passed(&mut self.checksum);
+                std::io::copy(&mut (&mut *source).take(length), &mut passed)
             };
             let read = read.map_err(|e| Error::system(self.file, "read", &e, "check the disk"))?;
             if read < length {
                 self.chunks(source, position)?;
                 return Ok(ended);
+            }
+            if opcode != op::DATA_END {
+                // Of what is not wanted there is nothing left.
+                self.checksum.update(&body);
             }
             match opcode {
                 op::CHUNK => {
@@ -293,9 +336,13 @@ impl Reader<'_, '_> {
                     std::mem::swap(&mut chunk.body, &mut body);
                     self.waiting.push(chunk);
                 }
-                op::DATA_END => behind_data = true,
+                op::DATA_END => {
+                    behind_data = true;
+                    let claimed = body.first_chunk().map_or(0, |crc| u32::from_le_bytes(*crc));
+                    self.is_changed = ![0, self.checksum.clone().finalize()].contains(&claimed);
+                }
                 op::FOOTER => return Ok(End::Whole),
-                _ if wanted => match self.record(opcode, &body) {
+                _ if wanted => match self.record_outside(opcode, &body) {
                     Ok(()) => {}
                     Err(Damage::File(error)) => return Err(error),
                     Err(Damage::Chunk(problem)) => {
@@ -359,6 +406,7 @@ impl Reader<'_, '_> {
             waiting.par_iter_mut().map(|c| c.unpack(file)).collect();
         for (chunk, unpacked) in waiting.iter().zip(unpacked) {
             self.chunks += 1;
+            self.unchecked |= !chunk.is_checked;
             match unpacked.and_then(|()| self.records_of_chunk(chunk.records())) {
                 Ok(()) => {}
                 Err(Damage::File(error)) => return Err(error),
@@ -394,9 +442,24 @@ impl Reader<'_, '_> {
         Ok(())
     }
 
+    /// A record that is in no chunk.
+    fn record_outside(&mut self, opcode: u8, body: &[u8]) -> std::result::Result<(), Damage> {
+        self.unchecked |= opcode == op::MESSAGE;
+        self.record(opcode, body)
+    }
+
     fn record(&mut self, opcode: u8, body: &[u8]) -> std::result::Result<(), Damage> {
         if opcode == op::MESSAGE {
             return self.message(body);
+        }
+        if matches!(opcode, op::SCHEMA | op::CHANNEL) && body.len() > MAX_DECLARATION {
+            return Err(Damage::File(self.refuse(
+                format!(
+                    "a schema or channel has {} bytes, the limit is {MAX_DECLARATION}",
+                    body.len()
+                ),
+                "record it again with the message's own definition",
+            )));
         }
         match parse(opcode, body) {
             Ok(Record::Schema { header, data }) => {
@@ -415,6 +478,12 @@ impl Reader<'_, '_> {
                     former.map_or(0, |former| former.text.len().min(self.definitions));
             }
             Ok(Record::Channel(channel)) if !self.channels.contains_key(&channel.id) => {
+                if self.channels.len() == MAX_CHANNELS {
+                    return Err(Damage::File(self.refuse(
+                        format!("has more than {MAX_CHANNELS} channels"),
+                        "keep the topics that are needed: `mcap filter -y TOPIC`",
+                    )));
+                }
                 let schema = self.schemas.get(&channel.schema_id).cloned();
                 let topic = (self.sink).topic(&channel.topic, schema, &channel.message_encoding)?;
                 self.channels.insert(channel.id, topic);
@@ -446,12 +515,33 @@ impl Reader<'_, '_> {
                 topic
             }
         };
+        let data = if self.sink.reads(topic) {
+            self.packed.unpack(data)
+        } else {
+            data
+        };
         Ok(self.sink.message(topic, log_time, data)?)
     }
 }
 
+/// Bytes that nobody reads, but for their checksum.
+struct Passed<'a>(&'a mut crc32fast::Hasher);
+
+impl std::io::Write for Passed<'_> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.update(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Opcode and length; none at the end and where no record is: 0 is no opcode, and a file with a hole would be walked without end.
 fn record_head(head: &[u8]) -> Option<(u8, u64)> {
     let (&opcode, length) = head.split_first()?;
+    (opcode != 0).then_some(())?;
     Some((opcode, u64::from_le_bytes(length.try_into().ok()?)))
 }
 

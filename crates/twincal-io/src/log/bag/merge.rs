@@ -6,12 +6,13 @@ use super::part::{IN_TABLES, LISTS, Part, Rows, Stored};
 use crate::error::{Error, Place, Result};
 use crate::log::Cells;
 use crate::log::cells::unreadable;
-use crate::log::stamps::seconds;
+use crate::log::stamps::{since, start};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::io;
 use twincal::robot::{JointKind, Robot};
+use twincal::words::{listed, quoted};
 use twincal::{Finding, Severity};
 
 /// Neighbours further apart than this many median steps are not joined by a line.
@@ -161,8 +162,8 @@ pub(super) fn merge<'t>(
     let describe = |Used { part, rows, step }: &Used| {
         let joints: Vec<&str> = parts[*part].joints.iter().map(|&j| names[j]).collect();
         format!(
-            "`{}` of `{}` ({} messages, every {:.3} ms)",
-            joints.join("`, `"),
+            "{} of `{}` ({} messages, every {:.3} ms)",
+            quoted(&joints),
             topic(*part),
             rows.len(),
             step / 1e6
@@ -194,7 +195,7 @@ pub(super) fn merge<'t>(
     }
     let others = used.iter().enumerate().filter(|(k, _)| *k != slowest);
     let others: Vec<String> = others.map(|(_, used)| describe(used)).collect();
-    let (others, slowest) = (others.join(" and "), describe(&used[slowest]));
+    let (others, slowest) = (listed(&others, " and "), describe(&used[slowest]));
     if (lost as f64) > (1.0 - COVERED) * rows as f64 {
         return Err(Error::content(
             Place::file(file),
@@ -261,6 +262,8 @@ fn fill(
     }
     let (own, wanted) = (&used[slowest].rows, wanted(slowest));
     let (mut rows, mut lost) = (0_usize, 0);
+    let origin = start(&own.block(0, &[]).map_err(of_disk)?.stamps);
+    cells.origin = Some(origin);
     for number in 0..own.blocks() {
         let block = own.block(number, &wanted).map_err(of_disk)?;
         for (row, &stamp) in block.stamps.iter().enumerate() {
@@ -268,7 +271,7 @@ fn fill(
                 walk.to(stamp).map_err(of_disk)?;
             }
             let mut is_whole = true;
-            cells.columns[0].push(seconds(stamp));
+            cells.columns[0].push(since(origin, stamp));
             for (column, source) in cells.columns[1..].iter_mut().zip(sources) {
                 let value = match &walks[source.of] {
                     Some(walk) => walk.value(source.column, source.is_angle, stamp),

@@ -29,6 +29,7 @@ mod value;
 
 use super::{Kind, Request};
 use crate::error::{Error, Place, Result};
+use crate::open::{InputFile, MAX_LOG, open_log_file};
 use joint_states::JointStates;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
@@ -52,9 +53,10 @@ type ReadLog = (Log<'static>, Vec<Finding>);
 /// Reads a bag: one file, packed or not, or a folder.
 pub(super) fn read(path: &Path, request: Request<'_>) -> Result<ReadLog> {
     let (files, mut findings) = files(path)?;
+    let folder = path.is_dir().then_some(path);
     let mut states = JointStates::new(request)?;
     for file in &files {
-        findings.extend(read_file(file, &mut states)?);
+        findings.extend(read_file(file, folder, &mut states)?);
     }
     states.finish(findings)
 }
@@ -70,25 +72,40 @@ pub(super) fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<Finding>)> {
     Ok((vec![path.to_owned()], Vec::new()))
 }
 
-fn read_file(path: &Path, states: &mut JointStates<'_>) -> Result<Vec<Finding>> {
+/// Reads one file; a file of a bag's folder has to lie in it.
+fn read_file(
+    path: &Path,
+    folder: Option<&Path>,
+    states: &mut JointStates<'_>,
+) -> Result<Vec<Finding>> {
     let name = path.display().to_string();
-    match kind(path, &name)? {
+    let mut file = match folder {
+        None => open_log_file(path, &name)?,
+        Some(folder) => (InputFile::new(path, MAX_LOG).inside(folder).open())
+            .map_err(|refusal| refusal.into_error(&name, "check its permissions"))?,
+    };
+    match kind(&mut file, &name)? {
         Kind::Zstd => {
-            let packed = open(path, &name)?;
-            let unpacked = unpack::unpack(packed, &name)?;
-            read_unpacked(unpacked.path(), &name, states)
+            let unpacked = unpack::unpack(file, &name)?;
+            let file = open_log_file(unpacked.path(), &name)?;
+            read_unpacked(file, unpacked.path(), &name, states)
         }
-        _ => read_unpacked(path, &name, states),
+        _ => read_unpacked(file, path, &name, states),
     }
 }
 
-fn read_unpacked(path: &Path, name: &str, states: &mut JointStates<'_>) -> Result<Vec<Finding>> {
-    match kind(path, name)? {
+fn read_unpacked(
+    mut file: File,
+    path: &Path,
+    name: &str,
+    states: &mut JointStates<'_>,
+) -> Result<Vec<Finding>> {
+    match kind(&mut file, name)? {
         Kind::Mcap => {
-            let mut file = BufReader::with_capacity(BUFFER, open(path, name)?);
+            let mut file = BufReader::with_capacity(BUFFER, file);
             mcap::read(&mut file, name, states)
         }
-        Kind::Sqlite => sqlite::read(path, name, states).map(|()| Vec::new()),
+        Kind::Sqlite => sqlite::read(&file, path, name, states).map(|()| Vec::new()),
         Kind::LfsPointer => Err(super::lfs_pointer(name)),
         _ => Err(Error::content(
             Place::file(name),
@@ -98,16 +115,10 @@ fn read_unpacked(path: &Path, name: &str, states: &mut JointStates<'_>) -> Resul
     }
 }
 
-fn open(path: &Path, name: &str) -> Result<File> {
-    File::open(path)
-        .map_err(|e| Error::system(name, "read", &e, "check the path and its permissions"))
-}
-
-fn kind(path: &Path, name: &str) -> Result<Kind> {
+/// What a file is by its first bytes; it stands at its start again.
+fn kind(file: &mut File, name: &str) -> Result<Kind> {
     let mut head = Vec::new();
-    open(path, name)?
-        .take(Kind::HEAD as u64)
-        .read_to_end(&mut head)
-        .map_err(|e| Error::system(name, "read", &e, "check the disk"))?;
+    let read = (file.take(Kind::HEAD as u64).read_to_end(&mut head)).and_then(|_| file.rewind());
+    read.map_err(|e| Error::system(name, "read", &e, "check the disk"))?;
     Ok(Kind::of(&head))
 }

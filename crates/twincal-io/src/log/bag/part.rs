@@ -220,10 +220,12 @@ impl Part {
             return self.earlier.take().map(|earlier| earlier.cells);
         }
         let mut cells = Cells::new(0, false);
+        let start = stamps::start(&self.rows.stamps);
+        cells.origin = Some(start);
         let time = self.rows.stamps.iter();
         cells
             .columns
-            .push(time.map(|ns| stamps::seconds(*ns)).collect());
+            .push(time.map(|ns| stamps::since(start, *ns)).collect());
         let lists = &mut self.rows.columns;
         let taken = columns
             .iter()
@@ -266,7 +268,7 @@ impl Part {
 }
 
 impl Earlier {
-    /// For rows like these; time counts from the last of them (a first stamp may be one that nobody filled in).
+    /// For rows that begin like these.
     fn new(file: &str, rows: &Rows) -> Result<Self> {
         let lists = 0..rows.columns.len() / LISTS;
         let columns: Vec<usize> = lists
@@ -274,7 +276,7 @@ impl Earlier {
             .filter(|column| !rows.columns[*column].is_empty())
             .collect();
         let mut cells = Cells::on_disk(file, columns.len() + 1)?;
-        cells.origin = rows.stamps.last().copied();
+        cells.origin = Some(stamps::start(&rows.stamps));
         Ok(Self { cells, columns })
     }
 

@@ -3,25 +3,29 @@
 use super::definition::MAX_TEXT;
 use super::joint_states::{JointStates, TopicId};
 use super::mapping::Schema;
-use super::mcap::MAX_RECORD;
+use super::mcap::{MAX_DEFINITIONS, MAX_RECORD};
+use super::unpack::PackedMessages;
 use crate::error::{Error, Place, Result};
+use crate::open::still_leads_to;
+use rusqlite::config::DbConfig;
 use rusqlite::limits::Limit;
 use rusqlite::{Connection, OpenFlags};
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 use std::rc::Rc;
 
-/// First bytes of a Zstandard frame: rosbag2 can pack messages one by one.
-const ZSTD: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
-/// Largest message when unpacked, bytes.
-const MAX_MESSAGE: usize = 1 << 20;
-
-/// Hands all messages of topics that are read in the file at `path` to `sink`; `file` is what messages call it.
+/// Hands all messages of topics that are read in the file `opened`, which lies at `path`, to `sink`; `file` is what messages call it.
 ///
 /// # Errors
 /// [`Error::Content`] for files that are still being written, damaged, or no bag.
-pub(super) fn read(path: &Path, file: &str, sink: &mut JointStates<'_>) -> Result<()> {
+pub(super) fn read(
+    opened: &File,
+    path: &Path,
+    file: &str,
+    sink: &mut JointStates<'_>,
+) -> Result<()> {
     refuse_unfinished(path, file)?;
     let broken = |e: rusqlite::Error| {
         Error::content(
@@ -34,16 +38,22 @@ pub(super) fn read(path: &Path, file: &str, sink: &mut JointStates<'_>) -> Resul
         | OpenFlags::SQLITE_OPEN_URI
         | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let bag = Connection::open_with_flags(uri(path), flags).map_err(broken)?;
+    // SQLite opens by path: what it opened has to be what was looked at.
+    if !still_leads_to(path, opened).is_ok_and(|same| same) {
+        let problem = "was replaced by another file while it was opened";
+        return Err(Error::content(
+            Place::file(file),
+            problem,
+            "read it again when nobody writes it",
+        ));
+    }
     let limit = i32::try_from(MAX_RECORD).unwrap_or(i32::MAX);
     bag.set_limit(Limit::SQLITE_LIMIT_LENGTH, limit)
         .map_err(broken)?;
-    // A view called `messages` could compute without end.
+    bag.set_db_config(DbConfig::SQLITE_DBCONFIG_TRUSTED_SCHEMA, false)
+        .map_err(broken)?;
     for table in ["topics", "messages"] {
-        let query = "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = ?1";
-        let count: i64 = bag
-            .query_row(query, [table], |row| row.get(0))
-            .map_err(broken)?;
-        if count != 1 {
+        if !is_plain_table(&bag, table).map_err(broken)? {
             return Err(Error::content(
                 Place::file(file),
                 format!("is a SQLite file without a table `{table}`"),
@@ -51,22 +61,32 @@ pub(super) fn read(path: &Path, file: &str, sink: &mut JointStates<'_>) -> Resul
             ));
         }
     }
+    let mut definitions = definitions(&bag).map_err(broken)?;
     let mut topics: BTreeMap<i64, TopicId> = BTreeMap::new();
     let mut query = bag
-        .prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id")
+        .prepare(
+            "SELECT id, substr(name, 1, 5000), substr(type, 1, 5000), substr(serialization_format, 1, 5000) \
+             FROM topics ORDER BY id",
+        )
         .map_err(broken)?;
     let mut rows = query.query([]).map_err(broken)?;
     while let Some(row) = rows.next().map_err(broken)? {
         let text = |column| row.get::<_, String>(column).map_err(broken);
         let (name, kind, encoding) = (text(1)?, text(2)?, text(3)?);
-        let schema = Rc::new(definition(&bag, kind).map_err(broken)?);
-        let topic = sink.topic(&name, Some(schema), &encoding)?;
+        let schema = (definitions.entry(kind)).or_insert_with_key(|kind| {
+            Rc::new(Schema {
+                kind: kind.clone(),
+                ..Schema::default()
+            })
+        });
+        let topic = sink.topic(&name, Some(schema.clone()), &encoding)?;
         topics.insert(row.get(0).map_err(broken)?, topic);
     }
     let mut query = bag
         .prepare("SELECT topic_id, timestamp, data FROM messages ORDER BY id")
         .map_err(broken)?;
     let mut rows = query.query([]).map_err(broken)?;
+    let mut packed = PackedMessages::default();
     while let Some(row) = rows.next().map_err(broken)? {
         let (topic, time): (i64, i64) = (row.get(0).map_err(broken)?, row.get(1).map_err(broken)?);
         let Some(&topic) = topics.get(&topic) else {
@@ -81,39 +101,53 @@ pub(super) fn read(path: &Path, file: &str, sink: &mut JointStates<'_>) -> Resul
             .as_bytes()
             .map_err(|_| broken(rusqlite::Error::InvalidQuery))?;
         let time = time.cast_unsigned();
-        if data.starts_with(&ZSTD) && sink.reads(topic) {
-            // What cannot be unpacked is dropped and counted like any message that cannot be read.
-            let unpacked = zstd::bulk::decompress(data, MAX_MESSAGE).unwrap_or_default();
-            sink.message(topic, time, &unpacked)?;
+        let data = if sink.reads(topic) {
+            packed.unpack(data)
         } else {
-            sink.message(topic, time, data)?;
-        }
+            data
+        };
+        sink.message(topic, time, data)?;
     }
     Ok(())
 }
 
-/// What the bag says of a message type; bags before ROS 2 Iron have no definitions.
-fn definition(bag: &Connection, kind: String) -> rusqlite::Result<Schema> {
+/// Whether there is a table of that name whose values are stored: a view, a virtual table or a computed column could compute without
+/// end.
+fn is_plain_table(bag: &Connection, table: &str) -> rusqlite::Result<bool> {
     let query =
-        "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = 'message_definitions'";
-    let tables: i64 = bag.query_row(query, [], |row| row.get(0))?;
-    let mut schema = Schema {
-        kind,
-        ..Schema::default()
-    };
-    if tables == 0 {
-        return Ok(schema);
+        "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND rootpage > 0 AND name = ?1";
+    let tables: i64 = bag.query_row(query, [table], |row| row.get(0))?;
+    let query = "SELECT count(*) FROM pragma_table_xinfo(?1) WHERE hidden <> 0";
+    let computed: i64 = bag.query_row(query, [table], |row| row.get(0))?;
+    Ok(tables == 1 && computed == 0)
+}
+
+/// What the bag says of message types; bags before ROS 2 Iron have no definitions. Those beyond all reason are left out.
+fn definitions(bag: &Connection) -> rusqlite::Result<BTreeMap<String, Rc<Schema>>> {
+    let mut all = BTreeMap::new();
+    if !is_plain_table(bag, "message_definitions")? {
+        return Ok(all);
     }
-    let query = "SELECT encoding, encoded_message_definition FROM message_definitions \
-                 WHERE topic_type = ?1 AND length(encoded_message_definition) <= ?2";
+    let query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions \
+                 WHERE length(encoded_message_definition) <= ?1";
     let mut query = bag.prepare(query)?;
     let limit = i64::try_from(MAX_TEXT).unwrap_or(i64::MAX);
-    let mut rows = query.query(rusqlite::params![schema.kind, limit])?;
-    if let Some(row) = rows.next()? {
-        schema.language = row.get(0)?;
-        schema.text = row.get(1)?;
+    let mut rows = query.query([limit])?;
+    let mut bytes = 0;
+    while let Some(row) = rows.next()? {
+        let schema = Schema {
+            kind: row.get(0)?,
+            language: row.get(1)?,
+            text: row.get(2)?,
+        };
+        bytes += schema.kind.len() + schema.text.len();
+        if bytes > MAX_DEFINITIONS {
+            break;
+        }
+        // The first counts, as it always did.
+        (all.entry(schema.kind.clone())).or_insert_with(|| Rc::new(schema));
     }
-    Ok(schema)
+    Ok(all)
 }
 
 /// A log that is still being written has a file beside it that holds what is missing.

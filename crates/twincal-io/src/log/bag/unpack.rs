@@ -1,4 +1,5 @@
 //! Bags that are packed as a whole (`.db3.zstd`, `.mcap.zstd`): unpacked into a file that nobody else sees and that goes by itself.
+//! Bags whose messages are packed one by one (rosbag2's `compression_mode: MESSAGE`): unpacked as they come.
 
 use crate::error::{Error, Place, Result};
 use std::fs::File;
@@ -53,4 +54,37 @@ pub(super) fn unpack(packed: File, file: &str) -> Result<NamedTempFile> {
     }
     target.flush().map_err(|e| room(&e))?;
     Ok(target)
+}
+
+/// First bytes of a Zstandard frame; CDR and ROS 1 messages begin otherwise.
+const ZSTD: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
+/// Largest message when unpacked, bytes.
+const MAX_MESSAGE: usize = 1 << 20;
+
+/// Unpacks messages that are packed one by one; what is not packed stays as it is.
+#[derive(Default)]
+pub(super) struct PackedMessages {
+    zstd: Option<zstd::bulk::Decompressor<'static>>,
+    unpacked: Vec<u8>,
+}
+
+impl PackedMessages {
+    /// The message; an empty one where it cannot be unpacked, which is dropped and counted like any that cannot be read.
+    pub(super) fn unpack<'a>(&'a mut self, data: &'a [u8]) -> &'a [u8] {
+        if !data.starts_with(&ZSTD) {
+            return data;
+        }
+        self.unpacked.clear();
+        if self.zstd.is_none() {
+            self.zstd = zstd::bulk::Decompressor::new().ok();
+            self.unpacked.reserve_exact(MAX_MESSAGE);
+        }
+        let unpacked = self.zstd.as_mut();
+        let unpacked =
+            unpacked.and_then(|zstd| zstd.decompress_to_buffer(data, &mut self.unpacked).ok());
+        if unpacked.is_none() {
+            self.unpacked.clear();
+        }
+        &self.unpacked
+    }
 }

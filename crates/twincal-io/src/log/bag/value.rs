@@ -2,6 +2,7 @@
 
 use super::path::{NAMES, STAMPS, Step, Written};
 use twincal::robot::did_you_mean;
+use twincal::words::quoted;
 
 /// A number as it stands in a message.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -210,8 +211,8 @@ pub(super) fn find(root: &Value, steps: &[Step], joint: Joint<'_>) -> Result<Fou
                     }
                     if let Some(names) = other_names(&enclosing, length) {
                         return Err(format!(
-                            "`{before}` has the names `{}`, and none of them is a joint of the model; write a path per joint: {{ {own} = \"…[name]\" }}",
-                            names.join("`, `")
+                            "`{before}` has the names {}, and none of them is a joint of the model; write a path per joint: {{ {own} = \"…[name]\" }}",
+                            quoted(&names)
                         ));
                     }
                     found.by_name = Some(false);

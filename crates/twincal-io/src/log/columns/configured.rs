@@ -5,7 +5,7 @@ use crate::config::ChannelNames;
 use crate::error::{Error, Place, Result};
 use crate::log::LogOptions;
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use twincal::robot::did_you_mean;
 
 /// A joint in `[columns]` that the model does not have.
@@ -26,7 +26,8 @@ pub(in super::super) fn refuse_unknown_joints(
         let ChannelNames::ByJoint(table) = names else {
             continue;
         };
-        let unknown = |joint: &&String| !joints.contains(&joint.as_str());
+        let known: BTreeSet<&str> = joints.iter().copied().collect();
+        let unknown = |joint: &&String| !known.contains(joint.as_str());
         if let Some(joint) = table.keys().find(unknown) {
             return Err(Error::content(
                 Place::file(file),
@@ -40,7 +41,8 @@ pub(in super::super) fn refuse_unknown_joints(
 
 /// Whether a table has the columns that `[columns]` names for one channel.
 pub(crate) fn has_columns(header: &[String], names: &ChannelNames, joints: &[&str]) -> bool {
-    let has = |column: &str| header.iter().any(|own| own == column);
+    let there: BTreeSet<&str> = header.iter().map(String::as_str).collect();
+    let has = |column: &str| there.contains(column);
     match names {
         ChannelNames::ByJoint(table) => table.values().all(|column| has(column)),
         ChannelNames::All(pattern) => [0, 1].into_iter().any(|first| {

@@ -13,6 +13,8 @@ pub(super) struct Line {
     pub(super) number: u64,
     /// Content.
     pub(super) text: Vec<u8>,
+    /// Whether the file ends within it, without a line feed.
+    pub(super) is_open: bool,
 }
 
 /// Reads lines; knows the byte-order marks and the impostors.
@@ -122,6 +124,7 @@ impl<R: Read> Lines<R> {
         let number = self.number + 1;
         // Parity of quotation marks so far, counted once per byte.
         let mut open = false;
+        let mut is_open = true;
         loop {
             let room = (MAX_LINE + 2 - text.len()) as u64;
             let before = text.len();
@@ -139,6 +142,7 @@ impl<R: Read> Lines<R> {
             if text.len() - usize::from(ended) > MAX_LINE {
                 return Err(self.too_long(number, open));
             }
+            is_open = !ended;
             if !ended || !open {
                 break;
             }
@@ -159,7 +163,11 @@ impl<R: Read> Lines<R> {
         if number == 1 && text.starts_with(b"\xEF\xBB\xBF") {
             text.drain(..3);
         }
-        Ok(Some(Line { number, text }))
+        Ok(Some(Line {
+            number,
+            text,
+            is_open,
+        }))
     }
 
     fn too_long(&self, number: u64, open: bool) -> Error {

@@ -1,5 +1,6 @@
 //! Text tables, streamed: one line in memory at a time, only the wanted columns turned into numbers.
 
+mod cut;
 mod dialect;
 mod lines;
 mod number;
@@ -8,6 +9,7 @@ mod plain;
 use super::Cells;
 use crate::error::{Error, Place, Result};
 use crate::memory;
+use cut::LastFields;
 use dialect::Dialect;
 use lines::Lines;
 use std::io::Read;
@@ -25,6 +27,8 @@ pub(super) struct Table<R: Read> {
     /// First data line, which was needed to tell the dialect.
     first: Option<lines::Line>,
     bytes: u64,
+    /// That the file ends within its last row.
+    cut: Option<Finding>,
 }
 
 impl<R: Read> Table<R> {
@@ -68,6 +72,7 @@ impl<R: Read> Table<R> {
             header: names,
             first,
             bytes,
+            cut: None,
         })
     }
 
@@ -95,11 +100,15 @@ impl<R: Read> Table<R> {
         let mut next = self.first.take();
         let (mut rows, mut text) = (0_u64, 0_u64);
         let (dialect, fields) = (self.dialect, self.header.len());
+        let mut last_fields = LastFields::new(dialect.delimiter);
         loop {
             let mut taken = 0;
             if next.is_none() {
-                taken = (self.lines)
-                    .in_place(|text| plain::read(text, false, dialect, fields, &order, &mut row))?;
+                taken = self.lines.in_place(|text| {
+                    let taken = plain::read(text, false, dialect, fields, &order, &mut row)?;
+                    last_fields.see(&text[..taken]);
+                    Some(taken)
+                })?;
             }
             let mut read = Ok(());
             if taken == 0 {
@@ -111,6 +120,13 @@ impl<R: Read> Table<R> {
                 };
                 read = self.parse(&line, &order, &mut row);
                 taken = line.text.len() + 1;
+                if line.is_open && rows > 0 {
+                    self.cut = last_fields.cut(&self.name, &line, read.is_ok());
+                    if self.cut.is_some() {
+                        break;
+                    }
+                }
+                last_fields.see(&line.text);
                 self.lines.give_back(line);
             }
             match read {
@@ -145,7 +161,7 @@ impl<R: Read> Table<R> {
 
     /// What the reader assumed.
     pub(super) fn into_findings(self) -> Vec<Finding> {
-        let mut findings = Vec::new();
+        let mut findings: Vec<Finding> = self.cut.into_iter().collect();
         let note = |code: &str, message: String| {
             Finding::new(Severity::Note, code, &self.name, message, 0)
         };
@@ -277,8 +293,9 @@ mod tests {
                     header: header.clone(),
                     first: None,
                     bytes: 0,
+                    cut: None,
                 };
-                let line = lines::Line { number: 2, text: text.clone().into_bytes() };
+                let line = lines::Line { number: 2, text: text.clone().into_bytes(), is_open: false };
                 for order in [&[(0, 1), (2, 0), (2, 2)][..], &[(0, 0), (1, 1), (2, 2), (3, 3)]] {
                     let (mut short, mut long) = ([7.0; 4], [7.0; 4]);
                     if plain::read(&line.text, true, table.dialect, 4, order, &mut short).is_some() {

@@ -327,13 +327,14 @@ impl<'a> Tree<'a> {
         joint.damping = view.linear("damping")?;
         joint.stiffness = view.linear("stiffness")?;
         joint.spring_reference = angle * view.number("springref")?.unwrap_or(0.0);
+        joint.unused_friction = view.number("frictionloss")?.unwrap_or(0.0);
         self.sites.joints.push(JointSite {
             joint: name.clone(),
             offset: part.element.offset,
             angle,
             damping: joint.damping,
             armature: joint.armature,
-            frictionloss: view.number("frictionloss")?.unwrap_or(0.0),
+            frictionloss: joint.unused_friction,
             stiffness: joint.stiffness,
             spring_reference: joint.spring_reference,
         });
@@ -357,7 +358,7 @@ impl<'a> Tree<'a> {
             .placement
             .point(view.numbers("pos")?.unwrap_or([0.0; 3]));
         let reference = angle * view.number("ref")?.unwrap_or(0.0);
-        let friction = view.number("frictionloss")?.unwrap_or(0.0);
+        let friction = joint.unused_friction;
         if part.element.text("name").is_none_or(str::is_empty) {
             let message = format!(
                 "joint {} of body `{body}` has no name: called `{name}`",

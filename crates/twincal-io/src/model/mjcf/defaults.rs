@@ -8,6 +8,9 @@ use twincal::robot::did_you_mean;
 /// Most classes of one model (each holds a copy of its parent's entries).
 const MAX_CLASSES: usize = 10_000;
 
+/// Most attributes that all classes together hold, inherited ones included.
+const MAX_STATED: usize = 1_000_000;
+
 /// Where an attribute was stated; the last of a list is the most specific.
 type Stated<'a> = Vec<(&'a Element, &'a Attribute)>;
 /// Attributes by element name, then attribute name.
@@ -46,6 +49,12 @@ fn kind(name: &str) -> &str {
     }
 }
 
+/// Attributes of a class.
+fn size(entries: &Entries<'_>) -> usize {
+    let attributes = entries.values().flat_map(BTreeMap::values);
+    attributes.map(Vec::len).sum()
+}
+
 impl<'a> Defaults<'a> {
     /// Reads all `<default>` sections under the root.
     ///
@@ -57,6 +66,7 @@ impl<'a> Defaults<'a> {
             main: "main",
         };
         defaults.classes.insert("main", Entries::new());
+        let mut stated = 0;
         for (number, section) in document.children(root, "default").enumerate() {
             if let Some(name) = section.text("class")
                 && number == 0
@@ -81,6 +91,14 @@ impl<'a> Defaults<'a> {
                             .or_default()
                             .push((child, attribute));
                     }
+                }
+                stated += (1 + nested.len()) * size(&entries);
+                if stated > MAX_STATED {
+                    return Err(document.error(
+                        element,
+                        format!("default classes hold more than {MAX_STATED} attributes"),
+                        "no robot needs this: is it the right file?",
+                    ));
                 }
                 for child in nested.into_iter().rev() {
                     let Some(class) = child.text("class").filter(|c| !c.is_empty()) else {

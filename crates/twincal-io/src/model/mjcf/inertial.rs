@@ -23,6 +23,13 @@ pub(super) fn of_body<'a>(
 ) -> Result<Option<Inertia>> {
     let mut explicit = None;
     for part in parts.iter().filter(|p| p.element.name == "inertial") {
+        if explicit.is_some() {
+            return Err(document.error(
+                part.element,
+                format!("body `{body}` has a second <inertial>"),
+                "keep one of them, as MuJoCo asks",
+            ));
+        }
         explicit = Some(stated(document, compiler, part, body)?);
     }
     let from_geoms = match compiler.inertia_from_geom {

@@ -10,7 +10,7 @@ use crate::infer::approximate;
 use crate::infer::search::{Care, Set};
 use crate::infer::standard::{Reduced, Response};
 use crate::infer::walker::Walker;
-use crate::posterior::Problem;
+use crate::posterior::{Posterior, Problem};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -47,9 +47,9 @@ impl Jumps {
         }
     }
 
-    /// What a search finds.
-    pub(super) fn of(reduced: &Reduced<'_>, problem: &Problem) -> Self {
-        let found = approximate::search(reduced, problem, None, BUDGET, Care::Loop);
+    /// What a search finds, from the models of a near posterior where there is one.
+    pub(super) fn of(reduced: &Reduced<'_>, problem: &Problem, near: Option<&Posterior>) -> Self {
+        let found = approximate::search(reduced, problem, near, BUDGET, Care::Loop);
         let models = found.models.into_iter().map(|(_, set)| set);
         Self::heaviest(models.take(MODELS).collect(), reduced, problem)
     }

@@ -59,16 +59,20 @@ impl Agreement {
     }
 }
 
-/// The posterior by Markov chains.
+/// The posterior by Markov chains; `near`: one that is known to be near.
 ///
 /// # Errors
 /// Those of [`super::infer`].
-pub(super) fn sample(problem: &Problem, settings: &InferenceSettings) -> Result<Posterior> {
+pub(super) fn sample(
+    problem: &Problem,
+    near: Option<&Posterior>,
+    settings: &InferenceSettings,
+) -> Result<Posterior> {
     require_draws(settings)?;
     let standard = Standard::new(problem)?;
-    let certain = certain::components(&standard, problem, None);
+    let certain = certain::components(&standard, problem, near);
     let reduced = Reduced::new(&standard, &certain);
-    let jumps = Jumps::of(&reduced, problem);
+    let jumps = Jumps::of(&reduced, problem, near);
     chains(problem, settings, &reduced, jumps, true)
 }
 

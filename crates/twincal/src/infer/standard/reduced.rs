@@ -314,7 +314,8 @@ impl<'a> Reduced<'a> {
         };
         let mut row = vec![0.0; count];
         for (c, &d) in self.gone.iter().enumerate() {
-            let t = |o: usize| self.response[o * out + c];
+            let own: Vec<f64> = (0..count).map(|o| self.response[o * out + c]).collect();
+            let t = |o: usize| own[o];
             // T E[δ δᵀ] Tᵀ
             for (i, value) in row.iter_mut().enumerate() {
                 let entries = &products[i * count..(i + 1) * count];

@@ -4,6 +4,7 @@ use super::{JointStates, PART_LISTS};
 use crate::error::Result;
 use crate::log::TorqueSource;
 use twincal::robot::did_you_mean;
+use twincal::words::quoted;
 
 impl JointStates<'_> {
     /// Which part each joint's position, velocity, effort and acceleration come from: what is mapped first, then joint states.
@@ -53,8 +54,8 @@ impl JointStates<'_> {
         if self.states == 0 {
             return Err(self.refuse(
                 format!(
-                    "[columns] q maps no position of joint `{}`, and there are no joint states",
-                    missing.join("`, `")
+                    "[columns] q maps no position of joint {}, and there are no joint states",
+                    quoted(&missing)
                 ),
                 "map it too, or fix a joint that does not move with [model] locked",
             ));
@@ -63,43 +64,43 @@ impl JointStates<'_> {
         if named.clone().any(|joint| *joint == first) {
             return Err(self.refuse(
                 format!(
-                    "topic {}: position[] of joint `{}` is empty in all messages",
+                    "topic {}: position[] of joint {} is empty in all messages",
                     self.read_topics(),
-                    missing.join("`, `")
+                    quoted(&missing)
                 ),
                 self.unread().map_or_else(
                     || "record positions too".to_owned(),
-                    |topics| format!("if {topics} has them, name it too: [log] topic = [\"…\", \"…\"]; else record positions too"),
+                    |topics| format!("if {topics} has them, name it too: [[log]] topic = [\"…\", \"…\"]; else record positions too"),
                 ),
             ));
         }
-        let shown: Vec<&str> = self.foreign.iter().take(16).map(String::as_str).collect();
-        let names = if shown.is_empty() {
+        let named = &self.foreign.in_order;
+        let names = if named.is_empty() {
             String::new()
         } else {
-            format!("; it names `{}`", shown.join("`, `"))
+            format!("; it names {}", quoted(named))
         };
         Err(self.refuse(
             format!(
-                "topic {} has no joint `{}` of the model{names}",
+                "topic {} has no joint {} of the model{names}",
                 self.read_topics(),
-                missing.join("`, `")
+                quoted(&missing)
             ),
             format!(
                 "{}; map names with [columns] q = {{ joint = \"name in the log\" }}, or fix a joint that does not move with [model] locked",
-                did_you_mean(missing[0], shown.iter().copied())
+                did_you_mean(missing[0], named.iter().map(String::as_str))
             ),
         ))
     }
 
     /// Topics of joint states that were left aside.
     fn unread(&self) -> Option<String> {
-        let names: Vec<String> = (self.topics.iter())
+        let names: Vec<&str> = (self.topics.iter())
             .filter(|topic| topic.read_as.is_none() && topic.is_joint_state() && topic.messages > 0)
             .filter(|topic| ["cdr", "ros1"].contains(&topic.encoding.as_str()))
-            .map(|topic| format!("`{}`", topic.name))
+            .map(|topic| topic.name.as_str())
             .collect();
-        (!names.is_empty()).then(|| names.join(" or "))
+        (!names.is_empty()).then(|| quoted(names))
     }
 
     fn refuse_missing_effort(&self, chosen: &[[Option<usize>; PART_LISTS]]) -> Result<()> {
@@ -116,12 +117,12 @@ impl JointStates<'_> {
         let whose = if missing.len() == chosen.len() {
             String::new()
         } else {
-            format!(" of joint `{}`", missing.join("`, `"))
+            format!(" of joint {}", quoted(&missing))
         };
         if self.states == 0 {
             return Err(self.refuse(
                 format!("[columns] maps no torque{whose}, and no joint states are read"),
-                "map it with [columns] tau, name a topic of joint states in [log] topic, or say [log] torque = \"none\" for a log that is only to be predicted",
+                "map it with [columns] tau, name a topic of joint states in [[log]] topic, or say [[log]] torque = \"none\" for a log that is only to be predicted",
             ));
         }
         let elsewhere = self.torque_elsewhere();
@@ -130,7 +131,7 @@ impl JointStates<'_> {
                 "topic {}: effort[]{whose} is empty in all messages",
                 self.read_topics()
             ),
-            elsewhere.map_or_else(String::new, |words| words + "; else ") + "record a topic with effort, name it too in [log] topic = [\"…\", \"…\"], or say [log] torque = \"none\" for a log that is only to be predicted",
+            elsewhere.map_or_else(String::new, |words| words + "; else ") + "record a topic with effort, name it too in [[log]] topic = [\"…\", \"…\"], or say [[log]] torque = \"none\" for a log that is only to be predicted",
         ))
     }
 }

@@ -7,8 +7,9 @@ use crate::log::bag::joint_state::Encoding;
 use crate::log::bag::mapping::{Problem, Schema};
 use crate::log::bag::suggest::Lists;
 
-/// Most topics whose definitions are looked at for advice, and that are shown.
+/// Most topics whose definitions are looked at for advice, most bytes of these, and topics that are shown.
 const LOOKED_AT: usize = 64;
+const MAX_BYTES: usize = 1 << 20;
 const SHOWN: usize = 8;
 
 impl JointStates<'_> {
@@ -153,8 +154,13 @@ impl JointStates<'_> {
     /// Topics with messages of other types, and their lists of numbers.
     fn lists(&self) -> impl Iterator<Item = (&str, Lists)> {
         let with_messages = self.topics.iter().filter(|topic| topic.messages > 0);
-        with_messages.take(LOOKED_AT).filter_map(|topic| {
+        let mut bytes = 0;
+        with_messages.take(LOOKED_AT).filter_map(move |topic| {
             let schema = topic.schema.as_ref()?;
+            bytes += schema.text.len();
+            if bytes > MAX_BYTES {
+                return None;
+            }
             let (language, encoding) = match topic.encoding.as_str() {
                 "cdr" => ("ros2msg", Encoding::Cdr),
                 "ros1" => ("ros1msg", Encoding::Ros1),

@@ -2,8 +2,8 @@
 
 use super::{JointStates, KINDS, Topic};
 use crate::error::Result;
-use std::fmt::Write as _;
 use twincal::robot::did_you_mean;
+use twincal::words::{NAMED, listed, quoted, shortened};
 use twincal::{Finding, Severity};
 
 /// What helps where a topic cannot be read.
@@ -47,7 +47,7 @@ impl JointStates<'_> {
                 let names = self.topics.iter().map(|topic| topic.name.as_str());
                 return Err(self.refuse(
                     format!(
-                        "has no topic `{asked}`, which [log] topic names; it has {}",
+                        "has no topic `{asked}`, which [[log]] topic names; it has {}",
                         self.list(|_| true)
                     ),
                     did_you_mean(asked, names),
@@ -58,12 +58,13 @@ impl JointStates<'_> {
             let list = self.list(|topic| topic.read_as.is_some() && topic.messages > 0);
             let names: Vec<String> = (self.topics.iter())
                 .filter(|topic| topic.read_as.is_some() && topic.messages > 0)
+                .take(NAMED)
                 .map(|topic| format!("{:?}", topic.name))
                 .collect();
             return Err(self.refuse(
                 format!("has joint states on more than one topic: {list}"),
                 format!(
-                    "say which with [log] topic = {}; if they complete each other, say topic = [{}], and each joint's channel comes from the first that has it",
+                    "say which with [[log]] topic = {}; if they complete each other, say topic = [{}], and each joint's channel comes from the first that has it",
                     names.first().map_or("", String::as_str),
                     names.join(", ")
                 ),
@@ -90,26 +91,15 @@ impl JointStates<'_> {
     }
 
     pub(super) fn list(&self, which: impl Fn(&Topic) -> bool) -> String {
-        const SHOWN: usize = 12;
-        let chosen: Vec<&Topic> = self.topics.iter().filter(|topic| which(topic)).collect();
-        let mut text = String::new();
-        for topic in chosen.iter().take(SHOWN) {
-            let comma = if text.is_empty() { "" } else { ", " };
-            // Writing to a String cannot fail.
-            let _ = write!(text, "{comma}{}", topic.words());
-        }
-        if chosen.len() > SHOWN {
-            let _ = write!(text, " and {} more", chosen.len() - SHOWN);
-        }
-        text
+        let chosen = self.topics.iter().filter(|topic| which(topic));
+        listed(chosen.map(Topic::words), ", ")
     }
 
     pub(super) fn read_topics(&self) -> String {
-        let names: Vec<String> = (self.topics.iter())
+        let read = (self.topics.iter())
             .filter(|topic| topic.read_as.is_some() && topic.messages > 0)
-            .map(|topic| format!("`{}`", topic.name))
-            .collect();
-        names.join(", ")
+            .map(|topic| topic.name.as_str());
+        quoted(read)
     }
 }
 
@@ -122,10 +112,12 @@ impl Topic {
     }
 
     pub(super) fn words(&self) -> String {
-        let kind = self.kind.as_deref().unwrap_or("no schema");
+        let kind = shortened(self.kind.as_deref().unwrap_or("no schema"));
         format!(
             "`{}` ({kind}, {}, {} messages)",
-            self.name, self.encoding, self.messages
+            shortened(&self.name),
+            shortened(&self.encoding),
+            self.messages
         )
     }
 }

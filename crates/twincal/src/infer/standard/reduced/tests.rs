@@ -31,7 +31,8 @@ fn summed(problem: &Problem, shrink: bool) -> (Averages, f64, bool) {
             }
         }
         walker.tableau.refine();
-        sums.add(walker.log_weight(), &present(&walker, reduced.shrinks()));
+        let moments = present(&walker, reduced.shrinks());
+        sums.add(&reduced.open, walker.log_weight(), &moments);
     }
     let found = Found {
         sums,

@@ -1,0 +1,66 @@
+//! What logs say of each other, and what follows for the calibration.
+
+use super::again::Goal;
+use super::data::Trajectories;
+use super::{Calibration, Stopped};
+use crate::cross_check::{copies, odd_torque, stuck_encoders};
+use crate::error::{Finding, Mistake, Result};
+use crate::robot::Robot;
+use crate::signal::{Log, Logs, Pipeline, Trajectory};
+
+/// Findings on logs as recorded; logs to fit come first.
+pub(super) fn as_recorded(
+    robot: &Robot,
+    (fit, heldout): &(Logs<'_>, Logs<'_>),
+) -> std::result::Result<Vec<Finding>, Stopped> {
+    let logs: Vec<Log<'_>> = fit.0.iter().chain(&heldout.0).map(Log::lent).collect();
+    let look = || -> Result<Vec<Finding>> {
+        let mut findings = copies(&logs)?;
+        findings.extend(stuck_encoders(robot, &logs)?);
+        Ok(findings)
+    };
+    look().map_err(|error| Stopped {
+        error,
+        findings: Vec::new(),
+    })
+}
+
+/// Findings on the filtered logs; `compared` is what the self-check says. Where rows are only counted nothing is looked for.
+pub(super) fn as_filtered(
+    robot: &Robot,
+    pipeline: &Pipeline,
+    trajectories: &Trajectories,
+    (goal, compared): (Goal, &[Finding]),
+) -> Vec<Finding> {
+    if goal == Goal::Count {
+        return Vec::new();
+    }
+    let all: Vec<&Trajectory> = trajectories.all().collect();
+    odd_torque(robot, pipeline, &all, compared.is_empty())
+}
+
+/// The end of a calibration with the findings of [`as_recorded`] first. Nothing is guaranteed by a log that is no recording of its own.
+pub(super) fn told(
+    calibration: Result<Calibration>,
+    mut as_recorded: Vec<Finding>,
+    findings: Vec<Finding>,
+) -> std::result::Result<Calibration, Stopped> {
+    let copied = (as_recorded.iter()).any(|f| f.mistake() == Some(Mistake::Copy));
+    match calibration {
+        Ok(mut calibration) => {
+            if copied {
+                calibration.validation.conformal = None;
+            }
+            as_recorded.append(&mut calibration.findings);
+            calibration.findings = as_recorded;
+            Ok(calibration)
+        }
+        Err(error) => {
+            as_recorded.extend(findings);
+            Err(Stopped {
+                error,
+                findings: as_recorded,
+            })
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! What a fit says of each joint's noise.
+
+use super::{Fitted, independent_rows};
+use crate::likelihood::{JointNoise, Spread};
+use crate::observations::Part;
+use crate::robot::Robot;
+
+/// Noise per joint as reported; σ_j = √E[φ/(w_j(1−ρ_j²)) | y].
+pub(super) fn noise_of(
+    robot: &Robot,
+    fitted: &Fitted,
+    training: &[Part<'_>],
+    out_of_band: &[f64],
+    spreads: &[Spread],
+) -> Vec<JointNoise> {
+    let (plug_in, posterior) = (&fitted.fit.plug_in, &fitted.fit.posterior);
+    robot
+        .joint_names()
+        .into_iter()
+        .enumerate()
+        .map(|(j, name)| {
+            let [n, n_eff] = independent_rows::of_joint(&fitted.fit, training, j);
+            let rho = plug_in.rho[j];
+            let left = plug_in.variance.get(j).copied().unwrap_or(1.0);
+            JointNoise {
+                joint: name.to_owned(),
+                sigma: (left * posterior.noise / (plug_in.weight[j] * (1.0 - rho * rho))).sqrt(),
+                rho,
+                weight: plug_in.weight[j],
+                n,
+                n_eff,
+                autocorrelation_time: plug_in.autocorrelation_time[j],
+                interval_factor: fitted
+                    .left_out
+                    .as_ref()
+                    .map_or_else(|| left.sqrt(), |l| l.interval_factor[j]),
+                out_of_band: out_of_band[j],
+                spread: spreads[j].clone(),
+                sampled: fitted.sampled.get(j).copied(),
+            }
+        })
+        .collect()
+}

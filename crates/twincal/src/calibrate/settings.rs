@@ -1,0 +1,76 @@
+//! What a calibration can be told.
+
+use super::UnaskedRipple;
+use crate::infer::{Choice, InferenceSettings};
+use crate::likelihood::{NoiseModel, NoiseSettings, NoiseUncertainty};
+use crate::prior::PriorSettings;
+use crate::signal::{Auto, Corrections, SignalSettings};
+use crate::term::{Family, LibrarySettings};
+
+/// Everything a calibration can be told; each field but the last two is a table of `twincal.toml`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibrationSettings {
+    /// `[library]`.
+    pub library: LibrarySettings,
+    /// `[signal]`.
+    pub signal: SignalSettings,
+    /// `[prior]`.
+    pub prior: PriorSettings,
+    /// `[noise]`.
+    pub noise: NoiseSettings,
+    /// `[inference]`.
+    pub inference: InferenceSettings,
+    /// What becomes of gear ripple that nobody asked for: what `[library]` families and ripple say beside `library`.
+    pub unasked_ripple: UnaskedRipple,
+    /// `[signal] wider_band` with no `[noise] model`: where nobody chose a cut-off either and the noise allows it, the fit goes on in a wider
+    /// band with `ar1`.
+    pub may_widen: bool,
+    /// Bytes that are free for what is made of the recordings (no key of `twincal.toml`); `None`: any number.
+    pub most_bytes: Option<u64>,
+}
+
+impl Default for CalibrationSettings {
+    /// What an empty `twincal.toml` means: every candidate family, everything else chosen from the data.
+    fn default() -> Self {
+        Self {
+            library: LibrarySettings {
+                families: Family::DEFAULT.to_vec(),
+                nonnegative: true,
+                ..LibrarySettings::default()
+            },
+            signal: SignalSettings {
+                cutoff_hz: Auto::Auto,
+                rate_hz: Auto::Auto,
+                coulomb_velocity: None,
+                corrections: Corrections::default(),
+                every_sample: false,
+            },
+            prior: PriorSettings {
+                scaled_variance: Auto::Auto,
+                inclusion: None,
+                noise: None,
+                families: Vec::new(),
+                forced: Vec::new(),
+                heredity: None,
+            },
+            noise: NoiseSettings {
+                model: NoiseModel::Tempered,
+                per_joint: true,
+                robust: false,
+                varies_with_speed: false,
+                varies_with_load: false,
+                uncertainty: NoiseUncertainty::PlugIn,
+            },
+            inference: InferenceSettings {
+                method: Choice::Auto,
+                chains: 4,
+                draws: 5000,
+                seed: 1,
+                allow_disagreement: false,
+            },
+            unasked_ripple: UnaskedRipple::Candidate,
+            may_widen: true,
+            most_bytes: None,
+        }
+    }
+}

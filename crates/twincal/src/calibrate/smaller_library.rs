@@ -1,0 +1,66 @@
+//! Fewer candidates where the rows are too few for all of them, unless somebody chose the candidates: friction and base parameters.
+
+use super::{CalibrationSettings, UnaskedRipple};
+use crate::error::{Error, Finding, Severity};
+use crate::term::Family;
+
+/// Viscous and Coulomb friction, and the inertial parameters of links with the motors' inertia.
+const FAMILIES: [Family; 5] = [
+    Family::Viscous,
+    Family::Coulomb,
+    Family::MotorInertia,
+    Family::MassMoments,
+    Family::Tensor,
+];
+
+/// A fit with fewer candidates.
+pub(super) struct Smaller {
+    /// Its settings.
+    pub(super) settings: CalibrationSettings,
+    /// What is said of it.
+    pub(super) finding: Finding,
+}
+
+/// The fit that is tried after one by `settings` was refused; `None` where somebody chose the candidates or the refusal has another reason.
+pub(super) fn smaller(refused: &Error, settings: &CalibrationSettings) -> Option<Smaller> {
+    let Error::Refused { problem, .. } = refused else {
+        return None;
+    };
+    if settings.library.families != Family::DEFAULT {
+        return None;
+    }
+    let mut settings = settings.clone();
+    settings.library.families = FAMILIES.to_vec();
+    settings.unasked_ripple = UnaskedRipple::Ignored;
+    settings.may_widen = false;
+    let message = format!(
+        "too few rows for all candidates ({problem}): fitted with friction, motor inertia and link inertias only; log longer and faster motion \
+         for the others"
+    );
+    let finding = Finding::new(Severity::Warning, "smaller_library", "", message, 0);
+    Some(Smaller { settings, finding })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chosen_candidates_and_other_errors_stay() {
+        let refused = Error::Refused {
+            problem: "12 rows".into(),
+            remedy: String::new(),
+        };
+        let usual = CalibrationSettings::default();
+        let smaller_one = smaller(&refused, &usual).unwrap();
+        assert_eq!(smaller_one.settings.library.families, FAMILIES);
+        assert!(smaller_one.finding.message.contains("(12 rows)"));
+        assert!(smaller(&refused, &smaller_one.settings).is_none());
+        let other = Error::Setting {
+            key: "a".into(),
+            problem: "b".into(),
+            remedy: "c".into(),
+        };
+        assert!(smaller(&other, &usual).is_none());
+    }
+}

@@ -1,0 +1,135 @@
+//! Copies are found, recordings of one programme are not.
+
+use super::*;
+use crate::posterior::random::Random;
+use crate::signal::{Channels, Payload};
+
+/// Sampling interval, s.
+const INTERVAL: f64 = 0.008;
+/// sd of torque noise, N·m.
+const NOISE: f64 = 0.1;
+
+/// A recording of a programme: three joints that move on the same path whenever `programme` is the same, torque with dry friction and noise
+/// that is that of `take`.
+fn recording(programme: u64, take: u64, rows: usize) -> Recording {
+    let mut path = Random::new(programme, 0);
+    let mut noise = Random::new(1000 + take, 1);
+    let time: Vec<f64> = (0..rows).map(|i| i as f64 * INTERVAL).collect();
+    let joints = (0..3).map(|_| {
+        let waves: Vec<[f64; 2]> = (1..5)
+            .map(|k| [path.normal() / f64::from(k), path.normal()])
+            .collect();
+        let at = |t: f64, rate: bool| -> f64 {
+            let wave = |(k, [size, phase]): (usize, &[f64; 2])| {
+                let w = 1.3 * (k + 1) as f64;
+                match rate {
+                    true => size * w * (w * t + phase).cos(),
+                    false => size * (w * t + phase).sin(),
+                }
+            };
+            waves.iter().enumerate().map(wave).sum()
+        };
+        let mut slow = 0.0;
+        let tau = time.iter().map(|t| {
+            slow = 0.4 * slow + 0.6 * noise.normal();
+            let motion = 20.0 * at(*t, false) + 5.0 * (at(*t, true) / 0.01).tanh();
+            motion + NOISE * (0.7 * noise.normal() + 0.7 * slow)
+        });
+        Channels {
+            tau: Some(tau.collect()),
+            q: time.iter().map(|t| at(*t, false)).collect(),
+            qd: None,
+            qdd: None,
+            temperature: None,
+        }
+    });
+    Recording {
+        unfolded: false,
+        start_ns: 0,
+        name: format!("run{take}"),
+        joints: joints.collect(),
+        time,
+        payload: Payload::None,
+    }
+}
+
+/// Rows `rows` of a recording, changed.
+fn cut(
+    from: &Recording,
+    rows: std::ops::Range<usize>,
+    change: impl Fn(f64, usize) -> f64,
+) -> Recording {
+    let mut copy = from.clone();
+    copy.name = "copy".into();
+    copy.time = copy.time[rows.clone()].iter().map(|t| t + 1000.0).collect();
+    for channels in &mut copy.joints {
+        channels.q = channels.q[rows.clone()].to_vec();
+        let tau = channels.tau.take().unwrap_or_default();
+        let tau = tau[rows.clone()].iter().enumerate();
+        channels.tau = Some(tau.map(|(i, tau)| change(*tau, i)).collect());
+    }
+    copy
+}
+
+fn found(recordings: &[Recording]) -> Vec<Finding> {
+    let logs: Vec<Log<'_>> = recordings.iter().map(Log::from).collect();
+    copies(&logs).unwrap()
+}
+
+#[test]
+fn copies_are_found_shifted_cut_rounded_and_with_noise() {
+    let run = recording(1, 1, 1500);
+    let other = recording(2, 2, 1500);
+    let mut random = Random::new(3, 3);
+    let more: Vec<f64> = (0..1500).map(|_| 0.5 * NOISE * random.normal()).collect();
+    let copies = [
+        cut(&run, 0..1500, |tau, _| tau),
+        cut(&run, 37..1500, |tau, _| tau),
+        cut(&run, 300..1200, |tau, _| (tau * 100.0).round() / 100.0),
+        cut(&run, 0..1500, |tau, i| tau + more[i]),
+        cut(&run, 600..1100, |tau, i| tau + more[i]),
+    ];
+    for copy in copies {
+        let rows = copy.time.len() as u64;
+        let said = found(&[run.clone(), other.clone(), copy.clone()]);
+        assert_eq!(said.len(), 1, "{said:?}");
+        assert_eq!((said[0].subject.as_str(), said[0].count), ("copy", rows));
+        assert_eq!(said[0].severity, Severity::Degraded);
+        assert!(said[0].message.contains("`run1`"), "{}", said[0].message);
+        // Whichever of the two is given first.
+        assert_eq!(found(&[copy, other.clone(), run.clone()]).len(), 1);
+    }
+}
+
+/// Independent noise passes one limit of 8 sd with probability 6e-16 per offset that is looked at.
+#[test]
+fn recordings_of_one_programme_are_no_copies() {
+    let runs: Vec<Recording> = (0..20).map(|take| recording(7, take, 1000)).collect();
+    assert_eq!(found(&runs), []);
+    let runs: Vec<Recording> = (0..20).map(|take| recording(take, take, 1000)).collect();
+    assert_eq!(found(&runs), []);
+}
+
+#[test]
+fn logs_without_torque_or_without_noise_say_nothing() {
+    let run = recording(1, 1, 400);
+    let constant = cut(&run, 0..400, |_, _| 1.5);
+    let mut without = run.clone();
+    without.joints.iter_mut().for_each(|own| own.tau = None);
+    assert_eq!(
+        found(&[constant.clone(), constant, without.clone(), without]),
+        []
+    );
+    assert_eq!(found(&[]), []);
+}
+
+#[test]
+fn a_copy_among_many_logs_is_found() {
+    let mut runs: Vec<Recording> = (0..300)
+        .map(|take| recording(take % 3, take, 300))
+        .collect();
+    runs.push(cut(&runs[17], 0..300, |tau, _| tau));
+    let said = found(&runs);
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert!(said[0].message.contains("`run17`"));
+}

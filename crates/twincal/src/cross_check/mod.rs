@@ -1,0 +1,12 @@
+//! Logs compared with each other, and with themselves over time: is each a recording of its own, and is it read as the others are?
+
+mod common_fit;
+mod copies;
+mod rows;
+mod signature;
+mod stuck;
+mod torque;
+
+pub use copies::copies;
+pub use stuck::stuck_encoders;
+pub use torque::odd_torque;

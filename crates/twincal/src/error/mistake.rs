@@ -1,0 +1,102 @@
+//! The one list of findings that forbid a "Yes": a log or model is not what it is said to be.
+
+use super::Finding;
+use super::Severity::{self, Degraded, Note, Warning};
+
+/// What a mistake is about. The order is that of the answer: the first kind that stands is its headline.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Mistake {
+    /// Log and model contradict each other in orientation, sign, scale or order of joints.
+    Contradiction,
+    /// Torque is no measurement.
+    NoMeasurement,
+    /// A log is a copy of another one.
+    Copy,
+    /// Torque of one log or joint differs from the others'.
+    OddTorque,
+    /// Positions or their clock are wrong in a log.
+    OddMotion,
+    /// A held-out log is of another robot, or another state of it.
+    AnotherState,
+}
+
+/// Every code that forbids a "Yes": from which severity on, and what it is about. Add a line for a new one; nothing else decides.
+const TABLE: &[(&str, Severity, Mistake)] = &[
+    // signal/agreement.rs, self_check
+    ("sign_flip", Note, Mistake::Contradiction),
+    ("joint_order", Note, Mistake::Contradiction),
+    ("torque_scale", Note, Mistake::Contradiction),
+    ("velocity_opposite", Note, Mistake::Contradiction),
+    ("base_orientation", Degraded, Mistake::Contradiction),
+    ("model_torque", Degraded, Mistake::Contradiction),
+    ("gravity_compensated", Degraded, Mistake::Contradiction),
+    ("clock_scale", Degraded, Mistake::Contradiction),
+    ("torque_copied", Degraded, Mistake::Contradiction),
+    ("torque_constant", Degraded, Mistake::NoMeasurement),
+    ("torque_held", Degraded, Mistake::NoMeasurement),
+    // signal/torque.rs; a warning where one joint of several is passive
+    ("constant_torque", Degraded, Mistake::NoMeasurement),
+    // cross_check
+    ("copied_log", Warning, Mistake::Copy),
+    ("log_torque_factor", Warning, Mistake::OddTorque),
+    ("joint_torque_factor", Warning, Mistake::OddTorque),
+    ("log_torque_lag", Warning, Mistake::OddTorque),
+    ("clock_drift", Warning, Mistake::OddMotion),
+    ("encoder_stuck", Warning, Mistake::OddMotion),
+    // signal/jumps.rs
+    ("position_step", Warning, Mistake::OddMotion),
+    // calibrate/another_state.rs
+    ("another_state", Warning, Mistake::AnotherState),
+];
+
+impl Mistake {
+    /// The codes that forbid a "Yes", with the severity from which on each does.
+    pub fn codes() -> impl Iterator<Item = (&'static str, Severity)> {
+        TABLE.iter().map(|(code, severity, _)| (*code, *severity))
+    }
+}
+
+impl Finding {
+    /// The mistake that it speaks of; `None` where a "Yes" may stand beside it.
+    #[must_use]
+    pub fn mistake(&self) -> Option<Mistake> {
+        let named = |(code, severity, _): &&(&str, Severity, Mistake)| {
+            *code == self.code && self.severity >= *severity
+        };
+        TABLE.iter().find(named).map(|(_, _, mistake)| *mistake)
+    }
+
+    /// True if it forbids a "Yes".
+    #[must_use]
+    pub fn forbids_yes(&self) -> bool {
+        self.mistake().is_some()
+    }
+
+    /// True if it says that log and model hardly speak of the same robot: turned signs, exchanged joints, torque of another scale. What
+    /// is fitted all the same explains the mistake, with high probability and small errors.
+    #[must_use]
+    pub fn doubts_the_log(&self) -> bool {
+        self.mistake() == Some(Mistake::Contradiction)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn codes_are_listed_once_and_forbid_from_their_severity_on() {
+        let codes: BTreeSet<&str> = Mistake::codes().map(|(code, _)| code).collect();
+        assert_eq!(codes.len(), TABLE.len());
+        let passive = Finding::new(Severity::Warning, "constant_torque", "", "", 0);
+        assert!(!passive.forbids_yes());
+        assert!(!Finding::new(Severity::Degraded, "drift", "", "", 0).forbids_yes());
+        for (code, severity) in Mistake::codes() {
+            assert!(
+                Finding::new(severity, code, "", "", 0).forbids_yes(),
+                "{code}"
+            );
+        }
+    }
+}

@@ -1,0 +1,223 @@
+//! A trajectory averaged over bins: what contacts and lags are looked for in.
+
+use crate::error::Result;
+use crate::robot::Robot;
+use crate::signal::{Numbers, Pipeline, Segment, Shelf, Trajectory};
+use rayon::prelude::*;
+use std::borrow::Cow;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Width of the bins, s, and in periods of a cut-off below 5 Hz.
+const WIDTH: f64 = 0.05;
+const PERIODS: f64 = 0.25;
+/// Velocities of the friction's shapes, rad/s or m/s.
+const DRY: [f64; 2] = [0.02, 0.2];
+/// Below this a joint turns round or creeps, and is at rest, rad/s or m/s.
+const SLOW: f64 = 0.05;
+const REST: f64 = 0.02;
+/// How long before and after that friction remembers it, in bins: presliding.
+const MEMORY: usize = 2;
+/// Channels of a joint: torque, position, velocity, acceleration and the shapes of dry friction.
+const CHANNELS: usize = 6;
+
+/// What friction of a joint can be in a bin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Zone {
+    /// It slides: friction is a function of velocity.
+    Slides,
+    /// A velocity reversal within a tenth of a second: friction is anything up to its static value.
+    Reverses,
+    /// At rest: the same, with no motion.
+    Rests,
+    /// The drives are off or torque is saturated.
+    Unknown,
+}
+
+/// A segment, averaged over bins.
+#[derive(Debug)]
+pub(crate) struct Bins {
+    /// Sampling intervals of the segment and of the log, s.
+    pub(crate) intervals: [f64; 2],
+    /// First and last stamp of each bin, s.
+    pub(crate) spans: Vec<[f64; 2]>,
+    /// Samples of each bin.
+    pub(crate) width: u64,
+    /// `joint * bins + bin`.
+    zones: Vec<Zone>,
+    /// By joint, channel by channel.
+    joints: Vec<Numbers>,
+}
+
+/// Some bins of one joint.
+pub(crate) struct JointBins<'a> {
+    channels: [Cow<'a, [f64]>; CHANNELS],
+}
+
+/// A trajectory in bins; `stopped`: spans in which the drives were off, s.
+pub(crate) fn bins(
+    robot: &Robot,
+    pipeline: &Pipeline,
+    trajectory: &Trajectory,
+    stopped: &[[f64; 2]],
+) -> Vec<Bins> {
+    let seconds = if pipeline.is_off() {
+        WIDTH
+    } else {
+        WIDTH.max(PERIODS / pipeline.cutoff_hz)
+    };
+    let first = trajectory.segments.first();
+    let width = first.map_or(1, |s| {
+        ((seconds / s.interval * (1.0 + 1e-9)) as usize).max(1)
+    });
+    let segments = trajectory.segments.iter();
+    segments
+        .map(|segment| Bins::new(robot.dof(), segment, width, stopped))
+        .collect()
+}
+
+impl Bins {
+    fn new(dof: usize, segment: &Segment, width: usize, stopped: &[[f64; 2]]) -> Self {
+        let len = segment.time.len();
+        let count = len / width;
+        let spans: Vec<[f64; 2]> = segment
+            .time
+            .chunks_exact(width)
+            .map(|bin| [bin[0], bin[width - 1]])
+            .collect();
+        let mean = |bin: &[f64]| bin.iter().sum::<f64>() / width as f64;
+        let of_joint = |joint: usize| {
+            let own = |values: &[f64]| -> Vec<f64> {
+                let values = &values[joint * len..(joint + 1) * len];
+                values.chunks_exact(width).map(mean).collect()
+            };
+            // Means of the shapes, since where a joint turns round that is not the shape of the mean.
+            let dry = |velocity: f64| -> Vec<f64> {
+                let velocities = &segment.qd[joint * len..(joint + 1) * len];
+                let shape = |bin: &[f64]| {
+                    bin.iter().map(|qd| (qd / velocity).tanh()).sum::<f64>() / width as f64
+                };
+                velocities.chunks_exact(width).map(shape).collect()
+            };
+            let [slow, fast] = DRY.map(dry);
+            let Segment {
+                tau, q, qd, qdd, ..
+            } = segment;
+            let channels = [own(tau), own(q), own(qd), own(qdd), slow, fast];
+            (
+                Numbers::Memory(channels.concat()),
+                zones(segment, joint, width, (&spans, stopped)),
+            )
+        };
+        let all: Vec<(Numbers, Vec<Zone>)> = (0..dof).into_par_iter().map(of_joint).collect();
+        let (joints, zones): (Vec<Numbers>, Vec<Vec<Zone>>) = all.into_iter().unzip();
+        debug_assert!(zones.iter().all(|zones| zones.len() == count));
+        Self {
+            intervals: [segment.interval, segment.logged_interval],
+            spans,
+            width: (width * segment.thinning()) as u64,
+            zones: zones.concat(),
+            joints,
+        }
+    }
+
+    /// How many bins there are.
+    pub(crate) fn len(&self) -> usize {
+        self.spans.len()
+    }
+
+    /// Leaves the channels on a shelf.
+    ///
+    /// # Errors
+    /// Those of [`Shelf::put`].
+    pub(crate) fn put_away(&mut self, shelf: &Arc<dyn Shelf>) -> Result<()> {
+        let mut joints = self.joints.iter_mut();
+        joints.try_for_each(|numbers| numbers.put_away(shelf))
+    }
+
+    /// Some bins of a joint.
+    pub(crate) fn joint(&self, joint: usize, range: &Range<usize>) -> JointBins<'_> {
+        let count = self.len();
+        let numbers = &self.joints[joint];
+        let channel = |k: usize| numbers.some(k * count + range.start..k * count + range.end);
+        JointBins {
+            channels: std::array::from_fn(channel),
+        }
+    }
+
+    /// What friction of a joint can be in each bin.
+    pub(crate) fn zones(&self, joint: usize) -> &[Zone] {
+        let count = self.len();
+        &self.zones[joint * count..(joint + 1) * count]
+    }
+}
+
+/// Zones of a joint; `stopped`: beside the spans of the bins, those in which the drives were off.
+fn zones(
+    segment: &Segment,
+    joint: usize,
+    width: usize,
+    (spans, stopped): (&[[f64; 2]], &[[f64; 2]]),
+) -> Vec<Zone> {
+    let len = segment.time.len();
+    let own = joint * len..(joint + 1) * len;
+    let (velocity, still) = (&segment.qd[own.clone()], &segment.standstill[own]);
+    let bins = velocity.chunks_exact(width);
+    let ends: Vec<[f64; 2]> = bins
+        .map(|bin| {
+            let least = bin.iter().copied().fold(f64::INFINITY, f64::min);
+            [least, bin.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
+        })
+        .collect();
+    let slow: Vec<bool> = (ends.iter())
+        .map(|[least, most]| least * most <= 0.0 || least.abs().min(most.abs()) < SLOW)
+        .collect();
+    let off = |span: &[f64; 2]| {
+        let overlaps = |[from, to]: &[f64; 2]| span[1] >= *from && span[0] <= *to;
+        stopped.iter().any(overlaps)
+    };
+    let zone = |i: usize| {
+        let [least, most] = ends[i];
+        let fastest = least.abs().max(most.abs());
+        let masked = still[i * width..(i + 1) * width].iter().any(|still| *still);
+        let near = i.saturating_sub(MEMORY)..(i + MEMORY + 1).min(slow.len());
+        if off(&spans[i]) || masked && fastest > 2.0 * SLOW {
+            Zone::Unknown
+        } else if fastest < REST {
+            Zone::Rests
+        } else if slow[near].iter().any(|slow| *slow) {
+            Zone::Reverses
+        } else {
+            Zone::Slides
+        }
+    };
+    (0..ends.len()).map(zone).collect()
+}
+
+impl JointBins<'_> {
+    /// Mean torque of each bin.
+    pub(crate) fn torque(&self) -> &[f64] {
+        &self.channels[0]
+    }
+
+    /// Mean position.
+    pub(crate) fn position(&self) -> &[f64] {
+        &self.channels[1]
+    }
+
+    /// Mean velocity.
+    pub(crate) fn velocity(&self) -> &[f64] {
+        &self.channels[2]
+    }
+
+    /// Mean acceleration.
+    pub(crate) fn acceleration(&self) -> &[f64] {
+        &self.channels[3]
+    }
+
+    /// Columns of friction, motor inertia, offset and spring of a bin.
+    pub(crate) fn friction(&self, bin: usize) -> [f64; super::design::FRICTION] {
+        let [q, v, a, slow, fast] = [1, 2, 3, 4, 5].map(|channel| self.channels[channel][bin]);
+        [v, slow, fast, v.abs() * v, a, 1.0, q]
+    }
+}

@@ -1,0 +1,103 @@
+//! Torque columns that hold no measurement of their joint: another joint's, or one constant number.
+
+use super::explain::Explained;
+use super::parts::{Parts, driven};
+use super::sample::Sample;
+use crate::error::{Finding, Severity};
+use crate::robot::Robot;
+use crate::words::significant;
+
+/// Share of samples in which two columns must be the same number.
+const SAME: f64 = 0.99;
+/// Range of a column, as a share of its size, up to which it is constant: resampling rounds.
+const CONSTANT: f64 = 1e-9;
+
+/// Findings on the columns of one log's sample.
+pub(super) fn of_sample(
+    robot: &Robot,
+    (log, sample): (&str, &Sample),
+    explained: &[Option<Explained>],
+) -> Vec<Finding> {
+    let mut findings = copied(robot, log, sample, explained);
+    if (0..robot.dof()).any(|joint| is_constant(sample, joint)) {
+        findings.extend(constant(robot, log, sample, &Parts::of(robot, sample)));
+    }
+    findings
+}
+
+/// Pairs of joints that have one torque column.
+fn copied(
+    robot: &Robot,
+    log: &str,
+    sample: &Sample,
+    explained: &[Option<Explained>],
+) -> Vec<Finding> {
+    let names = robot.joint_names();
+    let share = |k: usize, a: usize, b: usize| {
+        let [a, b] = [a, b].map(|joint| &sample.channels[k][joint]);
+        let same = a.iter().zip(b).filter(|(a, b)| a == b).count();
+        same as f64 / sample.len as f64
+    };
+    let left = |joint: usize| explained[joint].map_or(1.0, |e| e.left);
+    let mut findings = Vec::new();
+    for a in 0..names.len() {
+        for b in a + 1..names.len() {
+            let is_one = share(3, a, b) > SAME && !is_constant(sample, a);
+            // Two fingers of a gripper move alike and have one drive.
+            if !is_one || share(0, a, b) > SAME {
+                continue;
+            }
+            let (wrong, right) = if left(a) > left(b) { (a, b) } else { (b, a) };
+            let message = format!(
+                "log `{log}`: the torque of joint `{}` is that of joint `{}` in {:.0} % of the samples: one column was written twice; map the \
+                 measured torque of `{}` in [columns] tau, or log it again",
+                names[wrong],
+                names[right],
+                100.0 * share(3, a, b),
+                names[wrong]
+            );
+            let count = sample.len as u64;
+            let finding = Finding::new(
+                Severity::Degraded,
+                "torque_copied",
+                names[wrong],
+                message,
+                count,
+            );
+            findings.push(finding);
+        }
+    }
+    findings
+}
+
+/// Driven joints that move while their torque never changes. A torque of 0 is that of a joint without a drive.
+fn constant(robot: &Robot, log: &str, sample: &Sample, parts: &Parts) -> Vec<Finding> {
+    let gravity = parts.gravity(robot.description().gravity);
+    let names = robot.joint_names();
+    let driven = driven(sample, parts, &gravity).into_iter().enumerate();
+    let wrong = driven
+        .filter(|(joint, _)| is_constant(sample, *joint) && sample.channels[3][*joint][0] != 0.0);
+    wrong
+        .filter_map(|(joint, size)| Some((joint, size?)))
+        .map(|(joint, size)| {
+            let message = format!(
+                "log `{log}`: the torque of joint `{}` is {} throughout while the model needs {} N·m (sd) for its motion: no measurement; map its \
+                 torque in [columns] tau, or leave this log out",
+                names[joint],
+                significant(sample.channels[3][joint][0], 3),
+                significant(size, 2)
+            );
+            let count = sample.len as u64;
+            Finding::new(Severity::Degraded, "torque_constant", names[joint], message, count)
+        })
+        .collect()
+}
+
+/// True if a joint's torque never changes.
+pub(super) fn is_constant(sample: &Sample, joint: usize) -> bool {
+    let values = sample.channels[3][joint].iter();
+    let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+        [low.min(*x), high.max(*x)]
+    });
+    high - low <= CONSTANT * high.abs().max(low.abs())
+}
