@@ -27,6 +27,9 @@ REFUSED = {
     "iris_description/robots/iris_simple.urdf": "none of its 5 joints can move",
     "ur_description/urdf/ur3.urdf": "has no link",  # an empty <robot>
 }
+# Files with frames that have a tensor and no mass, which no body has: twincal leaves the tensor out (finding `massless_frame`), Pinocchio keeps
+# it. Torque of these tensors at the states of the test, N m.
+IGNORED = {"bolt_description/robots/bolt.urdf": 1e-5}
 EXPORTED = [
     "a1_description/urdf/a1.urdf",
     "double_pendulum_description/urdf/double_pendulum.urdf",
@@ -114,7 +117,7 @@ def test_pinocchio(name, tmp_path):
             whole[s] = full
 
     scale = np.abs(expected_tau).max()
-    np.testing.assert_allclose(tau, expected_tau, rtol=0, atol=1e-10 * scale)
+    np.testing.assert_allclose(tau, expected_tau, rtol=0, atol=1e-10 * scale + IGNORED.get(name, 0.0))
 
     # Relative to the largest column of the same kind: masses, first moments, tensors. Outside the pairs all is 0.
     for kind in (slice(0, 1), slice(1, 4), slice(4, 10)):
