@@ -336,43 +336,8 @@ fn score(
 
 #[cfg(test)]
 mod tests {
+    use super::gates::tests::scores;
     use super::*;
-    use twincal::validate::JointScore;
-
-    fn scores(rmse: f64, coverage: f64) -> Validation {
-        let joint = JointScore {
-            joint: "elbow".into(),
-            rows: 10,
-            rmse_nominal: 1.0,
-            rmse_calibrated: rmse,
-            bias: 0.0,
-            coverage95: coverage,
-            mean_width95: 0.4,
-            torque_sd: 5.0,
-            interval_score95: 0.5,
-            epistemic_sd: 0.01,
-            noise_sd: 0.1,
-            epistemic_share: 0.01,
-            rmse_friction: None,
-        };
-        let moving = Scores {
-            rmse_nominal: 1.0,
-            rmse_calibrated: rmse,
-            coverage95: coverage,
-            interval_score95: 0.5,
-            epistemic_share: 0.01,
-            joints: vec![joint],
-        };
-        // At rest it is far off, which no gate is for.
-        let mut filtered = moving.clone();
-        filtered.joints[0].rmse_calibrated = 9.0;
-        filtered.joints[0].coverage95 = 0.1;
-        Validation {
-            filtered,
-            moving,
-            ..HeldOut::new(vec!["elbow"]).finish(Split::HeldoutLogs)
-        }
-    }
 
     /// 10 moving rows with squares of 1 and 30 at standstill with 9: 40 rows with a mean square of 7; 9 and 15 of them in the interval.
     #[test]

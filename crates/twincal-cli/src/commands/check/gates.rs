@@ -140,11 +140,12 @@ fn own_rows(split: &Split) -> &'static str {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use twincal::validate::{HeldOut, JointScore, Scores};
 
-    fn scores(rmse: f64, coverage: f64) -> Validation {
+    /// One joint with this error and coverage while it moves.
+    pub(in super::super) fn scores(rmse: f64, coverage: f64) -> Validation {
         let joint = JointScore {
             joint: "elbow".into(),
             rows: 10,
