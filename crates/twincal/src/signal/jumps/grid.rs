@@ -95,7 +95,7 @@ fn a_real_reset_cuts_in_rest_and_in_motion() {
                             };
                             let mut log = world.clean();
                             let len = log.time.len();
-                            // Not faster than a quarter of the reset per step.
+                            // Slower than 0.15 of the reset per step.
                             let at = loop {
                                 let at = random.random_range(len / 4..3 * len / 4);
                                 let speed = motion.at(0, log.time[at])[1].abs();
