@@ -1,0 +1,215 @@
+"""The table of the study, from JSON lines: one line per fit.
+
+    python table.py fits.jsonl
+"""
+
+import json
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+from columns import INERTIAL
+from scipy.stats import beta
+
+BINS = ((0.5, 0.8), (0.8, 0.95), (0.95, 0.99), (0.99, 1.0000001))
+LARGE = 8.0  # standard errors
+
+
+def bounds99(hits, total):
+    """One-sided 99 % bounds of a share (Clopper and Pearson): the lower one and the upper one, each of its own."""
+    if total == 0:
+        return 0.0, 1.0
+    low = beta.ppf(0.01, hits, total - hits + 1) if hits else 0.0
+    high = beta.ppf(0.99, hits + 1, total - hits) if hits < total else 1.0
+    return float(low), float(high)
+
+
+def share(hits, total):
+    """`0.93 (14/15, 99 %: > 0.74, < 0.99)`."""
+    if total == 0:
+        return "–"
+    low, high = bounds99(hits, total)
+    return f"{hits / total:.2f} ({hits}/{total}; 99 %: > {low:.2f}, < {high:.2f})"
+
+
+def components(lines):
+    """All judged components of some lines."""
+    return [row for line in lines for row in line["components"]]
+
+
+def false_claims(line, inertial=False):
+    """Established and false components, and sets without the cause, of one fit."""
+    own = [row for row in line["components"] if row["status"] == "established" and row["judged"] == "false" and (not inertial or row["family"] in INERTIAL)]
+    return len(own) + sum(one["judged"] == "false" and (not inertial or one["inertial"]) for one in line["sets"])
+
+
+def found(line):
+    """True effects of 8 standard errors or more that have a candidate: how many are reported, how many there are."""
+    large = [cause for cause in line["causes"] if cause["candidate"] and cause["standard_errors"] >= LARGE]
+    return sum(cause["established"] or cause["in_set"] for cause in large), len(large)
+
+
+def coverage(lines):
+    """Rows inside and rows, pooled."""
+    rows = [joint for line in lines for joint in line["heldout"]]
+    return sum(j["coverage"] * j["rows"] for j in rows), sum(j["rows"] for j in rows)
+
+
+def error_ratio(lines):
+    """Geometric mean over joints of the held-out error over that of friction and motor inertia alone."""
+    ratios = [j["rmse"] / j["rmse_friction"] for line in lines for j in line["heldout"] if j["rmse_friction"] and j["rmse"]]
+    return float(np.exp(np.mean(np.log(ratios)))) if ratios else float("nan")
+
+
+def by_world(lines):
+    """Lines of each world, in the order in which they come."""
+    out = defaultdict(list)
+    for line in lines:
+        out[line["world"]].append(line)
+    return out
+
+
+def world_rows(worlds):
+    """One row per world."""
+    head = ["world", "fits", "candidates", "PIP ≥ .95: true, stand-in, false", "true share", "established false per fit", "inertial", "power, 8 se",
+            "held-out coverage", "error / friction", "CPU, s"]  # fmt: skip
+    rows = [head, ["---"] * len(head)]
+    for name, lines in worlds.items():
+        sure = [row["judged"] for row in components(lines) if row["pip"] >= 0.95]
+        counts = [sure.count(word) for word in ("true", "stand_in", "false")]
+        hits, large = (sum(part) for part in zip(*map(found, lines)))
+        inside, all_rows = coverage(lines)
+        specified = sum(line["well_specified"] for line in lines)
+        rows.append([f"`{name}`", str(len(lines)), "all" if specified == len(lines) else "none or some" if specified == 0 else f"all in {specified}",
+                     " ".join(map(str, counts)), f"{counts[0] / len(sure):.2f}" if sure else "–",
+                     f"{np.mean([false_claims(line) for line in lines]):.2f}", f"{np.mean([false_claims(line, True) for line in lines]):.2f}",
+                     f"{hits}/{large}" if large else "–", f"{inside / all_rows:.3f}", f"{error_ratio(lines):.3f}",
+                     f"{np.mean([line['cpu'] for line in lines]):.1f}"])  # fmt: skip
+    return rows
+
+
+def reliability_rows(lines):
+    """Probabilities said, and the share that is true: worlds whose causes all have candidates, and the others."""
+    rows = [["PIP", "candidates: n", "mean PIP", "true", "bound", "others: n", "mean PIP", "true", "true or stand-in"], ["---"] * 9]
+    for low, high in BINS:
+        cells = [f"{low}–{min(high, 1.0):.4g}"]
+        for specified in (True, False):
+            some = [row for line in lines if line["well_specified"] == specified for row in line["components"] if low <= row["pip"] < high]
+            true, stand = (sum(row["judged"] == word for row in some) for word in ("true", "stand_in"))
+            n = len(some)
+            cells += [str(n), f"{np.mean([row['pip'] for row in some]):.3f}" if n else "–", f"{true / n:.2f}" if n else "–"]
+            cells += [f"< {bounds99(true, n)[1]:.2f}" if n else "–"] if specified else [f"{(true + stand) / n:.2f}" if n else "–"]
+        rows.append(cells)
+    return rows
+
+
+def mass_intervals(lines, family):
+    """Mass intervals that hold the truth, and how many masses are reported."""
+    told = [line["masses"].get(family) for line in lines if line["masses"].get(family)]
+    return sum(low <= truth <= high for _, _, truth, low, high, _ in told), len(told)
+
+
+def right_links(lines):
+    """Fits in which payload and heavier link are established (or in a set of three), no other body is, and both mass intervals hold."""
+    good = right = 0
+    for line in lines:
+        bodies = [cause for cause in line["causes"] if cause["family"] in ("payload", "body")]
+        link = all(cause["established"] or cause["in_set"] for cause in bodies) and not false_claims(line, True)
+        told = [line["masses"].get(cause["family"]) for cause in bodies]
+        right += link
+        good += link and all(one and one[3] <= one[2] <= one[4] for one in told)
+    return right, good, len(lines)
+
+
+def limits(worlds):
+    """The limits of the study: what, reached, asked, and whether the one-sided 99 % bound excludes it."""
+    lines = [line for some in worlds.values() for line in some]
+    rows = []
+
+    def add(what, reached, asked, missed):
+        rows.append([what, reached, asked, "missed" if missed else ""])
+
+    # a world counts as one with candidates by the program's own list of components
+    candidates = {name: [line for line in some if line["well_specified"]] for name, some in worlds.items()}
+    sure = {name: [row["judged"] == "true" for row in components(some) if row["pip"] >= 0.95] for name, some in candidates.items()}
+    sure = {name: some for name, some in sure.items() if some}
+    if sure:
+        mean = np.mean([np.mean(some) for some in sure.values()])
+        hits, total = sum(map(sum, sure.values())), sum(map(len, sure.values()))
+        add("PIP ≥ .95 that is true, worlds with candidates (mean of worlds)", f"{mean:.2f}; all: {share(hits, total)}", "≥ .90", bounds99(hits, total)[1] < 0.9)
+    for low, high in BINS:
+        some = [row for row in components([line for line in lines if line["well_specified"]]) if low <= row["pip"] < high]
+        if some:
+            hits = sum(row["judged"] == "true" for row in some)
+            said = float(np.mean([row["pip"] for row in some]))
+            add(f"PIP {low} to {min(high, 1.0):.4g}, worlds with candidates", share(hits, len(some)), f"≥ {said:.2f}, as said", bounds99(hits, len(some))[1] < said)
+    false = {name: [false_claims(line) for line in some] for name, some in worlds.items()}
+    inertial = {name: [false_claims(line, True) for line in some] for name, some in worlds.items()}
+    if lines:
+        worst = max(false, key=lambda name: np.mean(false[name]))
+        add("established and false per fit, mean of worlds", f"{np.mean([np.mean(x) for x in false.values()]):.2f}", "≤ .1", exceeds(sum(false.values(), []), 0.1))
+        add(f"… worst world (`{worst}`)", f"{np.mean(false[worst]):.2f}", "≤ .3", exceeds(false[worst], 0.3))
+        add("… inertial", f"{np.mean([np.mean(x) for x in inertial.values()]):.2f}", "≤ .1", exceeds(sum(inertial.values(), []), 0.1))
+    for word, specified, asked in (("well-specified", True, 0.85), ("misspecified", False, 0.65)):
+        hits, total = (sum(part) for part in zip((0, 0), *(found(line) for line in lines if line["well_specified"] == specified)))
+        add(f"true effects ≥ 8 standard errors, established or in a set of ≤ 3: {word}", share(hits, total), f"≥ {asked}", total and bounds99(hits, total)[1] < asked)
+    if "ur5_forearm" in worlds:
+        right, good, total = right_links(worlds["ur5_forearm"])
+        add("UR5, payload and heavier forearm: right links", f"{right} of {total}", "≥ 19 of 20", bounds99(right, total)[1] < 0.95)
+        add("… and both mass intervals hold", f"{good} of {total}", "≥ 19 of 20", bounds99(good, total)[1] < 0.95)
+    if "null" in worlds:
+        some = worlds["null"]
+        wrong = sum(false_claims(line) for line in some)
+        add("false terms in fits of noise (`null`)", f"{wrong} in {len(some)}", "≤ 1 in 100", exceeds([false_claims(line) for line in some], 0.01))
+    covered = {name: coverage(some) for name, some in worlds.items()}
+    covered = {name: inside / rows for name, (inside, rows) in covered.items() if rows}
+    if covered:
+        worst = min(covered, key=covered.get)
+        add(f"held-out 95 % interval, worst world (`{worst}`)", f"{covered[worst]:.3f}", "≥ .90", covered[worst] < 0.9)
+    if "gain" in worlds:
+        hits, total = mass_intervals(worlds["gain"], "payload")
+        add("mass intervals in worlds with gain error", f"{share(hits, total)} of {len(worlds['gain'])} fits", "≥ .90", total and bounds99(hits, total)[1] < 0.9)
+    return [["what (beyond viscous and Coulomb friction)", "reached", "asked", ""], ["---"] * 4, *rows]
+
+
+def exceeds(counts, limit):
+    """Whether counts per fit are above a mean of `limit`: one-sided at 99 %, their spread over fits taken from the fits (Poisson at least)."""
+    counts = np.asarray(counts, float)
+    spread = max(counts.var(ddof=1) if len(counts) > 1 else 0.0, limit)
+    return bool(counts.mean() - limit > 2.326 * (spread / len(counts)) ** 0.5)
+
+
+def lines_of(rows):
+    """Rows as Markdown."""
+    return "\n".join("| " + " | ".join(row) + " |" if row[0] != "---" else "|" + "|".join(row) + "|" for row in rows)
+
+
+def false_names(lines):
+    """What is established and false, by family and world."""
+    count = defaultdict(int)
+    for line in lines:
+        for row in line["components"]:
+            if row["status"] == "established" and row["judged"] == "false":
+                count[(line["world"], row["family"])] += 1
+    return ", ".join(f"`{world}` {family} {n}" for (world, family), n in sorted(count.items(), key=lambda item: -item[1])) or "none"
+
+
+def markdown(lines):
+    """All tables."""
+    failed = [line for line in lines if "error" in line]
+    worlds = by_world([line for line in lines if "error" not in line])
+    good = [line for some in worlds.values() for line in some]
+    parts = [f"{len(lines)} fits, {len(failed)} failed" + "".join(f"; `{line['world']}` {line['seed']}: {line['error'][:120]}" for line in failed) + "."]
+    if good:
+        parts += [lines_of(world_rows(worlds)), lines_of(reliability_rows(good)), lines_of(limits(worlds)), f"Established and false: {false_names(good)}."]
+    return "\n\n".join(parts)
+
+
+def main():
+    path = Path(sys.argv[1])
+    print(markdown([json.loads(text) for text in path.read_text().splitlines() if text.strip()]))
+
+
+if __name__ == "__main__":
+    main()
