@@ -1,13 +1,17 @@
 """Torque of a reported component along a motion, from the coefficients in result.json and Pinocchio.
 
-    component_torque(model, result, "elbow.spring", path)      # samples x joints, N m; None for families without a formula here
+    component_torque(Formulas("ur5", path, 0.01), result, "elbow_joint.spring")     # samples x joints, N m; None without a formula here
 
 The formulas are those of docs/components.md; `tests/python/test_worlds.py` compares their sum with `twincal predict`.
 """
 
+import xml.etree.ElementTree as tree
+from functools import lru_cache
+
 import numpy as np
 import pinocchio as pin
-from shared import rigid_torque
+import sympy
+from shared import load, model_file, rigid_torque
 
 MOMENTS = ("m", "mx", "my", "mz")
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -15,10 +19,11 @@ INERTIAL = ("payload", "payload_tensor", "mass_moments", "tensor", "mass_scale",
 
 
 class Formulas:
-    """Columns of a model along a motion; what several columns need is worked out once."""
+    """Columns of a robot along a motion; what several columns need is worked out once."""
 
-    def __init__(self, model, path, coulomb_velocity):
-        self.model, self.path, self.v_s = model, path, coulomb_velocity
+    def __init__(self, robot, path, coulomb_velocity):
+        self.robot, self.model, self.path, self.v_s = robot, load(robot), path, coulomb_velocity
+        model = self.model
         self.names = list(model.names)[1:]
         self.data = model.createData()
         self.nominal = rigid_torque(model, path.q, path.qd, path.qdd)
@@ -38,20 +43,19 @@ class Formulas:
         """A column of `<link>.mass_moments`, `<link>.tensor` or `<link>.mass_scale`."""
 
         def parameters(joint, placement):
-            nominal = self.model.inertias[joint]
             if level in ("mass_scale", "density"):
-                return nominal.toDynamicParameters()
-            centre = placement.actInv(nominal.lever)
-            return moved(own_inertia(column, centre), placement)
+                return self.model.inertias[joint].toDynamicParameters()
+            return moved(own_inertia(column, own_inertial(self.robot, link).lever), placement)
 
         return self.body(link, parameters)
 
     def payload(self, link, column):
-        """A column of `payload` in the frame of `link`: its tensor is about the nominal centre of mass of the body that carries it."""
+        """A column of `payload` in the frame of `link`: its tensor is about the nominal centre of mass of the link that carries it."""
 
         def parameters(joint, placement):
-            centre = placement.actInv(self.model.inertias[joint].lever)
-            return moved(payload_inertia(column, centre), placement)
+            carrier = next(f for f in self.model.frames if f.type == pin.FrameType.BODY and f.parentJoint == joint)
+            centre = carrier.placement.act(own_inertial(self.robot, carrier.name).lever)
+            return moved(payload_inertia(column, placement.actInv(centre)), placement)
 
         return self.body(link, parameters)
 
@@ -83,6 +87,23 @@ class Formulas:
             "viscous": qd, "coulomb": turn, "offset": np.ones_like(q), "motor_inertia": qdd, "stribeck": turn * np.exp(-((qd / 0.1) ** 2)),
             "quadratic_friction": qd * np.abs(qd), "load_friction": np.abs(self.nominal[:, j]) * turn, "gain": self.nominal[:, j],
         }.get(family)  # fmt: skip
+
+
+@lru_cache(maxsize=64)
+def own_inertial(robot, link):
+    """A link's own inertia in its frame, as the model file states it: without the links that are fixed to it."""
+    single = tree.Element("robot", name="one")
+    single.append(next(e for e in tree.parse(model_file(robot)).getroot().iter("link") if e.get("name") == link))
+    return pin.buildModelFromXML(tree.tostring(single, encoding="unicode"), pin.JointModelFreeFlyer()).inertias[1]
+
+
+@lru_cache(maxsize=512)
+def expression(text, joints):
+    """Euler-Lagrange torque of an expression in q1 ..., qd1 ...: a function of q, qd, qdd (each a list of arrays) per joint."""
+    q, qd, qdd = ([sympy.Symbol(f"{name}{j + 1}") for j in range(joints)] for name in ("q", "qd", "qdd"))
+    phi = sympy.sympify(text.replace("^", "**"))
+    torque = [sum(phi.diff(qd[k], qd[j]) * qdd[j] + phi.diff(qd[k], q[j]) * qd[j] for j in range(joints)) - phi.diff(q[k]) for k in range(joints)]
+    return sympy.lambdify([q, qd, qdd], torque, "numpy")
 
 
 def own_inertia(column, centre):
@@ -167,6 +188,9 @@ def column_torque(formulas, component, term, frame):
         out = np.zeros_like(formulas.path.q)
         out[:, found[0]], out[:, found[1]] = found[3], found[2] * found[3]
         return out
+    if family == "generic":
+        values = expression(name, n)(formulas.path.q.T, formulas.path.qd.T, formulas.path.qdd.T)
+        return np.stack([np.broadcast_to(value, len(formulas.path.t)) for value in values], axis=1)
     if subject not in formulas.names:
         return None
     joint = formulas.names.index(subject)

@@ -8,6 +8,7 @@ Viscous and Coulomb friction belong to the arm (`arms.Arm`) and always act. A me
 """
 
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -16,7 +17,7 @@ from shared import BASE_RATE, COULOMB_VELOCITY, lugre, rigid_torque, through_gea
 PAYLOAD_RADIUS = 0.05  # m, of a solid ball
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Path:
     """A motion as the encoders show it, without their error: t in s, q, qd, qdd as samples x joints at BASE_RATE."""
 
@@ -72,6 +73,13 @@ class Defects:
         return real
 
 
+@lru_cache(maxsize=8)
+def lugre_memory(arm, path):
+    """LuGre friction without its viscous part."""
+    return lugre(arm, path.qd) - arm.viscous * path.qd
+
+
+@lru_cache(maxsize=8)
 def maxwell_slip(arm, path, ranges):
     """Four elastic sliders per joint with equal shares of Coulomb friction, which slip after a quarter, two quarters … of `ranges` rad."""
     out = np.zeros_like(path.q)
@@ -89,8 +97,7 @@ def sliding(arm, defects, path):
     """Friction at BASE_RATE, without what depends on load and time."""
     coulomb = arm.coulomb * np.tanh(path.qd / COULOMB_VELOCITY)
     if defects.lugre:
-        memory = lugre(arm, path.qd) - arm.viscous * path.qd
-        coulomb = np.where(np.asarray(defects.lugre) > 0, memory, coulomb)
+        coulomb = np.where(np.asarray(defects.lugre) > 0, lugre_memory(arm, path), coulomb)
     if defects.slip:
         coulomb = np.where(np.asarray(defects.slip) > 0, maxwell_slip(arm, path, defects.slip), coulomb)
     return arm.viscous * path.qd + coulomb

@@ -1,6 +1,6 @@
 """Fits worlds with one program and writes a JSON line per fit, then the table.
 
-    run --program twincal --seeds 1 3 [--worlds tilt,gain] [--held-back] [--robots ur5,panda] [--keep DIR] [--lines fits.jsonl]
+    run --program twincal --seeds 1 3 [--worlds tilt,gain] [--held-back] [--robots ur5,panda] [--keep DIR] [--lines fits.jsonl] [--judge-again]
 
 Logs are made once in the folder of `--keep` (default target/worlds), so that several programs are compared on the same logs. Fits that the
 lines have already, by the same program file, are not repeated. `compare.py a.jsonl b.jsonl` shows what two programs do differently.
@@ -73,6 +73,16 @@ def one(program, kind, seed, keep):
     return line | judged(truth, result, friction_only(program, folder, name), folder)
 
 
+def judge_again(line, keep):
+    """A line judged anew, from the result that its fit left in the folder of the logs."""
+    folder, truth = kept(line["world"], line["seed"], keep)
+    path = folder / f"out-{line['program']}" / "result.json"
+    if "error" in line or not path.exists():
+        return line
+    friction = json.loads((folder / f"friction-{line['program']}.json").read_text())
+    return line | judged(truth, json.loads(path.read_text()), friction, folder)
+
+
 def read(path):
     """Lines of a file, none if it is not there."""
     path = Path(path) if path else None
@@ -101,12 +111,16 @@ def main():
     arguments.add_argument("--jobs", type=int, default=1)
     arguments.add_argument("--keep", type=Path, default=ROOT / "target/worlds", help="folder of the logs")
     arguments.add_argument("--lines", type=Path, help="JSON lines of every fit; fits that are there are not repeated")
+    arguments.add_argument("--judge-again", action="store_true", help="judge the lines anew from the results that are kept with the logs")
     arguments.add_argument("--quiet", action="store_true", help="no line per fit on standard error")
     given = arguments.parse_args()
     program = given.program.resolve()
     name = fingerprint(program)
     cells = wanted(given)
     lines = [line for line in read(given.lines) if line["program"] == name and (line["world"], line["seed"]) in cells]
+    if given.judge_again:
+        lines = [judge_again(line, given.keep.resolve()) for line in lines]
+        given.lines.write_text("".join(json.dumps(line) + "\n" for line in lines))
     there = {(line["world"], line["seed"]) for line in lines}
     todo = [cell for cell in cells if cell not in there]
     with ProcessPoolExecutor(max(given.jobs, 1)) as pool:

@@ -13,7 +13,6 @@
 import numpy as np
 from columns import INERTIAL, Formulas, component_torque
 from defects import Path as Motion
-from shared import load
 
 FRICTION = ("viscous", "coulomb")
 ESTABLISHED, FULL_SET = 0.95, 4
@@ -54,7 +53,7 @@ class StandIns:
         third = np.load(folder / "third.npz")
         self.result = result
         motion = Motion(third["t"], third["q"], third["qd"], third["qdd"])
-        self.formulas = Formulas(load(truth["world"]["robot"]), motion, result["signal"]["coulomb_velocity"])
+        self.formulas = Formulas(truth["world"]["robot"], motion, result["signal"]["coulomb_velocity"])
         self.replaced = self.beyond_friction(sum(third["effects"][k] for k in missing))
 
     def beyond_friction(self, torque):

@@ -8,7 +8,8 @@ with the torque that every cause contributes to it. The same kind and seed give 
 
 import argparse
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property, lru_cache
 from math import radians
 from pathlib import Path
 
@@ -19,10 +20,11 @@ from defects import Path as Motion
 from oracle import standard_errors
 from shared import BASE_RATE, HERE, MOTIONS, Arm, Log, Recorder, Study, arms, colored, encode, write_study
 
-VERSION = 1  # of the worlds: logs of another version are made anew
+VERSION = 2  # of the worlds: logs of another version are made anew
 ROBOTS = ("ur5", "panda", "xarm7", "planar3")
 OTHER_ROBOTS = ("ur10", "z1")  # of the held-back worlds
-KINDS = ("null", "payload_link", "ur5_forearm", "tilt", "joint_zero", "gain", "lugre", "warm_up", "flexible", "link_length")
+KINDS = ("null", "payload_link", "ur5_forearm", "tilt", "joint_zero", "gain", "lugre", "warm_up", "flexible", "link_length",
+         "small")  # fmt: skip
 HELD_BACK = ("spring", "heavier_wrist", "maxwell_slip", "torque_ripple", "load_friction", "other_robot")
 # Largest payload drawn, kg; the least is a fifth of it
 PAYLOAD = {"ur5": 3.0, "panda": 2.5, "xarm7": 3.0, "planar3": 1.2, "ur10": 6.0, "z1": 1.5}
@@ -46,7 +48,7 @@ class Cause:
     body: list = field(default_factory=list)  # links of its body: all their levels count
 
 
-@dataclass
+@dataclass(eq=False)
 class World:
     """One robot with its defects, and how it is recorded."""
 
@@ -61,7 +63,7 @@ class World:
     defects: Defects
     causes: list
 
-    @property
+    @cached_property
     def arm(self):
         """The arm without defects, with its friction."""
         return Arm(arms.World(self.robot, self.motion, payload=0.0, seed=self.seed))
@@ -107,13 +109,13 @@ class Drawer:
         return tuple(sizes)
 
     def seen(self, make):
-        """Joints whose defect `make(joint)` changes some joint's torque by more than the noise (5 % of Coulomb friction) on a probe."""
+        """Joints whose defect `make(joint)` changes some joint's torque by more than 1 % of its Coulomb friction on a probe."""
         rng = np.random.default_rng(5)
         q, qd, qdd = rng.uniform(self.arm.low, self.arm.high, (60, self.model.nv)), *rng.normal(size=(2, 60, self.model.nv))
         probe = Motion(np.zeros(60), q, qd, qdd)
         base = torque(self.arm, Defects(), probe)
         size = lambda j: np.sqrt(np.mean((torque(self.arm, make(j), probe) - base) ** 2, 0))
-        return [j for j in range(self.model.nv) if (size(j) > 0.05 * self.arm.coulomb).any()]
+        return [j for j in range(self.model.nv) if (size(j) > 0.01 * self.arm.coulomb).any()]
 
     def one_joint(self, j, value):
         """A tuple with `value` at joint j."""
@@ -151,14 +153,18 @@ class Drawer:
         self.heavier((2,))
 
     def tilt(self):
-        """0.5 to 3 degrees about a horizontal axis (the joints' own on the planar arm)."""
-        angle = radians(self.rng.uniform(0.5, 3.0))
+        """0.5 to 3 degrees."""
+        self.lean(self.rng.uniform(0.5, 3.0))
+        self.maybe_payload()
+
+    def lean(self, degrees):
+        """The base leans about a horizontal axis (the joints' own on the planar arm)."""
+        angle = radians(degrees)
         around = 0.0 if self.robot == "planar3" else self.rng.uniform(-np.pi, np.pi)
         pitch = self.sign() * angle
         turn = pin.exp3(pitch * np.array([np.sin(around), np.cos(around), 0.0]))
         self.defects["tilt"] = tuple(float(x) for x in pin.rpy.matrixToRpy(turn))
         self.causes.append(Cause("tilt", "base", float(np.degrees(pitch)), "degrees", "tilt", None, ["base.tilt"], ["base.tilt"]))
-        self.maybe_payload()
 
     def joint_zero(self):
         """0.3 to 1.5 degrees on one or two joints."""
@@ -202,6 +208,45 @@ class Drawer:
         self.causes.append(Cause("link_length", links_of(self.model, joint - 1)[0], float(change), "1", "length", None, [], []))
         self.maybe_payload()
 
+    def small(self):
+        """Two of payload, heavier link and tilt; `draw` scales each to 8 to 40 standard errors."""
+        for which in self.rng.choice(3, 2, replace=False):
+            (self.payload, lambda: self.heavier(MIDDLE[self.robot]), lambda: self.lean(1.0))[which]()
+
+    def spring(self):
+        """A cable that pulls: twice to six times the Coulomb friction per rad, at rest within 0.5 rad."""
+        joint = int(self.rng.integers(self.model.nv))
+        stiffness = self.arm.coulomb[joint] * self.rng.uniform(2.0, 6.0)
+        self.defects["spring"] = (joint, float(stiffness), float(self.rng.uniform(-0.5, 0.5)))
+        self.causes += joint_causes(self.model, self.one_joint(joint, stiffness), "spring", "N m/rad", "spring", ["spring"])
+        self.maybe_payload()
+
+    def heavier_wrist(self):
+        """The last link but one has 10 to 30 % more mass."""
+        self.heavier((self.model.nv - 2,))
+        self.maybe_payload()
+
+    def maxwell_slip(self):
+        """Friction with memory of another kind: four elastic sliders per joint, 5 to 30 mrad of presliding."""
+        self.defects["slip"] = tuple(self.rng.uniform(0.005, 0.03, self.model.nv).tolist())
+        self.causes += joint_causes(self.model, self.arm.coulomb, "memory", "N m", "slip", ["hysteresis"], ["stribeck"])
+        self.maybe_payload()
+
+    def torque_ripple(self):
+        """A sine of the position, 20 to 60 periods per turn, of a fifth to three fifths of the Coulomb friction, on one joint."""
+        joint, periods = int(self.rng.integers(self.model.nv)), int(self.rng.integers(20, 61))
+        height = self.arm.coulomb[joint] * self.rng.uniform(0.2, 0.6)
+        self.defects["ripple"] = (joint, periods, float(height))
+        self.causes += joint_causes(self.model, self.one_joint(joint, height), "ripple", "N m", "ripple", ["ripple"])
+        self.maybe_payload()
+
+    def load_friction(self):
+        """Friction grows by 5 to 15 % of the torque of one or two joints."""
+        joints = self.seen(lambda j: Defects(load=self.one_joint(j, 0.1)))
+        self.defects["load"] = sizes = tuple(np.abs(self.some(joints, 0.05, 0.15)))
+        self.causes += joint_causes(self.model, sizes, "load_friction", "1", "load", ["load_friction"])
+        self.maybe_payload()
+
     def other_robot(self):
         """Payload and heavier link on a robot that no development world has."""
         self.payload_link()
@@ -223,9 +268,30 @@ def draw(kind, seed):
     drawer = Drawer(kind, seed, robot, world.arm)
     getattr(drawer, kind)()
     world.defects, world.causes = Defects(**drawer.defects), drawer.causes
+    if kind == "small":
+        scale_to(world, rng.uniform(np.log(8.0), np.log(40.0), len(world.causes)))
     return world
 
 
+def scale_to(world, logarithms):
+    """Scales payload, heavier link and tilt to sizes in standard errors; these grow in proportion to the defect as long as it is small."""
+    for _ in range(2):
+        for cause, now, log in zip(world.causes, sizes_of(world), logarithms):
+            factor, value = float(np.exp(log) / now), getattr(world.defects, cause.mechanism)
+            changed = {"payload": lambda: (value[0] * factor, value[1]), "heavier": lambda: (value[0], 1.0 + (value[1] - 1.0) * factor),
+                       "tilt": lambda: tuple(factor * x for x in value)}[cause.mechanism]()  # fmt: skip
+            world.defects = replace(world.defects, **{cause.mechanism: changed})
+            cause.size *= factor
+
+
+def sizes_of(world):
+    """Size of every cause in standard errors."""
+    keep = BASE_RATE // world.recorder.rate
+    paths = [path_of(world, which) for which in range(2)]
+    return standard_errors(world, paths, [contributions(world, path, keep) for path in paths], noise_sd(world))
+
+
+@lru_cache(maxsize=8)
 def path_of(world, which):
     """Motion number `which`: 0 and 1 training, 2 held out, 3 the third."""
     kind = (world.motion, world.motion, world.heldout, world.third)[which]
@@ -281,12 +347,11 @@ def make(kind, seed, folder):
     third = Motion(*(getattr(paths[3], name)[::keep] for name in ("t", "q", "qd", "qdd")))
     effects = contributions(world, paths[3], keep)
     clean = torque(world.arm, world.defects, paths[3], keep)
-    sizes = standard_errors(world, paths[:2], [contributions(world, path, keep) for path in paths[:2]], noise_sd(world))
     nominal = world.arm.model
     truth = {
         "version": VERSION, "kind": kind, "seed": seed, "motion": world.motion, "heldout_motion": world.heldout, "third_motion": world.third,
         "torque": world.torque, "defects": {name: getattr(world.defects, name) for name in world.defects.present()},
-        "causes": [{**asdict(cause), "standard_errors": size} for cause, size in zip(world.causes, sizes)],
+        "causes": [{**asdict(cause), "standard_errors": size} for cause, size in zip(world.causes, sizes_of(world))],
         "joints": list(nominal.names)[1:], "links": {link: j for j in range(nominal.nv) for link in links_of(nominal, j)},
         "noise_sd": noise_sd(world).tolist(), "coulomb": world.arm.coulomb.tolist(), "viscous": world.arm.viscous.tolist(),
         "nominal_mass": [body.mass for body in nominal.inertias][1:],
