@@ -17,6 +17,7 @@ from scipy.signal import butter, sosfiltfilt
 from shared import BASE_RATE, COULOMB_VELOCITY
 
 CUTOFF = 5.0  # Hz
+THIN = 10  # every tenth of the low-passed samples is kept, and counts tenfold
 
 
 def low_pass(columns, rate):
@@ -69,7 +70,8 @@ def standard_errors(world, paths, effects, sd):
     recorder, keep = world.recorder, BASE_RATE // world.recorder.rate
     rho = exp(-1.0 / (recorder.rate * recorder.noise_time))
     scale = 1.0 / (sd * (0.5 * (1.0 + (1.0 + rho) / (1.0 - rho))) ** 0.5)
-    stack = lambda parts: np.concatenate([low_pass(part, recorder.rate) * scale[:, None] for part in parts]).reshape(-1, parts[0].shape[2])
+    rows = lambda part: low_pass(part, recorder.rate)[::THIN] * (THIN**0.5 * scale[:, None])
+    stack = lambda parts: np.concatenate([rows(part) for part in parts]).reshape(-1, parts[0].shape[2])
     sets = [stack([columns_of(world, cause, path, keep, effect[k]) for path, effect in zip(paths, effects)])
             for k, cause in enumerate(world.causes)]  # fmt: skip
     friction = stack([friction_columns(path.qd[::keep]) for path in paths])

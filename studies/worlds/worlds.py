@@ -20,7 +20,7 @@ from defects import Path as Motion
 from oracle import standard_errors
 from shared import BASE_RATE, HERE, MOTIONS, Arm, Log, Recorder, Study, arms, colored, encode, write_study
 
-VERSION = 2  # of the worlds: logs of another version are made anew
+VERSION = 3  # of the worlds: logs of another version are made anew
 ROBOTS = ("ur5", "panda", "xarm7", "planar3")
 OTHER_ROBOTS = ("ur10", "z1")  # of the held-back worlds
 KINDS = ("null", "payload_link", "ur5_forearm", "tilt", "joint_zero", "gain", "lugre", "warm_up", "flexible", "link_length",
