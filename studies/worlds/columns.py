@@ -163,7 +163,8 @@ def coupled(formulas, name, column):
             b = pair.removeprefix(a + mark)
             if pair.startswith(a + mark) and b in formulas.names:
                 i, j = formulas.names.index(a), formulas.names.index(b)
-                speed = (formulas.path.qdd if family == "coupled_inertia" else formulas.path.qd) @ (np.eye(len(formulas.names))[i] + sign * np.eye(len(formulas.names))[j])
+                rates = formulas.path.qdd if family == "coupled_inertia" else formulas.path.qd
+                speed = rates[:, i] + sign * rates[:, j]
                 own = np.tanh(speed / formulas.v_s) if "coulomb" in column else speed
                 return i, j, sign, own
     return None
@@ -191,6 +192,8 @@ def column_torque(formulas, component, term, frame):
     if family == "generic":
         values = expression(name, n)(formulas.path.q.T, formulas.path.qd.T, formulas.path.qdd.T)
         return np.stack([np.broadcast_to(value, len(formulas.path.t)) for value in values], axis=1)
+    if name == "drives.gain":
+        return formulas.nominal
     if subject not in formulas.names:
         return None
     joint = formulas.names.index(subject)

@@ -11,7 +11,7 @@ from math import log
 
 import numpy as np
 from fits import read
-from table import components, coverage, error_ratio, false_claims, found, lines_of
+from table import LARGE, components, coverage, error_ratio, false_claims, lines_of
 
 
 def claims(line):
@@ -23,12 +23,12 @@ def claims(line):
 def numbers(line):
     """What is compared, per fit; None where a fit does not have it."""
     inside, rows = coverage([line])
-    hits, large = found(line)
+    large = [cause["established"] or cause["in_set"] for cause in line["causes"] if cause["standard_errors"] >= LARGE]
     ratio = error_ratio([line])
     sure = [row["judged"] for row in components([line]) if row["pip"] >= 0.95]
     return {
         "established and false": false_claims(line), "… inertial": false_claims(line, True), "PIP ≥ .95": len(sure), "… true": sure.count("true"),
-        "true effects ≥ 8 se found": hits if large else None, "held-out coverage": inside / rows if rows else None,
+        "effects ≥ 8 se found, of all": sum(large) if large else None, "held-out coverage": inside / rows if rows else None,
         "log error / friction": log(ratio) if ratio > 0 else None, "CPU, s": line["cpu"],
     }  # fmt: skip
 
@@ -60,6 +60,12 @@ def changes(a, b):
     return gone + new
 
 
+def shared_pairs(a, b):
+    """Pairs of lines of the worlds that both fitted."""
+    right = {(line["world"], line["seed"]): line for line in b if "error" not in line}
+    return [(line, right[key]) for line in a if "error" not in line and (key := (line["world"], line["seed"])) in right]
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("a")
@@ -67,11 +73,10 @@ def main():
     arguments.add_argument("--all", action="store_true")
     given = arguments.parse_args()
     left, right = ({(line["world"], line["seed"]): line for line in read(path)} for path in (given.a, given.b))
-    both = [key for key in left if key in right]
-    for key in both:
-        if ("error" in left[key]) != ("error" in right[key]):
+    for key in left:
+        if key in right and ("error" in left[key]) != ("error" in right[key]):
             print(f"- `{key[0]}` {key[1]}: {'b' if 'error' in right[key] else 'a'} refuses")
-    pairs = [(left[key], right[key]) for key in both if "error" not in left[key] and "error" not in right[key]]
+    pairs = shared_pairs(left.values(), right.values())
     if not pairs:
         print("no world that both fitted")
         return

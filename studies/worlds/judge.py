@@ -100,14 +100,14 @@ def judge_components(truth, result, folder):
 
 
 def judge_sets(truth, result, rows):
-    """Sets that are claims: at most four members, probability 0.95 or more, no member established; once each."""
+    """Sets that are claims: at most four members, probability 0.95 or more, none established, none viscous or Coulomb friction; once each."""
     status = {row["name"]: row["status"] for row in rows}
     judged = {row["name"]: row["judged"] for row in rows}
     sets = []
     for group in result["groups"]:
         members = group["members"]
         families = {c["family"] for c in result["components"] if c["name"] in members}
-        if group["pip"] is None or group["pip"] < ESTABLISHED or len(members) > FULL_SET or families <= set(FRICTION):
+        if group["pip"] is None or group["pip"] < ESTABLISHED or len(members) > FULL_SET or families & set(FRICTION):
             continue
         if any(status.get(member) == "established" for member in members):
             continue
@@ -137,13 +137,13 @@ def masses(truth, result):
     for cause in truth["causes"]:
         if cause["family"] not in ("payload", "body"):
             continue
-        joint = truth["links"][cause["body"][0]]
-        found = []
+        nominal, found = truth["nominal_mass"][truth["links"][cause["body"][0]]], []
         for component in result["components"]:
             if not is_true(cause, component["name"]) or (component["pip"] or 0.0) < 0.5:
                 continue
             for parameter in component["parameters"]:
-                factor = {"mass": 1.0, "m": 1.0}.get(parameter["name"], truth["nominal_mass"][joint] if component["family"] in ("mass_scale", "density") else None)
+                scaled = nominal if component["family"] in ("mass_scale", "density") else None
+                factor = 1.0 if parameter["name"] in ("mass", "m") else scaled
                 if factor and parameter["interval95"][0] is not None:
                     low, high = (factor * end for end in parameter["interval95"])
                     found.append([component["name"], factor * parameter["mean"], cause["size"], low, high, component["pip"]])

@@ -145,15 +145,17 @@ class Drawer:
         """Nothing but viscous and Coulomb friction."""
 
     def payload_link(self):
+        """A payload, and a middle link with 10 to 30 % more mass, first moments and tensor."""
         self.payload()
         self.heavier(MIDDLE[self.robot])
 
     def ur5_forearm(self):
+        """UR5 with a payload and a forearm with 10 to 30 % more mass, first moments and tensor."""
         self.payload()
         self.heavier((2,))
 
     def tilt(self):
-        """0.5 to 3 degrees."""
+        """The base leans by 0.5 to 3 degrees about a horizontal axis."""
         self.lean(self.rng.uniform(0.5, 3.0))
         self.maybe_payload()
 
@@ -209,7 +211,7 @@ class Drawer:
         self.maybe_payload()
 
     def small(self):
-        """Two of payload, heavier link and tilt; `draw` scales each to 8 to 40 standard errors."""
+        """Two of payload, heavier link and tilt, each scaled to 8 to 40 standard errors."""
         for which in self.rng.choice(3, 2, replace=False):
             (self.payload, lambda: self.heavier(MIDDLE[self.robot]), lambda: self.lean(1.0))[which]()
 
@@ -248,8 +250,9 @@ class Drawer:
         self.maybe_payload()
 
     def other_robot(self):
-        """Payload and heavier link on a robot that no development world has."""
-        self.payload_link()
+        """A payload and a heavier middle link on a robot that no development world has."""
+        self.payload()
+        self.heavier(MIDDLE[self.robot])
 
 
 def draw(kind, seed):
