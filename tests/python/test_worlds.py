@@ -145,6 +145,19 @@ def test_contributions_add_up_where_causes_do():
     np.testing.assert_allclose(worlds.contributions(world, path, 1).sum(0), all_in - plain, atol=1e-9)
 
 
+def test_two_zeros_contribute_what_each_does():
+    """To first order: the sum is within 2 % of both together, and neither is the other's."""
+    world = replace(worlds.draw("null", SEED), robot="ur5", defects=Defects(zero=(0.0, 0.02, -0.01, 0.0, 0.0, 0.0)))
+    sizes = world.defects.zero
+    world.causes = worlds.joint_causes(world.arm.model, sizes, "encoder_zero", "rad", "zero", ["encoder_zero"], only=False)
+    path = motion(world)
+    effects = worlds.contributions(world, path, 1)
+    both = torque(world.arm, world.defects, path) - torque(world.arm, Defects(), path)
+    assert np.linalg.norm(effects.sum(0) - both) < 0.02 * np.linalg.norm(both)
+    alone = torque(world.arm, Defects(zero=(0.0, 0.02, 0.0, 0.0, 0.0, 0.0)), path) - torque(world.arm, Defects(), path)
+    assert np.linalg.norm(effects[0] - alone) < 0.02 * np.linalg.norm(alone)
+
+
 def test_every_kind_draws_within_its_ranges_and_again_the_same():
     for kind in worlds.KINDS + worlds.HELD_BACK:
         for seed in range(SEED, SEED + (1 if kind == "small" else 4)):
