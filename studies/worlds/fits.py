@@ -101,6 +101,16 @@ def wanted(given):
     return [cell for cell in cells if robots is None or draw(*cell).robot in robots]
 
 
+def made(program, todo, given):
+    """Lines of the worlds to do, one after the other; with more jobs in other processes, in the same order."""
+    tasks = [(program, *cell, given.keep.resolve()) for cell in todo]
+    if given.jobs <= 1:
+        yield from (one(*task) for task in tasks)
+        return
+    with ProcessPoolExecutor(given.jobs) as pool:
+        yield from pool.map(one, *zip(*tasks)) if tasks else []
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("--program", type=Path, default=PROGRAM)
@@ -123,14 +133,13 @@ def main():
         given.lines.write_text("".join(json.dumps(line) + "\n" for line in lines))
     there = {(line["world"], line["seed"]) for line in lines}
     todo = [cell for cell in cells if cell not in there]
-    with ProcessPoolExecutor(max(given.jobs, 1)) as pool:
-        for line in pool.map(one, *zip(*[(program, *cell, given.keep.resolve()) for cell in todo])) if todo else []:
-            lines.append(line)
-            if given.lines:
-                with given.lines.open("a") as file:
-                    file.write(json.dumps(line) + "\n")
-            if not given.quiet:
-                print(summary(line), file=sys.stderr, flush=True)
+    for line in made(program, todo, given):
+        lines.append(line)
+        if given.lines:
+            with given.lines.open("a") as file:
+                file.write(json.dumps(line) + "\n")
+        if not given.quiet:
+            print(summary(line), file=sys.stderr, flush=True)
     print(markdown(lines))
     return 0
 

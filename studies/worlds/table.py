@@ -40,8 +40,9 @@ def components(lines):
 
 def false_claims(line, inertial=False):
     """Established and false components, and sets without the cause, of one fit."""
-    own = [row for row in line["components"] if row["status"] == "established" and row["judged"] == "false" and (not inertial or row["family"] in INERTIAL)]
-    return len(own) + sum(one["judged"] == "false" and (not inertial or one["inertial"]) for one in line["sets"])
+    wrong = [row for row in line["components"] if row["status"] == "established" and row["judged"] == "false"]
+    sets = [one for one in line["sets"] if one["judged"] == "false"]
+    return sum(not inertial or row["family"] in INERTIAL for row in wrong) + sum(not inertial or one["inertial"] for one in sets)
 
 
 def found(line):
@@ -131,6 +132,7 @@ class Limits:
         self.rows = []
 
     def add(self, what, reached, asked, missed):
+        """A row."""
         self.rows.append([what, reached, asked, "missed" if missed else ""])
 
     def probabilities(self):

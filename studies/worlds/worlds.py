@@ -99,6 +99,7 @@ class Drawer:
         self.defects, self.causes = {}, []
 
     def sign(self):
+        """Plus or minus one."""
         return self.rng.choice((-1.0, 1.0))
 
     def some(self, joints, low, high):
