@@ -17,6 +17,7 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+import numpy as np
 from judge import judged
 from shared import ROOT
 from table import markdown
@@ -61,6 +62,23 @@ def friction_only(program, folder, name):
     return json.loads(path.read_text())
 
 
+def prediction(program, folder, out):
+    """What the twin predicts along the third motion, as `judge` asks for it."""
+
+    def predict(path, joints):
+        names = ["t", *(f"{name}{j + 1}" for name in ("q", "qd", "qdd", "tau") for j in range(len(joints)))]
+        motion = np.hstack([path.t[:, None], path.q, path.qd, path.qdd, np.zeros_like(path.q)])
+        np.savetxt(folder / "third.csv", motion, delimiter=",", header=",".join(names), comments="")
+        command = [str(program), "predict", "third.csv", "--twin", out, "-o", f"third-{out}.csv", "--force"]
+        subprocess.run(command, cwd=folder, capture_output=True, stdin=subprocess.DEVNULL, timeout=LIMIT)
+        with (folder / f"third-{out}.csv").open() as file:
+            header = file.readline().strip().split(",")
+            said = np.loadtxt(file, delimiter=",", usecols=[0, *(header.index(f"{joint}.tau") for joint in joints)])
+        return np.searchsorted(path.t, said[:, 0] - 1e-6), said[:, 1:]
+
+    return predict
+
+
 def one(program, kind, seed, keep):
     """Makes, fits and judges one world; its line."""
     folder, truth = kept(kind, seed, keep)
@@ -70,17 +88,18 @@ def one(program, kind, seed, keep):
             "program": name, "code": code, "cpu": round(cpu, 2), "wall": round(wall, 2)}  # fmt: skip
     if result is None:
         return line | {"error": error[max(error.find("error:"), 0) :].strip()}
-    return line | judged(truth, result, friction_only(program, folder, name), folder)
+    return line | judged(truth, result, friction_only(program, folder, name), folder, prediction(program, folder, f"out-{name}"))
 
 
-def judge_again(line, keep):
+def judge_again(program, line, keep):
     """A line judged anew, from the result that its fit left in the folder of the logs."""
     folder, truth = kept(line["world"], line["seed"], keep)
-    path = folder / f"out-{line['program']}" / "result.json"
+    out = f"out-{line['program']}"
+    path = folder / out / "result.json"
     if "error" in line or not path.exists():
         return line
     friction = json.loads((folder / f"friction-{line['program']}.json").read_text())
-    return line | judged(truth, json.loads(path.read_text()), friction, folder)
+    return line | judged(truth, json.loads(path.read_text()), friction, folder, prediction(program, folder, out))
 
 
 def read(path):
@@ -129,7 +148,7 @@ def main():
     cells = wanted(given)
     lines = [line for line in read(given.lines) if line["program"] == name and (line["world"], line["seed"]) in cells]
     if given.judge_again:
-        lines = [judge_again(line, given.keep.resolve()) for line in lines]
+        lines = [judge_again(program, line, given.keep.resolve()) for line in lines]
         given.lines.write_text("".join(json.dumps(line) + "\n" for line in lines))
     there = {(line["world"], line["seed"]) for line in lines}
     todo = [cell for cell in cells if cell not in there]

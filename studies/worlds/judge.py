@@ -49,9 +49,9 @@ def has_candidate(cause, names):
 class StandIns:
     """Judges components where causes have no candidate."""
 
-    def __init__(self, truth, result, folder, missing):
+    def __init__(self, truth, result, folder, missing, predict):
         third = np.load(folder / "third.npz")
-        self.result = result
+        self.result, self.predict, self.parts = result, predict, None
         motion = Motion(third["t"], third["q"], third["qd"], third["qdd"])
         self.formulas = Formulas(truth["world"]["robot"], motion, result["signal"]["coulomb_velocity"])
         self.replaced = self.beyond_friction(sum(third["effects"][k] for k in missing))
@@ -64,10 +64,28 @@ class StandIns:
             rest[:, j] -= columns @ np.linalg.lstsq(columns, torque[:, j], rcond=None)[0]
         return rest
 
+    def remainder(self, name):
+        """Torque of a component of one joint without a formula: what the twin's prediction has there beyond nominal torque and all formulas.
+
+        None where several such components of that joint are likely, or it is no joint's.
+        """
+        if self.parts is None:
+            self.parts = {c["name"]: component_torque(self.formulas, self.result, c["name"], mean="mean") for c in self.result["components"]}
+        pips = {c["name"]: c["pip"] or 0.0 for c in self.result["components"]}
+        joint = name.rpartition(".")[0]
+        beside = [other for other, part in self.parts.items() if part is None and other.rpartition(".")[0] == joint and pips[other] >= KEPT]
+        if beside != [name] or joint not in self.formulas.names:
+            return None
+        j, out = self.formulas.names.index(joint), np.zeros_like(self.formulas.nominal)
+        rows, predicted = self.predict(self.formulas.path, self.formulas.names)
+        known = self.formulas.nominal + sum(part for part in self.parts.values() if part is not None)
+        out[rows, j] = (predicted[:, j] - known[rows, j]) / pips[name]
+        return out
+
     def share(self, name):
-        """Share of the mean square that a component takes off; None where its torque has no formula here."""
+        """Share of the mean square that a component takes off; None where its torque is not known."""
         torque = component_torque(self.formulas, self.result, name)
-        if torque is None:
+        if torque is None and (torque := self.remainder(name)) is None:
             return None
         own = self.beyond_friction(torque)
         acts = np.sqrt((own**2).mean(0)) > 1e-3 * max(np.sqrt((own**2).mean(0)).max(), 1e-12)
@@ -75,7 +93,7 @@ class StandIns:
         return float(1.0 - ((self.replaced[:, acts] - own[:, acts]) ** 2).sum() / goal) if goal > 0 else 0.0
 
 
-def judge_components(truth, result, folder):
+def judge_components(truth, result, folder, predict=None):
     """Rows of components and whether each cause has a candidate."""
     names = [c["name"] for c in result["components"]]
     candidate = [has_candidate(cause, names) for cause in truth["causes"]]
@@ -91,7 +109,7 @@ def judge_components(truth, result, folder):
         if any(is_true(cause, component["name"]) for cause in truth["causes"]):
             row["judged"] = "true"
         elif missing and pip >= 0.5:
-            stand_ins = stand_ins or StandIns(truth, result, folder, missing)
+            stand_ins = stand_ins or StandIns(truth, result, folder, missing, predict)
             row["takes_off"] = stand_ins.share(component["name"])
             if row["takes_off"] is not None and row["takes_off"] >= STAND_IN:
                 row["judged"] = "stand_in"
@@ -160,8 +178,8 @@ def heldout(result, friction):
              "rmse_friction": base.get(row["joint"])} for row in scores]  # fmt: skip
 
 
-def judged(truth, result, friction, folder):
-    """The judgement of one fit."""
-    rows, candidate = judge_components(truth, result, folder)
+def judged(truth, result, friction, folder, predict):
+    """The judgement of one fit. `predict(path, joints)` gives rows of a motion and the twin's torque there."""
+    rows, candidate = judge_components(truth, result, folder, predict)
     return {"components": rows, "sets": judge_sets(truth, result, rows), "causes": judge_causes(truth, result, rows, candidate),
             "well_specified": all(candidate), "masses": masses(truth, result), "heldout": heldout(result, friction)}  # fmt: skip

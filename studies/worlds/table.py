@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from columns import INERTIAL
-from scipy.stats import beta, poisson
+from scipy.stats import beta
 
 BINS = ((0.5, 0.8), (0.8, 0.95), (0.95, 0.99), (0.99, 1.0000001))
 LARGE = 8.0  # standard errors
@@ -163,7 +163,7 @@ class Limits:
         self.add("… inertial", f"{mean(inertial):.2f}", "≤ .1", exceeds(sum(inertial.values(), []), 0.1))
         if "null" in self.worlds:
             wrong, fits = sum(false["null"]), len(false["null"])
-            self.add("false terms in fits of noise (`null`)", f"{wrong} in {fits}", "≤ 1 in 100", poisson.sf(wrong - 1, 0.01 * fits) < 0.01)
+            self.add("false terms in fits of noise (`null`)", f"{wrong} in {fits}", "≤ 1 in 100", exceeds(false["null"], 0.01))
 
     def power(self):
         """True effects of 8 standard errors or more that have a candidate."""
@@ -202,10 +202,15 @@ class Limits:
 
 
 def exceeds(counts, limit):
-    """Whether counts per fit are above a mean of `limit`: one-sided at 99 %, their spread over fits taken from the fits (Poisson at least)."""
+    """Whether the mean of counts per fit is above `limit`, one-sided at 99 %, by one of two tests.
+
+    A mean of at most `limit` allows at most this share of fits with any count (Markov's inequality): binomial. And the mean against its
+    standard error, the spread taken from the fits (that of a Poisson count at least), since counts of one fit are not independent.
+    """
     counts = np.asarray(counts, float)
-    spread = max(counts.var(ddof=1) if len(counts) > 1 else 0.0, limit)
-    return bool(counts.mean() - limit > 2.326 * (spread / len(counts)) ** 0.5)
+    some = int((counts > 0).sum())
+    spread = max(counts.var(ddof=1) if len(counts) > 1 else counts.mean(), limit)
+    return bool(bounds99(some, len(counts))[0] > limit or counts.mean() - limit > 2.326 * (spread / len(counts)) ** 0.5)
 
 
 def lines_of(rows):

@@ -11,7 +11,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from conftest import ROOT, program, twincal
+from conftest import ROOT, program
 
 sys.path.insert(0, str(ROOT / "studies" / "worlds"))
 
@@ -231,40 +231,61 @@ def lines(folder):
     return [fits.one(program("twincal"), kind, seed, folder) for kind, seed in SHORT]
 
 
+def fitted(line, folder):
+    """Folder, truth, result and formulas along the third motion of a line."""
+    place, truth = worlds.kept(line["world"], line["seed"], folder)
+    result = json.loads((place / f"out-{line['program']}" / "result.json").read_text())
+    third = np.load(place / "third.npz")
+    path = Motion(third["t"], third["q"], third["qd"], third["qdd"])
+    return place, truth, result, Formulas(truth["world"]["robot"], path, result["signal"]["coulomb_velocity"])
+
+
 def test_the_parts_of_a_twin_add_up_to_its_prediction(lines, folder):
     """Stand-ins are judged by formulas of our own: summed over all components they are what `twincal predict` says of joints that move."""
     compared = 0
     for line in lines:
-        place, truth = worlds.kept(line["world"], line["seed"], folder)
-        out = place / f"out-{line['program']}"
-        if "error" in line or truth["world"]["robot"] == "planar3":
+        if "error" in line or line["robot"] == "planar3":
             continue
-        result = json.loads((out / "result.json").read_text())
-        third = np.load(place / "third.npz")
-        path = Motion(third["t"], third["q"], third["qd"], third["qdd"])
-        formulas = Formulas(truth["world"]["robot"], path, result["signal"]["coulomb_velocity"])
+        place, truth, result, formulas = fitted(line, folder)
         parts = {c["name"]: component_torque(formulas, result, c["name"], mean="mean") for c in result["components"]}
         weight = {c["name"]: c["pip"] or 0.0 for c in result["components"]}
         if any(part is None and weight[name] > 1e-3 for name, part in parts.items()):
-            continue  # a family whose torque depends on the past has no formula here, and is no stand-in
-        columns = {"t": path.t[:, None], "q": path.q, "qd": path.qd, "qdd": path.qdd, "tau": third["tau"]}
-        names = ["t"] + [f"{name}{j + 1}" for name in ("q", "qd", "qdd", "tau") for j in range(path.q.shape[1])]
-        np.savetxt(place / "third.csv", np.hstack(list(columns.values())), delimiter=",", header=",".join(names), comments="")
-        twincal("predict", place / "third.csv", "--twin", out, "-o", place / "third-tau.csv", "--force", expect=None)
-        header = (place / "third-tau.csv").open().readline().strip().split(",")
-        said = np.genfromtxt(place / "third-tau.csv", delimiter=",", skip_header=1)
-        rows = np.searchsorted(path.t, said[:, 0] - 1e-6)
+            continue  # a family whose torque depends on the past has no formula here
+        rows, said = fits.prediction(program("twincal"), place, f"out-{line['program']}")(formulas.path, truth["joints"])
         total = formulas.nominal + sum(part for part in parts.values() if part is not None)
         for j, joint in enumerate(truth["joints"]):
-            moving = np.abs(path.qd[rows, j]) > 0.2
-            gap = said[moving, header.index(f"{joint}.tau")] - total[rows, j][moving]
+            moving = np.abs(formulas.path.qd[rows, j]) > 0.2
+            gap = (said[:, j] - total[rows, j])[moving]
             assert np.sqrt(np.mean(gap**2)) < 1e-3 * max(np.abs(total[:, j]).max(), 1.0), (line["world"], joint)
         compared += 1
-    assert compared >= 3
+    assert compared >= 2
+
+
+def test_a_component_without_formula_is_what_the_prediction_has_beyond_the_others(lines, folder, monkeypatch):
+    """Viscous friction of one joint, its formula taken away, comes out of `twincal predict` as the formula has it."""
+    line = next(line for line in lines if line["world"] == "ur5_forearm")
+    place, truth, result, formulas = fitted(line, folder)
+    name = f"{truth['joints'][1]}.viscous"
+    true = component_torque(formulas, result, name)[:, 1]
+    known = lambda formulas, result, which, mean="conditional_mean": None if which == name else component_torque(formulas, result, which, mean)
+    monkeypatch.setattr(judge, "component_torque", known)
+    missing = judge.StandIns(truth, result, place, [0], fits.prediction(program("twincal"), place, f"out-{line['program']}"))
+    moving = np.abs(formulas.path.qd[:, 1]) > 0.2
+    moving[:100] = moving[-100:] = False
+    np.testing.assert_allclose(missing.remainder(name)[moving, 1], true[moving], atol=2e-3 * np.abs(true).max())
 
 
 def test_twelve_fits_reach_the_limits(lines):
-    """No limit of the study is missed by its one-sided 99 % bound: each of them fails by chance in less than 1 of 100 changes of the seeds."""
+    """No limit is missed by its one-sided 99 % bound: one of the nine fails by chance in less than 9 of 100 changes of the seeds, which are fixed.
+
+    Bins of probabilities and the worst world need more fits than 12 and are left to the study.
+    """
     assert len(lines) == 12
-    missed = [row[:3] for row in table.limits(lines) if row[-1] == "missed"]
+    missed = [row[:3] for row in table.limits(lines) if row[-1] == "missed" and not row[0].startswith(("PIP 0.", "… worst world"))]
     assert not missed, table.markdown(lines)
+
+
+def test_a_count_above_its_limit_is_missed():
+    """Of 12 fits with a mean of 0.1 at most, five or more have a false effect in less than 1 of 100 studies (binomial: 0.0043)."""
+    assert table.exceeds([1] * 5 + [0] * 7, 0.1) and not table.exceeds([1] * 2 + [0] * 10, 0.1)
+    assert not table.exceeds([0] * 12, 0.1)
