@@ -1,8 +1,9 @@
-"""Torque of a reported component along a motion, from the coefficients in result.json and Pinocchio.
+"""Torque of a reported component along a motion, from the numbers in result.json and Pinocchio.
 
     component_torque(Formulas("ur5", path, 0.01), result, "elbow_joint.spring")     # samples x joints, N m; None without a formula here
 
-The formulas are those of docs/components.md; `tests/python/test_worlds.py` compares their sum with `twincal predict`.
+The formulas are those of docs/components.md, with the coefficients of `terms[]`; bodies go by `components[].parameters`.
+`tests/python/test_worlds.py` compares their sum with `twincal predict`.
 """
 
 import xml.etree.ElementTree as tree
@@ -39,25 +40,30 @@ class Formulas:
         joint = frame.parentJoint
         return self.regressors[:, :, 10 * (joint - 1) : 10 * joint] @ inertia_of(joint, frame.placement)
 
-    def inertial(self, link, level, column):
-        """A column of `<link>.mass_moments`, `<link>.tensor` or `<link>.mass_scale`."""
+    def inertial(self, component, whole):
+        """Torque of payload or of a level of a body, from its parameters: those are physical whatever columns the program has for them.
+
+        `whole`: the levels are about the centre of mass of all links that are fixed to each other, not of the named link alone.
+        """
+        link, _, level = component["name"].rpartition(".")
+        values = {p["name"]: p["mean"] for p in component["parameters"] if p["mean"] is not None}
 
         def parameters(joint, placement):
             if level in ("mass_scale", "density"):
-                return self.model.inertias[joint].toDynamicParameters()
-            return moved(own_inertia(column, own_inertial(self.robot, link).lever), placement)
+                return values["value"] * self.model.inertias[joint].toDynamicParameters()
+            centre = placement.actInv(self.model.inertias[joint].lever) if whole else own_inertial(self.robot, link).lever
+            return moved(sum(size * own_inertia(name, centre) for name, size in values.items()), placement)
 
         return self.body(link, parameters)
 
-    def payload(self, link, column):
-        """A column of `payload` in the frame of `link`: its tensor is about the nominal centre of mass of the link that carries it."""
-
-        def parameters(joint, placement):
-            carrier = next(f for f in self.model.frames if f.type == pin.FrameType.BODY and f.parentJoint == joint)
-            centre = carrier.placement.act(own_inertial(self.robot, carrier.name).lever)
-            return moved(payload_inertia(column, placement.actInv(centre)), placement)
-
-        return self.body(link, parameters)
+    def payload(self, component):
+        """Torque of a payload from mass, centre of mass (or first moments) and tensor, all about the origin of its frame."""
+        link = component["story"].removeprefix("payload at ")
+        values = {p["name"]: p["mean"] for p in component["parameters"] if p["mean"] is not None}
+        mass = values.get("mass", 0.0)
+        moments = [values.get(f"m{axis}", mass * values.get(f"com_{axis}", 0.0)) for axis in "xyz"]
+        tensor = sum(values.get(name, 0.0) * tensor_parameters(name) for name in TENSOR)
+        return self.body(link, lambda joint, placement: moved(np.concatenate([[mass], moments, np.zeros(6)]) + tensor, placement))
 
     def gravity(self, axis):
         """Torque per unit of gravity."""
@@ -132,17 +138,6 @@ def moment_about(column, centre):
     return np.concatenate([[0.0], h, [tensor[0, 0], tensor[0, 1], tensor[1, 1], tensor[0, 2], tensor[1, 2], tensor[2, 2]]])
 
 
-def payload_inertia(column, centre):
-    """Mass and first moments about the frame, tensor about `centre`: with c its place, I = (2 h.c - m c.c) E - (h c' + c h' - m c c')."""
-    if column in TENSOR:
-        return tensor_parameters(column)
-    if column != "m":
-        return moment_about(column, centre)
-    about = -mass_at_centre(centre)
-    about[:4] = (1.0, 0.0, 0.0, 0.0)
-    return about
-
-
 def moved(parameters, placement):
     """Ten parameters about a frame, about the joint's frame in which it stands at `placement`."""
     mass, h, rest = parameters[0], parameters[1:4], parameters[4:]
@@ -170,16 +165,12 @@ def coupled(formulas, name, column):
     return None
 
 
-def column_torque(formulas, component, term, frame):
+def column_torque(formulas, component, term):
     """Torque per unit of one term of a component; None where there is no formula."""
     name, family = component["name"], component["family"]
     subject, _, _ = name.rpartition(".")
     column = term.removeprefix(name).lstrip(".")
     n = len(formulas.names)
-    if name == "payload":
-        return formulas.payload(frame, column)
-    if family in ("mass_moments", "tensor", "mass_scale", "density"):
-        return formulas.inertial(subject, family, column)
     if family == "tilt":
         return formulas.gravity(column)
     if family in ("coupled_friction", "coupled_inertia"):
@@ -204,16 +195,21 @@ def column_torque(formulas, component, term, frame):
 
 
 def component_torque(formulas, result, name, mean="conditional_mean"):
-    """Torque of a component with the coefficients of result.json (given that it is in, or `mean="mean"`: averaged); None without a formula."""
+    """Torque of a component with the numbers of result.json (given that it is in, or `mean="mean"`: averaged); None without a formula."""
     component = next(c for c in result["components"] if c["name"] == name)
+    if component["family"] in INERTIAL:
+        if not any(p["mean"] for p in component["parameters"]):
+            return np.zeros_like(formulas.path.q)
+        whole = any(c["family"] == "density" for c in result["components"])
+        own = formulas.payload(component) if name == "payload" else formulas.inertial(component, whole)
+        return own * (component["pip"] or 0.0) if mean == "mean" else own
     terms = {term["name"]: term for term in result["terms"]}
-    frame = component["story"].removeprefix("payload at ") if name == "payload" else ""
     total = np.zeros_like(formulas.path.q)
     for column in component["columns"]:
         size = terms.get(column, {}).get(mean)
         if not size:
             continue
-        own = column_torque(formulas, component, column, frame)
+        own = column_torque(formulas, component, column)
         if own is None:
             return None
         total = total + size * own

@@ -241,7 +241,10 @@ def fitted(line, folder):
 
 
 def test_the_parts_of_a_twin_add_up_to_its_prediction(lines, folder):
-    """Stand-ins are judged by formulas of our own: summed over all components they are what `twincal predict` says of joints that move."""
+    """Stand-ins are judged by formulas of our own: summed over all components they are what `twincal predict` says of joints that move.
+
+    Within 1 % of the largest torque: bodies go by their reported parameters, and the centre of mass is a median.
+    """
     compared = 0
     for line in lines:
         if "error" in line or line["robot"] == "planar3":
@@ -256,7 +259,7 @@ def test_the_parts_of_a_twin_add_up_to_its_prediction(lines, folder):
         for j, joint in enumerate(truth["joints"]):
             moving = np.abs(formulas.path.qd[rows, j]) > 0.2
             gap = (said[:, j] - total[rows, j])[moving]
-            assert np.sqrt(np.mean(gap**2)) < 1e-3 * max(np.abs(total[:, j]).max(), 1.0), (line["world"], joint)
+            assert np.sqrt(np.mean(gap**2)) < 1e-2 * max(np.abs(total[:, j]).max(), 1.0), (line["world"], joint)
         compared += 1
     assert compared >= 2
 
@@ -272,7 +275,7 @@ def test_a_component_without_formula_is_what_the_prediction_has_beyond_the_other
     missing = judge.StandIns(truth, result, place, [0], fits.prediction(program("twincal"), place, f"out-{line['program']}"))
     moving = np.abs(formulas.path.qd[:, 1]) > 0.2
     moving[:100] = moving[-100:] = False
-    np.testing.assert_allclose(missing.remainder(name)[moving, 1], true[moving], atol=2e-3 * np.abs(true).max())
+    np.testing.assert_allclose(missing.remainder(name)[moving, 1], true[moving], atol=2e-2 * np.abs(true).max())
 
 
 def test_twelve_fits_reach_the_limits(lines):
