@@ -146,10 +146,13 @@ def main():
     program = given.program.resolve()
     name = fingerprint(program)
     cells = wanted(given)
-    lines = [line for line in read(given.lines) if line["program"] == name and (line["world"], line["seed"]) in cells]
+    kept_lines = read(given.lines)
+    mine = lambda line: line["program"] == name and (line["world"], line["seed"]) in cells
+    lines = [line for line in kept_lines if mine(line)]
     if given.judge_again:
         lines = [judge_again(program, line, given.keep.resolve()) for line in lines]
-        given.lines.write_text("".join(json.dumps(line) + "\n" for line in lines))
+        others = [line for line in kept_lines if not mine(line)]
+        given.lines.write_text("".join(json.dumps(line) + "\n" for line in others + lines))
     there = {(line["world"], line["seed"]) for line in lines}
     todo = [cell for cell in cells if cell not in there]
     for line in made(program, todo, given):
