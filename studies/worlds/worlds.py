@@ -8,6 +8,8 @@ with the torque that every cause contributes to it. The same kind and seed give 
 
 import argparse
 import json
+import os
+import shutil
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, lru_cache
 from math import radians
@@ -384,7 +386,11 @@ def kept(kind, seed, folder=HERE.parents[1] / "target" / "worlds"):
         truth = json.loads(path.read_text())
         if truth.get("version") == VERSION:
             return folder, truth
-    make(kind, seed, folder)
+    # complete or absent, also where two runs make the same world
+    part = folder.with_name(f"{folder.name}.{os.getpid()}")
+    make(kind, seed, part)
+    shutil.rmtree(folder, ignore_errors=True)
+    part.rename(folder)
     return folder, json.loads(path.read_text())
 
 
