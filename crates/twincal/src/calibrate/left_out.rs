@@ -194,8 +194,16 @@ impl LeftOut {
         Some(LeftOutError {
             left_out: folds.kind,
             blocks: gained.len(),
-            lowered: if error > 0.0 { count * mean / error } else { 0.0 },
-            standard_errors: if sds.is_nan() { 0.0 } else { sds.clamp(-MOST_SDS, MOST_SDS) },
+            lowered: if error > 0.0 {
+                count * mean / error
+            } else {
+                0.0
+            },
+            standard_errors: if sds.is_nan() {
+                0.0
+            } else {
+                sds.clamp(-MOST_SDS, MOST_SDS)
+            },
             needed: folds.needed,
         })
     }
@@ -216,7 +224,12 @@ impl LeftOut {
                 normal[place * size + place] += 1.0 / self.slab[k];
             }
             // What stands at its bound is given.
-            let given = |k: usize| (0..count).filter(|i| !free.contains(i)).map(|i| at(k, i) * beta[i]).sum::<f64>();
+            let given = |k: usize| {
+                (0..count)
+                    .filter(|i| !free.contains(i))
+                    .map(|i| at(k, i) * beta[i])
+                    .sum::<f64>()
+            };
             let mut mean: Vec<f64> = free.iter().map(|&k| at(k, count) - given(k)).collect();
             Cholesky::new(&normal, size).ok()?.solve(&mut mean);
             let below = |place: &usize| self.lower[free[*place]] - mean[*place];
@@ -227,7 +240,9 @@ impl LeftOut {
                     beta[k] = self.lower[k];
                 }
                 None => {
-                    free.iter().zip(&mean).for_each(|(&k, mean)| beta[k] = *mean);
+                    free.iter()
+                        .zip(&mean)
+                        .for_each(|(&k, mean)| beta[k] = *mean);
                     return Some(beta);
                 }
             }

@@ -82,11 +82,7 @@ pub enum StatusReason {
 }
 
 /// Status by probability alone: [`settle`] decides what is claimed.
-pub(super) fn by_probability(
-    pip: f64,
-    mcse: f64,
-    seen: bool,
-) -> (Status, StatusReason) {
+pub(super) fn by_probability(pip: f64, mcse: f64, seen: bool) -> (Status, StatusReason) {
     if !seen {
         (Status::Unidentifiable, StatusReason::WideAsPrior)
     } else if pip < ABSENT && !is_open(pip, mcse) {

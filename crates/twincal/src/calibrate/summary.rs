@@ -4,8 +4,7 @@ use super::components::{NOT_SEEN, components};
 use super::data::Data;
 use super::groups::{groups, told_as};
 use super::result::{
-    Calibration, Draws, Group, LikelihoodUsed, PriorUsed, SweepPoint,
-    TermSummary,
+    Calibration, Draws, Group, LikelihoodUsed, PriorUsed, SweepPoint, TermSummary,
 };
 use super::result::{Compact, ends};
 use super::{CalibrationSettings, Fitted, prior_conflict, sandwich, status};

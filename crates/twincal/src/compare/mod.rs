@@ -258,8 +258,7 @@ pub fn hindrances(before: &Twin, after: &Twin) -> Result<Vec<Finding>> {
 fn turns_round(twin: &Twin) -> Result<bool> {
     let library = twin.library()?;
     let mut columns = library.columns().iter().zip(&twin.posterior.inclusion);
-    Ok(columns
-        .any(|(&term, pip)| *pip > LIKELY && library.terms()[term].family.turns_round()))
+    Ok(columns.any(|(&term, pip)| *pip > LIKELY && library.terms()[term].family.turns_round()))
 }
 
 /// A twin with its library and draws.
@@ -499,7 +498,12 @@ mod tests {
             (Some(Tentative), Some(Established), true, Became::Changed),
             (Some(Tentative), Some(Equivalent), false, Became::AsBefore),
             (Some(Established), Some(Established), true, Became::Changed),
-            (Some(Established), Some(Established), false, Became::AsBefore),
+            (
+                Some(Established),
+                Some(Established),
+                false,
+                Became::AsBefore,
+            ),
         ] {
             let found = Became::of([before, after], changed);
             assert_eq!(found, became, "{before:?} → {after:?}");

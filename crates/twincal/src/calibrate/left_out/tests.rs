@@ -22,11 +22,11 @@ fn log(random: &mut Random, rows: usize, beta: [f64; COLUMNS]) -> Observations {
             .collect();
         let signal = |row: usize| {
             let pairs = columns.iter().enumerate();
-            pairs.map(|(i, &k)| beta[k] * x[i * rows + row]).sum::<f64>()
+            pairs
+                .map(|(i, &k)| beta[k] * x[i * rows + row])
+                .sum::<f64>()
         };
-        let y: Vec<f64> = (0..rows)
-            .map(|row| signal(row) + random.normal())
-            .collect();
+        let y: Vec<f64> = (0..rows).map(|row| signal(row) + random.normal()).collect();
         JointObservations {
             columns,
             measured: y.clone().into(),
@@ -52,7 +52,12 @@ fn fit(logs: &[Part<'_>], lower: f64) -> Fit {
         family: vec![0; 3],
         families: vec![Family::User],
         prior_sd: vec![None; COLUMNS],
-        lower: vec![f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY, lower],
+        lower: vec![
+            f64::NEG_INFINITY,
+            f64::NEG_INFINITY,
+            f64::NEG_INFINITY,
+            lower,
+        ],
         forced: Vec::new(),
         parent: Vec::new(),
         second_choice: Vec::new(),
@@ -116,11 +121,19 @@ fn refit(kept: &[(f64, [f64; COLUMNS], f64)], columns: &[usize], slab: &[f64]) -
 
 fn error(rows: &[(f64, [f64; COLUMNS], f64)], beta: &[f64]) -> f64 {
     let left = |x: &[f64; COLUMNS], y: f64| y - x.iter().zip(beta).map(|(x, b)| x * b).sum::<f64>();
-    rows.iter().map(|(weight, x, y)| weight * left(x, *y).powi(2)).sum()
+    rows.iter()
+        .map(|(weight, x, y)| weight * left(x, *y).powi(2))
+        .sum()
 }
 
 /// `(share, standard errors)` by rows.
-fn by_rows(logs: &[Part<'_>], fit: &Fit, kind: LeftOutData, with: &[usize], rest: &[usize]) -> (f64, f64) {
+fn by_rows(
+    logs: &[Part<'_>],
+    fit: &Fit,
+    kind: LeftOutData,
+    with: &[usize],
+    rest: &[usize],
+) -> (f64, f64) {
     let blocks = pieces(logs);
     let fold = |block: &(usize, usize, Part<'_>)| match kind {
         LeftOutData::Logs => block.0,
@@ -145,7 +158,10 @@ fn by_rows(logs: &[Part<'_>], fit: &Fit, kind: LeftOutData, with: &[usize], rest
 fn near(own: &LeftOutError, truth: (f64, f64)) {
     let off = |a: f64, b: f64| (a - b).abs() / b.abs().max(1e-3);
     assert!(off(own.lowered, truth.0) < 1e-9, "{own:?} {truth:?}");
-    assert!(off(own.standard_errors, truth.1) < 1e-9, "{own:?} {truth:?}");
+    assert!(
+        off(own.standard_errors, truth.1) < 1e-9,
+        "{own:?} {truth:?}"
+    );
 }
 
 #[test]
@@ -153,7 +169,10 @@ fn the_algebra_is_what_refits_by_rows_say() {
     let mut random = Random::new(3, 0);
     let own = [203, 150].map(|rows| log(&mut random, rows, [0.6, 0.0, 0.3, 0.2]));
     let two = own.each_ref().map(|log| log.whole());
-    for (logs, kind) in [(&two[..], LeftOutData::Logs), (&two[..1], LeftOutData::Fifths)] {
+    for (logs, kind) in [
+        (&two[..], LeftOutData::Logs),
+        (&two[..1], LeftOutData::Fifths),
+    ] {
         let fit = fit(logs, f64::NEG_INFINITY);
         let left_out = LeftOut::new(logs, &fit, &[true; 3]);
         let says = |rest: [bool; 3], own: usize| left_out.lowered(&rest, &[own]).unwrap();
@@ -161,7 +180,10 @@ fn the_algebra_is_what_refits_by_rows_say() {
         assert_eq!((first.left_out, first.blocks), (kind, pieces(logs).len()));
         near(&first, by_rows(logs, &fit, kind, &[0, 1, 2, 3], &[2, 3]));
         let second = says([true, false, true], 1);
-        near(&second, by_rows(logs, &fit, kind, &[0, 1, 2, 3], &[0, 1, 3]));
+        near(
+            &second,
+            by_rows(logs, &fit, kind, &[0, 1, 2, 3], &[0, 1, 3]),
+        );
         // With what is out of the structure nothing is compared.
         let left_out = LeftOut::new(logs, &fit, &[true, false, true]);
         let third = left_out.lowered(&[true, false, false], &[2]).unwrap();
@@ -177,7 +199,10 @@ fn a_bound_holds_in_every_refit() {
     let fit = fit(&logs, 0.0);
     let left_out = LeftOut::new(&logs, &fit, &[true; 3]);
     let bounded = left_out.lowered(&[true, false, true], &[1]).unwrap();
-    near(&bounded, by_rows(&logs, &fit, LeftOutData::Fifths, &[0, 1, 2], &[0, 1]));
+    near(
+        &bounded,
+        by_rows(&logs, &fit, LeftOutData::Fifths, &[0, 1, 2], &[0, 1]),
+    );
     let itself = left_out.lowered(&[true, true, false], &[2]).unwrap();
     assert_eq!((itself.lowered, itself.standard_errors), (0.0, 0.0));
 }
