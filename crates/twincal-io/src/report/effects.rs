@@ -568,5 +568,4 @@ mod tests {
         assert!(html.contains("not seen by these data: com y, izz"));
         assert!(!html.contains("0 ± 0<"));
     }
-
 }

@@ -1,7 +1,7 @@
 //! What the verdict rests on, a sentence each: error of held-out torque, what friction alone would leave, intervals, effects.
 
-use super::limits::{FEW, decisive, has_standstill, other_shares};
 use super::figures::inclusion::family_name;
+use super::limits::{FEW, decisive, has_standstill, other_shares};
 use super::standstill::{at_standstill, held_at_rest, rest_got_worse};
 use super::status::with;
 use super::text::{count, first_of, list, number, percent};
@@ -474,7 +474,10 @@ mod tests {
             told[from.unwrap()..].to_vec()
         };
         let all = of(&|_| ());
-        assert_eq!(all, ["Established: Lagrangian terms."; 0].to_vec(), "{all:?}");
+        assert!(
+            all.len() == 1 && all[0].starts_with("Established: "),
+            "{all:?}"
+        );
         let none = of(&|c| {
             let found = c.components.iter_mut().filter(|own| own.is_in());
             found.for_each(|own| own.status = Status::Tentative);

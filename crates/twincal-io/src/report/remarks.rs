@@ -80,10 +80,7 @@ fn of_the_file(component: &ComponentSummary, calibration: &Calibration) -> Optio
 }
 
 /// A tilt turns gravity; what changes its size is something else.
-fn size_of_gravity(
-    component: &ComponentSummary,
-    calibration: &Calibration,
-) -> Option<String> {
+fn size_of_gravity(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
     if component.family != Family::Tilt {
         return None;
     }
@@ -150,7 +147,7 @@ mod tests {
     fn friction_that_a_file_states_is_remarked() {
         let of = |code: &str, family: Family| {
             let mut calibration = fixture::two_joints();
-                let subject = "elbow";
+            let subject = "elbow";
             calibration.findings = vec![Finding::new(Severity::Note, code, subject, "", 0)];
             let mut own = calibration.components[0].clone();
             (own.family, own.name) = (family, format!("{subject}.x"));

@@ -1,9 +1,12 @@
 //! An effect's status and its one reason, in words.
 
-use super::text::{list, number, percent};
+use super::text::{first_of, list, number, percent, probability};
 use twincal::calibrate::{
     Alike, Calibration, ComponentSummary, LeftOutData, LeftOutError, Status, StatusReason,
 };
+
+/// Members of a set that are named; the others are counted.
+const NAMED: usize = 3;
 
 /// Why a component has its status: "lowers the error of left-out logs by 12.0 % (5.3 standard errors)"; empty where its probability says it all.
 #[must_use]
@@ -17,16 +20,13 @@ pub fn reason(component: &ComponentSummary) -> String {
             alike,
         } => {
             let others = members.iter().filter(|name| **name != component.name);
-            let others: Vec<&str> = others.map(String::as_str).collect();
+            let others = first_of(others.cloned().collect(), NAMED);
             let kind = match alike {
                 Alike::EveryMotion => "structurally",
                 Alike::TheseLogs => "in these logs only",
             };
-            format!(
-                "equivalent to {}, {kind}; at least one is in with probability {}",
-                list(&others),
-                super::text::probability(*pip)
-            )
+            let (others, pip) = (list(&others), probability(*pip));
+            format!("same torque as {others}, {kind}; P(at least one) {pip}")
         }
         StatusReason::NoRigidBody { share } => {
             format!("no rigid body in {} of the draws", percent(1.0 - share))
@@ -62,7 +62,8 @@ pub(super) fn is_claimed(component: &ComponentSummary) -> bool {
 /// Names of the effects with this status that are likelier in than not.
 pub(super) fn with(status: Status, calibration: &Calibration) -> Vec<&ComponentSummary> {
     let all = calibration.components.iter();
-    all.filter(|own| own.status == status && own.is_in()).collect()
+    all.filter(|own| own.status == status && own.is_in())
+        .collect()
 }
 
 #[cfg(test)]
@@ -94,7 +95,10 @@ mod tests {
             of(error(0.008, 1.2)),
             "lowers the error of left-out logs by 0.80\u{202f}%, 1.2 standard errors (2.1 needed)"
         );
-        assert_eq!(of(error(-0.1, -3.0)), "does not lower the error of left-out logs");
+        assert_eq!(
+            of(error(-0.1, -3.0)),
+            "does not lower the error of left-out logs"
+        );
         let same = |alike| StatusReason::SameTorque {
             members: ["b.tensor", "a.tensor"].map(str::to_owned).to_vec(),
             pip: 0.98,
@@ -102,7 +106,7 @@ mod tests {
         };
         assert_eq!(
             of(same(Alike::EveryMotion)),
-            "equivalent to b.tensor, structurally; at least one is in with probability 0.980"
+            "same torque as b.tensor, structurally; P(at least one) 0.980"
         );
         assert!(of(same(Alike::TheseLogs)).contains(", in these logs only;"));
         assert_eq!(

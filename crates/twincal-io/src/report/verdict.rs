@@ -199,7 +199,8 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
 fn no_bodies(calibration: &Calibration) -> usize {
     let findings = calibration.findings.iter();
     let sure = findings.filter(|f| f.severity == Severity::Warning);
-    sure.filter(|f| f.code == "unphysical_inertia_found").count()
+    sure.filter(|f| f.code == "unphysical_inertia_found")
+        .count()
 }
 
 /// The headline with what it is of: joints that move, and torque that the filter lets pass.
