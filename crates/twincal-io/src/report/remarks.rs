@@ -59,12 +59,12 @@ fn few_rows(component: &ComponentSummary, calibration: &Calibration) -> Option<S
 /// What the model says of a tensor's numbers that are told, and what it would have to say: known where nothing else of the link was found.
 fn of_the_file(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
     let link = component.name.strip_suffix(".tensor")?;
-    let moments = format!("{link}.mass_moments");
+    let levels = ["density", "mass_moments"].map(|level| format!("{link}.{level}"));
     let mut found = calibration.components.iter().filter(|other| other.selected);
     let robot = &calibration.twin.robot;
     let last = robot.links_of_body(robot.bodies().len().saturating_sub(1));
     let alone = !found
-        .any(|other| other.name == moments || other.family.is_payload() && last.contains(&link));
+        .any(|other| levels.contains(&other.name) || other.family.is_payload() && last.contains(&link));
     let links = &robot.description().links;
     let inertia = links.iter().find(|own| own.name == link)?.inertia?;
     let axis = |letter: char| "xyz".find(letter);

@@ -45,7 +45,7 @@ impl Use {
             | Family::PayloadTensor
             | Family::MassMoments
             | Family::Tensor
-            | Family::MassScale
+            | Family::Density
             | Family::MotorInertia
             | Family::CoupledInertia => Self::Inertia,
             Family::Tilt => Self::Gravity,
