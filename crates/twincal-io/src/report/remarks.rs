@@ -63,10 +63,22 @@ fn of_the_file(component: &ComponentSummary, calibration: &Calibration) -> Optio
     let mut found = calibration.components.iter().filter(|other| other.selected);
     let robot = &calibration.twin.robot;
     let last = robot.links_of_body(robot.bodies().len().saturating_sub(1));
-    let alone = !found
-        .any(|other| levels.contains(&other.name) || other.family.is_payload() && last.contains(&link));
+    let alone = !found.any(|other| {
+        levels.contains(&other.name) || other.family.is_payload() && last.contains(&link)
+    });
     let links = &robot.description().links;
     let inertia = links.iter().find(|own| own.name == link)?.inertia?;
+    // Links that are fixed to it are part of the body whose tensor changes.
+    let (body, _) = robot.body_of_link(link)?;
+    let of_body = robot.links_of_body(body);
+    let heavy = links.iter().filter(|own| own.inertia.is_some());
+    if heavy
+        .filter(|own| of_body.contains(&own.name.as_str()))
+        .count()
+        > 1
+    {
+        return None;
+    }
     let axis = |letter: char| "xyz".find(letter);
     let told = component.parameters.iter().filter_map(|parameter| {
         let mut letters = parameter.name.strip_prefix('i')?.chars();

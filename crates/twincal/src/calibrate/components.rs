@@ -215,7 +215,7 @@ fn parameters(
 }
 
 /// Of a mass that is open by more than half of itself there is no centre: then first moments are told, else the centre.
-fn identified(library: &Library, index: usize, parameters: &mut [ParameterSummary]) {
+fn identified(library: &Library, index: usize, parameters: &mut Vec<ParameterSummary>) {
     let ratio = |p: &usize| library.before(index, *p) == Some(Before::Ratio);
     let centre: Vec<usize> = (0..parameters.len()).filter(ratio).collect();
     let Some(mass) = parameters.first_mut().filter(|_| !centre.is_empty()) else {
@@ -226,7 +226,5 @@ fn identified(library: &Library, index: usize, parameters: &mut [ParameterSummar
     for p in centre {
         parameters[p].seen &= known;
     }
-    let moments = |name: &str| matches!(name, "mx" | "my" | "mz");
-    let moments = parameters.iter_mut().filter(|own| moments(&own.name));
-    moments.for_each(|own| own.seen &= !known);
+    parameters.retain(|own| !(known && matches!(own.name.as_str(), "mx" | "my" | "mz")));
 }

@@ -199,6 +199,7 @@ impl Family {
             Self::Payload => Some(1.0 / 3.0),
             Self::PayloadTensor => Some(0.999),
             Self::Offset => Some(1.0 / 30.0),
+            Self::Density => Some(1.0 / 30.0),
             Self::MassMoments | Self::Tensor => Some(1.0 / 50.0),
             _ => None,
         }

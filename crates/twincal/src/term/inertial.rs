@@ -23,7 +23,8 @@ const SOME_MASS: f64 = 1.0;
 /// Payload and the levels of every body, named after the link that its joint carries: links that are fixed to each other are one body.
 ///
 /// A level is a deviation from what those before it make of the model: a factor on everything, first moments beside that, second moments
-/// beside both. Their prior is the body's own; a payload's is that of a body of three tenths of all moving mass on the last body.
+/// beside both. Their prior is the body's own; a payload's is that of a body of three tenths of all moving mass on the last body, whose first
+/// moments and tensor have the payload's prior: what both can say is told by prior odds alone, not by whose prior happens to fit.
 ///
 /// # Errors
 /// [`Error::Setting`] for a payload frame that does not move.
@@ -44,20 +45,27 @@ pub(super) fn inertial(
     let bodies = bodies(robot);
     let torque = torques(robot);
     let mut all = Vec::new();
-    if settings.has(Family::Payload) {
-        let mount = payload_mount(robot, settings, &bodies)?;
-        all.push(payload::proposal(&mount, &torque[mount.body.index]));
+    let mount = match settings.has(Family::Payload) {
+        true => Some(payload_mount(robot, settings, &bodies)?),
+        false => None,
+    };
+    if let Some(mount) = &mount {
+        all.push(payload::proposal(mount, &torque[mount.body.index]));
     }
     if settings.has(Family::Density) {
         all.extend((bodies.iter()).map(|body| density::candidate(body, LINK_SHARE).into()));
     }
     let each = bodies.iter().zip(&torque);
+    let each = each.map(|(body, torque)| match &mount {
+        Some(mount) if mount.body.index == body.index => (&mount.body, torque, 1.0),
+        _ => (body, torque, LINK_SHARE),
+    });
     if settings.has(Family::MassMoments) {
         let own = each.clone();
-        all.extend(own.map(|(body, torque)| mass_moments::proposal(body, torque, LINK_SHARE)));
+        all.extend(own.map(|(body, torque, share)| mass_moments::proposal(body, torque, share)));
     }
     if settings.has(Family::Tensor) {
-        all.extend(each.map(|(body, torque)| tensor::proposal(body, torque, LINK_SHARE)));
+        all.extend(each.map(|(body, torque, share)| tensor::proposal(body, torque, share)));
     }
     findings.extend(floored(&bodies));
     Ok(all)

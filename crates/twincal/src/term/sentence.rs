@@ -69,7 +69,8 @@ fn one(p: &Estimate) -> String {
     format!("{} {}", p.number(1.0), p.unit)
 }
 
-/// Indices of the parameters that are worth telling, in their order: of a payload its mass, and where that is clear its centre; of a tilt all; of any
+/// Indices of the parameters that are worth telling, in their order: of a payload its mass, and where that is clear its centre, or its first
+/// moments where no mass is known; of a tilt all; of any
 /// other component the clearest three that are further from 0 than two spreads, at least one. None where no value is known.
 #[must_use]
 pub fn told(family: Family, parameters: &[Estimate]) -> Vec<usize> {
@@ -82,8 +83,12 @@ pub fn told(family: Family, parameters: &[Estimate]) -> Vec<usize> {
                 .is_some_and(|mass| clearness(mass) >= CLEAR);
             let centre = all.iter().take(CENTRE_ENDS).skip(1).filter(known).copied();
             let mass = all.iter().take(1).filter(known).copied();
+            let open = parameters.first().is_none_or(|mass| mass.value.is_nan());
             let moments = all.iter().skip(MOMENTS).filter(known).copied();
-            mass.chain(centre.filter(|_| clear)).chain(moments).collect()
+            let moments = moments.filter(|_| open);
+            mass.chain(centre.filter(|_| clear))
+                .chain(moments)
+                .collect()
         }
         Family::Tilt => all.iter().filter(known).copied().collect(),
         Family::Spring => {
