@@ -35,13 +35,14 @@ pub struct PriorSettings {
 }
 
 /// What is in only with what, unless the user says otherwise: the Stribeck effect and asymmetry are changes of Coulomb friction,
-/// which no nominal model here contains, quadratic friction is one of viscous friction, and a coupled
-/// motor that has inertia has friction, which is the larger part of its torque.
-pub const HEREDITY: [(&str, &str); 4] = [
+/// which no nominal model here contains, quadratic friction is one of viscous friction, a coupled
+/// motor that has inertia has friction, which is the larger part of its torque, and a link whose centre of mass is elsewhere has another mass.
+pub const HEREDITY: [(&str, &str); 5] = [
     ("asymmetry", "coulomb"),
     ("stribeck", "coulomb"),
     ("quadratic_friction", "viscous"),
     ("coupled_inertia", "coupled_friction"),
+    ("mass_moments", "density"),
 ];
 
 /// Factor on prior odds that settles a component: what the data say weighs nothing beside it (e^690).
