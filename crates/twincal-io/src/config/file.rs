@@ -304,6 +304,10 @@ pub enum FamilyWord {
     EncoderZero,
     /// `<joint>.ripple`: gear ripple; needs `ripple = { joint = gear ratio }`.
     Ripple,
+    /// `<joint>.hysteresis`: friction that builds up over milliradians after a velocity reversal.
+    Hysteresis,
+    /// `<joint>.warm_up`: friction that changes with the time since the log's start, or with logged temperature.
+    WarmUp,
 }
 
 impl From<FamilyWord> for Family {
@@ -329,6 +333,8 @@ impl From<FamilyWord> for Family {
             FamilyWord::Gain => Self::Gain,
             FamilyWord::EncoderZero => Self::EncoderZero,
             FamilyWord::Ripple => Self::Ripple,
+            FamilyWord::Hysteresis => Self::Hysteresis,
+            FamilyWord::WarmUp => Self::WarmUp,
         }
     }
 }

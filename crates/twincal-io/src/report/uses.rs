@@ -40,7 +40,9 @@ impl Use {
             | Family::Stribeck
             | Family::QuadraticFriction
             | Family::LoadFriction
-            | Family::CoupledFriction => Self::Friction,
+            | Family::CoupledFriction
+            | Family::Hysteresis
+            | Family::WarmUp => Self::Friction,
             Family::Payload
             | Family::PayloadTensor
             | Family::MassMoments

@@ -105,7 +105,12 @@ impl Data {
         let fit = self.fit.iter().map(|log| &log.observations);
         let zero = zero_columns(fit, &library);
         for &column in &zero {
-            let name = &library.terms()[library.columns()[column]].name;
+            let term = &library.terms()[library.columns()[column]];
+            let name = &term.name;
+            // What was not followed is no fault of the logs.
+            if term.family.remembers() {
+                continue;
+            }
             self.findings.push(Finding::new(
                 Severity::Warning,
                 "zero_column",

@@ -15,6 +15,7 @@ mod groups;
 mod heavy_tails;
 mod held_out;
 mod heredity;
+mod history;
 mod independent_rows;
 mod lower_band;
 mod negative_friction;
@@ -164,6 +165,8 @@ fn road(
         (pipeline, library) = (turned.pipeline, turned.library);
         findings.push(turned.finding);
     }
+    let families = &library_settings.families;
+    history::follow(robot, (logs, &prepared), families, &mut pipeline, findings)?;
 
     // eq. (1)–(4): residual torque and Euler–Lagrange columns, filtered alike
     let others = heldout.iter().map(|log| ready(robot, log, &pipeline));

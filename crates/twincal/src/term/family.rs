@@ -52,6 +52,10 @@ pub enum Family {
     EncoderZero,
     /// Gear ripple.
     Ripple,
+    /// Friction that builds up over a way after a velocity reversal.
+    Hysteresis,
+    /// Friction that changes with warmth.
+    WarmUp,
 }
 
 /// A number further from 0 than this many spreads is clear.
@@ -59,7 +63,7 @@ pub(super) const CLEAR: f64 = 2.0;
 
 impl Family {
     /// All families that `[library] families` can name, in the order of `terms[]`.
-    pub const NAMED: [Self; 20] = [
+    pub const NAMED: [Self; 22] = [
         Self::Viscous,
         Self::Coulomb,
         Self::Offset,
@@ -80,6 +84,8 @@ impl Family {
         Self::Gain,
         Self::EncoderZero,
         Self::Ripple,
+        Self::Hysteresis,
+        Self::WarmUp,
     ];
 
     /// Families that come without a switch of their own: with `terms`, with `generic`, with a payload.
@@ -125,6 +131,8 @@ impl Family {
                 | Self::Stribeck
                 | Self::LoadFriction
                 | Self::CoupledFriction
+                | Self::Hysteresis
+                | Self::WarmUp
         )
     }
 
@@ -183,6 +191,8 @@ impl Family {
             Self::Gain => "gain",
             Self::EncoderZero => "encoder_zero",
             Self::Ripple => "ripple",
+            Self::Hysteresis => "hysteresis",
+            Self::WarmUp => "warm_up",
         }
     }
 
@@ -198,6 +208,8 @@ impl Family {
             Self::Payload => Some(1.0 / 3.0),
             Self::PayloadTensor => Some(0.999),
             Self::Offset => Some(1.0 / 30.0),
+            Self::Hysteresis => Some(1.0 / 20.0),
+            Self::WarmUp => Some(1.0 / 100.0),
             _ => None,
         }
     }
@@ -220,6 +232,8 @@ impl Family {
                 | Self::QuadraticFriction
                 | Self::LoadFriction
                 | Self::CoupledFriction
+                | Self::Hysteresis
+                | Self::WarmUp
         )
     }
 
@@ -227,7 +241,13 @@ impl Family {
     /// standstill, however little of that the data hold.
     #[must_use]
     pub fn fades(self) -> bool {
-        self == Self::Stribeck
+        matches!(self, Self::Stribeck | Self::Hysteresis)
+    }
+
+    /// True if its torque depends on more of a joint's motion than one state: 0 where nothing is known of what was before.
+    #[must_use]
+    pub fn remembers(self) -> bool {
+        matches!(self, Self::Hysteresis | Self::WarmUp)
     }
 
     /// True if it is another story than the columns that span it. The rotors of a sum and of a difference of two joints and those of

@@ -6,8 +6,8 @@ use super::model_column::LinkFrame;
 use super::payload::Mount;
 use super::{
     Family, LibrarySettings, asymmetry, base_tilt, coulomb, coupled_friction, coupled_inertia,
-    encoder_zero, gain, generic, load_friction, mass_moments, mass_scale, motor_inertia, offset,
-    payload, potential, quadratic_friction, ripple, spring, stribeck, tensor, user, viscous,
+    encoder_zero, gain, generic, hysteresis, load_friction, mass_moments, mass_scale, motor_inertia, offset,
+    payload, potential, quadratic_friction, ripple, spring, stribeck, tensor, user, viscous, warm_up,
 };
 use crate::error::{Error, Finding, Result, Severity};
 use crate::robot::spatial::{apply, transpose};
@@ -167,6 +167,13 @@ pub(super) fn proposals(
         });
     }
     all.extend(ripples(graph, joints, settings)?);
+    if settings.has(Family::Hysteresis) {
+        all.extend(joints.iter().map(|joint| hysteresis::proposal(graph, joint)));
+    }
+    if settings.has(Family::WarmUp) {
+        let warm_up = joints.iter().map(|joint| warm_up::proposal(graph, joint, velocity));
+        all.extend(warm_up);
+    }
     Ok(all)
 }
 
