@@ -1,12 +1,16 @@
 //! What is followed of the joints' history: thresholds of stop operators and what warmth is, from what the training logs hold.
 
+use super::CalibrationSettings;
 use crate::error::{Finding, Result, Severity};
 use crate::robot::{JointKind, Robot};
-use crate::signal::{JointHistory, Log, Pipeline, ReadyLog, STOPS, Warmth, known_temperatures, stretches};
+use crate::signal::{
+    JointHistory, Log, Pipeline, ReadyLog, STOPS, Warmth, known_temperatures, stretches,
+};
 use crate::term::Family;
 
 /// Thresholds of a turning joint's stop operators, rad: friction of geared arms builds up over 2r of 3 to 30 mrad. Shorter ways look like
-/// Coulomb friction behind the row filter; a factor of 3 apart, operators leave 2 % of any exponential between them.
+/// Coulomb friction behind the row filter. A factor of 3 apart, operators leave at most 1 % of the mean square of an exponential of 2 to 8 mrad,
+/// and 3 % of one of 15 mrad.
 const THRESHOLDS: [f64; STOPS] = [1.5e-3, 5e-3, 15e-3];
 /// What turns thresholds of a sliding joint into metres.
 const REACH: f64 = 0.1;
@@ -18,56 +22,76 @@ const LEAST: f64 = 0.1;
 const SAMPLES: usize = 1 << 13;
 /// Shortest log in which a joint warms up, s; shorter ones hold too few repetitions of a motion to tell.
 const SHORTEST: f64 = 20.0;
-/// Time constant in lengths of the longest log: between a drift all along and one that is over soon, e^(−3t/L) shares at least 0.93 with both.
+/// Time constant in lengths of the longest log: between a drift all along (correlation 0.94 with e^(−3t/L)) and one that is over in a tenth (0.88).
 const CONSTANT: f64 = 1.0 / 3.0;
 /// Least standard deviation of a logged temperature that says anything, K.
 const LEAST_SPREAD: f64 = 0.5;
 /// Joints beyond which nothing is followed: the prior of what needs Coulomb friction takes `(joints + 1)^5` numbers.
 const MOST_JOINTS: usize = 9;
 
-/// Sets [`Pipeline::history`] for the families that need it.
+/// What is followed, and who may ask for it.
+pub(super) struct Followed {
+    /// Of every joint; empty where nothing is.
+    pub(super) history: Vec<JointHistory>,
+    /// The calibration's, without the families that these logs say nothing of.
+    pub(super) settings: CalibrationSettings,
+}
+
+/// What the families that are asked for need of the joints' history, as far as the training logs hold it.
 ///
 /// # Errors
 /// Of chapters that cannot be read.
 pub(super) fn follow(
     robot: &Robot,
     (logs, prepared): (&[Log<'_>], &[ReadyLog<'_>]),
-    families: &[Family],
-    pipeline: &mut Pipeline,
+    pipeline: &Pipeline,
+    settings: &CalibrationSettings,
     findings: &mut Vec<Finding>,
-) -> Result<()> {
-    let dof = robot.dof();
-    if !families.iter().any(|family| family.remembers()) {
-        return Ok(());
-    }
-    if dof > MOST_JOINTS {
-        findings.push(Finding::new(
-            Severity::Note,
-            "history_not_followed",
-            "",
-            format!("the robot has {dof} moving joints, more than {MOST_JOINTS}: hysteresis and warm-up of friction are no candidates"),
-            0,
-        ));
-        return Ok(());
-    }
+) -> Result<Followed> {
+    let (dof, families) = (robot.dof(), &settings.library.families);
     let mut history = vec![JointHistory::default(); dof];
-    if families.contains(&Family::Hysteresis) {
+    let few = dof <= MOST_JOINTS;
+    if few && families.contains(&Family::Hysteresis) {
         let travel = travel(dof, prepared, pipeline)?;
         for (joint, own) in history.iter_mut().enumerate() {
             own.thresholds = thresholds(travel[joint], robot.joint_kind(joint));
         }
     }
-    if families.contains(&Family::WarmUp) {
+    if few && families.contains(&Family::WarmUp) {
         let by_time = of_time(logs)?;
         let temperatures = of_temperature(dof, logs)?;
         for (own, temperature) in history.iter_mut().zip(temperatures) {
             own.warmth = temperature.or(by_time);
         }
     }
-    if history.iter().any(|own| *own != JointHistory::default()) {
-        pipeline.history = history;
+    let bends = history.iter().any(|own| !own.thresholds.is_empty());
+    let warms = history.iter().any(|own| own.warmth.is_some());
+    let mut settings = settings.clone();
+    for (family, followed) in [(Family::Hysteresis, bends), (Family::WarmUp, warms)] {
+        if followed || !settings.library.families.contains(&family) {
+            continue;
+        }
+        settings.library.families.retain(|other| *other != family);
+        let why = match family {
+            _ if !few => format!("{dof} joints move, more than {MOST_JOINTS}"),
+            Family::WarmUp => {
+                format!("no log lasts {SHORTEST} s or has a temperature that changes")
+            }
+            _ => "no joint travels far enough".to_owned(),
+        };
+        let message = format!("`{}` of friction is no candidate: {why}", family.word());
+        findings.push(Finding::new(
+            Severity::Note,
+            "history_not_followed",
+            "",
+            message,
+            0,
+        ));
     }
-    Ok(())
+    if !bends && !warms {
+        history.clear();
+    }
+    Ok(Followed { history, settings })
 }
 
 /// The usual thresholds, or smaller ones of a joint that travels little; none where it hardly does.
@@ -95,7 +119,10 @@ fn travel(dof: usize, logs: &[ReadyLog<'_>], pipeline: &Pipeline) -> Result<Vec<
             }
         }
     }
-    Ok(ends.iter().map(|[low, high]| (high - low).max(0.0)).collect())
+    Ok(ends
+        .iter()
+        .map(|[low, high]| (high - low).max(0.0))
+        .collect())
 }
 
 /// Warmth by the time since a log's start, where a log is long enough.
@@ -107,7 +134,10 @@ fn of_time(logs: &[Log<'_>]) -> Result<Option<Warmth>> {
     }
     let constant = CONSTANT * longest;
     // ∫ exp(−t/T) dt over all logs, per second of them
-    let sum: f64 = lengths.iter().map(|length| constant * -(-length / constant).exp_m1()).sum();
+    let sum: f64 = lengths
+        .iter()
+        .map(|length| constant * -(-length / constant).exp_m1())
+        .sum();
     let mean = sum / lengths.iter().sum::<f64>();
     Ok(Some(Warmth::Time { constant, mean }))
 }
@@ -118,7 +148,9 @@ fn length(log: &Log<'_>) -> Result<f64> {
     let last = |time: &[f64]| time.iter().rfind(finite).copied();
     let ends = match log {
         Log::Whole(log) => log.time.iter().find(finite).copied().zip(last(&log.time)),
-        Log::Long(log) => log.start().zip(last(&log.chapter(log.chapters() - 1)?.time)),
+        Log::Long(log) => log
+            .start()
+            .zip(last(&log.chapter(log.chapters() - 1)?.time)),
     };
     Ok(ends.map_or(0.0, |(first, last)| last - first))
 }
@@ -159,9 +191,16 @@ mod tests {
     #[test]
     fn thresholds_follow_the_travel() {
         assert_eq!(thresholds(2.0, JointKind::Revolute), THRESHOLDS);
-        let near = |a: Vec<f64>, b: [f64; STOPS]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
-        assert!(near(thresholds(0.15, JointKind::Continuous), [0.75e-3, 2.5e-3, 7.5e-3]));
-        assert!(near(thresholds(0.5, JointKind::Prismatic), [0.15e-3, 0.5e-3, 1.5e-3]));
+        let near =
+            |a: Vec<f64>, b: [f64; STOPS]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
+        assert!(near(
+            thresholds(0.15, JointKind::Continuous),
+            [0.75e-3, 2.5e-3, 7.5e-3]
+        ));
+        assert!(near(
+            thresholds(0.5, JointKind::Prismatic),
+            [0.15e-3, 0.5e-3, 1.5e-3]
+        ));
         assert!(thresholds(0.02, JointKind::Revolute).is_empty());
     }
 
@@ -178,12 +217,15 @@ mod tests {
                 payload: crate::signal::Payload::None,
             })
         };
-        let Some(Warmth::Time { constant, mean }) = of_time(&[log(60.0), log(15.0)]).unwrap() else {
+        let Some(Warmth::Time { constant, mean }) = of_time(&[log(60.0), log(15.0)]).unwrap()
+        else {
             panic!("long enough");
         };
         assert_eq!(constant, 20.0);
         let steps = (0..75_000).map(|i| 1e-3 * (f64::from(i) + 0.5));
-        let sum: f64 = steps.map(|t| (-(if t < 60.0 { t } else { t - 60.0 }) / 20.0).exp()).sum();
+        let sum: f64 = steps
+            .map(|t| (-(if t < 60.0 { t } else { t - 60.0 }) / 20.0).exp())
+            .sum();
         assert!((sum / 75_000.0 - mean).abs() < 1e-6);
         assert_eq!(of_time(&[log(19.0)]).unwrap(), None);
     }

@@ -150,6 +150,9 @@ fn road(
     findings.extend(constant_torque(robot, every_log.clone())?);
     findings.extend(hardly_driven(robot, every_log.clone())?);
     let mut lags = aligned::align(robot, logs, &mut pipeline, &mut prepared, findings)?;
+    let usual = settings.library.families == Family::DEFAULT;
+    let followed = history::follow(robot, (logs, &prepared), &pipeline, settings, findings)?;
+    let settings = &followed.settings;
     let mut library_settings = LibrarySettings {
         coulomb_velocity: pipeline.coulomb_velocity,
         ..settings.library.clone()
@@ -165,8 +168,7 @@ fn road(
         (pipeline, library) = (turned.pipeline, turned.library);
         findings.push(turned.finding);
     }
-    let families = &library_settings.families;
-    history::follow(robot, (logs, &prepared), families, &mut pipeline, findings)?;
+    pipeline.history = followed.history;
 
     // eq. (1)–(4): residual torque and Euler–Lagrange columns, filtered alike
     let others = heldout.iter().map(|log| ready(robot, log, &pipeline));
@@ -216,7 +218,6 @@ fn road(
         UnaskedRipple::Ignored => Vec::new(),
         _ => ripples::seen(robot, &training, &fitted.fit, &library_settings, &pipeline),
     };
-    let usual = settings.library.families == Family::DEFAULT;
     if !seen.is_empty() && usual && settings.unasked_ripple == UnaskedRipple::Candidate {
         return Ok(Road::Again(seen));
     }

@@ -99,7 +99,9 @@ impl Pipeline {
         }
         let temperatures: Vec<Option<Vec<(f64, f64)>>> = (self.history.iter().zip(&log.joints))
             .map(|(joint, channels)| match joint.warmth {
-                Some(Warmth::Temperature { .. }) => known_temperatures(&log.time, &channels.temperature),
+                Some(Warmth::Temperature { .. }) => {
+                    known_temperatures(&log.time, &channels.temperature)
+                }
                 _ => None,
             })
             .collect();
@@ -160,7 +162,11 @@ impl Pipeline {
         let velocity = self.coulomb_velocity;
         let sense: Vec<f64> = qd.iter().map(|qd| direction(*qd, velocity)).collect();
         let mut known = 0;
-        for (r, channel) in history.thresholds.iter().zip(channels.chunks_exact_mut(q.len())) {
+        for (r, channel) in history
+            .thresholds
+            .iter()
+            .zip(channels.chunks_exact_mut(q.len()))
+        {
             known = known.max(stop(q, *r, channel));
             let both = channel.iter_mut().zip(&sense);
             both.for_each(|(e, sense)| *e -= sense);
@@ -179,7 +185,10 @@ fn direction(rate: f64, velocity: f64) -> f64 {
 }
 
 /// Temperatures with their stamps; `None` without any, and of a log whose stamps step back.
-pub(crate) fn known_temperatures(time: &[f64], logged: &Option<Vec<f64>>) -> Option<Vec<(f64, f64)>> {
+pub(crate) fn known_temperatures(
+    time: &[f64],
+    logged: &Option<Vec<f64>>,
+) -> Option<Vec<(f64, f64)>> {
     let logged = time.iter().zip(logged.iter().flatten());
     let known: Vec<(f64, f64)> = logged
         .filter(|(time, value)| time.is_finite() && value.is_finite())
@@ -219,7 +228,9 @@ mod tests {
         let (mut state, mut q) = (seed, 0.0);
         (0..len)
             .map(|_| {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
                 q += 2e-3 * ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5);
                 q
             })
@@ -234,7 +245,11 @@ mod tests {
             let mut e = vec![0.0; q.len()];
             let known = stop(&q, r, &mut e);
             let ways: Vec<Vec<f64>> = [-1.0, -0.4, 0.3, 1.0].map(|s| brute(&q, r, s * r)).into();
-            let apart = |i: usize| ways.iter().map(|way| (way[i] - e[i]).abs()).fold(0.0, f64::max);
+            let apart = |i: usize| {
+                ways.iter()
+                    .map(|way| (way[i] - e[i]).abs())
+                    .fold(0.0, f64::max)
+            };
             assert!((known..q.len()).all(|i| apart(i) < 1e-9), "{seed}");
             assert!(known == 0 || apart(known - 1) > 0.0, "{seed}");
             // Position has spanned 2r by then, and not before.
@@ -255,12 +270,19 @@ mod tests {
         let q: Vec<f64> = (0..5 * period)
             .map(|i| {
                 let phase = (i % period) as f64 / period as f64;
-                a * (if phase < 0.5 { 4.0 * phase - 1.0 } else { 3.0 - 4.0 * phase })
+                a * (if phase < 0.5 {
+                    4.0 * phase - 1.0
+                } else {
+                    3.0 - 4.0 * phase
+                })
             })
             .collect();
         let mut e = vec![0.0; q.len()];
         let known = stop(&q, r, &mut e);
-        assert_eq!(known, (2.0 * r / (4.0 * a / period as f64)).round() as usize);
+        assert_eq!(
+            known,
+            (2.0 * r / (4.0 * a / period as f64)).round() as usize
+        );
         for (i, e) in e.iter().enumerate().skip(period) {
             let phase = (i % period) as f64 / period as f64;
             let travelled = 4.0 * a * (phase % 0.5);
@@ -275,8 +297,10 @@ mod tests {
     fn a_closed_inner_loop_is_forgotten() {
         let path = |corners: &[f64]| -> Vec<f64> {
             let legs = corners.windows(2);
-            legs.flat_map(|leg| (0..100).map(move |i| leg[0] + (leg[1] - leg[0]) * f64::from(i) / 100.0))
-                .collect()
+            legs.flat_map(|leg| {
+                (0..100).map(move |i| leg[0] + (leg[1] - leg[0]) * f64::from(i) / 100.0)
+            })
+            .collect()
         };
         let plain = path(&[0.0, 0.05, -0.01, 0.03]);
         let looped = path(&[0.0, 0.05, -0.01, 0.012, 0.004, 0.012, 0.03]);
@@ -307,7 +331,10 @@ mod tests {
         let (mut channels, mut masked) = (vec![0.0; 3 * len as usize], vec![false; len as usize]);
         pipeline.stops(&history, (&q, &qd), &mut channels, &mut masked);
         let known = masked.iter().position(|masked| !masked).unwrap_or(0);
-        assert!((99..=102).contains(&known), "30 mrad at 0.3 mrad a sample: {known}");
+        assert!(
+            (99..=102).contains(&known),
+            "30 mrad at 0.3 mrad a sample: {known}"
+        );
         for channel in channels.chunks_exact(len as usize) {
             assert!(channel[known..].iter().all(|h| h.abs() < 1e-9));
         }
