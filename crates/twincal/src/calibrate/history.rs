@@ -22,6 +22,8 @@ const LEAST: f64 = 0.1;
 const SAMPLES: usize = 1 << 13;
 /// Shortest log in which a joint warms up, s; shorter ones hold too few repetitions of a motion to tell.
 const SHORTEST: f64 = 20.0;
+/// So many of them at least: what was seen once is a drift, and says nothing of another log's start.
+const FEWEST: usize = 2;
 /// Time constant in lengths of the longest log: between a drift all along (correlation 0.94 with e^(−3t/L)) and one that is over in a tenth (0.88).
 const CONSTANT: f64 = 1.0 / 3.0;
 /// Least standard deviation of a logged temperature that says anything, K.
@@ -75,7 +77,9 @@ pub(super) fn follow(
         let why = match family {
             _ if !few => format!("{dof} joints move, more than {MOST_JOINTS}"),
             Family::WarmUp => {
-                format!("no log lasts {SHORTEST} s or has a temperature that changes")
+                format!(
+                    "fewer than {FEWEST} logs last {SHORTEST} s, and not all have a temperature that changes"
+                )
             }
             _ => "no joint travels far enough".to_owned(),
         };
@@ -125,11 +129,11 @@ fn travel(dof: usize, logs: &[ReadyLog<'_>], pipeline: &Pipeline) -> Result<Vec<
         .collect())
 }
 
-/// Warmth by the time since a log's start, where a log is long enough.
+/// Warmth by the time since a log's start, where logs that are long enough start more than once.
 fn of_time(logs: &[Log<'_>]) -> Result<Option<Warmth>> {
     let lengths: Vec<f64> = logs.iter().map(length).collect::<Result<_>>()?;
     let longest = lengths.iter().copied().fold(0.0, f64::max);
-    if longest < SHORTEST {
+    if lengths.iter().filter(|length| **length >= SHORTEST).count() < FEWEST {
         return Ok(None);
     }
     let constant = CONSTANT * longest;
@@ -217,16 +221,22 @@ mod tests {
                 payload: crate::signal::Payload::None,
             })
         };
-        let Some(Warmth::Time { constant, mean }) = of_time(&[log(60.0), log(15.0)]).unwrap()
+        let Some(Warmth::Time { constant, mean }) =
+            of_time(&[log(60.0), log(15.0), log(20.0)]).unwrap()
         else {
             panic!("long enough");
         };
         assert_eq!(constant, 20.0);
-        let steps = (0..75_000).map(|i| 1e-3 * (f64::from(i) + 0.5));
-        let sum: f64 = steps
-            .map(|t| (-(if t < 60.0 { t } else { t - 60.0 }) / 20.0).exp())
-            .sum();
-        assert!((sum / 75_000.0 - mean).abs() < 1e-6);
-        assert_eq!(of_time(&[log(19.0)]).unwrap(), None);
+        let steps = (0..95_000).map(|i| 1e-3 * (f64::from(i) + 0.5));
+        let since = |t: f64| match t {
+            t if t < 60.0 => t,
+            t if t < 75.0 => t - 60.0,
+            t => t - 75.0,
+        };
+        let sum: f64 = steps.map(|t| (-since(t) / 20.0).exp()).sum();
+        assert!((sum / 95_000.0 - mean).abs() < 1e-6);
+        for few in [&[log(19.0), log(60.0)][..], &[log(600.0)]] {
+            assert_eq!(of_time(few).unwrap(), None);
+        }
     }
 }

@@ -13,6 +13,7 @@
 
 use super::{Pipeline, Recording, Trajectory};
 use crate::error::{Finding, Severity};
+use crate::lanes::tanh;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -71,10 +72,19 @@ pub(crate) fn stop(q: &[f64], r: f64, out: &mut [f64]) -> usize {
         let step = q - before;
         before = *q;
         (low, high) = ((low + step).clamp(-r, r), (high + step).clamp(-r, r));
-        if low == high {
-            known = known.min(i);
-        }
         *out = 0.5 * (low + high) / r;
+        if low == high {
+            known = i;
+            break;
+        }
+    }
+    // From here on one state is all of them.
+    let rest = known.min(out.len())..;
+    let share = 1.0 / r;
+    for (q, out) in q[rest.clone()].iter().zip(&mut out[rest]) {
+        low = (low + (q - before)).clamp(-r, r);
+        before = *q;
+        *out = low * share;
     }
     known
 }
@@ -159,8 +169,8 @@ impl Pipeline {
         if history.thresholds.is_empty() {
             return;
         }
-        let velocity = self.coulomb_velocity;
-        let sense: Vec<f64> = qd.iter().map(|qd| direction(*qd, velocity)).collect();
+        let mut sense = qd.to_vec();
+        directions(&mut sense, self.coulomb_velocity);
         let mut known = 0;
         for (r, channel) in history
             .thresholds
@@ -175,12 +185,28 @@ impl Pipeline {
     }
 }
 
-/// tanh(q̇/v_s), or the sign for v_s = 0.
-fn direction(rate: f64, velocity: f64) -> f64 {
-    match velocity > 0.0 {
-        true => (rate / velocity).tanh(),
-        false if rate == 0.0 => 0.0,
-        false => rate.signum(),
+/// Rates to tanh(q̇/v_s), or their signs for v_s = 0.
+fn directions(rates: &mut [f64], velocity: f64) {
+    if velocity > 0.0 {
+        rates.iter_mut().for_each(|rate| *rate /= velocity);
+        return pulp::Arch::new().dispatch(Tanh(rates));
+    }
+    for rate in rates.iter_mut().filter(|rate| **rate != 0.0) {
+        *rate = rate.signum();
+    }
+}
+
+/// Numbers to their hyperbolic tangents.
+struct Tanh<'a>(&'a mut [f64]);
+
+impl pulp::WithSimd for Tanh<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
+        let (lanes, rest) = S::as_mut_simd_f64s(self.0);
+        lanes.iter_mut().for_each(|x| *x = tanh(simd, *x));
+        rest.iter_mut().for_each(|x| *x = x.tanh());
     }
 }
 
