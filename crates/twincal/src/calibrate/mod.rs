@@ -150,7 +150,7 @@ fn road(
     findings.extend(constant_torque(robot, every_log.clone())?);
     findings.extend(hardly_driven(robot, every_log.clone())?);
     let mut lags = aligned::align(robot, logs, &mut pipeline, &mut prepared, findings)?;
-    let usual = settings.library.families == Family::DEFAULT;
+    let usual = smaller_library::is_usual(&settings.library.families);
     let followed = history::follow(robot, (logs, &prepared), &pipeline, settings, findings)?;
     let settings = &followed.settings;
     let mut library_settings = LibrarySettings {
