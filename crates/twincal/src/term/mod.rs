@@ -57,6 +57,7 @@ pub(crate) use model_column::ModelColumn;
 pub use recipes::Recipes;
 pub use sentence::{Estimate, is_place, told};
 pub use status::Status;
+pub(crate) use stribeck::STRIBECK_VELOCITY;
 pub(crate) use words::estimate;
 
 use serde::{Deserialize, Serialize};
