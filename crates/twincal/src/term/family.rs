@@ -191,15 +191,22 @@ impl Family {
     /// mass somewhere has a tensor about any other point: that of a payload is next to certain where the payload is in; not quite,
     /// because the tensor of a small payload near the link's own centre of mass is too small to be seen. A drive's zero is calibrated,
     /// while a constant is what is left on one motion of whatever else is missing: one arm of six joints in five has an offset.
+    /// A function of one joint's position is likewise what is left of much else, and few joints have a spring or a counterbalance.
     #[must_use]
     pub fn usual(self) -> Option<f64> {
         match self {
             Self::Viscous | Self::Coulomb | Self::MotorInertia => Some(0.5),
             Self::Payload => Some(1.0 / 3.0),
             Self::PayloadTensor => Some(0.999),
-            Self::Offset => Some(1.0 / 30.0),
+            Self::Offset | Self::Spring | Self::Potential => Some(1.0 / 30.0),
             _ => None,
         }
+    }
+
+    /// True for a function of one joint's position, which one motion alone hardly tells from the error of another term.
+    #[must_use]
+    pub fn asks_for_two_motions(self) -> bool {
+        matches!(self, Self::Spring | Self::Potential)
     }
 
     /// True for all that a payload has.

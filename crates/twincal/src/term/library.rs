@@ -324,8 +324,8 @@ impl Library {
         sentence(&self.components[component], parameters)
     }
 
-    /// Least value of a term's coefficient if friction and motor inertia cannot be negative: minus what the model has; −∞
-    /// where any value is physical.
+    /// Least value of a term's coefficient if friction, motor inertia and stiffness cannot be negative: minus what the model has; −∞
+    /// where any value is physical. (A joint that a spring drives away from a position inside its range has a potential.)
     ///
     /// # Panics
     /// If there is no such term or the robot is another one.
@@ -340,6 +340,10 @@ impl Library {
             Family::Viscous => joint(".viscous").map_or(0.0, |joint| -joint.damping),
             Family::MotorInertia => joint(".motor_inertia").map_or(0.0, |joint| -joint.armature),
             Family::Coulomb | Family::CoupledFriction | Family::CoupledInertia => 0.0,
+            Family::Spring => match joint(".spring.stiffness") {
+                Some(joint) => -joint.stiffness,
+                None => UNBOUNDED,
+            },
             _ => f64::NEG_INFINITY,
         }
     }
@@ -512,8 +516,11 @@ fn home(components: &[Component], terms: usize) -> Vec<usize> {
     home
 }
 
+/// Bound that never acts: all columns of a component have bounds, or none.
+const UNBOUNDED: f64 = -1e100;
+
 /// States that have nothing in particular in common: a Weyl sequence with irrational steps.
-fn random_motions(joints: usize) -> Vec<Motions> {
+pub(super) fn random_motions(joints: usize) -> Vec<Motions> {
     const STATES: usize = 40;
     let value = |state: usize, joint: usize, k: usize| {
         let step = ((3 * joint + k + 2) as f64).sqrt() * std::f64::consts::E;

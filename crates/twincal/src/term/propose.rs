@@ -1,7 +1,9 @@
 //! Which candidates a robot gets: every family that is switched on, in the order of `terms[]`.
 
+use super::aliases::channels;
 use super::candidate::{Joint, Proposal};
 use super::expression::Graph;
+use super::library::random_motions;
 use super::model_column::LinkFrame;
 use super::payload::Mount;
 use super::{
@@ -11,7 +13,7 @@ use super::{
 };
 use crate::error::{Error, Finding, Result, Severity};
 use crate::robot::spatial::{apply, transpose};
-use crate::robot::{Placement, Robot, did_you_mean, to_body_frame};
+use crate::robot::{Motion, Placement, Robot, did_you_mean, nominal_torque, to_body_frame};
 
 /// Most columns a library may have.
 const TERM_LIMIT: usize = 1000;
@@ -27,6 +29,8 @@ const PAYLOAD_SHARE: f64 = 0.3;
 const PAYLOAD_REACH: f64 = 0.1;
 /// Share of all moving mass that counts for links that the model gives less.
 const LEAST_MASS_SHARE: f64 = 0.02;
+/// Share of the largest torque that a joint holds against gravity, for joints that hold less: what cables and seals amount to.
+const LEAST_HELD: f64 = 0.05;
 /// Length that makes first moments and tensors out of masses, m.
 const REACH: f64 = 0.2;
 
@@ -120,11 +124,12 @@ pub(super) fn proposals(
             all.extend(joints.iter().filter_map(make));
         }
     };
+    let held: Vec<Option<f64>> = held_torque(about);
     per_joint(Family::Spring, &mut |joint| {
-        Some(spring::proposal(graph, joint))
+        Some(spring::proposal(graph, joint, held[joint.index]))
     });
     per_joint(Family::Potential, &mut |joint| {
-        (!joint.slides).then(|| potential::proposal(graph, joint))
+        (!joint.slides).then(|| potential::proposal(graph, joint, held[joint.index]))
     });
     per_joint(Family::Asymmetry, &mut |joint| {
         Some(asymmetry::proposal(graph, joint, velocity))
@@ -153,12 +158,12 @@ pub(super) fn proposals(
     per_pair(Family::CoupledInertia, &mut |a, b, sign| {
         coupled_inertia::candidate(graph, a, b, sign).into()
     });
-    let mut per_joint = |family: Family, make: &mut dyn FnMut(&Joint) -> Option<Proposal>| {
-        if settings.has(family) {
-            all.extend(joints.iter().filter_map(make));
-        }
-    };
     if about.robot.is_some() {
+        let mut per_joint = |family: Family, make: &mut dyn FnMut(&Joint) -> Option<Proposal>| {
+            if settings.has(family) {
+                all.extend(joints.iter().filter_map(make));
+            }
+        };
         per_joint(Family::Gain, &mut |joint| {
             Some(gain::candidate(joint).into())
         });
@@ -168,6 +173,34 @@ pub(super) fn proposals(
     }
     all.extend(ripples(graph, joints, settings)?);
     Ok(all)
+}
+
+/// Torque that each joint holds against gravity: amplitude (√2 rms) over random positions, N·m or N, at least a twentieth of the robot's
+/// largest; `None` where nothing is held.
+fn held_torque(about: &About<'_>) -> Vec<Option<f64>> {
+    let count = about.joints.len();
+    let Some(robot) = about.robot else {
+        return vec![None; count];
+    };
+    let states = random_motions(count);
+    let [q, _, _] = channels(&states, count);
+    let still = vec![0.0; q.len()];
+    let mut tau = vec![0.0; q.len()];
+    let motion = Motion {
+        len: states.len(),
+        q: &q,
+        qd: &still,
+        qdd: &still,
+    };
+    nominal_torque(robot, motion, &mut tau);
+    let amplitude = |tau: &[f64]| {
+        let square: f64 = tau.iter().map(|t| t * t).sum();
+        (2.0 * square / tau.len() as f64).sqrt()
+    };
+    let own: Vec<f64> = tau.chunks_exact(states.len()).map(amplitude).collect();
+    let least = LEAST_HELD * own.iter().copied().fold(0.0, f64::max);
+    let held = own.into_iter().map(|own| own.max(least));
+    held.map(|held| (held > 0.0).then_some(held)).collect()
 }
 
 /// Payload and, link by link, mass moments, tensor and mass scale: of the link that each moving joint carries.
