@@ -86,9 +86,8 @@ impl Family {
     pub const UNNAMED: [Self; 3] = [Self::User, Self::Generic, Self::PayloadTensor];
 
     /// What twincal proposes unasked for an arm with geared drives: all but `mass_scale` (a special case of
-    /// `mass_moments` and `tensor`), `ripple` (it asks for a gear ratio), and `gain` and `encoder_zero`, which can imitate
-    /// almost anything: on real logs they took what springs and counterbalances are.
-    pub const DEFAULT: [Self; 16] = [
+    /// `mass_moments` and `tensor`) and `ripple` (it asks for a gear ratio).
+    pub const DEFAULT: [Self; 18] = [
         Self::Viscous,
         Self::Coulomb,
         Self::Offset,
@@ -105,6 +104,8 @@ impl Family {
         Self::LoadFriction,
         Self::CoupledFriction,
         Self::CoupledInertia,
+        Self::Gain,
+        Self::EncoderZero,
     ];
 
     /// What is proposed beside the user's own expressions: friction, offset and motor inertia of every joint.
@@ -192,6 +193,7 @@ impl Family {
     /// because the tensor of a small payload near the link's own centre of mass is too small to be seen. A drive's zero is calibrated,
     /// while a constant is what is left on one motion of whatever else is missing: one arm of six joints in five has an offset.
     /// A function of one joint's position is likewise what is left of much else, and few joints have a spring or a counterbalance.
+    /// Drive constants and joint zeros can imitate almost anything and are calibrated by the maker: one in a thousand is off.
     #[must_use]
     pub fn usual(self) -> Option<f64> {
         match self {
@@ -199,6 +201,7 @@ impl Family {
             Self::Payload => Some(1.0 / 3.0),
             Self::PayloadTensor => Some(0.999),
             Self::Offset | Self::Spring | Self::Potential => Some(1.0 / 30.0),
+            Self::Gain | Self::EncoderZero => Some(1e-3),
             _ => None,
         }
     }
