@@ -205,6 +205,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
             n: (logs * rows) as f64,
             n_eff: (logs * rows) as f64 / 7.3,
             autocorrelation_time: 2.4,
+            misfit: 1.0,
             interval_factor: 1.08,
             out_of_band: 0.021,
             spread: Default::default(),
@@ -262,8 +263,6 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
         },
         likelihood: LikelihoodUsed {
             model: NoiseModel::Tempered,
-            tempering: 3.0,
-            tempering_scores: vec![(1.0, 10.0), (3.0, 14.0), (10.0, 9.0)],
             rounds: 6,
         },
         groups: Vec::new(),

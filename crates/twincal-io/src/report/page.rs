@@ -73,8 +73,6 @@ struct Page<'a> {
     findings: Vec<findings::Kind>,
     convergence: Vec<String>,
     pipeline: Vec<String>,
-    /// c of the tempered likelihood; empty without.
-    tempering: String,
 }
 
 /// The page as HTML.
@@ -176,10 +174,5 @@ fn gather<'a>(
         findings: findings::findings(calibration),
         convergence: tables::convergence(calibration),
         pipeline: tables::pipeline(calibration),
-        tempering: if calibration.likelihood.tempering == 1.0 {
-            String::new()
-        } else {
-            calibration.likelihood.tempering.to_string()
-        },
     }
 }

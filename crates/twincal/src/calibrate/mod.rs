@@ -17,6 +17,7 @@ mod held_out;
 mod heredity;
 mod independent_rows;
 mod lower_band;
+mod misfit;
 mod negative_friction;
 mod noise_of;
 mod outlook;
@@ -61,7 +62,7 @@ use crate::error::{Error, Finding, Result};
 use crate::infer::{Given, infer_near, sample, sampled_likelihood};
 use crate::likelihood::{Columns, NoiseInterval, NoiseModel, NoiseUncertainty};
 use crate::observations::Part;
-use crate::plug_in::{Fit, FitSettings, LeftOut, Moving, fit, fit_tempered, start};
+use crate::plug_in::{Fit, FitSettings, Moving, fit, fit_tempered, start};
 use crate::posterior::draws::Drawer;
 use crate::robot::Robot;
 use crate::self_check::self_check;
@@ -245,6 +246,7 @@ fn road(
             (drift::findings(robot, &training, mean), uneven)
         },
     );
+    findings.extend(misfit::findings(robot, &fitted.fit.plug_in));
     findings.extend(tails.into_iter().chain(drifts).chain(uneven));
     let inside = compact::members(&fitted.fit.problem, &fitted.fit.posterior);
     let compact = compact::refit(&fitted.fit.problem, &inside, &fitted.fit.posterior)?;
@@ -359,12 +361,13 @@ fn road(
 /// A fit together with what left-out training data said of it.
 struct Fitted {
     fit: Fit,
-    left_out: Option<LeftOut>,
+    /// Per joint on the noise sd of intervals; `None` unless tempered.
+    interval_factors: Option<Vec<f64>>,
     /// What draws say of each joint's noise; empty where it is a plug-in.
     sampled: Vec<NoiseInterval>,
 }
 
-/// Fixed point, and for the tempered likelihood the choice of c.
+/// Fixed point, and for the tempered likelihood what no candidate describes.
 fn estimate(
     training: &[Part<'_>],
     columns: &Columns,
@@ -380,10 +383,10 @@ fn estimate(
     }
     match settings.noise.model {
         NoiseModel::Tempered => {
-            let (fit, left_out) = fit_tempered(training, columns, fit_settings)?;
+            let (fit, factors) = fit_tempered(training, columns, fit_settings)?;
             Ok(Fitted {
                 fit,
-                left_out: Some(left_out),
+                interval_factors: Some(factors),
                 sampled: Vec::new(),
             })
         }
@@ -412,7 +415,7 @@ fn estimate(
             }
             Ok(Fitted {
                 fit,
-                left_out: None,
+                interval_factors: None,
                 sampled: noise,
             })
         }

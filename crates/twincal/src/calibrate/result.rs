@@ -369,10 +369,6 @@ pub struct PriorUsed {
 pub struct LikelihoodUsed {
     /// Model.
     pub model: NoiseModel,
-    /// c; 1 unless tempered.
-    pub tempering: f64,
-    /// `(c, left-out log score)` of every multiplier tried.
-    pub tempering_scores: Vec<(f64, f64)>,
     /// Rounds of the plug-in iteration.
     pub rounds: usize,
 }

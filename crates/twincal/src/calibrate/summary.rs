@@ -57,7 +57,7 @@ pub(super) fn summarise(
     opinion: SecondOpinion,
     findings: &mut Vec<Finding>,
 ) -> Result<Calibration> {
-    let Fitted { fit, left_out, .. } = fitted;
+    let Fitted { fit, .. } = fitted;
     let training: Vec<Part<'_>> = data
         .fit
         .iter()
@@ -158,8 +158,6 @@ pub(super) fn summarise(
         },
         likelihood: LikelihoodUsed {
             model: settings.noise.model,
-            tempering: fit.plug_in.tempering,
-            tempering_scores: left_out.map_or_else(Vec::new, |l| l.scores),
             rounds: fit.rounds,
         },
         groups,
