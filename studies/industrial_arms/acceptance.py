@@ -89,7 +89,7 @@ def judge(truth, result):
 
     pips = {name: sure(name) for name in sorted(true)}
     missed += [f"{name}: PIP {own:.3f}" for name, (own, group) in pips.items() if group < 0.99]
-    false = [name for name, c in components.items() if c["verdict"] == "found" and name not in true | true_too]
+    false = [name for name, c in components.items() if c["status"] == "established" and name not in true | true_too]
     same = {name: group for name in [*false, *true] for group in groups
             if group["alike"] == "every_motion" and name in group["members"] and true & set(group["members"])}
     missed += [f"{name} is false, PIP {components[name]['pip']:.3f}" for name in false]

@@ -39,7 +39,7 @@ fn calibrated(logs: &[Recording], heldout: Recording, families: &[Family]) -> Ca
 }
 
 fn selected(result: &Calibration) -> Vec<&str> {
-    let all = result.components.iter().filter(|c| c.selected);
+    let all = result.components.iter().filter(|c| c.is_in());
     all.map(|component| component.name.as_str()).collect()
 }
 

@@ -1,6 +1,7 @@
 //! From the posterior over columns to physical stories: one line per component, with parameters that people know.
 
-use super::result::{ComponentSummary, ParameterSummary, TermSummary, Verdict};
+use super::result::{ComponentSummary, ParameterSummary, TermSummary};
+use super::status::{Status, StatusReason, by_probability};
 use crate::posterior::draws::{CoefficientDraws, Drawer};
 use crate::posterior::{Model, Posterior};
 use crate::term::{Component, Estimate, Library};
@@ -85,8 +86,8 @@ fn summary(
         columns: own.iter().map(|term| term.term.name.clone()).collect(),
         pip: None,
         pip_mcse: None,
-        selected: false,
-        verdict: None,
+        status: Status::Unidentifiable,
+        reason: StatusReason::NoColumn,
         alias_of: component.alias_of.clone(),
         told_as: None,
         no_rigid_body: false,
@@ -98,9 +99,9 @@ fn summary(
         return summary;
     };
     (summary.pip, summary.pip_mcse) = (first.pip, first.pip_mcse);
-    summary.verdict = verdict(&live);
-    summary.selected =
-        first.pip.is_some_and(|pip| pip >= 0.5) && summary.verdict != Some(Verdict::NotSeen);
+    let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
+    let (pip, mcse) = (number(first.pip), number(first.pip_mcse));
+    (summary.status, summary.reason) = by_probability(pip, mcse, is_seen(&live));
     summary.parameters = parameters(library, component, index, &own, drawn);
     let estimates: Vec<Estimate> = summary
         .parameters
@@ -116,7 +117,7 @@ fn summary(
         .collect();
     let held = || summary.parameters.iter().any(|p| p.median.is_finite());
     let unseen = estimates.iter().all(|p| p.value.is_nan()) && held();
-    summary.words = if summary.verdict == Some(Verdict::NotSeen) || unseen {
+    summary.words = if summary.status == Status::Unidentifiable || unseen {
         format!("{}: {NOT_SEEN}", component.story)
     } else {
         library.component_words(index, &estimates)
@@ -124,15 +125,10 @@ fn summary(
     summary
 }
 
-/// The verdict that all columns share which are in or out with the first, except that one seen column is enough for the component to be
-/// seen.
-fn verdict(live: &[&TermSummary]) -> Option<Verdict> {
-    let first = live.first()?;
-    let mut together = live
-        .iter()
-        .filter(|term| term.term.family == first.term.family);
-    let seen = together.find(|term| term.verdict != Some(Verdict::NotSeen));
-    seen.unwrap_or(first).verdict
+/// Whether the data see one of the columns that are in or out with the first.
+fn is_seen(live: &[&TermSummary]) -> bool {
+    let together = |term: &&&TermSummary| term.term.family == live[0].term.family;
+    live.iter().filter(together).any(|term| term.seen)
 }
 
 /// Mean, sd and central interval of every parameter, given that the component is in.
@@ -197,7 +193,7 @@ fn parameters(
                 interval95: [quantile(0.025), quantile(0.975)],
                 median,
                 interval68,
-                seen: term.is_none_or(|term| term.verdict != Some(Verdict::NotSeen)),
+                seen: term.is_none_or(|term| term.seen),
             }
         })
         .collect()

@@ -359,6 +359,20 @@ impl<'a> Candidates<'a> {
     }
 }
 
+impl Group {
+    /// A set whose members take each other's place in these logs.
+    pub(super) fn in_these_logs(members: Vec<String>, pip: f64) -> Self {
+        let names: Vec<&str> = members.iter().map(String::as_str).collect();
+        Self {
+            words: words(&names, pip, (Alike::TheseLogs, true), false),
+            members,
+            pip,
+            alike: Alike::TheseLogs,
+            settled: false,
+        }
+    }
+}
+
 /// What columns make of another's torque.
 struct Instead {
     /// Nats that are lost.
@@ -388,7 +402,7 @@ impl Calibration {
             // What several others have together only.
             let spanned = self.components.iter().filter(|own| {
                 alike == Alike::EveryMotion
-                    && own.selected
+                    && own.is_in()
                     && !own.names_beside().is_empty()
                     && !in_a_group(&own.name)
             });

@@ -16,6 +16,7 @@ mod heavy_tails;
 mod held_out;
 mod heredity;
 mod independent_rows;
+mod left_out;
 mod lower_band;
 mod misfit;
 mod negative_friction;
@@ -23,14 +24,13 @@ mod noise_of;
 mod outlook;
 mod prior_conflict;
 mod reader;
-mod repeat;
-mod repeated;
 mod ripples;
 mod result;
 mod room;
 mod sandwich;
 mod settings;
 mod smaller_library;
+mod status;
 mod stopped;
 mod summary;
 mod sweep;
@@ -47,15 +47,15 @@ mod worse;
 #[cfg(test)]
 mod testing;
 
+pub use left_out::{LeftOutData, LeftOutError};
 pub use outlook::{LookedAt, Outlook, outlook};
-pub use repeated::Repeated;
 pub use result::{
-    Alike, Along, Calibration, Compact, CompactTerm, ComponentSummary, Curve, Draws, Group, Halves,
-    LikelihoodUsed, LogSummary, ParameterSummary, PriorUsed, Repeat, SweepPoint, TermSummary,
-    Verdict,
+    Alike, Along, Calibration, Compact, CompactTerm, ComponentSummary, Curve, Draws, Group,
+    LikelihoodUsed, LogSummary, ParameterSummary, PriorUsed, SweepPoint, TermSummary,
 };
 pub use ripples::UnaskedRipple;
 pub use settings::CalibrationSettings;
+pub use status::{Status, StatusReason};
 pub use stopped::Stopped;
 
 use crate::error::{Error, Finding, Result};
@@ -284,19 +284,6 @@ fn road(
     let prepared: Vec<ReadyLog<'static>> = prepared.into_iter().map(ReadyLog::detached).collect();
     *recordings = None;
     progress(Stage::Sensitivity);
-    let gap = (skeleton.pipeline.kernel_length() * skeleton.pipeline.rate_hz).ceil() as usize;
-    let halves = repeat::cut(&training, gap);
-    let again = || match &halves {
-        None => Ok(Vec::new()),
-        Some(cut) => repeat::repeat(
-            cut,
-            &library,
-            &columns,
-            &settings.prior,
-            &fitted.fit,
-            &inside,
-        ),
-    };
     let elsewhere = || {
         sweep::cutoff(
             &skeleton,
@@ -310,7 +297,6 @@ fn road(
     };
     let (problem, posterior) = (&fitted.fit.problem, &fitted.fit.posterior);
     let beside = || {
-        let repeats = again();
         let sandwich = sandwich::sds(&fitted.fit, &compact, &training);
         let compact = compact::summary(&library, problem, posterior, &compact, &training);
         let excitation = unseen::excitation(
@@ -320,22 +306,13 @@ fn road(
             &fitted.fit.gram,
             &data,
         );
-        (repeats, sandwich, compact, excitation)
+        (sandwich, compact, excitation)
     };
-    let (sweep, (repeats, sandwich, compact, excitation)) = rayon::join(elsewhere, beside);
-    let (sweep, repeats) = (sweep?, repeats?);
+    let (sweep, (sandwich, compact, excitation)) = rayon::join(elsewhere, beside);
+    let sweep = sweep?;
     drop(prepared);
     findings.extend(sweep::findings(&sweep, &library, posterior));
-    let halves = halves.map(|cut| cut.kind).filter(|_| !repeats.is_empty());
-    if let Some(kind) = halves {
-        findings.extend(repeat::findings(&repeats, kind));
-    }
-    let opinion = summary::SecondOpinion {
-        sandwich,
-        compact,
-        repeats,
-        halves,
-    };
+    let opinion = summary::SecondOpinion { sandwich, compact };
     let mut calibration = summary::summarise(
         skeleton, &library, &data, &columns, settings, fitted, validation, sweep, opinion, findings,
     )?;

@@ -57,7 +57,6 @@ pub(crate) use model_column::ModelColumn;
 pub use recipes::Recipes;
 pub use sentence::{Estimate, is_place, told};
 pub use status::Status;
-pub(crate) use words::estimate;
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
