@@ -7,7 +7,8 @@ PIP > 0.99 or lie in a group that is; no false one may be found. Where a compone
 the robot (`groups[].alike` is `every_motion`; a payload and the last link's moments) that is printed below the row; it counts as false all the same.
 Payload mass (within 0.5 % where some motion of the robot separates it from what else is true) and held-out RMSE (root mean square over
 the joints, and the worst joint, of its ratio to the joint's noise) are compared with the truth.
-The first moments of link 3 change with its mass: `<link>.mass_moments` is true, its tensor (about the joint) is as well.
+Link 3 is heavier and its centre of mass moves: `<link>.density` is true, its other levels (centre of mass; tensor, which is not scaled with
+the mass here) are as well.
 """
 
 import argparse
@@ -78,8 +79,8 @@ def judge(truth, result):
     components = {c["name"]: c for c in result["components"]}
     groups = result["groups"]
     link = link_of(truth, truth["drift_joint"])
-    true = {"payload", truth["spring"], f"{link}.mass_moments", *truth["friction"]}
-    true_too = {f"{link}.tensor"}
+    true = {"payload", truth["spring"], f"{link}.density", *truth["friction"]}
+    true_too = {f"{link}.mass_moments", f"{link}.tensor"}
     missed = []
 
     def sure(name):

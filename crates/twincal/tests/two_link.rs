@@ -104,13 +104,13 @@ fn the_answer_comes_with_its_own_checks() {
         [
             "sin(q1 - q2)",
             "payload.m",
-            "payload.mx",
-            "payload.my",
-            "payload.izz"
+            "payload.h1",
+            "payload.h2",
+            "payload.s1"
         ]
     );
     let mut terms = result.terms.iter();
-    let tensor = terms.find(|term| term.term.name == "payload.izz");
+    let tensor = terms.find(|term| term.term.name == "payload.s1");
     let tensor = tensor.expect("its tensor");
     let [mean, sd] = [tensor.conditional_mean, tensor.conditional_sd].map(|x| x.expect("a number"));
     assert!(mean.abs() < 4.5 * sd, "{mean} ± {sd}");

@@ -48,14 +48,26 @@ fn of_a_point_mass(component: &ComponentSummary, calibration: &Calibration) -> O
 /// What the model says of a tensor's numbers that are told, and what it would have to say: known where nothing else of the link was found.
 fn of_the_file(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
     let link = component.name.strip_suffix(".tensor")?;
-    let moments = format!("{link}.mass_moments");
+    let levels = ["density", "mass_moments"].map(|level| format!("{link}.{level}"));
     let mut found = calibration.components.iter().filter(|other| other.is_in());
     let robot = &calibration.twin.robot;
     let last = robot.links_of_body(robot.bodies().len().saturating_sub(1));
-    let alone = !found
-        .any(|other| other.name == moments || other.family.is_payload() && last.contains(&link));
+    let alone = !found.any(|other| {
+        levels.contains(&other.name) || other.family.is_payload() && last.contains(&link)
+    });
     let links = &robot.description().links;
     let inertia = links.iter().find(|own| own.name == link)?.inertia?;
+    // Links that are fixed to it are part of the body whose tensor changes.
+    let (body, _) = robot.body_of_link(link)?;
+    let of_body = robot.links_of_body(body);
+    let heavy = links.iter().filter(|own| own.inertia.is_some());
+    if heavy
+        .filter(|own| of_body.contains(&own.name.as_str()))
+        .count()
+        > 1
+    {
+        return None;
+    }
     let axis = |letter: char| "xyz".find(letter);
     let told = component.parameters.iter().filter_map(|parameter| {
         let mut letters = parameter.name.strip_prefix('i')?.chars();

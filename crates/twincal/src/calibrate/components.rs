@@ -4,7 +4,7 @@ use super::result::{ComponentSummary, ParameterSummary, TermSummary};
 use super::status::{Status, StatusReason, by_probability};
 use crate::posterior::draws::{CoefficientDraws, Drawer};
 use crate::posterior::{Model, Posterior};
-use crate::term::{Component, Estimate, Library};
+use crate::term::{Before, Component, Estimate, Library};
 use rayon::prelude::*;
 
 /// Draws that the parameters are worked out from.
@@ -15,6 +15,10 @@ const ENOUGH: usize = 500;
 const ONE_SD: [f64; 2] = [0.158_655, 0.841_345];
 /// What is said instead of a number that is the prior's alone.
 pub(super) const NOT_SEEN: &str = "not seen by these data";
+/// Share of the prior's sd from which on a parameter is not seen.
+const UNSEEN: f64 = 0.9;
+/// Share of a mass that its sd may be where its centre is told.
+const OPEN: f64 = 0.5;
 /// Random stream of those draws.
 const STREAM: u64 = (1 << 32) + 1;
 
@@ -151,7 +155,7 @@ fn parameters(
     let values: Vec<Vec<f64>> = given
         .map(|beta| library.parameter_values(index, &beta))
         .collect();
-    library
+    let mut parameters: Vec<ParameterSummary> = library
         .parameters(index)
         .into_iter()
         .enumerate()
@@ -164,9 +168,11 @@ fn parameters(
                 column.get(place).copied().unwrap_or(f64::NAN)
             };
             // A coefficient has exact moments. A ratio of coefficients has none where its denominator can be near zero.
-            // A parameter stands at the place of its term. Where that is no column, its value is not 0 but unknown.
+            // A parameter stands at the place of its term, or mixes several. Where one of those is no column, its value is not 0 but unknown.
+            let before = library.before(index, p);
             let term = own.get(p).copied();
-            if term.is_some_and(|term| term.pip.is_none()) {
+            let alone = term.filter(|_| before.is_none());
+            if alone.is_some_and(|term| term.pip.is_none()) || before == Some(Before::Hidden) {
                 return ParameterSummary {
                     name: parameter.name,
                     unit: parameter.unit,
@@ -193,8 +199,28 @@ fn parameters(
                 interval95: [quantile(0.025), quantile(0.975)],
                 median,
                 interval68,
-                seen: term.is_none_or(|term| term.seen),
+                seen: match before {
+                    Some(Before::Width(prior)) => sd < UNSEEN * prior,
+                    _ => alone.is_none_or(|term| term.seen),
+                },
             }
         })
-        .collect()
+        .collect();
+    identified(library, index, &mut parameters);
+    parameters
+}
+
+/// Of a mass that is open by more than half of itself there is no centre: then first moments are told, else the centre.
+fn identified(library: &Library, index: usize, parameters: &mut Vec<ParameterSummary>) {
+    let ratio = |p: &usize| library.before(index, *p) == Some(Before::Ratio);
+    let centre: Vec<usize> = (0..parameters.len()).filter(ratio).collect();
+    let Some(mass) = parameters.first_mut().filter(|_| !centre.is_empty()) else {
+        return;
+    };
+    mass.seen &= mass.sd <= OPEN * mass.mean.abs();
+    let known = mass.seen;
+    for p in centre {
+        parameters[p].seen &= known;
+    }
+    parameters.retain(|own| !(known && matches!(own.name.as_str(), "mx" | "my" | "mz")));
 }

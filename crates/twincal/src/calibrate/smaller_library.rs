@@ -5,10 +5,11 @@ use crate::error::{Error, Finding, Severity};
 use crate::term::Family;
 
 /// Viscous and Coulomb friction, and the inertial parameters of links with the motors' inertia.
-const FAMILIES: [Family; 5] = [
+const FAMILIES: [Family; 6] = [
     Family::Viscous,
     Family::Coulomb,
     Family::MotorInertia,
+    Family::Density,
     Family::MassMoments,
     Family::Tensor,
 ];

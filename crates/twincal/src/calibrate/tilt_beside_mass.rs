@@ -27,7 +27,9 @@ pub(super) fn finding(
         let mut all = calibration.components.iter();
         all.any(|component| component.is_in() && family(component.family))
     };
-    let inertial = |family| matches!(family, Family::MassMoments) || Family::is_payload(family);
+    let inertial = |family| {
+        matches!(family, Family::Density | Family::MassMoments) || Family::is_payload(family)
+    };
     if !(found(&|family| family == Family::Tilt) && found(&inertial)) {
         return None;
     }

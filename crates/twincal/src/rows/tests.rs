@@ -538,7 +538,7 @@ fn a_coarser_clock_changes_no_row() {
     let (robot, settings) = (
         arm(1.0),
         LibrarySettings {
-            families: vec![Family::MassScale, Family::Viscous, Family::Coulomb],
+            families: vec![Family::Density, Family::Viscous, Family::Coulomb],
             coulomb_velocity: 0.02,
             ..LibrarySettings::default()
         },
@@ -548,7 +548,7 @@ fn a_coarser_clock_changes_no_row() {
         .columns()
         .iter()
         .map(|&term| match library.terms()[term].family {
-            Family::MassScale => 0.15,
+            Family::Density => 0.15,
             Family::Viscous => 1.5,
             _ => 2.0,
         })

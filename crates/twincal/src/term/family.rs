@@ -22,12 +22,12 @@ pub enum Family {
     Payload,
     /// Its inertia tensor, which may be out while the payload is in.
     PayloadTensor,
-    /// Mass and first moments of a link.
-    MassMoments,
-    /// Inertia tensor of a link.
-    Tensor,
     /// Mass, first moments and inertia of a link by one factor.
-    MassScale,
+    Density,
+    /// First moments of a link's mass, beside its density.
+    MassMoments,
+    /// Inertia tensor of a link, beside its density.
+    Tensor,
     /// Direction and size of gravity in the base.
     Tilt,
     /// Joint spring with rest position.
@@ -65,9 +65,9 @@ impl Family {
         Self::Offset,
         Self::MotorInertia,
         Self::Payload,
+        Self::Density,
         Self::MassMoments,
         Self::Tensor,
-        Self::MassScale,
         Self::Tilt,
         Self::Spring,
         Self::Potential,
@@ -85,15 +85,15 @@ impl Family {
     /// Families that come without a switch of their own: with `terms`, with `generic`, with a payload.
     pub const UNNAMED: [Self; 3] = [Self::User, Self::Generic, Self::PayloadTensor];
 
-    /// What twincal proposes unasked for an arm with geared drives: all but `mass_scale` (a special case of
-    /// `mass_moments` and `tensor`), `ripple` (it asks for a gear ratio), and `gain` and `encoder_zero`, which can imitate
-    /// almost anything: on real logs they took what springs and counterbalances are.
-    pub const DEFAULT: [Self; 16] = [
+    /// What twincal proposes unasked for an arm with geared drives: all but `ripple` (it asks for a gear ratio), and `gain` and
+    /// `encoder_zero`, which can imitate almost anything: on real logs they took what springs and counterbalances are.
+    pub const DEFAULT: [Self; 17] = [
         Self::Viscous,
         Self::Coulomb,
         Self::Offset,
         Self::MotorInertia,
         Self::Payload,
+        Self::Density,
         Self::MassMoments,
         Self::Tensor,
         Self::Tilt,
@@ -133,7 +133,7 @@ impl Family {
     #[must_use]
     pub fn told_in(self, unit: &str) -> (f64, &str) {
         match (self, unit) {
-            (Self::Gain | Self::LoadFriction | Self::MassScale, "1") => (100.0, "%"),
+            (Self::Gain | Self::LoadFriction | Self::Density, "1") => (100.0, "%"),
             (Self::EncoderZero, "rad") => (1f64.to_degrees(), "°"),
             (Self::EncoderZero | Self::Payload, "m") => (1e3, "mm"),
             (_, "1") => (1.0, ""),
@@ -170,7 +170,7 @@ impl Family {
             Self::PayloadTensor => "payload_tensor",
             Self::MassMoments => "mass_moments",
             Self::Tensor => "tensor",
-            Self::MassScale => "mass_scale",
+            Self::Density => "density",
             Self::Tilt => "tilt",
             Self::Spring => "spring",
             Self::Potential => "potential",
@@ -190,7 +190,8 @@ impl Family {
     /// a payload, which one log in three or so carries unsaid, is the usual reason why the last link is not what the model says. What has
     /// mass somewhere has a tensor about any other point: that of a payload is next to certain where the payload is in; not quite,
     /// because the tensor of a small payload near the link's own centre of mass is too small to be seen. A drive's zero is calibrated,
-    /// while a constant is what is left on one motion of whatever else is missing: one arm of six joints in five has an offset.
+    /// while a constant is what is left on one motion of whatever else is missing: one arm of six joints in five has an offset. What is wrong
+    /// with a link is first of all how heavy it is: a centre of mass or a tensor that is off by itself is rarer.
     #[must_use]
     pub fn usual(self) -> Option<f64> {
         match self {
@@ -198,8 +199,16 @@ impl Family {
             Self::Payload => Some(1.0 / 3.0),
             Self::PayloadTensor => Some(0.999),
             Self::Offset => Some(1.0 / 30.0),
+            Self::Density => Some(1.0 / 30.0),
+            Self::MassMoments | Self::Tensor => Some(1.0 / 50.0),
             _ => None,
         }
+    }
+
+    /// True for what a link's inertia may be off, level by level.
+    #[must_use]
+    pub fn is_level(self) -> bool {
+        matches!(self, Self::Density | Self::MassMoments | Self::Tensor)
     }
 
     /// True for all that a payload has.

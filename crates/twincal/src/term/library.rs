@@ -5,13 +5,14 @@ mod judged;
 
 use super::aliases::{Motions, channels};
 use super::candidate::{Candidate, Joint, Proposal};
-use super::component::{Component, Meaning, Parameter};
+use super::component::{Before, Component, Meaning, Parameter};
+use super::directions::Mixture;
 use super::expression::{Graph, Id, Slot, Tape, Variable, bounded_values};
 use super::model_column::{ModelColumn, ModelColumns};
 use super::overlaps;
 use super::parts::{self, Parts, Torque};
 use super::payload::NAME as PAYLOAD;
-use super::propose::{About, payload_mount, proposals};
+use super::propose::{About, proposals};
 use super::recipes::Recipes;
 use super::sentence::{Estimate, sentence};
 use super::{Family, LibrarySettings, Status, Term, user};
@@ -46,8 +47,8 @@ pub struct Library {
     parts: Arc<Parts>,
     /// As the settings say.
     payload_frame: Option<String>,
-    /// What a payload's tensor is about, in its frame.
-    payload_centre: [f64; 3],
+    /// Parameters of each component that its coefficients mix to.
+    mixtures: Vec<Option<Arc<Mixture>>>,
     /// No motion tells its tensor from its mass and first moments.
     payload_is_one: bool,
 }
@@ -108,10 +109,9 @@ impl Library {
             }
         };
 
-        let payload_centre = match about.robot {
-            Some(robot) if settings.has(Family::Payload) => payload_mount(robot, settings)?.centre,
-            _ => [0.0; 3],
-        };
+        let mixtures = (components.iter())
+            .map(|component| candidates[component.terms[0]].mixture.take().map(Arc::new))
+            .collect();
         graph.forget_derivatives();
         let mut library = Self {
             terms: Vec::new(),
@@ -128,7 +128,7 @@ impl Library {
             model: model.map(Arc::new),
             parts: Arc::default(),
             payload_frame: settings.payload_frame.clone(),
-            payload_centre,
+            mixtures,
             payload_is_one: false,
         };
         let judged = candidates.into_iter().zip(statuses).zip(acting);
@@ -275,6 +275,7 @@ impl Library {
     /// # Panics
     /// If there is no such component.
     pub fn parameters(&self, component: usize) -> Vec<Parameter> {
+        let index = component;
         let component = &self.components[component];
         let columns: Vec<(String, String)> = component
             .terms
@@ -287,16 +288,26 @@ impl Library {
                 (own.to_owned(), unit.clone())
             })
             .collect();
-        self.meaning(component.family).parameters(&columns)
+        self.meaning(index).parameters(&columns)
     }
 
     /// Values of [`Library::parameters`] at coefficients `beta`, one per term of the component (0 for dropped ones).
     pub fn parameter_values(&self, component: usize, beta: &[f64]) -> Vec<f64> {
-        self.meaning(self.components[component].family).values(beta)
+        self.meaning(component).values(beta)
     }
 
-    fn meaning(&self, family: Family) -> Meaning {
-        Meaning::of(family, self.payload_centre)
+    /// What is known before the data of a parameter that is not its term's.
+    pub(crate) fn before(&self, component: usize, parameter: usize) -> Option<Before> {
+        let terms = self.components[component].terms.iter();
+        let live: Vec<bool> = terms
+            .map(|&term| self.terms[term].status == Status::Candidate)
+            .collect();
+        self.meaning(component).before(parameter, &live)
+    }
+
+    fn meaning(&self, component: usize) -> Meaning<'_> {
+        let mixture = self.mixtures[component].as_deref();
+        Meaning::of(self.components[component].family, mixture)
     }
 
     /// The same library for a robot with other inertias and the same joints.
@@ -311,10 +322,10 @@ impl Library {
 
     /// True if parameter `parameter` of a component is the coefficient of its term at the same place.
     pub fn is_coefficient(&self, component: usize, parameter: usize) -> bool {
-        match self.meaning(self.components[component].family) {
+        match self.meaning(component) {
             Meaning::Coefficients => true,
-            Meaning::Payload { centre } => parameter == 0 || (parameter > 3 && centre == [0.0; 3]),
-            Meaning::Spring => parameter == 0,
+            Meaning::Mixture(_) => false,
+            Meaning::Payload(_) | Meaning::Spring => parameter == 0,
         }
     }
 
@@ -513,7 +524,7 @@ fn home(components: &[Component], terms: usize) -> Vec<usize> {
 }
 
 /// States that have nothing in particular in common: a Weyl sequence with irrational steps.
-fn random_motions(joints: usize) -> Vec<Motions> {
+pub(super) fn random_motions(joints: usize) -> Vec<Motions> {
     const STATES: usize = 40;
     let value = |state: usize, joint: usize, k: usize| {
         let step = ((3 * joint + k + 2) as f64).sqrt() * std::f64::consts::E;

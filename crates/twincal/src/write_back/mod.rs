@@ -457,7 +457,7 @@ fn reason(family: Family, format: &str) -> String {
         | Family::PayloadTensor
         | Family::MassMoments
         | Family::Tensor
-        | Family::MassScale => "this",
+        | Family::Density => "this",
     };
     let article = if format.starts_with('M') { "an" } else { "a" };
     format!("{article} {format} cannot hold {what}")
