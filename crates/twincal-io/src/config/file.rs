@@ -304,6 +304,10 @@ pub enum FamilyWord {
     EncoderZero,
     /// `<joint>.ripple`: gear ripple; needs `ripple = { joint = gear ratio }`.
     Ripple,
+    /// `<joint>.hysteresis`: friction that builds up over milliradians after a velocity reversal.
+    Hysteresis,
+    /// `<joint>.warm_up`: friction that changes with the time since the log's start, or with logged temperature.
+    WarmUp,
 }
 
 impl From<FamilyWord> for Family {
@@ -329,6 +333,8 @@ impl From<FamilyWord> for Family {
             FamilyWord::Gain => Self::Gain,
             FamilyWord::EncoderZero => Self::EncoderZero,
             FamilyWord::Ripple => Self::Ripple,
+            FamilyWord::Hysteresis => Self::Hysteresis,
+            FamilyWord::WarmUp => Self::WarmUp,
         }
     }
 }
@@ -414,7 +420,7 @@ pub struct PriorTable {
     /// Components that are in, whatever the data say, such as ["elbow.viscous"].
     pub forced: Option<Vec<String>>,
     /// Heredity: what is in only where something else is, such as { stribeck = "coulomb", "sin(2*q2)" = "sin(q2)" }; families joint by
-    /// joint, or components by name. Default: { asymmetry = "coulomb", stribeck = "coulomb", quadratic_friction = "viscous", coupled_inertia = "coupled_friction" }; {} binds nothing.
+    /// joint, or components by name. Default: { asymmetry = "coulomb", stribeck = "coulomb", quadratic_friction = "viscous", coupled_inertia = "coupled_friction", hysteresis = "coulomb", warm_up = "coulomb" }; {} binds nothing.
     pub heredity: Option<BTreeMap<String, String>>,
 }
 

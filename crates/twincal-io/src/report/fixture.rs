@@ -233,6 +233,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
                 derived_from: vec![twincal::signal::DerivedFrom::Position; names.len()],
                 velocity_from: Vec::new(),
                 corrections: twincal::signal::Corrections::default(),
+                history: Vec::new(),
             },
             posterior,
             noise: joint_noise.clone(),

@@ -15,6 +15,7 @@ mod groups;
 mod heavy_tails;
 mod held_out;
 mod heredity;
+mod history;
 mod independent_rows;
 mod left_out;
 mod lower_band;
@@ -150,6 +151,9 @@ fn road(
     findings.extend(constant_torque(robot, every_log.clone())?);
     findings.extend(hardly_driven(robot, every_log.clone())?);
     let mut lags = aligned::align(robot, logs, &mut pipeline, &mut prepared, findings)?;
+    let usual = smaller_library::is_usual(&settings.library.families);
+    let followed = history::follow(robot, (logs, &prepared), &pipeline, settings, findings)?;
+    let settings = &followed.settings;
     let mut library_settings = LibrarySettings {
         coulomb_velocity: pipeline.coulomb_velocity,
         ..settings.library.clone()
@@ -165,6 +169,7 @@ fn road(
         (pipeline, library) = (turned.pipeline, turned.library);
         findings.push(turned.finding);
     }
+    pipeline.history = followed.history;
 
     // eq. (1)–(4): residual torque and Euler–Lagrange columns, filtered alike
     let others = heldout.iter().map(|log| ready(robot, log, &pipeline));
@@ -214,7 +219,6 @@ fn road(
         UnaskedRipple::Ignored => Vec::new(),
         _ => ripples::seen(robot, &training, &fitted.fit, &library_settings, &pipeline),
     };
-    let usual = settings.library.families == Family::DEFAULT;
     if !seen.is_empty() && usual && settings.unasked_ripple == UnaskedRipple::Candidate {
         return Ok(Road::Again(seen));
     }

@@ -84,6 +84,8 @@ pub(super) fn tell(calibration: &mut Calibration, excitation: &Excitation) {
             .collect();
         let why = if !joints.is_empty() {
             format!("move {} more", joints.join(" and "))
+        } else if component.family.remembers() {
+            "the joint travels too little in these logs".to_owned()
         } else if excited.seen == Seen::Never {
             "no motion of this robot shows it".to_owned()
         } else if !component.alias_of.is_empty() {

@@ -6,6 +6,7 @@ mod judged;
 use super::aliases::{Motions, channels};
 use super::candidate::{Candidate, Joint, Proposal};
 use super::component::{Before, Component, Meaning, Parameter};
+use super::course::Course;
 use super::directions::Mixture;
 use super::expression::{Graph, Id, Slot, Tape, Variable, bounded_values};
 use super::model_column::{ModelColumn, ModelColumns};
@@ -350,7 +351,10 @@ impl Library {
         match family {
             Family::Viscous => joint(".viscous").map_or(0.0, |joint| -joint.damping),
             Family::MotorInertia => joint(".motor_inertia").map_or(0.0, |joint| -joint.armature),
-            Family::Coulomb | Family::CoupledFriction | Family::CoupledInertia => 0.0,
+            Family::Coulomb
+            | Family::CoupledFriction
+            | Family::CoupledInertia
+            | Family::Hysteresis => 0.0,
             _ => f64::NEG_INFINITY,
         }
     }
@@ -404,19 +408,20 @@ impl Library {
     }
 
     /// [`Library::evaluate`] with working memory that is kept between calls: for many short batches.
-    pub fn evaluate_with<T: Table>(
+    pub fn evaluate_with<'a, T: Table>(
         &self,
-        motion: Motion<'_>,
+        course: impl Into<Course<'a>>,
         out: &mut [T],
         scratch: &mut Scratch,
     ) {
+        let course = course.into();
         let counts = self.by_joint.iter().map(Vec::len);
         parts::evaluate(
             counts,
             &self.tape,
             self.model.as_deref(),
-            motion,
-            (motion.len, out),
+            course,
+            (course.motion.len, out),
             scratch,
         );
     }
@@ -431,19 +436,20 @@ impl Library {
     ///
     /// # Panics
     /// As [`Library::evaluate`], or if `stride` is less than `motion.len`.
-    pub fn evaluate_parts<T: Table>(
+    pub fn evaluate_parts<'a, T: Table>(
         &self,
-        motion: Motion<'_>,
+        course: impl Into<Course<'a>>,
         stride: usize,
         out: &mut [T],
         scratch: &mut Scratch,
     ) {
+        let course = course.into();
+        let len = course.motion.len;
         assert!(
-            stride >= motion.len,
-            "signals of {} samples every {stride} numbers",
-            motion.len
+            stride >= len,
+            "signals of {len} samples every {stride} numbers"
         );
-        self.parts.evaluate(motion, stride, out, scratch);
+        self.parts.evaluate(course, stride, out, scratch);
     }
 
     /// φ(q, q̇) of a term (index into [`Library::terms`]) at one state, J per unit of β; `None` where the term
@@ -453,7 +459,7 @@ impl Library {
         let values = bounded_values(&self.graph, |variable| match variable {
             Variable::Position(joint) => q[joint],
             Variable::Velocity(joint) => qd[joint],
-            Variable::Acceleration(_) => 0.0, // no Lagrangian holds one
+            Variable::Acceleration(_) | Variable::History(_) => 0.0, // no Lagrangian holds one
         });
         Some(values[phi.0 as usize].value)
     }

@@ -10,6 +10,7 @@
 mod expression;
 mod euler_lagrange;
 mod candidate;
+mod course;
 mod family;
 mod model_column;
 mod recipes;
@@ -30,6 +31,8 @@ mod spring;
 mod potential;
 mod asymmetry;
 mod stribeck;
+mod hysteresis;
+mod warm_up;
 mod quadratic_friction;
 mod load_friction;
 mod coupled_friction;
@@ -52,6 +55,7 @@ mod library;
 mod tests;
 
 pub(crate) use component::Before;
+pub use course::Course;
 pub use component::{Component, Parameter};
 pub use expression::Function;
 pub(crate) use expression::{Graph, Id as GraphId, Node, Variable};

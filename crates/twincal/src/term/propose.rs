@@ -5,8 +5,8 @@ use super::expression::Graph;
 use super::inertial::inertial;
 use super::{
     Family, LibrarySettings, asymmetry, base_tilt, coulomb, coupled_friction, coupled_inertia,
-    encoder_zero, gain, generic, load_friction, motor_inertia, offset, potential,
-    quadratic_friction, ripple, spring, stribeck, user, viscous,
+    encoder_zero, gain, generic, hysteresis, load_friction, motor_inertia, offset, potential,
+    quadratic_friction, ripple, spring, stribeck, user, viscous, warm_up,
 };
 use crate::error::{Error, Finding, Result, Severity};
 use crate::robot::{Robot, did_you_mean};
@@ -155,6 +155,13 @@ pub(super) fn proposals(
         });
     }
     all.extend(ripples(graph, joints, settings)?);
+    if settings.has(Family::Hysteresis) {
+        all.extend(joints.iter().map(|joint| hysteresis::proposal(graph, joint)));
+    }
+    if settings.has(Family::WarmUp) {
+        let warm_up = joints.iter().map(|joint| warm_up::proposal(graph, joint, velocity));
+        all.extend(warm_up);
+    }
     Ok(all)
 }
 

@@ -451,6 +451,8 @@ fn reason(family: Family, format: &str) -> String {
         Family::Gain => "torque gains",
         Family::EncoderZero => "encoder zeros",
         Family::Ripple => "gear ripple",
+        Family::Hysteresis => "friction with hysteresis",
+        Family::WarmUp => "friction that changes with warmth",
         Family::Viscous
         | Family::Coulomb
         | Family::Payload

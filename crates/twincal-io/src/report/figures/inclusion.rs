@@ -222,6 +222,8 @@ pub(in crate::report) fn family_name(family: Family) -> &'static str {
         Family::Gain => "torque gain",
         Family::EncoderZero => "encoder zero",
         Family::Ripple => "gear ripple",
+        Family::Hysteresis => "friction with hysteresis",
+        Family::WarmUp => "friction that changes with warmth",
     }
 }
 
