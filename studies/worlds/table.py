@@ -17,7 +17,7 @@ LARGE = 8.0  # standard errors
 
 
 def bounds99(hits, total):
-    """One-sided 99 % bounds of a share (Clopper and Pearson): the lower one and the upper one, each of its own."""
+    """One-sided 99 % bounds of a share (Clopper and Pearson): the lower one and the upper one."""
     if total == 0:
         return 0.0, 1.0
     low = beta.ppf(0.01, hits, total - hits + 1) if hits else 0.0

@@ -227,7 +227,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def lines(folder):
-    """The 12 fits."""
+    """Short fits of several kinds of worlds."""
     return [fits.one(program("twincal"), kind, seed, folder) for kind, seed in SHORT]
 
 
