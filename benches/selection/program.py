@@ -48,5 +48,6 @@ def answer(result, columns):
 
 
 def verdicts(result):
-    """Found or not, and the probability, of every component by name."""
-    return {} if result is None else {c["name"]: (c["selected"], c["pip"]) for c in result["components"] if c["pip"] is not None}
+    """Kept or not, and the probability, of every component by name: kept is what is likelier in than not and seen by the data."""
+    live = [c for c in (result or {"components": []})["components"] if c["pip"] is not None]
+    return {c["name"]: (c["pip"] >= 0.5 and c["status"] != "unidentifiable", c["pip"]) for c in live}

@@ -23,7 +23,7 @@ HEAVIER = ("forearm_link", 3, 0.25)  # link, its joint, share of its inertia
 LINKS = ("shoulder_link", "upper_arm_link", "forearm_link", "wrist_1_link", "wrist_2_link", "wrist_3_link")
 PAYLOAD = ("m", "mx", "my", "mz", "ixx", "ixy", "iyy", "ixz", "iyz", "izz")  # in Pinocchio's order
 # Seen by no motion apart from others: a heavier first link turns like a motor inertia, a heavier last one is a payload.
-ALIASES = ("shoulder_link.mass_scale", "wrist_3_link.mass_scale")
+ALIASES = ("shoulder_link.density", "wrist_3_link.density")
 KINDS = ("viscous", "coulomb", "stribeck")
 
 
@@ -35,7 +35,7 @@ class Data:
         self.nominal = arms.load("ur5")
         self.joints = [self.nominal.names[j + 1] for j in range(6)]
         stories = {"payload": [f"payload.{p}" for p in PAYLOAD]}
-        stories |= {f"{link}.mass_scale": [f"{link}.mass_scale"] for link in LINKS}
+        stories |= {f"{link}.density": [f"{link}.density"] for link in LINKS}
         stories |= {f"{j}.spring": [f"{j}.spring.stiffness", f"{j}.spring.preload"] for j in self.joints}
         self.kinds = (KINDS if problem.friction else ()) + ("motor_inertia",)
         stories |= {f"{j}.{kind}": [f"{j}.{kind}"] for kind in self.kinds for j in self.joints}
@@ -44,12 +44,12 @@ class Data:
             self.parts.append(list(range(len(self.columns), len(self.columns) + len(columns))))
             self.columns += columns
         viscous, coulomb = arms.effects(6, seed)
-        true = {"payload", f"{HEAVIER[0]}.mass_scale", f"{self.joints[1]}.spring"}
+        true = {"payload", f"{HEAVIER[0]}.density", f"{self.joints[1]}.spring"}
         true |= {f"{j}.viscous" for j, v in zip(self.joints, viscous) if v} | {f"{j}.coulomb" for j, v in zip(self.joints, coulomb) if v}
         self.true = np.array([name in true for name in self.names])
         self.ignored = np.array([name in ALIASES for name in self.names])
         # Coverage counts the single numbers; the payload's ten are known only in the combinations that turn some joint.
-        truth = {name: np.nan for name in stories["payload"]} | {f"{HEAVIER[0]}.mass_scale": HEAVIER[2]}
+        truth = {name: np.nan for name in stories["payload"]} | {f"{HEAVIER[0]}.density": HEAVIER[2]}
         stiffness, rest = arms.SPRING
         truth |= {f"{self.joints[1]}.spring.stiffness": stiffness, f"{self.joints[1]}.spring.preload": -stiffness * rest}
         truth |= {f"{j}.viscous": v for j, v in zip(self.joints, viscous)} | {f"{j}.coulomb": v for j, v in zip(self.joints, coulomb)}
@@ -71,7 +71,7 @@ class Data:
 
     def config(self):
         """`[library]` for the program: the same stories as the peers' columns."""
-        families = ["payload", "mass_scale", "spring", *self.kinds]
+        families = ["payload", "density", "spring", *self.kinds]
         words = ", ".join(f'"{family}"' for family in families)
         return f'[library]\nfamilies = [{words}]\npayload_frame = "{LINKS[-1]}"\ncoulomb_velocity = {arms.COULOMB_VELOCITY}\n'
 

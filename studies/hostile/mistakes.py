@@ -110,7 +110,7 @@ def one(program, fault, robot, motion, seed):
     truth = {key: [log.truth.get(key) for log in study.train] for key in ("repeats", "missing", "contact")}
     return Run(fault, robot, motion, seed, code, headline(out), "" if result else error[max(error.find("error:"), 0) :].strip()[:2000],
                findings, rmse, round(seconds, 2), study.truth.get("log") or "", "" if joint is None else Arm(world).names[joint],
-               sorted(c["name"] for c in components if c["verdict"] == "found"), masses[0] if masses else None, rows, truth, rest)  # fmt: skip
+               sorted(c["name"] for c in components if c["status"] == "established"), masses[0] if masses else None, rows, truth, rest)  # fmt: skip
 
 
 def names_it(run, text):

@@ -7,7 +7,8 @@ PIP > 0.99 or lie in a group that is; no false one may be found. Where a compone
 the robot (`groups[].alike` is `every_motion`; a payload and the last link's moments) that is printed below the row; it counts as false all the same.
 Payload mass (within 0.5 % where some motion of the robot separates it from what else is true) and held-out RMSE (root mean square over
 the joints, and the worst joint, of its ratio to the joint's noise) are compared with the truth.
-The first moments of link 3 change with its mass: `<link>.mass_moments` is true, its tensor (about the joint) is as well.
+Link 3 is heavier and its centre of mass moves: `<link>.density` is true, its other levels (centre of mass; tensor, which is not scaled with
+the mass here) are as well.
 """
 
 import argparse
@@ -78,8 +79,8 @@ def judge(truth, result):
     components = {c["name"]: c for c in result["components"]}
     groups = result["groups"]
     link = link_of(truth, truth["drift_joint"])
-    true = {"payload", truth["spring"], f"{link}.mass_moments", *truth["friction"]}
-    true_too = {f"{link}.tensor"}
+    true = {"payload", truth["spring"], f"{link}.density", *truth["friction"]}
+    true_too = {f"{link}.mass_moments", f"{link}.tensor"}
     missed = []
 
     def sure(name):
@@ -89,7 +90,7 @@ def judge(truth, result):
 
     pips = {name: sure(name) for name in sorted(true)}
     missed += [f"{name}: PIP {own:.3f}" for name, (own, group) in pips.items() if group < 0.99]
-    false = [name for name, c in components.items() if c["verdict"] == "found" and name not in true | true_too]
+    false = [name for name, c in components.items() if c["status"] == "established" and name not in true | true_too]
     same = {name: group for name in [*false, *true] for group in groups
             if group["alike"] == "every_motion" and name in group["members"] and true & set(group["members"])}
     missed += [f"{name} is false, PIP {components[name]['pip']:.3f}" for name in false]

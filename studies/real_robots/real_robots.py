@@ -112,7 +112,7 @@ def main():
             print(f"| {split.name} | {joint} | {value:.3f}{unit} | {asked} | {ratio:.2f} | {100 * coverage:.0f} % |")
             if value > limit or ratio > 1.25:
                 missed.append(f"{split.name} joint {joint}: {value:.3f} (limit {limit}), ratio {ratio:.2f}")
-        found = {c["name"]: c for c in result["components"] if c["verdict"] == "found"}
+        found = {c["name"]: c for c in result["components"] if c["status"] == "established"}
         print(f"\n{split.name}, method {result['inference']['method']}: " + "; ".join(c["words"] for c in found.values()))
         for group in result["groups"]:
             print(f"  one of {', '.join(group['members'])}: {group['pip']:.3f}")

@@ -34,7 +34,7 @@ def test_friction_and_inertia_of_a_coupled_motor(sign, tmp_path):
     result = fit(tmp_path, [tmp_path / "run.csv"], "[signal]\ncutoff_hz = 0\n[library]\ncoulomb_velocity = 0.02\n",
                  model=simulate_arms.model_file("ur5"))  # fmt: skip
     pair = f"wrist_2_joint{'+' if sign > 0 else '-'}wrist_3_joint"
-    found = {c["name"]: c for c in result["components"] if c["verdict"] == "found"}
+    found = {c["name"]: c for c in result["components"] if c["status"] == "established"}
     assert set(found) == {f"{pair}.coupled_friction", f"{pair}.coupled_inertia"}
     assert all(c["pip"] > 0.99 for c in found.values())
     terms = {term["name"]: term for term in result["terms"]}

@@ -36,7 +36,7 @@ def test_first_two_runs_held_out(tmp_path):
     shoulder, elbow = scores(result, "rmse_calibrated")
     assert shoulder <= 0.15 and elbow <= 0.09
     # what docs/tutorial.md prints: both tensors wrong by the parallel-axis term, and no mass
-    found = {c["name"]: c["parameters"][0] for c in result["components"] if c["verdict"] == "found"}
+    found = {c["name"]: c["parameters"][0] for c in result["components"] if c["status"] == "established"}
     assert sorted(found) == ["Joint1.coulomb", "Joint2.coulomb", "Link1.tensor", "Link2.tensor"]
     for name, (median, sd) in {"Joint1.coulomb": (0.278, 0.039), "Joint2.coulomb": (0.151, 0.026),
                                "Link1.tensor": (-0.0193, 0.0026), "Link2.tensor": (-0.0391, 0.0013)}.items():  # fmt: skip

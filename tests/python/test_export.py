@@ -332,7 +332,8 @@ def test_the_simulator_follows_the_robot_for_a_second(planar):
     log = {name: columns[name].to_numpy() for name in columns.column_names}
     nominal, exported = (rolled_out(mujoco.MjModel.from_xml_path(str(file)), log) for file in (ASSETS / "arm.xml", planar / "arm.xml"))
     print(f"position error after 1 s, rad: nominal {nominal}, exported {exported}")
-    assert (exported < 0.15 * nominal).all()
+    # What is not established (mass of the upper arm, PIP 0.96) is in the residual, not in the file.
+    assert (exported < 0.25 * nominal).all()
 
 
 def test_mjcf_changes_nothing_but_numbers(planar):

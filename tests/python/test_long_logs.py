@@ -85,7 +85,7 @@ def fitted(folder, file):
 
 def agrees(result):
     """Three effects and no other, each within 4.5 sd (false alarm 3e-5 in all, the seed is fixed)."""
-    found = {c["name"]: c["parameters"][0] for c in result["components"] if c["verdict"] == "found"}
+    found = {c["name"]: c["parameters"][0] for c in result["components"] if c["status"] == "established"}
     truth = {"payload": PAYLOAD[0], "shoulder.viscous": VISCOUS, "elbow.coulomb": COULOMB}
     assert found.keys() == truth.keys()
     for name, value in truth.items():

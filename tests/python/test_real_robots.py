@@ -33,7 +33,7 @@ def test_held_out_torque_and_known_effects(split, tmp_path):
     for name in split.found:
         assert components[name]["pip"] > 0.99
     for name, component in components.items():
-        if component["verdict"] == "found":
+        if component["status"] == "established":
             assert not name.endswith(tuple(split.absent) or "\0"), name
     # Of a link with a found inertia that is a body in less than half of the draws: the share at each effect is that of its finding.
     open_links = {f["subject"]: f["message"] for f in result["findings"] if f["code"] == "unphysical_inertia_found"}

@@ -371,7 +371,8 @@ fn a_log_of_the_models_own_torque_lacks_nothing() {
             run(folder.path(), command.iter().chain(&rest)).expect(0);
             let result = result(folder.path());
             for term in result["terms"].as_array().unwrap() {
-                assert_eq!(term["selected"], false, "{error} {config} {term}");
+                let pip = term["pip"].as_f64().unwrap_or(0.0);
+                assert!(pip < 0.5 || term["seen"] == false, "{error} {config} {term}");
                 assert!(term["pip"].is_null() || term["mean"].is_f64(), "{term}");
             }
         }

@@ -147,7 +147,7 @@ fn an_elbow_that_stands_still_is_asked_to_move() {
     let said: Vec<&Value> = said.filter(|f| f["code"] == "unseen_motion").collect();
     assert_eq!(said[0]["message"], words);
     let viscous = component(&result, "elbow.viscous");
-    assert_eq!(viscous["verdict"], "not_seen");
+    assert_eq!(viscous["status"], "unidentifiable");
     let why = viscous["words"].as_str().unwrap();
     assert!(why.contains("not seen: move `elbow` more"), "{why}");
     let report = fs::read_to_string(folder.path().join("out/report.html")).unwrap();

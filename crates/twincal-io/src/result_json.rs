@@ -9,8 +9,8 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use twincal::Finding;
 use twincal::calibrate::{
-    Calibration, CompactTerm, ComponentSummary, Curve, Group, Halves, LikelihoodUsed, LogSummary,
-    Repeat, SweepPoint, TermSummary, Verdict,
+    Calibration, CompactTerm, ComponentSummary, Curve, Group, LikelihoodUsed, LogSummary,
+    SweepPoint, TermSummary,
 };
 use twincal::lag::Lags;
 use twincal::likelihood::JointNoise;
@@ -55,8 +55,6 @@ struct ResultFile<'a> {
     inference: InferenceRow,
     validation: ValidationRow<'a>,
     compact: Option<CompactRow<'a>>,
-    repeatability_halves: Option<Halves>,
-    repeatability: &'a [Repeat],
     curves: &'a [Curve],
     logs: &'a [LogSummary],
     lags: Option<&'a Lags>,
@@ -85,8 +83,7 @@ struct TermRow<'a> {
     conditional_sd: Option<f64>,
     conditional_median: Option<f64>,
     conditional_interval68: Option<[f64; 2]>,
-    selected: bool,
-    verdict: Option<Verdict>,
+    seen: bool,
     column_rms: Option<f64>,
     pip_sensitivity: &'a [f64],
     sandwich_sd: Option<f64>,
@@ -244,8 +241,6 @@ impl<'a> ResultFile<'a> {
             inference: InferenceRow::of(&calibration.twin.posterior.method, context.seed),
             validation: ValidationRow::of(&calibration.validation),
             compact: CompactRow::of(calibration),
-            repeatability_halves: calibration.halves,
-            repeatability: &calibration.repeatability,
             curves: &calibration.curves,
             logs: &calibration.logs,
             lags: calibration.lags.as_ref(),
@@ -270,8 +265,7 @@ impl<'a> TermRow<'a> {
             conditional_sd: summary.conditional_sd,
             conditional_median: summary.conditional_median,
             conditional_interval68: summary.conditional_interval68,
-            selected: summary.selected,
-            verdict: summary.verdict,
+            seen: summary.seen,
             column_rms: summary.column_rms,
             pip_sensitivity: &summary.pip_sensitivity,
             sandwich_sd: summary.sandwich_sd,

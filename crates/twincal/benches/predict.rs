@@ -61,6 +61,7 @@ fn main() {
         n: 400.0,
         n_eff: 400.0,
         autocorrelation_time: 1.0,
+        misfit: 1.0,
         interval_factor: 1.0,
         spread: Default::default(),
         sampled: None,

@@ -84,7 +84,7 @@ pub(crate) fn study() -> twincal::Result<Calibration> {
 
 fn main() -> twincal::Result<()> {
     let result = study()?;
-    for found in result.components.iter().filter(|found| found.selected) {
+    for found in result.components.iter().filter(|found| found.is_in()) {
         println!("PIP {:.3}  {}", found.pip.unwrap_or(0.0), found.words);
     }
     let scores = &result.validation.filtered;

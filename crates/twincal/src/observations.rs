@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::gram::{Gram, JointAccumulator, Workspace};
 use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, recipes_of_log, slices, visit_parts};
-use crate::signal::{Numbers, Pipeline, Recording, Trajectory};
+use crate::signal::{Numbers, Pipeline, Recording, Trajectory, known_temperatures, temperature_at};
 use crate::term::{Library, Recipes};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -224,23 +224,10 @@ impl Observations {
     /// beyond them; samples without a number are skipped. A log whose stamps step back has none.
     pub fn set_temperatures(&mut self, log: &Recording) {
         for (rows, channels) in self.joints.iter_mut().zip(&log.joints) {
-            let logged = log.time.iter().zip(channels.temperature.iter().flatten());
-            let known: Vec<(f64, f64)> = logged
-                .filter(|(time, value)| time.is_finite() && value.is_finite())
-                .map(|(time, value)| (*time, *value))
-                .collect();
-            if known.is_empty() || known.windows(2).any(|pair| pair[1].0 <= pair[0].0) {
-                continue;
+            if let Some(known) = known_temperatures(&log.time, &channels.temperature) {
+                let at = |time: &f64| temperature_at(&known, *time);
+                rows.temperature = self.time.iter().map(at).collect();
             }
-            let at = |time: &f64| {
-                let after = known.partition_point(|(t, _)| t <= time);
-                match (after.checked_sub(1).map(|i| known[i]), known.get(after)) {
-                    (Some((t0, v0)), Some((t1, v1))) => v0 + (v1 - v0) * (time - t0) / (t1 - t0),
-                    (Some((_, value)), None) => value,
-                    (None, first) => first.map_or(f64::NAN, |(_, value)| *value),
-                }
-            };
-            rows.temperature = self.time.iter().map(at).collect();
         }
     }
 

@@ -283,4 +283,6 @@ pub fn count_rows(pipeline: &Pipeline, trajectory: &Trajectory, signal: RowSigna
 }
 
 #[cfg(test)]
+mod history_tests;
+#[cfg(test)]
 mod tests;

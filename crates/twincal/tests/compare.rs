@@ -7,7 +7,7 @@ mod two_link;
 
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::sync::LazyLock;
-use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
+use twincal::calibrate::{Calibration, CalibrationSettings, Status, calibrate};
 use twincal::compare::{Became, ParameterChange, compare, hindrances};
 use twincal::posterior::random::Random;
 use twincal::posterior::{Model, Posterior};
@@ -31,6 +31,26 @@ fn calibrated(fore: f64, seed: u64) -> Calibration {
     calibrate(&nominal, &[training], &[heldout], &settings, &|_| {}).expect("a calibration")
 }
 
+/// A calibration with this twin whose statuses follow from the probabilities.
+fn with_status(twin: Twin) -> Calibration {
+    let mut calibration = LOADED.clone();
+    let library = twin.library().expect("a library");
+    for (&column, pip) in library.columns().iter().zip(&twin.posterior.inclusion) {
+        let own = &library.components()[library.terms()[column].component].name;
+        let all = calibration.components.iter_mut();
+        let summary = all.into_iter().find(|c| c.name == *own).expect("a component");
+        summary.status = match pip {
+            pip if *pip >= 0.95 => Status::Established,
+            pip if *pip >= 0.2 => Status::Tentative,
+            _ => Status::Absent,
+        };
+    }
+    Calibration {
+        twin,
+        ..calibration
+    }
+}
+
 static EMPTY: LazyLock<Calibration> = LazyLock::new(|| calibrated(2.0, 11));
 static LOADED: LazyLock<Calibration> = LazyLock::new(|| calibrated(2.6, 12));
 
@@ -38,7 +58,7 @@ static LOADED: LazyLock<Calibration> = LazyLock::new(|| calibrated(2.6, 12));
 /// with probability 0.02; the seeds are fixed.
 #[test]
 fn the_load_is_what_changed_and_nothing_else() {
-    let changes = compare(&EMPTY.twin, &LOADED.twin).expect("twins of one robot");
+    let changes = compare(&EMPTY, &LOADED).expect("twins of one robot");
     let changed: Vec<&str> = changes
         .iter()
         .filter(|change| change.changed)
@@ -61,7 +81,7 @@ fn the_load_is_what_changed_and_nothing_else() {
     );
 
     // The other way round the load went.
-    let back = compare(&LOADED.twin, &EMPTY.twin).expect("twins of one robot");
+    let back = compare(&LOADED, &EMPTY).expect("twins of one robot");
     let back = back.iter().find(|c| c.name == "payload");
     let mass = &back.expect("the payload").parameters[0];
     assert!((mass.difference + 0.6).abs() < 4.5 * mass.sd, "{mass:?}");
@@ -229,9 +249,9 @@ fn two_normal_posteriors_differ_by_their_closed_form() {
         inside: 0.7,
         ..before
     };
-    let other = after.twin();
+    let other = with_status(after.twin());
     for given in [&before, &perhaps] {
-        let changes = compare(&given.twin(), &other).expect("twins of one robot");
+        let changes = compare(&with_status(given.twin()), &other).expect("twins of one robot");
         for (i, name) in ["sin(q1 - q2)", "payload"].into_iter().enumerate() {
             let change = changes.iter().find(|change| change.name == name);
             let change = change.expect("it is in both");
@@ -247,7 +267,7 @@ fn two_normal_posteriors_differ_by_their_closed_form() {
     }
 }
 
-/// The payload or the hidden effect, never both: 0.94 and 0.06 before, 0.7 and 0.3 after.
+/// The payload or the hidden effect, never both: 0.94 and 0.06 before, 0.1 and 0.9 after.
 #[test]
 fn one_effect_under_two_names_is_as_before() {
     let given = Given {
@@ -272,25 +292,26 @@ fn one_effect_under_two_names_is_as_before() {
         }
         twin
     };
-    let changes = compare(&twin(0.94), &twin(0.7)).expect("twins of one robot");
+    let [before, after] = [0.94, 0.1].map(|share| with_status(twin(share)));
+    let changes = compare(&before, &after).expect("twins of one robot");
     let of = |name: &str| changes.iter().find(|c| c.name == name).expect("compared");
     let (payload, hidden) = (of("payload"), of("sin(q1 - q2)"));
     assert_eq!(payload.became, Became::OneOfTwo);
     assert_eq!(payload.rival.as_deref(), Some("sin(q1 - q2)"));
     assert_eq!(hidden.rival.as_deref(), Some("payload"));
     // Where the other does not stand for it, it went.
-    let mut without = twin(0.7);
+    let mut without = twin(0.1);
     without.posterior.models[0].members.clear();
     without.posterior.models[0].mean.clear();
     without.posterior.models[0].factor.clear();
-    let changes = compare(&twin(0.94), &without).expect("twins of one robot");
+    let changes = compare(&before, &with_status(without)).expect("twins of one robot");
     let payload = changes.iter().find(|c| c.name == "payload");
     assert_eq!(payload.expect("compared").became, Became::PerhapsGone);
 }
 
 #[test]
 fn a_twin_beside_itself_shows_no_change() {
-    let changes = compare(&LOADED.twin, &LOADED.twin).expect("twins of one robot");
+    let changes = compare(&LOADED, &LOADED).expect("twins of one robot");
     assert!(changes.len() >= 2);
     assert!(changes.iter().all(|change| !change.changed), "{changes:?}");
 }

@@ -53,7 +53,7 @@ fn a_moment_that_is_less_is_no_motor() {
     let less = found(-0.1, true);
     let tensor = |c: &Calibration| {
         let mut all = c.components.iter();
-        all.any(|c| c.name == "upper.tensor" && c.selected)
+        all.any(|c| c.name == "upper.tensor" && c.is_in())
     };
     assert!(tensor(&less), "{:?}", less.groups);
     assert_eq!(names(&less), [""; 0]);

@@ -30,7 +30,10 @@ pub(super) fn run(flags: &Diff, terminal: &mut Terminal) -> Outcome<u8> {
     let read = |folder: &Path| StoredTwin::read(&Artifact::open(folder)?, false);
     let (before, after) = (read(&flags.before)?, read(&flags.after)?);
     let (old, new) = (&before.calibration.twin, &after.calibration.twin);
-    let (changes, mut found) = (compare(old, new)?, hindrances(old, new)?);
+    let (changes, mut found) = (
+        compare(&before.calibration, &after.calibration)?,
+        hindrances(old, new)?,
+    );
     for (folder, stored) in [(&flags.before, &before), (&flags.after, &after)] {
         found.extend(doubt(&stored.calibration).map(|mut doubt| {
             doubt.subject = folder.to_string_lossy().into_owned();

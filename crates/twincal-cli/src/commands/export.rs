@@ -13,7 +13,7 @@ use serde::Serialize;
 use std::io::Write as _;
 use std::path::Path;
 use twincal::Finding;
-use twincal::evaluator::{Beyond, Evaluator};
+use twincal::evaluator::{Beyond, Evaluator, forgotten};
 use twincal::posterior::draws::draw;
 use twincal::robot::Inertia;
 use twincal::write_back::{Holds, LinkChange, Residual, WriteBack, Writer, Written};
@@ -186,6 +186,8 @@ fn code(flags: &Export, language: Language, terminal: &mut Terminal) -> Outcome<
     if twin.payload_where_unknown {
         about.push(CARRIED.into());
     }
+    let forgets = forgotten(twin)?;
+    about.extend(forgets.iter().map(|finding| finding.message.clone()));
     let evaluator = match flags.beyond {
         None => Evaluator::new(twin, None)?,
         Some(format) => {
@@ -214,7 +216,11 @@ fn code(flags: &Export, language: Language, terminal: &mut Terminal) -> Outcome<
         }
     };
     let text = source(&evaluator, language, &about)?;
-    let findings = doubts(&stored, terminal);
+    let mut findings = doubts(&stored, terminal);
+    if let Some(finding) = &forgets {
+        paragraph(&finding.message, terminal);
+    }
+    findings.extend(forgets);
     if !write(flags, output, text.as_bytes(), terminal)? {
         return Ok(0);
     }

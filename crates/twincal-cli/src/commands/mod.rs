@@ -14,7 +14,6 @@ mod inspect;
 mod not_kept;
 mod predict;
 mod reads;
-mod repeats;
 mod report;
 mod settings;
 mod summary;

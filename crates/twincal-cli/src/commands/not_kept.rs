@@ -21,7 +21,7 @@ pub(super) fn others(calibration: &Calibration, terminal: &mut Terminal) {
     for component in calibration
         .components
         .iter()
-        .filter(|c| !c.selected && calibration.sees(c))
+        .filter(|c| !c.is_in() && calibration.sees(c))
     {
         match component.pip {
             Some(p) if p >= MENTIONED => {

@@ -165,6 +165,8 @@ struct Model<'a> {
 
 /// The stretch of a log that is predicted.
 struct Stretch<'a> {
+    /// First stamp of the log, where it is a part of one, s.
+    start: Option<f64>,
     /// Motion alone: measured torque stands beside it, row by row, and what it lacks cuts nothing.
     motion: &'a Recording,
     /// Rows of `motion` that are wanted.
@@ -216,6 +218,7 @@ impl Prediction {
                 let mut motion = recording.into_owned();
                 let measured = motion.take_torque();
                 let stretch = Stretch {
+                    start: None,
                     motion: &motion,
                     own: 0..motion.time.len(),
                     measured: measured.iter().map(Option::as_deref).collect(),
@@ -228,6 +231,7 @@ impl Prediction {
                 let visited = long.visit_motion(pipeline, &mut findings, |part, said| {
                     let joints = part.chapter.joints.iter();
                     let stretch = Stretch {
+                        start: long.start(),
                         motion: &part.motion,
                         own: part.own.clone(),
                         measured: joints.map(|joint| joint.tau.as_deref()).collect(),
@@ -266,7 +270,7 @@ impl Prediction {
         findings: &mut Vec<Finding>,
     ) -> Result<io::Result<()>> {
         let twin = model.twin;
-        let (trajectory, more) = twin.align(stretch.motion)?;
+        let (trajectory, more) = twin.align_part(stretch.motion, stretch.start)?;
         findings.extend(more);
         let mut written = Ok(());
         visit_rows(

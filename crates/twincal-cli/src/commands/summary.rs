@@ -1,10 +1,9 @@
 //! What a person reads after a fit: physical sentences, terms, held-out scores, findings.
 
 use super::not_kept::others;
-use super::repeats;
 use super::table::{print_table, table};
 use crate::terminal::{Terminal, clean};
-use twincal::calibrate::{Calibration, ParameterSummary, Repeated};
+use twincal::calibrate::{Calibration, ParameterSummary};
 use twincal::validate::{Scores, Split};
 use twincal::words::significant;
 use twincal::{Finding, Severity};
@@ -42,17 +41,14 @@ fn mistakes(calibration: &Calibration, terminal: &mut Terminal) {
 fn effects(calibration: &Calibration, terminal: &mut Terminal) {
     let all = &calibration.components;
     terminal.heading("What the model misses");
-    if !all.iter().any(|component| component.selected) {
+    if !all.iter().any(|component| component.is_in()) {
         terminal.say("  nothing: no candidate has a probability of 0.5 or more");
     }
-    for component in all.iter().filter(|component| component.selected) {
-        let mut said = vec![format!("PIP {}", pip(component.pip))];
-        let why = report::why_suspected(component, calibration);
-        said.extend((!why.is_empty()).then(|| format!("only suspected: {}", why.join(", "))));
-        if report::of_halves(component, calibration) == Repeated::InOneHalf {
-            said.push(Repeated::InOneHalf.words().into());
-        }
-        let text = format!("{} ({})", component.words, said.join(", "));
+    for component in all.iter().filter(|component| component.is_in()) {
+        let status = component.status.word();
+        let mut said = vec![format!("{status}, PIP {}", pip(component.pip))];
+        said.extend(Some(report::reason(component)).filter(|why| !why.is_empty()));
+        let text = format!("{} ({})", component.words, said.join(": "));
         paragraph(&text, terminal);
     }
     let unseen: Vec<&str> = calibration.unseen().map(|own| own.name.as_str()).collect();
@@ -66,9 +62,6 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
     for told in calibration.told_apart_by_the_prior() {
         paragraph(&told, terminal);
     }
-    for line in repeats::lines(&calibration.repeatability, calibration.halves) {
-        paragraph(&line, terminal);
-    }
     if tells_ends(calibration) {
         paragraph(ENDS, terminal);
     }
@@ -80,7 +73,7 @@ pub(super) fn tells_ends(calibration: &Calibration) -> bool {
     let found = calibration
         .components
         .iter()
-        .filter(|component| component.selected);
+        .filter(|component| component.is_in());
     found
         .flat_map(|component| &component.parameters)
         .any(has_ends)

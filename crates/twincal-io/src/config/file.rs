@@ -218,7 +218,7 @@ pub struct LibraryTable {
     pub terms: Vec<String>,
     /// The built-in trigonometric and polynomial family; default: on up to 3 joints.
     pub generic: Option<bool>,
-    /// Built-in families of physical components. Default: all but mass_scale, gain, encoder_zero and ripple; with own `terms`
+    /// Built-in families of physical components. Default: all but gain, encoder_zero and ripple; with own `terms`
     /// or `generic = true`: viscous, coulomb, offset and motor_inertia.
     pub families: Option<Vec<FamilyWord>>,
     /// Link in whose frame the payload is described; default: the last link.
@@ -274,12 +274,12 @@ pub enum FamilyWord {
     MotorInertia,
     /// `payload`: a body at the tool.
     Payload,
-    /// `<link>.mass_moments`: mass and first moments of a link.
+    /// `<link>.density`: mass, first moments and tensor of a link by one factor.
+    Density,
+    /// `<link>.mass_moments`: first moments of a link beside its density: its centre of mass.
     MassMoments,
-    /// `<link>.tensor`: inertia tensor of a link.
+    /// `<link>.tensor`: inertia tensor of a link beside its density.
     Tensor,
-    /// `<link>.mass_scale`: mass, first moments and tensor by one factor.
-    MassScale,
     /// `base.tilt`: direction and size of gravity in the base.
     Tilt,
     /// `<joint>.spring`: spring with rest position.
@@ -304,6 +304,10 @@ pub enum FamilyWord {
     EncoderZero,
     /// `<joint>.ripple`: gear ripple; needs `ripple = { joint = gear ratio }`.
     Ripple,
+    /// `<joint>.hysteresis`: friction that builds up over milliradians after a velocity reversal.
+    Hysteresis,
+    /// `<joint>.warm_up`: friction that changes with the time since the log's start, or with logged temperature.
+    WarmUp,
 }
 
 impl From<FamilyWord> for Family {
@@ -314,9 +318,9 @@ impl From<FamilyWord> for Family {
             FamilyWord::Offset => Self::Offset,
             FamilyWord::MotorInertia => Self::MotorInertia,
             FamilyWord::Payload => Self::Payload,
+            FamilyWord::Density => Self::Density,
             FamilyWord::MassMoments => Self::MassMoments,
             FamilyWord::Tensor => Self::Tensor,
-            FamilyWord::MassScale => Self::MassScale,
             FamilyWord::Tilt => Self::Tilt,
             FamilyWord::Spring => Self::Spring,
             FamilyWord::Potential => Self::Potential,
@@ -329,6 +333,8 @@ impl From<FamilyWord> for Family {
             FamilyWord::Gain => Self::Gain,
             FamilyWord::EncoderZero => Self::EncoderZero,
             FamilyWord::Ripple => Self::Ripple,
+            FamilyWord::Hysteresis => Self::Hysteresis,
+            FamilyWord::WarmUp => Self::WarmUp,
         }
     }
 }
@@ -414,7 +420,7 @@ pub struct PriorTable {
     /// Components that are in, whatever the data say, such as ["elbow.viscous"].
     pub forced: Option<Vec<String>>,
     /// Heredity: what is in only where something else is, such as { stribeck = "coulomb", "sin(2*q2)" = "sin(q2)" }; families joint by
-    /// joint, or components by name. Default: { asymmetry = "coulomb", stribeck = "coulomb", quadratic_friction = "viscous", coupled_inertia = "coupled_friction" }; {} binds nothing.
+    /// joint, or components by name. Default: { asymmetry = "coulomb", stribeck = "coulomb", quadratic_friction = "viscous", coupled_inertia = "coupled_friction", hysteresis = "coulomb", warm_up = "coulomb" }; {} binds nothing.
     pub heredity: Option<BTreeMap<String, String>>,
 }
 

@@ -3,13 +3,12 @@
 
 use super::MENTIONED;
 use super::figures::inclusion::family_name;
-use super::figures::sensitivity;
 use super::remarks::remarks;
-use super::standing::{Standing, standing};
+use super::status::reason as status_reason;
 use super::text::{interval, probability, with_ends};
 use super::verdict::plus_minus;
 use serde::Serialize;
-use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary, TermSummary, Verdict};
+use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary, TermSummary};
 use twincal::term::{Estimate, Family, Status, is_place, told};
 
 /// The effects as a reader wants them: by kind, in the order of the library, joints in the order of the model.
@@ -63,13 +62,10 @@ pub(super) struct Effect {
     pub(super) all: Vec<Parameter>,
     /// Names of the others.
     pub(super) unseen: Vec<String>,
-    /// The data do not say whether it is there, or the sampler cannot tell on which side of 0.5 it lies.
-    pub(super) undecided: bool,
-    /// Found, and nothing speaks against it or its numbers.
-    pub(super) stands: bool,
-    /// More likely than not, but something speaks against its being there or being what it says.
-    pub(super) suspected: bool,
-    /// What is to be minded.
+    pub(super) status: &'static str,
+    /// Why; may be empty.
+    pub(super) reason: String,
+    /// What explains its numbers.
     pub(super) remarks: Vec<String>,
 }
 
@@ -113,23 +109,22 @@ pub(super) fn sort(calibration: &Calibration) -> Effects {
     };
     let dropped = dropped(&calibration.terms);
     let unseen: Vec<&ComponentSummary> = calibration.unseen().collect();
-    let seen = |c: &ComponentSummary| !c.selected && calibration.sees(c);
+    let seen = |c: &ComponentSummary| !c.is_in() && calibration.sees(c);
     let possible = pick(&|c, p| seen(c) && p >= MENTIONED);
     let unlikely = |c: &ComponentSummary, p: f64| seen(c) && (p < MENTIONED || p.is_nan());
-    // Not only where the data leave it open: what the prior alone tells apart, or would judge otherwise, is not excluded either.
+    // Not only where the data leave it open: what the prior alone tells apart is not excluded either.
     let likely = calibration
         .groups
         .iter()
         .filter(|group| group.pip >= LIKELY);
     let mut alike: Vec<&String> = likely.flat_map(|group| &group.members).collect();
-    alike.extend(sensitivity::by_prior(calibration).map(|component| &component.name));
-    let found = calibration.components.iter().filter(|c| c.selected);
+    let found = calibration.components.iter().filter(|c| c.is_in());
     alike.extend(found.flat_map(|component| component.names_beside()));
     let is_alike = |c: &ComponentSummary| c.is_unseen() || alike.contains(&&c.name);
     let rivals = pick(&|c, p| unlikely(c, p) && is_alike(c));
     let absent = pick(&|c, p| unlikely(c, p) && !is_alike(c));
     Effects {
-        found: kinds(&pick(&|c, _| c.selected), calibration),
+        found: kinds(&pick(&|c, _| c.is_in()), calibration),
         counts: Counts {
             possible: possible.len(),
             absent: absent.len(),
@@ -192,8 +187,6 @@ fn effect(component: &ComponentSummary, calibration: &Calibration) -> Effect {
     let show = |all: &[&ParameterSummary]| -> Vec<Parameter> {
         all.iter().map(|p| parameter(p, component.family)).collect()
     };
-    let undecided = component.verdict == Some(Verdict::Undecided);
-    let standing = standing(component, calibration);
     Effect {
         title: match component.name.rsplit_once('.') {
             Some((place, word)) if word == component.family.word() => place.into(),
@@ -208,12 +201,8 @@ fn effect(component: &ComponentSummary, calibration: &Calibration) -> Effect {
         },
         told: show(&told),
         unseen: self::seen(component, false).map(name).collect(),
-        undecided: undecided
-            || component
-                .pip_mcse
-                .is_some_and(|e| e > 0.0 && (pip - 0.5).abs() < 3.0 * e),
-        stands: standing == Some(Standing::Stands),
-        suspected: standing == Some(Standing::Suspected),
+        status: component.status.word(),
+        reason: status_reason(component),
         remarks: remarks(component, calibration),
     }
 }
@@ -304,6 +293,12 @@ fn reason(status: &Status) -> Option<String> {
 mod tests {
     use super::*;
     use crate::report::fixture;
+    use twincal::calibrate::{Status as Said, StatusReason};
+
+    fn unsee(own: &mut ComponentSummary, pip: f64) {
+        (own.pip, own.status) = (Some(pip), Said::Unidentifiable);
+        own.reason = StatusReason::WideAsPrior;
+    }
 
     #[test]
     fn every_term_is_listed_exactly_once() {
@@ -336,11 +331,11 @@ mod tests {
         use twincal::calibrate::{Alike, Group};
         let of = |pip: f64, alike: bool| {
             let mut calibration = fixture::two_joints();
-            let found = calibration.components.iter().find(|own| own.selected);
+            let found = calibration.components.iter().find(|own| own.is_in());
             let found = found.unwrap().name.clone();
             let mut all = calibration.components.iter_mut();
-            let own = all.find(|own| !own.selected && own.pip.is_some()).unwrap();
-            (own.pip, own.verdict) = (Some(pip), Some(Verdict::NotSeen));
+            let own = all.find(|own| !own.is_in() && own.pip.is_some()).unwrap();
+            unsee(own, pip);
             let members = vec![found, own.name.clone()];
             let groups = alike.then(|| Group {
                 members: members.clone(),
@@ -367,10 +362,10 @@ mod tests {
         let before = sort(&calibration).counts.absent;
         let own = calibration.components.iter_mut();
         let own = own
-            .filter(|c| !c.selected)
+            .filter(|c| !c.is_in())
             .find(|c| c.pip.is_some())
             .unwrap();
-        (own.pip, own.verdict) = (Some(0.02), Some(Verdict::Absent));
+        (own.pip, own.status) = (Some(0.02), Said::Absent);
         let name = own.name.clone();
         let group = |settled, pip| Group {
             members: vec!["elbow.coulomb".into(), name.clone()],
@@ -400,7 +395,7 @@ mod tests {
         for (name, pip) in [("elbow.offset", 0.01), ("qd1^2*cos(q2)", 0.21)] {
             let own = calibration.components.iter_mut().find(|c| c.name == name);
             let own = own.unwrap();
-            (own.pip, own.verdict) = (Some(pip), Some(Verdict::NotSeen));
+            unsee(own, pip);
         }
         let effects = sort(&calibration);
         let unseen: Vec<&String> = effects.unseen.iter().flat_map(|u| &u.names).collect();
@@ -452,7 +447,7 @@ mod tests {
         {
             component.name = name.into();
             component.family = Family::Viscous;
-            (component.selected, component.pip) = (true, Some(1.0));
+            (component.status, component.pip) = (Said::Established, Some(1.0));
         }
         let effects = sort(&calibration);
         let first = &effects.found[0];
@@ -572,25 +567,5 @@ mod tests {
         let html = html.unwrap();
         assert!(html.contains("not seen by these data: com y, izz"));
         assert!(!html.contains("0 ± 0<"));
-    }
-
-    #[test]
-    fn within_three_standard_errors_of_one_half_is_undecided() {
-        let mut calibration = fixture::gibbs();
-        calibration
-            .components
-            .iter_mut()
-            .for_each(|c| c.pip_mcse = c.pip.map(|_| 0.02));
-        calibration.components[0].pip = Some(0.55);
-        calibration.components[1].pip = Some(0.57);
-        let effects = sort(&calibration);
-        let by_name = |name: &str| {
-            let all = [effects.found.clone(), effects.possible.clone()];
-            let mut all = all.into_iter().flat_map(flat);
-            all.find(|e| e.name == name).unwrap().undecided
-        };
-        assert!(
-            by_name(&calibration.components[0].name) && !by_name(&calibration.components[1].name)
-        );
     }
 }

@@ -3,13 +3,13 @@
 mod effects;
 mod held_out;
 
-use effects::{compact, components, draws, repeats, terms};
+use effects::{compact, components, draws, terms};
 use held_out::{trace, validation};
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use twincal::calibrate::{
-    Along, Calibration, Curve, Draws, Halves, LikelihoodUsed, LogSummary, PriorUsed, TermSummary,
+    Along, Calibration, Curve, Draws, LikelihoodUsed, LogSummary, PriorUsed, TermSummary,
 };
 use twincal::likelihood::{JointNoise, NoiseModel};
 use twincal::posterior::{Method, Model, Posterior};
@@ -65,7 +65,6 @@ pub(super) fn gibbs() -> Calibration {
         term.pip_mcse = Some(0.011);
     }
     calibration.terms[0].pip = Some(0.52);
-    calibration.terms[0].selected = true;
     calibration
 }
 
@@ -74,7 +73,6 @@ pub(super) fn nothing_found() -> Calibration {
     let mut calibration = two_joints();
     for term in calibration.terms.iter_mut().filter(|t| t.pip.is_some()) {
         term.pip = Some(0.01);
-        term.selected = false;
         term.pip_sensitivity = vec![0.03, 0.01, 0.0, 0.01, 0.02];
     }
     calibration.draws = Draws::default();
@@ -169,7 +167,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
             .collect::<Vec<_>>()
     };
     let members: Vec<u32> = (0..live.len())
-        .filter(|k| live[*k].selected)
+        .filter(|k| live[*k].pip >= Some(0.5))
         .map(|k| k as u32)
         .collect();
     let posterior = Posterior {
@@ -205,6 +203,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
             n: (logs * rows) as f64,
             n_eff: (logs * rows) as f64 / 7.3,
             autocorrelation_time: 2.4,
+            misfit: 1.0,
             interval_factor: 1.08,
             out_of_band: 0.021,
             spread: Default::default(),
@@ -234,6 +233,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
                 derived_from: vec![twincal::signal::DerivedFrom::Position; names.len()],
                 velocity_from: Vec::new(),
                 corrections: twincal::signal::Corrections::default(),
+                history: Vec::new(),
             },
             posterior,
             noise: joint_noise.clone(),
@@ -245,8 +245,6 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
             payload_where_unknown: false,
         },
         components: components(&terms),
-        repeatability: repeats(&terms),
-        halves: Some(Halves::EveryOtherLog),
         compact: Some(compact(&terms)),
         terms,
         noise: joint_noise,
@@ -262,8 +260,6 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
         },
         likelihood: LikelihoodUsed {
             model: NoiseModel::Tempered,
-            tempering: 3.0,
-            tempering_scores: vec![(1.0, 10.0), (3.0, 14.0), (10.0, 9.0)],
             rounds: 6,
         },
         groups: Vec::new(),

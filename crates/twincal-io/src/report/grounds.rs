@@ -1,12 +1,12 @@
 //! What the verdict rests on, a sentence each: error of held-out torque, what friction alone would leave, intervals, effects.
 
+use super::figures::inclusion::family_name;
 use super::limits::{FEW, decisive, has_standstill, other_shares};
-use super::standing::why_suspected;
 use super::standstill::{at_standstill, held_at_rest, rest_got_worse};
+use super::status::with;
 use super::text::{count, first_of, list, number, percent};
-use super::uses;
 use super::view::{Joint, independent_rows, pooled_unit};
-use twincal::calibrate::Calibration;
+use twincal::calibrate::{Calibration, ComponentSummary, Status};
 use twincal::validate::{JointScore, Scores, Split};
 
 /// Change of an error from which other rows are told apart.
@@ -17,8 +17,6 @@ const UNFILTERED_WORTH_TELLING: f64 = 0.25;
 const SHARE_WORTH_TELLING: f64 = 0.01;
 /// Held-out time that is told because it is short, s.
 const SHORT: f64 = 30.0;
-/// Probability above which at least one of a group is sure.
-pub(super) const SURE: f64 = 0.95;
 /// Share of the intervals' width that would have done from which they are called too wide, and the share of rows that they then hold.
 const MUCH_TOO_WIDE: f64 = 0.5;
 const SHARE_ALL: f64 = 0.99;
@@ -251,38 +249,50 @@ pub(super) fn held_out_seconds(calibration: &Calibration) -> f64 {
     rows.unwrap_or(0).saturating_sub(1) as f64 / calibration.kept_rate_hz()
 }
 
-/// What was found, use by use; where nothing of it is sure, what at least one is.
+/// Effects up to this number are named; more are counted by family.
+const FEW_EFFECTS: usize = 3;
+
+/// "Established: viscous friction (6) and payload.", the equivalent sets and the tentative effects.
 pub(super) fn effects_found(calibration: &Calibration) -> Vec<String> {
-    let likely = || calibration.components.iter().filter(|c| c.selected);
-    let suspected = likely().filter(|own| !why_suspected(own, calibration).is_empty());
-    match (likely().count(), suspected.count()) {
-        (0, _) => vec!["No missing effect is more likely than not.".into()],
-        (n, suspected) if suspected == n => {
-            let groups = calibration.groups.iter().filter(|group| group.pip > SURE);
-            let sure: Vec<String> = groups
-                .map(|group| {
-                    let named = first_of(group.members.clone(), NAMED);
-                    format!("at least one of {} is there", list(&named))
-                })
-                .collect();
-            let more = format!("{n} more likely than not, but only suspected");
-            vec![match sure.is_empty() {
-                true => format!("No missing effect is sure; {more}."),
-                false => format!(
-                    "No single missing effect is sure; {more}. Sure: {}.",
-                    sure.join("; ")
-                ),
-            }]
+    let established = with(Status::Established, calibration);
+    let mut out = vec![match established.len() {
+        0 => "No effect is established.".into(),
+        _ => format!("Established: {}.", by_family(&established)),
+    }];
+    let name = |own: &&ComponentSummary| own.name.clone();
+    let is_equivalent = |name: &String| {
+        let mut all = calibration.components.iter();
+        all.any(|own| own.name == *name && own.status == Status::Equivalent)
+    };
+    let sets = calibration.groups.iter();
+    let sets = sets.filter(|group| group.members.iter().any(is_equivalent));
+    let sets: Vec<String> = sets.map(|group| group.members.join(" or ")).collect();
+    let tentative = with(Status::Tentative, calibration);
+    let tentative: Vec<String> = tentative.iter().map(name).collect();
+    for (word, all) in [("Equivalent", sets), ("Tentative", tentative)] {
+        if !all.is_empty() {
+            out.push(format!("{word}: {}.", list(&first_of(all, NAMED))));
         }
-        _ => uses::sentences(calibration),
     }
+    out
+}
+
+fn by_family(effects: &[&ComponentSummary]) -> String {
+    if effects.len() <= FEW_EFFECTS {
+        let names: Vec<&str> = effects.iter().map(|own| own.name.as_str()).collect();
+        return list(&names);
+    }
+    let kinds = effects.chunk_by(|a, b| a.family == b.family);
+    let kinds: Vec<String> = kinds
+        .map(|own| format!("{} ({})", family_name(own[0].family), own.len()))
+        .collect();
+    list(&kinds)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::verdict::tests::judged;
     use super::*;
-    use twincal::calibrate::Verdict as Decision;
     use twincal::{Finding, Severity};
 
     /// Standstill rows as many as moving ones: of these the mean square is 4 before and 0.25 after; at rest `still` before and after, joint by joint.
@@ -456,25 +466,35 @@ mod tests {
     }
 
     #[test]
-    fn where_no_effect_is_sure_groups_are_told_of_which_one_is() {
+    fn effects_are_told_by_status() {
         use twincal::calibrate::{Alike, Group};
-        let of = |pip: f64| {
-            let told = judged(|c| {
-                for component in c.components.iter_mut().filter(|c| c.selected) {
-                    component.verdict = Some(Decision::Undecided);
-                }
-                c.groups = vec![Group {
-                    members: ["a", "b", "c", "d", "e"].map(str::to_owned).to_vec(),
-                    pip,
-                    alike: Alike::EveryMotion,
-                    settled: false,
-                    words: String::new(),
-                }];
-            });
-            told.grounds.last().cloned().unwrap_or_default()
+        let of = |change: &dyn Fn(&mut Calibration)| {
+            let told = judged(change).grounds;
+            let from = told.iter().position(|t| t.contains("stablished"));
+            told[from.unwrap()..].to_vec()
         };
-        let sure = "No single missing effect is sure; 7 more likely than not, but only suspected. Sure: at least one of a, b, c and 2 more is there.";
-        assert_eq!(of(0.999), sure);
-        assert!(of(0.9).starts_with("No missing effect is sure;"));
+        let all = of(&|_| ());
+        assert!(
+            all.len() == 1 && all[0].starts_with("Established: "),
+            "{all:?}"
+        );
+        let none = of(&|c| {
+            let found = c.components.iter_mut().filter(|own| own.is_in());
+            found.for_each(|own| own.status = Status::Tentative);
+        });
+        assert_eq!(none[0], "No effect is established.");
+        assert!(none[1].starts_with("Tentative: ") && none[1].ends_with("and 4 more."));
+        let set = of(&|c| {
+            let found = c.components.iter_mut().find(|own| own.is_in()).unwrap();
+            found.status = Status::Equivalent;
+            c.groups = vec![Group {
+                members: vec![found.name.clone(), "a.tensor".into()],
+                pip: 0.98,
+                alike: Alike::EveryMotion,
+                settled: false,
+                words: String::new(),
+            }];
+        });
+        assert!(set[1].starts_with("Equivalent: ") && set[1].ends_with(" or a.tensor."));
     }
 }

@@ -1,11 +1,10 @@
-//! Can the numbers be believed: intervals joint by joint, a guarantee, what repeats, what the compact twin costs.
+//! Can the numbers be believed: intervals joint by joint, a guarantee, what the compact twin costs.
 
 use super::limits::has_standstill;
 use super::tables::{Table, with_unit};
-use super::text::{count, number, percent, probability};
-use super::verdict::plus_minus;
+use super::text::{count, number, percent};
 use super::view::{Joint, pooled_unit};
-use twincal::calibrate::{Calibration, Halves, Verdict};
+use twincal::calibrate::Calibration;
 use twincal::validate::{Conformal, TREND_ALARM, TREND_FEWEST, Trend, Validation};
 use twincal::words::significant;
 use twincal::{Finding, Mistake};
@@ -156,72 +155,6 @@ pub fn stretched(factor: f64) -> &'static str {
     }
 }
 
-/// Every coefficient of the compact twin that these data see, on the two halves of them.
-pub(super) fn repeats(calibration: &Calibration) -> Table {
-    let mut table = Table::new([
-        "coefficient",
-        "the two halves (sd apart)",
-        "first half",
-        "second half",
-        "all data, likewise",
-        "unit",
-        "probability in each half",
-    ]);
-    for repeat in &calibration.repeatability {
-        let own = (calibration.terms.iter()).find(|t| t.term.name == repeat.term);
-        // All that is told of it elsewhere is that these data do not see it.
-        if own.is_some_and(|own| own.verdict == Some(Verdict::NotSeen)) {
-            continue;
-        }
-        let words = repeat.repeated().words();
-        let words = match repeat.z {
-            None => words.to_owned(),
-            Some(z) => format!("{words} ({})", apart(z.abs())),
-        };
-        let mut compact = calibration
-            .compact
-            .iter()
-            .flat_map(|compact| &compact.terms);
-        let all = compact.find(|own| own.name == repeat.term);
-        let (factor, unit) = match own {
-            Some(own) => own.term.family.told_in(&repeat.unit),
-            None => (1.0, repeat.unit.as_str()),
-        };
-        table.rows.push(vec![
-            repeat.term.clone(),
-            words,
-            plus_minus(factor * repeat.first, factor * repeat.first_sd),
-            plus_minus(factor * repeat.second, factor * repeat.second_sd),
-            all.map_or_else(String::new, |own| {
-                plus_minus(factor * own.mean, factor * own.sd)
-            }),
-            unit.into(),
-            format!(
-                "{} / {}",
-                probability(repeat.first_pip),
-                probability(repeat.second_pip)
-            ),
-        ]);
-    }
-    table
-}
-
-/// "2.5", and "1.97" where one digit less would be the next word's number.
-fn apart(z: f64) -> String {
-    let rounded = (10.0 * z).round() / 10.0;
-    let border = [2.0, 3.0].contains(&rounded) && z < rounded;
-    number(z, if border { 3 } else { 2 })
-}
-
-/// What the two halves are.
-pub(super) fn halves(calibration: &Calibration) -> &'static str {
-    match calibration.halves {
-        Some(Halves::OneLog) => "the first and the second half of the log",
-        Some(Halves::EveryOtherLog) => "the first, third, … log and the others",
-        None => "",
-    }
-}
-
 /// The compact twin and what it costs, in sentences; none in results without it.
 pub(super) fn compact(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
     let Some(compact) = &calibration.compact else {
@@ -264,45 +197,6 @@ pub(super) fn compact(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<St
 mod tests {
     use super::*;
     use crate::report::fixture;
-
-    #[test]
-    fn words_follow_the_distance_between_the_halves() {
-        let mut calibration = fixture::two_joints();
-        let words = |calibration: &Calibration| -> Vec<String> {
-            let rows = repeats(calibration).rows;
-            rows.iter().map(|row| row[1].clone()).collect()
-        };
-        assert_eq!(
-            words(&calibration)[..3],
-            [
-                "does not repeat (3.6)",
-                "not seen in both halves",
-                "repeats (0.40)"
-            ]
-        );
-        for (z, said) in [
-            (-2.5, "wavers (2.5)"),
-            (1.966, "repeats (1.97)"),
-            (2.0, "wavers (2.0)"),
-        ] {
-            calibration.repeatability[0].z = Some(z);
-            assert_eq!(words(&calibration)[0], said);
-        }
-    }
-
-    #[test]
-    fn a_number_that_these_data_do_not_see_is_not_compared() {
-        let mut calibration = fixture::two_joints();
-        let name = calibration.repeatability[0].term.clone();
-        let has = |calibration: &Calibration| {
-            let rows = repeats(calibration).rows;
-            rows.iter().any(|row| row[0] == name)
-        };
-        assert!(has(&calibration));
-        let term = calibration.terms.iter_mut().find(|t| t.term.name == name);
-        term.unwrap().verdict = Some(Verdict::NotSeen);
-        assert!(!has(&calibration));
-    }
 
     use twincal::Severity;
 

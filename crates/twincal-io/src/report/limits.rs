@@ -2,7 +2,6 @@
 
 use super::beyond;
 use super::findings;
-use super::reservations::{not_to_rest_on, of_settings};
 use super::shape;
 use super::standstill::{at_standstill, hardly_at_rest, rest_got_worse};
 use super::text::{THIN, list, number, percent, subject};
@@ -73,14 +72,12 @@ fn of_results(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
     out.extend(limits_of_torque(calibration, joints));
     out.extend(at_standstill(calibration, joints).filter(|_| rest_got_worse(calibration)));
     out.extend(raw_is_worse(calibration, joints));
-    out.extend(not_to_rest_on(calibration));
     out.extend(friction_does_as_well(
         decisive(&calibration.validation),
         joints,
     ));
     out.extend(beyond::mostly(calibration, joints));
     out.extend(hardly_at_rest(calibration, joints));
-    out.extend(of_settings(calibration));
     out
 }
 
@@ -395,36 +392,6 @@ mod tests {
     use crate::report::shape::tests::pit;
 
     #[test]
-    fn what_is_not_to_rest_on_is_said() {
-        let says =
-            |verdict: &Verdict, words: &str| verdict.limits.iter().any(|l| l.contains(words));
-        let body = judged(|c| {
-            let found = c.components.iter_mut().find(|own| own.selected);
-            found.unwrap().rigid_share = Some(0.3);
-        });
-        assert!(says(&body, "(no rigid body in 70.0\u{202f}% of the draws)"));
-        // Of two halves one may show it.
-        let halves = |second: f64| {
-            judged(move |c| {
-                for own in &mut c.repeatability {
-                    (own.first_pip, own.second_pip) = (0.4, second);
-                }
-            })
-        };
-        assert!(says(&halves(0.3), "(found in neither half alone)"));
-        let against = judged(|c| {
-            for own in &mut c.repeatability {
-                (own.first, own.second) = (own.first + 100.0, own.second + 100.0);
-            }
-        });
-        assert!(says(
-            &against,
-            "All data together say what their two halves do not: "
-        ));
-        assert!(!says(&halves(0.6), "neither half"));
-    }
-
-    #[test]
     fn three_are_shown_and_the_rest_is_folded_but_for_one_alone() {
         let of = |count: usize| {
             let (shown, folded) = fold(vec![String::new(); count]);
@@ -563,23 +530,6 @@ mod tests {
         let said = "Friction and an offset alone do about as well or better on elbow (0.104 instead of 0.100 N·m).";
         assert_eq!(of(0.104).as_deref(), Some(said));
         assert_eq!(of(0.106), None);
-    }
-
-    #[test]
-    fn gravity_of_another_size_is_in_the_verdict() {
-        let verdict = judged(|c| {
-            let tilt = c.components.iter_mut().find(|c| c.selected);
-            let Some(tilt) = tilt else { return };
-            tilt.family = twincal::term::Family::Tilt;
-            tilt.name = "base.tilt".into();
-            let z = &mut tilt.parameters[0];
-            (z.name, z.median, z.interval68) = ("z".into(), 1.17, [1.16, 1.18]);
-        });
-        let said = "base.tilt (gravity would be 8.64 m/s²";
-        assert!(
-            verdict.limits.iter().any(|l| l.contains(said)),
-            "{verdict:?}"
-        );
     }
 
     #[test]

@@ -11,7 +11,6 @@ mod figure;
 mod figures;
 mod findings;
 mod grounds;
-mod halves;
 mod honesty;
 #[cfg(test)]
 mod fixture;
@@ -20,17 +19,15 @@ mod next_recording;
 mod page;
 mod plot;
 mod remarks;
-mod reservations;
 mod scale;
 mod shape;
-mod standing;
 mod standstill;
+mod status;
 mod svg;
 mod tables;
 #[cfg(test)]
 mod tests;
 mod text;
-mod uses;
 mod verdict;
 mod view;
 
@@ -75,7 +72,7 @@ pub struct FileHash {
 pub use grounds::friction_only;
 pub use honesty::{drawn_alike, stretched};
 pub use limits::{decisive, has_standstill};
-pub use standing::{of_halves, why_suspected};
+pub use status::reason;
 
 /// Whether the calibrated torque can be used.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -4,36 +4,15 @@ use super::beyond;
 use super::findings::is_about;
 use super::grounds::NAMED;
 use super::limits::FEW;
-use super::standing::of_halves;
 use super::standstill::hardly_at_rest;
-use super::text::{first_of, list, number};
+use super::text::{first_of, list};
 use super::view::{Joint, independent_rows};
-use twincal::calibrate::{Alike, Calibration, Repeated};
+use twincal::calibrate::{Alike, Calibration};
 use twincal::validate::Split;
 
 /// In one phrase, without its beginning; `None` where nothing is known that it would show.
 pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
     let mut holds = Vec::new();
-    let found = calibration.components.iter().filter(|own| own.selected);
-    let open = found.filter(|own| of_halves(own, calibration) == Repeated::InNeitherHalf);
-    if let open @ 1.. = open.count() {
-        let fitted = calibration.logs.iter().filter(|log| log.role == "fit");
-        let (logs, seconds) = fitted.fold((0, 0.0), |(logs, seconds), log| {
-            (logs + 1, seconds + log.duration)
-        });
-        holds.push(format!(
-            "at least {} s long, as {} ({} in all of the data only, in neither half of it)",
-            number(seconds, 3),
-            match logs {
-                1 => "this log is",
-                _ => "these logs are together",
-            },
-            match open {
-                1 => "one effect shows".to_owned(),
-                n => format!("{n} effects show"),
-            }
-        ));
-    }
     let findings = || calibration.findings.iter();
     let mut more: Vec<String> = findings()
         .filter(|f| f.code == "unseen_motion" && !f.subject.is_empty())
@@ -140,7 +119,6 @@ mod tests {
         let of = |change: &dyn Fn(&mut Calibration)| {
             let mut calibration = fixture::two_joints();
             calibration.findings.clear();
-            calibration.repeatability.clear();
             calibration.groups.clear();
             for log in &mut calibration.logs {
                 log.standstill.iter_mut().for_each(|rows| *rows = 0);
@@ -152,34 +130,6 @@ mod tests {
         let untried = of(&|c| c.validation.split = Split::LastThirty);
         let test = "another motion, given with --heldout, as the test: so far only later parts of the fitted motion were tried.";
         assert_eq!(untried.as_deref(), Some(test));
-        let halves = of(&|c| {
-            let mut own = fixture::two_joints().repeatability[0].clone();
-            let found = c.components.iter().find(|own| own.selected);
-            own.component = found.unwrap().name.clone();
-            (own.first_pip, own.second_pip, own.z) = (0.3, 0.3, Some(0.5));
-            c.repeatability = vec![own];
-        });
-        let halves = halves.unwrap();
-        assert!(
-            halves.starts_with("one to fit with these, at least 180 s long, as these logs are together (one effect shows in all of the data only, in neither half of it)"),
-            "{halves}"
-        );
-        let joint = of(&|c| {
-            let code = "unseen_motion";
-            c.findings = vec![Finding::new(Severity::Note, code, "elbow", "", 1)];
-        });
-        assert_eq!(
-            joint.as_deref(),
-            Some("one to fit with these, with more motion of elbow.")
-        );
-        let pauses = of(&|c| {
-            for log in &mut c.logs {
-                log.standstill.iter_mut().for_each(|rows| *rows = 500);
-            }
-            c.validation.moving = c.validation.filtered.clone();
-        });
-        let said = "another motion with pauses in several poses, given with --heldout, to test standstill.";
-        assert_eq!(pauses.as_deref(), Some(said));
         let encoder = of(&|c| {
             let code = "quantised_encoder";
             c.findings = vec![Finding::new(Severity::Warning, code, "elbow", "", 1)];

@@ -50,12 +50,8 @@ struct Page<'a> {
     pit: Option<Figure>,
     reliability: Table,
     guarantee: String,
-    repeats: Table,
-    halves: &'static str,
     compact: Vec<String>,
     sensitivity: Option<Figure>,
-    /// Effects whose selection depends on the prior, in one phrase; may be empty.
-    sensitive: String,
     scores: Table,
     all_rows: Table,
     /// Whether some held-out rows are of joints that stand still.
@@ -73,8 +69,6 @@ struct Page<'a> {
     findings: Vec<findings::Kind>,
     convergence: Vec<String>,
     pipeline: Vec<String>,
-    /// c of the tempered likelihood; empty without.
-    tempering: String,
 }
 
 /// The page as HTML.
@@ -129,7 +123,6 @@ fn gather<'a>(
         .collect();
     let others = OTHER_TRACES / joints.len().max(1);
     let components = &calibration.components;
-    let sensitive = figures::sensitivity::by_prior(calibration).map(|c| c.name.as_str());
     Page {
         run,
         mentioned: super::MENTIONED,
@@ -154,11 +147,8 @@ fn gather<'a>(
         pit: figures::pit::figure(&pit, independent.min(pit.len() as f64)),
         reliability: honesty::reliability(validation),
         guarantee: honesty::guarantee(validation, &calibration.findings),
-        repeats: honesty::repeats(calibration),
-        halves: honesty::halves(calibration),
         compact: honesty::compact(calibration, joints),
         sensitivity: figures::sensitivity::figure(terms, components),
-        sensitive: text::list(&sensitive.collect::<Vec<_>>()),
         scores: tables::scores(limits::decisive(validation), joints, Rows::Moving),
         all_rows: tables::scores(&validation.filtered, joints, Rows::All),
         standstill: limits::has_standstill(validation),
@@ -176,10 +166,5 @@ fn gather<'a>(
         findings: findings::findings(calibration),
         convergence: tables::convergence(calibration),
         pipeline: tables::pipeline(calibration),
-        tempering: if calibration.likelihood.tempering == 1.0 {
-            String::new()
-        } else {
-            calibration.likelihood.tempering.to_string()
-        },
     }
 }

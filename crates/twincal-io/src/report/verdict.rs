@@ -1,4 +1,4 @@
-//! Can this twin be used, and where not: the first thing the report says, by held-out data and by what was found that is not to be rested on.
+//! Can this twin be used, and where not: the first thing the report says, by held-out data and findings.
 
 use super::grounds::{self, rows_of};
 use super::limits::{
@@ -6,10 +6,9 @@ use super::limits::{
     too_narrow, worse,
 };
 use super::next_recording;
-use super::reservations::{no_bodies, not_to_rest_on};
 use super::shape;
-use super::standing::why_suspected;
 use super::standstill;
+use super::status;
 use super::text::with_sd;
 use super::view::{Joint, independent_rows, memory};
 use serde::Serialize;
@@ -48,16 +47,16 @@ pub(super) struct Verdict {
 /// Judges `calibration`.
 pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict {
     let scores = &calibration.validation.filtered;
-    let found = || calibration.components.iter().filter(|c| c.selected);
-    let sure = found().filter(|c| why_suspected(c, calibration).is_empty());
-    let (found, sure) = (found().count(), sure.count());
+    let all = || calibration.components.iter();
+    let found = all().filter(|own| own.is_in()).count();
+    let sure = all().filter(|own| status::is_claimed(own)).count();
     let rows = rows_of(scores);
     if rows == 0 || !(scores.rmse_nominal.is_finite() && scores.rmse_calibrated.is_finite()) {
         return Verdict {
             grade: Grade::Bad,
             headline: "Not yet: there are no held-out rows to judge this twin by.".into(),
             grounds: grounds::effects_found(calibration),
-            limits: not_to_rest_on(calibration),
+            limits: Vec::new(),
             folded: Vec::new(),
             pointers: Vec::new(),
             next: Some(
@@ -72,7 +71,6 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     let off = shape::off(calibration);
     let mut each = scores.joints.iter();
     let too_narrow = each.any(|j| too_narrow(j, memory(joints, &j.joint)));
-    let firm = not_to_rest_on(calibration).is_empty();
     let rest_worse =
         standstill::rest_got_worse(calibration) && standstill::few_pauses(calibration).is_none();
     let (large, lost) = (large(scores, joints).len(), lost(scores, joints).len());
@@ -129,7 +127,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     } else if found > 0 && sure == 0 {
         (
             Grade::Care,
-            "Perhaps: low-passed torque is better with it, but none of its effects is sure.",
+            "Perhaps: low-passed torque is better with it, but none of its effects is established.",
         )
     } else if large > 0 && large == joints.len() {
         (
@@ -141,7 +139,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
             Grade::Care,
             "Better than the model alone, but on most joints the error that is left is large.",
         )
-    } else if no_bodies(calibration).len() > 1 {
+    } else if no_bodies(calibration) > 1 {
         (
             Grade::Care,
             "With care: what was found of several links is no rigid body. Is this the robot's model?",
@@ -171,7 +169,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         )
     } else if let Some(shape) = off.all.filter(|shape| !shape.contradicts(scores, joints)) {
         (Grade::Care, shape.headline())
-    } else if !serious && !off.single && !too_narrow && firm {
+    } else if !serious && !off.single && !too_narrow {
         (
             Grade::Good,
             "Yes, to predict torque on motions like the ones it was tested on.",
@@ -195,6 +193,14 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
             .then(|| next_recording::next(calibration, joints))
             .flatten(),
     }
+}
+
+/// Links of which what was found is no rigid body.
+fn no_bodies(calibration: &Calibration) -> usize {
+    let findings = calibration.findings.iter();
+    let sure = findings.filter(|f| f.severity == Severity::Warning);
+    sure.filter(|f| f.code == "unphysical_inertia_found")
+        .count()
 }
 
 /// The headline with what it is of: joints that move, and torque that the filter lets pass.
@@ -241,26 +247,13 @@ pub(super) mod tests {
     use crate::report::limits::{Rows, torque_deviation};
     use crate::report::shape::tests::pit;
     use crate::report::view;
-    use twincal::calibrate::Verdict as Decision;
+    use twincal::calibrate::Status;
     use twincal::posterior::Method;
     use twincal::validate::Pit;
 
     pub(in crate::report) fn judged(change: impl Fn(&mut Calibration)) -> Verdict {
         let mut calibration = fixture::two_joints();
         calibration.findings.clear();
-        calibration
-            .repeatability
-            .iter_mut()
-            .for_each(|r| r.z = Some(0.1));
-        // Halves that say what all data say.
-        for repeat in &mut calibration.repeatability {
-            let mut terms = calibration.terms.iter();
-            let whole = terms.find(|term| term.term.name == repeat.term);
-            if let Some(median) = whole.and_then(|term| term.conditional_median) {
-                (repeat.first, repeat.second) = (median, median);
-            }
-        }
-        (calibration.terms.iter_mut()).for_each(|t| t.pip_sensitivity.clear());
         let moving = calibration.validation.moving.clone();
         change(&mut calibration);
         if calibration.validation.moving == moving {
@@ -335,7 +328,8 @@ pub(super) mod tests {
             (
                 |c| {
                     c.validation.filtered.rmse_calibrated = c.validation.filtered.rmse_nominal;
-                    c.components.iter_mut().for_each(|t| t.selected = false);
+                    let all = c.components.iter_mut();
+                    all.for_each(|t| (t.pip, t.status) = (Some(0.0), Status::Absent));
                 },
                 Grade::Care,
                 "Nothing to correct",
@@ -400,24 +394,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn what_is_not_to_rest_on_makes_an_exception() {
-        let apart = judged(|c| c.repeatability[0].z = Some(3.7));
-        assert!(apart.headline.contains("exceptions"), "{apart:?}");
-        assert!(
-            apart.limits.iter().any(|l| l.contains("(3.7 sd)")),
-            "{apart:?}"
-        );
-        let prior = judged(|c| {
-            let selected = c.terms.iter_mut().find(|t| t.selected);
-            selected.unwrap().pip_sensitivity = vec![0.3, 0.9];
-        });
-        assert!(prior.headline.contains("exceptions"), "{prior:?}");
-        assert!(
-            prior
-                .limits
-                .iter()
-                .any(|l| l.starts_with("Only suspected, not to be rested on"))
-        );
+    fn intervals_that_one_joint_misses_make_an_exception() {
         let narrow = judged(|c| c.validation.filtered.joints[1].coverage95 = 0.78);
         assert!(narrow.headline.contains("exceptions"), "{narrow:?}");
     }
@@ -468,14 +445,14 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn effects_that_are_all_undecided_are_no_more_than_perhaps() {
+    fn effects_that_are_all_tentative_are_no_more_than_perhaps() {
         let verdict = judged(|c| {
-            let found = c.components.iter_mut().filter(|c| c.selected);
-            found.for_each(|c| c.verdict = Some(Decision::Undecided));
+            let found = c.components.iter_mut().filter(|c| c.is_in());
+            found.for_each(|c| c.status = Status::Tentative);
         });
         assert!(verdict.headline.starts_with("Perhaps"), "{verdict:?}");
-        let said = "No missing effect is sure; 7 more likely than not, but only suspected.";
-        assert_eq!(verdict.grounds.last().map(String::as_str), Some(said));
+        let said = "No effect is established.".to_owned();
+        assert!(verdict.grounds.contains(&said));
     }
 
     #[test]

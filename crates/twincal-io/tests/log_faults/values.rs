@@ -107,6 +107,7 @@ fn case_23_a_wrapped_angle_is_unfolded_and_counted_a_slider_never() {
         derived_from: vec![DerivedFrom::Position; 2],
         velocity_from: Vec::new(),
         corrections: twincal::signal::Corrections::default(),
+        history: Vec::new(),
     };
     let (trajectory, findings) = align(&robot, &recording, &pipeline).unwrap();
     let turns = ((turning(3999) + PI) / TAU).floor() as u64;

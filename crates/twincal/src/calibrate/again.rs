@@ -86,6 +86,13 @@ pub(super) fn whole_road(
             Ok(Road::Counted(_)) => unreachable!("the goal is the end"),
             Err(error) => TooFew::from(error),
         };
+        if recordings.is_some()
+            && let Some(smaller) = smaller_library::without_memory(&few.error, &settings)
+        {
+            settings = smaller.settings;
+            added.push(smaller.finding);
+            continue;
+        }
         if let Some((error, found)) = first.take() {
             *findings = found;
             return Err(error);

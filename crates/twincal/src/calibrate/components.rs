@@ -1,9 +1,10 @@
 //! From the posterior over columns to physical stories: one line per component, with parameters that people know.
 
-use super::result::{ComponentSummary, ParameterSummary, TermSummary, Verdict};
+use super::result::{ComponentSummary, ParameterSummary, TermSummary};
+use super::status::{Status, StatusReason, by_probability};
 use crate::posterior::draws::{CoefficientDraws, Drawer};
 use crate::posterior::{Model, Posterior};
-use crate::term::{Component, Estimate, Library};
+use crate::term::{Before, Component, Estimate, Library};
 use rayon::prelude::*;
 
 /// Draws that the parameters are worked out from.
@@ -14,6 +15,10 @@ const ENOUGH: usize = 500;
 const ONE_SD: [f64; 2] = [0.158_655, 0.841_345];
 /// What is said instead of a number that is the prior's alone.
 pub(super) const NOT_SEEN: &str = "not seen by these data";
+/// Share of the prior's sd from which on a parameter is not seen.
+const UNSEEN: f64 = 0.9;
+/// Share of a mass that its sd may be where its centre is told.
+const OPEN: f64 = 0.5;
 /// Random stream of those draws.
 const STREAM: u64 = (1 << 32) + 1;
 
@@ -85,8 +90,8 @@ fn summary(
         columns: own.iter().map(|term| term.term.name.clone()).collect(),
         pip: None,
         pip_mcse: None,
-        selected: false,
-        verdict: None,
+        status: Status::Unidentifiable,
+        reason: StatusReason::NoColumn,
         alias_of: component.alias_of.clone(),
         told_as: None,
         no_rigid_body: false,
@@ -98,9 +103,9 @@ fn summary(
         return summary;
     };
     (summary.pip, summary.pip_mcse) = (first.pip, first.pip_mcse);
-    summary.verdict = verdict(&live);
-    summary.selected =
-        first.pip.is_some_and(|pip| pip >= 0.5) && summary.verdict != Some(Verdict::NotSeen);
+    let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
+    let (pip, mcse) = (number(first.pip), number(first.pip_mcse));
+    (summary.status, summary.reason) = by_probability(pip, mcse, is_seen(&live));
     summary.parameters = parameters(library, component, index, &own, drawn);
     let estimates: Vec<Estimate> = summary
         .parameters
@@ -116,7 +121,7 @@ fn summary(
         .collect();
     let held = || summary.parameters.iter().any(|p| p.median.is_finite());
     let unseen = estimates.iter().all(|p| p.value.is_nan()) && held();
-    summary.words = if summary.verdict == Some(Verdict::NotSeen) || unseen {
+    summary.words = if summary.status == Status::Unidentifiable || unseen {
         format!("{}: {NOT_SEEN}", component.story)
     } else {
         library.component_words(index, &estimates)
@@ -124,15 +129,10 @@ fn summary(
     summary
 }
 
-/// The verdict that all columns share which are in or out with the first, except that one seen column is enough for the component to be
-/// seen.
-fn verdict(live: &[&TermSummary]) -> Option<Verdict> {
-    let first = live.first()?;
-    let mut together = live
-        .iter()
-        .filter(|term| term.term.family == first.term.family);
-    let seen = together.find(|term| term.verdict != Some(Verdict::NotSeen));
-    seen.unwrap_or(first).verdict
+/// Whether the data see one of the columns that are in or out with the first.
+fn is_seen(live: &[&TermSummary]) -> bool {
+    let together = |term: &&&TermSummary| term.term.family == live[0].term.family;
+    live.iter().filter(together).any(|term| term.seen)
 }
 
 /// Mean, sd and central interval of every parameter, given that the component is in.
@@ -155,7 +155,7 @@ fn parameters(
     let values: Vec<Vec<f64>> = given
         .map(|beta| library.parameter_values(index, &beta))
         .collect();
-    library
+    let mut parameters: Vec<ParameterSummary> = library
         .parameters(index)
         .into_iter()
         .enumerate()
@@ -168,9 +168,11 @@ fn parameters(
                 column.get(place).copied().unwrap_or(f64::NAN)
             };
             // A coefficient has exact moments. A ratio of coefficients has none where its denominator can be near zero.
-            // A parameter stands at the place of its term. Where that is no column, its value is not 0 but unknown.
+            // A parameter stands at the place of its term, or mixes several. Where one of those is no column, its value is not 0 but unknown.
+            let before = library.before(index, p);
             let term = own.get(p).copied();
-            if term.is_some_and(|term| term.pip.is_none()) {
+            let alone = term.filter(|_| before.is_none());
+            if alone.is_some_and(|term| term.pip.is_none()) || before == Some(Before::Hidden) {
                 return ParameterSummary {
                     name: parameter.name,
                     unit: parameter.unit,
@@ -197,8 +199,28 @@ fn parameters(
                 interval95: [quantile(0.025), quantile(0.975)],
                 median,
                 interval68,
-                seen: term.is_none_or(|term| term.verdict != Some(Verdict::NotSeen)),
+                seen: match before {
+                    Some(Before::Width(prior)) => sd < UNSEEN * prior,
+                    _ => alone.is_none_or(|term| term.seen),
+                },
             }
         })
-        .collect()
+        .collect();
+    identified(library, index, &mut parameters);
+    parameters
+}
+
+/// Of a mass that is open by more than half of itself there is no centre: then first moments are told, else the centre.
+fn identified(library: &Library, index: usize, parameters: &mut Vec<ParameterSummary>) {
+    let ratio = |p: &usize| library.before(index, *p) == Some(Before::Ratio);
+    let centre: Vec<usize> = (0..parameters.len()).filter(ratio).collect();
+    let Some(mass) = parameters.first_mut().filter(|_| !centre.is_empty()) else {
+        return;
+    };
+    mass.seen &= mass.sd <= OPEN * mass.mean.abs();
+    let known = mass.seen;
+    for p in centre {
+        parameters[p].seen &= known;
+    }
+    parameters.retain(|own| !(known && matches!(own.name.as_str(), "mx" | "my" | "mz")));
 }

@@ -44,7 +44,7 @@ pub(super) fn curves(
         let own = |k: usize| library.terms()[library.columns()[k]].component;
         let found = columns
             .iter()
-            .any(|c| !c.constant && components[own(c.index)].selected);
+            .any(|c| !c.constant && components[own(c.index)].is_in());
         if !found {
             return None;
         }

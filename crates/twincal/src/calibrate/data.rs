@@ -105,7 +105,12 @@ impl Data {
         let fit = self.fit.iter().map(|log| &log.observations);
         let zero = zero_columns(fit, &library);
         for &column in &zero {
-            let name = &library.terms()[library.columns()[column]].name;
+            let term = &library.terms()[library.columns()[column]];
+            let name = &term.name;
+            // What was not followed is no fault of the logs.
+            if term.family.remembers() {
+                continue;
+            }
             self.findings.push(Finding::new(
                 Severity::Warning,
                 "zero_column",
@@ -125,7 +130,8 @@ impl Data {
 
     /// Refuses a question with fewer rows than it needs.
     ///
-    /// Columns with a physical prior do not count: what the data do not say about an inertia, the prior does.
+    /// Columns with a physical prior do not count: what the data do not say about an inertia, the prior does. Nor do those that remember,
+    /// which change friction that is counted.
     pub(super) fn require_enough(
         &self,
         robot: &Robot,
@@ -137,7 +143,10 @@ impl Data {
         for joint in 0..names.len() {
             let kept: u64 = self.fit.iter().map(|log| log.summary.rows[joint]).sum();
             rows = rows.max(kept as usize);
-            let asks = |column: &&usize| asking.prior_sd[**column].is_none();
+            let family = |column: usize| asking.families[asking.family_of(column)];
+            let asks = |column: &&usize| {
+                asking.prior_sd[**column].is_none() && !family(**column).remembers()
+            };
             let count = self.fit.first().map_or(0, |log| {
                 let columns = &log.observations.joints[joint].columns;
                 columns.iter().filter(asks).count()

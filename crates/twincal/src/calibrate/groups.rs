@@ -3,7 +3,7 @@
 use super::result::{Alike, Calibration, Group};
 use crate::linear_algebra::Cholesky;
 use crate::posterior::{Posterior, Problem};
-use crate::term::{Family, Library};
+use crate::term::{Library, levels};
 
 /// Columns whose cosine over the rows is above this are hard to tell apart.
 const ALIKE: f64 = 0.95;
@@ -29,14 +29,13 @@ const TOLD: usize = 6;
 /// Two components belong together
 /// - if they are single columns that are alike in the data (cosine above 0.95) and both have a PIP between 0.02 and 0.98;
 /// - if their inclusions exclude each other (correlation below −0.5 over the models);
-/// - if one is in (PIP ≥ 0.2) and both span the same torques in every motion: a payload, and mass moments with tensor of
-///   the last link;
+/// - if one is in (PIP ≥ 0.2) and both span the same torques in every motion: a payload, and all levels of the last link;
 /// - if the torque that one explains (PIP ≥ 0.2) another one would explain as well, its prior included:
 ///
 /// ```text
 /// min_b ½|Φ_A β_A − Φ_B b|²/φ + ½ bᵀV_B⁻¹b/φ  is at most 1 nat above the same for A itself
 /// ```
-/// where B is one component or mass moments and tensor of one link, and A explains at least 10 nats. This holds also where
+/// where B is one component or levels of one link (density, first moments, tensor), and A explains at least 10 nats. This holds also where
 /// the prior is sure which one it is; the set is `settled` then.
 ///
 /// No component stands for another where a coefficient of its b would have to be below its bound by more than two standard
@@ -174,7 +173,7 @@ impl<'a> Candidates<'a> {
         names.iter().any(|name| name == self.name(b))
     }
 
-    /// Every motion gives both sides the same torques: payload, and mass moments with tensor of the last link.
+    /// Every motion gives both sides the same torques: payload, and all levels of the last link.
     fn same_span(&self, own: usize, others: &[usize]) -> bool {
         let both = |&b: &usize| self.is_alias(own, b) && self.is_alias(b, own);
         others.iter().all(both)
@@ -206,19 +205,15 @@ impl<'a> Candidates<'a> {
         self.problem.gram[i * self.problem.names.len() + j]
     }
 
-    /// What could stand in for a component: any other, or mass moments and tensor of one link.
+    /// What could stand in for a component: any other, or levels of one link.
     fn others(&self, own: usize) -> Vec<Vec<usize>> {
-        let family = |k: usize| self.library.components()[self.component[k]].family;
-        let link = |k: usize| self.name(k).rsplit_once('.').map(|(link, _)| link);
-        let mut others: Vec<Vec<usize>> = Vec::new();
         let same = |k: usize| self.component[k] == self.component[own];
-        for k in (0..self.columns.len()).filter(|&k| !same(k)) {
-            others.push(vec![k]);
-            if family(k) == Family::MassMoments {
-                let tensor = (0..self.columns.len())
-                    .find(|&t| t != own && family(t) == Family::Tensor && link(t) == link(k));
-                others.extend(tensor.map(|tensor| vec![k, tensor]));
-            }
+        let all = (0..self.columns.len()).filter(|&k| !same(k));
+        let mut others: Vec<Vec<usize>> = all.map(|k| vec![k]).collect();
+        for levels in levels(self.library.components()) {
+            let place = |c: &usize| self.component.iter().position(|own| own == c);
+            let places: Option<Vec<usize>> = levels.iter().map(place).collect();
+            others.extend(places.filter(|places| !places.contains(&own)));
         }
         others
     }
@@ -359,6 +354,20 @@ impl<'a> Candidates<'a> {
     }
 }
 
+impl Group {
+    /// A set whose members take each other's place in these logs.
+    pub(super) fn in_these_logs(members: Vec<String>, pip: f64) -> Self {
+        let names: Vec<&str> = members.iter().map(String::as_str).collect();
+        Self {
+            words: words(&names, pip, (Alike::TheseLogs, true), false),
+            members,
+            pip,
+            alike: Alike::TheseLogs,
+            settled: false,
+        }
+    }
+}
+
 /// What columns make of another's torque.
 struct Instead {
     /// Nats that are lost.
@@ -388,7 +397,7 @@ impl Calibration {
             // What several others have together only.
             let spanned = self.components.iter().filter(|own| {
                 alike == Alike::EveryMotion
-                    && own.selected
+                    && own.is_in()
                     && !own.names_beside().is_empty()
                     && !in_a_group(&own.name)
             });

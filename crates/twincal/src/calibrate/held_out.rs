@@ -60,7 +60,7 @@ struct Rivals {
 }
 
 impl Plan<'_> {
-    /// The fits that do not know what is held out, plug-ins, tempering and all, fold by fold; none where whole logs are
+    /// The fits that do not know what is held out, plug-ins, misfit and all, fold by fold; none where whole logs are
     /// held out, which the twin itself predicts.
     pub(super) fn fits(
         &self,

@@ -15,21 +15,23 @@ mod groups;
 mod heavy_tails;
 mod held_out;
 mod heredity;
+mod history;
 mod independent_rows;
+mod left_out;
 mod lower_band;
+mod misfit;
 mod negative_friction;
 mod noise_of;
 mod outlook;
 mod prior_conflict;
 mod reader;
-mod repeat;
-mod repeated;
 mod ripples;
 mod result;
 mod room;
 mod sandwich;
 mod settings;
 mod smaller_library;
+mod status;
 mod stopped;
 mod summary;
 mod sweep;
@@ -46,22 +48,22 @@ mod worse;
 #[cfg(test)]
 mod testing;
 
+pub use left_out::{LeftOutData, LeftOutError};
 pub use outlook::{LookedAt, Outlook, outlook};
-pub use repeated::Repeated;
 pub use result::{
-    Alike, Along, Calibration, Compact, CompactTerm, ComponentSummary, Curve, Draws, Group, Halves,
-    LikelihoodUsed, LogSummary, ParameterSummary, PriorUsed, Repeat, SweepPoint, TermSummary,
-    Verdict,
+    Alike, Along, Calibration, Compact, CompactTerm, ComponentSummary, Curve, Draws, Group,
+    LikelihoodUsed, LogSummary, ParameterSummary, PriorUsed, SweepPoint, TermSummary,
 };
 pub use ripples::UnaskedRipple;
 pub use settings::CalibrationSettings;
+pub use status::{Status, StatusReason};
 pub use stopped::Stopped;
 
 use crate::error::{Error, Finding, Result};
 use crate::infer::{Given, infer_near, sample, sampled_likelihood};
 use crate::likelihood::{Columns, NoiseInterval, NoiseModel, NoiseUncertainty};
 use crate::observations::Part;
-use crate::plug_in::{Fit, FitSettings, LeftOut, Moving, fit, fit_tempered, start};
+use crate::plug_in::{Fit, FitSettings, Moving, fit, fit_tempered, start};
 use crate::posterior::draws::Drawer;
 use crate::robot::Robot;
 use crate::self_check::self_check;
@@ -149,6 +151,9 @@ fn road(
     findings.extend(constant_torque(robot, every_log.clone())?);
     findings.extend(hardly_driven(robot, every_log.clone())?);
     let mut lags = aligned::align(robot, logs, &mut pipeline, &mut prepared, findings)?;
+    let usual = smaller_library::is_usual(&settings.library.families);
+    let followed = history::follow(robot, (logs, &prepared), &pipeline, settings, findings)?;
+    let settings = &followed.settings;
     let mut library_settings = LibrarySettings {
         coulomb_velocity: pipeline.coulomb_velocity,
         ..settings.library.clone()
@@ -164,6 +169,7 @@ fn road(
         (pipeline, library) = (turned.pipeline, turned.library);
         findings.push(turned.finding);
     }
+    pipeline.history = followed.history;
 
     // eq. (1)–(4): residual torque and Euler–Lagrange columns, filtered alike
     let others = heldout.iter().map(|log| ready(robot, log, &pipeline));
@@ -213,7 +219,6 @@ fn road(
         UnaskedRipple::Ignored => Vec::new(),
         _ => ripples::seen(robot, &training, &fitted.fit, &library_settings, &pipeline),
     };
-    let usual = settings.library.families == Family::DEFAULT;
     if !seen.is_empty() && usual && settings.unasked_ripple == UnaskedRipple::Candidate {
         return Ok(Road::Again(seen));
     }
@@ -245,6 +250,7 @@ fn road(
             (drift::findings(robot, &training, mean), uneven)
         },
     );
+    findings.extend(misfit::findings(robot, &fitted.fit.plug_in));
     findings.extend(tails.into_iter().chain(drifts).chain(uneven));
     let inside = compact::members(&fitted.fit.problem, &fitted.fit.posterior);
     let compact = compact::refit(&fitted.fit.problem, &inside, &fitted.fit.posterior)?;
@@ -282,19 +288,6 @@ fn road(
     let prepared: Vec<ReadyLog<'static>> = prepared.into_iter().map(ReadyLog::detached).collect();
     *recordings = None;
     progress(Stage::Sensitivity);
-    let gap = (skeleton.pipeline.kernel_length() * skeleton.pipeline.rate_hz).ceil() as usize;
-    let halves = repeat::cut(&training, gap);
-    let again = || match &halves {
-        None => Ok(Vec::new()),
-        Some(cut) => repeat::repeat(
-            cut,
-            &library,
-            &columns,
-            &settings.prior,
-            &fitted.fit,
-            &inside,
-        ),
-    };
     let elsewhere = || {
         sweep::cutoff(
             &skeleton,
@@ -308,7 +301,6 @@ fn road(
     };
     let (problem, posterior) = (&fitted.fit.problem, &fitted.fit.posterior);
     let beside = || {
-        let repeats = again();
         let sandwich = sandwich::sds(&fitted.fit, &compact, &training);
         let compact = compact::summary(&library, problem, posterior, &compact, &training);
         let excitation = unseen::excitation(
@@ -318,22 +310,13 @@ fn road(
             &fitted.fit.gram,
             &data,
         );
-        (repeats, sandwich, compact, excitation)
+        (sandwich, compact, excitation)
     };
-    let (sweep, (repeats, sandwich, compact, excitation)) = rayon::join(elsewhere, beside);
-    let (sweep, repeats) = (sweep?, repeats?);
+    let (sweep, (sandwich, compact, excitation)) = rayon::join(elsewhere, beside);
+    let sweep = sweep?;
     drop(prepared);
     findings.extend(sweep::findings(&sweep, &library, posterior));
-    let halves = halves.map(|cut| cut.kind).filter(|_| !repeats.is_empty());
-    if let Some(kind) = halves {
-        findings.extend(repeat::findings(&repeats, kind));
-    }
-    let opinion = summary::SecondOpinion {
-        sandwich,
-        compact,
-        repeats,
-        halves,
-    };
+    let opinion = summary::SecondOpinion { sandwich, compact };
     let mut calibration = summary::summarise(
         skeleton, &library, &data, &columns, settings, fitted, validation, sweep, opinion, findings,
     )?;
@@ -359,12 +342,13 @@ fn road(
 /// A fit together with what left-out training data said of it.
 struct Fitted {
     fit: Fit,
-    left_out: Option<LeftOut>,
+    /// Per joint on the noise sd of intervals; `None` unless tempered.
+    interval_factors: Option<Vec<f64>>,
     /// What draws say of each joint's noise; empty where it is a plug-in.
     sampled: Vec<NoiseInterval>,
 }
 
-/// Fixed point, and for the tempered likelihood the choice of c.
+/// Fixed point, and for the tempered likelihood what no candidate describes.
 fn estimate(
     training: &[Part<'_>],
     columns: &Columns,
@@ -380,10 +364,10 @@ fn estimate(
     }
     match settings.noise.model {
         NoiseModel::Tempered => {
-            let (fit, left_out) = fit_tempered(training, columns, fit_settings)?;
+            let (fit, factors) = fit_tempered(training, columns, fit_settings)?;
             Ok(Fitted {
                 fit,
-                left_out: Some(left_out),
+                interval_factors: Some(factors),
                 sampled: Vec::new(),
             })
         }
@@ -412,7 +396,7 @@ fn estimate(
             }
             Ok(Fitted {
                 fit,
-                left_out: None,
+                interval_factors: None,
                 sampled: noise,
             })
         }

@@ -54,7 +54,7 @@ pub(super) fn findings(
             };
             let (column, quadratic) = mean("quadratic_friction", Family::QuadraticFriction)?;
             let component = library.terms()[library.columns()[column]].component;
-            if !components[component].selected {
+            if !components[component].is_in() {
                 return None;
             }
             let of = |suffix, family| mean(suffix, family).map_or(0.0, |(_, mean)| mean);

@@ -30,10 +30,11 @@ pub(super) fn noise_of(
                 n,
                 n_eff,
                 autocorrelation_time: plug_in.autocorrelation_time[j],
+                misfit: plug_in.misfit.get(j).copied().unwrap_or(1.0),
                 interval_factor: fitted
-                    .left_out
+                    .interval_factors
                     .as_ref()
-                    .map_or_else(|| left.sqrt(), |l| l.interval_factor[j]),
+                    .map_or_else(|| left.sqrt(), |factors| factors[j]),
                 out_of_band: out_of_band[j],
                 spread: spreads[j].clone(),
                 sampled: fitted.sampled.get(j).copied(),

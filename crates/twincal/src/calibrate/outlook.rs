@@ -49,10 +49,12 @@ pub fn outlook(
         None if settings.coulomb_velocity > 0.0 => settings.coulomb_velocity,
         None => COULOMB_VELOCITY,
     };
-    let settings = LibrarySettings {
+    let mut settings = LibrarySettings {
         coulomb_velocity: velocity,
         ..settings.clone()
     };
+    // States say nothing of what remembers: a fit follows the logs.
+    settings.families.retain(|family| !family.remembers());
     let (library, findings) = Library::propose(robot, &settings)?;
     let excitation = match logs {
         Some((pipeline, mut logs)) if !logs.is_empty() => {

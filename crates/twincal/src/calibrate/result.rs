@@ -5,6 +5,7 @@ use crate::incidents::Incident;
 use crate::lag::Lags;
 use crate::likelihood::{JointNoise, NoiseModel};
 use crate::prior::Inclusion;
+use super::status::{Status, StatusReason};
 use crate::term::{Family, Term};
 use crate::twin::Twin;
 use crate::validate::{Validation, nan_if_null, nans_if_null};
@@ -35,10 +36,8 @@ pub struct TermSummary {
     /// Central 68.3 % interval of β | y, included; half its width stands behind ± in words and tables.
     #[serde(default)]
     pub conditional_interval68: Option<[f64; 2]>,
-    /// PIP ≥ 0.5 and seen by the data.
-    pub selected: bool,
-    /// What the data say about the term; `None` for dropped terms.
-    pub verdict: Option<Verdict>,
+    /// False where the data leave the coefficient as wide as the prior (posterior sd > 0.9 prior sd), and for dropped terms.
+    pub seen: bool,
     /// rms of the column over all rows (method section 6), N·m per unit of β.
     pub column_rms: Option<f64>,
     /// PIP with the slab variance × 0.1, 1, 10 and expected terms × 0.5, 2 (method section 6).
@@ -65,10 +64,10 @@ pub struct ComponentSummary {
     pub pip: Option<f64>,
     /// Monte Carlo standard error of `pip` (0 when exact).
     pub pip_mcse: Option<f64>,
-    /// PIP ≥ 0.5 and seen by the data.
-    pub selected: bool,
-    /// What the data say about it.
-    pub verdict: Option<Verdict>,
+    /// What the data say of it.
+    pub status: Status,
+    /// Why.
+    pub reason: StatusReason,
     /// Components that no motion of this robot can tell from it.
     pub alias_of: Vec<String>,
     /// Those of `alias_of` that can have what was found of it: a motor's inertia, which is never negative, is no name for a tensor that
@@ -178,7 +177,7 @@ impl ComponentSummary {
     /// True where these data do not see it: it may be there, and is not in.
     #[must_use]
     pub fn is_unseen(&self) -> bool {
-        !self.selected && self.verdict == Some(Verdict::NotSeen)
+        self.status == Status::Unidentifiable && self.reason != StatusReason::NoColumn
     }
 
     /// What else may be meant by it in every motion: [`told_as`](Self::told_as), or all of [`alias_of`](Self::alias_of) where that is not known.
@@ -213,20 +212,6 @@ fn nans() -> [f64; 2] {
 
 fn yes() -> bool {
     true
-}
-
-/// What the data say about a candidate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// PIP ≥ 0.8 and three Monte Carlo standard errors or more above 0.5.
-    Found,
-    /// PIP < 0.2 and three Monte Carlo standard errors or more below 0.5.
-    Absent,
-    /// PIP between, or within three Monte Carlo standard errors of 0.5.
-    Undecided,
-    /// The data leave the coefficient as wide as the prior (posterior sd > 0.9 prior sd).
-    NotSeen,
 }
 
 /// Why the members of a [`Group`] cannot be told apart.
@@ -265,53 +250,6 @@ pub struct SweepPoint {
     pub cutoff_hz: f64,
     /// E[β | y] of every column at that cut-off.
     pub mean: Vec<f64>,
-}
-
-/// How the data were halved to see what repeats.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Halves {
-    /// First and second half of the one log.
-    OneLog,
-    /// Every other log.
-    EveryOtherLog,
-}
-
-impl Halves {
-    /// What the two halves are, in words.
-    pub fn words(self) -> (&'static str, &'static str) {
-        match self {
-            Self::OneLog => ("the first half of the log", "the second"),
-            Self::EveryOtherLog => ("the first, third, … log", "the others"),
-        }
-    }
-}
-
-/// One coefficient of the compact twin on the two halves of the data (method section 5).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Repeat {
-    /// Component.
-    pub component: String,
-    /// Term.
-    pub term: String,
-    /// Its unit.
-    pub unit: String,
-    /// E[β | first half, the structure of the compact twin].
-    pub first: f64,
-    /// Its sd.
-    #[serde(deserialize_with = "nan_if_null")]
-    pub first_sd: f64,
-    /// Inclusion probability from the first half alone.
-    pub first_pip: f64,
-    /// The same of the second half.
-    pub second: f64,
-    /// Its sd.
-    #[serde(deserialize_with = "nan_if_null")]
-    pub second_sd: f64,
-    /// Inclusion probability from the second half alone.
-    pub second_pip: f64,
-    /// `(second − first)/√(sd₁² + sd₂²)`; `None` where a half does not see the coefficient.
-    pub z: Option<f64>,
 }
 
 /// The median-probability model (PIP ≥ 0.5) refitted jointly (Barbieri & Berger 2004); its held-out loss stands in
@@ -369,10 +307,6 @@ pub struct PriorUsed {
 pub struct LikelihoodUsed {
     /// Model.
     pub model: NoiseModel,
-    /// c; 1 unless tempered.
-    pub tempering: f64,
-    /// `(c, left-out log score)` of every multiplier tried.
-    pub tempering_scores: Vec<(f64, f64)>,
     /// Rounds of the plug-in iteration.
     pub rounds: usize,
 }
@@ -461,12 +395,6 @@ pub struct Calibration {
     pub groups: Vec<Group>,
     /// Estimates at 0.7, 1 and 1.4 times the cut-off; empty with the filter off or weighed rows.
     pub sweep: Vec<SweepPoint>,
-    /// What repeats on the two halves of the data: every coefficient of the compact twin.
-    #[serde(default)]
-    pub repeatability: Vec<Repeat>,
-    /// How they were halved; `None` if they were not.
-    #[serde(default)]
-    pub halves: Option<Halves>,
     /// The compact twin; `None` in files that are older than it.
     #[serde(default)]
     pub compact: Option<Compact>,

@@ -38,6 +38,7 @@ pub(super) fn require(
     };
     let all = || fit.iter().chain(heldout);
     let samples: usize = all().map(ReadyLog::samples).sum();
+    let of_a_sample = OF_A_SAMPLE + 2 * pipeline.channels();
     let numbers: usize = (0..library.joints())
         .map(|joint| library.recipes(joint).parts() + BESIDE)
         .sum();
@@ -52,7 +53,7 @@ pub(super) fn require(
     };
     let needed = all().map(of_rows).sum::<f64>()
         + again as f64 * numbers as f64
-        + (samples * library.joints() * OF_A_SAMPLE) as f64;
+        + (samples * library.joints() * of_a_sample) as f64;
     let needed = needed * size_of::<f64>() as f64;
     let longest = all().max_by_key(|log| rows(log));
     match longest {

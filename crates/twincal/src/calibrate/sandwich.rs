@@ -8,7 +8,7 @@
 //! ```
 //!
 //! (Huber 1967; blocks for dependent rows as in Liang & Zeger 1986; the second part is the prior's own, so that what the data
-//! do not see stays as wide as the prior). The tempering cancels: A⁻¹ grows with c τ as s_b sinks.
+//! do not see stays as wide as the prior). The tempering cancels: A⁻¹ grows with max(τ, λ) as s_b sinks.
 
 use super::result::TermSummary;
 use crate::error::{Finding, Severity};

@@ -5,10 +5,11 @@ use crate::error::{Error, Finding, Severity};
 use crate::term::Family;
 
 /// Viscous and Coulomb friction, and the inertial parameters of links with the motors' inertia.
-const FAMILIES: [Family; 5] = [
+const FAMILIES: [Family; 6] = [
     Family::Viscous,
     Family::Coulomb,
     Family::MotorInertia,
+    Family::Density,
     Family::MassMoments,
     Family::Tensor,
 ];
@@ -21,12 +22,34 @@ pub(super) struct Smaller {
     pub(super) finding: Finding,
 }
 
+/// Whether nobody chose these families: the usual ones, with or without those that remember.
+pub(super) fn is_usual(families: &[Family]) -> bool {
+    let states = || Family::DEFAULT.into_iter().filter(|family| !family.remembers());
+    *families == Family::DEFAULT || families.iter().copied().eq(states())
+}
+
+/// The same fit without candidates that remember, which cost the rows before their state is known; `None` where there are none, or somebody
+/// chose the candidates, or the refusal has another reason.
+pub(super) fn without_memory(refused: &Error, settings: &CalibrationSettings) -> Option<Smaller> {
+    let Error::Refused { problem, .. } = refused else {
+        return None;
+    };
+    if settings.library.families != Family::DEFAULT {
+        return None;
+    }
+    let mut settings = settings.clone();
+    settings.library.families.retain(|family| !family.remembers());
+    let message = format!("too few rows for all candidates ({problem}): fitted without hysteresis and warm-up of friction");
+    let finding = Finding::new(Severity::Note, "history_not_followed", "", message, 0);
+    Some(Smaller { settings, finding })
+}
+
 /// The fit that is tried after one by `settings` was refused; `None` where somebody chose the candidates or the refusal has another reason.
 pub(super) fn smaller(refused: &Error, settings: &CalibrationSettings) -> Option<Smaller> {
     let Error::Refused { problem, .. } = refused else {
         return None;
     };
-    if settings.library.families != Family::DEFAULT {
+    if !is_usual(&settings.library.families) {
         return None;
     }
     let mut settings = settings.clone();
@@ -52,6 +75,10 @@ mod tests {
             remedy: String::new(),
         };
         let usual = CalibrationSettings::default();
+        let states = without_memory(&refused, &usual).unwrap().settings;
+        assert!(is_usual(&states.library.families) && states.library.families.len() == 16);
+        assert!(without_memory(&refused, &states).is_none());
+        assert!(smaller(&refused, &states).is_some());
         let smaller_one = smaller(&refused, &usual).unwrap();
         assert_eq!(smaller_one.settings.library.families, FAMILIES);
         assert!(smaller_one.finding.message.contains("(12 rows)"));

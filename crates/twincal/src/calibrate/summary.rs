@@ -1,14 +1,13 @@
-//! From posterior to what people read: terms, verdicts, groups, sensitivity, autocorrelation.
+//! From posterior to what people read: terms, statuses, groups, sensitivity, autocorrelation.
 
 use super::components::{NOT_SEEN, components};
 use super::data::Data;
 use super::groups::{groups, told_as};
 use super::result::{
-    Calibration, ComponentSummary, Draws, Group, LikelihoodUsed, PriorUsed, SweepPoint,
-    TermSummary, Verdict,
+    Calibration, Draws, Group, LikelihoodUsed, PriorUsed, SweepPoint, TermSummary,
 };
-use super::result::{Compact, Halves, Repeat, ends};
-use super::{CalibrationSettings, Fitted, prior_conflict, sandwich};
+use super::result::{Compact, ends};
+use super::{CalibrationSettings, Fitted, prior_conflict, sandwich, status};
 use crate::error::{Finding, Result, Severity};
 use crate::infer::approximate;
 use crate::likelihood::{Columns, mean_squares};
@@ -28,6 +27,8 @@ use rayon::prelude::*;
 const LAGS: usize = 20;
 /// Terms in the pair plot at most, and draws of each.
 const PAIR_PLOT: (usize, usize) = (8, 1000);
+/// Posterior sd in prior sd above which the data do not see a coefficient.
+const WIDE: f64 = 0.9;
 /// Random stream of those draws.
 const DRAW_STREAM: u64 = 1 << 32;
 
@@ -36,8 +37,6 @@ pub(super) struct SecondOpinion {
     /// Per column.
     pub(super) sandwich: Vec<Option<f64>>,
     pub(super) compact: Compact,
-    pub(super) repeats: Vec<Repeat>,
-    pub(super) halves: Option<Halves>,
 }
 
 /// Everything a reader gets, from the pieces of [`super::calibrate`].
@@ -57,7 +56,7 @@ pub(super) fn summarise(
     opinion: SecondOpinion,
     findings: &mut Vec<Finding>,
 ) -> Result<Calibration> {
-    let Fitted { fit, left_out, .. } = fitted;
+    let Fitted { fit, .. } = fitted;
     let training: Vec<Part<'_>> = data
         .fit
         .iter()
@@ -94,7 +93,8 @@ pub(super) fn summarise(
     for (component, told_as) in components.iter_mut().zip(told) {
         component.told_as = told_as;
     }
-    let groups = groups(&fit.problem, &fit.posterior, told_apart);
+    let mut groups = groups(&fit.problem, &fit.posterior, told_apart);
+    status::settle(&mut components, &mut groups, &fit, told_apart, &training);
     let names = names(library, columns);
     let is_forced = |(_, forced): &(&String, &bool)| **forced;
     let mut sure: Vec<String> = (names.iter().zip(&columns.forced))
@@ -103,12 +103,7 @@ pub(super) fn summarise(
         .collect();
     sure.dedup();
     findings.extend(sure.iter().map(forced));
-    findings.extend(findings_of_posterior(
-        &components,
-        &groups,
-        &fit.problem,
-        data,
-    ));
+    findings.extend(findings_of_posterior(&groups, &fit.problem, data));
     let selected = pair_plot_columns(library, &terms);
     let draws = draw(
         &fit.posterior,
@@ -158,14 +153,10 @@ pub(super) fn summarise(
         },
         likelihood: LikelihoodUsed {
             model: settings.noise.model,
-            tempering: fit.plug_in.tempering,
-            tempering_scores: left_out.map_or_else(Vec::new, |l| l.scores),
             rounds: fit.rounds,
         },
         groups,
         sweep,
-        repeatability: opinion.repeats,
-        halves: opinion.halves,
         compact: Some(opinion.compact),
         validation,
         autocorrelation: autocorrelation(&training, &fit.posterior.mean),
@@ -261,7 +252,7 @@ fn terms(
             };
             let s = &summaries[k];
             let prior_sd = (posterior.noise * problem.prior.slab[k]).sqrt();
-            let verdict = verdict(s.pip, s.pip_mcse, s.conditional_sd, prior_sd);
+            let seen = s.conditional_sd.is_none_or(|sd| sd <= WIDE * prior_sd);
             TermSummary {
                 term: term.clone(),
                 pip: Some(s.pip),
@@ -273,16 +264,15 @@ fn terms(
                 conditional_sd: s.conditional_sd,
                 conditional_median: s.conditional_median,
                 conditional_interval68: s.conditional_interval68,
-                selected: s.pip >= 0.5 && verdict != Verdict::NotSeen,
-                verdict: Some(verdict),
+                seen,
                 column_rms: Some(rms[k]),
                 pip_sensitivity: sensitivity[k].clone(),
                 sandwich_sd: None,
-                words: if verdict == Verdict::NotSeen {
-                    format!("{}: {NOT_SEEN}", library.story(index))
-                } else {
+                words: if seen {
                     let (value, spread, ends) = told(s);
                     library.words(index, value, spread, ends)
+                } else {
+                    format!("{}: {NOT_SEEN}", library.story(index))
                 },
             }
         })
@@ -314,8 +304,7 @@ fn dropped(term: &crate::term::Term) -> TermSummary {
         conditional_sd: None,
         conditional_median: None,
         conditional_interval68: None,
-        selected: false,
-        verdict: None,
+        seen: false,
         column_rms: None,
         pip_sensitivity: Vec::new(),
         sandwich_sd: None,
@@ -323,24 +312,7 @@ fn dropped(term: &crate::term::Term) -> TermSummary {
     }
 }
 
-fn verdict(pip: f64, mcse: f64, sd: Option<f64>, prior_sd: f64) -> Verdict {
-    if sd.is_some_and(|sd| sd > 0.9 * prior_sd) {
-        Verdict::NotSeen
-    } else if (0.2..0.8).contains(&pip) || (pip - 0.5).abs() < 3.0 * mcse {
-        Verdict::Undecided
-    } else if pip >= 0.5 {
-        Verdict::Found
-    } else {
-        Verdict::Absent
-    }
-}
-
-fn findings_of_posterior(
-    components: &[ComponentSummary],
-    groups: &[Group],
-    problem: &Problem,
-    data: &Data,
-) -> Vec<Finding> {
+fn findings_of_posterior(groups: &[Group], problem: &Problem, data: &Data) -> Vec<Finding> {
     let mut findings = Vec::new();
     let measured: f64 = data
         .fit
@@ -371,42 +343,14 @@ fn findings_of_posterior(
             group.members.len() as u64,
         ));
     }
-    for component in components {
-        let name = &component.name;
-        if component.verdict == Some(Verdict::Undecided) {
-            findings.push(Finding::new(
-                Severity::Note,
-                "undecided",
-                name.clone(),
-                format!(
-                    "`{name}` is undecided (inclusion probability {:.2}): {}",
-                    component.pip.unwrap_or(f64::NAN),
-                    what_would_decide(name, groups)
-                ),
-                0,
-            ));
-        }
-    }
     findings
-}
-
-/// Motion decides nothing that others do alike in every motion.
-fn what_would_decide(name: &String, groups: &[Group]) -> &'static str {
-    let alike =
-        |group: &Group| group.alike == super::Alike::EveryMotion && group.members.contains(name);
-    match groups.iter().any(alike) {
-        true => {
-            "others can stand in for it in every motion of this robot, wholly or in part; motion decides only what they do not share"
-        }
-        false => "more or richer motion would decide",
-    }
 }
 
 /// Columns of the pair plot: of the selected ones those with the largest value against its spread.
 fn pair_plot_columns(library: &Library, terms: &[TermSummary]) -> Vec<usize> {
     let of = |k: usize| &terms[library.columns()[k]];
     let mut selected: Vec<usize> = (0..library.columns().len())
-        .filter(|&k| of(k).selected)
+        .filter(|&k| of(k).seen && of(k).pip.is_some_and(|pip| pip >= 0.5))
         .collect();
     let strength = |k: usize| match (of(k).conditional_median, of(k).interval95) {
         (Some(median), Some([low, high])) => {
@@ -439,28 +383,4 @@ fn autocorrelation(training: &[Part<'_>], beta: &[f64]) -> Vec<Vec<f64>> {
     };
     let both = (0..joints).flat_map(|joint| [(joint, &nothing[..]), (joint, beta)]);
     both.collect::<Vec<_>>().into_par_iter().map(of).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::Alike;
-    use super::*;
-
-    #[test]
-    fn motion_is_not_promised_to_decide_what_is_alike_in_every_motion() {
-        let of = |alike, member: &str| {
-            let group = Group {
-                members: vec!["arm.offset".into(), "arm.spring".into()],
-                pip: 1.0,
-                alike,
-                settled: false,
-                words: String::new(),
-            };
-            what_would_decide(&member.to_owned(), &[group])
-        };
-        let motion = "more or richer motion would decide";
-        assert_ne!(of(Alike::EveryMotion, "arm.spring"), motion);
-        assert_eq!(of(Alike::TheseLogs, "arm.spring"), motion);
-        assert_eq!(of(Alike::EveryMotion, "arm.viscous"), motion);
-    }
 }

@@ -1,19 +1,14 @@
 //! Small regressions with known truth for the tests of this module: one joint, white columns, no robot behind them.
 
 use super::compact::refit;
-use super::repeat::{cut, repeat};
-use super::result::Repeat;
 use crate::likelihood::{Columns, assemble};
 use crate::observations::{JointObservations, Observations, Part};
 use crate::plug_in::{Fit, start, total};
 use crate::posterior::Posterior;
 use crate::posterior::random::Random;
 use crate::prior::{Inclusion, PriorSettings};
-use crate::robot::{
-    Inertia, JointDescription, JointKind, LinkDescription, Robot, RobotDescription,
-};
 use crate::signal::Auto;
-use crate::term::{Family, Library, LibrarySettings};
+use crate::term::Family;
 
 pub(super) struct Regression {
     pub(super) random: Random,
@@ -82,7 +77,7 @@ impl Regression {
         }
     }
 
-    fn prior() -> PriorSettings {
+    pub(super) fn prior() -> PriorSettings {
         PriorSettings {
             scaled_variance: Auto::Value(100.0),
             inclusion: Some(Inclusion::Probability(0.5)),
@@ -111,49 +106,4 @@ impl Regression {
         };
         (fit, compact)
     }
-
-    /// Both columns on two halves of the logs.
-    pub(super) fn repeats(&self, logs: &[Observations]) -> Vec<Repeat> {
-        let parts: Vec<Part<'_>> = logs.iter().map(part).collect();
-        let (fit, _) = self.fitted(&parts);
-        let halves = cut(&parts, 0).unwrap();
-        let (columns, prior) = (Self::columns(), Self::prior());
-        repeat(&halves, &library(), &columns, &prior, &fit, &[true, true]).unwrap()
-    }
-}
-
-/// A library with two columns of one joint.
-fn library() -> Library {
-    let settings = LibrarySettings {
-        terms: vec!["cos(q1)".into(), "sin(q1)".into()],
-        generic: Some(false),
-        families: Vec::new(),
-        ..LibrarySettings::default()
-    };
-    Library::propose(&pendulum(), &settings).unwrap().0
-}
-
-fn pendulum() -> Robot {
-    let link = |name: &str, inertia| LinkDescription {
-        name: name.into(),
-        inertia,
-    };
-    let inertia = Inertia {
-        mass: 1.0,
-        com: [0.1, 0.0, 0.0],
-        tensor: [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]],
-    };
-    let description = RobotDescription {
-        name: "pendulum".into(),
-        gravity: [0.0, 0.0, -9.81],
-        links: vec![link("base", None), link("arm", Some(inertia))],
-        joints: vec![JointDescription::new(
-            "hinge",
-            JointKind::Revolute,
-            "base",
-            "arm",
-        )],
-        allow_unphysical: false,
-    };
-    Robot::new(description, &Default::default()).unwrap().0
 }

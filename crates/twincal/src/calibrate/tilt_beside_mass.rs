@@ -25,9 +25,11 @@ pub(super) fn finding(
 ) -> Option<Finding> {
     let found = |family: &dyn Fn(Family) -> bool| {
         let mut all = calibration.components.iter();
-        all.any(|component| component.selected && family(component.family))
+        all.any(|component| component.is_in() && family(component.family))
     };
-    let inertial = |family| matches!(family, Family::MassMoments) || Family::is_payload(family);
+    let inertial = |family| {
+        matches!(family, Family::Density | Family::MassMoments) || Family::is_payload(family)
+    };
     if !(found(&|family| family == Family::Tilt) && found(&inertial)) {
         return None;
     }

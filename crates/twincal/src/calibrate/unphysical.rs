@@ -1,6 +1,7 @@
 //! Found inertias that no rigid body has (case 94).
 
 use super::result::Calibration;
+use super::status::{Status, StatusReason};
 use crate::error::{Finding, Severity};
 use crate::posterior::draws::Drawer;
 use crate::robot::{Robot, base_parameters, inertia_of, principal_axes};
@@ -44,7 +45,7 @@ pub(super) fn findings(
 ) -> Vec<Unphysical> {
     let found = |column: usize| {
         let term = &library.terms()[library.columns()[column]];
-        calibration.components[term.component].selected
+        calibration.components[term.component].is_in()
     };
     let mut columns: Vec<Vec<(usize, [f64; 10])>> = vec![Vec::new(); robot.bodies().len()];
     let mut asked = vec![false; columns.len()];
@@ -85,7 +86,7 @@ pub(super) fn findings(
             };
             let mut components: Vec<usize> = columns[body].iter().map(of_column).collect();
             components.dedup();
-            components.retain(|component| calibration.components[*component].selected);
+            components.retain(|component| calibration.components[*component].is_in());
             all.push(Unphysical {
                 finding: finding(name, share),
                 share,
@@ -108,6 +109,7 @@ pub(super) fn tell(calibration: &mut Calibration, unphysical: Vec<Unphysical>) {
             let own = &mut calibration.components[component];
             own.rigid_share = Some(share);
             own.no_rigid_body = share < CONTRADICTS;
+            (own.status, own.reason) = (Status::Tentative, StatusReason::NoRigidBody { share });
             own.words
                 .push_str(if own.no_rigid_body { NO_BODY } else { "" });
         }

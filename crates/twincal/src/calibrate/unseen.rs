@@ -1,7 +1,8 @@
 //! What the fit logs do not show, why, and which motion would.
 
 use super::data::Data;
-use super::result::{Calibration, Verdict};
+use super::result::Calibration;
+use super::status::{Status as Said, StatusReason};
 use crate::error::{Finding, Severity};
 use crate::excitation::{Excitation, STATES, Seen, States, excitation as compare, sentence};
 use crate::gram::Gram;
@@ -68,10 +69,10 @@ pub(super) fn tell(calibration: &mut Calibration, excitation: &Excitation) {
             let term = calibration.terms.iter().find(|t| t.term.name == *name);
             term.is_some_and(|t| t.term.status == Status::ZeroColumn)
         };
-        if component.verdict.is_none() && component.columns.iter().any(is_zero) {
-            component.verdict = Some(Verdict::NotSeen);
+        if component.reason == StatusReason::NoColumn && component.columns.iter().any(is_zero) {
+            component.reason = StatusReason::NoTorqueInLogs;
         }
-        if component.verdict != Some(Verdict::NotSeen) {
+        if !component.is_unseen() {
             continue;
         }
         let joints = excitation.unseen.iter().filter(|unseen| {
@@ -83,6 +84,8 @@ pub(super) fn tell(calibration: &mut Calibration, excitation: &Excitation) {
             .collect();
         let why = if !joints.is_empty() {
             format!("move {} more", joints.join(" and "))
+        } else if component.family.remembers() {
+            "the joint travels too little in these logs".to_owned()
         } else if excited.seen == Seen::Never {
             "no motion of this robot shows it".to_owned()
         } else if !component.alias_of.is_empty() {
@@ -104,7 +107,7 @@ pub(super) fn tell(calibration: &mut Calibration, excitation: &Excitation) {
     // What hides only behind absent candidates is nobody's question.
     let matters = |name: &String| {
         let summary = calibration.components.iter().find(|c| c.name == *name);
-        summary.is_some_and(|c| c.verdict != Some(Verdict::Absent))
+        summary.is_some_and(|c| c.status != Said::Absent)
     };
     let asked = excitation
         .unseen

@@ -5,6 +5,7 @@
 
 mod rivals;
 
+use crate::calibrate::{Calibration, Status};
 use crate::error::{Error, Finding, Result, Severity};
 use crate::posterior::draws::{CoefficientDraws, draw};
 use crate::term::{Estimate, Family, Library};
@@ -18,12 +19,11 @@ const STREAMS: (u64, u64) = ((1 << 32) + 2, (1 << 32) + 3);
 const SEED: u64 = 1;
 /// A parameter changed if the probability of a change in the other direction, or of none, is below this.
 const DOUBT: f64 = 0.01;
-/// Probability of a component that makes it worth comparing; below it the component is out.
-const WORTH_COMPARING: f64 = 0.2;
-/// Probability from which a component is in; between the two it is undecided, as in the verdicts of a fit.
-const IN: f64 = 0.8;
+/// Probability of friction from which a twin is likely to hold it.
+const LIKELY: f64 = 0.2;
 
-/// What became of a component, by its probability before and after: out below 0.2, in from 0.8, undecided between.
+/// What became of a component, by its [`Status`] before and after: in where it is established, out where it is absent, unidentifiable or no
+/// candidate, open otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Became {
@@ -31,43 +31,37 @@ pub enum Became {
     New,
     /// In before, out after, and a number that differs for certain.
     Gone,
-    /// Likelier than before, where one of the two is undecided or no number differs for certain.
+    /// Out before, in or open after, where it is open or no number differs for certain.
     PerhapsNew,
-    /// Less likely than before, where one of the two is undecided or no number differs for certain.
+    /// In or open before, out after, where it is open or no number differs for certain.
     PerhapsGone,
     /// It or its rival is in on both sides: one effect under two names, and these logs leave open which.
     OneOfTwo,
-    /// In on both sides, or undecided on both, with another number.
+    /// In or open on both sides, with another number.
     Changed,
     /// Nothing that these logs can tell.
     AsBefore,
 }
 
 impl Became {
-    fn of(pip: [Option<f64>; 2], changed: bool) -> Self {
-        let [before, after] = pip.map(|pip| pip.unwrap_or(0.0));
-        let (out, inside) = (|pip: f64| pip < WORTH_COMPARING, |pip: f64| pip >= IN);
-        let undecided = |pip| !out(pip) && !inside(pip);
-        if out(before) && inside(after) && changed {
-            Self::New
-        } else if inside(before) && out(after) && changed {
-            Self::Gone
-        } else if out(before) && inside(after) {
-            Self::PerhapsNew
-        } else if inside(before) && out(after) {
-            Self::PerhapsGone
-        } else if undecided(before) != undecided(after) {
-            if after > before {
-                Self::PerhapsNew
-            } else {
-                Self::PerhapsGone
-            }
-        } else if changed {
-            Self::Changed
-        } else {
-            Self::AsBefore
+    fn of(status: [Option<Status>; 2], changed: bool) -> Self {
+        let inside = |side: usize| status[side] == Some(Status::Established);
+        let out = |side: usize| is_out(status[side]);
+        match [out(0), out(1)] {
+            [true, false] if inside(1) && changed => Self::New,
+            [false, true] if inside(0) && changed => Self::Gone,
+            [true, false] => Self::PerhapsNew,
+            [false, true] => Self::PerhapsGone,
+            [false, false] if changed => Self::Changed,
+            _ => Self::AsBefore,
         }
     }
+}
+
+/// Whether a component counts as none.
+fn is_out(status: Option<Status>) -> bool {
+    use Status::{Absent, Unidentifiable};
+    matches!(status, None | Some(Absent | Unidentifiable))
 }
 
 /// What became of one component.
@@ -87,6 +81,8 @@ pub struct Change {
     pub comparable: bool,
     /// Inclusion probability before and after; `None` where the twin does not have the component.
     pub pip: [Option<f64>; 2],
+    /// Status before and after; `None` where the twin does not have the component.
+    pub status: [Option<Status>; 2],
     /// True if at least one of its parameters changed with probability above 0.99.
     pub changed: bool,
     /// "payload at tool0: mass +1.740 ± 0.004 kg": the surest differences.
@@ -197,11 +193,13 @@ pub fn surest(parameters: &[ParameterChange]) -> Vec<&ParameterChange> {
 }
 
 /// Compares `after` with `before`, component by component in the order of `before` and then of what only `after` has.
-/// Components that neither twin gives a probability of 0.2 are left out.
+/// Components that are out on both sides are left out.
 ///
 /// # Errors
 /// [`Error::Setting`] with the key `twin` if the twins belong to different robots or a twin is damaged.
-pub fn compare(before: &Twin, after: &Twin) -> Result<Vec<Change>> {
+pub fn compare(before: &Calibration, after: &Calibration) -> Result<Vec<Change>> {
+    let components = [&before.components, &after.components];
+    let (before, after) = (&before.twin, &after.twin);
     if before.robot.joint_names() != after.robot.joint_names() {
         return Err(Error::Setting {
             key: "twin".into(),
@@ -223,7 +221,11 @@ pub fn compare(before: &Twin, after: &Twin) -> Result<Vec<Change>> {
     );
     let mut changes: Vec<Change> = names
         .into_iter()
-        .filter_map(|name| change(name, &sides, apart))
+        .filter_map(|name| {
+            let own = components.map(|all| all.iter().find(|own| own.name == name));
+            let status = own.map(|own| own.map(|own| own.status));
+            change(name, status, &sides, apart)
+        })
         .collect();
     rivals::mark(&mut changes, &sides);
     Ok(changes)
@@ -256,8 +258,7 @@ pub fn hindrances(before: &Twin, after: &Twin) -> Result<Vec<Finding>> {
 fn turns_round(twin: &Twin) -> Result<bool> {
     let library = twin.library()?;
     let mut columns = library.columns().iter().zip(&twin.posterior.inclusion);
-    Ok(columns
-        .any(|(&term, pip)| *pip > WORTH_COMPARING && library.terms()[term].family.turns_round()))
+    Ok(columns.any(|(&term, pip)| *pip > LIKELY && library.terms()[term].family.turns_round()))
 }
 
 /// A twin with its library and draws.
@@ -322,10 +323,15 @@ impl Side {
 }
 
 /// What became of a component; `apart` where friction turns round within another velocity.
-fn change(name: &str, sides: &[Side; 2], apart: bool) -> Option<Change> {
+fn change(
+    name: &str,
+    status: [Option<Status>; 2],
+    sides: &[Side; 2],
+    apart: bool,
+) -> Option<Change> {
     let at = [sides[0].find(name), sides[1].find(name)];
     let pip = [0, 1].map(|side| at[side].and_then(|component| sides[side].pip(component)));
-    if pip.iter().all(|pip| pip.unwrap_or(0.0) < WORTH_COMPARING) {
+    if status.into_iter().all(is_out) {
         return None;
     }
     let (library, component) = match at {
@@ -363,10 +369,11 @@ fn change(name: &str, sides: &[Side; 2], apart: bool) -> Option<Change> {
         name: name.to_owned(),
         family: component.family,
         story: component.story.clone(),
-        became: Became::of(pip, changed),
+        became: Became::of(status, changed),
         rival: None,
         comparable: !(apart && component.family.turns_round()),
         pip,
+        status,
         changed,
         words: words(&component.story, component.family, &parameters),
         parameters,
@@ -476,23 +483,27 @@ mod tests {
         assert!(!of(vec![0.0; 1000]));
     }
 
-    /// By the thresholds of a fit's verdicts.
     #[test]
-    fn what_became_of_a_component_follows_from_both_probabilities() {
+    fn what_became_of_a_component_follows_from_both_statuses() {
+        use Status::{Absent, Equivalent, Established, Tentative, Unidentifiable};
         for (before, after, changed, became) in [
-            (Some(0.01), Some(0.99), true, Became::New),
-            (None, Some(0.9), true, Became::New),
-            (None, Some(0.9), false, Became::PerhapsNew),
-            (Some(0.99), Some(0.01), false, Became::PerhapsGone),
-            (Some(0.99), None, true, Became::Gone),
-            (Some(0.5), Some(0.99), true, Became::PerhapsNew),
-            (Some(0.01), Some(0.6), false, Became::PerhapsNew),
-            (Some(0.6), Some(0.1), false, Became::PerhapsGone),
-            (Some(0.9), Some(0.7), false, Became::PerhapsGone),
-            (Some(0.9), Some(0.95), true, Became::Changed),
-            (Some(0.5), Some(0.6), true, Became::Changed),
-            (Some(0.5), Some(0.6), false, Became::AsBefore),
-            (Some(1.0), Some(0.8), false, Became::AsBefore),
+            (Some(Absent), Some(Established), true, Became::New),
+            (None, Some(Established), true, Became::New),
+            (None, Some(Established), false, Became::PerhapsNew),
+            (Some(Established), Some(Absent), false, Became::PerhapsGone),
+            (Some(Established), None, true, Became::Gone),
+            (Some(Established), Some(Unidentifiable), true, Became::Gone),
+            (Some(Absent), Some(Tentative), true, Became::PerhapsNew),
+            (Some(Equivalent), Some(Absent), false, Became::PerhapsGone),
+            (Some(Tentative), Some(Established), true, Became::Changed),
+            (Some(Tentative), Some(Equivalent), false, Became::AsBefore),
+            (Some(Established), Some(Established), true, Became::Changed),
+            (
+                Some(Established),
+                Some(Established),
+                false,
+                Became::AsBefore,
+            ),
         ] {
             let found = Became::of([before, after], changed);
             assert_eq!(found, became, "{before:?} → {after:?}");

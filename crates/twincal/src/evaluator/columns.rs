@@ -127,6 +127,8 @@ impl<'a> Columns<'a> {
             Node::Variable(Variable::Position(joint)) => t.step(Step::Position(*joint)),
             Node::Variable(Variable::Velocity(joint)) => t.step(Step::Velocity(*joint)),
             Node::Variable(Variable::Acceleration(joint)) => t.step(Step::Acceleration(*joint)),
+            // A program knows one state: of what was before, what every channel is where nothing is known.
+            Node::Variable(Variable::History(_)) => t.number(0.0),
             Node::Sum(constant, parts) => {
                 let mut sum = t.number(constant.get());
                 for &(coefficient, part) in parts {

@@ -7,6 +7,7 @@
 mod columns;
 mod coordinates;
 mod dynamics;
+mod forgotten;
 mod interval;
 mod states;
 mod trace;
@@ -16,6 +17,7 @@ mod tests;
 pub(crate) mod testing;
 
 pub(crate) use states::{STATES, States, rms};
+pub use forgotten::forgotten;
 pub use trace::Step;
 
 use crate::error::{Error, Result};

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 pub enum NoiseModel {
     /// Independent rows (the paper's).
     Iid,
-    /// Independent rows, statistics divided by c·τ_j.
+    /// Independent rows, statistics divided by max(τ_j, λ_j).
     Tempered,
     /// First-order autoregression per joint.
     Ar1,
@@ -82,10 +82,13 @@ pub struct JointNoise {
     pub weight: f64,
     /// Rows.
     pub n: f64,
-    /// Rows after tempering: n/(c·τ_j); with ar1 p n(1−ρ)/(1+ρ), p the share of frequencies that the row filter passes.
+    /// Rows after tempering: n/max(τ_j, λ_j); with ar1 p n(1−ρ)/(1+ρ), p the share of frequencies that the row filter passes.
     pub n_eff: f64,
     /// Integrated autocorrelation time τ_j of the residual, rows; with `noise.robust` times what weighing rows costs (≥ 1).
     pub autocorrelation_time: f64,
+    /// λ_j: rows that count as one because of what no candidate describes, at least 1; 1 unless `tempered`.
+    #[serde(default = "one")]
+    pub misfit: f64,
     /// Factor on the noise part of intervals: with `tempered` from left-out blocks, with `ar1` what the row filter leaves, else 1.
     pub interval_factor: f64,
     /// sd of the torque outside the filter's band, measured on the training residual, N·m; 0 with the filter off.
@@ -115,8 +118,9 @@ pub struct PlugIn {
     pub rho: Vec<f64>,
     /// τ_j ≥ 1 in rows; 1 unless `tempered`.
     pub autocorrelation_time: Vec<f64>,
-    /// c; 1 unless `tempered`.
-    pub tempering: f64,
+    /// λ_j ≥ 1: rows that count as one because of what no candidate describes; 1 (or empty) unless `tempered`.
+    #[serde(default)]
+    pub misfit: Vec<f64>,
     /// What one row counts where an autoregression knows of the row filter: the share of frequencies that passes; 1 unless `ar1`.
     #[serde(default = "one")]
     pub passed: f64,
@@ -197,7 +201,7 @@ impl PlugIn {
             weight: vec![1.0; joints],
             rho: vec![0.0; joints],
             autocorrelation_time: vec![1.0; joints],
-            tempering: 1.0,
+            misfit: vec![1.0; joints],
             passed: 1.0,
             variance: vec![1.0; joints],
             scaled_variance: vec![v; families],
@@ -205,14 +209,15 @@ impl PlugIn {
         }
     }
 
-    /// What the statistics of a joint are multiplied with: w_j / (c τ_j).
+    /// What the statistics of a joint are multiplied with: w_j / max(τ_j, λ_j).
     pub fn factor(&self, joint: usize) -> f64 {
         self.weight[joint] * self.temper(joint)
     }
 
-    /// What one row of a joint's statistics counts: 1 / (c τ_j).
+    /// What one row of a joint's statistics counts: 1 / max(τ_j, λ_j).
     pub fn temper(&self, joint: usize) -> f64 {
-        1.0 / (self.tempering * self.autocorrelation_time[joint])
+        let misfit = self.misfit.get(joint).copied().unwrap_or(1.0);
+        1.0 / self.autocorrelation_time[joint].max(misfit)
     }
 
     /// What the row count of a joint is multiplied with: with `ar1` the filter leaves fewer independent rows than there are, and φ is the
@@ -244,7 +249,7 @@ pub fn mean_squares(grams: &Gram, columns: usize, weight: &[f64]) -> Vec<f64> {
 /// The weighted regression and its prior: all that inference sees.
 ///
 /// ```text
-/// G = Σ_j w_j/(c τ_j) G_j(ρ_j)    n = Σ_j p n_j/(c τ_j)    v_k = v_family / r_k, or sd_k² / φ
+/// G = Σ_j w_j/t_j G_j(ρ_j)    n = Σ_j p n_j/t_j,   t_j = max(τ_j, λ_j)    v_k = v_family / r_k, or sd_k² / φ
 /// ```
 /// with r_k of [`Columns::references`] and p of [`PlugIn::passed`]. A prior sd that physics says gives way to a scale that the user gives.
 ///

@@ -312,6 +312,7 @@ mod tests {
             qdd: wave(|t, a| -a * a * (a * t).sin()),
             tau: wave(|t, a| a + t.cos()),
             standstill: vec![false; 2 * samples],
+            history: Vec::new(),
             input_rows: (0..samples).collect(),
             logged: None,
             interval: 0.01,
@@ -342,6 +343,7 @@ mod tests {
             derived_from: vec![DerivedFrom::Position; 2],
             velocity_from: Vec::new(),
             corrections: Corrections::default(),
+            history: Vec::new(),
         };
         for (acts, most) in [(true, 0), (true, 1000), (false, 1000)] {
             let rows = |from: f64, samples: usize| {

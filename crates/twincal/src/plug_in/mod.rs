@@ -1,15 +1,18 @@
-//! Noise weights, autocorrelation, tempering and slab scale: everything that is plugged into the posterior.
+//! Noise weights, autocorrelation, misfit and slab scale: everything that is plugged into the posterior.
 //!
 //! [`fit`] iterates likelihood → infer → residual at the model average until nothing moves (method section 5);
-//! [`fit_tempered`] chooses the multiplier c on left-out parts of the training data. Given the plug-ins, exact
-//! enumeration and Gibbs sampling share one target.
+//! [`fit_tempered`] lets what no candidate describes count as noise. Given the plug-ins, exact enumeration and Gibbs
+//! sampling share one target.
 
 mod autoregression;
+mod decoys;
+mod left_out;
 mod memory;
+mod misfit;
 mod passband;
 mod tempering;
 
-pub use tempering::{LeftOut, fit_tempered};
+pub use tempering::fit_tempered;
 
 use crate::diagnostics::integrated_autocorrelation_time;
 use crate::error::Result;
@@ -91,7 +94,7 @@ impl Moving {
 
 /// Iterates the plug-ins to their fixed point on the training parts.
 ///
-/// τ and c of `start` are kept as they are. `known` is the posterior of a similar problem, to start the search from.
+/// τ and λ of `start` are kept as they are. `known` is the posterior of a similar problem, to start the search from.
 ///
 /// # Errors
 /// Those of [`assemble`] and [`approximate`].

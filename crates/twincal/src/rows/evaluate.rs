@@ -2,7 +2,8 @@
 
 use crate::lanes::Aligned;
 use crate::robot::{Motion, Robot, nominal_torque};
-use crate::term::{Library, Recipes, Scratch};
+use crate::signal::Segment;
+use crate::term::{Course, Library, Recipes, Scratch};
 use std::sync::Arc;
 
 /// Where nominal torque and columns come from.
@@ -14,11 +15,11 @@ pub(super) trait Source {
     /// How the columns of a joint follow from its parts.
     fn recipes(&self, joint: usize) -> &Arc<Recipes>;
     /// `nominal[joint * len + sample]`, `out[joint][i * len + sample]`.
-    fn evaluate(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Aligned]);
+    fn evaluate(&mut self, course: Course<'_>, nominal: &mut [f64], out: &mut [Aligned]);
     /// `nominal[joint * len + sample]`, `out[joint][part * stride + sample]`.
     fn evaluate_parts(
         &mut self,
-        motion: Motion<'_>,
+        course: Course<'_>,
         nominal: &mut [f64],
         stride: usize,
         out: &mut [Aligned],
@@ -88,25 +89,31 @@ impl Source for OfLibrary<'_> {
         &self.recipes[joint]
     }
 
-    fn evaluate(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Aligned]) {
-        nominal_torque(self.robot, motion, nominal);
-        self.library.evaluate_with(motion, out, &mut self.scratch);
+    fn evaluate(&mut self, course: Course<'_>, nominal: &mut [f64], out: &mut [Aligned]) {
+        nominal_torque(self.robot, course.motion, nominal);
+        self.library.evaluate_with(course, out, &mut self.scratch);
+        let len = course.motion.len;
         for &(joint, row) in &self.absent {
-            out[joint][row * motion.len..(row + 1) * motion.len].fill(0.0);
+            out[joint][row * len..(row + 1) * len].fill(0.0);
         }
     }
 
     fn evaluate_parts(
         &mut self,
-        motion: Motion<'_>,
+        course: Course<'_>,
         nominal: &mut [f64],
         stride: usize,
         out: &mut [Aligned],
     ) {
-        nominal_torque(self.robot, motion, nominal);
+        nominal_torque(self.robot, course.motion, nominal);
         self.library
-            .evaluate_parts(motion, stride, out, &mut self.scratch);
+            .evaluate_parts(course, stride, out, &mut self.scratch);
     }
+}
+
+/// What is evaluated of a segment: positions, velocities, accelerations, history.
+pub(super) fn channels(segment: &Segment) -> [&[f64]; 4] {
+    [&segment.q, &segment.qd, &segment.qdd, &segment.history]
 }
 
 /// Motion of a stretch of samples, and what was evaluated there.
@@ -120,6 +127,8 @@ pub(super) struct Stretch {
     pub(super) qd: Vec<f64>,
     /// Acceleration.
     pub(super) qdd: Vec<f64>,
+    /// History channels, `channel * len + sample`.
+    pub(super) history: Vec<f64>,
     /// Nominal torque.
     pub(super) nominal: Vec<f64>,
     /// Columns or parts: `values[joint][i * len + sample]`.
@@ -136,12 +145,9 @@ impl Stretch {
     }
 
     /// Takes samples `from .. from + len` of arrays `joint * total + sample`.
-    pub(super) fn load(&mut self, from: usize, len: usize, total: usize, source: [&[f64]; 3]) {
+    pub(super) fn load(&mut self, from: usize, len: usize, total: usize, source: [&[f64]; 4]) {
         self.len = len;
-        for (to, from_all) in [&mut self.q, &mut self.qd, &mut self.qdd]
-            .into_iter()
-            .zip(source)
-        {
+        for (to, from_all) in self.channels().into_iter().zip(source) {
             to.clear();
             for joint in from_all.chunks_exact(total) {
                 to.extend_from_slice(&joint[from..from + len]);
@@ -149,19 +155,24 @@ impl Stretch {
         }
     }
 
+    /// What is loaded: positions, velocities, accelerations, history.
+    pub(super) fn channels(&mut self) -> [&mut Vec<f64>; 4] {
+        [&mut self.q, &mut self.qd, &mut self.qdd, &mut self.history]
+    }
+
     /// Evaluates nominal torque and columns of the loaded motion.
     pub(super) fn evaluate(&mut self, source: &mut dyn Source) {
-        let (motion, nominal, values) = self.split();
-        source.evaluate(motion, nominal, values);
+        let (course, nominal, values) = self.split();
+        source.evaluate(course, nominal, values);
     }
 
     /// Evaluates nominal torque and parts of the loaded motion, `values[joint][part * stride + sample]`.
     pub(super) fn evaluate_parts(&mut self, source: &mut dyn Source, stride: usize) {
-        let (motion, nominal, values) = self.split();
-        source.evaluate_parts(motion, nominal, stride, values);
+        let (course, nominal, values) = self.split();
+        source.evaluate_parts(course, nominal, stride, values);
     }
 
-    fn split(&mut self) -> (Motion<'_>, &mut [f64], &mut [Aligned]) {
+    fn split(&mut self) -> (Course<'_>, &mut [f64], &mut [Aligned]) {
         let len = self.len;
         self.nominal.resize(self.values.len() * len, 0.0);
         let motion = Motion {
@@ -170,6 +181,10 @@ impl Stretch {
             qd: &self.qd,
             qdd: &self.qdd,
         };
-        (motion, &mut self.nominal, &mut self.values)
+        let course = Course {
+            motion,
+            history: &self.history,
+        };
+        (course, &mut self.nominal, &mut self.values)
     }
 }

@@ -1,6 +1,6 @@
 //! Rows of the regression: F over torque and the columns' parts, only where a row is kept.
 
-use super::evaluate::{Source, Stretch};
+use super::evaluate::{Source, Stretch, channels};
 use super::{Form, JointRows, MAX_BLOCK, RowBlock, Slice};
 use crate::error::Result;
 use crate::robot::BLOCK;
@@ -156,7 +156,7 @@ impl Rows {
         let mut from = begin;
         while from < end {
             let count = STRETCH.min(end - from);
-            stretch.load(from, count, total, [&segment.q, &segment.qd, &segment.qdd]);
+            stretch.load(from, count, total, channels(segment));
             stretch.evaluate_parts(source, count);
             let mut at_hand: Vec<(usize, &[f64])> = Vec::with_capacity(3 * dof);
             for (joint, &first) in firsts.iter().enumerate() {

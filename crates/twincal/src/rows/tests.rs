@@ -5,6 +5,7 @@ use crate::lanes::Aligned;
 use crate::robot::Motion;
 use crate::signal::fir::column_kernel;
 use crate::signal::{DerivedFrom, LoggedSamples, Payload, Segment};
+use crate::term::Course;
 
 const COLUMNS: [&[usize]; 2] = [&[0, 2, 3], &[1, 2]];
 const BETA: [f64; 4] = [0.7, -1.3, 0.25, 2.0];
@@ -77,18 +78,20 @@ impl Source for StandIn {
         &self.recipes[joint]
     }
 
-    fn evaluate(&mut self, motion: Motion<'_>, nominal: &mut [f64], out: &mut [Aligned]) {
+    fn evaluate(&mut self, course: Course<'_>, nominal: &mut [f64], out: &mut [Aligned]) {
+        let motion = course.motion;
         let of = |joint: usize, c: usize, s: [f64; 3]| column(COLUMNS[joint][c], s[0], s[1], s[2]);
         Self::fill(motion, nominal, (motion.len, out), of);
     }
 
     fn evaluate_parts(
         &mut self,
-        motion: Motion<'_>,
+        course: Course<'_>,
         nominal: &mut [f64],
         stride: usize,
         out: &mut [Aligned],
     ) {
+        let motion = course.motion;
         Self::fill(motion, nominal, (stride, out), part);
     }
 }
@@ -104,6 +107,7 @@ fn pipeline(cutoff_hz: f64) -> Pipeline {
         derived_from: vec![DerivedFrom::Position; 2],
         velocity_from: Vec::new(),
         corrections: crate::signal::Corrections::default(),
+        history: Vec::new(),
     }
 }
 
@@ -139,6 +143,7 @@ fn trajectory(samples: usize, interval: f64) -> Trajectory {
         qdd,
         tau,
         standstill,
+        history: Vec::new(),
         interval,
         logged_interval: interval,
     };
@@ -538,7 +543,7 @@ fn a_coarser_clock_changes_no_row() {
     let (robot, settings) = (
         arm(1.0),
         LibrarySettings {
-            families: vec![Family::MassScale, Family::Viscous, Family::Coulomb],
+            families: vec![Family::Density, Family::Viscous, Family::Coulomb],
             coulomb_velocity: 0.02,
             ..LibrarySettings::default()
         },
@@ -548,7 +553,7 @@ fn a_coarser_clock_changes_no_row() {
         .columns()
         .iter()
         .map(|&term| match library.terms()[term].family {
-            Family::MassScale => 0.15,
+            Family::Density => 0.15,
             Family::Viscous => 1.5,
             _ => 2.0,
         })

@@ -1,6 +1,6 @@
 //! Rows as logged: for the pipeline off, for raw validation and for predictions.
 
-use super::evaluate::{Source, Stretch};
+use super::evaluate::{Source, Stretch, channels};
 use super::{Form, JointRows, MAX_BLOCK, PARTS_APART, RowBlock, Slice};
 use crate::error::Result;
 use crate::signal::Segment;
@@ -64,17 +64,15 @@ pub(super) fn visit(
     while from < slice.rows.end {
         let len = MAX_BLOCK.min(slice.rows.end - from);
         let own = from..from + len;
-        let motion = [&segment.q, &segment.qd, &segment.qdd];
         let still: Vec<bool> = if segment.logged.is_some() {
             let at = AtStamps::new(segment, &time[own.clone()]);
             stretch.len = len;
-            let own = [&mut stretch.q, &mut stretch.qd, &mut stretch.qdd];
-            for (to, values) in own.into_iter().zip(motion) {
+            for (to, values) in stretch.channels().into_iter().zip(channels(segment)) {
                 at.of(values, samples, to);
             }
             at.standstill(&segment.standstill, samples)
         } else {
-            stretch.load(from, len, total, motion.map(Vec::as_slice));
+            stretch.load(from, len, total, channels(segment));
             let joints = segment.standstill.chunks_exact(total);
             joints
                 .flat_map(|joint| &joint[own.clone()])

@@ -103,6 +103,7 @@ pub(crate) fn log_of(robot: &Robot, seed: f64) -> Trajectory {
         qdd,
         tau,
         standstill: vec![false; dof * LEN],
+        history: Vec::new(),
         interval: INTERVAL,
         logged_interval: INTERVAL,
     };

@@ -96,6 +96,7 @@ mod tests {
             qdd: vec![0.0; time.len()],
             tau: Vec::new(),
             standstill: vec![false; time.len()],
+            history: Vec::new(),
             interval: 0.002,
             logged_interval: 0.002,
             time,

@@ -49,6 +49,8 @@ pub struct PreparedLog<'a> {
     at_rest: Vec<f64>,
     /// Time between cuts, before anything is thinned, s.
     seconds: f64,
+    /// First stamp of the log that this is, or is a part of, s.
+    start: f64,
     findings: Vec<Finding>,
 }
 
@@ -91,10 +93,20 @@ impl<'a> PreparedLog<'a> {
             saturated: Saturated::find(&joints, log, pipeline),
             at_rest,
             seconds,
+            start: first_stamp(log).unwrap_or(0.0),
             log: Cow::Borrowed(log),
             joints,
             pieces,
             findings,
+        }
+    }
+
+    /// The same as a part of a log that starts at another time, s.
+    #[must_use]
+    pub(crate) fn since(self, start: Option<f64>) -> Self {
+        Self {
+            start: start.unwrap_or(self.start),
+            ..self
         }
     }
 
@@ -130,6 +142,7 @@ impl<'a> PreparedLog<'a> {
             saturated: self.saturated.clone(),
             at_rest: self.at_rest.clone(),
             seconds: self.seconds,
+            start: self.start,
             findings: Vec::new(),
         }
     }
@@ -177,6 +190,7 @@ impl<'a> PreparedLog<'a> {
             saturated: self.saturated,
             at_rest: self.at_rest,
             seconds: self.seconds,
+            start: self.start,
             findings: self.findings,
         }
     }
@@ -217,6 +231,7 @@ fn align(
     if pipeline.is_off() {
         let logged = prepared.pieces.iter();
         trajectory.segments = logged.map(|piece| as_logged(piece, with_tau)).collect();
+        pipeline.remember(log, ready.start, &mut trajectory, findings);
         saturated.mask(log, pipeline, &mut trajectory, findings);
         return Ok(trajectory);
     }
@@ -292,8 +307,14 @@ fn align(
     }
     findings.extend(agreement::findings(&names, &log.name, &agreement));
     report_standstill(joints, log, (&trajectory, pipeline), findings);
+    pipeline.remember(log, ready.start, &mut trajectory, findings);
     saturated.mask(log, pipeline, &mut trajectory, findings);
     Ok(trajectory)
+}
+
+/// First stamp of a log, s.
+pub(super) fn first_stamp(log: &Recording) -> Option<f64> {
+    log.time.iter().copied().find(|time| time.is_finite())
 }
 
 /// Channels one after the other: `joint * len + sample`.
@@ -340,6 +361,7 @@ fn as_logged(piece: &Piece<'_>, with_tau: bool) -> Segment {
             Vec::new()
         },
         standstill: vec![false; piece.joints.len() * piece.time.len()],
+        history: Vec::new(),
         interval: piece.interval,
     }
 }
@@ -402,6 +424,7 @@ fn smoothed(
         qdd,
         tau,
         standstill: still,
+        history: Vec::new(),
         interval: piece.interval,
         logged_interval: piece.interval / piece.every as f64,
     })

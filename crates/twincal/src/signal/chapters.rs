@@ -2,7 +2,7 @@
 //! is said once for the log, see [`told_once`].
 
 use super::clock::{GAP, median_step};
-use super::{Channels, LongLog, Pipeline, Recording};
+use super::{Channels, JointHistory, LongLog, Pipeline, Recording};
 use crate::error::{Error, Finding, Result, Severity};
 use std::ops::Range;
 
@@ -11,6 +11,9 @@ const LEFT_OUT_LIMIT: f64 = 0.01;
 
 /// Samples beyond the filter's reach, so that splines and interpolation do not feel the ends.
 const NEAREST: f64 = 24.0;
+
+/// What position has to span in thresholds of a stop operator until its state is that of any beginning, and a tenth for what is smoothed.
+const SPANNED: f64 = 2.2;
 
 /// A chapter between its neighbours.
 #[derive(Debug)]
@@ -173,9 +176,11 @@ impl<'a> Place<'a> {
     fn motion(&self, pipeline: &Pipeline) -> ChapterMotion<'a> {
         let chapter = self.chapter;
         let reach = Reach::of(chapter, pipeline);
-        let lead = self
-            .before
-            .map(|before| (before, reach.back(before, chapter)));
+        let lead = self.before.map(|before| {
+            let seconds = reach.seconds + unknown(before, pipeline);
+            let further = Reach { seconds, ..reach };
+            (before, further.back(before, chapter))
+        });
         let tail = self.after.map(|after| (after, reach.on(chapter, after)));
         let whole = 0..chapter.time.len();
         let parts: Vec<(&Recording, Range<usize>)> = (lead.into_iter())
@@ -276,6 +281,29 @@ impl Reach {
     }
 }
 
+/// How far back from the end of a recording the states of stop operators may depend on what was, s: until every joint that has some has
+/// spanned twice the largest threshold; all of it where it does not.
+fn unknown(before: &Recording, pipeline: &Pipeline) -> f64 {
+    let end = before.time.iter().rfind(|time| time.is_finite());
+    let of_joint = |(history, joint): (&JointHistory, &Channels)| -> f64 {
+        let (Some(&end), Some(threshold)) = (end, history.thresholds.last()) else {
+            return 0.0;
+        };
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (time, q) in before.time.iter().zip(&joint.q).rev() {
+            if time.is_finite() && q.is_finite() {
+                (low, high) = (low.min(*q), high.max(*q));
+                if high - low > SPANNED * threshold {
+                    return end - time;
+                }
+            }
+        }
+        f64::INFINITY
+    };
+    let joints = pipeline.history.iter().zip(&before.joints);
+    joints.map(of_joint).fold(0.0, f64::max)
+}
+
 /// Whether the motion of a row is, and its stamp.
 fn finite(recording: &Recording, row: usize) -> bool {
     let of_joint = |joint: &Channels| {
@@ -303,7 +331,7 @@ fn joined(parts: &[(&Recording, Range<usize>)]) -> Recording {
         qd: join(&|log| log.joints[joint].qd.as_ref()),
         qdd: join(&|log| log.joints[joint].qdd.as_ref()),
         tau: None,
-        temperature: None,
+        temperature: join(&|log| log.joints[joint].temperature.as_ref()),
     };
     Recording {
         unfolded: first.unfolded,

@@ -243,6 +243,7 @@ fn off(
         derived_from: vec![DerivedFrom::Position; joints.len()],
         velocity_from: Vec::new(),
         corrections: settings.corrections.clone(),
+        history: Vec::new(),
     };
     Ok((pipeline, findings))
 }
@@ -388,6 +389,7 @@ fn on(
         derived_from: derived,
         velocity_from,
         corrections: settings.corrections.clone(),
+        history: Vec::new(),
     };
     if intervals
         .iter()

@@ -3,6 +3,7 @@
 //! For a fit a chapter ends as a log does: filters need some seconds at either end of it, which become no rows (`chapters.rs` visits them).
 //! Angles are unfolded as those of the whole log.
 
+use super::align::first_stamp;
 use super::unwrap::Folding;
 use super::{Payload, Recording, Shelf};
 use crate::error::{Error, Result};
@@ -35,6 +36,8 @@ pub struct LongLog {
     pub name: String,
     /// What the robot carried.
     pub payload: Payload,
+    /// First stamp of the whole log, s.
+    pub(super) start: Option<f64>,
     pub(super) samples: Vec<usize>,
     source: Arc<dyn ReadChapter>,
     pub(super) shelf: Option<Arc<dyn Shelf>>,
@@ -51,6 +54,7 @@ impl LongLog {
         Ok(Self {
             name: String::new(),
             payload: Payload::None,
+            start: first_stamp(&source.read(0)?),
             folding: Folding::find(robot, samples.len(), &*source)?,
             samples,
             source,
@@ -75,6 +79,11 @@ impl LongLog {
     /// Where its chapters come from.
     pub fn source(&self) -> &Arc<dyn ReadChapter> {
         &self.source
+    }
+
+    /// First stamp of the whole log, s.
+    pub fn start(&self) -> Option<f64> {
+        self.start
     }
 
     /// Samples of each chapter.

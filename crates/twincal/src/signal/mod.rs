@@ -10,6 +10,7 @@ pub(crate) mod decimate;
 mod correct;
 mod fourier;
 mod held;
+mod history;
 mod jumps;
 mod long;
 mod cutoff;
@@ -45,6 +46,8 @@ pub(crate) use clock::median_step;
 pub use correct::{Corrections, Lag};
 pub use describe::{JointOverview, LogOverview, describe, hardly_driven};
 pub(crate) use few_chapters::FewChapters;
+pub use history::{JointHistory, Warmth};
+pub(crate) use history::{STOPS, known_temperatures, stop_channel, temperature_at, warmth_channel};
 pub use long::{Log, Logs, LongLog, ReadChapter};
 pub use ready::{LongReady, ReadyLog};
 pub use shelf::{Numbers, Shelf};
@@ -193,6 +196,9 @@ pub struct Pipeline {
     /// What is put right in every log first.
     #[serde(default, skip_serializing_if = "Corrections::is_default")]
     pub corrections: Corrections,
+    /// What is followed of each joint's history; empty: nothing.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub history: Vec<JointHistory>,
 }
 
 /// A run of samples on one clock without a cut: finite, time increasing. Arrays are `joint * len + sample`.
@@ -215,6 +221,8 @@ pub struct Segment {
     pub tau: Vec<f64>,
     /// Per joint and sample: the joint stands still or its torque is saturated, so that the torque says nothing.
     pub standstill: Vec<bool>,
+    /// History channels, `channel * len + sample`; empty where none is followed ([`Pipeline::history`]).
+    pub history: Vec<f64>,
     /// Sampling interval, s.
     pub interval: f64,
     /// Sampling interval of the log, s.
@@ -261,6 +269,7 @@ impl Segment {
             qdd: of(&self.qdd),
             tau: of(&self.tau),
             standstill: part(&self.standstill, dof, len, &range),
+            history: part(&self.history, self.history.len() / len.max(1), len, &range),
             interval: self.interval,
             logged_interval: self.logged_interval,
             time,
@@ -341,6 +350,7 @@ impl Pipeline {
             derived_from: vec![DerivedFrom::Position; dof],
             velocity_from: Vec::new(),
             corrections: Corrections::default(),
+            history: Vec::new(),
         }
     }
 
@@ -474,6 +484,19 @@ pub fn align(
     pipeline: &Pipeline,
 ) -> Result<(Trajectory, Vec<Finding>)> {
     prepare(robot, log, pipeline)?.align(pipeline, Raw::All)
+}
+
+/// [`align`] of a part of a log that starts at `start`, s.
+///
+/// # Errors
+/// As [`align`].
+pub(crate) fn align_part(
+    robot: &Robot,
+    part: &Recording,
+    start: Option<f64>,
+    pipeline: &Pipeline,
+) -> Result<(Trajectory, Vec<Finding>)> {
+    prepare(robot, part, pipeline)?.since(start).align(pipeline, Raw::All)
 }
 
 /// Step 1 alone, for [`PreparedLog::align`] at several cut-offs up to 1.4 times that of `pipeline`.

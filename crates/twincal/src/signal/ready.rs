@@ -123,11 +123,8 @@ impl LongReady {
         mut visit: impl FnMut(usize, &PreparedLog<'_>, &mut Vec<Finding>) -> Result<()> + Send,
     ) -> Result<()> {
         self.log.visit(findings, |number, chapter, said| {
-            visit(
-                number,
-                &PreparedLog::new(self.joints.clone(), chapter, pipeline)?,
-                said,
-            )
+            let prepared = PreparedLog::new(self.joints.clone(), chapter, pipeline)?;
+            visit(number, &prepared.since(self.log.start), said)
         })
     }
 }

@@ -109,6 +109,7 @@ impl LongReady {
             let chapter = self.log.chapter((2 * i + 1) * all / (2 * of))?;
             // Chapters that cannot be used are left out, as elsewhere.
             if let Ok(log) = PreparedLog::new(self.joints.clone(), &chapter, pipeline) {
+                let log = log.since(self.log.start);
                 kept.extend(log.stretches(samples / of, shortest, pipeline));
             }
         }

@@ -1,6 +1,7 @@
 //! Which candidates say nothing, or nothing new: judged at random states, so for every motion and not for one log.
 
 use super::candidate::Candidate;
+use super::course::anything;
 use super::expression::{Bounded, Graph, Id, Variable, bounded_values};
 use crate::linear_algebra::dot;
 use rand_chacha::ChaCha8Rng;
@@ -215,6 +216,9 @@ fn pool(
                 Variable::Position(joint) => motion[joint][0],
                 Variable::Velocity(joint) => motion[joint][1],
                 Variable::Acceleration(joint) => motion[joint][2],
+                Variable::History(channel) => {
+                    anything(channel, motion.iter().map(|joint| joint[0]).sum())
+                }
             });
             let mut torque = Vec::with_capacity(entries.count);
             let mut exists = Vec::with_capacity(candidates.len());

@@ -1,6 +1,7 @@
 //! What every family hands to the library: a named candidate with its torque image.
 
 use super::Family;
+use super::directions::Mixture;
 use super::euler_lagrange::euler_lagrange;
 use super::expression::{Function, Graph, Id, Variable};
 use super::model_column::ModelColumn;
@@ -67,6 +68,8 @@ pub(super) struct Candidate {
     pub(super) model: Option<ModelColumn>,
     /// Prior sd of β in its own unit where physics says one (a fifth of the link's mass); `None`: learned from the data.
     pub(super) prior_sd: Option<f64>,
+    /// On the first column of a component: the parameters that its coefficients mix to; `None`: the coefficients themselves.
+    pub(super) mixture: Option<Mixture>,
 }
 
 impl Candidate {
@@ -87,6 +90,7 @@ impl Candidate {
             image,
             model: None,
             prior_sd: None,
+            mixture: None,
         }
     }
 

@@ -1,6 +1,7 @@
 //! A component: one physical story with all its columns, and its coefficients as the parameters that people know.
 
 use super::Family;
+use super::directions::Mixture;
 use super::{payload, spring};
 use serde::{Deserialize, Serialize};
 
@@ -20,11 +21,11 @@ pub struct Component {
 }
 
 impl Component {
-    /// True for what is wrong with a link that a payload, which is the usual reason, would look like in every motion: its mass and
+    /// True for what is wrong with a link that a payload, which is the usual reason, would look like in every motion: its density and
     /// first moments. A wrong tensor alone is no payload, which has a mass.
     #[must_use]
     pub fn is_second_choice(&self) -> bool {
-        let has_mass = matches!(self.family, Family::MassMoments | Family::MassScale);
+        let has_mass = matches!(self.family, Family::Density | Family::MassMoments);
         has_mass && self.alias_of.iter().any(|other| other == payload::NAME)
     }
 }
@@ -49,24 +50,23 @@ impl Parameter {
 
 /// How coefficients become parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Meaning {
+pub(super) enum Meaning<'a> {
     /// The coefficients themselves.
     Coefficients,
-    /// Mass, first moments, tensor about a centre → mass, centre of mass, tensor about the frame's origin.
-    Payload {
-        /// In the payload's frame, m.
-        centre: [f64; 3],
-    },
+    /// Linear in the coefficients.
+    Mixture(&'a Mixture),
+    /// Mass, first moments and tensor, linear in the coefficients → mass, centre of mass, tensor, first moments.
+    Payload(&'a Mixture),
     /// Stiffness and preload → stiffness, rest position and preload.
     Spring,
 }
 
-impl Meaning {
-    /// `centre` is what a payload's tensor is about.
-    pub(super) fn of(family: Family, centre: [f64; 3]) -> Self {
-        match family {
-            Family::Payload => Self::Payload { centre },
-            Family::Spring => Self::Spring,
+impl<'a> Meaning<'a> {
+    pub(super) fn of(family: Family, mixture: Option<&'a Mixture>) -> Self {
+        match (family, mixture) {
+            (Family::Payload, Some(mixture)) => Self::Payload(mixture),
+            (_, Some(mixture)) => Self::Mixture(mixture),
+            (Family::Spring, None) => Self::Spring,
             _ => Self::Coefficients,
         }
     }
@@ -78,7 +78,8 @@ impl Meaning {
                 .iter()
                 .map(|(name, unit)| Parameter::new(name, unit))
                 .collect(),
-            Self::Payload { .. } => payload::parameters(columns),
+            Self::Mixture(mixture) => mixture.parameters.clone(),
+            Self::Payload(_) => payload::parameters(),
             Self::Spring => spring::parameters(columns),
         }
     }
@@ -87,8 +88,32 @@ impl Meaning {
     pub(super) fn values(self, beta: &[f64]) -> Vec<f64> {
         match self {
             Self::Coefficients => beta.to_vec(),
-            Self::Payload { centre } => payload::values(beta, centre),
+            Self::Mixture(mixture) => mixture.values(beta),
+            Self::Payload(mixture) => payload::values(&mixture.values(beta)),
             Self::Spring => spring::values(beta),
         }
     }
+
+    /// What is known of a parameter before the data where it is not its term's; `live`: which terms are columns.
+    pub(super) fn before(self, parameter: usize, live: &[bool]) -> Option<Before> {
+        match self {
+            Self::Mixture(mixture) => Some(match mixture.prior_sd(parameter, live) {
+                Some(sd) => Before::Width(sd),
+                None => Before::Hidden,
+            }),
+            Self::Payload(mixture) => Some(payload::before(mixture, parameter, live)),
+            Self::Coefficients | Self::Spring => None,
+        }
+    }
+}
+
+/// What is known of a parameter before the data.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Before {
+    /// No motion shows it.
+    Hidden,
+    /// Its prior sd.
+    Width(f64),
+    /// It is a ratio and has none.
+    Ratio,
 }

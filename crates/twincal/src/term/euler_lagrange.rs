@@ -15,10 +15,11 @@ pub(super) fn euler_lagrange(graph: &mut Graph, phi: Id) -> Vec<(usize, Id)> {
     let coordinates = graph.variables(phi);
     let mut joints: Vec<usize> = coordinates
         .iter()
-        .map(|&coordinate| match coordinate {
+        .filter_map(|&coordinate| match coordinate {
             Variable::Velocity(joint)
             | Variable::Position(joint)
-            | Variable::Acceleration(joint) => joint,
+            | Variable::Acceleration(joint) => Some(joint),
+            Variable::History(_) => None,
         })
         .collect();
     joints.sort_unstable();
@@ -33,7 +34,7 @@ pub(super) fn euler_lagrange(graph: &mut Graph, phi: Id) -> Vec<(usize, Id)> {
             let rate = match coordinate {
                 Variable::Velocity(other) => Variable::Acceleration(other),
                 Variable::Position(other) => Variable::Velocity(other),
-                Variable::Acceleration(_) => continue,
+                Variable::Acceleration(_) | Variable::History(_) => continue,
             };
             let slope = graph.derivative(momentum, coordinate);
             if !graph.is_zero(slope) {

@@ -5,13 +5,15 @@ mod judged;
 
 use super::aliases::{Motions, channels};
 use super::candidate::{Candidate, Joint, Proposal};
-use super::component::{Component, Meaning, Parameter};
+use super::component::{Before, Component, Meaning, Parameter};
+use super::course::Course;
+use super::directions::Mixture;
 use super::expression::{Graph, Id, Slot, Tape, Variable, bounded_values};
 use super::model_column::{ModelColumn, ModelColumns};
 use super::overlaps;
 use super::parts::{self, Parts, Torque};
 use super::payload::NAME as PAYLOAD;
-use super::propose::{About, payload_mount, proposals};
+use super::propose::{About, proposals};
 use super::recipes::Recipes;
 use super::sentence::{Estimate, sentence};
 use super::{Family, LibrarySettings, Status, Term, user};
@@ -46,8 +48,8 @@ pub struct Library {
     parts: Arc<Parts>,
     /// As the settings say.
     payload_frame: Option<String>,
-    /// What a payload's tensor is about, in its frame.
-    payload_centre: [f64; 3],
+    /// Parameters of each component that its coefficients mix to.
+    mixtures: Vec<Option<Arc<Mixture>>>,
     /// No motion tells its tensor from its mass and first moments.
     payload_is_one: bool,
 }
@@ -108,10 +110,9 @@ impl Library {
             }
         };
 
-        let payload_centre = match about.robot {
-            Some(robot) if settings.has(Family::Payload) => payload_mount(robot, settings)?.centre,
-            _ => [0.0; 3],
-        };
+        let mixtures = (components.iter())
+            .map(|component| candidates[component.terms[0]].mixture.take().map(Arc::new))
+            .collect();
         graph.forget_derivatives();
         let mut library = Self {
             terms: Vec::new(),
@@ -128,7 +129,7 @@ impl Library {
             model: model.map(Arc::new),
             parts: Arc::default(),
             payload_frame: settings.payload_frame.clone(),
-            payload_centre,
+            mixtures,
             payload_is_one: false,
         };
         let judged = candidates.into_iter().zip(statuses).zip(acting);
@@ -275,6 +276,7 @@ impl Library {
     /// # Panics
     /// If there is no such component.
     pub fn parameters(&self, component: usize) -> Vec<Parameter> {
+        let index = component;
         let component = &self.components[component];
         let columns: Vec<(String, String)> = component
             .terms
@@ -287,16 +289,26 @@ impl Library {
                 (own.to_owned(), unit.clone())
             })
             .collect();
-        self.meaning(component.family).parameters(&columns)
+        self.meaning(index).parameters(&columns)
     }
 
     /// Values of [`Library::parameters`] at coefficients `beta`, one per term of the component (0 for dropped ones).
     pub fn parameter_values(&self, component: usize, beta: &[f64]) -> Vec<f64> {
-        self.meaning(self.components[component].family).values(beta)
+        self.meaning(component).values(beta)
     }
 
-    fn meaning(&self, family: Family) -> Meaning {
-        Meaning::of(family, self.payload_centre)
+    /// What is known before the data of a parameter that is not its term's.
+    pub(crate) fn before(&self, component: usize, parameter: usize) -> Option<Before> {
+        let terms = self.components[component].terms.iter();
+        let live: Vec<bool> = terms
+            .map(|&term| self.terms[term].status == Status::Candidate)
+            .collect();
+        self.meaning(component).before(parameter, &live)
+    }
+
+    fn meaning(&self, component: usize) -> Meaning<'_> {
+        let mixture = self.mixtures[component].as_deref();
+        Meaning::of(self.components[component].family, mixture)
     }
 
     /// The same library for a robot with other inertias and the same joints.
@@ -311,10 +323,10 @@ impl Library {
 
     /// True if parameter `parameter` of a component is the coefficient of its term at the same place.
     pub fn is_coefficient(&self, component: usize, parameter: usize) -> bool {
-        match self.meaning(self.components[component].family) {
+        match self.meaning(component) {
             Meaning::Coefficients => true,
-            Meaning::Payload { centre } => parameter == 0 || (parameter > 3 && centre == [0.0; 3]),
-            Meaning::Spring => parameter == 0,
+            Meaning::Mixture(_) => false,
+            Meaning::Payload(_) | Meaning::Spring => parameter == 0,
         }
     }
 
@@ -339,7 +351,10 @@ impl Library {
         match family {
             Family::Viscous => joint(".viscous").map_or(0.0, |joint| -joint.damping),
             Family::MotorInertia => joint(".motor_inertia").map_or(0.0, |joint| -joint.armature),
-            Family::Coulomb | Family::CoupledFriction | Family::CoupledInertia => 0.0,
+            Family::Coulomb
+            | Family::CoupledFriction
+            | Family::CoupledInertia
+            | Family::Hysteresis => 0.0,
             _ => f64::NEG_INFINITY,
         }
     }
@@ -393,19 +408,20 @@ impl Library {
     }
 
     /// [`Library::evaluate`] with working memory that is kept between calls: for many short batches.
-    pub fn evaluate_with<T: Table>(
+    pub fn evaluate_with<'a, T: Table>(
         &self,
-        motion: Motion<'_>,
+        course: impl Into<Course<'a>>,
         out: &mut [T],
         scratch: &mut Scratch,
     ) {
+        let course = course.into();
         let counts = self.by_joint.iter().map(Vec::len);
         parts::evaluate(
             counts,
             &self.tape,
             self.model.as_deref(),
-            motion,
-            (motion.len, out),
+            course,
+            (course.motion.len, out),
             scratch,
         );
     }
@@ -420,19 +436,20 @@ impl Library {
     ///
     /// # Panics
     /// As [`Library::evaluate`], or if `stride` is less than `motion.len`.
-    pub fn evaluate_parts<T: Table>(
+    pub fn evaluate_parts<'a, T: Table>(
         &self,
-        motion: Motion<'_>,
+        course: impl Into<Course<'a>>,
         stride: usize,
         out: &mut [T],
         scratch: &mut Scratch,
     ) {
+        let course = course.into();
+        let len = course.motion.len;
         assert!(
-            stride >= motion.len,
-            "signals of {} samples every {stride} numbers",
-            motion.len
+            stride >= len,
+            "signals of {len} samples every {stride} numbers"
         );
-        self.parts.evaluate(motion, stride, out, scratch);
+        self.parts.evaluate(course, stride, out, scratch);
     }
 
     /// φ(q, q̇) of a term (index into [`Library::terms`]) at one state, J per unit of β; `None` where the term
@@ -442,7 +459,7 @@ impl Library {
         let values = bounded_values(&self.graph, |variable| match variable {
             Variable::Position(joint) => q[joint],
             Variable::Velocity(joint) => qd[joint],
-            Variable::Acceleration(_) => 0.0, // no Lagrangian holds one
+            Variable::Acceleration(_) | Variable::History(_) => 0.0, // no Lagrangian holds one
         });
         Some(values[phi.0 as usize].value)
     }
@@ -513,7 +530,7 @@ fn home(components: &[Component], terms: usize) -> Vec<usize> {
 }
 
 /// States that have nothing in particular in common: a Weyl sequence with irrational steps.
-fn random_motions(joints: usize) -> Vec<Motions> {
+pub(super) fn random_motions(joints: usize) -> Vec<Motions> {
     const STATES: usize = 40;
     let value = |state: usize, joint: usize, k: usize| {
         let step = ((3 * joint + k + 2) as f64).sqrt() * std::f64::consts::E;

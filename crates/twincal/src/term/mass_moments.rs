@@ -1,33 +1,42 @@
-//! Mass and first moments of a link: what a wrong mass or centre of mass in the model changes.
+//! First moments of mass of a link: what a wrong centre of mass in the model changes, the second level.
 
 use super::Family;
-use super::candidate::{Candidate, Proposal};
-use super::model_column::LinkFrame;
+use super::body::{Body, Ten};
+use super::candidate::Proposal;
+use super::component::Parameter;
+use super::directions::{Columns, split};
+use crate::robot::spatial::transpose;
 
-/// Names and units of the four, in the order of the regressor's parameters.
-pub(super) const COLUMNS: [(&str, &str); 4] =
-    [("m", "kg"), ("mx", "kg·m"), ("my", "kg·m"), ("mz", "kg·m")];
-
-/// `<link>.mass_moments`: columns `.m`, `.mx`, `.my`, `.mz`: differences of mass and first moments from the model, the
-/// moments about the model's centre of mass (mass × shift of the centre), axes of the link's frame; the tensor about that
-/// point is unchanged.
+/// `<link>.mass_moments`: differences of the first moments from the model with its density, about the model's centre of mass (mass × shift
+/// of the centre); the tensor about that point is unchanged. Its parameters `mx`, `my`, `mz` have the axes of the link's frame; its columns
+/// `.h1` … are directions of equal prior probability, without those that no motion shows.
 ///
-/// `mass` is the prior sd of the mass, kg, and `moment` that of a first moment, kg·m.
-pub(super) fn proposal(link: &LinkFrame, mass: f64, moment: f64) -> Proposal {
-    let name = format!("{}.mass_moments", link.name);
-    let columns = COLUMNS
-        .into_iter()
-        .enumerate()
-        .map(|(parameter, (column, unit))| {
-            Candidate::model(
-                format!("{name}.{column}"),
-                Family::MassMoments,
-                unit,
-                format!("mass and centre of mass of {}", link.name),
-                link.column(parameter),
-            )
-            .within(if parameter == 0 { mass } else { moment })
+/// `torque`: of the body's ten parameters at random states; `share`: prior sd in the metric of [`super::body`].
+pub(super) fn proposal(body: &Body, torque: &[Vec<f64>], share: f64) -> Proposal {
+    let trace: f64 = (0..3).map(|i| body.second[i][i]).sum();
+    let columns = Columns {
+        directions: split(&body.of_first_moments(), torque),
+        size: (body.mass * trace / 6.0).sqrt(),
+        share,
+        letter: "h",
+        family: Family::MassMoments,
+        unit: "kg·m",
+    };
+    let to_link = transpose(&body.link.rotation);
+    let rows: Vec<Ten> = (to_link.iter())
+        .map(|row| {
+            let mut own = [0.0; 10];
+            own[1..4].copy_from_slice(row);
+            own
         })
         .collect();
-    Proposal { name, columns }
+    let parameters = ["mx", "my", "mz"].map(|name| Parameter::new(name, "kg·m"));
+    columns.proposal(
+        body.index,
+        (
+            &format!("{}.mass_moments", body.name),
+            &format!("centre of mass of {}", body.name),
+        ),
+        (parameters.to_vec(), rows),
+    )
 }

@@ -68,32 +68,6 @@ impl ModelColumn {
     }
 }
 
-/// A link's frame as the inertial families need it.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct LinkFrame {
-    /// Name of the link.
-    pub(super) name: String,
-    /// The body that it belongs to.
-    pub(super) body: usize,
-    /// Parameters in the body's frame = this × parameters in the link's frame.
-    pub(super) to_body: [[f64; 10]; 10],
-}
-
-impl LinkFrame {
-    /// The column of one parameter (mass, three first moments, six of the tensor) in the link's frame.
-    pub(super) fn column(&self, parameter: usize) -> ModelColumn {
-        ModelColumn::Inertia {
-            body: self.body,
-            weights: self.weights(parameter),
-        }
-    }
-
-    /// The body's ten parameters per unit of one of the link's.
-    pub(super) fn weights(&self, parameter: usize) -> [f64; 10] {
-        std::array::from_fn(|row| self.to_body[row][parameter])
-    }
-}
-
 /// Working memory that is kept between calls of [`super::Library::evaluate_with`].
 #[derive(Debug, Clone, Default)]
 pub struct Scratch {

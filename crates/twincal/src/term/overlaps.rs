@@ -12,16 +12,16 @@ const TOLERANCE: f64 = 1e-9;
 const ROUNDING: f64 = 1e-12;
 
 /// Per component the names of those that can say the same: one other component whose columns span its columns at every
-/// state, or mass moments and tensor of one link together (a payload at that link).
+/// state, or levels of one link together (a payload at that link).
 pub(super) fn spanning(library: &Library, joints: usize, states: &[Motions]) -> Vec<Vec<String>> {
     let columns = columns(library, joints, states);
     let components = library.components();
     let mut stories: Vec<(Vec<usize>, Vec<Vec<f64>>)> = (0..components.len())
         .map(|c| (vec![c], basis(columns[c].iter())))
         .collect();
-    for (a, b) in links(components) {
-        let both = columns[a].iter().chain(&columns[b]);
-        stories.push((vec![a, b], basis(both)));
+    for levels in levels(components) {
+        let all = basis(levels.iter().flat_map(|&c| &columns[c]));
+        stories.push((levels, all));
     }
     (0..components.len())
         .map(|own| {
@@ -65,20 +65,25 @@ pub(super) fn payload_is_one(library: &Library, joints: usize, states: &[Motions
     of(Family::Payload).any(|column| within(column, &tensor))
 }
 
-/// Mass moments and tensor of the same link.
-fn links(components: &[Component]) -> Vec<(usize, usize)> {
-    let of = |family: Family| {
-        let all = components.iter().enumerate();
-        all.filter(move |(_, c)| c.family == family)
-    };
-    let link = |c: &Component| c.name.rsplit_once('.').map(|(link, _)| link.to_owned());
-    of(Family::MassMoments)
-        .filter_map(|(a, moments)| {
-            let mut tensors = of(Family::Tensor);
-            let (b, _) = tensors.find(|(_, tensor)| link(tensor) == link(moments))?;
-            Some((a, b))
-        })
-        .collect()
+/// Two and more levels (density, first moments, tensor) of the same link.
+pub(crate) fn levels(components: &[Component]) -> Vec<Vec<usize>> {
+    let link = |c: usize| components[c].name.rsplit_once('.').map(|(link, _)| link);
+    let is_level = |c: &usize| components[*c].family.is_level();
+    let all: Vec<usize> = (0..components.len()).filter(is_level).collect();
+    let mut sets: Vec<Vec<usize>> = Vec::new();
+    for (place, &own) in all.iter().enumerate() {
+        let before = all[..place]
+            .iter()
+            .filter(|&&other| link(other) == link(own));
+        let pairs: Vec<Vec<usize>> = before.map(|&other| vec![other, own]).collect();
+        let whole = match &pairs[..] {
+            [a, b] => Some(vec![a[0], b[0], own]),
+            _ => None,
+        };
+        sets.extend(pairs);
+        sets.extend(whole);
+    }
+    sets
 }
 
 /// Torque of the columns of each component, `[state * joints + joint]`; components that are no number at a state have none.

@@ -5,11 +5,12 @@
 //! has 350 inertial columns on its joints with payload, mass moments and tensors; they are combinations of 253 entries, and
 //! of 185 that are independent. Where few links have columns their own entries may be fewer: each joint has what is less.
 
+use super::course::Course;
 use super::expression::{Graph, Id, Slot, Tape};
 use super::model_column::{ModelColumn, ModelColumns, Scratch};
 use super::recipes::Recipes;
 use crate::lanes::Aligned;
-use crate::robot::{Motion, Robot, regrouped};
+use crate::robot::{Robot, regrouped};
 use std::collections::BTreeMap;
 use std::ops::DerefMut;
 use std::sync::Arc;
@@ -183,7 +184,7 @@ impl Parts {
     /// Writes every part: `out[joint][part * stride + sample]`.
     pub(super) fn evaluate<T: Table>(
         &self,
-        motion: Motion<'_>,
+        course: Course<'_>,
         stride: usize,
         out: &mut [T],
         scratch: &mut Scratch,
@@ -193,7 +194,7 @@ impl Parts {
             counts,
             &self.tape,
             self.model.as_ref(),
-            motion,
+            course,
             (stride, out),
             scratch,
         );
@@ -223,15 +224,15 @@ pub(super) fn evaluate<T: Table>(
     counts: impl Iterator<Item = usize>,
     tape: &Tape,
     model: Option<&ModelColumns>,
-    motion: Motion<'_>,
+    course: Course<'_>,
     (stride, out): (usize, &mut [T]),
     scratch: &mut Scratch,
 ) {
     for (count, out) in counts.zip(out.iter_mut()) {
         out.resize(count * stride);
     }
-    tape.evaluate(motion, stride, out, &mut scratch.tape);
+    tape.evaluate(course, stride, out, &mut scratch.tape);
     if let Some(model) = model {
-        model.evaluate(motion, stride, out, scratch);
+        model.evaluate(course.motion, stride, out, scratch);
     }
 }

@@ -2,16 +2,14 @@
 
 use super::candidate::{Joint, Proposal};
 use super::expression::Graph;
-use super::model_column::LinkFrame;
-use super::payload::Mount;
+use super::inertial::inertial;
 use super::{
     Family, LibrarySettings, asymmetry, base_tilt, coulomb, coupled_friction, coupled_inertia,
-    encoder_zero, gain, generic, load_friction, mass_moments, mass_scale, motor_inertia, offset,
-    payload, potential, quadratic_friction, ripple, spring, stribeck, tensor, user, viscous,
+    encoder_zero, gain, generic, hysteresis, load_friction, motor_inertia, offset, potential,
+    quadratic_friction, ripple, spring, stribeck, user, viscous, warm_up,
 };
 use crate::error::{Error, Finding, Result, Severity};
-use crate::robot::spatial::{apply, transpose};
-use crate::robot::{Placement, Robot, did_you_mean, to_body_frame};
+use crate::robot::{Robot, did_you_mean};
 
 /// Most columns a library may have.
 const TERM_LIMIT: usize = 1000;
@@ -19,16 +17,6 @@ const TERM_LIMIT: usize = 1000;
 const MOST_JOINTS: usize = 64;
 /// Joints up to which the generic family is proposed unasked.
 const GENERIC_JOINTS: usize = 3;
-/// Prior sd of what a link's mass is off, as a share of it.
-const LINK_SHARE: f64 = 0.5;
-/// Prior sd of a payload as a share of all moving mass: about what arms are rated for.
-const PAYLOAD_SHARE: f64 = 0.3;
-/// Size of tools and workpieces, m.
-const PAYLOAD_REACH: f64 = 0.1;
-/// Share of all moving mass that counts for links that the model gives less.
-const LEAST_MASS_SHARE: f64 = 0.02;
-/// Length that makes first moments and tensors out of masses, m.
-const REACH: f64 = 0.2;
 
 /// Everything about a robot that the families ask for; `robot` is absent where a library is made for joints alone.
 pub(super) struct About<'a> {
@@ -110,7 +98,7 @@ pub(super) fn proposals(
         Some(motor_inertia::candidate(graph, joint).into())
     });
     if let Some(robot) = about.robot {
-        all.extend(inertial(robot, settings)?);
+        all.extend(inertial(robot, settings, findings)?);
         if settings.has(Family::Tilt) {
             all.push(base_tilt::proposal());
         }
@@ -167,130 +155,14 @@ pub(super) fn proposals(
         });
     }
     all.extend(ripples(graph, joints, settings)?);
-    Ok(all)
-}
-
-/// Payload and, link by link, mass moments, tensor and mass scale: of the link that each moving joint carries.
-///
-/// Their prior is physical: a link's mass is off by half of it where it is off at all (of at least 2 % of all mass), a
-/// payload weighs three tenths of all that moves and is about 0.1 m large, and other lengths are 0.2 m. The link that carries the payload
-/// has the payload's: what both can say is told by prior odds alone, not by whose prior happens to fit.
-fn inertial(robot: &Robot, settings: &LibrarySettings) -> Result<Vec<Proposal>> {
-    let names = robot.bodies();
-    let parameters: Vec<[f64; 10]> = (0..names.len())
-        .map(|body| robot.parameters_of_body(body))
-        .collect();
-    let total: f64 = parameters.iter().map(|parameters| parameters[0]).sum();
-    let links: Vec<LinkFrame> = names
-        .into_iter()
-        .filter_map(|link| {
-            let (body, placement) = robot.body_of_link(link)?;
-            Some(LinkFrame {
-                name: link.to_owned(),
-                body,
-                to_body: to_body_frame(&at_centre_of_mass(robot, link, placement)),
-            })
-        })
-        .collect();
-    let payload = match settings.has(Family::Payload) {
-        true => Some(payload_mount(robot, settings)?),
-        false => None,
-    };
-    let payload_mass = if total > 0.0 {
-        PAYLOAD_SHARE * total
-    } else {
-        1.0
-    };
-    let widths = |link: &LinkFrame| match &payload {
-        Some(mount) if mount.frame.body == link.body => mount.widths(payload_mass, PAYLOAD_REACH),
-        _ => {
-            let own = parameters[link.body][0].max(LEAST_MASS_SHARE * total);
-            let mass = if own > 0.0 { LINK_SHARE * own } else { 1.0 };
-            [mass, mass * REACH, mass * REACH * REACH]
-        }
-    };
-    let mut all = Vec::new();
-    if let Some(mount) = &payload {
-        all.push(payload::proposal(
-            mount,
-            mount.widths(payload_mass, PAYLOAD_REACH),
-        ));
+    if settings.has(Family::Hysteresis) {
+        all.extend(joints.iter().map(|joint| hysteresis::proposal(graph, joint)));
     }
-    let links = || links.iter();
-    if settings.has(Family::MassMoments) {
-        all.extend(links().map(|link| {
-            let [mass, moment, _] = widths(link);
-            mass_moments::proposal(link, mass, moment)
-        }));
-    }
-    if settings.has(Family::Tensor) {
-        all.extend(links().map(|link| tensor::proposal(link, widths(link)[2])));
-    }
-    if settings.has(Family::MassScale) {
-        all.extend(links().map(|link| mass_scale::candidate(link, parameters[link.body]).into()));
+    if settings.has(Family::WarmUp) {
+        let warm_up = joints.iter().map(|joint| warm_up::proposal(graph, joint, velocity));
+        all.extend(warm_up);
     }
     Ok(all)
-}
-
-/// The link's frame moved to the link's nominal centre of mass: about that point a change of mass, a shift of the centre
-/// and a change of the tensor are three things and not one (to first order).
-fn at_centre_of_mass(robot: &Robot, link: &str, placement: Placement) -> Placement {
-    let mut links = robot.description().links.iter();
-    let own = links.find(|other| other.name == link);
-    let inertia = own.and_then(|own| own.inertia.as_ref());
-    Placement {
-        translation: inertia.map_or(placement.translation, |inertia| {
-            placement.point(inertia.com)
-        }),
-        ..placement
-    }
-}
-
-/// The frame of `payload_frame`, or of the last link, and the centre of mass of the link that the body is named after.
-pub(super) fn payload_mount(robot: &Robot, settings: &LibrarySettings) -> Result<Mount> {
-    let name = match &settings.payload_frame {
-        Some(name) => name.as_str(),
-        None => last_link(robot),
-    };
-    let Some((body, placement)) = robot.body_of_link(name) else {
-        let links = robot.description().links.iter();
-        return Err(Error::Setting {
-            key: "library.payload_frame".to_owned(),
-            problem: format!("the model has no moving link `{name}`"),
-            remedy: did_you_mean(name, links.map(|link| link.name.as_str())),
-        });
-    };
-    let carrier = robot.bodies()[body];
-    let centre = match robot.body_of_link(carrier) {
-        Some((_, own)) => at_centre_of_mass(robot, carrier, own).translation,
-        None => placement.translation,
-    };
-    let from_frame = [0, 1, 2].map(|i| centre[i] - placement.translation[i]);
-    Ok(Mount {
-        centre: apply(&transpose(&placement.rotation), from_frame),
-        frame: LinkFrame {
-            name: name.to_owned(),
-            body,
-            to_body: to_body_frame(&placement),
-        },
-    })
-}
-
-/// Where a tool is mounted: the last of the links that move with the last body of the longest chain. Frames without
-/// inertia (`tool0`, `flange`) come behind the link that carries them; what hangs from a locked joint is a finger, and holds no tool.
-pub(super) fn last_link(robot: &Robot) -> &str {
-    let last = robot.bodies().len().saturating_sub(1);
-    let links = robot.links_of_body(last);
-    let mount = links.iter().rfind(|link| !hangs_from_locked(robot, link));
-    mount.or(links.last()).copied().unwrap_or("")
-}
-
-/// True if one of the joints between a link and the base is locked.
-fn hangs_from_locked(robot: &Robot, link: &str) -> bool {
-    let mut joints = robot.description().joints.iter();
-    joints.find(|joint| joint.child == link).is_some_and(|own| {
-        robot.locked().contains_key(&own.name) || hangs_from_locked(robot, &own.parent)
-    })
 }
 
 fn ripples(

@@ -49,7 +49,7 @@ pub(super) fn sentence(component: &Component, parameters: &[Estimate]) -> String
     }
     let text = match component.family {
         Family::Payload => payload(parameters),
-        Family::Gain | Family::LoadFriction | Family::MassScale => parameters
+        Family::Gain | Family::LoadFriction | Family::Density => parameters
             .first()
             .map(|p| format!("{} %", p.number(100.0)))
             .unwrap_or_default(),
@@ -69,7 +69,8 @@ fn one(p: &Estimate) -> String {
     format!("{} {}", p.number(1.0), p.unit)
 }
 
-/// Indices of the parameters that are worth telling, in their order: of a payload its mass, and where that is clear its centre; of a tilt all; of any
+/// Indices of the parameters that are worth telling, in their order: of a payload its mass, and where that is clear its centre, or its first
+/// moments where no mass is known; of a tilt all; of any
 /// other component the clearest three that are further from 0 than two spreads, at least one. None where no value is known.
 #[must_use]
 pub fn told(family: Family, parameters: &[Estimate]) -> Vec<usize> {
@@ -82,7 +83,12 @@ pub fn told(family: Family, parameters: &[Estimate]) -> Vec<usize> {
                 .is_some_and(|mass| clearness(mass) >= CLEAR);
             let centre = all.iter().take(CENTRE_ENDS).skip(1).filter(known).copied();
             let mass = all.iter().take(1).filter(known).copied();
-            mass.chain(centre.filter(|_| clear)).collect()
+            let open = parameters.first().is_none_or(|mass| mass.value.is_nan());
+            let moments = all.iter().skip(MOMENTS).filter(known).copied();
+            let moments = moments.filter(|_| open);
+            mass.chain(centre.filter(|_| clear))
+                .chain(moments)
+                .collect()
         }
         Family::Tilt => all.iter().filter(known).copied().collect(),
         Family::Spring => {
@@ -100,6 +106,8 @@ pub fn told(family: Family, parameters: &[Estimate]) -> Vec<usize> {
 
 /// A payload's mass is its first parameter, its centre of mass the next three.
 const CENTRE_ENDS: usize = 4;
+/// Its first moments are its last parameters.
+const MOMENTS: usize = 10;
 
 fn clearness(p: &Estimate) -> f64 {
     p.value.abs() / p.spread.max(f64::MIN_POSITIVE)
@@ -161,7 +169,15 @@ fn payload(parameters: &[Estimate]) -> String {
     };
     let com = &rest[..(CENTRE_ENDS - 1).min(rest.len())];
     if mass.value.is_nan() {
-        return MASS_NOT_SEEN.into();
+        let moments = rest.iter().skip(MOMENTS - 1);
+        let moments: Vec<String> = moments
+            .filter(|p| p.value.is_finite())
+            .map(|p| format!("{} {}", p.name, one(p)))
+            .collect();
+        return match moments.is_empty() {
+            true => MASS_NOT_SEEN.into(),
+            false => format!("{MASS_NOT_SEEN}, first moments {}", moments.join(", ")),
+        };
     }
     let mass_text = one(mass);
     // Without a clear mass there is no centre of it.

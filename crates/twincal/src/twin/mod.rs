@@ -15,7 +15,7 @@ use crate::error::{Error, Finding, Result};
 use crate::likelihood::JointNoise;
 use crate::posterior::Posterior;
 use crate::robot::{JointKind, Robot};
-use crate::signal::{Payload, Pipeline, Recording, Trajectory, align};
+use crate::signal::{Payload, Pipeline, Recording, Trajectory, align_part};
 use crate::term::{Family, Library, LibrarySettings};
 use serde::{Deserialize, Serialize};
 
@@ -97,9 +97,22 @@ impl Twin {
     /// A log as a trajectory for this twin: the filters it was fitted with, and its payload only where it was carried.
     ///
     /// # Errors
-    /// Those of [`align`].
+    /// Those of [`crate::signal::align`].
     pub fn align(&self, recording: &Recording) -> Result<(Trajectory, Vec<Finding>)> {
-        let (mut trajectory, findings) = align(&self.robot, recording, &self.pipeline)?;
+        self.align_part(recording, None)
+    }
+
+    /// The same of a part of a log whose first stamp is `start`, s.
+    ///
+    /// # Errors
+    /// Those of [`crate::signal::align`].
+    pub fn align_part(
+        &self,
+        recording: &Recording,
+        start: Option<f64>,
+    ) -> Result<(Trajectory, Vec<Finding>)> {
+        let (mut trajectory, findings) =
+            align_part(&self.robot, recording, start, &self.pipeline)?;
         trajectory.payload_acts =
             !self.payload_where_unknown || recording.payload == Payload::Unknown;
         Ok((trajectory, findings))

@@ -104,9 +104,13 @@ impl HeldOut {
         let mut collected = self.collect(log.name(), rows_about(log, &twin.pipeline)?);
         let names = twin.robot.joint_names();
         let whole = matches!(log, Log::Whole(_));
+        let start = match log {
+            Log::Whole(_) => None,
+            Log::Long(long) => long.start(),
+        };
         let mut part = |recording: &Recording, said: &mut Vec<Finding>| -> Result<Trajectory> {
             recording.require_torque(&names)?;
-            let (mut trajectory, more) = twin.align(recording)?;
+            let (mut trajectory, more) = twin.align_part(recording, start)?;
             said.extend(more);
             if whole {
                 said.extend(without_incidents(twin, &mut trajectory));

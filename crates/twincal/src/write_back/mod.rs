@@ -19,7 +19,7 @@ pub use links::LinkChange;
 pub use projection::Projection;
 pub use torque_error::JointTorqueError;
 
-use crate::calibrate::{Calibration, Verdict};
+use crate::calibrate::{Calibration, Status};
 use crate::error::Result;
 use crate::evaluator::{States, rms};
 use crate::robot::{Robot, RobotDescription};
@@ -66,7 +66,7 @@ pub struct Written {
     pub nearest: bool,
 }
 
-/// A component that the file cannot hold, or that is too uncertain to be written.
+/// A component that the file cannot hold, or that is not established.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Residual {
     /// Name of the component.
@@ -121,8 +121,6 @@ pub struct Writer<'a> {
 
 /// Share by which a number in the file may differ from the one in words before both are told: words round, too.
 const AS_TOLD: f64 = 0.02;
-/// A component of a group that nobody can tell apart is written with the others from this probability on.
-const SHARE_OF_GROUP: f64 = 0.05;
 
 impl<'a> Writer<'a> {
     /// Prepares the write-back of a calibration into a file that holds this.
@@ -140,8 +138,7 @@ impl<'a> Writer<'a> {
         })
     }
 
-    /// The model average: every component with a probability of 0.5 or more that the data see, with E[β | y]. Where
-    /// several components cannot be told apart but one of them must be there, all of them that count and are seen.
+    /// The established effects with E[β | y]; all others stay beside the file, so that both together are the model average.
     ///
     /// # Errors
     /// [`crate::Error::Refused`] where no physical inertia can be found.
@@ -164,18 +161,12 @@ impl<'a> Writer<'a> {
         self.write(&chosen, beta)
     }
 
-    /// Components that the data speak for.
+    /// The effects that are established.
     fn chosen(&self) -> Vec<bool> {
-        let components = &self.calibration.components;
-        let mut chosen: Vec<bool> = components.iter().map(|c| c.selected).collect();
-        for group in self.calibration.groups.iter().filter(|g| g.pip >= 0.5) {
-            for (component, chosen) in components.iter().zip(&mut chosen) {
-                let seen = component.verdict != Some(Verdict::NotSeen);
-                let counts = seen && component.pip.unwrap_or(0.0) >= SHARE_OF_GROUP;
-                *chosen |= counts && group.members.contains(&component.name);
-            }
-        }
-        chosen
+        let components = self.calibration.components.iter();
+        components
+            .map(|own| own.status == Status::Established)
+            .collect()
     }
 
     /// The write-back of coefficients `beta` for the `chosen` components.
@@ -246,7 +237,7 @@ impl<'a> Writer<'a> {
         let components = &self.calibration.components;
         let judged = |column: usize| {
             let own = &components[self.component(column)];
-            own.pip.is_some() && own.verdict != Some(Verdict::NotSeen)
+            own.pip.is_some() && own.status != Status::Unidentifiable
         };
         let columns = held.iter().enumerate();
         let absent = columns.filter(|(column, place)| place.is_none() && judged(*column));
@@ -372,7 +363,7 @@ impl<'a> Writer<'a> {
                 } else if chosen[index] {
                     reason(component.family, self.holds.format)
                 } else {
-                    "its probability is below 0.5, or these data do not see it".into()
+                    format!("it is {}, not established", component.status.word())
                 },
                 torque: self.states.rms(&alone),
                 coefficients: beside
@@ -460,13 +451,15 @@ fn reason(family: Family, format: &str) -> String {
         Family::Gain => "torque gains",
         Family::EncoderZero => "encoder zeros",
         Family::Ripple => "gear ripple",
+        Family::Hysteresis => "friction with hysteresis",
+        Family::WarmUp => "friction that changes with warmth",
         Family::Viscous
         | Family::Coulomb
         | Family::Payload
         | Family::PayloadTensor
         | Family::MassMoments
         | Family::Tensor
-        | Family::MassScale => "this",
+        | Family::Density => "this",
     };
     let article = if format.starts_with('M') { "an" } else { "a" };
     format!("{article} {format} cannot hold {what}")

@@ -263,6 +263,7 @@ fn the_metric_is_the_square_of_the_torque_between_two_robots() {
             n: 900.0,
             n_eff: if j == 1 { 0.0 } else { 100.0 + 50.0 * j as f64 },
             autocorrelation_time: 1.0,
+            misfit: 1.0,
             interval_factor: 1.0,
             out_of_band: 0.0,
             spread: Spread::default(),

@@ -186,7 +186,7 @@ fn calibrated(log: Log<'static>) -> Calibration {
 }
 
 fn selected(result: &Calibration) -> Vec<&str> {
-    let all = result.components.iter().filter(|c| c.selected);
+    let all = result.components.iter().filter(|c| c.is_in());
     all.map(|component| component.name.as_str()).collect()
 }
 

@@ -123,10 +123,10 @@ BUGS = [
         "level: 1.0,",
     ),
     (
-        "sds of two halves added instead of their squares",
-        "calibrate/repeat.rs",
-        "first_sd.hypot(second_sd)",
-        "(first_sd + second_sd)",
+        "blocks of left-out rows counted as one",
+        "calibrate/left_out.rs",
+        "(square / (count - 1.0) / count).sqrt()",
+        "(square / (count - 1.0)).sqrt()",
     ),
     (
         "the expected number of a family spread over all components",

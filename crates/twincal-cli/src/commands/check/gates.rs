@@ -190,6 +190,7 @@ pub(super) mod tests {
             n: 90.0,
             n_eff: 90.0,
             autocorrelation_time: 1.0,
+            misfit: 1.0,
             interval_factor: 1.0,
             out_of_band: 0.0,
             spread: twincal::likelihood::Spread::default(),

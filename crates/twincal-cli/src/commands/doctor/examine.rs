@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::calibrate::{
-    Calibration, CalibrationSettings, ComponentSummary, Outlook, Verdict, calibrate, outlook,
+    Calibration, CalibrationSettings, ComponentSummary, Outlook, Status, calibrate, outlook,
 };
 use twincal::robot::Robot;
 use twincal::signal::{
@@ -416,7 +416,7 @@ impl Examination {
 
 /// Whether `lower` still finds what `usual` does: a cut-off below the motion's own band loses effects of acceleration.
 fn finds_all(lower: &Calibration, usual: &Calibration) -> bool {
-    let is_found = |component: &&ComponentSummary| component.verdict == Some(Verdict::Found);
+    let is_found = |component: &&ComponentSummary| component.status == Status::Established;
     let found: Vec<&str> = (lower.components.iter().filter(is_found))
         .map(|component| component.name.as_str())
         .collect();

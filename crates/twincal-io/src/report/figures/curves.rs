@@ -88,11 +88,10 @@ fn laws(curve: &Curve, components: &[ComponentSummary]) -> String {
     let mut open = Vec::new();
     for name in &curve.components {
         match components.iter().find(|own| own.name == *name) {
-            Some(ComponentSummary {
-                selected: false,
-                pip: Some(pip),
-                ..
-            }) => open.push(format!("{name} (PIP {})", text::probability(*pip))),
+            Some(own) if !own.is_in() && own.pip.is_some() => {
+                let pip = text::probability(own.pip.unwrap_or(0.0));
+                open.push(format!("{name} (PIP {pip})"));
+            }
             _ => found.push(name.as_str()),
         }
     }
@@ -117,7 +116,7 @@ mod tests {
         let (found, open) = {
             let of = |selected: bool| {
                 let mut all = calibration.components.iter();
-                all.find(|own| own.selected == selected && own.pip.is_some())
+                all.find(|own| own.is_in() == selected && own.pip.is_some())
             };
             (of(true).unwrap(), of(false).unwrap())
         };

@@ -37,7 +37,7 @@ pub(in crate::report) fn figure(
         return None;
     }
     let rows = rows(&components, live);
-    let selected = components.iter().filter(|t| t.selected).count();
+    let selected = components.iter().filter(|t| t.is_in()).count();
     let label = format!(
         "Bar chart of the inclusion probabilities of {live} candidates; {selected} reach one half."
     );
@@ -90,7 +90,7 @@ fn rows<'a>(components: &[&'a ComponentSummary], live: usize) -> Vec<Row<'a>> {
             .filter_map(|t| Some((*t, t.pip?)));
         let mut rest = 0;
         for (term, pip) in members {
-            if live <= MOST || pip >= LEAST || term.selected {
+            if live <= MOST || pip >= LEAST || term.is_in() {
                 rows.push(Row::Term(term, pip))
             } else {
                 rest += 1
@@ -150,7 +150,7 @@ fn draw(rows: &[Row<'_>], width: f64, label: &str) -> String {
                 svg.text("t", (left + 4.0, base), Anchor::Start, &text);
             }
             Row::Term(term, pip) => {
-                let class = if term.selected { "kept" } else { "left" };
+                let class = if term.is_in() { "kept" } else { "left" };
                 let hint = format!("{}: {}", term.name, probability(*pip));
                 if stacked {
                     let name = shorten(&term.name, width - left, 12.0);
@@ -207,9 +207,9 @@ pub(in crate::report) fn family_name(family: Family) -> &'static str {
         Family::MotorInertia => "motor inertia",
         Family::Payload => "payload",
         Family::PayloadTensor => "inertia of the payload",
-        Family::MassMoments => "mass and centre of mass",
+        Family::MassMoments => "centre of mass",
         Family::Tensor => "inertia tensor",
-        Family::MassScale => "mass scale",
+        Family::Density => "density",
         Family::Tilt => "gravity",
         Family::Spring => "spring",
         Family::Potential => "conservative torque of one joint",
@@ -222,6 +222,8 @@ pub(in crate::report) fn family_name(family: Family) -> &'static str {
         Family::Gain => "torque gain",
         Family::EncoderZero => "encoder zero",
         Family::Ripple => "gear ripple",
+        Family::Hysteresis => "friction with hysteresis",
+        Family::WarmUp => "friction that changes with warmth",
     }
 }
 
@@ -229,7 +231,7 @@ pub(in crate::report) fn family_name(family: Family) -> &'static str {
 mod tests {
     use super::*;
     use crate::report::fixture;
-    use twincal::calibrate::Verdict;
+    use twincal::calibrate::{Status, StatusReason};
 
     #[test]
     fn bars_are_as_long_as_their_probability() {
@@ -251,9 +253,9 @@ mod tests {
         assert!(!said(&components).contains("do not see"));
         let own = components
             .iter_mut()
-            .find(|c| !c.selected && c.pip.is_some());
+            .find(|c| !c.is_in() && c.pip.is_some());
         let own = own.unwrap();
-        own.verdict = Some(Verdict::NotSeen);
+        (own.status, own.reason) = (Status::Unidentifiable, StatusReason::WideAsPrior);
         let name = format!(">{}<", own.name);
         let drawn = figure(&components, |c| !c.is_unseen()).unwrap();
         assert!(drawn.read.contains("do not see") && !drawn.images[0].wide.contains(&name));

@@ -56,7 +56,10 @@ pub(in crate::report) fn figure(draws: &Draws, terms: &[TermSummary]) -> Option<
 /// How many coefficients are drawn and why, where it is not all, and what the numbers stand for that replace long names; empty
 /// where the figure says everything.
 pub(in crate::report) fn shown(draws: &Draws, terms: &[TermSummary]) -> String {
-    let kept = terms.iter().filter(|term| term.selected).count();
+    let kept = terms
+        .iter()
+        .filter(|term| term.seen && term.pip >= Some(0.5))
+        .count();
     let names: Vec<&str> = variables(draws, terms).iter().map(|v| v.name).collect();
     let drawn = names.len();
     let mut out = String::new();

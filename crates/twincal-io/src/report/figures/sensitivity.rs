@@ -6,19 +6,11 @@ use crate::report::figure::{Figure, Image, Legend};
 use crate::report::scale::{Scale, extent};
 use crate::report::svg::{Anchor, Svg};
 use crate::report::text::{probability, shorten};
-use twincal::calibrate::{Calibration, ComponentSummary, TermSummary};
+use twincal::calibrate::{ComponentSummary, TermSummary};
 
 const ROW: f64 = 19.0;
 /// An effect is drawn if its probability reaches this under any of the priors.
 const LEAST: f64 = MENTIONED;
-
-/// The other priors, by their place in [`TermSummary::pip_sensitivity`].
-const OTHERS: [(usize, &str); 4] = [
-    (0, "the slab’s variance ten times smaller"),
-    (2, "the slab’s variance ten times larger"),
-    (3, "fewer effects expected"),
-    (4, "more effects expected"),
-];
 
 /// The first live term of every component: a component is in or out with all its terms, which share its probabilities.
 pub(in crate::report) fn one_each(
@@ -81,60 +73,6 @@ pub(in crate::report) fn name<'a>(
     component.map_or(&term.term.name, |component| &component.name)
 }
 
-/// Components that some prior tried would decide otherwise about.
-pub(in crate::report) fn by_prior(
-    calibration: &Calibration,
-) -> impl Iterator<Item = &ComponentSummary> {
-    let terms = one_each(&calibration.terms).filter(|term| depends_on_prior(term));
-    terms.filter_map(|term| {
-        let own = |c: &&ComponentSummary| c.columns.contains(&term.term.name);
-        let own = calibration.components.iter().find(own);
-        own.filter(|component| !component.is_unseen())
-    })
-}
-
-/// What is not found and tells the torque of a found component, and is in under a prior that leaves that out.
-pub(in crate::report) fn instead_of(
-    component: &ComponentSummary,
-    calibration: &Calibration,
-) -> Vec<String> {
-    let under = |name: &str| {
-        let mut all = calibration.components.iter();
-        let own = all.find(|own| own.name == name && !own.is_unseen())?;
-        let mut terms = one_each(&calibration.terms);
-        let term = terms.find(|term| own.columns.contains(&term.term.name))?;
-        Some((own.selected, &term.pip_sensitivity))
-    };
-    let Some((_, own)) = under(&component.name) else {
-        return Vec::new();
-    };
-    let groups = calibration.groups.iter();
-    let groups = groups.filter(|group| group.members.contains(&component.name));
-    let others = groups.flat_map(|group| &group.members);
-    let takes_over = |name: &&String| {
-        under(name).is_some_and(|(found, other)| {
-            let mut each = own.iter().zip(other);
-            !found && each.any(|(own, other)| *own < 0.5 && *other >= 0.5)
-        })
-    };
-    others.filter(takes_over).cloned().collect()
-}
-
-/// Under which of the other priors an effect is likelier in than not.
-pub(in crate::report) fn priors_that_hold(
-    component: &ComponentSummary,
-    calibration: &Calibration,
-) -> Vec<&'static str> {
-    let mut terms = one_each(&calibration.terms);
-    let own = terms.find(|term| component.columns.contains(&term.term.name));
-    let holds = |prior: usize| {
-        let pip = own.and_then(|term| term.pip_sensitivity.get(prior));
-        pip.is_some_and(|pip| *pip >= 0.5)
-    };
-    let named = OTHERS.iter().filter(|(prior, _)| holds(*prior));
-    named.map(|(_, words)| *words).collect()
-}
-
 struct Row<'a> {
     name: &'a str,
     term: &'a TermSummary,
@@ -143,7 +81,7 @@ struct Row<'a> {
 }
 
 /// True if the decision at 0.5 is not the same under all priors tried.
-pub(in crate::report) fn depends_on_prior(term: &TermSummary) -> bool {
+fn depends_on_prior(term: &TermSummary) -> bool {
     let (low, high) = extent(term.pip_sensitivity.iter().copied().chain(term.pip));
     low < 0.5 && high >= 0.5
 }

@@ -36,16 +36,19 @@ pub(crate) fn dimensions(graph: &Graph, slides: impl Fn(usize) -> bool) -> Vec<D
         let dimension = match node {
             Node::Constant(_) => Dimension::Any,
             &Node::Variable(variable) => {
-                let (joint, time) = match variable {
-                    Variable::Position(joint) => (joint, 0.0),
-                    Variable::Velocity(joint) => (joint, -1.0),
-                    Variable::Acceleration(joint) => (joint, -2.0),
+                let known = |joint: usize, time: f64| {
+                    let slider = f64::from(u8::from(slides(joint)));
+                    Dimension::Known {
+                        length: slider,
+                        time,
+                        angle: 1.0 - slider,
+                    }
                 };
-                let slider = f64::from(u8::from(slides(joint)));
-                Dimension::Known {
-                    length: slider,
-                    time,
-                    angle: 1.0 - slider,
+                match variable {
+                    Variable::Position(joint) => known(joint, 0.0),
+                    Variable::Velocity(joint) => known(joint, -1.0),
+                    Variable::Acceleration(joint) => known(joint, -2.0),
+                    Variable::History(_) => Dimension::Any,
                 }
             }
             Node::Sum(_, parts) => parts

@@ -22,6 +22,8 @@ pub(crate) enum Variable {
     Position(usize),
     /// q̈ᵢ: only in images, never in a Lagrangian.
     Acceleration(usize),
+    /// A channel of the motion's history: only in images, as a coordinate of its own.
+    History(usize),
 }
 
 /// Functions of one argument.

@@ -5,7 +5,7 @@
 
 use super::graph::{Function, Graph, Id, Node, Variable};
 use crate::lanes::{LANES, Lane, Line, sin_cos, tanh};
-use crate::robot::Motion;
+use crate::term::Course;
 use std::collections::HashMap;
 use std::ops::DerefMut;
 
@@ -13,6 +13,9 @@ use std::ops::DerefMut;
 const GROUPS: usize = 8;
 /// Samples per block.
 const BLOCK: usize = GROUPS * LANES;
+
+/// A channel of which nothing is known.
+const UNKNOWN: &[f64] = &[0.0; BLOCK];
 
 /// One value for each sample of a block.
 type Block = [Lane; GROUPS];
@@ -95,9 +98,9 @@ impl Tape {
     }
 
     /// Computes all outputs; `out[table]` must hold its rows.
-    pub(crate) fn evaluate<T: DerefMut<Target = [f64]>>(
+    pub(crate) fn evaluate<'a, T: DerefMut<Target = [f64]>>(
         &self,
-        motion: Motion<'_>,
+        course: impl Into<Course<'a>>,
         stride: usize,
         out: &mut [T],
         scratch: &mut Scratch,
@@ -109,7 +112,7 @@ impl Tape {
         }
         let run = Run {
             tape: self,
-            motion,
+            course: course.into(),
             outputs: Outputs {
                 slots: &self.slots,
                 stride,
@@ -357,7 +360,7 @@ impl<T: DerefMut<Target = [f64]>> Outputs<'_, T> {
 /// One evaluation, compiled once per instruction set.
 struct Run<'a, T> {
     tape: &'a Tape,
-    motion: Motion<'a>,
+    course: Course<'a>,
     outputs: Outputs<'a, T>,
     registers: &'a mut [Line<Block>],
 }
@@ -366,7 +369,7 @@ impl<T: DerefMut<Target = [f64]>> pulp::WithSimd for Run<'_, T> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(mut self, simd: S) {
-        let len = self.motion.len;
+        let len = self.course.motion.len;
         let mut start = 0;
         while start < len {
             let width = BLOCK.min(len - start);
@@ -375,7 +378,7 @@ impl<T: DerefMut<Target = [f64]>> pulp::WithSimd for Run<'_, T> {
                     simd,
                     instruction,
                     self.registers,
-                    self.motion,
+                    self.course,
                     start,
                     width,
                     &mut self.outputs,
@@ -426,14 +429,14 @@ fn step<S: pulp::Simd, T: DerefMut<Target = [f64]>>(
     simd: S,
     instruction: &Instruction,
     registers: &mut [Line<Block>],
-    motion: Motion<'_>,
+    course: Course<'_>,
     start: usize,
     width: usize,
     outputs: &mut Outputs<'_, T>,
 ) {
     match *instruction {
         I::Load(r, variable) => {
-            let source = samples(motion, variable, start, width);
+            let source = samples(course, variable, start, width);
             let target = registers[r as usize].0.as_flattened_mut();
             target[..width].copy_from_slice(source);
             target[width..].fill(source[width - 1]); // the tail of the last block repeats a real sample
@@ -472,7 +475,7 @@ fn step<S: pulp::Simd, T: DerefMut<Target = [f64]>>(
             );
         }
         I::StoreVariable(variable, slot) => {
-            outputs.store(slot, start, samples(motion, variable, start, width));
+            outputs.store(slot, start, samples(course, variable, start, width));
         }
         I::StoreConstant(value, slot) => outputs.store(slot, start, &[value; BLOCK][..width]),
     }
@@ -480,8 +483,12 @@ fn step<S: pulp::Simd, T: DerefMut<Target = [f64]>>(
 
 /// Some samples of a variable.
 #[inline(always)]
-fn samples<'a>(motion: Motion<'a>, variable: Variable, start: usize, width: usize) -> &'a [f64] {
+fn samples<'a>(course: Course<'a>, variable: Variable, start: usize, width: usize) -> &'a [f64] {
+    let motion = course.motion;
     let (source, joint) = match variable {
+        Variable::History(channel) => {
+            return (course.channel(channel, start, width)).unwrap_or(&UNKNOWN[..width]);
+        }
         Variable::Position(joint) => (motion.q, joint),
         Variable::Velocity(joint) => (motion.qd, joint),
         Variable::Acceleration(joint) => (motion.qdd, joint),

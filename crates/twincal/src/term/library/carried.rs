@@ -1,6 +1,6 @@
 //! What a library says of the payload: where it is told, which columns it has, and whether motion tells its parts apart.
 
-use super::super::propose::last_link;
+use super::super::inertial::last_link;
 use super::Library;
 use crate::robot::Robot;
 

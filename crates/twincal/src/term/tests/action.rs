@@ -74,6 +74,7 @@ fn row_is_the_variation_of_the_discrete_action() {
                     Variable::Position(joint) => q[joint],
                     Variable::Velocity(joint) => qd[joint],
                     Variable::Acceleration(joint) => qdd[joint],
+                    Variable::History(_) => f64::NAN,
                 });
                 values[id.0 as usize].value
             };

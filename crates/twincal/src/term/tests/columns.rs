@@ -291,6 +291,7 @@ fn the_tape_computes_what_the_graph_says() {
             Variable::Position(joint) => q[joint * len + sample],
             Variable::Velocity(joint) => qd[joint * len + sample],
             Variable::Acceleration(joint) => qdd[joint * len + sample],
+            Variable::History(_) => f64::NAN,
         });
         let walked = values[id.0 as usize];
         // two evaluation orders: both within the bound

@@ -3,6 +3,7 @@
 mod action;
 mod arm;
 mod columns;
+mod frames;
 mod judgement;
 mod parser;
 mod parts;

@@ -12,7 +12,7 @@ fn value(text: &str) -> f64 {
     let values = bounded_values(&graph, |variable| match variable {
         Variable::Position(joint) => [0.3, -0.7][joint],
         Variable::Velocity(joint) => [1.1, 0.4][joint],
-        Variable::Acceleration(_) => f64::NAN,
+        Variable::Acceleration(_) | Variable::History(_) => f64::NAN,
     });
     values[id.0 as usize].value
 }

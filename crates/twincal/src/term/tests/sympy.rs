@@ -95,6 +95,7 @@ fn thirty_lagrangians_have_sympys_torque() {
                 Variable::Position(joint) => state.q[joint],
                 Variable::Velocity(joint) => state.qd[joint],
                 Variable::Acceleration(joint) => state.qdd[joint],
+                Variable::History(_) => f64::NAN,
             });
             for joint in 0..reference.joints {
                 let what = format!("D_{}({}) at state {s}", joint + 1, case.expression);

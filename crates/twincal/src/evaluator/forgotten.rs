@@ -1,0 +1,75 @@
+//! What a program loses because it knows one state and nothing of what was before.
+
+use crate::error::{Finding, Result, Severity};
+use crate::signal::Warmth;
+use crate::term::Family;
+use crate::twin::Twin;
+use crate::words::significant;
+
+/// PIP from which a component is named.
+const NAMED: f64 = 0.5;
+/// Standard deviations of a logged temperature that are reckoned with.
+const DEVIATIONS: f64 = 2.0;
+/// Components that are named.
+const MOST: usize = 4;
+
+/// What programs of a twin leave out: they take friction with hysteresis as that of steady sliding, and friction that changes with warmth as
+/// its mean. `None` where the twin remembers nothing.
+///
+/// # Errors
+/// Those of [`Twin::library`].
+pub fn forgotten(twin: &Twin) -> Result<Option<Finding>> {
+    let (library, posterior) = (twin.library()?, &twin.posterior);
+    let mut sizes = vec![(0.0, 0.0); library.components().len()];
+    for (column, &term) in library.columns().iter().enumerate() {
+        let own = &library.terms()[term];
+        let most = match own.family {
+            // Right after the reversal of a long way: e/r = -1 where the direction is +1.
+            Family::Hysteresis => 2.0,
+            Family::WarmUp if own.name.ends_with(".coulomb") => {
+                let joints = 0..library.joints();
+                let joint = joints
+                    .into_iter()
+                    .find(|&joint| library.columns_of_joint(joint).contains(&column));
+                let history = joint.and_then(|joint| twin.pipeline.history.get(joint));
+                match history.and_then(|history| history.warmth) {
+                    Some(Warmth::Time { mean, .. }) => mean.max(1.0 - mean),
+                    Some(Warmth::Temperature { .. }) => DEVIATIONS,
+                    None => 0.0,
+                }
+            }
+            _ => continue,
+        };
+        let (size, pip) = &mut sizes[own.component];
+        *size += most * posterior.mean[column].abs();
+        *pip = posterior.inclusion[column].max(*pip);
+    }
+    let named = library.components().iter().zip(&sizes);
+    let named: Vec<String> = named
+        .filter(|(_, (_, pip))| *pip >= NAMED)
+        .map(|(component, (size, _))| {
+            format!("`{}` by up to {}", component.name, significant(*size, 2))
+        })
+        .collect();
+    let (Some(first), count) = (named.first(), named.len()) else {
+        return Ok(None);
+    };
+    let shown = match count {
+        1 => first.clone(),
+        _ => named[..count.min(MOST)].join(", "),
+    };
+    let more = match count.saturating_sub(MOST) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    Ok(Some(Finding::new(
+        Severity::Note,
+        "program_forgets",
+        "",
+        format!(
+            "the program knows one state and nothing of what was before: it takes friction as that of steady sliding at mean warmth, which is \
+             off for {shown}{more} N·m (N), for some milliradians after a velocity reversal or in a cold robot; `twincal predict` follows the motion"
+        ),
+        count as u64,
+    )))
+}

@@ -1,0 +1,143 @@
+//! Decoys: functions of one joint's own state that no candidate is made of. What the candidates leave along them says
+//! how much of the residual comes again with the motion.
+
+use crate::observations::Part;
+use std::ops::AddAssign;
+
+/// Harmonics of the joint's position.
+const HARMONICS: usize = 8;
+/// 1, cos kq and sin kq, each alone and times the direction of motion.
+pub(super) const DECOYS: usize = 2 * (1 + 2 * HARMONICS);
+/// Speed within which the direction of motion changes, rad/s or m/s.
+const REVERSAL: f64 = 0.02;
+
+/// Sums over the moving rows of one joint; those of several parts add.
+///
+/// ```text
+/// φ = {1, cos k q, sin k q; k = 1…8} × {1, tanh(q̇/v)}        φᵀ[X | y],   φ_kᵀφ_k
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct JointDecoys {
+    /// Columns of the joint.
+    columns: usize,
+    /// φ_kᵀ[X | y], `k * (columns + 1) + column`.
+    cross: Vec<f64>,
+    /// φ_kᵀφ_k.
+    square: [f64; DECOYS],
+}
+
+impl Default for JointDecoys {
+    /// No rows yet.
+    fn default() -> Self {
+        Self {
+            columns: 0,
+            cross: Vec::new(),
+            square: [0.0; DECOYS],
+        }
+    }
+}
+
+impl JointDecoys {
+    /// Sums over the rows of a part as the fit weighs them.
+    pub(super) fn of(part: &Part<'_>, joint: usize) -> Self {
+        let (all, rows) = (part.observations, &part.observations.joints[joint]);
+        let signals = rows.signals();
+        let width = signals + 1;
+        let mut sums = vec![0.0; DECOYS * width];
+        let mut square = [0.0; DECOYS];
+        rows.visit_signals(all.len(), part.rows.clone(), &mut |range, columns| {
+            let motion = [&all.q[joint], &all.qd[joint]];
+            let [q, qd] = motion.map(|values| values.some(range.clone()));
+            for (i, row) in range.enumerate() {
+                if rows.standstill[row] {
+                    continue;
+                }
+                let weight = rows.weight.get(row).copied().unwrap_or(1.0);
+                let decoys = decoys(q[i], qd[i]);
+                for ((phi, sums), square) in (decoys.iter())
+                    .zip(sums.chunks_exact_mut(width))
+                    .zip(&mut square)
+                {
+                    let weighted = weight * phi;
+                    *square += weighted * phi;
+                    for (signal, sum) in sums[..signals].iter_mut().enumerate() {
+                        *sum += weighted * columns.x[signal * columns.stride + i];
+                    }
+                    sums[signals] += weighted * rows.y[row];
+                }
+            }
+        });
+        let cross = match &rows.recipes {
+            None => sums,
+            Some(recipes) => (sums.chunks_exact(width))
+                .flat_map(|sums| {
+                    let mut columns = recipes.row(&sums[..signals]);
+                    columns.push(sums[signals]);
+                    columns
+                })
+                .collect(),
+        };
+        Self {
+            columns: rows.columns.len(),
+            cross,
+            square,
+        }
+    }
+
+    /// φ_kᵀφ_k.
+    pub(super) fn square(&self, decoy: usize) -> f64 {
+        self.square[decoy]
+    }
+
+    /// φ_kᵀX, one number per column of the joint; empty without rows.
+    pub(super) fn columns(&self, decoy: usize) -> &[f64] {
+        let first = decoy * (self.columns + 1);
+        self.cross
+            .get(first..first + self.columns)
+            .unwrap_or_default()
+    }
+
+    /// φ_kᵀ(y − Xβ); `beta` belongs to the columns of the joint.
+    pub(super) fn residual(&self, decoy: usize, beta: &[f64]) -> f64 {
+        let products = self.columns(decoy).iter().zip(beta);
+        let explained: f64 = products.map(|(x, beta)| x * beta).sum();
+        let torque = self.cross.get(decoy * (self.columns + 1) + self.columns);
+        torque.copied().unwrap_or(0.0) - explained
+    }
+}
+
+impl AddAssign<&JointDecoys> for JointDecoys {
+    /// # Panics
+    /// If the two belong to other columns (an empty default adopts the other's).
+    fn add_assign(&mut self, other: &JointDecoys) {
+        if self.cross.is_empty() {
+            *self = other.clone();
+            return;
+        }
+        assert_eq!(
+            self.columns, other.columns,
+            "sums over other columns do not add"
+        );
+        let sums = self.cross.iter_mut().zip(&other.cross);
+        sums.for_each(|(sum, other)| *sum += other);
+        let squares = self.square.iter_mut().zip(&other.square);
+        squares.for_each(|(sum, other)| *sum += other);
+    }
+}
+
+/// All decoys at one state.
+fn decoys(q: f64, qd: f64) -> [f64; DECOYS] {
+    let (direction, (sin, cos)) = ((qd / REVERSAL).tanh(), q.sin_cos());
+    let mut all = [0.0; DECOYS];
+    let (mut c, mut s) = (1.0, 0.0);
+    all[0] = 1.0;
+    for k in 1..=HARMONICS {
+        (c, s) = (c * cos - s * sin, s * cos + c * sin);
+        (all[2 * k - 1], all[2 * k]) = (c, s);
+    }
+    let (alone, directed) = all.split_at_mut(DECOYS / 2);
+    for (to, from) in directed.iter_mut().zip(alone) {
+        *to = direction * *from;
+    }
+    all
+}
