@@ -11,6 +11,7 @@
 
 use crate::robot::spatial::{Matrix, add, cross, dot, norm, scale, transpose};
 use crate::robot::{Body as Layout, Placement, Robot, principal_axes, to_body_frame};
+use std::f64::consts::PI;
 
 /// Least radius of gyration along an axis, as a share of the link's length.
 const LEAST_RADIUS: f64 = 0.1;
@@ -24,6 +25,8 @@ const REACH: f64 = 0.2;
 const CROSSING: f64 = 0.05;
 /// Length of a uniform rod per radius of gyration.
 const ROD: f64 = 3.464_101_615_137_754_6;
+/// Mean density below which nothing that a robot is made of lies, kg/m³: foam has more.
+const LIGHTEST: f64 = 20.0;
 /// Rounding in second moments of a plate or a rod, as a share of the largest.
 const ROUNDING: f64 = 1e-9;
 
@@ -45,7 +48,7 @@ pub(super) struct Body {
     pub(super) mass: f64,
     /// Centre of mass in the body's frame, m.
     pub(super) centre: [f64; 3],
-    /// Length of the link, m.
+    /// Length of the link between its axes and its centre of mass, m; 0 where they meet.
     pub(super) length: f64,
     /// Second moments about the centre, with their floor, kg·m².
     pub(super) second: Matrix,
@@ -62,7 +65,6 @@ pub(super) fn bodies(robot: &Robot) -> Vec<Body> {
     let lengths: Vec<f64> = (0..layout.len())
         .map(|b| length(layout, b, centres[b]))
         .collect();
-    let arm: f64 = lengths.iter().sum();
     let all = |index: usize| {
         let least = LEAST_MASS * moved[index];
         let link = robot.body_of_link(names[index]);
@@ -73,7 +75,7 @@ pub(super) fn bodies(robot: &Robot) -> Vec<Body> {
             ..floored(
                 &robot.parameters_of_body(index),
                 (least, centres[index]),
-                (lengths[index], arm),
+                lengths[index],
             )
         }
     };
@@ -154,35 +156,27 @@ fn length(layout: &[Layout], body: usize, centre: [f64; 3]) -> f64 {
     longest
 }
 
-/// Prior of a body with these parameters, at least `least` kg of mass about `centre`, `length` between its axes, on an arm of `arm` metres.
-fn floored(nominal: &Ten, (least, centre): (f64, [f64; 3]), (length, arm): (f64, f64)) -> Body {
+/// Prior of a body with these parameters, at least `least` kg of mass about `centre`, `length` metres between its axes.
+fn floored(nominal: &Ten, (least, centre): (f64, [f64; 3]), length: f64) -> Body {
     let light = nominal[0] < least;
     let mass = nominal[0].max(least);
     let (moments, axes) = principal_axes(&second_moments(nominal, centre));
     let largest = moments[2].max(0.0);
-    // A radius beyond the whole arm is no measure of a link.
-    let far = arm > 0.0 && largest > nominal[0] * arm * arm;
-    let rod = match light || far {
+    let hollow = density(nominal[0], moments) < LIGHTEST;
+    let rod = match light || hollow {
         true => 0.0,
         false => ROD * (largest / mass).sqrt(),
     };
-    let length = match length.max(rod) {
+    let size = match length.max(rod) {
         0.0 => REACH,
-        length => length,
+        size => size,
     };
-    let radius = |share: f64| mass * (share * length).powi(2);
-    let most = if arm > 0.0 {
-        mass * arm * arm
-    } else {
-        f64::MAX
-    };
-    let kept = moments.map(|moment| match light || far {
-        true => radius(LEAST_RADIUS),
-        false => moment.clamp(radius(LEAST_RADIUS), most.max(radius(LEAST_RADIUS))),
-    });
+    let radius = |share: f64| mass * (share * size).powi(2);
+    // A tensor that is too large is at least as uncertain as it is large.
+    let kept = moments.map(|moment| moment.max(radius(LEAST_RADIUS)));
     let floored = match () {
         () if light => Some("hardly any mass"),
-        () if far => Some("an inertia tensor larger than the arm"),
+        () if hollow => Some("an inertia tensor too large for its mass"),
         () if moments[0] < -ROUNDING * moments[2].abs() => Some("an impossible inertia tensor"),
         () if moments[2] < radius(POINT) => Some("a point mass"),
         () => None,
@@ -208,6 +202,16 @@ fn floored(nominal: &Ten, (least, centre): (f64, [f64; 3]), (length, arm): (f64,
         body.shape = body.from_centre(&own);
     }
     body
+}
+
+/// Mean density of the uniform ellipsoid with that mass and those second moments (`m a²/5` for a half axis a), kg/m³; ∞ for plates and rods.
+fn density(mass: f64, moments: [f64; 3]) -> f64 {
+    let half_axes = moments.map(|moment| (5.0 * moment.max(0.0) / mass).sqrt());
+    let volume = 4.0 / 3.0 * PI * half_axes.iter().product::<f64>();
+    match volume > 0.0 {
+        true => mass / volume,
+        false => f64::INFINITY,
+    }
 }
 
 /// Second moments of mass about `centre`, from parameters about the origin.

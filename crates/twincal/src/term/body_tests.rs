@@ -87,7 +87,7 @@ fn parameters(points: &[(f64, [f64; 3])]) -> Ten {
 fn body(points: &[(f64, [f64; 3])]) -> Body {
     let ten = parameters(points);
     let centre = [1, 2, 3].map(|k| ten[k] / ten[0]);
-    let body = floored(&ten, (1e-9, centre), (1e-9, 0.0));
+    let body = floored(&ten, (1e-9, centre), 1e-9);
     Body {
         second: second_moments(&ten, centre),
         ..body
@@ -158,13 +158,22 @@ fn no_affine_map_changes_a_distance() {
     }
 }
 
+/// A ball of 1000 kg/m³: its second moments are m r²/5.
+#[test]
+fn a_balls_density_is_its_own() {
+    let radius: f64 = 0.07;
+    let mass = 1000.0 * 4.0 / 3.0 * PI * radius.powi(3);
+    let moment = 0.2 * mass * radius * radius;
+    assert!((density(mass, [moment; 3]) - 1000.0).abs() < 1e-9);
+}
+
 /// Placeholders have the floor's widths and a reason, honest bodies keep theirs.
 #[test]
 fn placeholders_have_a_floor() {
     let about = |mass: f64, moments: [f64; 3]| {
         let mut ten = [0.0; 10];
         (ten[0], ten[4], ten[7], ten[9]) = (mass, moments[0], moments[1], moments[2]);
-        floored(&ten, (0.05, [0.0; 3]), (0.4, 1.2))
+        floored(&ten, (0.05, [0.0; 3]), 0.4)
     };
     let radii = |body: &Body| [0, 1, 2].map(|i| (body.second[i][i] / body.mass).sqrt());
     let honest = about(2.0, [0.02, 0.02, 0.02]);
@@ -175,14 +184,14 @@ fn placeholders_have_a_floor() {
         (about(1e-6, [1e-9; 3]), "mass"),
         (about(2.0, [0.0; 3]), "point"),
         (about(2.0, [0.1, 0.01, 0.01]), "impossible"),
-        (about(2.0, [9.0, 9.0, 9.0]), "larger"),
+        (about(2.0, [9.0, 9.0, 9.0]), "too large"),
     ] {
         assert!(
             own.floored.is_some_and(|told| told.contains(reason)),
             "{own:?}"
         );
         let radii = radii(&own);
-        assert!(own.mass >= 0.05 && radii.iter().all(|r| *r >= 0.04 - 1e-12 && *r <= 1.2));
+        assert!(own.mass >= 0.05 && radii.iter().all(|r| *r >= 0.04 - 1e-12));
         assert!(own.shape[0] >= 0.05);
     }
     // A thin rod is a body: its width across is the floor's.

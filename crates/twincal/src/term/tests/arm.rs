@@ -210,8 +210,8 @@ fn generic_family_spans_the_inverse_dynamics_of_any_chain() {
 }
 
 /// The axis y is turned to z by half a right angle's sine and cosine, of which one is 6e-17: what that leaves of a torque that is zero by
-/// structure must not stand for anything. `∂/∂q cos q` is the torque of a payload's moment along z, whose
-/// tensor about the rod's centre of mass is zero: of one about the hinge, which the motor's inertia takes off.
+/// structure must not stand for anything. `∂/∂q cos q` is the torque of a payload's moment along z, here a mass at the rod's centre of mass
+/// without the moment of that along x; it has a tensor about the hinge, which the motor's inertia takes off.
 #[test]
 fn rounding_stands_for_nothing() {
     let inertia = Inertia {
@@ -244,7 +244,7 @@ fn rounding_stands_for_nothing() {
     let (library, _) = Library::propose(&robot, &settings).unwrap();
     assert_eq!(
         status_of(&library, "cos(q1)").to_string(),
-        "alias_of:hinge.motor_inertia, payload.mz"
+        "alias_of:hinge.motor_inertia, payload.m, payload.h1"
     );
     assert_eq!(
         status_of(&library, "sin(q1)").to_string(),
