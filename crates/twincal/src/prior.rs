@@ -35,15 +35,17 @@ pub struct PriorSettings {
 }
 
 /// What is in only with what, unless the user says otherwise: the Stribeck effect and asymmetry are changes of Coulomb friction,
-/// which no nominal model here contains, quadratic friction is one of viscous friction, and a coupled
-/// motor that has inertia has friction, which is the larger part of its torque. Hysteresis and warmth are changes of Coulomb friction, too.
-pub const HEREDITY: [(&str, &str); 6] = [
+/// which no nominal model here contains, quadratic friction is one of viscous friction, a coupled
+/// motor that has inertia has friction, which is the larger part of its torque, and a link whose centre of mass is elsewhere has another
+/// mass. Hysteresis and warmth are changes of Coulomb friction, too.
+pub const HEREDITY: [(&str, &str); 7] = [
     ("asymmetry", "coulomb"),
     ("stribeck", "coulomb"),
     ("quadratic_friction", "viscous"),
     ("coupled_inertia", "coupled_friction"),
     ("hysteresis", "coulomb"),
     ("warm_up", "coulomb"),
+    ("mass_moments", "density"),
 ];
 
 /// Factor on prior odds that settles a component: what the data say weighs nothing beside it (e^690).

@@ -203,8 +203,8 @@ impl Family {
     /// mass somewhere has a tensor about any other point: that of a payload is next to certain where the payload is in; not quite,
     /// because the tensor of a small payload near the link's own centre of mass is too small to be seen. A drive's zero is calibrated,
     /// while a constant is what is left on one motion of whatever else is missing: one arm of six joints in five has an offset. What is wrong
-    /// with a link is first of all how heavy it is: a centre of mass or a tensor that is off by itself is rarer. One geared joint
-    /// in twenty bends before it slides so far that it shows behind the row filter; one in a hundred warms while it is logged.
+    /// with a link is first of all how heavy it is, in one link of thirty, and then, which needs that, often where (one in four); a tensor that is off by
+    /// itself is rarer. One geared joint in twenty bends before it slides so far that it shows behind the row filter; one in a hundred warms while it is logged.
     #[must_use]
     pub fn usual(self) -> Option<f64> {
         match self {
@@ -213,7 +213,8 @@ impl Family {
             Self::PayloadTensor => Some(0.999),
             Self::Offset => Some(1.0 / 30.0),
             Self::Density => Some(1.0 / 30.0),
-            Self::MassMoments | Self::Tensor => Some(1.0 / 50.0),
+            Self::MassMoments => Some(1.0 / 4.0),
+            Self::Tensor => Some(1.0 / 50.0),
             Self::Hysteresis => Some(1.0 / 20.0),
             Self::WarmUp => Some(1.0 / 100.0),
             _ => None,

@@ -248,6 +248,6 @@ fn rounding_stands_for_nothing() {
     );
     assert_eq!(
         status_of(&library, "sin(q1)").to_string(),
-        "alias_of:hinge.motor_inertia, payload.mx"
+        "alias_of:hinge.motor_inertia, payload.h1"
     );
 }
