@@ -58,8 +58,10 @@ fn of_the_file(component: &ComponentSummary, calibration: &Calibration) -> Optio
     let links = &robot.description().links;
     let inertia = links.iter().find(|own| own.name == link)?.inertia?;
     // Links that are fixed to it are part of the body whose tensor changes.
-    let (body, _) = robot.body_of_link(link)?;
-    let of_body = robot.links_of_body(body);
+    let of_body = match robot.body_of_link(link) {
+        Some((body, _)) => robot.links_of_body(body),
+        None => Vec::new(),
+    };
     let heavy = links.iter().filter(|own| own.inertia.is_some());
     if heavy
         .filter(|own| of_body.contains(&own.name.as_str()))

@@ -8,7 +8,7 @@ mod rivals;
 use crate::calibrate::{Calibration, Status};
 use crate::error::{Error, Finding, Result, Severity};
 use crate::posterior::draws::{CoefficientDraws, draw};
-use crate::term::{Estimate, Family, Library};
+use crate::term::{Before, Estimate, Family, Library};
 use crate::twin::Twin;
 use serde::Serialize;
 
@@ -350,9 +350,17 @@ fn change(
             None => rows.map(|_| vec![0.0; parameters.len()]).collect(),
         }
     });
+    // A payload's first moments are its mass and centre once more.
+    let twice = |name: &str| {
+        let family = library.components()[component].family;
+        family == Family::Payload && matches!(name, "mx" | "my" | "mz")
+    };
     let parameters: Vec<ParameterChange> = parameters
         .into_iter()
         .enumerate()
+        .filter(|(p, own)| {
+            !twice(&own.name) && library.before(component, *p) != Some(Before::Hidden)
+        })
         .map(|(p, parameter)| {
             let of = |side: usize| table[side].iter().map(move |row| row[p]);
             parameter_change(

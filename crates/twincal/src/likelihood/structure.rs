@@ -9,8 +9,8 @@ use crate::term::Family;
 const DEFAULT_EXPECTED: f64 = 5.0;
 /// Prior probability of a component that says what a more usual one says: so small that models which hold both, and share the
 /// effect between them in any way that the slabs allow, do not widen what is said of either (with 1/1000 a payload of
-/// 1.740 ± 0.002 kg was ± 0.055).
-const SECOND_CHOICE: f64 = 1e-6;
+/// 1.740 ± 0.002 kg was ± 0.055), and that one number (a last link's density) does not win over the payload's many.
+const SECOND_CHOICE: f64 = 1e-12;
 
 /// Family of every component, r_f of every family, and the inclusion prior, as [`crate::prior::Prior`] wants them.
 ///
@@ -20,7 +20,7 @@ const SECOND_CHOICE: f64 = 1e-6;
 /// b_f = C/m0 − 1             m0 components expected in total, families by their size
 /// b_f = C_f/m_f − 1          m_f expected of family f, where the user says so
 /// b_f = 1/p − 1              unasked, with the probability p of what is more or less usual than the rest ([`Family::usual`])
-/// b_f = 1e6 − 1              second choices, which no motion tells from something more usual (P(z = 1) = 1e-6)
+/// b_f = 1e12 − 1             second choices, which no motion tells from something more usual (P(z = 1) = 1e-12)
 /// ```
 /// What a payload's tensor adds to the payload's probability, as its child, is taken off: with and without tensor together have p.
 /// Second choices are a family of their own after the others unless the user says how many are expected of theirs, or how likely
@@ -253,14 +253,17 @@ mod tests {
         let mut some = columns(&[]);
         some.second_choice = (0..9).map(|c| c == 1 || c == 4).collect();
         // The third of their family is expected as the others are, m0 = 4.5 of 9.
-        near(expected(&some, &settings(None, &[])), [2.0, 0.500_002, 1.0]);
+        near(
+            expected(&some, &settings(None, &[])),
+            [2.0, 0.500_000_000_002, 1.0],
+        );
         let mine = [(Family::Spring, 0.3)];
         near(expected(&some, &settings(None, &mine)), [2.0, 0.3, 1.0]);
         let half = Some(Inclusion::Probability(0.25));
         near(expected(&some, &settings(half, &[])), [1.0, 0.75, 0.5]);
         some.forced[1] = true;
         let one = expected(&some, &settings(None, &[]))[1];
-        assert!((one - 1.500_001).abs() < 1e-12, "{one}");
+        assert!((one - 1.500_000_000_001).abs() < 1e-12, "{one}");
     }
 
     /// Out, in without its tensor, in with it: 2/3, and of the other third 1 in 1000 without.

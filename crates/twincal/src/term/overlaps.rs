@@ -45,7 +45,7 @@ pub(super) fn spanning(library: &Library, joints: usize, states: &[Motions]) -> 
         .collect()
 }
 
-/// True if in every motion the tensor of the payload can do what its mass or a first moment does: then motion says nothing of the one
+/// True if in every motion the tensor of the payload can do what some mass with first moments does: then motion says nothing of the one
 /// without the other.
 pub(super) fn payload_is_one(library: &Library, joints: usize, states: &[Motions]) -> bool {
     let terms = library.columns().iter().map(|&term| &library.terms()[term]);
@@ -61,8 +61,21 @@ pub(super) fn payload_is_one(library: &Library, joints: usize, states: &[Motions
         let own = pairs.filter(move |(_, (_, own))| *own == family);
         own.map(|(column, _)| column)
     };
-    let tensor = basis(of(Family::PayloadTensor));
-    of(Family::Payload).any(|column| within(column, &tensor))
+    let rank = |columns: &mut dyn Iterator<Item = &Vec<f64>>| {
+        let unit = |column: &Vec<f64>| column.iter().map(|x| x / norm(column)).collect();
+        let columns: Vec<Vec<f64>> = columns.map(unit).collect();
+        let mut directions: Vec<Vec<f64>> = Vec::new();
+        for column in &columns {
+            let rest = outside(column, &directions);
+            let left = norm(&rest);
+            if left > TOLERANCE {
+                directions.push(rest.iter().map(|value| value / left).collect());
+            }
+        }
+        directions.len()
+    };
+    let parts = [Family::Payload, Family::PayloadTensor].map(|family| rank(&mut of(family)));
+    rank(&mut all.iter()) < parts[0] + parts[1]
 }
 
 /// Two and more levels (density, first moments, tensor) of the same link.
