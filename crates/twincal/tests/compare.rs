@@ -35,10 +35,15 @@ fn calibrated(fore: f64, seed: u64) -> Calibration {
 fn with_status(twin: Twin) -> Calibration {
     let mut calibration = LOADED.clone();
     let library = twin.library().expect("a library");
-    for (&column, pip) in library.columns().iter().zip(&twin.posterior.inclusion) {
+    // A component's own probability is that of its first column.
+    let columns = library.columns().iter().zip(&twin.posterior.inclusion);
+    for (&column, pip) in columns.rev() {
         let own = &library.components()[library.terms()[column].component].name;
         let all = calibration.components.iter_mut();
-        let summary = all.into_iter().find(|c| c.name == *own).expect("a component");
+        let summary = all
+            .into_iter()
+            .find(|c| c.name == *own)
+            .expect("a component");
         summary.status = match pip {
             pip if *pip >= 0.95 => Status::Established,
             pip if *pip >= 0.2 => Status::Tentative,

@@ -386,7 +386,6 @@ pub(super) fn torque_deviation(joint: &Joint<'_>, which: Rows) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::verdict::Verdict;
     use super::super::verdict::tests::judged;
     use super::*;
     use crate::report::shape::tests::pit;

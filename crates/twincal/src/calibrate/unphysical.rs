@@ -19,12 +19,16 @@ const WORTH_TELLING: f64 = 0.5;
 const NO_BODY: &str = "; no rigid body has such an inertia";
 /// Rounding in the triangle inequality, as a share of the largest moment.
 const ROUNDING: f64 = 1e-9;
+/// The same share for a body that is nearly one: a point mass or a thin rod lies on the bound, and half of what is found of it beyond.
+const NEARLY: f64 = 0.01;
 
 /// A found inertia that is none.
 pub(super) struct Unphysical {
     finding: Finding,
     /// Share of the draws that are those of a rigid body.
     share: f64,
+    /// Whether most draws are not even nearly those of one.
+    is_far: bool,
     /// What was found of it.
     components: Vec<usize>,
 }
@@ -66,10 +70,10 @@ pub(super) fn findings(
         let across = ["Ixx", "Iyy"].map(|moment| hidden.contains(&format!("{name}.{moment}")));
         let whole = !across.contains(&true);
         let nominal = robot.parameters_of_body(body);
-        if !asked[body] || !is_physical(&nominal, whole) {
+        if !asked[body] || !is_physical(&nominal, whole, ROUNDING) {
             continue;
         }
-        let consistent = (0..count).filter(|row| {
+        let parameters = |row: usize| {
             let beta = &draws.beta[row * draws.columns..(row + 1) * draws.columns];
             let mut parameters = nominal;
             for (column, weights) in &columns[body] {
@@ -77,9 +81,13 @@ pub(super) fn findings(
                     *parameter += weight * beta[*column];
                 }
             }
-            is_physical(&parameters, whole)
-        });
-        let share = consistent.count() as f64 / count.max(1) as f64;
+            parameters
+        };
+        let share = |rounding: f64| {
+            let bodies = (0..count).filter(|row| is_physical(&parameters(*row), whole, rounding));
+            bodies.count() as f64 / count.max(1) as f64
+        };
+        let (share, nearly) = (share(ROUNDING), share(NEARLY));
         if share < WORTH_TELLING {
             let of_column = |(column, _): &(usize, [f64; 10])| {
                 library.terms()[library.columns()[*column]].component
@@ -90,6 +98,7 @@ pub(super) fn findings(
             all.push(Unphysical {
                 finding: finding(name, share),
                 share,
+                is_far: nearly < WORTH_TELLING,
                 components,
             });
         }
@@ -102,6 +111,7 @@ pub(super) fn tell(calibration: &mut Calibration, unphysical: Vec<Unphysical>) {
     for Unphysical {
         finding,
         share,
+        is_far,
         components,
     } in unphysical
     {
@@ -109,7 +119,9 @@ pub(super) fn tell(calibration: &mut Calibration, unphysical: Vec<Unphysical>) {
             let own = &mut calibration.components[component];
             own.rigid_share = Some(share);
             own.no_rigid_body = share < CONTRADICTS;
-            (own.status, own.reason) = (Status::Tentative, StatusReason::NoRigidBody { share });
+            if is_far {
+                (own.status, own.reason) = (Status::Tentative, StatusReason::NoRigidBody { share });
+            }
             own.words
                 .push_str(if own.no_rigid_body { NO_BODY } else { "" });
         }
@@ -144,12 +156,12 @@ fn finding(link: &str, share: f64) -> Finding {
 }
 
 /// Positive mass, and moments that a distribution of mass can have; without `whole` only the one about z.
-fn is_physical(parameters: &[f64; 10], whole: bool) -> bool {
+fn is_physical(parameters: &[f64; 10], whole: bool, rounding: f64) -> bool {
     let Some(inertia) = inertia_of(parameters) else {
         return false;
     };
     let ([small, middle, large], _) = principal_axes(&inertia.tensor);
-    let rounding = ROUNDING * (large.abs() + parameters[9].abs());
+    let rounding = rounding * (large.abs() + parameters[9].abs());
     if whole {
         small >= -rounding && small + middle >= large - rounding
     } else {
@@ -166,6 +178,7 @@ mod tests {
         // A thin rod of 1 kg and 1 m along x about its end, a plate, and a body whose moments no mass has.
         let rod = [1.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / 3.0, 0.0, 1.0 / 3.0];
         let plate = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, 0.0, 3.0];
+        let is_physical = |parameters: &[f64; 10], whole| is_physical(parameters, whole, ROUNDING);
         assert!(is_physical(&rod, true) && is_physical(&plate, true));
         let mut wrong = plate;
         wrong[9] = 3.01;
