@@ -129,6 +129,15 @@ mod tests {
         remarks(&calibration.components[0], &calibration)
     }
 
+    /// A component that counts as found.
+    fn found(calibration: &Calibration) -> ComponentSummary {
+        ComponentSummary {
+            pip: Some(1.0),
+            status: Status::Established,
+            ..calibration.components[0].clone()
+        }
+    }
+
     #[test]
     fn nothing_is_remarked_of_a_plain_effect() {
         assert_eq!(of(|_| ()), [""; 0]);
@@ -147,7 +156,7 @@ mod tests {
                 "",
                 0,
             )];
-            let mut own = calibration.components[0].clone();
+            let mut own = found(&calibration);
             (own.family, own.name) = (family, format!("{name}.x"));
             (of_a_point_mass(&own, &calibration), child)
         };
@@ -163,7 +172,7 @@ mod tests {
             let mut calibration = fixture::two_joints();
             let subject = "elbow";
             calibration.findings = vec![Finding::new(Severity::Note, code, subject, "", 0)];
-            let mut own = calibration.components[0].clone();
+            let mut own = found(&calibration);
             (own.family, own.name) = (family, format!("{subject}.x"));
             remarks(&own, &calibration)
         };
@@ -180,7 +189,7 @@ mod tests {
             let links = &robot.description().links;
             let link = links.iter().find(|link| link.inertia.is_some()).unwrap();
             let (name, before) = (link.name.clone(), link.inertia.unwrap().tensor[2][2]);
-            let mut own = calibration.components[0].clone();
+            let mut own = found(&calibration);
             own.name = format!("{name}.tensor");
             own.parameters.truncate(1);
             let value = &mut own.parameters[0];

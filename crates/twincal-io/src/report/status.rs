@@ -93,7 +93,7 @@ mod tests {
         );
         assert_eq!(
             of(error(0.008, 1.2)),
-            "lowers the error of left-out logs by 0.80\u{202f}%, 1.2 standard errors (2.1 needed)"
+            "lowers the error of left-out logs by 0.8\u{202f}%, 1.2 standard errors (2.1 needed)"
         );
         assert_eq!(
             of(error(-0.1, -3.0)),
@@ -106,7 +106,7 @@ mod tests {
         };
         assert_eq!(
             of(same(Alike::EveryMotion)),
-            "same torque as b.tensor, structurally; P(at least one) 0.980"
+            "same torque as b.tensor, structurally; P(at least one) 0.98"
         );
         assert!(of(same(Alike::TheseLogs)).contains(", in these logs only;"));
         assert_eq!(
