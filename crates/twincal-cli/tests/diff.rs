@@ -99,19 +99,26 @@ fn each_change_is_told_with_both_values_and_the_difference() {
     assert!(!words.out.contains("medians"), "{}", words.out);
 }
 
-/// A potential of a few standard errors is neither in nor out: "perhaps", in either direction.
+/// A potential of a few standard errors is neither in nor out: beside none it is perhaps new or gone, beside a clear one it changed.
 #[test]
 fn what_one_twin_leaves_open_is_perhaps() {
     let folder = folder();
     let potential = |size: f64| move |q2: f64, _: [f64; 2]| [0.0, (0.9 - size) * q2.cos()];
-    twin(folder.path(), "clear", common::QUICK, &potential(0.9));
-    twin(folder.path(), "weak", common::QUICK, &potential(WEAK));
-    for (before, after, mark) in [("clear", "weak", "gone"), ("weak", "clear", "new")] {
+    for (name, size) in [("none", 0.0), ("weak", WEAK), ("clear", 0.9)] {
+        twin(folder.path(), name, common::QUICK, &potential(size));
+    }
+    for (before, after, mark, word) in [
+        ("weak", "none", "perhaps gone", "perhaps_gone"),
+        ("none", "weak", "perhaps new", "perhaps_new"),
+        ("clear", "weak", "changed", "changed"),
+    ] {
         let (words, json) = diff(folder.path(), before, after);
-        let line = format!("  perhaps {mark}: gravity-like potential sin(q2) (PIP ");
+        let line = format!("  {mark}: gravity-like potential sin(q2) (PIP ");
         assert!(words.out.contains(&line), "{}", words.out);
-        let became = &component(&json, "sin(q2)")["became"];
-        assert_eq!(became, &format!("perhaps_{mark}"));
+        let own = component(&json, "sin(q2)");
+        assert_eq!(own["became"], word);
+        let status = &own["status"][usize::from(after == "weak")];
+        assert_eq!(status, "tentative", "{own}");
     }
 }
 
