@@ -30,10 +30,10 @@ pub mod likelihood;
 pub mod infer;
 pub mod plug_in;
 pub mod twin;
-pub mod compare;
 pub mod validate;
 pub mod cross_check;
 pub mod calibrate;
+pub mod compare;
 pub mod evaluator;
 pub mod write_back;
 

@@ -324,10 +324,6 @@ impl<'a> Writer<'a> {
                     place: match place {
                         Some(Place::Inertia { body, .. }) => {
                             let link = links::home(self, *body, component.family);
-                            if component.no_rigid_body {
-                                let own = change.links.iter_mut().find(|own| own.link == link);
-                                own.into_iter().for_each(|own| own.no_body = true);
-                            }
                             format!("link {link}")
                         }
                         Some(Place::Gravity(_)) | None => "gravity".into(),
