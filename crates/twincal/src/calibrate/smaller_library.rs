@@ -24,7 +24,11 @@ pub(super) struct Smaller {
 
 /// Whether nobody chose these families: the usual ones, with or without those that remember.
 pub(super) fn is_usual(families: &[Family]) -> bool {
-    let states = || Family::DEFAULT.into_iter().filter(|family| !family.remembers());
+    let states = || {
+        Family::DEFAULT
+            .into_iter()
+            .filter(|family| !family.remembers())
+    };
     *families == Family::DEFAULT || families.iter().copied().eq(states())
 }
 
@@ -38,8 +42,13 @@ pub(super) fn without_memory(refused: &Error, settings: &CalibrationSettings) ->
         return None;
     }
     let mut settings = settings.clone();
-    settings.library.families.retain(|family| !family.remembers());
-    let message = format!("too few rows for all candidates ({problem}): fitted without hysteresis and warm-up of friction");
+    settings
+        .library
+        .families
+        .retain(|family| !family.remembers());
+    let message = format!(
+        "too few rows for all candidates ({problem}): fitted without hysteresis and warm-up of friction"
+    );
     let finding = Finding::new(Severity::Note, "history_not_followed", "", message, 0);
     Some(Smaller { settings, finding })
 }
