@@ -152,10 +152,12 @@ fn an_element_that_bends_and_slips_is_explained_by_its_column() {
                 (all, worst)
             };
             let (whole, worst) = numbers(usize::MAX);
-            assert!(
-                worst < 0.02 * FRICTION,
-                "{signal:?}, {motion_interval}: {worst}"
-            );
+            // As logged, a thinned clock rounds off the corner where the element begins to slip.
+            let limit = match signal {
+                RowSignal::Filtered => 0.02 * FRICTION,
+                RowSignal::Raw => 0.05 * FRICTION,
+            };
+            assert!(worst < limit, "{signal:?}, {motion_interval}: {worst}");
             assert_eq!(whole, numbers(77).0);
         }
     }

@@ -1,6 +1,6 @@
 //! Columns that are combined from parts are the columns that are evaluated at once.
 
-use super::super::{Family, Library, LibrarySettings, Scratch};
+use super::super::{Course, Family, Library, LibrarySettings, Scratch};
 use crate::robot::{
     Inertia, JointDescription, JointKind, LinkDescription, Mimic, Motion, Robot, RobotDescription,
 };
@@ -58,13 +58,21 @@ fn compare(library: &Library, joints: usize) {
         qd: &qd,
         qdd: &qdd,
     };
+    // Any numbers for the channels of every joint.
+    let history: Vec<f64> = (0..4)
+        .flat_map(|k| wave(0.29 + 0.1 * f64::from(k)))
+        .collect();
+    let course = Course {
+        motion,
+        history: &history,
+    };
     let mut whole = vec![Vec::new(); joints];
-    library.evaluate(motion, &mut whole);
+    library.evaluate_with(course, &mut whole, &mut Scratch::default());
     // What stands between two signals is left alone.
     let (stride, apart) = (len + 3, 1e9);
     let counts = (0..joints).map(|joint| library.recipes(joint).parts());
     let mut parts: Vec<Vec<f64>> = counts.map(|count| vec![apart; count * stride]).collect();
-    library.evaluate_parts(motion, stride, &mut parts, &mut Scratch::default());
+    library.evaluate_parts(course, stride, &mut parts, &mut Scratch::default());
     let mut combined = Vec::new();
     for joint in 0..joints {
         let recipes = library.recipes(joint);
