@@ -92,7 +92,7 @@ fn case_90_and_91_chains_that_disagree_are_refused() {
     ];
     let terms = terms.map(|term| format!("\"{term}\""));
     let config = format!(
-        "{}[prior]\ninclusion = {{ probability = 0.5 }}\nslab = {{ scaled_variance = 0.02 }}\n\
+        "{}[noise]\nmodel = \"iid\"\n[prior]\ninclusion = {{ probability = 0.5 }}\nslab = {{ scaled_variance = 0.02 }}\n\
          [inference]\nmethod = \"gibbs\"\nchains = 4\ndraws = 100\nseed = 4\n",
         QUICK.replace("\"sin(q2)\"", &terms.join(", "))
     );

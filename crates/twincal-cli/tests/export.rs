@@ -313,4 +313,4 @@ fn what_is_not_established_stays_beside_the_file() {
 }
 
 /// Friction that these 400 rows leave open, N·m·s/rad.
-const WEAK: f64 = 0.004;
+const WEAK: f64 = 0.006;

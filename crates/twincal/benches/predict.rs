@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 use twincal::likelihood::JointNoise;
-use twincal::posterior::random::Random;
+use twincal::random::Random;
 use twincal::posterior::{Method, Model, Posterior};
 use twincal::twin::{JointInput, JointSetting, Predictor, TorqueSignal};
 

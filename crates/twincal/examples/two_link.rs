@@ -1,7 +1,7 @@
 //! The paper on one page: which effects does the model of an arm lack, and how sure is its torque?
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
-use twincal::posterior::random::Random;
+use twincal::random::Random;
 use twincal::robot::*;
 use twincal::signal::{Auto, Channels, Payload, Recording};
 use twincal::term::Family;

@@ -12,6 +12,7 @@ pub mod error;
 pub mod words;
 pub mod lanes;
 pub mod linear_algebra;
+pub mod random;
 pub mod diagnostics;
 pub mod robot;
 pub mod signal;

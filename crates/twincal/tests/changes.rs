@@ -5,7 +5,7 @@
 mod two_link;
 
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
-use twincal::posterior::random::Random;
+use twincal::random::Random;
 use twincal::signal::{Auto, Recording};
 use twincal::term::Family;
 use twincal::validate::{Change, ChangeKind, Changes, least_share};

@@ -9,7 +9,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use std::sync::LazyLock;
 use twincal::calibrate::{Calibration, CalibrationSettings, Status, calibrate};
 use twincal::compare::{Became, ParameterChange, compare, hindrances};
-use twincal::posterior::random::Random;
+use twincal::random::Random;
 use twincal::posterior::{Model, Posterior};
 use twincal::signal::Auto;
 use twincal::term::Family;

@@ -5,7 +5,7 @@
 mod two_link;
 
 use twincal::calibrate::{CalibrationSettings, calibrate};
-use twincal::posterior::random::Random;
+use twincal::random::Random;
 use twincal::signal::{Auto, Recording};
 use twincal::term::Family;
 use twincal::validate::{Split, Validation};

@@ -6,7 +6,7 @@ mod common;
 mod two_link;
 
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
-use twincal::posterior::random::Random;
+use twincal::random::Random;
 use twincal::robot::{Robot, Workspace, inverse_dynamics};
 use twincal::signal::Recording;
 use twincal::term::Family;

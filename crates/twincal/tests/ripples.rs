@@ -4,7 +4,7 @@ mod common;
 
 use std::f64::consts::TAU;
 use twincal::calibrate::{Calibration, CalibrationSettings, UnaskedRipple, calibrate};
-use twincal::posterior::random::Random;
+use twincal::random::Random;
 use twincal::robot::{
     Inertia, JointDescription, JointKind, LinkDescription, Robot, RobotDescription,
 };

@@ -9,7 +9,7 @@ use twincal::calibrate::{
     calibrate,
 };
 use twincal::likelihood::NoiseModel;
-use twincal::posterior::random::Random;
+use twincal::random::Random;
 use twincal::robot::Robot;
 use twincal::signal::{Auto, Recording};
 use twincal::term::Family;

@@ -6,7 +6,7 @@ mod two_link;
 
 use twincal::Finding;
 use twincal::calibrate::{CalibrationSettings, calibrate};
-use twincal::posterior::random::Random;
+use twincal::random::Random;
 use twincal::robot::Robot;
 use twincal::signal::{Auto, Payload, Recording};
 use twincal::term::Family;

@@ -5,7 +5,7 @@
 mod two_link;
 
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
-use twincal::posterior::random::Random;
+use twincal::random::Random;
 use twincal::robot::Robot;
 use twincal::signal::Auto;
 use twincal::term::Family;

@@ -7,7 +7,7 @@ mod two_link;
 
 use std::sync::Arc;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
-use twincal::posterior::random::Random;
+use twincal::random::Random;
 use twincal::robot::{Workspace, inverse_dynamics};
 use twincal::signal::{Auto, Log, LongLog, ReadChapter, Recording};
 use twincal::term::Family;

@@ -6,7 +6,7 @@ mod two_link;
 
 use std::sync::LazyLock;
 use twincal::calibrate::{Calibration, CalibrationSettings, Status, calibrate};
-use twincal::posterior::random::Random;
+use twincal::random::Random;
 use twincal::rows::{RowSignal, count_rows};
 use twincal::signal::{Auto, Log, Raw, choose_pipeline, prepare};
 use twincal::twin::Twin;

@@ -8,7 +8,7 @@
 //! The rows that are used come from q, q̇ and q̈ of ONE smooth motion: the encoder's positions through a low-pass, its first and
 //! its second derivative. For such a motion the two forms are the same number, and noise has no way to tell them apart.
 
-use twincal::posterior::random::Random;
+use twincal::random::Random;
 use twincal::robot::{
     Inertia, JointDescription, JointKind, LinkDescription, Motion, Robot, RobotDescription,
     nominal_torque,

@@ -7,7 +7,7 @@ mod two_link;
 
 use twincal::calibrate::{Calibration, CalibrationSettings, Stopped, calibrate};
 use twincal::likelihood::NoiseModel;
-use twincal::posterior::random::Random;
+use twincal::random::Random;
 use twincal::robot::{Workspace, inverse_dynamics};
 use twincal::signal::{Auto, Recording};
 use twincal::term::Family;

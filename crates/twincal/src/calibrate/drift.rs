@@ -257,7 +257,7 @@ fn mean_and_variance(values: &[f64]) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::posterior::random::Random;
+    use crate::random::Random;
 
     /// AR(1) residual (ρ = .8, sd 1) on a motion with a period of 40 rows, 2400 rows.
     fn run(random: &mut Random) -> (Vec<f64>, Vec<f64>, Vec<bool>) {

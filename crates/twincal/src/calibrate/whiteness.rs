@@ -202,7 +202,7 @@ fn variances(mut innovations: Vec<(f64, f64)>, rows: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::posterior::random::Random;
+    use crate::random::Random;
     use crate::signal::fir::column_kernel;
 
     /// Rows of the filter at 20 Hz, cycles per row.

@@ -145,7 +145,7 @@ impl Profile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::posterior::random::Random;
+    use crate::random::Random;
 
     /// Speeds 0 … 2 and noise of sd exp(−speed): ln g = −2·speed + constant.
     fn rows(random: &mut Random, count: usize, slope: f64) -> Vec<(f64, f64)> {

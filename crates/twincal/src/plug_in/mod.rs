@@ -256,20 +256,24 @@ pub fn residual_runs(training: &[Part<'_>], joint: usize, beta: &[f64]) -> Vec<V
 /// Integrated autocorrelation time of a joint's residual, rows, at least 1.
 pub fn residual_correlation_time(training: &[Part<'_>], joint: usize, beta: &[f64]) -> f64 {
     let runs = residual_runs(training, joint, beta);
-    let measured = training.iter().map(|part| {
-        let torque = part.observations.joints[joint]
-            .measured
-            .some(part.rows.clone());
-        torque.iter().map(|tau| tau * tau).sum::<f64>()
-    });
-    let left: f64 = runs.iter().flatten().map(|r| r * r).sum();
-    if left <= ROUNDING * measured.sum::<f64>() {
+    if is_rounding(training, joint, runs.iter().flatten().map(|r| r * r).sum()) {
         return 1.0; // rounding has no memory that means anything
     }
     let runs: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
     let cutoffs = training.iter().map(|part| part.observations.cutoff);
     let cutoff = cutoffs.fold(0.0, f64::max);
     memory::behind_filter(integrated_autocorrelation_time(&runs), cutoff)
+}
+
+/// Whether residual squares of a joint are what rounding leaves of its torque.
+fn is_rounding(training: &[Part<'_>], joint: usize, squares: f64) -> bool {
+    let measured = training.iter().map(|part| {
+        let torque = part.observations.joints[joint]
+            .measured
+            .some(part.rows.clone());
+        torque.iter().map(|tau| tau * tau).sum::<f64>()
+    });
+    squares <= ROUNDING * measured.sum::<f64>()
 }
 
 /// `w_j ∝ 1/s_j²` with n_j-weighted geometric mean 1. A joint without rows or without residual weighs like the mean.

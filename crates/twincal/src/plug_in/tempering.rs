@@ -7,7 +7,10 @@
 use super::decoys::JointDecoys;
 use super::left_out::{folds, interval_factors};
 use super::misfit::{Fold, misfit};
-use super::{Fit, FitSettings, Moving, fit_gram, residual_correlation_time, start, total, weights};
+use super::{
+    Fit, FitSettings, Moving, fit_gram, is_rounding, residual_correlation_time, start, total,
+    weights,
+};
 use crate::error::Result;
 use crate::likelihood::Columns;
 use crate::observations::Part;
@@ -56,7 +59,16 @@ pub fn fit_tempered(
         let found = misfit(measured, (columns, settings.prior), &fitted)?;
         let mut plug_in = fitted.plug_in.clone();
         plug_in.autocorrelation_time.clone_from(&times);
-        plug_in.misfit = found.largest();
+        plug_in.misfit = (found.largest().into_iter().enumerate())
+            .map(|(joint, largest)| {
+                let squares = found.variance[joint] * gram.joints[joint].n;
+                if is_rounding(training, joint, squares) {
+                    1.0
+                } else {
+                    largest
+                }
+            })
+            .collect();
         if settings.noise.per_joint {
             plug_in.weight = weights(&gram, &found.variance);
         }

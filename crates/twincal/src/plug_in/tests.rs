@@ -3,8 +3,8 @@
 use super::*;
 use crate::likelihood::{AUTO_SHAPE, NoiseUncertainty};
 use crate::observations::{JointObservations, Observations};
-use crate::posterior::random::Random;
 use crate::prior::Inclusion;
+use crate::random::Random;
 use crate::term::Family;
 
 const ROWS: usize = 300;

@@ -1,6 +1,6 @@
 //! Draws of one model's coefficients within their bounds.
 
-use super::random::Random;
+use crate::random::Random;
 use super::{Model, Site};
 use crate::linear_algebra::Cholesky;
 

@@ -1,7 +1,7 @@
 //! Joint posterior draws of structure, noise and coefficients (paper fig. 3; method section 7).
 
 use super::bounded::Law;
-use super::random::Random;
+use crate::random::Random;
 use super::{Model, Posterior};
 use std::sync::OnceLock;
 

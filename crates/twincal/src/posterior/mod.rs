@@ -4,7 +4,6 @@ mod bounded;
 mod covariance;
 pub mod draws;
 pub mod mixture;
-pub mod random;
 pub mod student;
 pub mod summary;
 

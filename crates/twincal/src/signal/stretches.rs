@@ -150,7 +150,7 @@ fn spread(
         if due < len.min(shortest) {
             continue;
         }
-        let stretches = (due / shortest).clamp(1, MOST_STRETCHES);
+        let stretches = (due / shortest.max(1)).clamp(1, MOST_STRETCHES);
         let (of_each, apart) = (due / stretches, len / stretches);
         kept.extend((0..stretches).map(|i| {
             let from = i * apart + (apart - of_each) / 2;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::posterior::random::Random;
+use crate::random::Random;
 
 type Four = [[f64; 4]; 4];
 

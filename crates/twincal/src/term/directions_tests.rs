@@ -1,5 +1,5 @@
 use super::*;
-use crate::posterior::random::Random;
+use crate::random::Random;
 
 /// Six directions whose torque has rank three: the prior of the torque, Σ image imageᵀ, stays what it was, by three directions.
 #[test]

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::posterior::draws::draw;
-use crate::posterior::random::Random;
+use crate::random::Random;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 

@@ -122,7 +122,7 @@ fn score(mut stretches: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::posterior::random::Random;
+    use crate::random::Random;
 
     #[test]
     fn a_score_holds_nineteen_of_twenty_rows() {

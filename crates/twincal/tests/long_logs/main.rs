@@ -8,7 +8,7 @@ mod motion;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex};
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
-use twincal::posterior::random::Random;
+use twincal::random::Random;
 use twincal::robot::{Workspace, inverse_dynamics};
 use twincal::signal::{Channels, Log, LongLog, Payload, ReadChapter, Recording, Shelf};
 use twincal::term::Family;

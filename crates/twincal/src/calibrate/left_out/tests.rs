@@ -4,7 +4,7 @@ use super::*;
 use crate::calibrate::testing::Regression;
 use crate::likelihood::{Columns, PlugIn, assemble};
 use crate::observations::{JointObservations, Observations};
-use crate::posterior::random::Random;
+use crate::random::Random;
 use crate::term::Family;
 
 const COLUMNS: usize = 4;

@@ -1,7 +1,7 @@
 //! Copies are found, recordings of one programme are not.
 
 use super::*;
-use crate::posterior::random::Random;
+use crate::random::Random;
 use crate::signal::{Channels, Payload};
 
 /// Sampling interval, s.

@@ -16,7 +16,7 @@ use super::sweep::Sweep;
 use super::target::{Noise, Squares, Target};
 use crate::error::Result;
 use crate::linear_algebra::Cholesky;
-use crate::posterior::random::Random;
+use crate::random::Random;
 
 /// Exchanges that a transition proposes; most are void.
 const EXCHANGES: usize = 4;

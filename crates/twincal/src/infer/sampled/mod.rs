@@ -20,7 +20,7 @@ use crate::likelihood::{
     AUTO_SHAPE, Columns, NoiseInterval, NoiseModel, NoiseSettings, PlugIn, assemble, auto_scale,
 };
 use crate::linear_algebra::Cholesky;
-use crate::posterior::random::Random;
+use crate::random::Random;
 use crate::posterior::{Method, Model, Posterior, Problem};
 use crate::prior::PriorSettings;
 use chain::Chain;

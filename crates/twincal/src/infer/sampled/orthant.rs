@@ -7,7 +7,7 @@
 use super::planted::planted;
 use crate::infer::moments::log_normal_mass;
 use crate::linear_algebra::Cholesky;
-use crate::posterior::random::Random;
+use crate::random::Random;
 
 /// See the module's text; the slab of θ is a standard normal, cut off and normalised likewise.
 pub(super) struct Orthant {

@@ -79,7 +79,7 @@ impl Sweep {
 mod tests {
     use super::*;
     use crate::linear_algebra::Cholesky;
-    use crate::posterior::random::Random;
+    use crate::random::Random;
 
     /// Against plain solves of the blocks; and the way back leads to where it began.
     #[test]

@@ -6,7 +6,7 @@ use super::planted::{self, BUGS};
 use super::target::{Noise, Target};
 use crate::diagnostics::mcse_mean;
 use crate::gram::{JointGram, Symmetric};
-use crate::posterior::random::Random;
+use crate::random::Random;
 use crate::prior::{Inclusion, Prior};
 
 const JOINTS: usize = 2;

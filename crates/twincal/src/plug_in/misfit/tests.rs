@@ -5,7 +5,7 @@ use super::super::{FitSettings, Moving, fit, start, total};
 use super::*;
 use crate::likelihood::NoiseModel;
 use crate::observations::Observations;
-use crate::posterior::random::Random;
+use crate::random::Random;
 use crate::term::Family;
 
 /// A joint that swings, with two columns (q̇ and q̈ like) and what no column describes: `unknown` times sin 3q.

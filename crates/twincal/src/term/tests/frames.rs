@@ -1,7 +1,7 @@
 //! The prior of a component's torque knows the bodies and the joints, not how a file writes them down.
 
 use super::super::{Family, Library, LibrarySettings};
-use crate::posterior::random::Random;
+use crate::random::Random;
 use crate::robot::spatial::{apply, axis_angle, norm, rotate_tensor, scale, transpose};
 use crate::robot::{
     Inertia, JointDescription, JointKind, LinkDescription, Motion, Placement, Robot,

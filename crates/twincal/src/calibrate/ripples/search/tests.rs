@@ -1,5 +1,5 @@
 use super::*;
-use crate::posterior::random::Random;
+use crate::random::Random;
 
 /// 60 s at 33 rows per second, back and forth over 4 rad at changing speed, with noise of 1 whose neighbours have correlation ρ.
 fn moved(rho: f64, seed: u64, ripple: impl Fn(f64) -> f64) -> Vec<Row> {
