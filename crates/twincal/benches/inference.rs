@@ -133,6 +133,7 @@ fn arm(size: usize) -> Problem {
                 .collect(),
             odds: vec![1.0; 3],
             lower: vec![f64::NEG_INFINITY; columns],
+            halves: Vec::new(),
             inclusion: Inclusion::ExpectedTerms(size as f64 / 3.0),
             shape: 1e-3,
             scale: 1e-3,

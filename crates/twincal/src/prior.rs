@@ -70,12 +70,45 @@ pub struct Prior {
     pub odds: Vec<f64>,
     /// β_k ≥ lower_k (≤ 0, so that 0 is allowed); −∞: free, K. The slab is truncated there and normalised again.
     pub lower: Vec<f64>,
+    /// Bounds on sums of coefficients; the slab of a model is truncated to what acts there and normalised again. Not kept where noise is
+    /// sampled ([`crate::infer::sample`]).
+    pub halves: Vec<HalfSpace>,
     /// Inclusion.
     pub inclusion: Inclusion,
     /// a0.
     pub shape: f64,
     /// b0, (N·m)².
     pub scale: f64,
+}
+
+/// `Σ factor · β_k ≥ lower` over the columns that are in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HalfSpace {
+    /// (column, factor), the first factor positive.
+    pub terms: Vec<(usize, f64)>,
+    /// At most 0.
+    pub lower: f64,
+    /// It acts where of each of these sets a column is in.
+    pub with: Vec<Vec<usize>>,
+    /// The column, first of `terms`, whose own bound this one and its mirror image imply. Without it the others would be exactly 0 where
+    /// `lower` is: such models have no probability.
+    pub replaces: Option<usize>,
+    /// Bounds of different groups share no column.
+    pub group: usize,
+}
+
+impl HalfSpace {
+    /// Whether it acts in a model with these columns.
+    pub fn acts(&self, inside: impl Fn(usize) -> bool) -> bool {
+        let mut sets = self.with.iter();
+        sets.all(|set| set.iter().any(|&k| inside(k)))
+    }
+
+    /// Whether it forbids a model with these columns.
+    pub fn forbids(&self, inside: impl Fn(usize) -> bool) -> bool {
+        let first = self.replaces.is_some_and(&inside);
+        self.replaces.is_some() && !first && self.lower == 0.0 && self.acts(inside)
+    }
 }
 
 impl Prior {
@@ -90,6 +123,7 @@ impl Prior {
         Self {
             component: (0..slab.len()).collect(),
             lower: vec![f64::NEG_INFINITY; slab.len()],
+            halves: Vec::new(),
             odds: vec![1.0; families],
             slab,
             family,

@@ -99,6 +99,33 @@ impl Random {
         }
     }
 
+    /// A standard normal number between two ends (Robert 1995).
+    pub fn normal_between(&mut self, [low, high]: [f64; 2]) -> f64 {
+        if high == f64::INFINITY {
+            return self.normal_above(low);
+        }
+        if low + high < 0.0 {
+            return -self.normal_between([-high, -low]);
+        }
+        // The interval's middle is on the positive side: |low| ≤ high.
+        let decay = low.max(1.0);
+        if (high - low) * decay > 1.5 {
+            loop {
+                let x = self.normal_above(low);
+                if x <= high {
+                    return x;
+                }
+            }
+        }
+        let least = low.max(0.0);
+        loop {
+            let x = low + (high - low) * self.uniform();
+            if self.uniform() <= (0.5 * (least * least - x * x)).exp() {
+                return x;
+            }
+        }
+    }
+
     /// φ ~ InvGamma(shape, scale), density ∝ φ^−(shape+1) e^(−scale/φ).
     pub fn inverse_gamma(&mut self, shape: f64, scale: f64) -> f64 {
         scale / self.gamma(shape)

@@ -9,6 +9,7 @@ mod correlate;
 mod cross_checked;
 mod curves;
 mod data;
+mod dissipative;
 mod drift;
 mod friction_only;
 mod groups;
@@ -191,7 +192,8 @@ fn road(
     lags = aligned::of_every_log(robot, &pipeline, settings, &trajectories, findings).or(lags);
     let every_candidate = library.clone();
     let (library, zero_columns) = data.drop_zero_columns(library);
-    let columns = columns_of(robot, &library, settings, data::tell_payload_apart(logs))?;
+    let mut columns = columns_of(robot, &library, settings, data::tell_payload_apart(logs))?;
+    columns.halves = dissipative::halves(robot, &library_settings, &columns, &data.hull(robot));
     findings.append(&mut data.findings);
     let cutoff_hz = pipeline.cutoff_hz;
     let too_few = |error| Ok(Road::TooFew(TooFew { error, cutoff_hz }));
@@ -425,6 +427,7 @@ fn columns_of(
         forced: Vec::new(),
         parent: Vec::new(),
         second_choice: Vec::new(),
+        halves: Vec::new(),
     };
     let mut named = Vec::new();
     let mut unknown: Vec<&String> = forced.iter().collect();

@@ -1,4 +1,5 @@
-//! Coefficients with bounds: the slab and the posterior of every model truncated to `β_k ≥ lower_k`.
+//! Coefficients with bounds: the slab and the posterior of every model truncated to `β_k ≥ lower_k` and, for sums that are bounded,
+//! `aᵀβ ≥ lower`.
 //!
 //! Truncating both multiplies the weight of a model by
 //!
@@ -13,15 +14,19 @@
 //! average. Where that moves weight to models that a method without bounds does not list, a search that knows the bounds
 //! lists them.
 
+mod acting;
 mod propagation;
 
 use super::answer::{Averages, Listed};
 use super::approximate;
 use super::search::Care;
-use super::standard::{Reduced, Standard, nudged, slab_mass};
+use super::moments::{FORBIDDEN, log_normal_mass};
+use super::standard::{Reduced, Standard, nudged};
 use crate::error::Result;
 use crate::linear_algebra::Cholesky;
-use crate::posterior::{Model, Problem, Site};
+use crate::posterior::{Model, Problem};
+use acting::Acting;
+pub(super) use acting::most_of_sums;
 use propagation::propagate;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -264,44 +269,33 @@ pub(super) fn truncate(
     positions: &[usize],
     weights: Weights,
 ) -> Result<f64> {
+    let Some(acting) = Acting::new(standard, positions) else {
+        return Ok(FORBIDDEN);
+    };
     let phi = model.scale / standard.shape;
     let count = positions.len();
     let factor = Cholesky::from_lower(model.factor.clone(), count);
-    let bounded: Vec<usize> = (0..count)
-        .filter(|&i| standard.lower[positions[i]] > f64::NEG_INFINITY)
-        .collect();
-    // The slab's mass at this model's φ instead of the full model's.
-    let misfit = standard.misfit(model.scale);
-    let mut log_ratio: f64 = bounded
-        .iter()
-        .map(|&i| {
-            let d = positions[i];
-            let mass = |weight: f64| slab_mass(standard.lower[d], standard.precision[d], weight);
-            (mass(2.0 * standard.shape) / mass(2.0 * standard.shape / misfit)).ln()
-        })
-        .sum();
-    // Covariance of the bounded coefficients, in units of φ.
-    let columns: Vec<Vec<f64>> = bounded
-        .iter()
-        .map(|&i| {
-            let mut x = vec![0.0; count];
-            x[i] = 1.0;
-            factor.solve(&mut x);
-            x
-        })
-        .collect();
-    let lower = |i: usize| standard.lower[positions[i]] / standard.natural(positions[i]);
+    let mut log_ratio = acting.slab_ratio(standard, positions, model.scale);
+    // A⁻¹ a of every bound, for the covariance in units of φ.
+    let solved = |terms: &[(usize, f64)]| {
+        let mut x = vec![0.0; count];
+        terms.iter().for_each(|&(i, f)| x[i] = f);
+        factor.solve(&mut x);
+        x
+    };
+    let columns: Vec<Vec<f64>> = acting.bounds.iter().map(|b| solved(&b.terms)).collect();
     let place = |a: usize| {
-        let i = bounded[a];
-        let sd = (phi * columns[a][i]).sqrt();
-        (sd, (model.mean[i] - lower(i)) / sd)
+        let bound = &acting.bounds[a];
+        let sd = (phi * bound.sum(&columns[a])).sqrt();
+        (sd, (bound.sum(&model.mean) - bound.lower) / sd)
     };
     if weights == Weights::Guided {
-        log_ratio -= (0..bounded.len())
-            .map(|a| super::moments::log_normal_mass(place(a).1))
-            .sum::<f64>();
+        let alone = |a: &usize| acting.bounds[*a].group.is_none();
+        let own = (0..columns.len()).filter(alone).map(place);
+        log_ratio -= own.map(|(_, t)| log_normal_mass(t)).sum::<f64>();
+        log_ratio -= acting.guided(standard, positions, model, &factor);
     }
-    let near: Vec<usize> = (0..bounded.len()).filter(|&a| place(a).1 < FAR).collect();
+    let near: Vec<usize> = (0..columns.len()).filter(|&a| place(a).1 < FAR).collect();
     if near.is_empty() {
         return Ok(log_ratio);
     }
@@ -309,11 +303,11 @@ pub(super) fn truncate(
     let correlation: Vec<f64> = near
         .iter()
         .flat_map(|&a| near.iter().map(move |&b| (a, b)))
-        .map(|(a, b)| phi * columns[a][bounded[b]] / (place(a).0 * place(b).0))
+        .map(|(a, b)| phi * acting.bounds[b].sum(&columns[a]) / (place(a).0 * place(b).0))
         .collect();
     let (log_mass, sites) = propagate(&score, &correlation);
     log_ratio += log_mass;
-    // Sites are in x = (β − lower)/sd: −½ τ x² + ν x.
+    // Sites are in x = (aᵀβ − lower)/sd: −½ τ x² + ν x.
     let mut matrix = multiply_transposed(&model.factor, count);
     let mut right = vec![0.0; count];
     for i in 0..count {
@@ -322,17 +316,15 @@ pub(super) fn truncate(
             .sum();
     }
     for (&a, (precision, shift)) in near.iter().zip(sites) {
-        let (i, sd) = (bounded[a], place(a).0);
+        let (bound, sd) = (&acting.bounds[a], place(a).0);
         let precision = phi * precision / (sd * sd);
-        let shift = phi * shift / sd + precision * lower(i);
-        matrix[i * count + i] += precision;
-        right[i] += shift;
-        model.sites.push(Site {
-            place: i as u32,
-            lower: lower(i),
-            precision,
-            shift,
-        });
+        let shift = phi * shift / sd + precision * bound.lower;
+        for &(i, f) in &bound.terms {
+            let others = bound.terms.iter();
+            others.for_each(|&(k, g)| matrix[i * count + k] += precision * f * g);
+            right[i] += shift * f;
+        }
+        model.sites.push(bound.site(precision, shift));
     }
     let factor =
         nudged(&matrix, count).map_err(|error| standard.singular(positions[error.pivot]))?;

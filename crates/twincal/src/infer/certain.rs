@@ -19,14 +19,14 @@
 //!
 //! A bound that is [`FAR`] sd away even so acts in no model that counts.
 
-use super::bounds::log_weight;
+use super::bounds::{log_weight, most_of_sums};
 use super::moments::{Moments, present};
 use super::search::climb;
 use super::standard::{Block, Reduced, Standard, nudged};
 use super::walker::Walker;
 use crate::linear_algebra::Cholesky;
 use crate::posterior::{Posterior, Problem};
-use crate::prior::{Prior, SETTLED};
+use crate::prior::{HalfSpace, Prior, SETTLED};
 use pulp::{Simd, WithSimd};
 
 /// ln of the share of the mass below which models are not visited: 4e-18, far below one ulp of the sum.
@@ -92,7 +92,18 @@ pub(super) fn components(
         prior,
         costs: standard.blocks.iter().map(cost).collect(),
         spread: (0..size).map(|d| inverse[d * size + d]).collect(),
-        factors: standard.blocks.iter().map(|b| b.factor.ln()).sum(),
+        factors: standard.blocks.iter().map(|b| b.factor.ln()).sum::<f64>() + most_of_sums(standard),
+        sums: standard
+            .halves
+            .iter()
+            .map(|half| {
+                let pairs = |&(i, f): &(usize, f64)| {
+                    let row = half.terms.iter().map(move |(j, g)| (i * size + j, f * g));
+                    row.map(|(entry, product)| product * inverse[entry]).sum::<f64>()
+                };
+                half.terms.iter().map(pairs).sum()
+            })
+            .collect(),
     };
     let reference = match prior.settled_structure() {
         Some(holds) => weight_of(standard, problem, &holds),
@@ -178,6 +189,8 @@ struct Bounds<'a> {
     spread: Vec<f64>,
     /// `Σ ln factor`.
     factors: f64,
+    /// `a'(A⁻¹) a` of each bound on a sum.
+    sums: Vec<f64>,
 }
 
 impl Bounds<'_> {
@@ -196,11 +209,20 @@ impl Bounds<'_> {
             reference,
             ..none(self.prior)
         };
+        let near: Vec<&HalfSpace> = (standard.halves.iter().zip(&self.sums))
+            .filter(|(half, spread)| {
+                let reach = (most.sqrt() + FAR * phi.sqrt()) * spread.sqrt();
+                let sum = half.terms.iter().map(|(d, f)| f * standard.center[*d]);
+                sum.sum::<f64>() - half.lower <= reach
+            })
+            .map(|(half, _)| half)
+            .collect();
+        let in_sums = |d: usize| near.iter().any(|half| half.terms.iter().any(|t| t.0 == d));
         for (block, cost) in standard.blocks.iter().zip(&self.costs) {
             let (_, outside) = self.prior.next(block.family, 0, 0);
             let bound = self.factors + outside.ln() - standard.shape * cost.ln_1p();
             certain.sure[block.component] = bound < least;
-            certain.settled[block.component] = block.range().all(far);
+            certain.settled[block.component] = block.range().all(|d| far(d) && !in_sums(d));
             certain.costs[block.component] = *cost;
         }
         // What holds a child holds its parent.

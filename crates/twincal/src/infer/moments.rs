@@ -5,6 +5,7 @@ use super::pivot::Pivot;
 use super::standard::Standard;
 use super::walker::{Step, Walker};
 use crate::linear_algebra::Cholesky;
+use crate::prior::HalfSpace;
 use statrs::function::erf::erfc;
 
 /// `E[δ]` and `Var[β]/φ` of every position, c, and the components of one model.
@@ -42,14 +43,44 @@ impl Moments {
             return 0.0;
         }
         let phi = 0.5 * (1.0 + self.excess) / standard.shape;
-        (0..self.delta.len())
+        let single: f64 = (0..self.delta.len())
             .filter(|&k| self.variance[k] > 0.0 && standard.lower[k] > f64::NEG_INFINITY)
             .map(|k| {
                 let beta = standard.center[k] + self.delta[k];
                 log_normal_mass((beta - standard.lower[k]) / (phi * self.variance[k]).sqrt())
             })
-            .sum()
+            .sum();
+        let inside = |d: usize| self.variance[d] > 0.0;
+        let beta = |d: usize| standard.center[d] + self.delta[d];
+        let sums = standard.halves.iter().map(|half| {
+            half_mass(half, inside, beta, |d| phi * self.variance[d])
+        });
+        single + sums.sum::<f64>()
     }
+}
+
+/// ln of the probability of a model that a bound forbids.
+pub(super) const FORBIDDEN: f64 = -1e4;
+
+/// ln of the mass above a bound on a sum if the coefficients were independent, of mean `beta` and this variance; 0 where it does not act.
+pub(super) fn half_mass(
+    half: &HalfSpace,
+    inside: impl Fn(usize) -> bool,
+    beta: impl Fn(usize) -> f64,
+    variance: impl Fn(usize) -> f64,
+) -> f64 {
+    if !half.acts(&inside) {
+        return 0.0;
+    }
+    if half.forbids(&inside) {
+        return FORBIDDEN;
+    }
+    let (mut mean, mut spread) = (0.0, 0.0);
+    for &(d, factor) in half.terms.iter().filter(|(d, _)| inside(*d)) {
+        mean += factor * beta(d);
+        spread += factor * factor * variance(d);
+    }
+    log_normal_mass((mean - half.lower) / spread.sqrt())
 }
 
 /// `ln Φ(t)`, also far below 0.

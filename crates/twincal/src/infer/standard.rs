@@ -17,6 +17,7 @@ use super::check::check;
 use crate::error::{Error, Result};
 use crate::linear_algebra::{Cholesky, NotPositiveDefinite};
 use crate::posterior::{Model, Problem};
+use crate::prior::HalfSpace;
 use statrs::function::erf::erfc;
 use statrs::function::gamma::ln_gamma;
 use std::ops::Range;
@@ -71,7 +72,9 @@ pub(super) struct Standard {
     pub(super) precision: Vec<f64>,
     /// Bounds, −∞ where free.
     pub(super) lower: Vec<f64>,
-    /// Some coefficient has a bound.
+    /// Bounds on sums, columns being positions and factors those of natural units; `lower` in its own.
+    pub(super) halves: Vec<HalfSpace>,
+    /// Some coefficient or sum has a bound.
     pub(super) bounded: bool,
     /// `a_n = a0 + n/2`.
     pub(super) shape: f64,
@@ -170,6 +173,7 @@ impl Standard {
             .zip(&scale)
             .map(|(&k, scale)| prior.lower[k] * scale / unit)
             .collect();
+        let halves = halves_in(&prior.halves, &order, |d| unit / scale[d]);
         let mut start = 0;
         let blocks = components
             .iter()
@@ -199,8 +203,9 @@ impl Standard {
             blocks,
             held: vec![0; prior.families()],
             log_held: 0.0,
-            bounded: lower.iter().any(|&l| l > f64::NEG_INFINITY),
+            bounded: lower.iter().any(|&l| l > f64::NEG_INFINITY) || !halves.is_empty(),
             lower,
+            halves,
             scale,
             unit,
             matrix,
@@ -344,6 +349,23 @@ impl Standard {
             sites: Vec::new(),
         })
     }
+}
+
+/// Bounds on sums with columns by position in `order`, and factors times `unit` there; those with a column that has no position are
+/// left out.
+fn halves_in(halves: &[HalfSpace], order: &[usize], unit: impl Fn(usize) -> f64) -> Vec<HalfSpace> {
+    let place = |k: usize| order.iter().position(|&own| own == k);
+    let set = |own: &Vec<usize>| own.iter().map(|&k| place(k)).collect::<Option<Vec<_>>>();
+    let moved = |half: &HalfSpace| {
+        let term = |&(k, factor): &(usize, f64)| place(k).map(|d| (d, factor * unit(d)));
+        Some(HalfSpace {
+            terms: half.terms.iter().map(term).collect::<Option<_>>()?,
+            with: half.with.iter().map(set).collect::<Option<_>>()?,
+            replaces: half.replaces.and_then(place),
+            ..half.clone()
+        })
+    };
+    halves.iter().filter_map(moved).collect()
 }
 
 /// `P(x ≥ lower)` of the slab: `x ~ N(0, φ/precision)` with `1/φ = weight`.

@@ -145,6 +145,7 @@ pub(super) fn acting(
         parent: Vec::new(),
         odds: vec![1.0, 0.3, 4.0],
         lower: vec![f64::NEG_INFINITY; size],
+        halves: Vec::new(),
         inclusion: Inclusion::ExpectedTerms(0.3 * sizes.len() as f64),
         shape: 0.01,
         scale: 0.02,

@@ -8,7 +8,7 @@ pub use spread::{Profile, Spread};
 use crate::error::Result;
 use crate::gram::{Gram, JointGram};
 use crate::posterior::Problem;
-use crate::prior::{Prior, PriorSettings};
+use crate::prior::{HalfSpace, Prior, PriorSettings};
 use crate::signal::Auto;
 use crate::term::Family;
 use serde::{Deserialize, Serialize};
@@ -158,6 +158,8 @@ pub struct Columns {
     pub parent: Vec<Option<usize>>,
     /// Components whose torque another one, more usual, has in every motion: rare before the data; empty: none, C.
     pub second_choice: Vec<bool>,
+    /// Bounds on sums of coefficients.
+    pub halves: Vec<HalfSpace>,
 }
 
 impl Columns {
@@ -319,6 +321,7 @@ pub fn assemble(
             parent: columns.parent.clone(),
             odds,
             lower: columns.lower.clone(),
+            halves: columns.halves.clone(),
             inclusion,
             shape,
             scale,

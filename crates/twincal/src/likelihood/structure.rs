@@ -173,6 +173,7 @@ mod tests {
             forced: (0..9).map(|c| forced.contains(&c)).collect(),
             parent: Vec::new(),
             second_choice: Vec::new(),
+            halves: Vec::new(),
         }
     }
 

@@ -53,22 +53,40 @@ pub struct Model {
     pub sites: Vec<Site>,
 }
 
-/// One bound `β_k ≥ lower` of a model. `mean` and `factor` of the model are those of the normal distribution with the
+/// One bound `β_k ≥ lower` of a model, or `Σ f β_k ≥ lower`. `mean` and `factor` of the model are those of the normal distribution with the
 /// moments of the bounded one; without its sites it is the conjugate posterior, so that draws can respect the bound:
 ///
 /// ```text
 /// A_z (conjugate) = L Lᵀ − diag(precision),     A_z μ (conjugate) = L Lᵀ mean − shift
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Site {
-    /// Index in `members`.
+    /// Index in `members`; of a sum its first term.
     pub place: u32,
-    /// The bound, in the coefficient's unit.
+    /// (index in `members`, factor f) of a sum; empty: the coefficient at `place` alone.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub terms: Vec<(u32, f64)>,
+    /// The bound, in the coefficients' unit.
     pub lower: f64,
-    /// What the bound adds to the diagonal of A_z.
+    /// What the bound adds to the diagonal of A_z, of a sum times f fᵀ.
     pub precision: f64,
-    /// What it adds to A_z μ.
+    /// What it adds to A_z μ, of a sum times f.
     pub shift: f64,
+}
+
+impl Site {
+    /// (index in `members`, factor) of what is bounded.
+    pub fn direction(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let single = self.terms.is_empty().then_some((self.place as usize, 1.0));
+        let terms = self.terms.iter().map(|&(i, f)| (i as usize, f));
+        single.into_iter().chain(terms)
+    }
+
+    /// What is bounded, at these coefficients of the members.
+    #[must_use]
+    pub fn value(&self, beta: &[f64]) -> f64 {
+        self.direction().map(|(i, f)| f * beta[i]).sum()
+    }
 }
 
 /// How the posterior was computed.

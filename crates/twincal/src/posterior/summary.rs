@@ -2,7 +2,7 @@
 
 use super::mixture::{Level, Mixture};
 use super::student::StudentT;
-use super::{Method, Model, Posterior};
+use super::{Method, Model, Posterior, Site};
 use crate::linear_algebra::Cholesky;
 use rayon::prelude::*;
 
@@ -93,7 +93,8 @@ pub fn summarise(posterior: &Posterior) -> Vec<ColumnSummary> {
     let mut components = vec![Components::default(); posterior.inclusion.len()];
     for (model, diagonal) in posterior.models.iter().zip(&diagonals) {
         for (place, &column) in model.members.iter().enumerate() {
-            let bound = model.sites.iter().find(|site| site.place as usize == place);
+            let single = |site: &&Site| site.terms.is_empty() && site.place as usize == place;
+            let bound = model.sites.iter().find(single);
             components[column as usize].push(
                 bound.map_or(f64::NEG_INFINITY, |site| site.lower),
                 model,

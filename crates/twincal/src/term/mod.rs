@@ -66,6 +66,7 @@ pub(crate) use overlaps::levels;
 pub use recipes::Recipes;
 pub use sentence::{Estimate, is_place, told};
 pub use status::Status;
+pub(crate) use stribeck::STRIBECK_VELOCITY;
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -5,7 +5,7 @@ use super::candidate::{Candidate, Joint, direction};
 use super::expression::{Function, Graph};
 
 /// Velocity over which the excess falls to 1/e, rad/s or m/s.
-const STRIBECK_VELOCITY: f64 = 0.1;
+pub(crate) const STRIBECK_VELOCITY: f64 = 0.1;
 
 /// `<joint>.stribeck`: torque +tanh(q̇/v_s) exp(−(q̇/0.1)²), N·m (N for a slider): friction that falls from breakaway to
 /// sliding within about 0.1 rad/s. Dissipated.

@@ -393,6 +393,7 @@ fn summarise(
     let (plug_in, phi) = mean_noise(given, target, &pooled);
     let mut problem = assemble(given.grams, given.columns, &plug_in, given.prior)?;
     problem.prior.slab = target.slab.iter().map(|s| s * s / phi).collect();
+    problem.prior.halves.clear();
     let standard = Standard::new(&problem)?;
     let mut visits: BTreeMap<&[bool], u64> = BTreeMap::new();
     for (holds, count) in traces.iter().flat_map(|trace| &trace.visits) {

@@ -18,6 +18,7 @@ const RUN: usize = 6;
 fn prior() -> Prior {
     Prior {
         parent: Vec::new(),
+        halves: Vec::new(),
         slab: vec![1.0; COLUMNS],
         component: vec![0, 1, 1, 2, 3, 3],
         family: vec![0, 0, 1, 1],

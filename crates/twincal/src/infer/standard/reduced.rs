@@ -10,7 +10,7 @@
 //! (`h_CᵀA_CC⁻¹h_C` is rounding, squared.) A walk over models needs O alone, and mean and variance of C follow from those
 //! of O exactly, model by model or from the averages.
 
-use super::{Block, Standard, nudged};
+use super::{Block, Standard, halves_in, nudged};
 use crate::infer::answer::Averages;
 use crate::infer::certain::Certain;
 
@@ -173,6 +173,8 @@ impl<'a> Reduced<'a> {
             .sum::<f64>();
         let (sure, active) = (0..blocks.len()).partition(|&b| certain.sure[blocks[b].component]);
         let lower = with(&full.lower, |lower, stretch| lower * stretch);
+        // Of those with a column that goes none acts.
+        let halves = halves_in(&full.halves, &left, |i| 1.0 / stretch[i]);
         let open = Standard {
             order: left.iter().map(|&d| full.order[d]).collect(),
             names: left.iter().map(|&d| full.names[d].clone()).collect(),
@@ -186,8 +188,9 @@ impl<'a> Reduced<'a> {
             center: with(&full.center, |center, stretch| center * stretch),
             offset,
             precision: with(&full.precision, |own, stretch| own / (stretch * stretch)),
-            bounded: lower.iter().any(|&l| l > f64::NEG_INFINITY),
+            bounded: lower.iter().any(|&l| l > f64::NEG_INFINITY) || !halves.is_empty(),
             lower,
+            halves,
             shape: full.shape,
             full_scale: full.full_scale,
             log_constant: full.log_constant,
