@@ -193,6 +193,7 @@ fn road(
     let every_candidate = library.clone();
     let (library, zero_columns) = data.drop_zero_columns(library);
     let mut columns = columns_of(robot, &library, settings, data::tell_payload_apart(logs))?;
+    columns.one_motion = logs.len() == 1;
     columns.halves = dissipative::halves(robot, &library_settings, &columns, &data.hull(robot));
     findings.append(&mut data.findings);
     let cutoff_hz = pipeline.cutoff_hz;
@@ -427,6 +428,7 @@ fn columns_of(
         forced: Vec::new(),
         parent: Vec::new(),
         second_choice: Vec::new(),
+        one_motion: false,
         halves: Vec::new(),
     };
     let mut named = Vec::new();

@@ -74,6 +74,7 @@ impl Regression {
             forced: Vec::new(),
             parent: Vec::new(),
             second_choice: Vec::new(),
+            one_motion: false,
             halves: Vec::new(),
         }
     }

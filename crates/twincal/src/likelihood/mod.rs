@@ -158,6 +158,8 @@ pub struct Columns {
     pub parent: Vec<Option<usize>>,
     /// Components whose torque another one, more usual, has in every motion: rare before the data; empty: none, C.
     pub second_choice: Vec<bool>,
+    /// All rows come from one log.
+    pub one_motion: bool,
     /// Bounds on sums of coefficients.
     pub halves: Vec<HalfSpace>,
 }

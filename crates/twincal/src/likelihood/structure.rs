@@ -12,6 +12,9 @@ const DEFAULT_EXPECTED: f64 = 5.0;
 /// 1.740 ± 0.002 kg was ± 0.055), and that one number (a last link's density) does not win over the payload's many.
 const SECOND_CHOICE: f64 = 1e-12;
 
+/// Factor on the prior probability of what asks for two motions where there is one ([`Family::asks_for_two_motions`]).
+const ONE_MOTION: f64 = 0.1;
+
 /// Family of every component, r_f of every family, and the inclusion prior, as [`crate::prior::Prior`] wants them.
 ///
 /// With C free components (those that are not forced in) and C_f of family f
@@ -19,7 +22,8 @@ const SECOND_CHOICE: f64 = 1e-12;
 /// ```text
 /// b_f = C/m0 − 1             m0 components expected in total, families by their size
 /// b_f = C_f/m_f − 1          m_f expected of family f, where the user says so
-/// b_f = 1/p − 1              unasked, with the probability p of what is more or less usual than the rest ([`Family::usual`])
+/// b_f = 1/p − 1              unasked, with the probability p of what is more or less usual than the rest ([`Family::usual`]); of one log
+///                            a tenth of it for what asks for two motions
 /// b_f = 1e12 − 1             second choices, which no motion tells from something more usual (P(z = 1) = 1e-12)
 /// ```
 /// What a payload's tensor adds to the payload's probability, as its child, is taken off: with and without tensor together have p.
@@ -59,7 +63,10 @@ pub(super) fn structure(
             Some(&(_, expected)) => wanted(inclusion, free, count, family, size, expected)?,
             None => match family.usual() {
                 // A prior that the user gives holds for all families alike.
-                Some(p) if settings.inclusion.is_none() => with_probability(p),
+                Some(p) if settings.inclusion.is_none() => {
+                    let alone = columns.one_motion && family.asks_for_two_motions();
+                    with_probability(if alone { ONE_MOTION * p } else { p })
+                }
                 _ => reference(inclusion, count) / reference(inclusion, free),
             },
         });
@@ -161,18 +168,19 @@ mod tests {
     use crate::prior::Prior;
     use crate::signal::Auto;
 
-    /// Nine components: four of `User`, three of `Spring`, two of `Viscous`.
+    /// Nine components: four of `User`, three of `Stribeck`, two of `Viscous`.
     fn columns(forced: &[usize]) -> Columns {
         Columns {
             names: (0..9).map(|k| format!("x{k}")).collect(),
             component: (0..9).collect(),
             family: vec![0, 1, 0, 2, 1, 0, 0, 2, 1],
-            families: vec![Family::User, Family::Spring, Family::Viscous],
+            families: vec![Family::User, Family::Stribeck, Family::Viscous],
             prior_sd: vec![None; 9],
             lower: vec![f64::NEG_INFINITY; 9],
             forced: (0..9).map(|c| forced.contains(&c)).collect(),
             parent: Vec::new(),
             second_choice: Vec::new(),
+            one_motion: false,
             halves: Vec::new(),
         }
     }
@@ -217,7 +225,7 @@ mod tests {
         let free = columns(&[]);
         // Unasked: m0 = 4.5 of 9, by size; viscous friction is as likely there as not.
         near(expected(&free, &settings(None, &[])), [2.0, 1.5, 1.0]);
-        let mine = [(Family::Spring, 0.3), (Family::Viscous, 1.9)];
+        let mine = [(Family::Stribeck, 0.3), (Family::Viscous, 1.9)];
         near(expected(&free, &settings(None, &mine)), [2.0, 0.3, 1.9]);
         let terms = Some(Inclusion::ExpectedTerms(1.8));
         near(expected(&free, &settings(terms, &[])), [0.8, 0.6, 0.4]);
@@ -236,6 +244,18 @@ mod tests {
         near(expected(&free, &settings(terms, &[])), [0.8, 0.6, 0.4]);
     }
 
+    /// A spring in thirty joints; with one log one in three hundred.
+    #[test]
+    fn one_motion_makes_springs_rarer() {
+        let mut free = columns(&[]);
+        free.families[1] = Family::Spring;
+        near(expected(&free, &settings(None, &[])), [2.0, 0.1, 1.0]);
+        free.one_motion = true;
+        near(expected(&free, &settings(None, &[])), [2.0, 0.01, 1.0]);
+        free.families[1] = Family::Offset;
+        near(expected(&free, &settings(None, &[])), [2.0, 0.1, 1.0]);
+    }
+
     #[test]
     fn forced_components_are_in_and_count_for_nobody() {
         let some = columns(&[0, 3]);
@@ -243,7 +263,7 @@ mod tests {
         near(expected(&some, &settings(None, &[])), [2.5, 1.5, 1.5]);
         let terms = Some(Inclusion::ExpectedTerms(1.4));
         near(expected(&some, &settings(terms, &[])), [1.6, 0.6, 1.2]);
-        let mine = [(Family::Spring, 0.3)];
+        let mine = [(Family::Stribeck, 0.3)];
         near(expected(&some, &settings(None, &mine)), [2.5, 0.3, 1.5]);
         let all = columns(&[0, 1, 2, 3, 4, 5, 6, 7, 8]);
         near(expected(&all, &settings(None, &[])), [4.0, 3.0, 2.0]);
@@ -258,7 +278,7 @@ mod tests {
             expected(&some, &settings(None, &[])),
             [2.0, 0.500_000_000_002, 1.0],
         );
-        let mine = [(Family::Spring, 0.3)];
+        let mine = [(Family::Stribeck, 0.3)];
         near(expected(&some, &settings(None, &mine)), [2.0, 0.3, 1.0]);
         let half = Some(Inclusion::Probability(0.25));
         near(expected(&some, &settings(half, &[])), [1.0, 0.75, 0.5]);
@@ -296,8 +316,8 @@ mod tests {
     #[test]
     fn impossible_numbers_name_their_key() {
         for (family, number) in [
-            (Family::Spring, 3.0),
-            (Family::Spring, 0.0),
+            (Family::Stribeck, 3.0),
+            (Family::Stribeck, 0.0),
             (Family::Payload, 1.0),
         ] {
             let error = structure(&columns(&[]), &settings(None, &[(family, number)]));

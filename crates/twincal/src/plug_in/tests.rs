@@ -55,6 +55,7 @@ fn columns() -> Columns {
         forced: Vec::new(),
         parent: Vec::new(),
         second_choice: Vec::new(),
+        one_motion: false,
         halves: Vec::new(),
     }
 }

@@ -205,14 +205,14 @@ impl Family {
     /// while a constant is what is left on one motion of whatever else is missing: one arm of six joints in five has an offset. What is wrong
     /// with a link is first of all how heavy it is, in one link of thirty, and then, which needs that, often where (one in four); a tensor that is off by
     /// itself is rarer. One geared joint in twenty bends before it slides so far that it shows behind the row filter; one in a hundred warms while it is logged.
+    /// A function of one joint's position is likewise what is left of much else, and few joints have a spring or a counterbalance.
     #[must_use]
     pub fn usual(self) -> Option<f64> {
         match self {
             Self::Viscous | Self::Coulomb | Self::MotorInertia => Some(0.5),
             Self::Payload => Some(1.0 / 3.0),
             Self::PayloadTensor => Some(0.999),
-            Self::Offset => Some(1.0 / 30.0),
-            Self::Density => Some(1.0 / 30.0),
+            Self::Offset | Self::Density | Self::Spring | Self::Potential => Some(1.0 / 30.0),
             Self::MassMoments => Some(1.0 / 4.0),
             Self::Tensor => Some(1.0 / 50.0),
             Self::Hysteresis => Some(1.0 / 20.0),
@@ -225,6 +225,12 @@ impl Family {
     #[must_use]
     pub fn is_level(self) -> bool {
         matches!(self, Self::Density | Self::MassMoments | Self::Tensor)
+    }
+
+    /// True for a function of one joint's position, which one motion alone hardly tells from the error of another term.
+    #[must_use]
+    pub fn asks_for_two_motions(self) -> bool {
+        matches!(self, Self::Spring | Self::Potential)
     }
 
     /// True for all that a payload has.

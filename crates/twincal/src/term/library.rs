@@ -336,8 +336,8 @@ impl Library {
         sentence(&self.components[component], parameters)
     }
 
-    /// Least value of a term's coefficient if friction and motor inertia cannot be negative: minus what the model has; −∞
-    /// where any value is physical.
+    /// Least value of a term's coefficient if friction, motor inertia and stiffness cannot be negative: minus what the model has; −∞
+    /// where any value is physical. (A joint that a spring drives away from a position inside its range has a potential.)
     ///
     /// # Panics
     /// If there is no such term or the robot is another one.
@@ -355,6 +355,10 @@ impl Library {
             | Family::CoupledFriction
             | Family::CoupledInertia
             | Family::Hysteresis => 0.0,
+            Family::Spring => match joint(".spring.stiffness") {
+                Some(joint) => -joint.stiffness,
+                None => UNBOUNDED,
+            },
             _ => f64::NEG_INFINITY,
         }
     }
@@ -528,6 +532,9 @@ fn home(components: &[Component], terms: usize) -> Vec<usize> {
     }
     home
 }
+
+/// Bound that never acts: all columns of a component have bounds, or none.
+const UNBOUNDED: f64 = -1e100;
 
 /// States that have nothing in particular in common: a Weyl sequence with irrational steps.
 pub(super) fn random_motions(joints: usize) -> Vec<Motions> {

@@ -8,7 +8,9 @@ use super::expression::{Function, Graph};
 /// `.cos2`, J. The actuator delivers ∂U/∂q with U = Σ β·harmonic: Lagrangian −sin q, −cos q, −sin 2q, −cos 2q.
 ///
 /// A turning joint only: a slider's potential has no natural period.
-pub(super) fn proposal(graph: &mut Graph, joint: &Joint) -> Proposal {
+///
+/// `held`: the torque that the joint holds against gravity, prior sd of each harmonic's torque; `None`: learned from the data.
+pub(super) fn proposal(graph: &mut Graph, joint: &Joint, held: Option<f64>) -> Proposal {
     let name = format!("{}.potential", joint.name);
     let story = format!("conservative torque of {} alone", joint.name);
     let q = joint.position(graph);
@@ -23,14 +25,18 @@ pub(super) fn proposal(graph: &mut Graph, joint: &Joint) -> Proposal {
         let angle = graph.scaled(order, q);
         let harmonic = graph.function(function, angle);
         let phi = graph.scaled(-1.0, harmonic);
-        Candidate::lagrangian(
+        let candidate = Candidate::lagrangian(
             graph,
             format!("{name}.{column}"),
             Family::Potential,
             "N·m",
             story.clone(),
             phi,
-        )
+        );
+        Candidate {
+            prior_sd: held.map(|held| held / order),
+            ..candidate
+        }
     })
     .collect();
     Proposal { name, columns }

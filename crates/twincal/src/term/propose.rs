@@ -1,15 +1,17 @@
 //! Which candidates a robot gets: every family that is switched on, in the order of `terms[]`.
 
+use super::aliases::channels;
 use super::candidate::{Joint, Proposal};
 use super::expression::Graph;
 use super::inertial::inertial;
+use super::library::random_motions;
 use super::{
     Family, LibrarySettings, asymmetry, base_tilt, coulomb, coupled_friction, coupled_inertia,
     encoder_zero, gain, generic, hysteresis, load_friction, motor_inertia, offset, potential,
     quadratic_friction, ripple, spring, stribeck, user, viscous, warm_up,
 };
 use crate::error::{Error, Finding, Result, Severity};
-use crate::robot::{Robot, did_you_mean};
+use crate::robot::{Motion, Robot, did_you_mean, nominal_torque};
 
 /// Most columns a library may have.
 const TERM_LIMIT: usize = 1000;
@@ -17,6 +19,8 @@ const TERM_LIMIT: usize = 1000;
 const MOST_JOINTS: usize = 64;
 /// Joints up to which the generic family is proposed unasked.
 const GENERIC_JOINTS: usize = 3;
+/// Share of the largest torque that a joint holds against gravity, for joints that hold less: what cables and seals amount to.
+const LEAST_HELD: f64 = 0.05;
 
 /// Everything about a robot that the families ask for; `robot` is absent where a library is made for joints alone.
 pub(super) struct About<'a> {
@@ -108,11 +112,12 @@ pub(super) fn proposals(
             all.extend(joints.iter().filter_map(make));
         }
     };
+    let held: Vec<Option<f64>> = held_torque(about);
     per_joint(Family::Spring, &mut |joint| {
-        Some(spring::proposal(graph, joint))
+        Some(spring::proposal(graph, joint, held[joint.index]))
     });
     per_joint(Family::Potential, &mut |joint| {
-        (!joint.slides).then(|| potential::proposal(graph, joint))
+        (!joint.slides).then(|| potential::proposal(graph, joint, held[joint.index]))
     });
     per_joint(Family::Asymmetry, &mut |joint| {
         Some(asymmetry::proposal(graph, joint, velocity))
@@ -141,12 +146,12 @@ pub(super) fn proposals(
     per_pair(Family::CoupledInertia, &mut |a, b, sign| {
         coupled_inertia::candidate(graph, a, b, sign).into()
     });
-    let mut per_joint = |family: Family, make: &mut dyn FnMut(&Joint) -> Option<Proposal>| {
-        if settings.has(family) {
-            all.extend(joints.iter().filter_map(make));
-        }
-    };
     if about.robot.is_some() {
+        let mut per_joint = |family: Family, make: &mut dyn FnMut(&Joint) -> Option<Proposal>| {
+            if settings.has(family) {
+                all.extend(joints.iter().filter_map(make));
+            }
+        };
         per_joint(Family::Gain, &mut |joint| {
             Some(gain::candidate(joint).into())
         });
@@ -163,6 +168,34 @@ pub(super) fn proposals(
         all.extend(warm_up);
     }
     Ok(all)
+}
+
+/// Torque that each joint holds against gravity: amplitude (√2 rms) over random positions, N·m or N, at least a twentieth of the robot's
+/// largest; `None` where nothing is held.
+fn held_torque(about: &About<'_>) -> Vec<Option<f64>> {
+    let count = about.joints.len();
+    let Some(robot) = about.robot else {
+        return vec![None; count];
+    };
+    let states = random_motions(count);
+    let [q, _, _] = channels(&states, count);
+    let still = vec![0.0; q.len()];
+    let mut tau = vec![0.0; q.len()];
+    let motion = Motion {
+        len: states.len(),
+        q: &q,
+        qd: &still,
+        qdd: &still,
+    };
+    nominal_torque(robot, motion, &mut tau);
+    let amplitude = |tau: &[f64]| {
+        let square: f64 = tau.iter().map(|t| t * t).sum();
+        (2.0 * square / tau.len() as f64).sqrt()
+    };
+    let own: Vec<f64> = tau.chunks_exact(states.len()).map(amplitude).collect();
+    let least = LEAST_HELD * own.iter().copied().fold(0.0, f64::max);
+    let held = own.into_iter().map(|own| own.max(least));
+    held.map(|held| (held > 0.0).then_some(held)).collect()
 }
 
 fn ripples(

@@ -7,7 +7,10 @@ use super::expression::Graph;
 
 /// `<joint>.spring`: columns `.stiffness` (torque +q) and `.preload` (torque +1), so that k (q − q₀) = k q + c with
 /// q₀ = −c/k. Lagrangian −½ k q² − c q.
-pub(super) fn proposal(graph: &mut Graph, joint: &Joint) -> Proposal {
+///
+/// `held`: the torque that the joint holds against gravity, prior sd of the preload and, over 1 rad (1 m), of the stiffness; `None`:
+/// learned from the data.
+pub(super) fn proposal(graph: &mut Graph, joint: &Joint, held: Option<f64>) -> Proposal {
     let name = format!("{}.spring", joint.name);
     let story = format!("spring on {}", joint.name);
     let q = joint.position(graph);
@@ -18,14 +21,18 @@ pub(super) fn proposal(graph: &mut Graph, joint: &Joint) -> Proposal {
         .into_iter()
         .zip(energies)
         .map(|((column, unit), phi)| {
-            Candidate::lagrangian(
+            let candidate = Candidate::lagrangian(
                 graph,
                 format!("{name}.{column}"),
                 Family::Spring,
                 unit,
                 story.clone(),
                 phi,
-            )
+            );
+            Candidate {
+                prior_sd: held,
+                ..candidate
+            }
         })
         .collect();
     Proposal { name, columns }

@@ -76,6 +76,7 @@ impl Data {
             forced: Vec::new(),
             parent: Vec::new(),
             second_choice: Vec::new(),
+            one_motion: false,
             halves: Vec::new(),
         };
         let mut plug_in = PlugIn::start(2, 2, 30.0);
