@@ -59,7 +59,12 @@ impl<'a> Columns<'a> {
                 gravity[*axis] = 1.0;
                 self.gravity(t, gravity)
             }
-            Some(ModelColumn::Nominal { joint }) => vec![(*joint, self.nominal(t)[*joint])],
+            Some(ModelColumn::Nominal { joint: Some(joint) }) => {
+                vec![(*joint, self.nominal(t)[*joint])]
+            }
+            Some(ModelColumn::Nominal { joint: None }) => {
+                self.nominal(t).into_iter().enumerate().collect()
+            }
             Some(ModelColumn::LoadFriction { joint, velocity }) => {
                 let torque = self.nominal(t)[*joint];
                 let size = t.step(Step::Absolute(torque));

@@ -91,9 +91,8 @@ impl Family {
     /// Families that come without a switch of their own: with `terms`, with `generic`, with a payload.
     pub const UNNAMED: [Self; 3] = [Self::User, Self::Generic, Self::PayloadTensor];
 
-    /// What twincal proposes unasked for an arm with geared drives: all but `ripple` (it asks for a gear ratio), and `gain` and
-    /// `encoder_zero`, which can imitate almost anything: on real logs they took what springs and counterbalances are.
-    pub const DEFAULT: [Self; 19] = [
+    /// What twincal proposes unasked for an arm with geared drives: all but `ripple` (it asks for a gear ratio).
+    pub const DEFAULT: [Self; 21] = [
         Self::Viscous,
         Self::Coulomb,
         Self::Offset,
@@ -113,6 +112,8 @@ impl Family {
         Self::CoupledInertia,
         Self::Hysteresis,
         Self::WarmUp,
+        Self::Gain,
+        Self::EncoderZero,
     ];
 
     /// What is proposed beside the user's own expressions: friction, offset and motor inertia of every joint.
@@ -206,6 +207,7 @@ impl Family {
     /// with a link is first of all how heavy it is, in one link of thirty, and then, which needs that, often where (one in four); a tensor that is off by
     /// itself is rarer. One geared joint in twenty bends before it slides so far that it shows behind the row filter; one in a hundred warms while it is logged.
     /// A function of one joint's position is likewise what is left of much else, and few joints have a spring or a counterbalance.
+    /// Drive constants and joint zeros can imitate almost anything and are calibrated by the maker: one in a thousand is off.
     #[must_use]
     pub fn usual(self) -> Option<f64> {
         match self {
@@ -217,6 +219,7 @@ impl Family {
             Self::Tensor => Some(1.0 / 50.0),
             Self::Hysteresis => Some(1.0 / 20.0),
             Self::WarmUp => Some(1.0 / 100.0),
+            Self::Gain | Self::EncoderZero => Some(1e-3),
             _ => None,
         }
     }

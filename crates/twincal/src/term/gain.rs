@@ -15,7 +15,21 @@ pub(super) fn candidate(joint: &Joint) -> Candidate {
         Family::Gain,
         "1",
         format!("torque gain of {}", joint.name),
-        ModelColumn::Nominal { joint: joint.index },
+        ModelColumn::Nominal {
+            joint: Some(joint.index),
+        },
+    )
+    .within(PRIOR_SD)
+}
+
+/// `drives.gain`: torque + nominal torque on every joint, one factor for all: drives of one kind share the error of their constant.
+pub(super) fn common() -> Candidate {
+    Candidate::model(
+        "drives.gain".to_owned(),
+        Family::Gain,
+        "1",
+        "torque gain of all joints".to_owned(),
+        ModelColumn::Nominal { joint: None },
     )
     .within(PRIOR_SD)
 }

@@ -29,10 +29,10 @@ pub(crate) enum ModelColumn {
         /// 0, 1, 2: x, y, z.
         axis: usize,
     },
-    /// Nominal torque of a joint, on that joint.
+    /// Nominal torque of a joint, on that joint; of every joint for `None`.
     Nominal {
         /// 0-based.
-        joint: usize,
+        joint: Option<usize>,
     },
     /// |nominal torque| in the direction of motion, on the same joint.
     LoadFriction {
@@ -62,7 +62,9 @@ impl ModelColumn {
     /// False on joints that it cannot act on by definition.
     fn acts_on(&self, other: usize) -> bool {
         match self {
-            Self::Nominal { joint } | Self::LoadFriction { joint, .. } => *joint == other,
+            Self::Nominal { joint: Some(joint) } | Self::LoadFriction { joint, .. } => {
+                *joint == other
+            }
             _ => true,
         }
     }

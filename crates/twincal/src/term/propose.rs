@@ -147,6 +147,9 @@ pub(super) fn proposals(
         coupled_inertia::candidate(graph, a, b, sign).into()
     });
     if about.robot.is_some() {
+        if settings.has(Family::Gain) && joints.len() > 1 {
+            all.push(gain::common().into());
+        }
         let mut per_joint = |family: Family, make: &mut dyn FnMut(&Joint) -> Option<Proposal>| {
             if settings.has(family) {
                 all.extend(joints.iter().filter_map(make));

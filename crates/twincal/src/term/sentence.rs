@@ -49,11 +49,14 @@ pub(super) fn sentence(component: &Component, parameters: &[Estimate]) -> String
     }
     let text = match component.family {
         Family::Payload => payload(parameters),
-        Family::Gain | Family::LoadFriction | Family::Density => parameters
+        Family::Gain => parameters.first().map(drive).unwrap_or_default(),
+        Family::LoadFriction | Family::Density => parameters
             .first()
             .map(|p| format!("{} %", p.number(100.0)))
             .unwrap_or_default(),
-        Family::EncoderZero => parameters.first().map(angle).unwrap_or_default(),
+        Family::EncoderZero => (parameters.first())
+            .map(|p| format!("joint zero {}", angle(p)))
+            .unwrap_or_default(),
         Family::Tilt => tilt(parameters),
         _ if parameters.len() == 1 => one(&parameters[0]),
         family => several(family, parameters),
@@ -63,6 +66,17 @@ pub(super) fn sentence(component: &Component, parameters: &[Estimate]) -> String
         .and_then(|p| component.family.remark(p.value, p.spread));
     let remark = remark.map_or_else(String::new, |remark| format!(" ({remark})"));
     format!("{}: {text}{remark}", component.story)
+}
+
+/// "drive constant × 1.050 ± 0.004".
+fn drive(p: &Estimate) -> String {
+    let factor = Estimate {
+        value: 1.0 + p.value,
+        ends: p.ends.map(|ends| ends.map(|end| 1.0 + end)),
+        ..p.clone()
+    };
+    let number = factor.number(1.0);
+    format!("drive constant × {}", number.trim_start_matches('+'))
 }
 
 fn one(p: &Estimate) -> String {
