@@ -422,6 +422,11 @@ pub struct PriorTable {
     /// Heredity: what is in only where something else is, such as { stribeck = "coulomb", "sin(2*q2)" = "sin(q2)" }; families joint by
     /// joint, or components by name. Default: { asymmetry = "coulomb", stribeck = "coulomb", quadratic_friction = "viscous", coupled_inertia = "coupled_friction", hysteresis = "coulomb", warm_up = "coulomb", mass_moments = "density" }; {} binds nothing.
     pub heredity: Option<BTreeMap<String, String>>,
+    /// Prior sd of a factor on torque that all drives share, as a share of 1: it widens the intervals of masses and inertias unless two known
+    /// payloads were logged. Default: 0.07 where [[log]] torque is "motor" or "current", else 0; set it where the torque in the log was made of
+    /// currents and catalogue constants.
+    #[schemars(extend("minimum" = 0, "exclusiveMaximum" = 1))]
+    pub drive_gain: Option<f64>,
 }
 
 /// The slab or "auto".

@@ -5,6 +5,7 @@
 //! [`Config::file`] before that: a flag overrides its key.
 
 mod channel_names;
+mod drive_gain;
 mod factors;
 mod families;
 mod file;

@@ -146,8 +146,8 @@ impl Config {
             model_file: file.model.file.clone(),
             model,
             locked: file.model.locked.clone(),
+            calibration: self.calibration(&log)?,
             log,
-            calibration: self.calibration()?,
             gates: check,
             threads,
             output: file
@@ -293,7 +293,7 @@ impl Config {
         })
     }
 
-    fn calibration(&self) -> Result<CalibrationSettings> {
+    fn calibration(&self, log: &LogSettings) -> Result<CalibrationSettings> {
         let signal = self.signal()?;
         Ok(CalibrationSettings {
             library: self.library(&signal)?,
@@ -303,6 +303,7 @@ impl Config {
             inference: self.inference()?,
             unasked_ripple: self.file.library.unasked_ripple(),
             may_widen: self.may_widen(),
+            drive_gain_sd: self.drive_gain_sd(log)?,
             most_bytes: None,
         })
     }

@@ -1,5 +1,6 @@
 //! From the posterior over columns to physical stories: one line per component, with parameters that people know.
 
+use super::drive_scale::DriveScale;
 use super::result::{ComponentSummary, ParameterSummary, TermSummary};
 use super::status::{Status, StatusReason, by_probability};
 use crate::posterior::draws::{CoefficientDraws, Drawer};
@@ -28,6 +29,7 @@ pub(super) fn components(
     posterior: &Posterior,
     terms: &[TermSummary],
     seed: u64,
+    scale: Option<&DriveScale>,
 ) -> Vec<ComponentSummary> {
     let drawer = Drawer::new(posterior);
     let drawn = Drawn {
@@ -35,6 +37,7 @@ pub(super) fn components(
         all: drawer.draw(DRAWS, seed, STREAM),
         drawer,
         seed,
+        scale,
     };
     (0..library.components().len())
         .into_par_iter()
@@ -48,6 +51,7 @@ struct Drawn<'a> {
     drawer: Drawer<'a>,
     all: CoefficientDraws,
     seed: u64,
+    scale: Option<&'a DriveScale>,
 }
 
 impl Drawn<'_> {
@@ -151,8 +155,10 @@ fn parameters(
     let Some(member) = columns.iter().flatten().next().copied() else {
         return Vec::new();
     };
-    let given = drawn.given(member as u32, &columns).into_iter();
-    let values: Vec<Vec<f64>> = given
+    let mut given = drawn.given(member as u32, &columns);
+    let scale = drawn.scale.iter();
+    scale.for_each(|scale| scale.shift(&columns, &mut given, drawn.seed));
+    let values: Vec<Vec<f64>> = (given.into_iter())
         .map(|beta| library.parameter_values(index, &beta))
         .collect();
     let mut parameters: Vec<ParameterSummary> = library

@@ -55,6 +55,8 @@ pub(super) struct Data {
     unknown: bool,
     /// See [`tell_payload_apart`].
     pub(super) payload_apart: bool,
+    /// What the robot carried in each fit log.
+    pub(super) payloads: Vec<Payload>,
 }
 
 impl Data {
@@ -86,6 +88,7 @@ impl Data {
             findings,
             unknown: reader.unknown,
             payload_apart: in_some_only(logs.iter().map(ReadyLog::payload)),
+            payloads: logs.iter().map(ReadyLog::payload).collect(),
         };
         let trajectories = Trajectories {
             fit: of_fit,

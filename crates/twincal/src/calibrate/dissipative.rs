@@ -159,9 +159,8 @@ mod tests {
             };
             let dissipates = [1.0, -1.0].iter().all(|d| {
                 let (dry, viscous) = (c + d * a, 0.5 + v + d * b);
-                let total = |x: f64| {
-                    dry + viscous * x + w * x * x + s * (-(x / 0.1) * (x / 0.1)).exp()
-                };
+                let total =
+                    |x: f64| dry + viscous * x + w * x * x + s * (-(x / 0.1) * (x / 0.1)).exp();
                 dry >= 0.0 && viscous >= 0.0 && speeds.iter().all(|&x| total(x) >= 0.0)
             });
             let keeps = halves.iter().all(|half| {

@@ -11,6 +11,7 @@ mod curves;
 mod data;
 mod dissipative;
 mod drift;
+mod drive_scale;
 mod friction_only;
 mod groups;
 mod heavy_tails;

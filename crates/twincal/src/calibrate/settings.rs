@@ -7,7 +7,7 @@ use crate::prior::PriorSettings;
 use crate::signal::{Auto, Corrections, SignalSettings};
 use crate::term::{Family, LibrarySettings};
 
-/// Everything a calibration can be told; each field but the last two is a table of `twincal.toml`.
+/// Everything a calibration can be told; each field but the last three is a table of `twincal.toml`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationSettings {
     /// `[library]`.
@@ -25,6 +25,8 @@ pub struct CalibrationSettings {
     /// `[signal] wider_band` with no `[noise] model`: where nobody chose a cut-off either and the noise allows it, the fit goes on in a wider
     /// band with `ar1`.
     pub may_widen: bool,
+    /// Prior sd of a factor on torque that all drives share (`[prior] drive_gain`); 0: torque is measured at the joints.
+    pub drive_gain_sd: f64,
     /// Bytes that are free for what is made of the recordings (no key of `twincal.toml`); `None`: any number.
     pub most_bytes: Option<u64>,
 }
@@ -70,6 +72,7 @@ impl Default for CalibrationSettings {
             },
             unasked_ripple: UnaskedRipple::Candidate,
             may_widen: true,
+            drive_gain_sd: 0.0,
             most_bytes: None,
         }
     }

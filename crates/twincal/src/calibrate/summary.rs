@@ -2,6 +2,7 @@
 
 use super::components::{NOT_SEEN, components};
 use super::data::Data;
+use super::drive_scale::{self, DriveScale};
 use super::groups::{groups, told_as};
 use super::result::{
     Calibration, Draws, Group, LikelihoodUsed, PriorUsed, SweepPoint, TermSummary,
@@ -12,7 +13,7 @@ use crate::error::{Finding, Result, Severity};
 use crate::infer::approximate;
 use crate::likelihood::{Columns, mean_squares};
 use crate::observations::Part;
-use crate::plug_in::residual_runs;
+use crate::plug_in::{Fit, residual_runs};
 use crate::posterior::draws::draw;
 use crate::posterior::summary::{ColumnSummary, summarise as summarise_columns};
 use crate::posterior::{Posterior, Problem};
@@ -67,7 +68,11 @@ pub(super) fn summarise(
         .map(f64::sqrt)
         .collect();
     let sensitivity = sensitivity(&fit.problem, &fit.posterior)?;
-    let mut terms = terms(library, &fit.posterior, &fit.problem, &rms, &sensitivity);
+    let drive_sd = drive_scale::left(settings.drive_gain_sd, data.payloads.iter().copied());
+    let scale = DriveScale::new(drive_sd, library, &fit.problem, &fit.posterior);
+    findings.extend(scale.as_ref().map(DriveScale::finding));
+    let scale = scale.as_ref();
+    let mut terms = terms(library, &fit, &rms, &sensitivity, scale);
     for (&index, sd) in library.columns().iter().zip(&opinion.sandwich) {
         terms[index].sandwich_sd = *sd;
     }
@@ -88,7 +93,8 @@ pub(super) fn summarise(
     ));
     let apart = data.payload_apart.then(|| library.with_payload_apart());
     let told_apart = apart.as_ref().unwrap_or(library);
-    let mut components = components(told_apart, &fit.posterior, &terms, settings.inference.seed);
+    let seed = settings.inference.seed;
+    let mut components = components(told_apart, &fit.posterior, &terms, seed, scale);
     let told = told_as(&fit.problem, &fit.posterior, told_apart);
     for (component, told_as) in components.iter_mut().zip(told) {
         component.told_as = told_as;
@@ -236,11 +242,12 @@ fn scaled(inclusion: Inclusion, factor: f64, columns: usize) -> Inclusion {
 
 fn terms(
     library: &Library,
-    posterior: &Posterior,
-    problem: &Problem,
+    fit: &Fit,
     rms: &[f64],
     sensitivity: &[Vec<f64>],
+    scale: Option<&DriveScale>,
 ) -> Vec<TermSummary> {
+    let (posterior, problem) = (&fit.posterior, &fit.problem);
     let summaries = summarise_columns(posterior);
     library
         .terms()
@@ -253,6 +260,9 @@ fn terms(
             let s = &summaries[k];
             let prior_sd = (posterior.noise * problem.prior.slab[k]).sqrt();
             let seen = s.conditional_sd.is_none_or(|sd| sd <= WIDE * prior_sd);
+            let mut widened = *s;
+            scale.iter().for_each(|scale| scale.widen(k, &mut widened));
+            let s = &widened;
             TermSummary {
                 term: term.clone(),
                 pip: Some(s.pip),

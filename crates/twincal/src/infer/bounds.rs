@@ -19,8 +19,8 @@ mod propagation;
 
 use super::answer::{Averages, Listed};
 use super::approximate;
-use super::search::Care;
 use super::moments::{FORBIDDEN, log_normal_mass};
+use super::search::Care;
 use super::standard::{Reduced, Standard, nudged};
 use crate::error::Result;
 use crate::linear_algebra::Cholesky;

@@ -92,14 +92,16 @@ pub(super) fn components(
         prior,
         costs: standard.blocks.iter().map(cost).collect(),
         spread: (0..size).map(|d| inverse[d * size + d]).collect(),
-        factors: standard.blocks.iter().map(|b| b.factor.ln()).sum::<f64>() + most_of_sums(standard),
+        factors: standard.blocks.iter().map(|b| b.factor.ln()).sum::<f64>()
+            + most_of_sums(standard),
         sums: standard
             .halves
             .iter()
             .map(|half| {
                 let pairs = |&(i, f): &(usize, f64)| {
                     let row = half.terms.iter().map(move |(j, g)| (i * size + j, f * g));
-                    row.map(|(entry, product)| product * inverse[entry]).sum::<f64>()
+                    row.map(|(entry, product)| product * inverse[entry])
+                        .sum::<f64>()
                 };
                 half.terms.iter().map(pairs).sum()
             })

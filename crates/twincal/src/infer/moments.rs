@@ -52,9 +52,10 @@ impl Moments {
             .sum();
         let inside = |d: usize| self.variance[d] > 0.0;
         let beta = |d: usize| standard.center[d] + self.delta[d];
-        let sums = standard.halves.iter().map(|half| {
-            half_mass(half, inside, beta, |d| phi * self.variance[d])
-        });
+        let sums = standard
+            .halves
+            .iter()
+            .map(|half| half_mass(half, inside, beta, |d| phi * self.variance[d]));
         single + sums.sum::<f64>()
     }
 }

@@ -118,7 +118,9 @@ impl Law {
                 let sd = (phi / row[a]).sqrt();
                 let [low, high] = self.range(&moved, i);
                 let ends = [(low - center) / sd, (high - center) / sd];
-                moved[i] = (center + sd * random.normal_between(ends)).min(high).max(low);
+                moved[i] = (center + sd * random.normal_between(ends))
+                    .min(high)
+                    .max(low);
             }
         }
         let gap: Vec<f64> = self.bounded.iter().map(|&i| moved[i] - beta[i]).collect();
@@ -168,7 +170,10 @@ impl Law {
         }
         let mut share: f64 = 1.0;
         for site in &self.sites {
-            let (here, there) = (site.value(&from) - site.lower, site.value(beta) - site.lower);
+            let (here, there) = (
+                site.value(&from) - site.lower,
+                site.value(beta) - site.lower,
+            );
             if there < 0.0 {
                 share = share.min(here.max(0.0) / (here - there));
             }
@@ -284,7 +289,12 @@ mod tests {
         };
         let sites = vec![site(1.0), site(-1.0)];
         // Σ precision a aᵀ = diag(1, 1), Σ shift a = (1.4, 0).
-        let matrix = [conjugate[0] + 1.0, conjugate[1], conjugate[2], conjugate[3] + 1.0];
+        let matrix = [
+            conjugate[0] + 1.0,
+            conjugate[1],
+            conjugate[2],
+            conjugate[3] + 1.0,
+        ];
         let factor = Cholesky::new(&matrix, 2).unwrap();
         let mut mean = vec![
             scale * (free[0] - rho * free[1]) + 1.4,
@@ -300,7 +310,12 @@ mod tests {
             sites,
         };
         let law = Law::new(&model);
-        assert!(law.mean.iter().zip(free).all(|(m, f)| (m - f).abs() < 1e-12));
+        assert!(
+            law.mean
+                .iter()
+                .zip(free)
+                .all(|(m, f)| (m - f).abs() < 1e-12)
+        );
         let mut random = Random::new(5, 0);
         let (n, mut sums) = (20_000.0, [0.0; 3]);
         for _ in 0..20_000 {

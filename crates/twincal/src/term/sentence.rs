@@ -401,16 +401,16 @@ mod tests {
     }
 
     #[test]
-    fn factors_are_told_in_per_cent_and_angles_in_degrees() {
+    fn drive_constants_are_factors_and_joint_zeros_degrees() {
         let gain = estimates(&[("value", "1", 0.05, 0.01)]);
         assert_eq!(
             sentence(&component(Family::Gain, "torque gain of a"), &gain),
-            "torque gain of a: +5.0 ± 1.0 %"
+            "torque gain of a: drive constant × 1.050 ± 0.010"
         );
         let zero = estimates(&[("value", "rad", 0.0175, 0.00175)]);
         assert_eq!(
             sentence(&component(Family::EncoderZero, "zero position of a"), &zero),
-            "zero position of a: +1.00° ± 0.10°"
+            "zero position of a: joint zero +1.00° ± 0.10°"
         );
     }
 }

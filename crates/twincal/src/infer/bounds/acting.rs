@@ -47,7 +47,10 @@ impl Acting {
     /// Of the model with these positions; `None` where a bound forbids it.
     pub(super) fn new(standard: &Standard, positions: &[usize]) -> Option<Self> {
         let mut place = vec![None; standard.size()];
-        positions.iter().enumerate().for_each(|(i, &d)| place[d] = Some(i));
+        positions
+            .iter()
+            .enumerate()
+            .for_each(|(i, &d)| place[d] = Some(i));
         let inside = |d: usize| place[d].is_some();
         let mut sums = Vec::new();
         let (mut replaced, mut group) = (vec![false; positions.len()], vec![None; positions.len()]);

@@ -298,7 +298,11 @@ fn a_sum_without_its_first_term_is_forbidden() {
     ] {
         let alone = got.models.iter().filter(|m| m.members == [1]);
         assert!(alone.map(|m| m.weight).sum::<f64>() < 1e-100);
-        assert!(got.inclusion.iter().all(|p| p.is_finite()), "{:?}", got.inclusion);
+        assert!(
+            got.inclusion.iter().all(|p| p.is_finite()),
+            "{:?}",
+            got.inclusion
+        );
     }
 }
 
