@@ -190,7 +190,7 @@ fn what_a_file_can_say_of_it_goes_there_and_the_rest_stays_beside() {
 
 /// Friction that bends so much that the viscous friction of the best fit is negative: a file has none of it, and the dry friction that is
 /// nearest then. 0.3 N·m·s/rad of the viscous friction are the model's own. Truth: least squares of what is left on tanh(v/0.02), over
-/// speeds spread evenly between the least and the largest of the log. The friction is negative within the motion, which is told.
+/// speeds spread evenly between the least and the largest of the log.
 #[test]
 fn a_file_without_negative_friction_and_its_residual_are_the_twin() {
     const DAMPING: f64 = 0.3;
@@ -198,7 +198,7 @@ fn a_file_without_negative_friction_and_its_residual_are_the_twin() {
     let mut description = arm.description().clone();
     description.joints[0].damping = DAMPING;
     let (arm, _) = Robot::new(description, &Default::default()).expect("an arm");
-    let log = log_of(&arm, [[1.0, 4.0 - DAMPING, -2.0], [0.6, 0.5, 0.0]], 12);
+    let log = log_of(&arm, [[8.0, 0.7 - DAMPING, -0.8], [0.6, 0.5, 0.0]], 12);
     let mut settings = CalibrationSettings::default();
     settings.library.families = vec![
         Family::Viscous,
@@ -215,7 +215,7 @@ fn a_file_without_negative_friction_and_its_residual_are_the_twin() {
     };
     let [dry, viscous, quadratic] =
         ["coulomb", "viscous", "quadratic_friction"].map(|what| mean(&format!("shoulder.{what}")));
-    assert!((quadratic + 2.0).abs() < 0.1, "{quadratic}");
+    assert!((quadratic + 0.8).abs() < 0.1, "{quadratic}");
     let [_, _, least, most, ..] = result.twin.hull[0];
     let [mut along, mut size] = [0.0; 2];
     for i in 0..100_000 {
@@ -250,9 +250,4 @@ fn a_file_without_negative_friction_and_its_residual_are_the_twin() {
         let (_, beside) = beside.expect("a coefficient");
         assert!((file + beside - twin).abs() < 1e-12, "{name}: {beside}");
     }
-    let told: Vec<&str> = (result.findings.iter())
-        .filter(|finding| finding.code == "friction_turns_negative")
-        .map(|finding| finding.subject.as_str())
-        .collect();
-    assert_eq!(told, ["shoulder"]);
 }

@@ -11,7 +11,7 @@
 
 use crate::error::{Finding, Severity};
 use crate::linear_algebra::Cholesky;
-use crate::posterior::random::Random;
+use crate::random::Random;
 use crate::posterior::summary::ColumnSummary;
 use crate::posterior::{Posterior, Problem};
 use crate::signal::Payload;

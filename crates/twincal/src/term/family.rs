@@ -110,10 +110,10 @@ impl Family {
         Self::LoadFriction,
         Self::CoupledFriction,
         Self::CoupledInertia,
-        Self::Hysteresis,
-        Self::WarmUp,
         Self::Gain,
         Self::EncoderZero,
+        Self::Hysteresis,
+        Self::WarmUp,
     ];
 
     /// What is proposed beside the user's own expressions: friction, offset and motor inertia of every joint.

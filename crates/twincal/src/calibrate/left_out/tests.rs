@@ -47,6 +47,8 @@ fn log(random: &mut Random, rows: usize, beta: [f64; COLUMNS]) -> Observations {
 /// Components {0, 1}, {2}, {3} with unlike noise weights; `lower` of column 3.
 fn fit(logs: &[Part<'_>], lower: f64) -> Fit {
     let columns = Columns {
+        halves: Vec::new(),
+        one_motion: false,
         names: (0..COLUMNS).map(|k| format!("c{k}")).collect(),
         component: vec![0, 0, 1, 2],
         family: vec![0; 3],

@@ -26,6 +26,8 @@ fn swinging(rows: usize, seed: u64, unknown: f64) -> Observations {
 
 fn two_columns() -> Columns {
     Columns {
+        halves: Vec::new(),
+        one_motion: false,
         names: vec!["a".into(), "b".into()],
         component: vec![0, 1],
         family: vec![0, 0],
