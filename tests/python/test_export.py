@@ -170,8 +170,12 @@ def require_same_as_predict(folder, truth, tau, low, high, outside):
     joints = truth["joints"]
     np.testing.assert_allclose(tau, predicted(folder, joints, "tau"), rtol=0, atol=1e-9)
     width = predicted(folder, joints, "tau_high95") - predicted(folder, joints, "tau_low95")
-    assert (np.abs(high - low - width) < 0.05 * width).all()
-    assert (np.abs(low - predicted(folder, joints, "tau_low95")) < 0.05 * width).all()
+    # A program has no memory: what a log's first 30 mrad leave open of friction (docs/components.md) it does not widen.
+    q = heldout(folder)[0]
+    far = np.maximum.accumulate(q, axis=1) - np.minimum.accumulate(q, axis=1) > 0.031
+    assert far.mean() > 0.98
+    assert (np.abs(high - low - width) < 0.05 * width)[far].all()
+    assert (np.abs(low - predicted(folder, joints, "tau_low95")) < 0.05 * width)[far].all()
     flags = table(folder / "predicted.csv")["extrapolating"].astype(bool)
     assert (outside == flags).mean() > 0.999
 
@@ -347,22 +351,18 @@ def test_mjcf_changes_nothing_but_numbers(planar):
 
 
 @pytest.mark.skipif(not UR10.is_dir(), reason="../shared/data/ur10 is not there")
-def test_bodies_of_a_real_robot_cost_next_to_no_torque(tmp_path):
-    """Its maker's model has centres of mass at the joints; what was found is no body until tensors that slow motion does not show are."""
+def test_what_a_real_robot_does_not_establish_changes_no_body(tmp_path):
+    """The maker's model has centres of mass at the joints; slow motion establishes no body that takes their place: inertias stay as they are."""
     fit(tmp_path, [UR10 / "run0.parquet"], "", model=UR10 / "model.urdf", expect=None)
     said = twincal("export", "--twin", tmp_path / "out", "--to", "urdf", "-o", tmp_path / "exported.urdf", "--json")
     told = json.loads(said.stdout)
-    assert told["projection"]["distance"] < 5 and told["projection"]["gap"] < 1e-8
     assert max(told["lost"]) < 0.1 and max(told["correction"]) > 10
-    text = (tmp_path / "exported.urdf").read_text()
-    links = {link["link"] for link in told["links"] if link["no_body"]}
-    assert "upper_arm_link" in links and links >= set(told["projection"]["links"])
-    commented = {link.split('"')[1] for link in text.split("<link ")[1:] if "<!-- twincal: no rigid body" in link.split("</link>")[0]}
-    assert commented == links
-    model = pin.buildModelFromUrdf(str(tmp_path / "exported.urdf"))
-    for inertia in list(model.inertias)[1:]:
-        moments = np.linalg.eigvalsh(inertia.inertia)
-        assert inertia.mass > 0 and moments[0] > 0 and moments[0] + moments[1] >= moments[2] * (1 - 1e-9)
+    assert told["projection"] is None and not told["links"]
+    of = lambda path: np.array([inertia.toDynamicParameters() for inertia in pin.buildModelFromUrdf(str(path)).inertias])
+    np.testing.assert_array_equal(of(tmp_path / "exported.urdf"), of(UR10 / "model.urdf"))
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    status = {c["name"]: c["status"] for c in result["components"]}
+    assert all(status[w["component"]] in ("established", "equivalent") for w in told["written"])
 
 
 @pytest.mark.skipif(not PENDULUM.is_dir(), reason="../shared/data/double_pendulum is not there")

@@ -16,8 +16,9 @@ sys.path.insert(0, str(ROOT / "studies" / "real_robots"))
 import real_robots as real  # noqa: E402
 
 pytestmark = pytest.mark.skipif(not (SHARED / "ur10").is_dir(), reason="../shared/data is not there")
-# Within which velocity friction turns round, rad/s: their training residuals prefer it by 14 nats and more (the TX40's by 1 % of it, too little to leave 0.02).
-TURNING = {"ur10": 0.08, "staubli_tx40": 0.02, "kuka_kr300": 0.01}
+# Within which velocity friction turns round, rad/s: the UR10's training residual prefers it by 14 nats and more (the TX40's by 1 % of it, too
+# little to leave 0.02; that of the KR300 no more, since hysteresis is a candidate).
+TURNING = {"ur10": 0.08, "staubli_tx40": 0.02, "kuka_kr300": 0.02}
 
 
 @pytest.mark.parametrize("split", [s for s in real.SPLITS if not s.absolute], ids=lambda s: s.name)
@@ -100,10 +101,10 @@ def test_a_coarse_encoder_is_fitted_where_its_rows_say_something(tmp_path):
     result = fit(tmp_path, sorted(folder.glob("run*.csv")), "", model=folder / "model.urdf")
     told = [f["message"] for f in result["findings"] if f["code"] == "lower_band"]
     assert len(told) == 1 and "automatic cut-off of 33 Hz" in told[0]
-    assert result["signal"]["cutoff_hz"] == 8.3
+    assert result["signal"]["cutoff_hz"] == 2.1
     assert result["noise"][0]["n_eff"] > 30
     scores = result["validation"]["joints"][0]
-    assert scores["rmse_calibrated"] < 0.85 * scores["rmse_nominal"]
+    assert scores["rmse_calibrated"] < 0.92 * min(scores["rmse_nominal"], scores["rmse_friction"])
 
 
 def test_accelerations_that_drown_the_model_send_the_fit_to_a_lower_band(tmp_path):

@@ -372,7 +372,10 @@ fn a_log_of_the_models_own_torque_lacks_nothing() {
             let result = result(folder.path());
             for term in result["terms"].as_array().unwrap() {
                 let pip = term["pip"].as_f64().unwrap_or(0.0);
-                assert!(pip < 0.5 || term["seen"] == false, "{error} {config} {term}");
+                assert!(
+                    pip < 0.5 || term["seen"] == false,
+                    "{error} {config} {term}"
+                );
                 assert!(term["pip"].is_null() || term["mean"].is_f64(), "{term}");
             }
         }

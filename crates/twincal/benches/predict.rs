@@ -3,8 +3,8 @@
 
 use std::time::Instant;
 use twincal::likelihood::JointNoise;
-use twincal::random::Random;
 use twincal::posterior::{Method, Model, Posterior};
+use twincal::random::Random;
 use twincal::twin::{JointInput, JointSetting, Predictor, TorqueSignal};
 
 const COLUMNS: usize = 24;

@@ -24,7 +24,12 @@ fn the_payload_and_the_hidden_effect_are_found_and_nothing_else() {
         .filter(|component| component.status == Status::Established)
         .map(|component| component.name.as_str())
         .collect();
-    assert_eq!(found, ["sin(q1 - q2)", "payload"], "{:?}", result.components);
+    assert_eq!(
+        found,
+        ["sin(q1 - q2)", "payload"],
+        "{:?}",
+        result.components
+    );
     // 0.6 kg more at the end of the fore link, which is 0.5 m from its joint.
     for (component, parameter, truth) in [
         ("sin(q1 - q2)", "value", 0.8),

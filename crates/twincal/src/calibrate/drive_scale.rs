@@ -11,9 +11,9 @@
 
 use crate::error::{Finding, Severity};
 use crate::linear_algebra::Cholesky;
-use crate::random::Random;
 use crate::posterior::summary::ColumnSummary;
 use crate::posterior::{Posterior, Problem};
+use crate::random::Random;
 use crate::signal::Payload;
 use crate::term::{Library, ModelColumn};
 

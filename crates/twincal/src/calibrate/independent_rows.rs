@@ -11,14 +11,12 @@ use crate::robot::Robot;
 /// Effective rows below which nothing is concluded (case 7).
 pub(super) const LEAST_EFFECTIVE_ROWS: f64 = 10.0;
 
-/// Rows of a joint that are not at standstill, and the independent rows that they count as once autocorrelation and misfit of what is left
-/// are counted.
-pub(super) fn of_joint(fit: &Fit, training: &[Part<'_>], joint: usize) -> [f64; 2] {
+/// Rows of a joint that are not at standstill, and the independent rows that they count as once the autocorrelation of what is left is
+/// counted. What no candidate describes is no matter of the rows: more of them would not help.
+fn of_joint(fit: &Fit, training: &[Part<'_>], joint: usize) -> [f64; 2] {
     let (n, rho) = (moving_rows(training, joint), fit.plug_in.rho[joint]);
-    [
-        n,
-        n * fit.plug_in.counted(joint) * (1.0 - rho) / (1.0 + rho),
-    ]
+    let counted = fit.plug_in.passed / fit.plug_in.autocorrelation_time[joint];
+    [n, n * counted * (1.0 - rho) / (1.0 + rho)]
 }
 
 /// How many there are.
@@ -66,7 +64,7 @@ pub(super) fn require(
         });
         return Err(refuse(
             format!(
-                "{} independent rows once autocorrelation and misfit of the residual are counted, {LEAST_EFFECTIVE_ROWS} are needed{}",
+                "{} independent rows once the residual's autocorrelation is counted, {LEAST_EFFECTIVE_ROWS} are needed{}",
                 counts.join(", "),
                 goes.unwrap_or_default()
             ),

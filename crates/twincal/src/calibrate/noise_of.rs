@@ -1,8 +1,9 @@
 //! What a fit says of each joint's noise.
 
-use super::{Fitted, independent_rows};
+use super::Fitted;
 use crate::likelihood::{JointNoise, Spread};
 use crate::observations::Part;
+use crate::plug_in::moving_rows;
 use crate::robot::Robot;
 
 /// Noise per joint as reported; σ_j = √E[φ/(w_j(1−ρ_j²)) | y].
@@ -19,8 +20,7 @@ pub(super) fn noise_of(
         .into_iter()
         .enumerate()
         .map(|(j, name)| {
-            let [n, n_eff] = independent_rows::of_joint(&fitted.fit, training, j);
-            let rho = plug_in.rho[j];
+            let (n, rho) = (moving_rows(training, j), plug_in.rho[j]);
             let left = plug_in.variance.get(j).copied().unwrap_or(1.0);
             JointNoise {
                 joint: name.to_owned(),
@@ -28,7 +28,7 @@ pub(super) fn noise_of(
                 rho,
                 weight: plug_in.weight[j],
                 n,
-                n_eff,
+                n_eff: n * plug_in.counted(j) * (1.0 - rho) / (1.0 + rho),
                 autocorrelation_time: plug_in.autocorrelation_time[j],
                 misfit: plug_in.misfit.get(j).copied().unwrap_or(1.0),
                 interval_factor: fitted

@@ -1,11 +1,11 @@
 //! What a calibration returns: plain values that can be printed, compared and written.
 
+use super::status::{Status, StatusReason};
 use crate::error::Finding;
 use crate::incidents::Incident;
 use crate::lag::Lags;
 use crate::likelihood::{JointNoise, NoiseModel};
 use crate::prior::Inclusion;
-use super::status::{Status, StatusReason};
 use crate::term::{Family, Term};
 use crate::twin::Twin;
 use crate::validate::{Validation, nan_if_null, nans_if_null};

@@ -5,8 +5,8 @@ use crate::likelihood::{Columns, assemble};
 use crate::observations::{JointObservations, Observations, Part};
 use crate::plug_in::{Fit, start, total};
 use crate::posterior::Posterior;
-use crate::random::Random;
 use crate::prior::{Inclusion, PriorSettings};
+use crate::random::Random;
 use crate::signal::Auto;
 use crate::term::Family;
 

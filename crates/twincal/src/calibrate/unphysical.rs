@@ -19,7 +19,7 @@ const WORTH_TELLING: f64 = 0.5;
 const NO_BODY: &str = "; no rigid body has such an inertia";
 /// Rounding in the triangle inequality, as a share of the largest moment.
 const ROUNDING: f64 = 1e-9;
-/// The same share for a body that is nearly one: a point mass or a thin rod lies on the bound, and half of what is found of it beyond.
+/// The same share for draws: a point mass or a thin rod lies on the bound, and half of what is found of it beyond.
 const NEARLY: f64 = 0.01;
 
 /// A found inertia that is none.
@@ -27,8 +27,6 @@ pub(super) struct Unphysical {
     finding: Finding,
     /// Share of the draws that are those of a rigid body.
     share: f64,
-    /// Whether most draws are not even nearly those of one.
-    is_far: bool,
     /// What was found of it.
     components: Vec<usize>,
 }
@@ -83,11 +81,8 @@ pub(super) fn findings(
             }
             parameters
         };
-        let share = |rounding: f64| {
-            let bodies = (0..count).filter(|row| is_physical(&parameters(*row), whole, rounding));
-            bodies.count() as f64 / count.max(1) as f64
-        };
-        let (share, nearly) = (share(ROUNDING), share(NEARLY));
+        let bodies = (0..count).filter(|row| is_physical(&parameters(*row), whole, NEARLY));
+        let share = bodies.count() as f64 / count.max(1) as f64;
         if share < WORTH_TELLING {
             let of_column = |(column, _): &(usize, [f64; 10])| {
                 library.terms()[library.columns()[*column]].component
@@ -98,7 +93,6 @@ pub(super) fn findings(
             all.push(Unphysical {
                 finding: finding(name, share),
                 share,
-                is_far: nearly < WORTH_TELLING,
                 components,
             });
         }
@@ -111,7 +105,6 @@ pub(super) fn tell(calibration: &mut Calibration, unphysical: Vec<Unphysical>) {
     for Unphysical {
         finding,
         share,
-        is_far,
         components,
     } in unphysical
     {
@@ -119,11 +112,10 @@ pub(super) fn tell(calibration: &mut Calibration, unphysical: Vec<Unphysical>) {
             let own = &mut calibration.components[component];
             own.rigid_share = Some(share);
             own.no_rigid_body = share < CONTRADICTS;
-            if is_far {
+            if own.no_rigid_body {
                 (own.status, own.reason) = (Status::Tentative, StatusReason::NoRigidBody { share });
+                own.words.push_str(NO_BODY);
             }
-            own.words
-                .push_str(if own.no_rigid_body { NO_BODY } else { "" });
         }
         calibration.findings.push(finding);
     }

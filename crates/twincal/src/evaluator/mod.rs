@@ -16,8 +16,8 @@ mod tests;
 #[cfg(test)]
 pub(crate) mod testing;
 
-pub(crate) use states::{STATES, States, rms};
 pub use forgotten::forgotten;
+pub(crate) use states::{STATES, States, rms};
 pub use trace::Step;
 
 use crate::error::{Error, Result};

@@ -1,8 +1,8 @@
 //! Draws of one model's coefficients within their bounds.
 
-use crate::random::Random;
 use super::{Model, Site};
 use crate::linear_algebra::Cholesky;
+use crate::random::Random;
 
 /// Sweeps of the sampler over the bounded coefficients: each draws them one after the other from their exact
 /// conditional laws.

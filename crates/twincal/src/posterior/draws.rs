@@ -1,8 +1,8 @@
 //! Joint posterior draws of structure, noise and coefficients (paper fig. 3; method section 7).
 
 use super::bounded::Law;
-use crate::random::Random;
 use super::{Model, Posterior};
+use crate::random::Random;
 use std::sync::OnceLock;
 
 /// Independent draws from p(z, φ, β | y).

@@ -55,8 +55,8 @@ mod library;
 mod tests;
 
 pub(crate) use component::Before;
-pub use course::Course;
 pub use component::{Component, Parameter};
+pub use course::Course;
 pub use expression::Function;
 pub(crate) use expression::{Graph, Id as GraphId, Node, Variable};
 pub use family::Family;

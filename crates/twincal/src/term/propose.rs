@@ -164,10 +164,16 @@ pub(super) fn proposals(
     }
     all.extend(ripples(graph, joints, settings)?);
     if settings.has(Family::Hysteresis) {
-        all.extend(joints.iter().map(|joint| hysteresis::proposal(graph, joint)));
+        all.extend(
+            joints
+                .iter()
+                .map(|joint| hysteresis::proposal(graph, joint)),
+        );
     }
     if settings.has(Family::WarmUp) {
-        let warm_up = joints.iter().map(|joint| warm_up::proposal(graph, joint, velocity));
+        let warm_up = joints
+            .iter()
+            .map(|joint| warm_up::proposal(graph, joint, velocity));
         all.extend(warm_up);
     }
     Ok(all)

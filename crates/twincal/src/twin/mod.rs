@@ -111,8 +111,7 @@ impl Twin {
         recording: &Recording,
         start: Option<f64>,
     ) -> Result<(Trajectory, Vec<Finding>)> {
-        let (mut trajectory, findings) =
-            align_part(&self.robot, recording, start, &self.pipeline)?;
+        let (mut trajectory, findings) = align_part(&self.robot, recording, start, &self.pipeline)?;
         trajectory.payload_acts =
             !self.payload_where_unknown || recording.payload == Payload::Unknown;
         Ok((trajectory, findings))

@@ -19,7 +19,7 @@ pub use links::LinkChange;
 pub use projection::Projection;
 pub use torque_error::JointTorqueError;
 
-use crate::calibrate::{Calibration, Status};
+use crate::calibrate::{Alike, Calibration, ComponentSummary, Status, StatusReason};
 use crate::error::Result;
 use crate::evaluator::{States, rms};
 use crate::robot::{Robot, RobotDescription};
@@ -138,7 +138,7 @@ impl<'a> Writer<'a> {
         })
     }
 
-    /// The established effects with E[β | y]; all others stay beside the file, so that both together are the model average.
+    /// The established effects, and sets of the same torque in every motion, with E[β | y]; all others stay beside the file, so that both together are the model average.
     ///
     /// # Errors
     /// [`crate::Error::Refused`] where no physical inertia can be found.
@@ -161,12 +161,17 @@ impl<'a> Writer<'a> {
         self.write(&chosen, beta)
     }
 
-    /// The effects that are established.
+    /// The effects that are established, and of sets that are, whose members have the same torque in every motion, all members: their torque
+    /// is established, only its name is open.
     fn chosen(&self) -> Vec<bool> {
-        let components = self.calibration.components.iter();
-        components
-            .map(|own| own.status == Status::Established)
-            .collect()
+        let is_chosen = |own: &ComponentSummary| match (own.status, &own.reason) {
+            (Status::Established, _) => true,
+            (Status::Equivalent, StatusReason::SameTorque { alike, .. }) => {
+                *alike == Alike::EveryMotion
+            }
+            _ => false,
+        };
+        self.calibration.components.iter().map(is_chosen).collect()
     }
 
     /// The write-back of coefficients `beta` for the `chosen` components.

@@ -20,9 +20,9 @@ use crate::likelihood::{
     AUTO_SHAPE, Columns, NoiseInterval, NoiseModel, NoiseSettings, PlugIn, assemble, auto_scale,
 };
 use crate::linear_algebra::Cholesky;
-use crate::random::Random;
 use crate::posterior::{Method, Model, Posterior, Problem};
 use crate::prior::PriorSettings;
+use crate::random::Random;
 use chain::Chain;
 use rayon::prelude::*;
 use std::collections::BTreeMap;

@@ -6,8 +6,8 @@ use super::planted::{self, BUGS};
 use super::target::{Noise, Target};
 use crate::diagnostics::mcse_mean;
 use crate::gram::{JointGram, Symmetric};
-use crate::random::Random;
 use crate::prior::{Inclusion, Prior};
+use crate::random::Random;
 
 const JOINTS: usize = 2;
 const COLUMNS: usize = 6;
