@@ -423,7 +423,7 @@ pub struct PriorTable {
     /// joint, or components by name. Default: { asymmetry = "coulomb", stribeck = "coulomb", quadratic_friction = "viscous", coupled_inertia = "coupled_friction", hysteresis = "coulomb", warm_up = "coulomb", mass_moments = "density" }; {} binds nothing.
     pub heredity: Option<BTreeMap<String, String>>,
     /// Prior sd of a factor on torque that all drives share, as a share of 1: it widens the intervals of masses and inertias unless two known
-    /// payloads were logged. Default: 0.07 where [[log]] torque is "motor" or "current", else 0; set it where the torque in the log was made of
+    /// payloads were logged. Default: 0.07 where the torque of `[[log]]` is "motor" or "current", else 0; set it where the torque in the log was made of
     /// currents and catalogue constants.
     #[schemars(extend("minimum" = 0, "exclusiveMaximum" = 1))]
     pub drive_gain: Option<f64>,

@@ -30,10 +30,8 @@ fn friction(q: &[f64], qd: &[f64]) -> Vec<f64> {
     let mut e = 0.0;
     (0..q.len())
         .map(|i| {
-            e = f64::max(
-                -R,
-                f64::min(R, e + if i == 0 { 0.0 } else { q[i] - q[i - 1] }),
-            );
+            let step = if i == 0 { 0.0 } else { q[i] - q[i - 1] };
+            e = (e + step).clamp(-R, R);
             let cold = COLD * (-1e-3 * i as f64 / CONSTANT).exp();
             FRICTION * e / R + cold * (qd[i] / 0.02).tanh()
         })

@@ -496,7 +496,9 @@ pub(crate) fn align_part(
     start: Option<f64>,
     pipeline: &Pipeline,
 ) -> Result<(Trajectory, Vec<Finding>)> {
-    prepare(robot, part, pipeline)?.since(start).align(pipeline, Raw::All)
+    prepare(robot, part, pipeline)?
+        .since(start)
+        .align(pipeline, Raw::All)
 }
 
 /// Step 1 alone, for [`PreparedLog::align`] at several cut-offs up to 1.4 times that of `pipeline`.

@@ -199,7 +199,7 @@ fn floored(nominal: &Ten, (least, centre): (f64, [f64; 3]), length: f64) -> Body
         let mut own = [0.0; 10];
         own[0] = mass;
         own[4..].copy_from_slice(&tensor(&second));
-        body.shape = body.from_centre(&own);
+        body.shape = body.centred(&own);
     }
     body
 }
@@ -268,7 +268,7 @@ impl Body {
     }
 
     /// Parameters about the centre as parameters about the body's origin.
-    pub(super) fn from_centre(&self, about_centre: &Ten) -> Ten {
+    pub(super) fn centred(&self, about_centre: &Ten) -> Ten {
         let map = to_body_frame(&Placement {
             translation: self.centre,
             ..Placement::IDENTITY
@@ -280,7 +280,7 @@ impl Body {
     pub(super) fn of_mass(&self) -> Ten {
         let mut own = [0.0; 10];
         own[0] = 1.0;
-        self.from_centre(&own)
+        self.centred(&own)
     }
 
     /// First moments about the centre for each of three standard normal coefficients.
@@ -289,7 +289,7 @@ impl Body {
         let one = |column: [f64; 3]| {
             let mut own = [0.0; 10];
             own[1..4].copy_from_slice(&scale((0.5 * self.mass).sqrt(), column));
-            self.from_centre(&own)
+            self.centred(&own)
         };
         columns.into_iter().map(one).collect()
     }
@@ -309,7 +309,7 @@ impl Body {
             });
             let mut own = [0.0; 10];
             own[4..].copy_from_slice(&tensor(&second));
-            self.from_centre(&own)
+            self.centred(&own)
         };
         pairs.into_iter().map(one).collect()
     }
