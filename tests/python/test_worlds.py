@@ -282,3 +282,14 @@ def test_a_count_above_its_limit_is_missed():
     """Of 12 fits with a mean of 0.1 at most, five or more have a false effect in less than 1 of 100 studies (binomial: 0.0043)."""
     assert table.exceeds([1] * 5 + [0] * 7, 0.1) and not table.exceeds([1] * 2 + [0] * 10, 0.1)
     assert not table.exceeds([0] * 12, 0.1)
+
+
+def test_twelve_fits_reach_the_limits(lines):
+    """No limit but one is missed by its one-sided 99 % bound: one of the eight fails by chance in less than 8 of 100 changes of the seeds, which are fixed.
+
+    Bins of probabilities and the worst world need more fits than 12 and are left to the study, where false effects per fit miss their limit.
+    """
+    assert len(lines) == 12
+    left = ("PIP 0.", "… worst world", "established and false")
+    missed = [row[:3] for row in table.limits(lines) if row[-1] == "missed" and not row[0].startswith(left)]
+    assert not missed, table.markdown(lines)

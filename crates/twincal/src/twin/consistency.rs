@@ -5,6 +5,9 @@ use crate::error::{Error, Result};
 use crate::likelihood::JointNoise;
 use crate::posterior::Posterior;
 
+/// What rounding may add to weights that sum to 1.
+const WEIGHT_ROUNDING: f64 = 1e-6;
+
 /// A posterior read from a file may have been cut or edited: nothing below may index out of range.
 pub(super) fn check(posterior: &Posterior, joints: &[JointSetting<'_>]) -> Result<()> {
     let columns = posterior.inclusion.len();
@@ -28,6 +31,12 @@ pub(super) fn check(posterior: &Posterior, joints: &[JointSetting<'_>]) -> Resul
             "the posterior holds no model with positive weight".into(),
         ));
     }
+    let sum: f64 = posterior.models.iter().map(|model| model.weight).sum();
+    if sum > 1.0 + WEIGHT_ROUNDING {
+        return Err(damaged(format!(
+            "the weights of the posterior's models add up to {sum:e}, not to 1"
+        )));
+    }
     if !posterior.shape.is_finite() || posterior.shape <= 0.0 {
         return Err(damaged(format!(
             "shape of the noise is {}",
@@ -46,7 +55,8 @@ pub(super) fn check(posterior: &Posterior, joints: &[JointSetting<'_>]) -> Resul
             .iter()
             .chain(&model.factor)
             .chain([&model.weight, &model.scale])
-            .all(|v| v.is_finite());
+            .all(|v| v.is_finite())
+            && model.weight >= 0.0;
         let positive = (0..size).all(|i| {
             model
                 .factor

@@ -350,6 +350,8 @@ fn a_damaged_posterior_is_an_error_and_no_panic() {
     assert!(spoil(&|p| p.models[0].factor[0] = 0.0));
     assert!(spoil(&|p| p.models[0].members = vec![70]));
     assert!(spoil(&|p| p.models[1].scale = f64::NAN));
+    assert!(spoil(&|p| p.models[0].weight = 1e308));
+    assert!(spoil(&|p| p.models[0].weight = -0.1));
     assert!(spoil(&|p| p.shape = -1.0));
     assert!(spoil(&|p| p.mean.truncate(2)));
 }
