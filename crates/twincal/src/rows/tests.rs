@@ -185,11 +185,8 @@ fn collect_slices(
             for r in 0..block.len {
                 let mut row = vec![block.time[r], block.input_rows[r] as f64];
                 row.extend((0..data.columns.len()).map(|c| data.x[c * data.stride + r]));
-                row.extend([
-                    data.measured[r],
-                    data.nominal[r],
-                    f64::from(u8::from(data.standstill[r])),
-                ]);
+                let standstill = f64::from(u8::from(data.standstill[r]));
+                row.extend([data.measured[r], data.nominal[r], standstill]);
                 rows[joint].push(row);
             }
         }
