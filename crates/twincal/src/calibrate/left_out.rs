@@ -92,7 +92,7 @@ impl LeftOut {
     /// Grams of blocks of the training rows over the columns of the components `inside`, weighted as in the likelihood of `fit`:
     ///
     /// ```text
-    /// G = Σ_j w_j/(c τ_j) G_j(ρ_j)
+    /// G = Σ_j w_j/max(τ_j, λ_j) G_j(ρ_j)
     /// ```
     pub(super) fn new(training: &[Part<'_>], fit: &Fit, inside: &[bool]) -> Self {
         let prior = &fit.problem.prior;
