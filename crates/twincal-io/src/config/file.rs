@@ -218,7 +218,7 @@ pub struct LibraryTable {
     pub terms: Vec<String>,
     /// The built-in trigonometric and polynomial family; default: on up to 3 joints.
     pub generic: Option<bool>,
-    /// Built-in families of physical components. Default: all but gain, encoder_zero and ripple; with own `terms`
+    /// Built-in families of physical components. Default: all but ripple; with own `terms`
     /// or `generic = true`: viscous, coulomb, offset and motor_inertia.
     pub families: Option<Vec<FamilyWord>>,
     /// Link in whose frame the payload is described; default: the last link.

@@ -63,8 +63,10 @@ impl Friction {
         let mut all = Vec::new();
         for direction in [1.0, -1.0] {
             all.extend(self.each_way(direction));
-            for speed in speeds.into_iter().filter(|speed| speed.is_finite()) {
-                all.extend(self.total(direction, speed));
+            for (i, speed) in speeds.into_iter().enumerate() {
+                if speed.is_finite() && !speeds[..i].contains(&speed) {
+                    all.extend(self.total(direction, speed));
+                }
             }
         }
         all

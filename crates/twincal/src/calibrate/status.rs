@@ -242,7 +242,8 @@ impl Effects<'_> {
         let clear = lowered.as_ref().is_some_and(LeftOutError::is_clear);
         for e in members {
             let own = &mut self.components[e];
-            if clear && own.pip.is_some_and(|pip| pip >= MEMBER) {
+            let seen = own.status != Status::Unidentifiable;
+            if clear && seen && own.pip.is_some_and(|pip| pip >= MEMBER) {
                 own.status = Status::Equivalent;
             }
             if matches!(own.status, Status::Equivalent | Status::Tentative) {

@@ -7,7 +7,7 @@ use crate::error::{Finding, Severity};
 use crate::excitation::{Excitation, STATES, Seen, States, excitation as compare, sentence};
 use crate::gram::Gram;
 use crate::robot::Robot;
-use crate::term::{Library, Status};
+use crate::term::{Family, Library, Status};
 
 /// Sentences at most.
 const TOLD: usize = 5;
@@ -84,7 +84,7 @@ pub(super) fn tell(calibration: &mut Calibration, excitation: &Excitation) {
             .collect();
         let why = if !joints.is_empty() {
             format!("move {} more", joints.join(" and "))
-        } else if component.family.remembers() {
+        } else if component.family == Family::Hysteresis {
             "the joint travels too little in these logs".to_owned()
         } else if excited.seen == Seen::Never {
             "no motion of this robot shows it".to_owned()

@@ -49,7 +49,7 @@ impl Misfit {
 /// λ²_j = the same over left-out pieces,        v_k = φ_kᵀφ_k + f_j g_kᵀA⁻¹g_k,   A of the other pieces
 /// ```
 /// r_j is the residual at the posterior mean (of a piece: at the mean of the other pieces with every column in that acts in some model), k
-/// runs over the decoys whose squares the columns do not explain, f_j = w_j/τ_j is the joint's factor in A = Σ f_j G_j + V⁻¹. v_k σ_j² is
+/// runs over the decoys whose squares the columns do not explain, f_j = w_j/max(τ_j, λ_j) of the fit is the joint's factor in A = Σ f_j G_j + V⁻¹. v_k σ_j² is
 /// what independent noise leaves along φ_k, so that such noise gives 1. Sums are divided and not ratios averaged: a decoy that the columns
 /// nearly explain says next to nothing.
 ///

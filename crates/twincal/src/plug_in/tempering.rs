@@ -69,7 +69,7 @@ pub fn fit_tempered(
                 }
             })
             .collect();
-        if settings.noise.per_joint {
+        if settings.noise.per_joint && found.variance.iter().any(|variance| *variance > 0.0) {
             plug_in.weight = weights(&gram, &found.variance);
         }
         let moving = match round {

@@ -61,6 +61,19 @@ pub struct JointHistory {
     pub warmth: Option<Warmth>,
 }
 
+impl JointHistory {
+    /// Whether its numbers can be used: a twin's file may be damaged.
+    pub(crate) fn is_sound(&self) -> bool {
+        let thresholds = self.thresholds.iter().all(|r| r.is_finite() && *r > 0.0);
+        let warmth = match self.warmth {
+            None => true,
+            Some(Warmth::Time { constant, mean }) => constant > 0.0 && mean.is_finite(),
+            Some(Warmth::Temperature { mean, sd }) => sd > 0.0 && mean.is_finite(),
+        };
+        self.thresholds.len() <= STOPS && thresholds && warmth
+    }
+}
+
 /// A stop operator over a motion, e/r to `out`, from a state that is not known: 0, halfway between the least and the largest, until both
 /// would have come together. Returns from which sample on that is so; `q.len()` if nowhere.
 ///

@@ -34,7 +34,7 @@ pub(super) fn check(posterior: &Posterior, joints: &[JointSetting<'_>]) -> Resul
     let sum: f64 = posterior.models.iter().map(|model| model.weight).sum();
     if sum > 1.0 + WEIGHT_ROUNDING {
         return Err(damaged(format!(
-            "the weights of the posterior's models add up to {sum:e}, not to 1"
+            "the weights of the posterior's models add up to {sum:e}, more than 1"
         )));
     }
     if !posterior.shape.is_finite() || posterior.shape <= 0.0 {
@@ -63,7 +63,15 @@ pub(super) fn check(posterior: &Posterior, joints: &[JointSetting<'_>]) -> Resul
                 .get(i * size + i)
                 .is_some_and(|&pivot| pivot > 0.0)
         });
+        let sites = model.sites.iter().all(|site| {
+            let numbers = [site.lower, site.precision, site.shift];
+            let directed = site
+                .direction()
+                .all(|(i, f)| i < size && f.is_finite() && f != 0.0);
+            (site.place as usize) < size && directed && numbers.iter().all(|v| v.is_finite())
+        });
         if !(ascending
+            && sites
             && inside
             && finite
             && positive

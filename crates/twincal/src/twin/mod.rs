@@ -15,7 +15,7 @@ use crate::error::{Error, Finding, Result};
 use crate::likelihood::JointNoise;
 use crate::posterior::Posterior;
 use crate::robot::{JointKind, Robot};
-use crate::signal::{Payload, Pipeline, Recording, Trajectory, align_part};
+use crate::signal::{JointHistory, Payload, Pipeline, Recording, Trajectory, align_part};
 use crate::term::{Family, Library, LibrarySettings};
 use serde::{Deserialize, Serialize};
 
@@ -166,6 +166,19 @@ impl Twin {
                     self.noise.len(),
                     self.hull.len(),
                     names.len()
+                ),
+                remedy: "the twin's file is damaged or from another version: fit again".into(),
+            });
+        }
+        let history = &self.pipeline.history;
+        if !(history.is_empty() || history.len() == names.len())
+            || !history.iter().all(JointHistory::is_sound)
+        {
+            return Err(Error::Setting {
+                key: "twin".into(),
+                problem: format!(
+                    "what it follows of the history of {} joints is not consistent",
+                    history.len()
                 ),
                 remedy: "the twin's file is damaged or from another version: fit again".into(),
             });

@@ -1,6 +1,7 @@
 //! Predictions against brute force, simulation and each other.
 
 use super::*;
+use crate::posterior::Site;
 use crate::posterior::draws::draw;
 use crate::random::Random;
 use serde::Deserialize;
@@ -352,6 +353,17 @@ fn a_damaged_posterior_is_an_error_and_no_panic() {
     assert!(spoil(&|p| p.models[1].scale = f64::NAN));
     assert!(spoil(&|p| p.models[0].weight = 1e308));
     assert!(spoil(&|p| p.models[0].weight = -0.1));
+    let site = |place, terms| Site {
+        place,
+        terms,
+        lower: 0.0,
+        precision: 1.0,
+        shift: 0.0,
+    };
+    assert!(spoil(&|p| p.models[0].sites = vec![site(70, Vec::new())]));
+    assert!(spoil(
+        &|p| p.models[0].sites = vec![site(0, vec![(70, 1.0)])]
+    ));
     assert!(spoil(&|p| p.shape = -1.0));
     assert!(spoil(&|p| p.mean.truncate(2)));
 }
