@@ -85,6 +85,7 @@ fn main() {
             x: &x,
             stride: ROWS,
             nominal: &nominal,
+            products: &[],
             measured: &measured,
             standstill: &[],
             motion: [&[]; 3],

@@ -34,8 +34,10 @@ pub struct JointObservations {
     pub measured: Numbers,
     /// Nominal torque, len, N·m.
     pub nominal: Numbers,
-    /// Residual torque of eq. (1), len, N·m.
+    /// Residual torque of eq. (1), len, N·m: measured less nominal, less that of products of effects.
     pub y: Vec<f64>,
+    /// There are such products: else `y` is the difference of the two torques.
+    pub has_products: bool,
     /// Rows at which the joint stands still; they are no observations of anything but stiction.
     pub standstill: Vec<bool>,
     /// Relative noise variance of a row, which `weight` contains already; empty: 1 each.
@@ -136,6 +138,7 @@ struct BlockJoint {
     x: Vec<f64>,
     measured: Vec<f64>,
     nominal: Vec<f64>,
+    products: Vec<f64>,
     standstill: Vec<bool>,
 }
 
@@ -148,6 +151,7 @@ impl Block {
                 .collect(),
             measured: rows.measured.to_vec(),
             nominal: rows.nominal.to_vec(),
+            products: rows.products.to_vec(),
             standstill: rows.standstill.to_vec(),
         });
         Self {
@@ -175,6 +179,7 @@ impl Observations {
                 measured: Vec::with_capacity(len).into(),
                 nominal: Vec::with_capacity(len).into(),
                 y: Vec::with_capacity(len),
+                has_products: library.has_products(),
                 standstill: Vec::with_capacity(len),
                 ..JointObservations::default()
             }
@@ -250,6 +255,18 @@ impl Observations {
     /// True without rows.
     pub fn is_empty(&self) -> bool {
         self.time.is_empty()
+    }
+
+    /// The same rows with measured less nominal torque in the place of the residual; `None` where that is what they have.
+    pub(crate) fn beyond_nominal(&self) -> Option<Self> {
+        self.joints.iter().any(|joint| joint.has_products).then(|| {
+            let mut rows = self.clone();
+            for joint in &mut rows.joints {
+                joint.y = joint.beyond_nominal(0..joint.y.len());
+                joint.has_products = false;
+            }
+            rows
+        })
     }
 
     /// All rows as a part.
@@ -466,6 +483,32 @@ pub(crate) struct QuadraticForm {
 }
 
 impl JointObservations {
+    /// Measured less nominal torque of some rows, N·m.
+    pub(crate) fn beyond_nominal(&self, rows: Range<usize>) -> Vec<f64> {
+        if !self.has_products {
+            return self.y[rows].to_vec();
+        }
+        let (measured, nominal) = (self.measured.some(rows.clone()), self.nominal.some(rows));
+        measured
+            .iter()
+            .zip(nominal.iter())
+            .map(|(m, n)| m - n)
+            .collect()
+    }
+
+    /// Torque of products of effects at some rows, N·m; empty without.
+    fn products(&self, rows: Range<usize>) -> Vec<f64> {
+        if !self.has_products {
+            return Vec::new();
+        }
+        let beyond = self.beyond_nominal(rows.clone());
+        beyond
+            .iter()
+            .zip(&self.y[rows])
+            .map(|(all, y)| all - y)
+            .collect()
+    }
+
     /// Columns, or parts of which they are made.
     pub(crate) fn signals(&self) -> usize {
         let parts = self.recipes.as_ref().map(|recipes| recipes.parts());
@@ -481,7 +524,10 @@ impl JointObservations {
         self.measured.append(&rows.measured)?;
         self.nominal.append(&rows.nominal)?;
         let residual = rows.measured.iter().zip(&rows.nominal);
+        let from = self.y.len();
         self.y.extend(residual.map(|(m, n)| m - n));
+        let residual = self.y[from..].iter_mut();
+        residual.zip(&rows.products).for_each(|(y, p)| *y -= p);
         self.standstill.extend_from_slice(&rows.standstill);
         Ok(())
     }

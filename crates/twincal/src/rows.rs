@@ -45,6 +45,8 @@ pub struct JointRows<'a> {
     pub measured: &'a [f64],
     /// Nominal torque, one per row.
     pub nominal: &'a [f64],
+    /// Torque beside it that no coefficient moves, because effects multiply each other; empty where there is none.
+    pub products: &'a [f64],
     /// Whether the joint stands still at the row's centre.
     pub standstill: &'a [bool],
 }
@@ -243,15 +245,15 @@ fn visit_loaded(
     // A known payload is part of the robot in this log.
     let loaded = match trajectory.payload {
         Payload::Known { mass, com } => {
-            let robot = robot.carrying(library.payload_frame(robot), mass, com)?;
-            Some((library.on(&robot), robot))
+            Some(robot.carrying(library.payload_frame(robot), mass, com)?)
         }
         Payload::None | Payload::Unknown => None,
     };
-    let (library, robot) = match &loaded {
-        Some((library, robot)) => (library, robot),
-        None => (library, robot),
-    };
+    let carries = trajectory.payload_acts;
+    let other = loaded.is_some() || (library.changes_with_payload() && !carries);
+    let robot = loaded.as_ref().unwrap_or(robot);
+    let other = other.then(|| library.in_log(robot, carries));
+    let library = other.as_ref().unwrap_or(library);
     let mut source = OfLibrary::new(robot, library, trajectory.payload_acts);
     visit_source(&mut source, pipeline, trajectory, signal, slices, visit)
 }

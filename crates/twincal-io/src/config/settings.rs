@@ -305,6 +305,7 @@ impl Config {
             may_widen: self.may_widen(),
             drive_gain_sd: self.drive_gain_sd(log)?,
             most_bytes: None,
+            ..CalibrationSettings::default()
         })
     }
 
@@ -393,6 +394,7 @@ impl Config {
             payload_frame: table.payload_frame.clone(),
             nonnegative: table.nonnegative.unwrap_or(true),
             ripple: table.ripple.clone().unwrap_or_default(),
+            linearised_at: BTreeMap::new(),
         })
     }
 

@@ -9,6 +9,7 @@ use super::{Calibration, CalibrationSettings, Stage, road, smaller_library};
 use crate::error::{Finding, Result};
 use crate::robot::Robot;
 use crate::signal::{Auto, Logs};
+use std::collections::BTreeMap;
 
 /// How far a road is to be gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,6 +28,8 @@ pub(super) enum Road {
     End(Box<Calibration>),
     /// Back, with gear ripple among the candidates that was none of them.
     Again(Vec<Seen>),
+    /// Back, with columns about these effects.
+    Elsewhere(BTreeMap<String, f64>),
     /// Back, in a wider band.
     Wider(Wider),
     /// Nowhere in this band.
@@ -61,6 +64,11 @@ pub(super) fn whole_road(
                 let orders = ripples.into_iter().map(|seen| (seen.joint, seen.periods));
                 settings.library.ripple.extend(orders);
                 settings.signal.every_sample = true;
+                continue;
+            }
+            Ok(Road::Elsewhere(point)) => {
+                settings.library.linearised_at = point;
+                settings.relinearise -= 1;
                 continue;
             }
             Ok(Road::Wider(wider)) => {

@@ -97,6 +97,11 @@ impl Data {
         Ok((data, trajectories))
     }
 
+    /// Whether the payload component acts in a log.
+    pub(super) fn acts(&self, payload: Payload) -> bool {
+        !self.unknown || payload == Payload::Unknown
+    }
+
     /// All rows of the fit logs.
     pub(super) fn training(&self) -> Vec<Part<'_>> {
         let logs = self.fit.iter();
@@ -192,7 +197,8 @@ impl Data {
             for log in &self.fit {
                 let own = &log.observations.joints[joint];
                 let measured = own.measured.get();
-                let torques = own.y.iter().zip(measured.iter());
+                let beyond = own.beyond_nominal(0..own.y.len());
+                let torques = beyond.iter().zip(measured.iter());
                 let moving = torques.zip(&own.standstill).filter(|(_, still)| !**still);
                 for ((difference, torque), _) in moving {
                     sums[0] += difference * difference;
@@ -407,6 +413,7 @@ fn raw_squares(
             let mut residual: Vec<f64> = (rows.measured.iter().zip(rows.nominal))
                 .map(|(measured, nominal)| measured - nominal)
                 .collect();
+            (residual.iter_mut().zip(rows.products)).for_each(|(r, products)| *r -= products);
             for (i, &column) in rows.columns.iter().enumerate() {
                 let x = &rows.x[i * rows.stride..i * rows.stride + block.len];
                 for (r, x) in residual.iter_mut().zip(x) {

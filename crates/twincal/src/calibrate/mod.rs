@@ -28,6 +28,7 @@ mod outlook;
 mod prior_conflict;
 mod reader;
 mod ripples;
+mod relinearise;
 mod result;
 mod room;
 mod sandwich;
@@ -37,7 +38,6 @@ mod status;
 mod stopped;
 mod summary;
 mod sweep;
-mod tilt_beside_mass;
 mod turning;
 mod unphysical;
 mod uneven_noise;
@@ -219,6 +219,10 @@ fn road(
     );
     let (mut fitted, fits_of_folds) = (fitted?, fits_of_folds?);
     let counted = count(&fitted);
+    let model = (robot, &library, &library_settings);
+    if let Some(point) = relinearise::elsewhere(model, &data, &fitted.fit, settings)? {
+        return Ok(Road::Elsewhere(point));
+    }
     let seen = match settings.unasked_ripple {
         UnaskedRipple::Ignored => Vec::new(),
         _ => ripples::seen(robot, &training, &fitted.fit, &library_settings, &pipeline),
@@ -335,11 +339,8 @@ fn road(
     (calibration.curves, calibration.lags) = (curves, lags);
     let components = &calibration.components;
     let negative = negative_friction::findings(&calibration.twin, &library, components);
-    let tilt = tilt_beside_mass::finding(robot, &library, &calibration);
     unphysical::tell(&mut calibration, unphysical);
-    calibration
-        .findings
-        .extend(negative.into_iter().chain(tilt));
+    calibration.findings.extend(negative);
     Ok(Road::End(Box::new(calibration)))
 }
 

@@ -7,7 +7,7 @@ use crate::prior::PriorSettings;
 use crate::signal::{Auto, Corrections, SignalSettings};
 use crate::term::{Family, LibrarySettings};
 
-/// Everything a calibration can be told; each field but the last three is a table of `twincal.toml`.
+/// Everything a calibration can be told; each field but the last four is a table of `twincal.toml`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationSettings {
     /// `[library]`.
@@ -27,6 +27,8 @@ pub struct CalibrationSettings {
     pub may_widen: bool,
     /// Prior sd of a factor on torque that all drives share (`[prior] drive_gain`); 0: torque is measured at the joints.
     pub drive_gain_sd: f64,
+    /// How often columns are worked out anew about what a fit found, where found effects multiply each other (no key of `twincal.toml`).
+    pub relinearise: usize,
     /// Bytes that are free for what is made of the recordings (no key of `twincal.toml`); `None`: any number.
     pub most_bytes: Option<u64>,
 }
@@ -73,6 +75,7 @@ impl Default for CalibrationSettings {
             unasked_ripple: UnaskedRipple::Candidate,
             may_widen: true,
             drive_gain_sd: 0.0,
+            relinearise: 3,
             most_bytes: None,
         }
     }

@@ -54,6 +54,7 @@ impl Regression {
                 measured: y.clone().into(),
                 nominal: vec![0.0; rows].into(),
                 y,
+                has_products: false,
                 standstill: vec![false; rows],
                 weight: Vec::new(),
                 shelved: None,

@@ -20,7 +20,9 @@ pub(super) struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
+    /// Columns of a library, about the robot that it is linearised about.
     pub(super) fn new(t: &mut Trace, robot: &'a Robot, library: &'a Library) -> Self {
+        let robot = library.robot(robot);
         Self {
             robot,
             library,
@@ -41,7 +43,17 @@ impl<'a> Columns<'a> {
                 .binary_search(&column)
                 .is_ok()
         });
+        if self.library.is_scaled_by_gain(column) {
+            self.times_gain(t, &mut all);
+        }
         all
+    }
+
+    /// Multiplies torque of the robot's numbers with the drive gains about which columns are taken.
+    pub(super) fn times_gain(&self, t: &mut Trace, torque: &mut [(usize, Id)]) {
+        for (joint, x) in torque {
+            *x = t.scale(self.library.gain(*joint), *x);
+        }
     }
 
     fn on_all_joints(&mut self, t: &mut Trace, column: usize) -> Vec<(usize, Id)> {

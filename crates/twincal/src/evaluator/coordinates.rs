@@ -90,6 +90,7 @@ impl Coordinates {
                 unit[parameter] = 1.0;
                 let mut all = columns.inertia(t, body, &unit);
                 all.retain(|(_, x)| t.value(*x) != Some(0.0));
+                columns.times_gain(t, &mut all);
                 all
             }
         }

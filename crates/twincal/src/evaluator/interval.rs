@@ -173,6 +173,7 @@ impl Interval {
                 x,
                 stride: STATES,
                 nominal: &nominal,
+                products: &[],
                 measured: &[],
                 standstill: &[],
                 motion: [&[], &[], &[]],

@@ -13,8 +13,6 @@ mod states;
 mod trace;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-pub(crate) mod testing;
 
 pub use forgotten::forgotten;
 pub(crate) use states::{STATES, States, rms};
@@ -135,13 +133,21 @@ impl Evaluator {
     }
 }
 
-/// τ_nom + Φ E[β | y] per joint.
+/// τ_nom + products + Φ E[β | y] per joint.
+///
+/// About a robot with effects θ* and drive gains 1 + g* that is τ(θ*) + (1 + g*) Σ (E[β] − θ*) columns + all others.
 fn mean_torque(t: &mut Trace, columns: &mut Columns<'_>, twin: &Twin, states: &States) -> Vec<Id> {
     let (robot, library): (&Robot, &Library) = (columns.robot, columns.library);
-    let mut parameters = parameters(robot);
+    let has_gain = (0..robot.dof()).any(|joint| library.gain(joint) != 1.0);
+    // One recursion for all that is rigid, where nothing of it is multiplied by a gain.
+    let mut parameters = match has_gain {
+        true => vec![[0.0; 10]; robot.layout().len()],
+        false => parameters(robot),
+    };
     let mut gravity = [0.0; 3];
     let mut others = Vec::new();
     for (column, &beta) in twin.posterior.mean.iter().enumerate() {
+        let beta = beta - library.about(column);
         match library.model_column(column) {
             Some(ModelColumn::Inertia { body, weights }) => {
                 for (parameter, weight) in parameters[*body].iter_mut().zip(weights) {
@@ -159,10 +165,17 @@ fn mean_torque(t: &mut Trace, columns: &mut Columns<'_>, twin: &Twin, states: &S
         loads = dynamics::together(t, &loads, &tilt);
     }
     let rigid = dynamics::torque(t, robot, &columns.moving, loads);
-    let passive = dynamics::passive(t, robot, &columns.moving);
-    let mut torque: Vec<Id> = (rigid.into_iter().zip(passive))
-        .map(|(a, b)| t.add(a, b))
-        .collect();
+    let mut torque: Vec<Id> = if has_gain {
+        let mut rigid: Vec<(usize, Id)> = rigid.into_iter().enumerate().collect();
+        columns.times_gain(t, &mut rigid);
+        let model = columns.nominal(t).into_iter().zip(rigid);
+        model.map(|(a, (_, b))| t.add(a, b)).collect()
+    } else {
+        let passive = dynamics::passive(t, robot, &columns.moving);
+        (rigid.into_iter().zip(passive))
+            .map(|(a, b)| t.add(a, b))
+            .collect()
+    };
     for (column, beta) in others {
         for (joint, x) in columns.column(t, column) {
             let part = t.scale(beta, x);

@@ -16,6 +16,8 @@ pub(crate) struct States {
     /// `columns[joint][i * STATES + state]` of the i-th column of the joint.
     columns: Vec<Vec<f64>>,
     by_joint: Vec<Vec<usize>>,
+    /// Torque that no coefficient moves beside the nominal, `joint * STATES + state`; empty where there is none.
+    products: Vec<f64>,
 }
 
 impl States {
@@ -49,10 +51,17 @@ impl States {
             by_joint: (0..joints)
                 .map(|joint| library.columns_of_joint(joint).to_vec())
                 .collect(),
+            products: Vec::new(),
         };
         let mut columns = std::mem::take(&mut states.columns);
         library.evaluate(states.motion(), &mut columns);
         states.columns = columns;
+        if library.has_products() {
+            let none = vec![0.0; library.columns().len()];
+            let nominal = states.nominal(&twin.robot);
+            let constant = library.torque_with(&twin.robot, states.motion(), true, &none);
+            states.products = constant.iter().zip(nominal).map(|(a, b)| a - b).collect();
+        }
         states
     }
 
@@ -70,6 +79,13 @@ impl States {
     pub(crate) fn state(&self, state: usize) -> [Vec<f64>; 3] {
         let of = |all: &[f64]| all.iter().skip(state).step_by(STATES).copied().collect();
         [of(&self.q), of(&self.qd), of(&self.qdd)]
+    }
+
+    /// Torque of products of effects, added to `torque`, `joint * STATES + state`.
+    pub(crate) fn add_products(&self, torque: &mut [f64]) {
+        for (torque, products) in torque.iter_mut().zip(&self.products) {
+            *torque += products;
+        }
     }
 
     /// Σ β x per joint and state, `joint * STATES + state`.

@@ -3,8 +3,8 @@
 use super::columns::{Columns, parameters};
 use super::coordinates::{Coordinate, Coordinates};
 use super::dynamics;
-use super::testing::tree;
 use super::trace::{Step, Trace, values};
+use crate::robot::testing::tree;
 use crate::robot::{Motion, nominal_torque, regrouped};
 use crate::term::{Family, Function, Library, LibrarySettings};
 

@@ -48,20 +48,27 @@ impl Observations {
             [measured.some(rows.clone()), nominal.some(rows.clone())]
         });
         let torques: Vec<[Cow<'_, [f64]>; 2]> = torques.collect();
-        let joints = self.joints.iter().zip(&held).zip(&torques);
-        let joints = joints.map(|((joint, (held, stride)), [measured, nominal])| JointRows {
-            columns: &joint.columns,
-            recipes: None,
-            stride: *stride,
-            x: if joint.shelved.is_some() || joint.recipes.is_some() {
-                held
-            } else {
-                joint.x.get(rows.start..).unwrap_or_default()
+        let products: Vec<Vec<f64>> = (self.joints.iter())
+            .map(|joint| joint.products(rows.clone()))
+            .collect();
+        let torques = torques.iter().zip(&products);
+        let joints = self.joints.iter().zip(&held).zip(torques);
+        let joints = joints.map(
+            |((joint, (held, stride)), ([measured, nominal], products))| JointRows {
+                columns: &joint.columns,
+                recipes: None,
+                stride: *stride,
+                x: if joint.shelved.is_some() || joint.recipes.is_some() {
+                    held
+                } else {
+                    joint.x.get(rows.start..).unwrap_or_default()
+                },
+                measured,
+                nominal,
+                products,
+                standstill: &joint.standstill[rows.clone()],
             },
-            measured,
-            nominal,
-            standstill: &joint.standstill[rows.clone()],
-        });
+        );
         visit(&RowBlock {
             segment,
             first,

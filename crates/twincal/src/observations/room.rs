@@ -73,6 +73,7 @@ impl Room {
                 to.measured.put_away(shelf)?;
                 to.nominal.put_away(shelf)?;
             }
+            to.has_products = part.has_products;
             to.append(part, from, len, most)?;
         }
         Ok(())

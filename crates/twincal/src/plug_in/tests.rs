@@ -35,6 +35,7 @@ pub(super) fn log_of(q: Vec<f64>, qd: Vec<f64>, x: Vec<f64>, y: Vec<f64>) -> Obs
             measured: y.clone().into(),
             nominal: vec![0.0; rows].into(),
             y,
+            has_products: false,
             standstill: vec![false; rows],
             weight: Vec::new(),
             shelved: None,

@@ -14,6 +14,7 @@ mod bodies;
 mod dense;
 mod parameters;
 mod carry;
+mod changed;
 mod regrouped;
 mod lane_vectors;
 mod recursion;
@@ -26,6 +27,9 @@ mod derivative;
 mod mass_matrix;
 mod energy_regressor;
 mod energy;
+
+#[cfg(test)]
+pub(crate) mod testing;
 
 #[cfg(test)]
 pub(crate) use base_parameters::random_states;
@@ -51,6 +55,7 @@ pub use regressor::{Pair, Regressor, RegressorBlock};
 use crate::error::{Error, Finding, Result, Severity};
 pub(crate) use bodies::Body;
 use bodies::Home;
+pub(crate) use changed::Change;
 pub(crate) use regrouped::regrouped;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -6,6 +6,14 @@ use crate::signal::Segment;
 use crate::term::{Course, Library, Recipes, Scratch};
 use std::sync::Arc;
 
+/// Torque that no coefficient moves.
+pub(super) struct Constant<'a> {
+    /// Of the model.
+    pub(super) nominal: &'a mut [f64],
+    /// Of products of the effects about which columns are linearised; empty without.
+    pub(super) products: &'a mut Vec<f64>,
+}
+
 /// Where nominal torque and columns come from.
 ///
 /// Parts are signals whose fixed linear combinations are all columns: what is filtered, because they are fewer.
@@ -14,13 +22,15 @@ pub(super) trait Source {
     fn columns(&self, joint: usize) -> &[usize];
     /// How the columns of a joint follow from its parts.
     fn recipes(&self, joint: usize) -> &Arc<Recipes>;
-    /// `nominal[joint * len + sample]`, `out[joint][i * len + sample]`.
-    fn evaluate(&mut self, course: Course<'_>, nominal: &mut [f64], out: &mut [Aligned]);
-    /// `nominal[joint * len + sample]`, `out[joint][part * stride + sample]`.
+    /// Whether there is torque that no coefficient moves beside the nominal.
+    fn has_products(&self) -> bool;
+    /// `nominal[joint * len + sample]`, products likewise, `out[joint][i * len + sample]`.
+    fn evaluate(&mut self, course: Course<'_>, torque: Constant<'_>, out: &mut [Aligned]);
+    /// `nominal[joint * len + sample]`, products likewise, `out[joint][part * stride + sample]`.
     fn evaluate_parts(
         &mut self,
         course: Course<'_>,
-        nominal: &mut [f64],
+        torque: Constant<'_>,
         stride: usize,
         out: &mut [Aligned],
     );
@@ -63,6 +73,8 @@ pub(super) struct OfLibrary<'a> {
     absent: Vec<(usize, usize)>,
     /// Of every joint, in which those columns are 0.
     recipes: Vec<Arc<Recipes>>,
+    /// Per joint, coefficients of columns and of parts, see [`Library::taken_off`]; empty without products.
+    taken_off: Vec<[Vec<f64>; 2]>,
     scratch: Scratch,
 }
 
@@ -70,10 +82,17 @@ impl<'a> OfLibrary<'a> {
     /// In a log where the payload acts, or does not.
     pub(super) fn new(robot: &'a Robot, library: &'a Library, payload_acts: bool) -> Self {
         let absent = absent(library, payload_acts);
+        let recipes = recipes(library, &absent);
+        let taken_off = library.taken_off().into_iter().zip(&recipes);
+        let taken_off = taken_off.map(|(columns, recipes)| {
+            let parts = recipes.of_parts(&columns);
+            [columns, parts]
+        });
         Self {
             robot,
             library,
-            recipes: recipes(library, &absent),
+            taken_off: taken_off.collect(),
+            recipes,
             absent,
             scratch: Scratch::default(),
         }
@@ -89,25 +108,54 @@ impl Source for OfLibrary<'_> {
         &self.recipes[joint]
     }
 
-    fn evaluate(&mut self, course: Course<'_>, nominal: &mut [f64], out: &mut [Aligned]) {
-        nominal_torque(self.robot, course.motion, nominal);
+    fn has_products(&self) -> bool {
+        self.library.has_products()
+    }
+
+    fn evaluate(&mut self, course: Course<'_>, torque: Constant<'_>, out: &mut [Aligned]) {
+        nominal_torque(self.robot, course.motion, torque.nominal);
         self.library.evaluate_with(course, out, &mut self.scratch);
         let len = course.motion.len;
         for &(joint, row) in &self.absent {
             out[joint][row * len..(row + 1) * len].fill(0.0);
         }
+        self.products(course, torque, 0, (len, out));
     }
 
     fn evaluate_parts(
         &mut self,
         course: Course<'_>,
-        nominal: &mut [f64],
+        torque: Constant<'_>,
         stride: usize,
         out: &mut [Aligned],
     ) {
-        nominal_torque(self.robot, course.motion, nominal);
+        nominal_torque(self.robot, course.motion, torque.nominal);
         self.library
             .evaluate_parts(course, stride, out, &mut self.scratch);
+        self.products(course, torque, 1, (stride, out));
+    }
+}
+
+impl OfLibrary<'_> {
+    /// Torque that no coefficient moves beside the nominal, with evaluated columns (`form` 0) or parts (1).
+    fn products(
+        &self,
+        course: Course<'_>,
+        torque: Constant<'_>,
+        form: usize,
+        (stride, out): (usize, &[Aligned]),
+    ) {
+        let Constant { nominal, products } = torque;
+        let (library, len) = (self.library, course.motion.len);
+        library.products(course.motion, nominal, products, |joint, torque| {
+            for (i, weight) in self.taken_off[joint][form].iter().enumerate() {
+                if *weight != 0.0 {
+                    let signal = &out[joint][i * stride..i * stride + len];
+                    let torque = torque.iter_mut().zip(signal);
+                    torque.for_each(|(torque, x)| *torque -= weight * x);
+                }
+            }
+        });
     }
 }
 
@@ -131,6 +179,8 @@ pub(super) struct Stretch {
     pub(super) history: Vec<f64>,
     /// Nominal torque.
     pub(super) nominal: Vec<f64>,
+    /// Torque of products likewise; empty without.
+    pub(super) products: Vec<f64>,
     /// Columns or parts: `values[joint][i * len + sample]`.
     pub(super) values: Vec<Aligned>,
 }
@@ -160,19 +210,25 @@ impl Stretch {
         [&mut self.q, &mut self.qd, &mut self.qdd, &mut self.history]
     }
 
+    /// Torque of products on a joint; empty without.
+    pub(super) fn products(&self, joint: usize) -> &[f64] {
+        let own = joint * self.len..(joint + 1) * self.len;
+        self.products.get(own).unwrap_or_default()
+    }
+
     /// Evaluates nominal torque and columns of the loaded motion.
     pub(super) fn evaluate(&mut self, source: &mut dyn Source) {
-        let (course, nominal, values) = self.split();
-        source.evaluate(course, nominal, values);
+        let (course, torque, values) = self.split();
+        source.evaluate(course, torque, values);
     }
 
     /// Evaluates nominal torque and parts of the loaded motion, `values[joint][part * stride + sample]`.
     pub(super) fn evaluate_parts(&mut self, source: &mut dyn Source, stride: usize) {
-        let (course, nominal, values) = self.split();
-        source.evaluate_parts(course, nominal, stride, values);
+        let (course, torque, values) = self.split();
+        source.evaluate_parts(course, torque, stride, values);
     }
 
-    fn split(&mut self) -> (Course<'_>, &mut [f64], &mut [Aligned]) {
+    fn split(&mut self) -> (Course<'_>, Constant<'_>, &mut [Aligned]) {
         let len = self.len;
         self.nominal.resize(self.values.len() * len, 0.0);
         let motion = Motion {
@@ -185,6 +241,10 @@ impl Stretch {
             motion,
             history: &self.history,
         };
-        (course, &mut self.nominal, &mut self.values)
+        let torque = Constant {
+            nominal: &mut self.nominal,
+            products: &mut self.products,
+        };
+        (course, torque, &mut self.values)
     }
 }

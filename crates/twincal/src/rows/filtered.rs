@@ -94,6 +94,8 @@ struct Rows {
     /// Columns or parts of each joint, `i * len + row`.
     x: Vec<Vec<f64>>,
     nominal: Vec<Vec<f64>>,
+    /// Empty without products.
+    products: Vec<Vec<f64>>,
     /// Empty if the log has no torque.
     measured: Vec<Vec<f64>>,
 }
@@ -128,6 +130,7 @@ impl Rows {
             form,
             x: vec![Vec::new(); dof],
             nominal: Vec::with_capacity(dof),
+            products: Vec::new(),
             measured: Vec::new(),
             range: range.clone(),
         };
@@ -139,7 +142,7 @@ impl Rows {
         self.range.len()
     }
 
-    /// F over torque and columns. Per joint the signals are its parts, its nominal and its measured torque.
+    /// F over torque and columns. Per joint the signals are its parts, its nominal, its measured torque, and that of products.
     fn filter(&mut self, source: &mut dyn Source, plan: &Plan, segment: &Segment, dof: usize) {
         let (len, total) = (self.len(), segment.time.len());
         let has_tau = !segment.tau.is_empty();
@@ -147,7 +150,7 @@ impl Rows {
         let mut signals = 0;
         for joint in 0..dof {
             firsts.push(signals);
-            signals += source.recipes(joint).parts() + 2;
+            signals += source.recipes(joint).parts() + 2 + usize::from(source.has_products());
         }
         let mut decimator = Decimator::new(&plan.kernel, plan.step, len, signals);
         let begin = self.range.start * plan.step;
@@ -158,7 +161,7 @@ impl Rows {
             let count = STRETCH.min(end - from);
             stretch.load(from, count, total, channels(segment));
             stretch.evaluate_parts(source, count);
-            let mut at_hand: Vec<(usize, &[f64])> = Vec::with_capacity(3 * dof);
+            let mut at_hand: Vec<(usize, &[f64])> = Vec::with_capacity(4 * dof);
             for (joint, &first) in firsts.iter().enumerate() {
                 let parts = source.recipes(joint).parts();
                 let own = joint * count..(joint + 1) * count;
@@ -167,6 +170,9 @@ impl Rows {
                 if has_tau {
                     let tau = &segment.tau[joint * total + from..][..count];
                     at_hand.push((first + parts + 1, tau));
+                }
+                if source.has_products() {
+                    at_hand.push((first + parts + 2, stretch.products(joint)));
                 }
             }
             decimator.add(from - begin, count, &at_hand);
@@ -187,6 +193,9 @@ impl Rows {
             self.nominal.push(row(first + parts));
             if has_tau {
                 self.measured.push(row(first + parts + 1));
+            }
+            if source.has_products() {
+                self.products.push(row(first + parts + 2));
             }
         }
     }
@@ -214,6 +223,7 @@ impl Rows {
                 x: self.x[joint].get(rows.start..).unwrap_or(&[]),
                 measured: self.measured.get(joint).map_or(&[], |m| &m[rows.clone()]),
                 nominal: &self.nominal[joint][rows.clone()],
+                products: self.products.get(joint).map_or(&[], |p| &p[rows.clone()]),
                 standstill: &self.standstill[joint * len..(joint + 1) * len][rows.clone()],
             })
             .collect();

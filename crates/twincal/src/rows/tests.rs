@@ -1,5 +1,5 @@
 //! Rows against brute force: a stand-in model whose columns are known functions of the motion.
-use super::evaluate::Source;
+use super::evaluate::{Constant, Source};
 use super::*;
 use crate::lanes::Aligned;
 use crate::robot::Motion;
@@ -78,8 +78,12 @@ impl Source for StandIn {
         &self.recipes[joint]
     }
 
-    fn evaluate(&mut self, course: Course<'_>, nominal: &mut [f64], out: &mut [Aligned]) {
-        let motion = course.motion;
+    fn has_products(&self) -> bool {
+        false
+    }
+
+    fn evaluate(&mut self, course: Course<'_>, torque: Constant<'_>, out: &mut [Aligned]) {
+        let (motion, nominal) = (course.motion, torque.nominal);
         let of = |joint: usize, c: usize, s: [f64; 3]| column(COLUMNS[joint][c], s[0], s[1], s[2]);
         Self::fill(motion, nominal, (motion.len, out), of);
     }
@@ -87,11 +91,11 @@ impl Source for StandIn {
     fn evaluate_parts(
         &mut self,
         course: Course<'_>,
-        nominal: &mut [f64],
+        torque: Constant<'_>,
         stride: usize,
         out: &mut [Aligned],
     ) {
-        let motion = course.motion;
+        let (motion, nominal) = (course.motion, torque.nominal);
         Self::fill(motion, nominal, (stride, out), part);
     }
 }

@@ -99,6 +99,7 @@ pub(super) fn visit(
                     &tau[joint * total + from..][..len]
                 },
                 nominal: &stretch.nominal[joint * len..(joint + 1) * len],
+                products: stretch.products(joint),
                 standstill: &still[joint * len..(joint + 1) * len],
             })
             .collect();

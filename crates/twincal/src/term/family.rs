@@ -272,6 +272,11 @@ impl Family {
         matches!(self, Self::Hysteresis | Self::WarmUp)
     }
 
+    /// True if its torque is another where other effects act: gravity acts on masses, drives on all torque, zeros on where masses are.
+    pub(crate) fn multiplies(self) -> bool {
+        matches!(self, Self::Tilt | Self::EncoderZero | Self::Gain)
+    }
+
     /// True if it is another story than the columns that span it. The rotors of a sum and of a difference of two joints and those of
     /// both joints are three directions, but each of the four is what a gear train can be.
     pub(super) fn is_story_of_its_own(self) -> bool {

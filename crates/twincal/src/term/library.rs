@@ -2,6 +2,7 @@
 
 mod carried;
 mod judged;
+mod linearised;
 
 use super::aliases::{Motions, channels};
 use super::candidate::{Candidate, Joint, Proposal};
@@ -9,6 +10,7 @@ use super::component::{Before, Component, Meaning, Parameter};
 use super::course::Course;
 use super::directions::Mixture;
 use super::expression::{Graph, Id, Slot, Tape, Variable, bounded_values};
+use super::linearisation::Linearisation;
 use super::model_column::{ModelColumn, ModelColumns};
 use super::overlaps;
 use super::parts::{self, Parts, Torque};
@@ -52,6 +54,8 @@ pub struct Library {
     mixtures: Vec<Option<Arc<Mixture>>>,
     /// No motion tells its tensor from its mass and first moments.
     payload_is_one: bool,
+    /// `None`: about the model as it is.
+    linearised: Option<Arc<Linearisation>>,
 }
 
 impl Library {
@@ -131,6 +135,7 @@ impl Library {
             payload_frame: settings.payload_frame.clone(),
             mixtures,
             payload_is_one: false,
+            linearised: None,
         };
         let judged = candidates.into_iter().zip(statuses).zip(acting);
         for (index, ((candidate, status), acting)) in judged.enumerate() {
@@ -174,6 +179,9 @@ impl Library {
         };
         for (component, names) in library.components.iter_mut().zip(names) {
             component.alias_of = names;
+        }
+        if let (Some(robot), false) = (about.robot, settings.linearised_at.is_empty()) {
+            library = library.linearised(robot, &settings.linearised_at)?;
         }
         Ok((library, findings))
     }
@@ -220,7 +228,10 @@ impl Library {
             None => Torque::Expression(&self.images[term]),
         });
         let joints = self.by_joint.len();
-        let parts = Parts::new(&self.graph, self.model.as_deref(), joints, torques);
+        let mut parts = Parts::new(&self.graph, self.model.as_deref(), joints, torques);
+        if let Some(factors) = self.factors() {
+            parts = parts.scaled(&factors);
+        }
         self.parts = Arc::new(parts);
     }
 
@@ -313,12 +324,7 @@ impl Library {
 
     /// The same library for a robot with other inertias and the same joints.
     pub fn on(&self, robot: &Robot) -> Self {
-        let model = self.model.as_ref().map(|model| Arc::new(model.on(robot)));
-        Self {
-            parts: Arc::new(self.parts.on(model.as_deref())),
-            model,
-            ..self.clone()
-        }
+        self.in_log(robot, true)
     }
 
     /// True if parameter `parameter` of a component is the coefficient of its term at the same place.
@@ -428,6 +434,7 @@ impl Library {
             (course.motion.len, out),
             scratch,
         );
+        self.scale(course.motion.len, out);
     }
 
     /// How the columns of a joint follow from the signals of [`Library::evaluate_parts`].

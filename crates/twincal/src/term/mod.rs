@@ -51,6 +51,7 @@ mod propose;
 mod overlaps;
 mod verdicts;
 mod library;
+mod linearisation;
 #[cfg(test)]
 mod tests;
 
@@ -105,6 +106,10 @@ pub struct LibrarySettings {
     pub nonnegative: bool,
     /// Periods of gear ripple per turn (per metre for a slider) by joint; joints without an entry have none.
     pub ripple: BTreeMap<String, f64>,
+    /// Coefficients by name of their term about which columns of the robot model are linearised; empty: the model as it is. Found by
+    /// [`crate::calibrate::calibrate`], where effects that multiply each other are found together.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub linearised_at: BTreeMap<String, f64>,
 }
 
 impl LibrarySettings {

@@ -176,6 +176,14 @@ impl Parts {
         }
     }
 
+    /// The same parts, of which the columns of a joint are made with these factors.
+    pub(super) fn scaled(mut self, factors: &[Vec<f64>]) -> Self {
+        for (recipes, factors) in self.recipes.iter_mut().zip(factors) {
+            *recipes = Arc::new(recipes.scaled(factors));
+        }
+        self
+    }
+
     /// How the columns of a joint follow from its parts.
     pub(super) fn recipes(&self, joint: usize) -> &Arc<Recipes> {
         &self.recipes[joint]

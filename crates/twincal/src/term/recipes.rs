@@ -155,6 +155,16 @@ impl Recipes {
         rest
     }
 
+    /// The same where columns are multiplied by `factors`.
+    #[must_use]
+    pub(crate) fn scaled(&self, factors: &[f64]) -> Self {
+        let mut scaled = self.clone();
+        for (column, factor) in scaled.columns.iter_mut().zip(factors) {
+            column.iter_mut().for_each(|(_, weight)| *weight *= factor);
+        }
+        scaled
+    }
+
     /// Some of the columns, which ascend, made from those parts that they need; which of the parts these are, ascending.
     #[must_use]
     pub fn some(&self, kept: &[usize]) -> (Self, Vec<usize>) {

@@ -22,6 +22,8 @@ pub struct JointInput<'a> {
     pub stride: usize,
     /// Nominal torque per row, N·m; its length is the number of rows.
     pub nominal: &'a [f64],
+    /// Torque beside it that no coefficient moves; empty where there is none.
+    pub products: &'a [f64],
     /// Measured torque per row, N·m, for `pit`; empty if there is none.
     pub measured: &'a [f64],
     /// Rows where the joint stands still; empty if none does.
@@ -38,6 +40,7 @@ impl<'a> JointInput<'a> {
             x,
             stride,
             nominal,
+            products,
             measured,
             standstill,
             ..
@@ -52,6 +55,7 @@ impl<'a> JointInput<'a> {
             x,
             stride,
             nominal,
+            products,
             measured,
             standstill,
             motion,
@@ -179,8 +183,8 @@ impl Predictor {
     /// Torque of `joint` over a block of rows, with the central 95 % interval of the mixture over models.
     ///
     /// ```text
-    /// tau | z, y ~ t_{2 a_n}( tau_nom + xᵀμ_z,  (b_n/a_n) (f²/(w_j(1−ρ_j²)) + xᵀA_z⁻¹x) [+ s_out²] ),  mixed over z
-    /// calibrated = tau_nom + xᵀE[β | y]
+    /// tau | z, y ~ t_{2 a_n}( tau_nom + products + xᵀμ_z,  (b_n/a_n) (f²/(w_j(1−ρ_j²)) + xᵀA_z⁻¹x) [+ s_out²] ),  mixed over z
+    /// calibrated = tau_nom + products + xᵀE[β | y]
     /// ```
     /// f is the joint's interval factor; where noise changes with speed or load, f² is multiplied by g(|q̇|) h(|τ_nom|). For [`TorqueSignal::Raw`] the variance s_out² of the torque outside the filter's
     /// band is added to scale² as it is: it was measured directly, φ does not multiply it. While a joint stands still,
@@ -212,6 +216,7 @@ impl Predictor {
         }
         for length in [
             input.measured.len(),
+            input.products.len(),
             input.standstill.len(),
             input.motion[0].len(),
         ] {
@@ -280,10 +285,10 @@ impl Predictor {
                 }
             });
             let spread: Lane = std::array::from_fn(|lane| joint.spread(input, row_of(lane)));
+            let constant =
+                |row: usize| input.nominal[row] + input.products.get(row).copied().unwrap_or(0.0);
             let residual: Option<Lane> = (!input.measured.is_empty()).then(|| {
-                std::array::from_fn(|lane| {
-                    input.measured[row_of(lane)] - input.nominal[row_of(lane)]
-                })
+                std::array::from_fn(|lane| input.measured[row_of(lane)] - constant(row_of(lane)))
             });
             let Bands {
                 low,
@@ -301,11 +306,11 @@ impl Predictor {
             });
             for lane in 0..count {
                 let row = start + lane;
-                let nominal = input.nominal[row];
-                torque.nominal.push(nominal);
-                torque.calibrated.push(nominal + correction[lane]);
-                torque.low.push(nominal + low[lane]);
-                torque.high.push(nominal + high[lane]);
+                let constant = constant(row);
+                torque.nominal.push(input.nominal[row]);
+                torque.calibrated.push(constant + correction[lane]);
+                torque.low.push(constant + low[lane]);
+                torque.high.push(constant + high[lane]);
                 torque.epistemic.push(epistemic[lane].sqrt());
                 let noise = noise(spread[lane]);
                 torque.noise.push(noise.sqrt());

@@ -180,6 +180,8 @@ impl HeldOut {
         let begin = observations.time.partition_point(|t| *t < from);
         let rows = begin..observations.len();
         self.moments.resize(self.names.len(), Moments::default());
+        let beyond = observations.beyond_nominal();
+        let observations = beyond.as_ref().unwrap_or(observations);
         let gram = Part { observations, rows }.gram();
         for (moments, gram) in self.moments.iter_mut().zip(&gram.joints) {
             *moments += Moments::of(gram);

@@ -1,13 +1,19 @@
 //! What one physical model cannot say of what was written into it, as torque.
 
-use super::{JointChange, Place, WriteBack};
-use crate::error::Result;
+use super::{JointChange, Place};
 use crate::evaluator::States;
-use crate::linear_algebra::Cholesky;
-use crate::robot::Robot;
+use crate::robot::{Change, Robot};
 
-/// Torque per joint and state, N·m, by which `before` + Σ β x of the written columns differs from the robot `after` and its
-/// dry friction.
+/// Coefficients of columns that the file holds; 0 of all others.
+pub(super) fn held_alone(held: &[Option<Place>], beta: &[f64]) -> Vec<f64> {
+    let written = beta.iter().zip(held);
+    written
+        .map(|(beta, place)| if place.is_some() { *beta } else { 0.0 })
+        .collect()
+}
+
+/// Torque per joint and state, N·m, by which `before` with the written effects, inertias and gravity acting together, differs from the
+/// robot `after` and its dry friction.
 pub(super) fn difference(
     states: &States,
     [before, after]: [&Robot; 2],
@@ -15,15 +21,24 @@ pub(super) fn difference(
     held: &[Option<Place>],
     beta: &[f64],
 ) -> Vec<f64> {
-    let written = beta.iter().zip(held);
-    let written: Vec<f64> = written
-        .map(|(beta, place)| if place.is_some() { *beta } else { 0.0 })
-        .collect();
-    lacks(states, [before, after], joints, held, &written)
+    let (mut change, mut rest) = (Change::default(), held_alone(held, beta));
+    for (place, beta) in held.iter().zip(&mut rest) {
+        match place {
+            Some(Place::Inertia { body, weights }) => {
+                let added = weights.map(|weight| *beta * weight);
+                change.inertia.push((*body, added));
+            }
+            Some(Place::Gravity(axis)) => change.gravity[*axis] += *beta,
+            _ => continue,
+        }
+        *beta = 0.0;
+    }
+    let together = before.changed(&change);
+    beyond(states, [&together, after], joints, held, &rest)
 }
 
-/// Torque per joint and state, N·m, that `before` + Σ β x of ALL columns has and the robot `after` with its dry friction has not.
-pub(super) fn lacks(
+/// Torque per joint and state, N·m, that `before` + Σ β x has and the robot `after` with its dry friction has not.
+pub(super) fn beyond(
     states: &States,
     [before, after]: [&Robot; 2],
     joints: &[JointChange],
@@ -48,41 +63,4 @@ pub(super) fn lacks(
         *d += before - after;
     }
     difference
-}
-
-/// The gravity with which the changed robot comes nearest to the twin: the columns are torque per unit of gravity on the
-/// NOMINAL robot, and in one model changed gravity acts on changed inertias.
-pub(super) fn fitted_gravity(
-    states: &States,
-    nominal: &Robot,
-    change: &WriteBack,
-    difference: &[f64],
-) -> Result<Option<[f64; 3]>> {
-    let Some(gravity) = change.gravity else {
-        return Ok(None);
-    };
-    let here = states.nominal(&change.robot(nominal)?);
-    let mut columns: Vec<Vec<f64>> = Vec::new();
-    for axis in 0..3 {
-        let mut moved = change.clone();
-        moved.gravity.get_or_insert(gravity)[axis] += 1.0;
-        let there = states.nominal(&moved.robot(nominal)?);
-        columns.push(there.iter().zip(&here).map(|(a, b)| a - b).collect());
-    }
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-    let mut normal = vec![0.0; 9];
-    let mut right: Vec<f64> = columns.iter().map(|c| dot(c, difference)).collect();
-    for i in 0..3 {
-        for k in 0..3 {
-            normal[3 * i + k] = dot(&columns[i], &columns[k]);
-        }
-    }
-    // What no joint feels stays as it is.
-    let size = normal[0] + normal[4] + normal[8];
-    (0..3).for_each(|i| normal[4 * i] += 1e-9 * size);
-    let Ok(root) = Cholesky::new(&normal, 3) else {
-        return Ok(Some(gravity));
-    };
-    root.solve(&mut right);
-    Ok(Some([0, 1, 2].map(|axis| gravity[axis] + right[axis])))
 }

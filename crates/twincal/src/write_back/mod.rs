@@ -99,7 +99,7 @@ pub struct WriteBack {
     /// How inertias were made physical; `None` where they were already.
     pub projection: Option<Projection>,
     /// RMS of the torque by which the file differs from the written components, per joint, N·m (N): what it costs that
-    /// inertias are physical, friction is not negative, and changed gravity acts on changed inertias.
+    /// inertias are physical and friction is not negative.
     pub lost: Vec<f64>,
     /// RMS of the torque that all components add to the nominal model, per joint, N·m (N).
     pub correction: Vec<f64>,
@@ -214,24 +214,17 @@ impl<'a> Writer<'a> {
             lacks: Vec::new(),
             torque_error: Vec::new(),
         };
-        let difference = |change: &WriteBack| -> Result<Vec<f64>> {
-            let robots = [robot, &change.robot(robot)?];
-            Ok(lost::difference(
-                &self.states,
-                robots,
-                &change.joints,
-                &held,
-                &file,
-            ))
-        };
-        let rest = difference(&change)?;
-        change.gravity = lost::fitted_gravity(&self.states, robot, &change, &rest)?;
-        let lost = difference(&change)?;
-        change.lost = rms(&lost);
-        change.torque_error = self.torque_error(&change, &held, &file, &lost);
-        change.correction = self.states.rms(beta);
-        let robots = [robot, &change.robot(robot)?];
-        let lacks = lost::lacks(&self.states, robots, &change.joints, &held, beta);
+        let (states, robots) = (&self.states, [robot, &change.robot(robot)?]);
+        let joints = &change.joints;
+        change.lost = rms(&lost::difference(states, robots, joints, &held, &file));
+        let alone = lost::held_alone(&held, &file);
+        let linear = lost::beyond(states, robots, joints, &held, &alone);
+        change.torque_error = self.torque_error(&change, &held, &file, &linear);
+        let mut correction = states.torque(beta);
+        states.add_products(&mut correction);
+        change.correction = rms(&correction);
+        let mut lacks = lost::beyond(states, robots, &change.joints, &held, beta);
+        states.add_products(&mut lacks);
         change.lacks = rms(&lacks);
         self.tell(&mut change, (&whole, chosen), (beta, &file), &held, &shares);
         Ok(change)

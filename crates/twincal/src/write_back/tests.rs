@@ -3,9 +3,9 @@
 use super::metric::torque_metric;
 use super::projection::{Link, project};
 use super::pseudo_inertia::{factor, inverse, pseudo_inertia, times};
-use crate::evaluator::testing::tree;
 use crate::likelihood::{JointNoise, Spread};
 use crate::linear_algebra::Cholesky;
+use crate::robot::testing::tree;
 use crate::robot::{
     Motion, Placement, Robot, body_parameters, inertia_of, nominal_torque, random_states,
 };

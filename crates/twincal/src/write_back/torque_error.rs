@@ -23,7 +23,7 @@ pub struct JointTorqueError {
 
 impl Writer<'_> {
     /// Errors of all joints; `file`: the coefficients that `held` columns have in the file, `lost`: torque by which the file differs from
-    /// these, as [`super::lost::difference`] has it.
+    /// the sum of these columns, as [`super::lost::beyond`] has it.
     pub(super) fn torque_error(
         &self,
         change: &WriteBack,
@@ -83,14 +83,14 @@ impl Writer<'_> {
         (0..self.library.columns().len()).find(|column| self.place(*column).as_ref() == Some(place))
     }
 
-    /// Coefficients of the inertial columns whose torque is nearest to `torque`, `joint * STATES + state`, over states within the training
+    /// Coefficients of the columns of inertias and gravity whose torque is nearest to `torque`, `joint * STATES + state`, over states within the training
     /// range; 0 of all others.
     fn projected(&self, torque: &[f64]) -> Vec<f64> {
         let columns = self.library.columns().len();
         let is_inertial = |column| {
             matches!(
                 self.library.model_column(column),
-                Some(ModelColumn::Inertia { .. })
+                Some(ModelColumn::Inertia { .. } | ModelColumn::Gravity { .. })
             )
         };
         let inertial: Vec<usize> = (0..columns).filter(|column| is_inertial(*column)).collect();

@@ -5,6 +5,7 @@ mod arm;
 mod columns;
 mod frames;
 mod judgement;
+mod linearised;
 mod parser;
 mod parts;
 mod sympy;

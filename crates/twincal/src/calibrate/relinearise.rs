@@ -1,0 +1,143 @@
+//! Columns about what a fit found, where found effects multiply each other.
+
+use super::CalibrationSettings;
+use super::data::{Data, Log};
+use crate::error::Result;
+use crate::observations::Part;
+use crate::plug_in::{Fit, moving_rows};
+use crate::robot::{Motion, Robot, nominal_torque};
+use crate::signal::{Numbers, Payload};
+use crate::term::{Library, LibrarySettings};
+use std::collections::BTreeMap;
+
+/// Standard deviations by which what is missing may move coefficients.
+const MOVES: f64 = 0.1;
+/// Rows of a log that it is measured on, evenly spread.
+const ROWS: usize = 256;
+/// Effects that are more likely in than out.
+const IN: f64 = 0.5;
+
+/// The effects of the robot model that a fit holds for real, by name of their term, if its columns have to be worked out anew about them.
+///
+/// With d_j the torque of these effects acting together, less what the linear model makes of them, coefficients move by less than
+///
+/// ```text
+/// √( Σ_j n_j mean(d_j²) / σ_j² )
+/// ```
+/// of their standard deviations, n_j effective rows with noise σ_j: no direction of the coefficients sees more. Where that is more than
+/// a tenth the fit goes on about these effects.
+///
+/// # Errors
+/// Those of [`Robot::carrying`].
+pub(super) fn elsewhere(
+    (robot, library, library_settings): (&Robot, &Library, &LibrarySettings),
+    data: &Data,
+    fit: &Fit,
+    settings: &CalibrationSettings,
+) -> Result<Option<BTreeMap<String, f64>>> {
+    let known = &library_settings.linearised_at;
+    let found = found(library, fit);
+    let multiplies = |point: &BTreeMap<String, f64>| {
+        let terms = library.terms().iter();
+        let mut own = terms.filter(|term| point.contains_key(&term.name));
+        own.any(|term| term.family.multiplies())
+    };
+    if settings.relinearise == 0 || !(multiplies(&found) || multiplies(known)) {
+        return Ok(None);
+    }
+    let there = library.linearised(robot, &found)?;
+    let beta = there_alone(library, &found);
+    let mut moves = 0.0;
+    for (log, payload) in data.fit.iter().zip(&data.payloads) {
+        let missing = missing(
+            (robot, [library, &there]),
+            log,
+            (*payload, data.acts(*payload)),
+            &beta,
+        )?;
+        let whole = [log.observations.whole()];
+        moves += weighed(&missing, fit, &whole);
+    }
+    Ok((moves > MOVES * MOVES).then_some(found))
+}
+
+/// Coefficients of the effects that are in.
+fn found(library: &Library, fit: &Fit) -> BTreeMap<String, f64> {
+    let columns = library.columns().iter().enumerate();
+    let posterior = &fit.posterior;
+    let own = columns.filter(|(column, _)| {
+        posterior.inclusion[*column] >= IN && library.is_number_of_robot(*column)
+    });
+    own.map(|(column, &term)| (library.terms()[term].name.clone(), posterior.mean[column]))
+        .collect()
+}
+
+/// The same, one per column.
+fn there_alone(library: &Library, found: &BTreeMap<String, f64>) -> Vec<f64> {
+    let value = |&term: &usize| found.get(&library.terms()[term].name).copied();
+    let columns = library.columns().iter();
+    columns.map(|term| value(term).unwrap_or(0.0)).collect()
+}
+
+/// Mean square per joint, (N·m)², of the torque of the effects `beta` beside what the linear model about `here` makes of them.
+fn missing(
+    (robot, [here, there]): (&Robot, [&Library; 2]),
+    log: &Log,
+    (payload, acts): (Payload, bool),
+    beta: &[f64],
+) -> Result<Vec<f64>> {
+    let rows = &log.observations;
+    let count = rows.len().min(ROWS);
+    let picked: Vec<usize> = (0..count).map(|i| i * rows.len() / count).collect();
+    let pick = |joints: &[Numbers]| -> Vec<f64> {
+        let of_joint = |joint: &Numbers| -> Vec<f64> {
+            let all = joint.get();
+            picked.iter().map(|&row| all[row]).collect()
+        };
+        joints.iter().flat_map(of_joint).collect()
+    };
+    let (q, qd, qdd) = (pick(&rows.q), pick(&rows.qd), pick(&rows.qdd));
+    let motion = Motion {
+        len: count,
+        q: &q,
+        qd: &qd,
+        qdd: &qdd,
+    };
+    let loaded = match payload {
+        Payload::Known { mass, com } => {
+            Some(robot.carrying(here.payload_frame(robot), mass, com)?)
+        }
+        Payload::None | Payload::Unknown => None,
+    };
+    let robot = loaded.as_ref().unwrap_or(robot);
+    let [here, there] = [here, there].map(|library| library.in_log(robot, acts));
+    let linear = here.torque_with(robot, motion, acts, beta);
+    let mut together = vec![0.0; q.len()];
+    nominal_torque(there.robot(robot), motion, &mut together);
+    let joints = together
+        .chunks_exact(count)
+        .zip(linear.chunks_exact(count))
+        .enumerate();
+    let square = joints.map(|(joint, (together, linear))| {
+        let gain = there.gain(joint);
+        let sum: f64 = together
+            .iter()
+            .zip(linear)
+            .map(|(all, part)| (gain * all - part).powi(2))
+            .sum();
+        sum / count as f64
+    });
+    Ok(square.collect())
+}
+
+/// Σ_j n_j d_j² / σ_j² of one log.
+fn weighed(square: &[f64], fit: &Fit, log: &[Part<'_>]) -> f64 {
+    let (plug_in, noise) = (&fit.plug_in, fit.posterior.noise);
+    let of_joint = |(joint, square): (usize, &f64)| {
+        let rho = plug_in.rho[joint];
+        let rows = moving_rows(log, joint) * plug_in.counted(joint) * (1.0 - rho) / (1.0 + rho);
+        let left = plug_in.variance.get(joint).copied().unwrap_or(1.0);
+        rows * square * plug_in.weight[joint] * (1.0 - rho * rho) / (left * noise)
+    };
+    square.iter().enumerate().map(of_joint).sum()
+}

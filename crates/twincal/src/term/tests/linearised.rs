@@ -1,0 +1,162 @@
+//! A library about effects that multiply each other.
+
+use super::super::aliases::channels;
+use super::super::library::random_motions;
+use super::super::{Family, Library, LibrarySettings, ModelColumn};
+use crate::robot::testing::tree;
+use crate::robot::{Change, Motion, Robot, nominal_torque};
+use std::collections::BTreeMap;
+
+/// Effects of every kind: names of terms and coefficients.
+fn effects(library: &Library) -> BTreeMap<String, f64> {
+    let terms = library.columns().iter().enumerate();
+    let own = terms.filter(|(column, _)| library.is_number_of_robot(*column));
+    own.map(|(column, &term)| {
+        let size = 0.03 * ((2.3 * column as f64).sin() + 1.5);
+        (library.terms()[term].name.clone(), size)
+    })
+    .collect()
+}
+
+/// Coefficients by column.
+fn by_column(library: &Library, effects: &BTreeMap<String, f64>) -> Vec<f64> {
+    let columns = library.columns().iter();
+    columns
+        .map(|&term| {
+            effects
+                .get(&library.terms()[term].name)
+                .copied()
+                .unwrap_or(0.0)
+        })
+        .collect()
+}
+
+/// Torque of the robot with effects, not linear in them: (1 + g_j) τ_j(θ).
+fn truth(robot: &Robot, library: &Library, motion: Motion<'_>, beta: &[f64]) -> Vec<f64> {
+    let (mut change, mut gain) = (Change::default(), vec![1.0; robot.dof()]);
+    for (column, beta) in beta.iter().enumerate() {
+        match library.model_column(column) {
+            Some(ModelColumn::Inertia { body, weights }) => {
+                change.inertia.push((*body, weights.map(|w| beta * w)));
+            }
+            Some(ModelColumn::Gravity { axis }) => change.gravity[*axis] += beta,
+            Some(ModelColumn::PositionDerivative { joint }) => change.zero.push((*joint, *beta)),
+            Some(ModelColumn::Nominal { joint: Some(joint) }) => gain[*joint] += beta,
+            Some(ModelColumn::Nominal { joint: None }) => gain.iter_mut().for_each(|g| *g += beta),
+            _ => assert_eq!(*beta, 0.0),
+        }
+    }
+    let mut torque = vec![0.0; robot.dof() * motion.len];
+    nominal_torque(&robot.changed(&change), motion, &mut torque);
+    for (torque, gain) in torque.chunks_exact_mut(motion.len).zip(gain) {
+        torque.iter_mut().for_each(|t| *t *= gain);
+    }
+    torque
+}
+
+/// At the effects the linear model is the robot with them, and beside them it is off by the square of how far: truth is that robot, from its numbers.
+#[test]
+fn a_library_about_effects_is_their_torque_to_first_order() {
+    let robot = tree();
+    let settings = LibrarySettings {
+        families: vec![
+            Family::Payload,
+            Family::Density,
+            Family::Tilt,
+            Family::EncoderZero,
+            Family::Gain,
+            Family::LoadFriction,
+            Family::Viscous,
+        ],
+        generic: Some(false),
+        coulomb_velocity: 0.02,
+        ..LibrarySettings::default()
+    };
+    let (plain, _) = Library::propose(&robot, &settings).unwrap();
+    let effects = effects(&plain);
+    let linearised_at = effects.clone();
+    let (there, _) = Library::propose(
+        &robot,
+        &LibrarySettings {
+            linearised_at,
+            ..settings
+        },
+    )
+    .unwrap();
+    assert_eq!(there.terms(), plain.terms());
+    assert_eq!(there.prior_sds(), plain.prior_sds());
+    let states = random_motions(robot.dof());
+    let [q, qd, qdd] = channels(&states, robot.dof());
+    let (q, qd, qdd) = (&q[..], &qd[..], &qdd[..]);
+    let len = states.len();
+    let motion = Motion { len, q, qd, qdd };
+    let at = by_column(&plain, &effects);
+    let error = |library: &Library, step: f64| -> f64 {
+        let is_moved = |column: usize| plain.is_number_of_robot(column);
+        let beta: Vec<f64> = (at.iter().enumerate())
+            .map(|(k, at)| {
+                at + if is_moved(k) {
+                    step * (1.1 * k as f64).cos()
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        let found = library.torque_with(&robot, motion, true, &beta);
+        let truth = truth(&robot, &plain, motion, &beta);
+        let squares = found.iter().zip(&truth).map(|(a, b)| (a - b).powi(2));
+        squares.sum::<f64>().sqrt()
+    };
+    let size = truth(&robot, &plain, motion, &at)
+        .iter()
+        .map(|t| t * t)
+        .sum::<f64>()
+        .sqrt();
+    assert!(error(&there, 0.0) < 1e-12 * size);
+    assert!(
+        error(&plain, 0.0) > 1e-3 * size,
+        "these effects multiply each other"
+    );
+    let [near, far] = [error(&there, 1e-4), error(&there, 2e-4)];
+    assert!(
+        (far / near - 4.0).abs() < 0.05,
+        "second order: {near} {far}"
+    );
+    // Without the payload it is that of the other effects.
+    let mut without = at.clone();
+    for (k, &term) in plain.columns().iter().enumerate() {
+        if plain.terms()[term].family.is_payload() {
+            without[k] = 0.0;
+        }
+    }
+    let library = there.in_log(&robot, false);
+    let found = library.torque_with(&robot, motion, false, &at);
+    let expected = truth(&robot, &plain, motion, &without);
+    let left = found
+        .iter()
+        .zip(&expected)
+        .map(|(a, b)| (a - b).powi(2))
+        .sum::<f64>()
+        .sqrt();
+    assert!(left < 1e-12 * size, "{left}");
+}
+
+/// A twin's file may say anything.
+#[test]
+fn effects_that_are_none_are_refused() {
+    let robot = tree();
+    for (name, value) in [
+        ("base.tilt.x", f64::NAN),
+        ("joint0.viscous", 1.0),
+        ("nobody", 1.0),
+    ] {
+        let settings = LibrarySettings {
+            families: vec![Family::Tilt, Family::Viscous],
+            generic: Some(false),
+            linearised_at: BTreeMap::from([(name.to_owned(), value)]),
+            ..LibrarySettings::default()
+        };
+        let error = Library::propose(&robot, &settings).unwrap_err();
+        assert!(error.to_string().contains(name), "{error}");
+    }
+}
