@@ -156,6 +156,7 @@ fn road(
     let usual = smaller_library::is_usual(&settings.library.families);
     let followed = history::follow(robot, (logs, &prepared), &pipeline, settings, findings)?;
     let settings = &followed.settings;
+    pipeline.history = followed.history;
     let mut library_settings = LibrarySettings {
         coulomb_velocity: pipeline.coulomb_velocity,
         ..settings.library.clone()
@@ -171,7 +172,6 @@ fn road(
         (pipeline, library) = (turned.pipeline, turned.library);
         findings.push(turned.finding);
     }
-    pipeline.history = followed.history;
 
     // eq. (1)–(4): residual torque and Euler–Lagrange columns, filtered alike
     let others = heldout.iter().map(|log| ready(robot, log, &pipeline));

@@ -1,7 +1,7 @@
 //! How sharply friction turns round: v_s of `tanh(q̇/v_s)` where the user says nothing, by what training data leave unexplained.
 //!
 //! Bearings and gears differ. With the wrong v_s every reversal leaves a pulse that looks like noise and moves the effects beside it. A
-//! few evenly spread stretches of the training logs are fitted once per v_s, with all components in, and
+//! few evenly spread stretches of the training logs are fitted once per v_s, with all components in but hysteresis, and
 //!
 //! ```text
 //! gain(v_s) = Σ_j n_j / (2 τ_j) · ln(s_j²(0.02) / s_j²(v_s))
@@ -23,7 +23,7 @@ use crate::plug_in::{
 use crate::posterior::Posterior;
 use crate::robot::Robot;
 use crate::signal::{Log, Payload, Pipeline, ReadyLog, Trajectory, ready, stretches};
-use crate::term::{Library, LibrarySettings};
+use crate::term::{Family, Library, LibrarySettings};
 
 /// Factors between neighbouring v_s, and how often one may be applied.
 const STEPS: [f64; 2] = [0.5, 2.0];
@@ -224,7 +224,10 @@ impl Trial<'_> {
         let mut logs: Vec<Observations> = (self.trajectories.iter())
             .map(|trajectory| observe(self.robot, library, self.pipeline, trajectory))
             .collect::<Result<_>>()?;
-        let zero = zero_columns(logs.iter(), library);
+        let mut zero = zero_columns(logs.iter(), library);
+        zero.extend(hysteresis(library));
+        zero.sort_unstable();
+        zero.dedup();
         for log in &mut logs {
             log.drop_columns(&zero);
         }
@@ -288,6 +291,15 @@ impl Trial<'_> {
         };
         Ok(Some((joints.map(of_joint).collect(), fit)))
     }
+}
+
+/// Columns of hysteresis: their channels are made for one v_s.
+fn hysteresis(library: &Library) -> impl Iterator<Item = usize> {
+    let terms = library.columns().iter().enumerate();
+    let family = |term: usize| library.terms()[term].family;
+    terms
+        .filter(move |(_, term)| family(**term) == Family::Hysteresis)
+        .map(|(column, _)| column)
 }
 
 /// Nats that `other` explains more than `usual`, and what it takes off the residual's standard deviation (geometric mean of the

@@ -13,6 +13,28 @@ const DEVIATIONS: f64 = 2.0;
 /// Components that are named.
 const MOST: usize = 4;
 
+/// Largest factor of a column that changes with warmth on a joint: of the channel, and of the speed where friction grows with it.
+fn warmth(twin: &Twin, joint: usize, name: &str) -> f64 {
+    let history = twin.pipeline.history.get(joint);
+    let channel = match history.and_then(|history| history.warmth) {
+        // At most (t/T) e^(−t/T) is 1/e.
+        Some(Warmth::Time { later_mean, .. }) if name.ends_with("_later") => {
+            later_mean.max((-1.0_f64).exp() - later_mean)
+        }
+        Some(Warmth::Time { mean, .. }) => mean.max(1.0 - mean),
+        Some(Warmth::Temperature { .. }) => DEVIATIONS,
+        None => 0.0,
+    };
+    let [_, _, slowest, fastest, ..] = twin.hull[joint];
+    let speed = slowest.abs().max(fastest.abs());
+    channel
+        * if name.contains(".viscous") {
+            speed
+        } else {
+            1.0
+        }
+}
+
 /// What programs of a twin leave out: they take friction with hysteresis as that of steady sliding, and friction that changes with warmth as
 /// its mean. `None` where the twin remembers nothing.
 ///
@@ -26,17 +48,10 @@ pub fn forgotten(twin: &Twin) -> Result<Option<Finding>> {
         let most = match own.family {
             // Right after the reversal of a long way: e/r = -1 where the direction is +1.
             Family::Hysteresis => 2.0,
-            Family::WarmUp if own.name.ends_with(".coulomb") => {
-                let joints = 0..library.joints();
-                let joint = joints
-                    .into_iter()
-                    .find(|&joint| library.columns_of_joint(joint).contains(&column));
-                let history = joint.and_then(|joint| twin.pipeline.history.get(joint));
-                match history.and_then(|history| history.warmth) {
-                    Some(Warmth::Time { mean, .. }) => mean.max(1.0 - mean),
-                    Some(Warmth::Temperature { .. }) => DEVIATIONS,
-                    None => 0.0,
-                }
+            Family::WarmUp => {
+                let mut joints = 0..library.joints();
+                let joint = joints.find(|joint| library.columns_of_joint(*joint).contains(&column));
+                joint.map_or(0.0, |joint| warmth(twin, joint, &own.name))
             }
             _ => continue,
         };

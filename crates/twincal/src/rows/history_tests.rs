@@ -97,6 +97,7 @@ fn an_element_that_bends_and_slips_is_explained_by_its_column() {
         warmth: Some(Warmth::Time {
             constant: CONSTANT,
             mean,
+            later_mean: 0.2,
         }),
     };
     for motion_interval in [0.0, 0.007] {

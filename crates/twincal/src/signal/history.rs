@@ -4,6 +4,7 @@
 //! stop operator     e(t) = clip(e(t−) + Δq, −r, r)
 //! its channel       e/r − tanh(q̇/v_s)               0 while the joint slides on
 //! warmth            exp(−t/T) − mean, or (temperature − mean)/sd
+//! later             (t/T) exp(−t/T) − mean, 0 with temperature: exp(−t/T') to first order in ln(T'/T)
 //! ```
 //! They are made once of a segment's smooth motion and carried with it. Every channel is 0 where nothing is known of what was before: a
 //! state by itself has steady sliding and the training logs' mean warmth.
@@ -19,8 +20,8 @@ use serde::{Deserialize, Serialize};
 
 /// Stop operators of a joint at most.
 pub(crate) const STOPS: usize = 3;
-/// Channels of a joint: its stop operators, then its warmth.
-const CHANNELS: usize = STOPS + 1;
+/// Channels of a joint: its stop operators, then its warmth, then how that goes with another time constant.
+const CHANNELS: usize = STOPS + 2;
 
 /// Channel of a stop operator of a joint.
 pub(crate) fn stop_channel(joint: usize, stop: usize) -> usize {
@@ -32,16 +33,24 @@ pub(crate) fn warmth_channel(joint: usize) -> usize {
     joint * CHANNELS + STOPS
 }
 
+/// Channel by which a joint warms later than its warmth says.
+pub(crate) fn later_channel(joint: usize) -> usize {
+    joint * CHANNELS + STOPS + 1
+}
+
 /// What a joint warms with.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Warmth {
-    /// Time since the log's start: `exp(−t/constant) − mean`.
+    /// Time since the log's start: `exp(−t/constant) − mean`, and `(t/constant) exp(−t/constant) − later_mean`.
     Time {
         /// T, s.
         constant: f64,
-        /// Mean over the training logs.
+        /// Mean of the first over the training logs.
         mean: f64,
+        /// Mean of the second.
+        #[serde(default)]
+        later_mean: f64,
     },
     /// Logged temperature: `(temperature − mean)/sd`.
     Temperature {
@@ -67,7 +76,11 @@ impl JointHistory {
         let thresholds = self.thresholds.iter().all(|r| r.is_finite() && *r > 0.0);
         let warmth = match self.warmth {
             None => true,
-            Some(Warmth::Time { constant, mean }) => constant > 0.0 && mean.is_finite(),
+            Some(Warmth::Time {
+                constant,
+                mean,
+                later_mean,
+            }) => constant > 0.0 && mean.is_finite() && later_mean.is_finite(),
             Some(Warmth::Temperature { mean, sd }) => sd > 0.0 && mean.is_finite(),
         };
         self.thresholds.len() <= STOPS && thresholds && warmth
@@ -153,11 +166,19 @@ impl Pipeline {
             of_joints.for_each(|(joint, (((channels, masked), history), temperature))| {
                 let own = joint * len..(joint + 1) * len;
                 let (stops, warmth) = channels.split_at_mut(STOPS * len);
+                let (warmth, later) = warmth.split_at_mut(len);
                 self.stops(history, (&q[own.clone()], &qd[own]), stops, masked);
                 match history.warmth {
-                    Some(Warmth::Time { constant, mean }) => {
-                        let of = |t: &f64| (-(t - start) / constant).exp() - mean;
-                        warmth.iter_mut().zip(time).for_each(|(w, t)| *w = of(t));
+                    Some(Warmth::Time {
+                        constant,
+                        mean,
+                        later_mean,
+                    }) => {
+                        for ((w, later), t) in warmth.iter_mut().zip(later).zip(time) {
+                            let since = (t - start) / constant;
+                            let left = (-since).exp();
+                            (*w, *later) = (left - mean, since * left - later_mean);
+                        }
                     }
                     Some(Warmth::Temperature { mean, sd }) => {
                         if let Some(known) = temperature {

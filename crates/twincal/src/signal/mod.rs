@@ -47,7 +47,9 @@ pub use correct::{Corrections, Lag};
 pub use describe::{JointOverview, LogOverview, describe, hardly_driven};
 pub(crate) use few_chapters::FewChapters;
 pub use history::{JointHistory, Warmth};
-pub(crate) use history::{STOPS, known_temperatures, stop_channel, temperature_at, warmth_channel};
+pub(crate) use history::{
+    STOPS, known_temperatures, later_channel, stop_channel, temperature_at, warmth_channel,
+};
 pub use long::{Log, Logs, LongLog, ReadChapter};
 pub use ready::{LongReady, ReadyLog};
 pub use shelf::{Numbers, Shelf};
