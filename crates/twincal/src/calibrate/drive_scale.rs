@@ -7,7 +7,8 @@
 //! β(s) = A_z⁻¹ X_zᵀ (y + s (y + x)) = β + s d,    d = β + A_z⁻¹ X_zᵀ x
 //! ```
 //! so that a mass is off by s times all the mass, nominal and found, that its column stands for. Friction and motor inertia are in the
-//! units of the logged torque and stay as they are. Nor does the prediction of logged torque change.
+//! units of the logged torque and stay as they are. Nor does the prediction of logged torque change. Where columns are worked out about effects
+//! (`relinearise`), x holds the torque of those as well, so that they count once less: d = β − β* + A_z⁻¹ X_zᵀ x.
 
 use crate::error::{Finding, Severity};
 use crate::linear_algebra::Cholesky;
@@ -51,7 +52,8 @@ impl DriveScale {
             factor.solve(&mut direction);
             let pairs = direction.iter().zip(&model.mean);
             for (&k, (d, mean)) in model.members.iter().zip(pairs) {
-                sum[k as usize] += model.weight * (d + mean);
+                let about = library.about(k as usize);
+                sum[k as usize] += model.weight * (d + mean - about);
                 mass[k as usize] += model.weight;
             }
         }
@@ -107,10 +109,12 @@ impl DriveScale {
         }
     }
 
-    /// What was done, and what would end it.
-    pub(super) fn finding(&self) -> Finding {
+    /// What was done, and what would end it; `None` where no inertia was found that it could widen.
+    pub(super) fn finding(&self) -> Option<Finding> {
         let share = 100.0 * self.sd;
-        Finding::new(
+        let widens = self.direction.iter().any(|more| *more != 0.0);
+        widens.then(|| {
+            Finding::new(
             Severity::Note,
             "drive_gain_uncertain",
             "",
@@ -120,7 +124,27 @@ impl DriveScale {
             ),
             0,
         )
+        })
     }
+}
+
+/// Said where a factor on torque is unknown and nothing tells what it does to inertias.
+pub(super) fn ignored(sd: f64, scale: Option<&DriveScale>, library: &Library) -> Option<Finding> {
+    let inertial = |k| matches!(library.model_column(k), Some(ModelColumn::Inertia { .. }));
+    let asked = (0..library.columns().len()).any(inertial) && sd > 0.0;
+    (asked && scale.is_none()).then(|| {
+        Finding::new(
+            Severity::Warning,
+            "drive_gain_ignored",
+            "prior.drive_gain",
+            format!(
+                "an error of {:.0} % (sd) that all drive constants may share is not in the intervals of masses: that takes `gain` among the \
+                 candidates ([library] families)",
+                100.0 * sd
+            ),
+            0,
+        )
+    })
 }
 
 /// The sd of the common factor that is left: none where two known payloads were logged.

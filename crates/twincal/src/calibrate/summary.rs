@@ -70,7 +70,8 @@ pub(super) fn summarise(
     let sensitivity = sensitivity(&fit.problem, &fit.posterior)?;
     let drive_sd = drive_scale::left(settings.drive_gain_sd, data.payloads.iter().copied());
     let scale = DriveScale::new(drive_sd, library, &fit.problem, &fit.posterior);
-    findings.extend(scale.as_ref().map(DriveScale::finding));
+    findings.extend(drive_scale::ignored(drive_sd, scale.as_ref(), library));
+    findings.extend(scale.as_ref().and_then(DriveScale::finding));
     let scale = scale.as_ref();
     let mut terms = terms(library, &fit, &rms, &sensitivity, scale);
     for (&index, sd) in library.columns().iter().zip(&opinion.sandwich) {
