@@ -23,6 +23,8 @@ const NEGLIGIBLE_IN_LOOPS: f64 = -14.0;
 const EXCHANGED: f64 = -4.6;
 /// Nats that bounds cost a model from which on they are worth a closer look.
 const ACTING: f64 = 0.5;
+/// Such looks at most: each costs as much as weighing some hundred models by the guide.
+const LOOKS: usize = 48;
 /// Nats by which the guide may rate a model too high before that is said.
 const OVERRATED: f64 = 3.0;
 /// Share of the mass that may be missing.
@@ -121,6 +123,7 @@ impl WithSimd for Run<'_> {
             sums: Sums::new(standard, reduced.shrinks()),
             best: f64::NEG_INFINITY,
             overrated: false,
+            looked: 0,
             walker,
             reduced,
             active: &reduced.active,
@@ -197,6 +200,8 @@ struct Search<'a> {
     sums: Sums,
     best: f64,
     overrated: bool,
+    /// Closer looks that were taken at what bounds leave of a model.
+    looked: usize,
     care: Care,
 }
 
@@ -309,6 +314,11 @@ impl Search<'_> {
         }
         let mut own = log_weight;
         if bounds > ACTING {
+            // What is negligible beside a lighter model than the heaviest is no loss: more is kept.
+            if self.looked == LOOKS {
+                return;
+            }
+            self.looked += 1;
             let standard = self.reduced.full;
             let (_, mut positions) = self.reduced.members(set);
             positions.sort_unstable_by_key(|&d| standard.order[d]);
