@@ -84,7 +84,8 @@ def main():
         parts += section("Worlds of other kinds, which no choice was made on", others, command_of(others, " --held-back"))
     if given.before:
         pairs = shared_pairs(read(given.before), lines)
-        parts += ["## Beside the version before, same logs", lines_of(difference_rows(pairs))]
+        said = f"{len(pairs)} worlds, fitted by both."
+        parts += ["## Beside the version before, same logs", said, lines_of(difference_rows(pairs))]
     parts += [TRUTH.rstrip(), RECORDED.rstrip(), lines_of(kinds_rows(KINDS + HELD_BACK))]
     given.output.write_text("\n\n".join(parts) + "\n")
 

@@ -1,6 +1,8 @@
 //! A few hundred smoothed rows of each log and joint: torque of the model, its regressor, friction's shapes.
 
-use crate::robot::{BLOCK, Motion, Regressor, Robot, nominal_torque};
+use crate::robot::{
+    BLOCK, BlockWorkspace, Motion, Regressor, Robot, STRIDE, gravity_regressor, nominal_torque,
+};
 use crate::signal::{Pipeline, Segment, Trajectory};
 use rayon::prelude::*;
 
@@ -47,9 +49,12 @@ impl Block {
     }
 }
 
-/// Number of common parameters: ten of each body, and the motor's inertia of each joint.
+/// Gravity along the axes of the base, which may lean.
+const GRAVITY: usize = 3;
+
+/// Number of common parameters: ten of each body, the motor's inertia of each joint, and gravity.
 pub(super) fn parameters(robot: &Robot) -> usize {
-    10 * bodies(&Regressor::new(robot)) + robot.dof()
+    10 * bodies(&Regressor::new(robot)) + robot.dof() + GRAVITY
 }
 
 fn bodies(regressor: &Regressor) -> usize {
@@ -170,10 +175,29 @@ fn of_log(robot: &Robot, regressor: &Regressor, log: usize, rows: Smooth) -> Vec
         block.columns.extend(present.map(|k| 10 * pair.body + k));
         block.x.resize(block.columns.len() * len, 0.0);
     }
+    let mut lean = vec![0; dof];
+    for (block, lean) in blocks.iter_mut().zip(&mut lean) {
+        *lean = block.columns.len();
+        block
+            .columns
+            .extend((0..GRAVITY).map(|axis| motor + dof + axis));
+        block.x.resize(block.columns.len() * len, 0.0);
+    }
     let mut cells = regressor.block(robot);
+    let mut workspace = BlockWorkspace::new(robot);
+    let mut gravity = vec![0.0; GRAVITY * dof * STRIDE];
     for from in (0..len).step_by(BLOCK) {
         let samples = from..(from + BLOCK).min(len);
         regressor.evaluate(robot, motion, samples.clone(), &mut cells);
+        gravity_regressor(robot, &mut workspace, motion, samples.clone(), &mut gravity);
+        for (joint, block) in blocks.iter_mut().enumerate() {
+            for axis in 0..GRAVITY {
+                let own = (GRAVITY * joint + axis) * STRIDE;
+                let start = (lean[joint] + axis) * len;
+                block.x[start + samples.start..start + samples.end]
+                    .copy_from_slice(&gravity[own..own + samples.len()]);
+            }
+        }
         for (index, pair) in regressor.pairs().iter().enumerate() {
             let block = &mut blocks[pair.coordinate];
             let present = (0..10).filter(|k| pair.present[*k]);

@@ -1,11 +1,17 @@
-//! Columns of bins: inertial parameters of every body, friction of every joint.
+//! Columns of bins: inertial parameters of every body, gravity in the base, friction of every joint.
 
 use super::bins::{Bins, Zone};
-use crate::robot::{BLOCK, Motion, Regressor, Robot, nominal_torque};
+use crate::robot::{
+    BLOCK, BlockWorkspace, Motion, Regressor, Robot, STRIDE, gravity_regressor, nominal_torque,
+};
 use std::ops::Range;
 
 /// Columns of a joint's own: velocity, two shapes of dry friction, velocity squared, acceleration, one, position.
 pub(crate) const FRICTION: usize = 7;
+/// Gravity along the axes of the base: a base that leans is a rigid body's matter, too.
+const GRAVITY: usize = 3;
+/// Prior sd of gravity along an axis, m/s²: a lean of about ten degrees.
+const LEAN: f64 = 2.0;
 /// Velocity at which Coulomb friction is read from them, rad/s or m/s, and the velocities of the shapes.
 const AT: f64 = 0.1;
 const SHAPES: [f64; 2] = [0.02, 0.2];
@@ -83,7 +89,7 @@ impl Design {
             }
         }
         Self {
-            parameters: 10 * bodies + FRICTION * dof,
+            parameters: 10 * bodies + GRAVITY + FRICTION * dof,
             joints,
             places,
         }
@@ -119,8 +125,10 @@ fn columns(regressor: &Regressor, joint: usize, bodies: usize) -> Vec<usize> {
         let present = (0..10).filter(|&k| pair.present[k]);
         present.map(move |k| 10 * pair.body + k)
     });
-    let first = 10 * bodies + FRICTION * joint;
-    inertial.chain(first..first + FRICTION).collect()
+    let gravity = 10 * bodies..10 * bodies + GRAVITY;
+    let first = gravity.end + FRICTION * joint;
+    let own = first..first + FRICTION;
+    inertial.chain(gravity).chain(own).collect()
 }
 
 /// Adds the rows of a block of bins.
@@ -148,6 +156,9 @@ fn add_block(
     let mut nominal = vec![0.0; own.len() * len];
     nominal_torque(robot, motion, &mut nominal);
     regressor.evaluate(robot, motion, 0..len, block);
+    let mut gravity = vec![0.0; GRAVITY * own.len() * STRIDE];
+    let mut workspace = BlockWorkspace::new(robot);
+    gravity_regressor(robot, &mut workspace, motion, 0..len, &mut gravity);
     for (joint, rows) in joints.iter_mut().enumerate() {
         let pairs: Vec<usize> = (0..regressor.pairs().len())
             .filter(|&p| regressor.pairs()[p].coordinate == joint)
@@ -159,6 +170,8 @@ fn add_block(
                 rows.values
                     .extend(values.map(|k| block.column(pair, k)[bin]));
             }
+            let along = (0..GRAVITY).map(|axis| gravity[(GRAVITY * joint + axis) * STRIDE + bin]);
+            rows.values.extend(along);
             rows.values.extend(own[joint].friction(bin));
         }
         rows.torque.extend_from_slice(own[joint].torque());
@@ -172,7 +185,8 @@ fn add_block(
 /// Evenly spread bins: all of them where they are few.
 pub(crate) fn sample(robot: &Robot, bins: &[Bins]) -> Vec<Part> {
     let all: usize = bins.iter().map(Bins::len).sum();
-    let width: usize = 10 * Regressor::new(robot).pairs().len() + FRICTION * robot.dof();
+    let own = GRAVITY + FRICTION;
+    let width: usize = 10 * Regressor::new(robot).pairs().len() + own * robot.dof();
     let most = BINS.min(NUMBERS / width).max(RUN);
     let every = all.div_ceil(most);
     let mut parts = Vec::new();
@@ -187,7 +201,7 @@ pub(crate) fn sample(robot: &Robot, bins: &[Bins]) -> Vec<Part> {
     parts
 }
 
-/// Precision of each parameter before the data: a mean link is as wrong as it is heavy; friction is free.
+/// Precision of each parameter before the data: a mean link is as wrong as it is heavy, a base leans by some degrees; friction is free.
 pub(crate) fn prior(robot: &Robot) -> Vec<f64> {
     let bodies = robot.bodies().len();
     let parameters: Vec<[f64; 10]> = (0..bodies).map(|b| robot.parameters_of_body(b)).collect();
@@ -203,6 +217,7 @@ pub(crate) fn prior(robot: &Robot) -> Vec<f64> {
     };
     let inertial = (0..bodies).flat_map(|_| (0..10).map(precision));
     inertial
+        .chain([LEAN.powi(-2); GRAVITY])
         .chain(std::iter::repeat_n(0.0, FRICTION * robot.dof()))
         .collect()
 }

@@ -59,7 +59,7 @@ fn compare(library: &Library, joints: usize) {
         qdd: &qdd,
     };
     // Any numbers for the channels of every joint.
-    let history: Vec<f64> = (0..4)
+    let history: Vec<f64> = (0..5)
         .flat_map(|k| wave(0.29 + 0.1 * f64::from(k)))
         .collect();
     let course = Course {
