@@ -2,8 +2,8 @@
 
     python diff_pairs.py [--twincal PROGRAM] [--pairs 20] [--loads 10] [--first-seed 1]
 
-Each log has 20 s, a motion and noise of its own, friction, and on every joint a torque of the position that no candidate describes
-(`check_changes.py`). Each is fitted by itself. Prints every change that is reported of an unchanged robot (new, gone, changed; ≤ 1 in 20
+Logs of 20 s differ in motion and noise; on every joint a function of its position acts that is outside the candidate library (`check_changes.py`).
+Each log is fitted separately. Prints every change that is reported of an unchanged robot (new, gone, changed; ≤ 1 in 20
 pairs is asked), and the payload's mass where it was taken up (within 10 % in 9 of 10).
 """
 

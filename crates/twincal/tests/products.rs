@@ -89,10 +89,9 @@ fn gravity_acts_on_a_payload_that_is_found() {
     }
 }
 
-/// The program of the twin computes what the twin predicts, with a gain and a zero beside payload and tilt; and what no file holds of products
-/// stays beside the file: file and residual are the twin.
+/// The program of the twin computes what the twin predicts, with a gain and a zero beside payload and tilt.
 #[test]
-fn program_and_file_know_of_products() {
+fn a_program_has_the_torque_of_products() {
     let families = [
         Family::Payload,
         Family::Tilt,

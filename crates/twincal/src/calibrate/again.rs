@@ -98,6 +98,8 @@ pub(super) fn whole_road(
             && let Some(smaller) = smaller_library::without_memory(&few.error, &settings)
         {
             settings = smaller.settings;
+            // Effects that are no candidates any more are nothing to be linearised about.
+            settings.library.linearised_at.clear();
             added.push(smaller.finding);
             continue;
         }
@@ -120,6 +122,7 @@ pub(super) fn whole_road(
             added.push(lowered(&few, cutoff_hz));
         } else if let Some(smaller) = smaller_library::smaller(&few.error, &settings) {
             settings = smaller.settings;
+            settings.library.linearised_at.clear();
             added.push(smaller.finding);
         } else {
             return Err(few.error);

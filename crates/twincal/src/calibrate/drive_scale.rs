@@ -111,10 +111,11 @@ impl DriveScale {
 
     /// What was done, and what would end it; `None` where no inertia was found that it could widen.
     pub(super) fn finding(&self) -> Option<Finding> {
+        if self.direction.iter().all(|more| *more == 0.0) {
+            return None;
+        }
         let share = 100.0 * self.sd;
-        let widens = self.direction.iter().any(|more| *more != 0.0);
-        widens.then(|| {
-            Finding::new(
+        Some(Finding::new(
             Severity::Note,
             "drive_gain_uncertain",
             "",
@@ -123,8 +124,7 @@ impl DriveScale {
                  centres of mass and inertias; log two known payloads ([[log]] payload) to be rid of it, or set prior.drive_gain"
             ),
             0,
-        )
-        })
+        ))
     }
 }
 
@@ -164,6 +164,8 @@ pub(super) fn left(sd: f64, payloads: impl Iterator<Item = Payload>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::testing::tree;
+    use crate::term::{Family, LibrarySettings};
 
     #[test]
     fn two_known_payloads_settle_the_factor() {
@@ -177,6 +179,27 @@ mod tests {
         assert_eq!(of(&[known(1.0), known(1.0)]), 0.07);
         assert_eq!(of(&[Payload::None, known(1.0)]), 0.0);
         assert_eq!(of(&[known(2.0), known(1.0)]), 0.0);
+    }
+
+    /// Without `gain` among the candidates nothing says what nominal torque looks like: that is reported, and nothing where the factor is known.
+    #[test]
+    fn a_factor_that_no_candidate_shows_is_reported() {
+        let settings = LibrarySettings {
+            families: vec![Family::Density],
+            generic: Some(false),
+            ..LibrarySettings::default()
+        };
+        let (library, _) = Library::propose(&tree(), &settings).unwrap();
+        let finding = ignored(0.07, None, &library).unwrap();
+        assert_eq!(finding.code, "drive_gain_ignored");
+        assert_eq!(ignored(0.0, None, &library), None);
+        let direction = vec![0.0];
+        let scale = DriveScale {
+            sd: 0.07,
+            direction,
+        };
+        assert_eq!(ignored(0.07, Some(&scale), &library), None);
+        assert_eq!(scale.finding(), None);
     }
 
     /// A mass of 1.5 ± 0.3 kg where 10 kg hang on the factor of 7 %: √(0.3² + 0.7²).

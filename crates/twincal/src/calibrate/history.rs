@@ -24,8 +24,8 @@ const SAMPLES: usize = 1 << 13;
 const SHORTEST: f64 = 20.0;
 /// So many of them at least: what was seen once is a drift, and says nothing of another log's start.
 const FEWEST: usize = 2;
-/// Time constant in lengths of the longest log. With a second channel, first order in its logarithm, 4 % or less is left of the rms of exp(−t/T')
-/// for T' from 0.18 to 1.2 of that length; without it 30 %.
+/// Time constant in lengths of the longest log. Of the rms of exp(−t/T') about its mean 3 % or less is left for T' from 0.2 to 2/3 of that length with a
+/// second channel, first order in the logarithm of T'; without it up to 19 %.
 const CONSTANT: f64 = 1.0 / 3.0;
 /// Least standard deviation of a logged temperature that says anything, K.
 const LEAST_SPREAD: f64 = 0.5;
@@ -214,6 +214,34 @@ mod tests {
             [0.15e-3, 0.5e-3, 1.5e-3]
         ));
         assert!(thresholds(0.02, JointKind::Revolute).is_empty());
+    }
+
+    /// Least squares on a fine grid: what either channel, and both, leave of other time constants, each about its mean.
+    #[test]
+    fn a_second_channel_stands_for_other_time_constants() {
+        let (steps, centred) = (3000, |of: &dyn Fn(f64) -> f64| -> Vec<f64> {
+            let all: Vec<f64> = (0..3000).map(|i| of(f64::from(i) / 3000.0)).collect();
+            let mean = all.iter().sum::<f64>() / 3000.0;
+            all.iter().map(|x| x - mean).collect()
+        });
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let without = |a: &[f64], b: &[f64]| -> Vec<f64> {
+            let factor = dot(a, b) / dot(b, b);
+            a.iter().zip(b).map(|(a, b)| a - factor * b).collect()
+        };
+        let first = centred(&|t| (-t / CONSTANT).exp());
+        let later = centred(&|t| t / CONSTANT * (-t / CONSTANT).exp());
+        let later = without(&later, &first);
+        let (mut most, mut most_alone) = (0.0_f64, 0.0_f64);
+        for other in [0.2, 0.25, 0.3, 0.4, 0.5, 2.0 / 3.0] {
+            let truth = centred(&|t| (-t / other).exp());
+            let alone = without(&truth, &first);
+            let both = without(&alone, &later);
+            let share = |left: &[f64]| (dot(left, left) / dot(&truth, &truth)).sqrt();
+            (most, most_alone) = (most.max(share(&both)), most_alone.max(share(&alone)));
+        }
+        assert_eq!(first.len(), steps);
+        assert!(most < 0.03 && most_alone > 0.18, "{most} {most_alone}");
     }
 
     /// The mean over both logs is that of sums over fine steps.

@@ -88,6 +88,9 @@ fn missing(
 ) -> Result<Vec<f64>> {
     let rows = &log.observations;
     let count = rows.len().min(ROWS);
+    if count == 0 {
+        return Ok(vec![0.0; robot.dof()]);
+    }
     let picked: Vec<usize> = (0..count).map(|i| i * rows.len() / count).collect();
     let pick = |joints: &[Numbers]| -> Vec<f64> {
         let of_joint = |joint: &Numbers| -> Vec<f64> {

@@ -23,7 +23,9 @@ pub(super) trait Source {
     /// How the columns of a joint follow from its parts.
     fn recipes(&self, joint: usize) -> &Arc<Recipes>;
     /// Whether there is torque that no coefficient moves beside the nominal.
-    fn has_products(&self) -> bool;
+    fn has_products(&self) -> bool {
+        false
+    }
     /// `nominal[joint * len + sample]`, products likewise, `out[joint][i * len + sample]`.
     fn evaluate(&mut self, course: Course<'_>, torque: Constant<'_>, out: &mut [Aligned]);
     /// `nominal[joint * len + sample]`, products likewise, `out[joint][part * stride + sample]`.

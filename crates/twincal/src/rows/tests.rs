@@ -78,10 +78,6 @@ impl Source for StandIn {
         &self.recipes[joint]
     }
 
-    fn has_products(&self) -> bool {
-        false
-    }
-
     fn evaluate(&mut self, course: Course<'_>, torque: Constant<'_>, out: &mut [Aligned]) {
         let (motion, nominal) = (course.motion, torque.nominal);
         let of = |joint: usize, c: usize, s: [f64; 3]| column(COLUMNS[joint][c], s[0], s[1], s[2]);
