@@ -154,6 +154,11 @@ impl CommonFit {
         }
     }
 
+    /// The last three common parameters: change of gravity in the base, m/s².
+    pub(super) fn gravity(&self) -> [f64; 3] {
+        std::array::from_fn(|axis| self.theta[self.size - 3 + axis])
+    }
+
     /// Logs and joints that have rows.
     pub(super) fn logs(&self) -> Vec<usize> {
         self.places(|block| block.log)

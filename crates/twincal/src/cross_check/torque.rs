@@ -3,9 +3,11 @@
 use super::common_fit::{CommonFit, Effect, Fitted};
 use super::rows::{Block, blocks, parameters};
 use crate::error::{Finding, Severity};
+use crate::rigid_fit::{Bins, bins, leaning, settle};
 use crate::robot::Robot;
 use crate::signal::{Pipeline, Trajectory};
 use crate::words::significant;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// Standard deviations from which a factor is believed. Real logs without a fault reach 10 (double pendulum, whose friction is not the same in each run), simulated
@@ -91,12 +93,12 @@ pub fn odd_torque(
     let alike = logs
         .windows(2)
         .all(|pair| pair[0].payload == pair[1].payload);
-    let rows = if alike {
-        blocks(robot, pipeline, logs)
+    let fit = if alike {
+        common_fit(robot, pipeline, logs)
     } else {
-        Vec::new()
+        None
     };
-    let Some(mut fit) = CommonFit::new(rows, parameters(robot)) else {
+    let Some(mut fit) = fit else {
         return Vec::new();
     };
     let names = Names {
@@ -113,6 +115,23 @@ pub fn odd_torque(
     findings.extend(late(&fit, &names));
     findings.extend(drifts(fit, &names));
     findings
+}
+
+/// The common fit, about the lean of the base where it sees one; `None` where too little moves. How far the base leans, under which inertias, the
+/// robust fit says, which holds both near the model's: with all of them free gravity may be anything.
+fn common_fit(robot: &Robot, pipeline: &Pipeline, logs: &[&Trajectory]) -> Option<CommonFit> {
+    let fit = |robot: &Robot| CommonFit::new(blocks(robot, pipeline, logs), parameters(robot));
+    let upright = fit(robot)?;
+    if leaning(robot, upright.gravity(), &[]).is_none() {
+        return Some(upright);
+    }
+    let bins: Vec<Bins> = (logs.iter())
+        .flat_map(|log| bins(robot, pipeline, log, &[]))
+        .collect();
+    match settle(robot, &bins).map(|settled| settled.robot) {
+        Some(Cow::Owned(turned)) => fit(&turned),
+        _ => Some(upright),
+    }
 }
 
 /// What a lag of 1 s of a log does to its torque.

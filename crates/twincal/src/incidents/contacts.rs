@@ -8,7 +8,7 @@
 use super::repeats::{Peak, repeats};
 use super::{Incident, IncidentKind};
 use crate::linear_algebra::dot;
-use crate::rigid_fit::{Bins, Design, Zone, mad, prior, robust, sample};
+use crate::rigid_fit::{Bins, Design, Settled, Zone, mad, settle};
 use crate::robot::Robot;
 use std::ops::Range;
 
@@ -139,9 +139,12 @@ struct Left {
 
 impl Left {
     fn new(robot: &Robot, bins: &[Bins]) -> Option<Self> {
-        let parts = sample(robot, bins);
-        let design = Design::new(robot, bins, &parts);
-        let solution = robust(&design, &prior(robot))?;
+        let Settled {
+            robot,
+            parts,
+            design,
+            solution,
+        } = settle(robot, bins)?;
         let theta = &solution.theta;
         let dof = robot.dof();
         let coulomb = (0..dof).map(|joint| {
@@ -167,7 +170,7 @@ impl Left {
                 let mut from = 0;
                 while from < own.len() {
                     let range = from..own.len().min(from + 1024);
-                    let rows = Design::new(robot, bins, &[(segment, range.clone())]);
+                    let rows = Design::new(&robot, bins, &[(segment, range.clone())]);
                     for (all, more) in joints.iter_mut().zip(rows.residual(theta)) {
                         all.extend(more);
                     }

@@ -1,8 +1,10 @@
 //! Lags by Gauss–Newton: joint by joint with all parameters free, log by log beside them.
 
 use super::rows::{REACH, Rows};
+use crate::rigid_fit::{LEANS, leaning};
 use crate::robot::Robot;
 use crate::signal::{Pipeline, Trajectory};
+use std::borrow::Cow;
 
 /// Steps before lags are looked at, and with them; longest step, s.
 const FITS: usize = 4;
@@ -38,14 +40,14 @@ pub(super) fn estimate<'a>(
     pipeline: &Pipeline,
     logs: &[&'a Trajectory],
 ) -> Option<Estimate<'a>> {
-    let rows = Rows::new(robot, pipeline, logs)?;
+    let (rows, theta) = settled(robot, pipeline, logs)?;
     let dof = robot.dof();
     let slides = |joint: usize| rows.used[joint].iter().filter(|used| **used).count() >= FEWEST;
     let speaks: Vec<bool> = (0..dof).map(slides).collect();
     if !speaks.contains(&true) {
         return None;
     }
-    let mut found = walk(rows, dof)?;
+    let mut found = walk(rows, theta, dof)?;
     found.rows.fill_rates(&found.theta);
     let sds = sandwich(&found.rows, &found.weights, dof)?;
     let counts = log_rows(&found.rows);
@@ -73,15 +75,39 @@ pub(super) fn estimate<'a>(
     Some(found)
 }
 
-/// Steps from no lag to that of every log and joint.
-fn walk(mut rows: Rows<'_>, dof: usize) -> Option<Estimate<'_>> {
-    let measured: Vec<Vec<f64>> = rows.design.residual(&vec![0.0; rows.design.parameters]);
-    let (mut weights, mut spread) = rows.weights(&measured);
-    let mut theta = Vec::new();
-    for _ in 0..FITS {
-        theta = rows.fit(&weights)?.solution();
-        (weights, spread) = rows.weights(&rows.design.residual(&theta));
+/// Rows and parameters before any lag, about the lean of the base that they found.
+fn settled<'a>(
+    robot: &Robot,
+    pipeline: &Pipeline,
+    logs: &[&'a Trajectory],
+) -> Option<(Rows<'a>, Vec<f64>)> {
+    let mut robot = Cow::Borrowed(robot);
+    let mut leans = 0;
+    loop {
+        let rows = Rows::new(&robot, pipeline, logs)?;
+        let theta = without_lag(&rows)?;
+        let (gravity, inertia) = rows.design.gravity_and_inertia(&theta);
+        match leaning(&robot, gravity, inertia) {
+            Some(turned) if leans < LEANS => robot = Cow::Owned(turned),
+            _ => return Some((rows, theta)),
+        }
+        leans += 1;
     }
+}
+
+/// Parameters without lags, in a few steps of weights.
+fn without_lag(rows: &Rows<'_>) -> Option<Vec<f64>> {
+    let mut theta = vec![0.0; rows.design.parameters];
+    for _ in 0..FITS {
+        let (weights, _) = rows.weights(&rows.design.residual(&theta));
+        theta = rows.fit(&weights)?.solution();
+    }
+    Some(theta)
+}
+
+/// Steps from no lag to that of every log and joint.
+fn walk(mut rows: Rows<'_>, mut theta: Vec<f64>, dof: usize) -> Option<Estimate<'_>> {
+    let (mut weights, mut spread) = rows.weights(&rows.design.residual(&theta));
     let mut lags = vec![vec![0.0; dof]; rows.logs()];
     let free = rows.design.parameters - dof;
     for _ in 0..STEPS {

@@ -27,6 +27,8 @@ pub(crate) type Part = (usize, Range<usize>);
 pub(crate) struct Design {
     /// How many parameters there are.
     pub(crate) parameters: usize,
+    /// Which of them is gravity along the first axis.
+    gravity: usize,
     /// By joint.
     pub(crate) joints: Vec<JointRows>,
     /// Segment and number of each bin.
@@ -90,6 +92,7 @@ impl Design {
         }
         Self {
             parameters: 10 * bodies + GRAVITY + FRICTION * dof,
+            gravity: 10 * bodies,
             joints,
             places,
         }
@@ -107,6 +110,12 @@ impl Design {
             (0..rows.torque.len()).map(left).collect()
         };
         self.joints.iter().map(of_joint).collect()
+    }
+
+    /// Change of gravity in the base, m/s², and of the ten parameters of each body in turn.
+    pub(crate) fn gravity_and_inertia<'a>(&self, theta: &'a [f64]) -> ([f64; 3], &'a [f64]) {
+        let (inertia, others) = theta.split_at(self.gravity);
+        (std::array::from_fn(|axis| others[axis]), inertia)
     }
 
     /// Coulomb friction of a joint as these parameters have it, N·m or N: friction at 0.1 rad/s.

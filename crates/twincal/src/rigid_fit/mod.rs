@@ -9,11 +9,13 @@
 
 mod bins;
 mod design;
+mod lean;
 mod robust;
 
 pub(crate) use bins::{Bins, Zone, bins};
 pub(crate) use design::{Design, JointRows, prior, sample};
-pub(crate) use robust::{Normal, mad, robust};
+pub(crate) use lean::{LEANS, Settled, leaning, settle};
+pub(crate) use robust::{Normal, mad};
 
 #[cfg(test)]
 mod tests;

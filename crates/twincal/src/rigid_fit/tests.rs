@@ -1,5 +1,6 @@
 //! A payload, a wrong model and friction leave noise; a push of a quarter of the log stays in what is left.
 
+use super::robust::robust;
 use super::*;
 use crate::self_check::testing::{INTERVAL, LEN, arm, log};
 use crate::signal::{Pipeline, Trajectory};

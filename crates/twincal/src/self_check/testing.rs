@@ -1,7 +1,7 @@
 //! A simulated arm with friction, noise and a wrong model, for the tests of what looks at logs.
 
 use crate::robot::{
-    Inertia, JointDescription, JointKind, LinkDescription, Motion, Robot, RobotDescription,
+    Change, Inertia, JointDescription, JointKind, LinkDescription, Motion, Robot, RobotDescription,
     nominal_torque,
 };
 use crate::signal::{Payload, Segment, Trajectory};
@@ -52,6 +52,30 @@ pub(crate) fn arm(heavier: f64) -> Robot {
         allow_unphysical: false,
     };
     Robot::new(description, &BTreeMap::new()).unwrap().0
+}
+
+/// The arm with its base leaning by some degrees, and 4 kg at its wrist.
+pub(crate) fn leaning_and_loaded(degrees: f64) -> Robot {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let (mass, com) = (4.0, [0.2, 0.02, 0.05]);
+    let [x, y, z] = com;
+    let payload = [
+        mass,
+        mass * x,
+        mass * y,
+        mass * z,
+        mass * (y * y + z * z),
+        -mass * x * y,
+        -mass * x * z,
+        mass * (x * x + z * z),
+        -mass * y * z,
+        mass * (x * x + y * y),
+    ];
+    arm(1.0).changed(&Change {
+        inertia: vec![(3, payload)],
+        gravity: [9.81 * 0.6 * sin, 9.81 * 0.8 * sin, 9.81 * (1.0 - cos)],
+        ..Change::default()
+    })
 }
 
 /// What the log of a robot 15 % heavier than the model with friction looks like; joints are independent.

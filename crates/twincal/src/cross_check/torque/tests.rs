@@ -1,7 +1,7 @@
 //! Planted factors, signs and drifts on a simulated arm that is 15 % heavier than its model: each is named with its size, and good logs are passed in silence.
 
 use super::*;
-use crate::self_check::testing::{INTERVAL, LEN, arm, log};
+use crate::self_check::testing::{INTERVAL, LEN, arm, leaning_and_loaded, log, log_of};
 
 fn pipeline() -> Pipeline {
     Pipeline {
@@ -58,6 +58,18 @@ fn good_logs_are_passed_in_silence() {
         }
     }
     assert_eq!(said(&[]), []);
+}
+
+/// What is left is noise: no more than under the same payload upright (a linear fit leaves 30 times as many squares).
+#[test]
+fn a_base_that_leans_under_an_unknown_payload_leaves_noise() {
+    let left = |robot: &Robot| {
+        let logs = [0.0, 3.1, 6.2].map(|seed| log_of(robot, seed));
+        let fit = common_fit(&arm(1.0), &pipeline(), &logs.each_ref()).unwrap();
+        fit.left(|_| true)
+    };
+    let [leans, upright] = [leaning_and_loaded(12.0), leaning_and_loaded(0.0)].map(|r| left(&r));
+    assert!(leans < 1.5 * upright, "{leans} against {upright}");
 }
 
 #[test]
