@@ -44,6 +44,16 @@ def answer(result, columns):
             term = terms[name]
             out["beta"][k], out["chance"][k] = term["mean"], term["pip"]
             out["low"][k], out["high"][k] = term["interval95"]
+    payload = next((c for c in result["components"] if c["name"] == "payload" and c["pip"] is not None), None) if result else None
+    if payload:
+        # Its own columns are about another point than these: what it is in its frame is told by its parameters, given that it is in.
+        known = {p["name"]: p["mean"] or 0.0 for p in payload["parameters"]}
+        known["m"] = known["mass"]
+        known |= {f"m{axis}": known["mass"] * known[f"com_{axis}"] for axis in "xyz"}
+        for k, name in enumerate(columns):
+            if name.startswith("payload."):
+                out["beta"][k] = payload["pip"] * known[name.removeprefix("payload.")]
+                out["chance"][k] = payload["pip"]
     return out
 
 

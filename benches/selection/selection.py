@@ -139,7 +139,7 @@ def measure(data, seed, options, folder):
     for (method, kind), (result, seconds) in results.items():
         scores[f"{method}|{kind}"] = score(data, program.answer(result, data.columns), heldout, seconds, program.verdicts(result))
         scores[f"{method}|{kind}"]["refused"] = result is None
-    if not options.quick:
+    if not (options.quick or options.ours):
         import peers
 
         for kind, (x, y) in sets.items():
@@ -161,7 +161,7 @@ def measure(data, seed, options, folder):
 
 def asked(options):
     """What runs in one folder have in common."""
-    return ("quick " if options.quick else "") + options.settings
+    return ("quick " if options.quick else "ours " if options.ours else "") + options.settings
 
 
 def main():
@@ -175,6 +175,7 @@ def main():
     parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="folder of selection.svg; what is not the whole comparison is drawn in --work")
     parser.add_argument("--fresh", action="store_true", help="forget earlier runs")
     parser.add_argument("--quick", action="store_true", help="only twincal as it comes, with a --work of its own")
+    parser.add_argument("--ours", action="store_true", help="the program with all its settings and no other method, with a --work of its own")
     parser.add_argument("--settings", default="", help="TOML for twincal beside the library, with --quick and a --work of its own")
     parser.add_argument("--table", action="store_true", help="only table and figure, of the runs there are")
     options = parser.parse_args()
@@ -187,7 +188,7 @@ def main():
         path = options.work / "runs" / f"{name}.jsonl"
         runs = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
         if any(run.get("settings", "") != asked(options) for run in runs):
-            sys.exit(f"{path} holds runs with other --settings, or with --quick: give these a --work of their own")
+            sys.exit(f"{path} holds runs with other --settings, --quick or --ours: give these a --work of their own")
     for seed in range(options.first, options.first if options.table else options.seeds + 1):
         for name, problem in problems.items():
             path = options.work / "runs" / f"{name}.jsonl"
@@ -201,7 +202,7 @@ def main():
                 file.write(json.dumps(run) + "\n")
     import table  # matplotlib takes a second
 
-    whole = not (options.only or options.quick or options.settings) and (options.first, options.seeds) == (1, 30)
+    whole = not (options.only or options.quick or options.ours or options.settings) and (options.first, options.seeds) == (1, 30)
     table.show(problems, options.work / "runs", (options.docs if whole else options.work) / "selection.svg")
 
 

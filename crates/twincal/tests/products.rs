@@ -5,6 +5,7 @@
 #[allow(dead_code, reason = "its `main` and its study are not needed here")]
 mod two_link;
 
+use twincal::Severity;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::evaluator::Evaluator;
 use twincal::random::Random;
@@ -72,6 +73,13 @@ fn holds(calibration: &Calibration, component: &str, parameter: &str, truth: f64
     );
 }
 
+/// How bad it is that columns were worked out anew.
+fn severity(calibration: &Calibration) -> Option<Severity> {
+    let mut findings = calibration.findings.iter();
+    let own = findings.find(|finding| finding.code == "relinearised");
+    own.map(|finding| finding.severity)
+}
+
 #[test]
 fn gravity_acts_on_a_payload_that_is_found() {
     let families = [Family::Payload, Family::Tilt];
@@ -79,8 +87,10 @@ fn gravity_acts_on_a_payload_that_is_found() {
     holds(&calibration, "payload", "mass", LOAD);
     holds(&calibration, "base.tilt", "x", LEAN);
     assert!(!calibration.twin.library.linearised_at.is_empty());
+    assert_eq!(severity(&calibration), Some(Severity::Note));
     // What this test is for: linear in all coefficients together it is off by many sd.
     let linear = fitted(&families, 0);
+    assert_eq!(severity(&linear), None);
     let [mean, sd] = told(&linear, "base.tilt", "x");
     assert!((mean - LEAN).abs() > 10.0 * sd, "{mean} ± {sd}");
     for (joint, score) in calibration.validation.filtered.joints.iter().enumerate() {

@@ -22,6 +22,7 @@ pub(super) fn others(calibration: &Calibration, terminal: &mut Terminal) {
         .components
         .iter()
         .filter(|c| !c.is_in() && calibration.sees(c))
+        .filter(|c| c.status != twincal::calibrate::Status::Equivalent)
     {
         match component.pip {
             Some(p) if p >= MENTIONED => {

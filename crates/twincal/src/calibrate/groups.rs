@@ -310,7 +310,7 @@ impl<'a> Candidates<'a> {
         let pip = self.share(&|holds: &[bool]| members.iter().any(|&k| holds[k]));
         let most = members.iter().fold(0.0_f64, |m, &k| m.max(self.pip[k]));
         // The listed models may miss what the members' own probabilities have.
-        let pip = pip.max(most);
+        let pip = pip.max(most).min(1.0);
         if pip < WORTH_TELLING {
             return None;
         }

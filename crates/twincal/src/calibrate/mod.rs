@@ -79,6 +79,7 @@ use data::Data;
 use heredity::Named;
 use lower_band::{Band, TooFew};
 use noise_of::noise_of;
+use relinearise::Linear;
 use ripples::Seen;
 use wider_band::wider;
 
@@ -220,9 +221,12 @@ fn road(
     let (mut fitted, fits_of_folds) = (fitted?, fits_of_folds?);
     let counted = count(&fitted);
     let model = (robot, &library, &library_settings);
-    if let Some(point) = relinearise::elsewhere(model, &data, &fitted.fit, settings)? {
-        return Ok(Road::Elsewhere(point));
-    }
+    let open = match relinearise::elsewhere(model, &data, &fitted.fit, settings)? {
+        Linear::Elsewhere(point) => return Ok(Road::Elsewhere(point)),
+        Linear::Open(moves) => Some(moves),
+        Linear::Enough => None,
+    };
+    findings.extend(relinearise::finding(&library_settings.linearised_at, open));
     let seen = match settings.unasked_ripple {
         UnaskedRipple::Ignored => Vec::new(),
         _ => ripples::seen(robot, &training, &fitted.fit, &library_settings, &pipeline),

@@ -2,12 +2,13 @@
 
 use super::CalibrationSettings;
 use super::data::{Data, Log};
-use crate::error::Result;
+use crate::error::{Finding, Result, Severity};
 use crate::observations::Part;
 use crate::plug_in::{Fit, moving_rows};
 use crate::robot::{Motion, Robot, nominal_torque};
 use crate::signal::{Numbers, Payload};
 use crate::term::{Library, LibrarySettings};
+use crate::words::significant;
 use std::collections::BTreeMap;
 
 /// Standard deviations by which what is missing may move coefficients.
@@ -16,8 +17,21 @@ const MOVES: f64 = 0.1;
 const ROWS: usize = 256;
 /// Effects that are more likely in than out.
 const IN: f64 = 0.5;
+/// Effects that a finding names.
+const NAMED: usize = 4;
 
-/// The effects of the robot model that a fit holds for real, by name of their term, if its columns have to be worked out anew about them.
+/// What the columns of a fit say of effects that multiply each other.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Linear {
+    /// Enough: nothing would move.
+    Enough,
+    /// They have to be worked out anew about these effects, by name of their term.
+    Elsewhere(BTreeMap<String, f64>),
+    /// Not enough after the last time; coefficients may move by this many standard deviations.
+    Open(f64),
+}
+
+/// Whether the columns of a fit have to be worked out anew about the effects of the robot model that it holds for real.
 ///
 /// With d_j the torque of these effects acting together, less what the linear model makes of them, coefficients move by less than
 ///
@@ -34,7 +48,7 @@ pub(super) fn elsewhere(
     data: &Data,
     fit: &Fit,
     settings: &CalibrationSettings,
-) -> Result<Option<BTreeMap<String, f64>>> {
+) -> Result<Linear> {
     let known = &library_settings.linearised_at;
     let found = found(library, fit);
     let multiplies = |point: &BTreeMap<String, f64>| {
@@ -42,8 +56,9 @@ pub(super) fn elsewhere(
         let mut own = terms.filter(|term| point.contains_key(&term.name));
         own.any(|term| term.family.multiplies())
     };
-    if settings.relinearise == 0 || !(multiplies(&found) || multiplies(known)) {
-        return Ok(None);
+    let asked = settings.relinearise > 0 || !known.is_empty();
+    if !asked || !(multiplies(&found) || multiplies(known)) {
+        return Ok(Linear::Enough);
     }
     let there = library.linearised(robot, &found)?;
     let beta = there_alone(library, &found);
@@ -58,7 +73,51 @@ pub(super) fn elsewhere(
         let whole = [log.observations.whole()];
         moves += weighed(&missing, fit, &whole);
     }
-    Ok((moves > MOVES * MOVES).then_some(found))
+    let moves = moves.sqrt();
+    Ok(match settings.relinearise {
+        _ if moves <= MOVES => Linear::Enough,
+        0 => Linear::Open(moves),
+        _ => Linear::Elsewhere(found),
+    })
+}
+
+/// Says that columns stand about what was found.
+pub(super) fn finding(point: &BTreeMap<String, f64>, open: Option<f64>) -> Option<Finding> {
+    let names: Vec<&str> = point.keys().map(String::as_str).collect();
+    if names.is_empty() {
+        return None;
+    }
+    let named = names[..names.len().min(NAMED)].join(", ");
+    let more = match names.len().saturating_sub(NAMED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    let about = format!(
+        "effects that multiply each other: the columns were worked out anew about what was found of {named}{more}"
+    );
+    Some(match open {
+        None => Finding::new(
+            Severity::Note,
+            "relinearised",
+            "",
+            about,
+            names.len() as u64,
+        ),
+        Some(moves) => {
+            let message = format!(
+                "{about}, and once more would move a coefficient by up to {} of its standard deviations. Log the robot with known load or a level base, so that these \
+                 effects are told apart",
+                significant(moves, 2)
+            );
+            Finding::new(
+                Severity::Warning,
+                "relinearised",
+                "",
+                message,
+                names.len() as u64,
+            )
+        }
+    })
 }
 
 /// Coefficients of the effects that are in.
@@ -143,4 +202,22 @@ fn weighed(square: &[f64], fit: &Fit, log: &[Part<'_>]) -> f64 {
         rows * square * plug_in.weight[joint] * (1.0 - rho * rho) / (left * noise)
     };
     square.iter().enumerate().map(of_joint).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_not_settled_is_a_warning_with_its_size() {
+        let point: BTreeMap<String, f64> = ["base.tilt.x", "payload.m"]
+            .map(|name| (name.to_owned(), 1.0))
+            .into();
+        assert_eq!(finding(&BTreeMap::new(), Some(0.3)), None);
+        let settled = finding(&point, None).unwrap();
+        assert_eq!((settled.severity, settled.count), (Severity::Note, 2));
+        let open = finding(&point, Some(0.34)).unwrap();
+        assert_eq!(open.severity, Severity::Warning);
+        assert!(open.message.contains("base.tilt.x, payload.m") && open.message.contains("0.34"));
+    }
 }

@@ -246,14 +246,12 @@ impl Effects<'_> {
             if clear && seen && own.pip.is_some_and(|pip| pip >= MEMBER) {
                 own.status = Status::Equivalent;
             }
-            if matches!(own.status, Status::Equivalent | Status::Tentative) {
-                own.reason = match &lowered {
-                    Some(lowered) if !clear => StatusReason::LeftOut(lowered.clone()),
-                    _ => StatusReason::SameTorque {
-                        members: group.members.clone(),
-                        pip: group.pip,
-                        alike: group.alike,
-                    },
+            let of_its_own = matches!(own.reason, StatusReason::LeftOut(_));
+            if own.status == Status::Equivalent || own.status == Status::Tentative && !of_its_own {
+                own.reason = StatusReason::SameTorque {
+                    members: group.members.clone(),
+                    pip: group.pip,
+                    alike: group.alike,
                 };
             }
         }
