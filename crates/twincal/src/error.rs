@@ -73,6 +73,9 @@ pub enum Error {
         /// How to mend it.
         remedy: String,
     },
+    /// Whoever watches the progress asked for an end.
+    #[error("cancelled: the calibration was asked to stop; run it again for a result")]
+    Cancelled,
 }
 
 /// How much a [`Finding`] matters.

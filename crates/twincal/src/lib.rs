@@ -37,5 +37,7 @@ pub mod calibrate;
 pub mod compare;
 pub mod evaluator;
 pub mod write_back;
+pub mod builder;
+pub mod prelude;
 
 pub use error::{Error, Finding, Mistake, Result, Severity};

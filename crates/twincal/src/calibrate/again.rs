@@ -5,8 +5,8 @@
 use super::lower_band::{Band, TooFew, clear, lower, lowered, most_rows};
 use super::ripples::Seen;
 use super::wider_band::{Wider, not_wider};
-use super::{Calibration, CalibrationSettings, Stage, road, smaller_library};
-use crate::error::{Finding, Result};
+use super::{Calibration, CalibrationSettings, Watch, road, smaller_library};
+use crate::error::{Error, Finding, Result};
 use crate::robot::Robot;
 use crate::signal::{Auto, Logs};
 use std::collections::BTreeMap;
@@ -47,7 +47,7 @@ pub(super) fn whole_road(
     robot: &Robot,
     recordings: (Logs<'_>, Logs<'_>),
     settings: &CalibrationSettings,
-    progress: &dyn Fn(Stage),
+    progress: &Watch<'_>,
     findings: &mut Vec<Finding>,
 ) -> Result<Calibration> {
     let (mut recordings, asked) = (Some(recordings), settings);
@@ -92,6 +92,7 @@ pub(super) fn whole_road(
             }
             // Only a road with `Goal::Count` ends there.
             Ok(Road::Counted(_)) => unreachable!("the goal is the end"),
+            Err(Error::Cancelled) => return Err(Error::Cancelled),
             Err(error) => TooFew::from(error),
         };
         if recordings.is_some()
@@ -144,7 +145,14 @@ fn lower_bands(
     for cutoff_hz in cutoffs {
         settings.signal.cutoff_hz = Auto::Value(cutoff_hz);
         let goal = Goal::Count;
-        let end = road(robot, recordings, &settings, goal, &|_| (), &mut Vec::new());
+        let end = road(
+            robot,
+            recordings,
+            &settings,
+            goal,
+            &|_| Ok(()),
+            &mut Vec::new(),
+        );
         if let Ok(Road::Counted(band)) = end {
             bands.push(band);
         }

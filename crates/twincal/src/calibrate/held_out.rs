@@ -3,7 +3,9 @@
 use super::another_state;
 use super::data::{Data, Log, Trajectories};
 use super::independent_rows::LEAST_EFFECTIVE_ROWS;
-use super::{CalibrationSettings, Fitted, Stage, compact, estimate, friction_only, noise_of};
+use super::{
+    CalibrationSettings, Fitted, Stage, Watch, compact, estimate, friction_only, noise_of,
+};
 use crate::error::{Finding, Result, Severity};
 use crate::likelihood::{Columns, JointNoise};
 use crate::observations::{Observations, Part};
@@ -85,14 +87,14 @@ pub(super) fn validate(
     library: &Library,
     plan: Plan<'_>,
     fits: Vec<Fitted>,
-    progress: &dyn Fn(Stage),
+    progress: &Watch<'_>,
 ) -> Result<(Validation, Vec<Finding>)> {
     let twin = own.twin;
     let mut findings = Vec::new();
     let mut held_out = HeldOut::new(twin.robot.joint_names());
     let mut fits = fits.into_iter();
     for (done, fold) in plan.folds.iter().enumerate() {
-        progress(Stage::Validation(done, plan.folds.len()));
+        progress(Stage::Validation(done, plan.folds.len()))?;
         let Rivals {
             average,
             compact,

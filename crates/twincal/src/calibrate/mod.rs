@@ -12,6 +12,7 @@ mod data;
 mod dissipative;
 mod drift;
 mod drive_scale;
+mod effects;
 mod friction_only;
 mod groups;
 mod heavy_tails;
@@ -50,6 +51,7 @@ mod worse;
 #[cfg(test)]
 mod testing;
 
+pub use effects::Effect;
 pub use left_out::{LeftOutData, LeftOutError};
 pub use outlook::{LookedAt, Outlook, outlook};
 pub use result::{
@@ -96,6 +98,9 @@ pub enum Stage {
     Sensitivity,
 }
 
+/// Who is told of each stage, and may end the calibration with an error.
+type Watch<'a> = dyn Fn(Stage) -> Result<()> + 'a;
+
 /// Finds what the nominal robot misses in `logs` and says how well the calibrated twin predicts.
 ///
 /// With `heldout` recordings these are predicted; without, three or more logs are left out one by one (many in five groups), and
@@ -114,8 +119,21 @@ pub fn calibrate<'a>(
     settings: &CalibrationSettings,
     progress: &dyn Fn(Stage),
 ) -> std::result::Result<Calibration, Stopped> {
+    let watch = |stage: Stage| {
+        progress(stage);
+        Ok(())
+    };
+    calibrate_watched(robot, (logs.into(), heldout.into()), settings, &watch)
+}
+
+/// [`calibrate`] under eyes that may end it with an error.
+pub(crate) fn calibrate_watched(
+    robot: &Robot,
+    recordings: (Logs<'_>, Logs<'_>),
+    settings: &CalibrationSettings,
+    progress: &Watch<'_>,
+) -> std::result::Result<Calibration, Stopped> {
     let mut findings = Vec::new();
-    let recordings = (logs.into(), heldout.into());
     let every_log = recordings.0.0.iter().chain(&recordings.1.0);
     let shelves: Vec<_> = every_log.filter_map(Log::shelf).collect();
     let as_recorded = cross_checked::as_recorded(robot, &recordings)?;
@@ -134,7 +152,7 @@ fn road(
     recordings: &mut Option<(Logs<'_>, Logs<'_>)>,
     settings: &CalibrationSettings,
     goal: Goal,
-    progress: &dyn Fn(Stage),
+    progress: &Watch<'_>,
     findings: &mut Vec<Finding>,
 ) -> Result<Road> {
     let (logs, heldout) = match recordings {
@@ -142,7 +160,7 @@ fn road(
         None => Default::default(),
     };
     // the same filters for every log, and candidates for this robot
-    progress(Stage::Rows);
+    progress(Stage::Rows)?;
     for log in logs.iter().chain(heldout) {
         let names = robot.joint_names();
         log.any_recording(|recording| recording.require_torque(&names))?;
@@ -205,7 +223,7 @@ fn road(
     }
     let misfit = data.nominal_misfit();
     // eq. (5): sparse regression with everything that is plugged in at its fixed point
-    progress(Stage::Inference);
+    progress(Stage::Inference)?;
     let spreads = weigh::weigh(robot, &mut data, &columns, settings, findings)?;
     let training = data.training();
     let count = |fitted: &Fitted| independent_rows::require(robot, &data, &fitted.fit, &training);
@@ -299,7 +317,7 @@ fn road(
     drop((trajectories, others, every_log));
     let prepared: Vec<ReadyLog<'static>> = prepared.into_iter().map(ReadyLog::detached).collect();
     *recordings = None;
-    progress(Stage::Sensitivity);
+    progress(Stage::Sensitivity)?;
     let elsewhere = || {
         sweep::cutoff(
             &skeleton,

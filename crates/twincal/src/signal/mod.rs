@@ -22,6 +22,7 @@ pub(crate) mod interpolate;
 mod mask;
 mod prepare;
 mod ready;
+mod recording;
 mod repeats;
 mod saturation;
 mod shelf;

@@ -4,10 +4,12 @@ mod components;
 mod consistency;
 mod kernel;
 mod predictor;
+mod torque;
 #[cfg(test)]
 mod tests;
 
 pub use predictor::{JointInput, JointSetting, Predictor};
+pub use torque::{Torque, TorqueModel};
 
 use predictor::widened;
 

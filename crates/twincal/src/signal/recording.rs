@@ -1,0 +1,149 @@
+//! Recordings put together from arrays.
+
+use super::{Channels, Payload, Recording};
+use crate::error::{Error, Result};
+
+impl Recording {
+    /// A recording without joints yet: `time` are its stamps, s.
+    ///
+    /// # Example
+    /// ```
+    /// use twincal::prelude::*;
+    ///
+    /// let time: Vec<f64> = (0..100).map(|i| 0.01 * f64::from(i)).collect();
+    /// let [q, torque] = [f64::sin, f64::cos].map(|f| time.iter().map(|t| f(*t)).collect::<Vec<_>>());
+    /// let log = Recording::new("run1", time).joint(q, torque)?;
+    /// assert_eq!(log.joints.len(), 1);
+    /// # Ok::<(), twincal::Error>(())
+    /// ```
+    pub fn new(name: impl Into<String>, time: impl Into<Vec<f64>>) -> Self {
+        Self {
+            unfolded: false,
+            name: name.into(),
+            time: time.into(),
+            start_ns: 0,
+            joints: Vec::new(),
+            payload: Payload::None,
+        }
+    }
+
+    /// Adds the next moving joint of the robot, in its order: positions, rad or m, and measured torque, N·m or N, one for each stamp. Samples that
+    /// are not known are NaN.
+    ///
+    /// # Errors
+    /// [`Error::Log`] with both lengths where one differs from that of the stamps.
+    pub fn joint(self, q: impl Into<Vec<f64>>, torque: impl Into<Vec<f64>>) -> Result<Self> {
+        let joint = self.joints.len() + 1;
+        let q = self.checked(q.into(), "positions", joint)?;
+        let torque = self.checked(torque.into(), "torques", joint)?;
+        Ok(self.with(q, Some(torque)))
+    }
+
+    /// Adds the next moving joint without torque, for a recording that is only to be predicted.
+    ///
+    /// # Errors
+    /// Those of [`Recording::joint`].
+    pub fn joint_without_torque(self, q: impl Into<Vec<f64>>) -> Result<Self> {
+        let q = self.checked(q.into(), "positions", self.joints.len() + 1)?;
+        Ok(self.with(q, None))
+    }
+
+    /// Velocity of the joint that was added last, rad/s or m/s; without it velocity is derived from position.
+    ///
+    /// # Errors
+    /// Those of [`Recording::joint`], and [`Error::Log`] before the first joint.
+    pub fn velocity(self, qd: impl Into<Vec<f64>>) -> Result<Self> {
+        self.channel(qd.into(), "velocities", |joint, values| {
+            joint.qd = Some(values);
+        })
+    }
+
+    /// Acceleration of the joint that was added last, rad/s² or m/s²; without it acceleration is derived.
+    ///
+    /// # Errors
+    /// Those of [`Recording::velocity`].
+    pub fn acceleration(self, qdd: impl Into<Vec<f64>>) -> Result<Self> {
+        self.channel(qdd.into(), "accelerations", |joint, values| {
+            joint.qdd = Some(values);
+        })
+    }
+
+    /// Temperature of the drive of the joint that was added last, °C or K.
+    ///
+    /// # Errors
+    /// Those of [`Recording::velocity`].
+    pub fn temperature(self, temperature: impl Into<Vec<f64>>) -> Result<Self> {
+        self.channel(temperature.into(), "temperatures", |joint, values| {
+            joint.temperature = Some(values);
+        })
+    }
+
+    /// What the robot carried.
+    #[must_use]
+    pub fn carrying(mut self, payload: Payload) -> Self {
+        self.payload = payload;
+        self
+    }
+
+    fn with(mut self, q: Vec<f64>, tau: Option<Vec<f64>>) -> Self {
+        self.joints.push(Channels {
+            q,
+            qd: None,
+            qdd: None,
+            tau,
+            temperature: None,
+        });
+        self
+    }
+
+    fn channel(
+        mut self,
+        values: Vec<f64>,
+        what: &str,
+        put: impl FnOnce(&mut Channels, Vec<f64>),
+    ) -> Result<Self> {
+        let values = self.checked(values, what, self.joints.len())?;
+        let Some(joint) = self.joints.last_mut() else {
+            return Err(Error::Log {
+                log: self.name,
+                problem: format!("has {what} before its first joint"),
+                remedy: "add the joint with its positions first".into(),
+            });
+        };
+        put(joint, values);
+        Ok(self)
+    }
+
+    fn checked(&self, values: Vec<f64>, what: &str, joint: usize) -> Result<Vec<f64>> {
+        let (stamps, count) = (self.time.len(), values.len());
+        if count == stamps {
+            return Ok(values);
+        }
+        Err(Error::Log {
+            log: self.name.clone(),
+            problem: format!("joint {joint} has {count} {what} for {stamps} stamps"),
+            remedy: "give one value for each stamp, NaN where it is not known".into(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_channel_of_another_length_is_an_error_with_both() {
+        let log = || Recording::new("run1", [0.0, 0.1, 0.2]);
+        let joint = log().joint([1.0, 2.0, 3.0], [0.0; 2]).unwrap_err();
+        let said = "log `run1`: joint 1 has 2 torques for 3 stamps; give one value for each stamp, NaN where it is not known";
+        assert_eq!(joint.to_string(), said);
+        let early = log().velocity([0.0; 3]).unwrap_err().to_string();
+        assert!(early.contains("before its first joint"), "{early}");
+        let whole = log().joint([1.0, 2.0, 3.0], [0.0; 3]).unwrap();
+        let second = whole.clone().joint([0.0; 4], [0.0; 3]).unwrap_err();
+        assert!(second.to_string().contains("joint 2 has 4 positions"));
+        let whole = whole.velocity([0.5; 3]).unwrap().carrying(Payload::Unknown);
+        assert_eq!(whole.joints[0].qd, Some(vec![0.5; 3]));
+        assert_eq!((whole.payload, whole.joints.len()), (Payload::Unknown, 1));
+    }
+}

@@ -1,0 +1,163 @@
+//! Torque of states that are given as arrays.
+
+use super::{Predictor, TorqueSignal, Twin};
+use crate::error::{Error, Result};
+use crate::rows::{RowBlock, RowSignal, visit_rows};
+use crate::signal::{Payload, Pipeline, Segment, Trajectory};
+use crate::term::Library;
+use rayon::prelude::*;
+
+/// States that one thread takes at a time.
+const BATCH: usize = 4096;
+
+/// Torque of some states, `state * joints + joint`, N·m or N.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Torque {
+    /// Nominal torque plus the mean of what was found.
+    pub mean: Vec<f64>,
+    /// Lower end of the central 95 % interval of measured torque.
+    pub low: Vec<f64>,
+    /// Upper end.
+    pub high: Vec<f64>,
+    /// The joint is where the logs have not been, or its torque is less certain than the noise.
+    pub outside: Vec<bool>,
+}
+
+/// Torque of a twin, made ready once for any number of states.
+#[derive(Debug, Clone)]
+pub struct TorqueModel<'a> {
+    twin: &'a Twin,
+    library: Library,
+    predictor: Predictor,
+    /// As the twin's, but states are no log: nothing is filtered.
+    pipeline: Pipeline,
+}
+
+impl Twin {
+    /// Torque of states, each joint's position, velocity and acceleration, `state * joints + joint`: eq. (1) with the posterior of β.
+    ///
+    /// A state has no history: friction that remembers the motion slides steadily, friction that warms up is at the mean of the logs. For many
+    /// calls make [`Twin::torque_model`] once.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] with the key `q`, `qd` or `qdd` where a length is no multiple of the joints, or differs; those of [`Twin::library`].
+    pub fn torque(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Result<Torque> {
+        self.torque_model()?.torque(q, qd, qdd)
+    }
+
+    /// Makes everything ready that predictions of single states share.
+    ///
+    /// # Errors
+    /// Those of [`Twin::library`] and [`Twin::predictor`].
+    pub fn torque_model(&self) -> Result<TorqueModel<'_>> {
+        let library = self.library()?;
+        let predictor = self.predictor(&library)?;
+        Ok(TorqueModel {
+            predictor,
+            library,
+            pipeline: Pipeline {
+                history: self.pipeline.history.clone(),
+                coulomb_velocity: self.pipeline.coulomb_velocity,
+                ..Pipeline::off(self.robot.dof())
+            },
+            twin: self,
+        })
+    }
+}
+
+impl TorqueModel<'_> {
+    /// As [`Twin::torque`].
+    ///
+    /// # Errors
+    /// [`Error::Setting`] with the key `q`, `qd` or `qdd`.
+    pub fn torque(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Result<Torque> {
+        let dof = self.twin.robot.dof();
+        for (key, values) in [("q", q), ("qd", qd), ("qdd", qdd)] {
+            if !values.len().is_multiple_of(dof) || values.len() != q.len() {
+                let problem = format!(
+                    "{} numbers; q has {} and the robot {dof} joints",
+                    values.len(),
+                    q.len()
+                );
+                return Err(Error::Setting {
+                    key: key.into(),
+                    problem,
+                    remedy: "give every joint of every state: state * joints + joint".into(),
+                });
+            }
+        }
+        let batches: Vec<usize> = (0..q.len()).step_by(BATCH * dof).collect();
+        let parts: Vec<Torque> = (batches.into_par_iter())
+            .map(|from| {
+                let own = from..q.len().min(from + BATCH * dof);
+                self.batch([&q[own.clone()], &qd[own.clone()], &qdd[own]])
+            })
+            .collect::<Result<_>>()?;
+        let mut torque = Torque::default();
+        for part in parts {
+            torque.mean.extend(part.mean);
+            torque.low.extend(part.low);
+            torque.high.extend(part.high);
+            torque.outside.extend(part.outside);
+        }
+        Ok(torque)
+    }
+
+    fn batch(&self, motion: [&[f64]; 3]) -> Result<Torque> {
+        let dof = self.twin.robot.dof();
+        let count = motion[0].len() / dof;
+        let by_joint = |values: &[f64]| -> Vec<f64> {
+            (0..dof)
+                .flat_map(|joint| values.iter().skip(joint).step_by(dof).copied())
+                .collect()
+        };
+        let [q, qd, qdd] = motion.map(by_joint);
+        let trajectory = Trajectory {
+            name: String::new(),
+            dof,
+            segments: vec![Segment {
+                time: (0..count).map(|i| i as f64).collect(),
+                input_rows: (0..count).collect(),
+                logged: None,
+                q,
+                qd,
+                qdd,
+                tau: Vec::new(),
+                standstill: vec![false; dof * count],
+                history: vec![0.0; self.pipeline.channels() * dof * count],
+                interval: 1.0,
+                logged_interval: 1.0,
+            }],
+            payload: Payload::None,
+            payload_acts: !self.twin.payload_where_unknown,
+        };
+        let mut torque = Torque {
+            mean: vec![0.0; dof * count],
+            low: vec![0.0; dof * count],
+            high: vec![0.0; dof * count],
+            outside: vec![false; dof * count],
+        };
+        let mut put = |block: &RowBlock<'_>| {
+            let joints = self.predictor.block(block, TorqueSignal::Raw);
+            for (joint, own) in joints.iter().enumerate() {
+                for (i, &row) in block.input_rows.iter().enumerate() {
+                    let at = row * dof + joint;
+                    torque.mean[at] = own.calibrated[i];
+                    torque.low[at] = own.low[i];
+                    torque.high[at] = own.high[i];
+                    torque.outside[at] = own.extrapolating[i];
+                }
+            }
+            Ok(())
+        };
+        visit_rows(
+            &self.twin.robot,
+            &self.library,
+            &self.pipeline,
+            &trajectory,
+            RowSignal::Raw,
+            &mut put,
+        )?;
+        Ok(torque)
+    }
+}
