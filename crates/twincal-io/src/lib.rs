@@ -1,6 +1,7 @@
 //! Files in, files and reports out: robot models, logs, settings, results. No mathematics here.
 
 pub mod error;
+mod files;
 pub mod open;
 pub mod model;
 pub mod memory;
@@ -14,3 +15,4 @@ pub mod twin_json;
 pub mod export;
 
 pub use error::{Error, Place, Result};
+pub use files::{load, read_recording, read_robot, save};
