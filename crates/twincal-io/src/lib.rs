@@ -1,4 +1,21 @@
 //! Files in, files and reports out: robot models, logs, settings, results. No mathematics here.
+//!
+//! # From a URDF and CSV files to a twin in a folder
+//! ```no_run
+//! use twincal::prelude::*;
+//! use twincal_io::{read_recording, read_robot, save};
+//!
+//! let robot = read_robot("arm.urdf")?;
+//! let log = read_recording("run1.csv", &robot)?;
+//! let other = read_recording("run2.csv", &robot)?;
+//! let fit = Calibrate::new(&robot).logs([log]).heldout([other]).run()?;
+//! for effect in fit.effects() {
+//!     println!("{effect}");
+//! }
+//! save(&fit, "twin")?; // as `twincal fit` writes it: result.json, twin.json, report.html
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//! `tests/library.rs` runs the same on files.
 
 pub mod error;
 mod files;

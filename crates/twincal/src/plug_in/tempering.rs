@@ -47,13 +47,18 @@ pub fn fit_tempered(
     };
     let times: Vec<f64> = joints.clone().map(time).collect();
     let folds = folds(training);
-    let decoys = decoys(training, joints.len());
     let pieces: Vec<Fold<'_>> = (folds.iter())
         .map(|fold| Fold {
             kept: &fold.kept,
-            out: self::decoys(&fold.out, joints.len()),
+            out: decoys(&fold.out, joints.len()),
         })
         .collect();
+    // The pieces are all of the rows.
+    let mut decoys = vec![JointDecoys::default(); joints.len()];
+    for piece in &pieces {
+        let sums = decoys.iter_mut().zip(&piece.out);
+        sums.for_each(|(sum, own)| *sum += own);
+    }
     for round in 1..=ROUNDS {
         let measured = (&gram, &decoys[..], &pieces[..]);
         let found = misfit(measured, (columns, settings.prior), &fitted)?;
