@@ -73,6 +73,14 @@ pub enum Error {
         /// How to mend it.
         remedy: String,
     },
+    /// Statistics that do not belong together.
+    #[error("statistics: {problem}; {remedy}")]
+    Statistics {
+        /// What differs, with the counts.
+        problem: String,
+        /// How to mend it.
+        remedy: String,
+    },
     /// Whoever watches the progress asked for an end.
     #[error("cancelled: the calibration was asked to stop; run it again for a result")]
     Cancelled,

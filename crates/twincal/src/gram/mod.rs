@@ -8,6 +8,7 @@ mod tiles;
 pub use accumulate::{JointAccumulator, OpenRun};
 pub use block::Workspace;
 
+use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
@@ -58,7 +59,13 @@ impl Symmetric {
 }
 
 impl AddAssign<&Symmetric> for Symmetric {
+    /// # Panics
+    /// If the two have different orders.
     fn add_assign(&mut self, other: &Symmetric) {
+        assert_eq!(
+            self.size, other.size,
+            "matrices of different orders do not add"
+        );
         for (a, b) in self.values.iter_mut().zip(&other.values) {
             *a += b;
         }
@@ -165,6 +172,66 @@ pub struct Gram {
 }
 
 impl Gram {
+    /// Adds the statistics of other logs, if they are of the same robot and library: as many joints, each with the same columns.
+    ///
+    /// # Errors
+    /// [`Error::Statistics`] with the joint, from 1 on, and both counts; then nothing was added.
+    ///
+    /// # Example
+    /// ```
+    /// use twincal::gram::{Gram, JointGram};
+    ///
+    /// let of = |columns: &[u32]| Gram { joints: vec![JointGram::empty(columns.to_vec())] };
+    /// let mut sum = of(&[0, 2]);
+    /// assert!(sum.try_merge(&of(&[0, 2])).is_ok());
+    /// let error = sum.try_merge(&of(&[0, 1, 2])).unwrap_err();
+    /// assert!(error.to_string().starts_with("statistics: joint 1 has 3 columns, the others 2"));
+    /// ```
+    pub fn try_merge(&mut self, other: &Gram) -> Result<()> {
+        if self.joints.is_empty() || other.joints.is_empty() {
+            *self += other;
+            return Ok(());
+        }
+        let refused = |problem: String| Error::Statistics {
+            problem,
+            remedy: "merge statistics of one robot and one library".into(),
+        };
+        if self.joints.len() != other.joints.len() {
+            let (ours, theirs) = (self.joints.len(), other.joints.len());
+            return Err(refused(format!("of {theirs} joints, the others of {ours}")));
+        }
+        for (joint, (own, more)) in self.joints.iter().zip(&other.joints).enumerate() {
+            let (ours, theirs) = (own.columns.len(), more.columns.len());
+            let of = format!(
+                "joint {} has {theirs} columns, the others {ours}",
+                joint + 1
+            );
+            let sized = |gram: &JointGram| {
+                let order = gram.columns.len() + 1;
+                let sums = [&gram.s0, &gram.d, &gram.first, &gram.last];
+                sums.iter()
+                    .all(|sum| sum.size == order && sum.values.len() == order * order)
+            };
+            if ours != theirs {
+                return Err(refused(of));
+            }
+            if !sized(own) || !sized(more) {
+                let joint = joint + 1;
+                return Err(refused(format!(
+                    "sums of joint {joint} are not of its columns"
+                )));
+            }
+            if own.columns != more.columns {
+                return Err(refused(format!(
+                    "joint {} has other columns than the others",
+                    joint + 1
+                )));
+            }
+        }
+        *self += other;
+        Ok(())
+    }
+
     /// Takes columns out, by their numbers, which ascend; those behind move up.
     pub fn drop_columns(&mut self, dropped: &[usize]) {
         if dropped.is_empty() {

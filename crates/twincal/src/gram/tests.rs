@@ -266,6 +266,47 @@ fn stationary_form_equals_the_dense_covariance() {
     }
 }
 
+/// Other robots, other libraries, and sums that lost their shape on the way from a file.
+#[test]
+fn statistics_that_do_not_belong_together_are_refused_and_nothing_is_added() {
+    let of = |columns: &[&[u32]]| Gram {
+        joints: columns
+            .iter()
+            .map(|c| JointGram::empty(c.to_vec()))
+            .collect(),
+    };
+    let mut sum = of(&[&[0, 1], &[1]]);
+    sum.joints[0].n = 5.0;
+    let mut damaged = of(&[&[0, 1], &[1]]);
+    damaged.joints[1].d = Symmetric::zeros(1);
+    let before = sum.clone();
+    for (other, said) in [
+        (of(&[&[0, 1]]), "of 1 joints, the others of 2"),
+        (
+            of(&[&[0, 1], &[1, 2]]),
+            "joint 2 has 2 columns, the others 1",
+        ),
+        (of(&[&[0, 1], &[2]]), "joint 2 has other columns"),
+        (damaged, "sums of joint 2 are not of its columns"),
+    ] {
+        let error = sum.try_merge(&other).unwrap_err().to_string();
+        assert!(error.contains(said), "{error}");
+        assert_eq!(sum, before);
+    }
+    let more = sum.clone();
+    assert!(sum.try_merge(&more).is_ok() && sum.try_merge(&Gram::default()).is_ok());
+    assert_eq!(sum.joints[0].n, 10.0);
+    let mut none = Gram::default();
+    assert!(none.try_merge(&sum).is_ok() && none == sum);
+}
+
+#[test]
+#[should_panic(expected = "matrices of different orders do not add")]
+fn matrices_of_different_orders_are_never_cut_to_fit() {
+    let mut sum = Symmetric::zeros(3);
+    sum += &Symmetric::zeros(2);
+}
+
 #[test]
 fn sums_of_robots_adopt_and_add() {
     let log = Log::new(9, 2, 50, false);
