@@ -16,6 +16,22 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //! `tests/library.rs` runs the same on files.
+//!
+//! # Features
+//! | feature | logs |
+//! |---|---|
+//! | `tables` (default) | Parquet, Arrow, NPZ; predictions as Parquet |
+//! | `bags` (default) | MCAP, SQLite bags, rosbag2 folders; predictions as MCAP |
+//!
+//! CSV is always read and written. Without them nothing in C is compiled.
+
+#![cfg_attr(
+    not(all(feature = "tables", feature = "bags")),
+    allow(
+        dead_code,
+        reason = "what several readers share is in use where all of them are there"
+    )
+)]
 
 pub mod error;
 mod files;

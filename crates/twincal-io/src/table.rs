@@ -1,23 +1,19 @@
 //! Tables out: predictions as CSV, Parquet or MCAP, written block by block.
 
+#[cfg(feature = "bags")]
 mod mcap;
+#[cfg(feature = "tables")]
+mod parquet;
 
+#[cfg(feature = "bags")]
 use self::mcap::McapTable;
+#[cfg(feature = "tables")]
+use self::parquet::ParquetTable;
 use crate::error::{Error, Result};
 use crate::log::stamps;
-use parquet::basic::{Compression, Repetition, Type as Physical, ZstdLevel};
-use parquet::data_type::{BoolType, DoubleType};
-use parquet::errors::ParquetError;
-use parquet::file::properties::WriterProperties;
-use parquet::file::writer::SerializedFileWriter;
-use parquet::schema::types::Type;
 use std::io::{self, Write};
 use std::ops::RangeInclusive;
 use std::path::Path;
-use std::sync::Arc;
-
-/// Rows of one Parquet row group.
-const GROUP: usize = 65_536;
 
 /// How a table is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,27 +86,10 @@ enum Sink<W: Write + Send> {
         writer: W,
         line: String,
     },
-    Parquet {
-        writer: Box<SerializedFileWriter<W>>,
-        waiting: Vec<Column>,
-    },
+    #[cfg(feature = "tables")]
+    Parquet(Box<ParquetTable<W>>),
+    #[cfg(feature = "bags")]
     Mcap(Box<McapTable<W>>),
-}
-
-/// One column's share of the row group that is being gathered.
-enum Column {
-    Numbers(Vec<f64>),
-    Flags(Vec<bool>),
-}
-
-fn io_error(error: ParquetError) -> io::Error {
-    match error {
-        ParquetError::External(inner) => match inner.downcast::<io::Error>() {
-            Ok(error) => *error,
-            Err(other) => io::Error::other(other),
-        },
-        other => io::Error::other(other),
-    }
 }
 
 impl<W: Write + Send> TableWriter<W> {
@@ -132,28 +111,15 @@ impl<W: Write + Send> TableWriter<W> {
                     line: String::new(),
                 }
             }
-            TableFormat::Parquet => {
-                let waiting = columns
-                    .iter()
-                    .map(|(_, kind)| match kind {
-                        ColumnKind::Number => Column::Numbers(Vec::new()),
-                        ColumnKind::Flag => Column::Flags(Vec::new()),
-                    })
-                    .collect();
-                let properties = WriterProperties::builder()
-                    .set_compression(Compression::ZSTD(ZstdLevel::default()))
-                    .set_dictionary_enabled(false)
-                    .set_created_by(format!("twincal version {}", env!("CARGO_PKG_VERSION")))
-                    .build();
-                let schema = schema(columns).map_err(io_error)?;
-                let writer = SerializedFileWriter::new(writer, schema, Arc::new(properties))
-                    .map_err(io_error)?;
-                Sink::Parquet {
-                    writer: Box::new(writer),
-                    waiting,
-                }
-            }
+            #[cfg(feature = "tables")]
+            TableFormat::Parquet => Sink::Parquet(Box::new(ParquetTable::new(writer, columns)?)),
+            #[cfg(feature = "bags")]
             TableFormat::Mcap => Sink::Mcap(Box::new(McapTable::new(writer, columns)?)),
+            #[cfg(not(all(feature = "tables", feature = "bags")))]
+            other => {
+                let problem = format!("{other:?} is not written by this build of twincal-io");
+                return Err(io::Error::new(io::ErrorKind::Unsupported, problem));
+            }
         };
         Ok(Self {
             columns: columns.to_vec(),
@@ -164,7 +130,10 @@ impl<W: Write + Send> TableWriter<W> {
     /// Times that the format can hold, s.
     pub fn times(&self) -> RangeInclusive<f64> {
         match &self.sink {
-            Sink::Csv { .. } | Sink::Parquet { .. } => f64::NEG_INFINITY..=f64::INFINITY,
+            Sink::Csv { .. } => f64::NEG_INFINITY..=f64::INFINITY,
+            #[cfg(feature = "tables")]
+            Sink::Parquet(_) => f64::NEG_INFINITY..=f64::INFINITY,
+            #[cfg(feature = "bags")]
             // Log time has no sign, `header.stamp` has 31 bits of seconds.
             Sink::Mcap(_) => 0.0..=f64::from(i32::MAX),
         }
@@ -195,26 +164,9 @@ impl<W: Write + Send> TableWriter<W> {
                 }
                 Ok(())
             }
-            Sink::Parquet { writer, waiting } => {
-                for (column, values) in waiting.iter_mut().zip(blocks) {
-                    match (column, values) {
-                        (Column::Numbers(all), Values::Numbers(new)) => all.extend_from_slice(new),
-                        (Column::Numbers(all), Values::Stamps(start, new)) => {
-                            all.extend(
-                                new.iter()
-                                    .map(|s| stamps::seconds(stamps::of_seconds(*start, *s))),
-                            );
-                        }
-                        (Column::Flags(all), Values::Flags(new)) => all.extend_from_slice(new),
-                        _ => {}
-                    }
-                }
-                let gathered = waiting.first().map_or(0, Column::len);
-                if gathered >= GROUP {
-                    write_group(writer, waiting).map_err(io_error)?;
-                }
-                Ok(())
-            }
+            #[cfg(feature = "tables")]
+            Sink::Parquet(table) => table.push(blocks),
+            #[cfg(feature = "bags")]
             Sink::Mcap(table) => table.push(blocks, rows),
         }
     }
@@ -229,72 +181,12 @@ impl<W: Write + Send> TableWriter<W> {
                 writer.flush()?;
                 Ok(writer)
             }
-            Sink::Parquet {
-                mut writer,
-                mut waiting,
-            } => {
-                if waiting.first().is_some_and(|c| c.len() > 0) {
-                    write_group(&mut writer, &mut waiting).map_err(io_error)?;
-                }
-                writer.into_inner().map_err(io_error)
-            }
+            #[cfg(feature = "tables")]
+            Sink::Parquet(table) => table.finish(),
+            #[cfg(feature = "bags")]
             Sink::Mcap(table) => table.finish(),
         }
     }
-}
-
-impl Column {
-    fn len(&self) -> usize {
-        match self {
-            Self::Numbers(v) => v.len(),
-            Self::Flags(v) => v.len(),
-        }
-    }
-}
-
-fn schema(columns: &[(String, ColumnKind)]) -> std::result::Result<Arc<Type>, ParquetError> {
-    let fields = columns
-        .iter()
-        .map(|(name, kind)| {
-            let physical = match kind {
-                ColumnKind::Number => Physical::DOUBLE,
-                ColumnKind::Flag => Physical::BOOLEAN,
-            };
-            Type::primitive_type_builder(name, physical)
-                .with_repetition(Repetition::REQUIRED)
-                .build()
-                .map(Arc::new)
-        })
-        .collect::<std::result::Result<Vec<_>, _>>()?;
-    Type::group_type_builder("predictions")
-        .with_fields(fields)
-        .build()
-        .map(Arc::new)
-}
-
-fn write_group<W: Write + Send>(
-    writer: &mut SerializedFileWriter<W>,
-    waiting: &mut [Column],
-) -> std::result::Result<(), ParquetError> {
-    let mut group = writer.next_row_group()?;
-    for column in waiting {
-        let Some(mut out) = group.next_column()? else {
-            break;
-        };
-        match column {
-            Column::Numbers(values) => {
-                out.typed::<DoubleType>().write_batch(values, None, None)?;
-                values.clear();
-            }
-            Column::Flags(values) => {
-                out.typed::<BoolType>().write_batch(values, None, None)?;
-                values.clear();
-            }
-        }
-        out.close()?;
-    }
-    group.close()?;
-    Ok(())
 }
 
 /// One row of a CSV table, line end included.

@@ -1,9 +1,8 @@
 //! The names of a table's columns, without its rows.
 
-use super::{Kind, arrow, csv};
+use super::{Kind, csv};
 use crate::error::{Error, Result};
 use crate::open::open_log_file;
-use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
@@ -24,7 +23,9 @@ pub fn read_header(path: &Path) -> Result<Option<Vec<String>>> {
         .map_err(|e| system(&e))?;
     file.seek(SeekFrom::Start(0)).map_err(|e| system(&e))?;
     match Kind::of(&head) {
+        #[cfg(feature = "tables")]
         Kind::Parquet => {
+            use parquet::file::reader::{FileReader as _, SerializedFileReader};
             super::parquet::check_footer(&file, &name)?;
             // What is wrong with the file is said when it is read.
             let Ok(reader) = SerializedFileReader::new(file) else {
@@ -35,7 +36,8 @@ pub fn read_header(path: &Path) -> Result<Option<Vec<String>>> {
             return Ok(Some(names.collect()));
         }
         // What is wrong with the file is said when it is read.
-        Kind::Arrow => return Ok(arrow::header(file, &name).ok()),
+        #[cfg(feature = "tables")]
+        Kind::Arrow => return Ok(super::arrow::header(file, &name).ok()),
         Kind::Text => {}
         _ => return Ok(None),
     }

@@ -13,19 +13,27 @@
 //! | other units and signs | `factors.rs` |
 //! | what the logged torque is | `torque.rs` |
 
+#[cfg(feature = "tables")]
 mod arrow;
 mod assemble;
+#[cfg(feature = "bags")]
 mod bag;
 mod cells;
 mod columns;
 mod csv;
 mod factors;
 mod header;
+#[cfg(feature = "tables")]
 mod npz;
+#[cfg(feature = "tables")]
 mod pages;
+#[cfg(feature = "tables")]
 mod parquet;
 mod preset;
 mod scratch;
+#[cfg(not(all(feature = "tables", feature = "bags")))]
+mod unsupported;
+#[cfg(feature = "tables")]
 mod shared_file;
 pub(crate) mod stamps;
 mod torque;
@@ -38,10 +46,12 @@ pub use header::read_header;
 pub use preset::Preset;
 pub use torque::{TorqueOptions, TorqueSource};
 
+#[cfg(feature = "bags")]
+use self::bag::read as read_bag;
 use crate::config::ColumnsTable;
 use crate::error::{Error, Place, Result};
 use crate::open::open_log_file;
-use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::robot::Robot;
@@ -51,6 +61,11 @@ use twincal::signal::{Log, Payload, Recording};
 pub const MAX_COLUMNS: usize = 100_000;
 /// Longest name of a column, a topic or a joint, bytes.
 pub const MAX_NAME: usize = 4096;
+
+/// What an Arrow file begins and ends with.
+const ARROW_FILE: &[u8] = b"ARROW1";
+/// What an Arrow message begins with, and so a stream.
+const ARROW_MESSAGE: [u8; 4] = [0xFF; 4];
 
 /// How logs are read.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -142,7 +157,7 @@ fn read(
         chapters,
     };
     if path.is_dir() {
-        return bag::read(path, request);
+        return read_bag(path, request);
     }
     let mut file = open_log_file(path, &name)?;
     let bytes = file.metadata().map_err(|e| system(&e))?.len();
@@ -155,18 +170,28 @@ fn read(
     refuse_false_name(path, &name, &head, kind)?;
     file.seek(SeekFrom::Start(0)).map_err(|e| system(&e))?;
     match kind {
+        #[cfg(feature = "tables")]
         Kind::Parquet => {
             let pages = file.try_clone().map_err(|e| system(&e))?;
             let chunks = shared_file::SharedFile::new(file).map_err(|e| system(&e))?;
             parquet::read(chunks, pages, request)
         }
+        #[cfg(feature = "tables")]
         Kind::Arrow => arrow::read(file, request),
-        Kind::Npz => npz::read(BufReader::new(file), request),
-        Kind::Mcap | Kind::Sqlite | Kind::Zstd => bag::read(path, request),
+        #[cfg(feature = "tables")]
+        Kind::Npz => npz::read(std::io::BufReader::new(file), request),
+        #[cfg(not(feature = "tables"))]
+        Kind::Parquet | Kind::Arrow | Kind::Npz => Err(unsupported::table(&name)),
+        Kind::Mcap | Kind::Sqlite | Kind::Zstd => read_bag(path, request),
         Kind::FirstFeather => Err(first_feather(&name)),
         Kind::LfsPointer => Err(lfs_pointer(&name)),
         Kind::Text => csv_table(file, bytes, request),
     }
+}
+
+#[cfg(not(feature = "bags"))]
+fn read_bag(_: &Path, request: Request<'_>) -> Result<(Log<'static>, Vec<Finding>)> {
+    Err(unsupported::bag(request.name))
 }
 
 /// The files that a log consists of: itself, or what a rosbag2 folder names.
@@ -174,7 +199,10 @@ fn read(
 /// # Errors
 /// [`Error::Content`] for a folder that is no bag.
 pub fn files_of(path: &Path) -> Result<Vec<PathBuf>> {
-    bag::files(path).map(|(files, _)| files)
+    #[cfg(feature = "bags")]
+    return bag::files(path).map(|(files, _)| files);
+    #[cfg(not(feature = "bags"))]
+    Ok(vec![path.to_owned()])
 }
 
 /// A file whose name says more than its content holds.
@@ -233,14 +261,22 @@ pub fn parse_log(
         chapters: false,
     };
     let read = match Kind::of(bytes) {
+        #[cfg(feature = "tables")]
         Kind::Parquet => {
             let pages = std::io::Cursor::new(bytes);
             let bytes = bytes::Bytes::from_static(bytes);
             parquet::read(bytes, pages, request)?
         }
-        Kind::Mcap => bag::read_mcap(&mut std::io::Cursor::new(bytes), request)?,
+        #[cfg(feature = "tables")]
         Kind::Arrow => arrow::read(std::io::Cursor::new(bytes), request)?,
+        #[cfg(feature = "tables")]
         Kind::Npz => npz::read(std::io::Cursor::new(bytes), request)?,
+        #[cfg(not(feature = "tables"))]
+        Kind::Parquet | Kind::Arrow | Kind::Npz => return Err(unsupported::table(name)),
+        #[cfg(feature = "bags")]
+        Kind::Mcap => bag::read_mcap(&mut std::io::Cursor::new(bytes), request)?,
+        #[cfg(not(feature = "bags"))]
+        Kind::Mcap => return Err(unsupported::bag(name)),
         Kind::FirstFeather => return Err(first_feather(name)),
         Kind::LfsPointer => return Err(lfs_pointer(name)),
         Kind::Text | Kind::Sqlite | Kind::Zstd => csv_table(bytes, bytes.len() as u64, request)?,
@@ -269,8 +305,8 @@ impl Kind {
     fn of(head: &[u8]) -> Self {
         let kinds: [(&[u8], Self); 10] = [
             (b"PAR1", Self::Parquet),
-            (arrow::FILE_MAGIC, Self::Arrow),
-            (&arrow::MARKER, Self::Arrow),
+            (ARROW_FILE, Self::Arrow),
+            (&ARROW_MESSAGE, Self::Arrow),
             (b"FEA1", Self::FirstFeather),
             (b"PK\x03\x04", Self::Npz),
             (b"PK\x05\x06", Self::Npz),

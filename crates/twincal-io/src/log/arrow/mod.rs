@@ -6,7 +6,7 @@
 mod layout;
 
 use super::cells::{Sink, disk_failure};
-use super::{Cells, MAX_COLUMNS, Request, assemble};
+use super::{ARROW_FILE, ARROW_MESSAGE, Cells, MAX_COLUMNS, Request, assemble};
 use crate::error::{Error, Place, Result};
 use arrow_ipc::{
     CompressionType, Endianness, MessageHeader, MetadataVersion, RecordBatch, Schema,
@@ -17,10 +17,6 @@ use std::io::{self, Read, Seek, SeekFrom};
 use twincal::signal::Log as GivenLog;
 use twincal::{Finding, Severity};
 
-/// What an Arrow file begins and ends with.
-pub(super) const FILE_MAGIC: &[u8] = b"ARROW1";
-/// What a message begins with, and so a stream.
-pub(super) const MARKER: [u8; 4] = [0xFF; 4];
 /// Longest footer or message without its values, bytes.
 const MAX_METADATA: u64 = 1 << 26;
 /// Most record batches.
@@ -142,7 +138,7 @@ impl<'a, R: Read + Seek> Log<'a, R> {
             batches: Vec::new(),
         };
         let mut head = [0; 8];
-        log.is_file = log.fill(0, &mut head).is_ok() && head.starts_with(FILE_MAGIC);
+        log.is_file = log.fill(0, &mut head).is_ok() && head.starts_with(ARROW_FILE);
         if log.is_file {
             log.read_footer()?;
         } else {
@@ -205,7 +201,7 @@ impl<'a, R: Read + Seek> Log<'a, R> {
         self.fill(at, &mut tail).map_err(|_| self.cut_off())?;
         let [a, b, c, d, magic @ ..] = tail;
         let length = u64::try_from(i32::from_le_bytes([a, b, c, d])).ok();
-        let (Some(length), true) = (length, magic == FILE_MAGIC) else {
+        let (Some(length), true) = (length, magic == ARROW_FILE) else {
             return Err(self.cut_off());
         };
         let start = at.checked_sub(length).ok_or_else(|| self.cut_off())?;
@@ -270,7 +266,7 @@ impl<'a, R: Read + Seek> Log<'a, R> {
             _ if given == 0 => return Ok(None),
             _ if given < 4 => return Err(self.broken(at)),
             // Before Arrow 0.15 the length stood alone.
-            [a, b, c, d, ..] if [a, b, c, d] != MARKER => ([a, b, c, d], at + 4),
+            [a, b, c, d, ..] if [a, b, c, d] != ARROW_MESSAGE => ([a, b, c, d], at + 4),
             [.., a, b, c, d] if given == 8 => ([a, b, c, d], at + 8),
             _ => return Err(self.broken(at)),
         };
