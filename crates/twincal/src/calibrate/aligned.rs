@@ -1,7 +1,7 @@
 //! Torque that is logged later than the motion is moved back before anything is fitted, where training logs clearly say so.
 
-use super::CalibrationSettings;
 use super::data::Trajectories;
+use super::settings::CalibrationSettings;
 use crate::error::{Finding, Result};
 use crate::lag::{Lags, lag_findings, lags, late_logs};
 use crate::robot::Robot;

@@ -1,8 +1,8 @@
 //! What logs say of each other, and what follows for the calibration.
 
-use super::again::Goal;
 use super::data::Trajectories;
-use super::{Calibration, Stopped};
+use super::result::Calibration;
+use super::stopped::Stopped;
 use crate::cross_check::{copies, odd_torque, stuck_encoders};
 use crate::error::{Finding, Mistake, Result};
 use crate::robot::Robot;
@@ -25,16 +25,13 @@ pub(super) fn as_recorded(
     })
 }
 
-/// Findings on the filtered logs; `compared` is what the self-check says. Where rows are only counted nothing is looked for.
+/// Findings on the filtered logs; `compared` is what the self-check says.
 pub(super) fn as_filtered(
     robot: &Robot,
     pipeline: &Pipeline,
     trajectories: &Trajectories,
-    (goal, compared): (Goal, &[Finding]),
+    compared: &[Finding],
 ) -> Vec<Finding> {
-    if goal == Goal::Count {
-        return Vec::new();
-    }
     let all: Vec<&Trajectory> = trajectories.all().collect();
     odd_torque(robot, pipeline, &all, compared.is_empty())
 }

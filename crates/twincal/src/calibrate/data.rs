@@ -1,9 +1,8 @@
 //! The logs of a calibration as rows, with what was read, dropped and masked.
 
 use super::reader::{Reader, Role};
-use super::refuse;
 use super::result::LogSummary;
-use crate::error::{Finding, Result, Severity};
+use crate::error::{Error, Finding, Result, Severity};
 use crate::gram::Gram;
 use crate::incidents::Incident;
 use crate::likelihood::Columns;
@@ -34,6 +33,7 @@ pub(super) struct Log {
 }
 
 /// The logs' motion, apart from their rows: it is dropped first.
+#[derive(Default)]
 pub(super) struct Trajectories {
     pub(super) fit: Vec<Trajectory>,
     pub(super) heldout: Vec<Trajectory>,
@@ -443,5 +443,13 @@ fn add_squares(sum: &mut (f64, f64), values: &[f64], standstill: &[bool]) {
             sum.0 += value * value;
             sum.1 += 1.0;
         }
+    }
+}
+
+/// The data cannot answer: fewer rows than the question needs (exit code 4).
+pub(super) fn refuse(problem: String, remedy: &str) -> Error {
+    Error::Refused {
+        problem,
+        remedy: remedy.into(),
     }
 }

@@ -1,11 +1,12 @@
 //! Held-out truth: what to leave out, fit without it, predict it, score it.
 
-use super::another_state;
 use super::data::{Data, Log, Trajectories};
+use super::fitted::{Fitted, estimate};
 use super::independent_rows::LEAST_EFFECTIVE_ROWS;
-use super::{
-    CalibrationSettings, Fitted, Stage, Watch, compact, estimate, friction_only, noise_of,
-};
+use super::noise_of::noise_of;
+use super::progress::{Stage, Watch};
+use super::settings::CalibrationSettings;
+use super::{another_state, compact, friction_only};
 use crate::error::{Finding, Result, Severity};
 use crate::likelihood::{Columns, JointNoise};
 use crate::observations::{Observations, Part};

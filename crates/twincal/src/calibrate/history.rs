@@ -1,6 +1,6 @@
 //! What is followed of the joints' history: thresholds of stop operators and what warmth is, from what the training logs hold.
 
-use super::CalibrationSettings;
+use super::settings::CalibrationSettings;
 use crate::error::{Finding, Result, Severity};
 use crate::robot::{JointKind, Robot};
 use crate::signal::{

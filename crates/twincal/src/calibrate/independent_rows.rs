@@ -1,8 +1,7 @@
 //! How many independent rows a fit rests on, and what is said where they are few.
 
 use super::correlate::strongest;
-use super::data::Data;
-use super::refuse;
+use super::data::{Data, refuse};
 use crate::error::{Finding, Result, Severity};
 use crate::observations::Part;
 use crate::plug_in::{Fit, moving_rows};

@@ -5,7 +5,7 @@
 //! where a fit is refused for want of rows, it is tried at half the cut-off and so on, not below [`LEAST`], and done where the rows of a joint
 //! count as most independent ones. Where they are too few everywhere the first refusal stands.
 //!
-//! So it is where the fit would begin, but accelerations drown the model: its torque differs from the measured one by more than twice that, on every
+//! So it is where the fit would begin, but accelerations mask the model: its torque differs from the measured one by more than twice that, on every
 //! joint that moves. Vibration of an encoder's step or two counts as motion, and what rounding adds to its acceleration grows as f_c^2.5, while
 //! what a model lacks is of a size in every band. The fit is done in the highest of the lower bands in which the model's torque is about as little off
 //! as in any; if it is as far off in all of them the usual one stands (units or signs may be wrong, which a fit tells).
@@ -13,7 +13,7 @@
 //! A log of some seconds has few rows as well, and more of them in a wider band. They say no more of what the robot does elsewhere: of six seconds of
 //! a UR10 that were fitted in twice the band, 95 % intervals held none to all of the next seconds' torque. Such a log is refused.
 
-use super::CalibrationSettings;
+use super::settings::CalibrationSettings;
 use crate::error::{Error, Finding, Severity};
 use crate::robot::Robot;
 use crate::signal::Auto;
@@ -22,7 +22,7 @@ use crate::words::significant;
 /// No band of a coarse encoder ends below, Hz: friction that reverses would blur.
 const LEAST: f64 = 2.0;
 /// How far the nominal torque may be from the measured one, in rms of that, before a lower band is tried.
-const DROWNED: f64 = 2.0;
+const MASKED: f64 = 2.0;
 /// A band is as good as the best where the nominal torque is no further off than this times: a fifth of its square may be rounding.
 const AS_GOOD: f64 = 1.1;
 
@@ -73,9 +73,9 @@ pub(super) fn most_rows(bands: &[Band]) -> Option<f64> {
     best(bands, more)
 }
 
-/// The highest band in which the model is as little drowned as in others.
+/// The highest band in which the model is as little masked as in others.
 pub(super) fn clear(bands: &[Band]) -> Option<f64> {
-    let least = bands.iter().map(|band| band.misfit).fold(DROWNED, f64::min);
+    let least = bands.iter().map(|band| band.misfit).fold(MASKED, f64::min);
     let as_good = |band: &&Band| band.misfit <= AS_GOOD * least;
     let good: Vec<Band> = bands.iter().filter(as_good).copied().collect();
     best(&good, |best, band| band.cutoff_hz > best.cutoff_hz)
@@ -93,14 +93,14 @@ fn best(bands: &[Band], better: fn(&Band, &Band) -> bool) -> Option<f64> {
 
 /// What is said of a band in which an encoder is coarse and the nominal torque differs from the measured one by far more than that on every joint
 /// that moves.
-pub(super) fn drowned(
+pub(super) fn masked(
     robot: &Robot,
     findings: &[Finding],
     misfit: Option<(usize, [f64; 2])>,
     cutoff_hz: f64,
 ) -> Option<TooFew> {
     let (joint, [difference, torque]) = misfit.filter(|_| is_coarse(findings))?;
-    if difference <= DROWNED * torque {
+    if difference <= MASKED * torque {
         return None;
     }
     let names = robot.joint_names();
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn the_highest_band_that_is_not_drowned_is_the_one() {
+    fn the_highest_band_that_is_not_masked_is_the_one() {
         let band = |cutoff_hz, rows, misfit| Band {
             cutoff_hz,
             rows,

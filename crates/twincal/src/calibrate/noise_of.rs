@@ -1,6 +1,6 @@
 //! What a fit says of each joint's noise.
 
-use super::Fitted;
+use super::fitted::Fitted;
 use crate::likelihood::{JointNoise, Spread};
 use crate::observations::Part;
 use crate::plug_in::moving_rows;

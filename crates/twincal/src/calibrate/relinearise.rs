@@ -1,7 +1,7 @@
 //! Columns about what a fit found, where found effects multiply each other.
 
-use super::CalibrationSettings;
 use super::data::{Data, Log};
+use super::settings::CalibrationSettings;
 use crate::error::{Finding, Result, Severity};
 use crate::observations::Part;
 use crate::plug_in::{Fit, moving_rows};

@@ -17,18 +17,6 @@ use std::f64::consts::TAU;
 /// Rows that are looked at, evenly spread.
 const ROWS: usize = 2048;
 
-/// What becomes of gear ripple that is no candidate and that the residual shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum UnaskedRipple {
-    /// A candidate, where `library.families` are the usual ones: nobody said otherwise.
-    #[default]
-    Candidate,
-    /// The warning `ripple_seen`: families were chosen.
-    Told,
-    /// Nothing, it is not looked for: `ripple = {}`.
-    Ignored,
-}
-
 /// A ripple of a joint that is no candidate.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Seen {

@@ -1,6 +1,6 @@
 //! Fewer candidates where the rows are too few for all of them, unless somebody chose the candidates: friction and base parameters.
 
-use super::{CalibrationSettings, UnaskedRipple};
+use super::settings::{CalibrationSettings, UnaskedRipple};
 use crate::error::{Error, Finding, Severity};
 use crate::term::Family;
 

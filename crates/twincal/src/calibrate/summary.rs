@@ -3,12 +3,14 @@
 use super::components::{NOT_SEEN, components};
 use super::data::Data;
 use super::drive_scale::{self, DriveScale};
+use super::fitted::Fitted;
 use super::groups::{groups, told_as};
 use super::result::{
     Calibration, Draws, Group, LikelihoodUsed, PriorUsed, SweepPoint, TermSummary,
 };
 use super::result::{Compact, ends};
-use super::{CalibrationSettings, Fitted, prior_conflict, sandwich, status};
+use super::settings::CalibrationSettings;
+use super::{prior_conflict, sandwich, status};
 use crate::error::{Finding, Result, Severity};
 use crate::infer::approximate;
 use crate::likelihood::{Columns, mean_squares};

@@ -1,8 +1,8 @@
 //! Does an estimate depend on the cut-off? The same fit at 0.7 and 1.4 times f_c (method section 1).
 
-use super::CalibrationSettings;
 use super::data::{Data, grams_at};
 use super::result::SweepPoint;
+use super::settings::CalibrationSettings;
 use crate::error::{Finding, Result, Severity};
 use crate::gram::Gram;
 use crate::infer::approximate;

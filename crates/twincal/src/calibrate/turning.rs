@@ -12,8 +12,9 @@
 //! From the usual one the search doubles and halves as long as a step gains [`CLEARLY`], up to four times; it counts
 //! where it takes [`NOTICEABLY`] off the residual.
 
+use super::columns::columns_of;
 use super::data::{tell_payload_apart, zero_columns};
-use super::{CalibrationSettings, columns_of};
+use super::settings::CalibrationSettings;
 use crate::error::{Finding, Result, Severity};
 use crate::likelihood::{NoiseModel, NoiseSettings};
 use crate::observations::{Observations, Part, observe};

@@ -1,6 +1,7 @@
 //! What a fit must say of itself: chains that disagree, an iteration that did not settle, correlation that the likelihood ignores.
 
-use super::{CalibrationSettings, Fitted};
+use super::fitted::Fitted;
+use super::settings::CalibrationSettings;
 use crate::error::{Finding, Severity};
 use crate::infer::R_HAT_LIMIT;
 use crate::likelihood::NoiseModel;

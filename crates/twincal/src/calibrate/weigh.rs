@@ -11,7 +11,8 @@
 //! 95 % of the left-out rows, outliers included (`interval_factor`).
 
 use super::data::Data;
-use super::{CalibrationSettings, estimate};
+use super::fitted::estimate;
+use super::settings::CalibrationSettings;
 use crate::error::{Error, Finding, Result, Severity};
 use crate::likelihood::{Columns, NoiseModel, NoiseSettings, Profile, Spread};
 use crate::observations::Part;

@@ -13,7 +13,7 @@
 //!
 //! The motion of the stretches is that of the fit, whose own filter ends at four times the cut-off: what it lacks stays in the residual.
 
-use super::CalibrationSettings;
+use super::settings::CalibrationSettings;
 use super::whiteness::{CUMULATED, Judged, Run, VARIANCES, judge};
 use crate::error::{Error, Finding, Result, Severity};
 use crate::likelihood::{NoiseModel, NoiseUncertainty};
