@@ -1,15 +1,42 @@
 //! The compact twin: the median-probability model (Barbieri & Berger 2004) refitted jointly, and what it costs.
 
 use super::heredity;
-use super::result::{Compact, CompactTerm};
 use crate::error::Result;
 use crate::infer::approximate;
 use crate::observations::Part;
 use crate::posterior::{Posterior, Problem};
 use crate::term::Library;
+use crate::validate::nan_if_null;
+use serde::{Deserialize, Serialize};
 
 /// A component is in the compact twin from this probability on.
 const MEDIAN: f64 = 0.5;
+
+/// The median-probability model (PIP ≥ 0.5) refitted jointly (Barbieri & Berger 2004); its held-out loss stands in
+/// [`Validation::compact`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Compact {
+    /// Names of its components.
+    pub components: Vec<String>,
+    /// Its coefficients.
+    pub terms: Vec<CompactTerm>,
+    /// RMSE over the moving training rows of all joints, N·m: of the model average, and of the compact twin.
+    pub training_rmse: [f64; 2],
+}
+
+/// One coefficient of the compact twin.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CompactTerm {
+    /// Term.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// E[β | y, the compact twin's structure].
+    pub mean: f64,
+    /// Its sd.
+    #[serde(deserialize_with = "nan_if_null")]
+    pub sd: f64,
+}
 
 /// Which components are in the median-probability model.
 pub(super) fn members(problem: &Problem, posterior: &Posterior) -> Vec<bool> {

@@ -1,10 +1,9 @@
-//! What logs say of each other, and what follows for the calibration.
+//! What logs say of each other.
 
 use super::data::Trajectories;
-use super::result::Calibration;
 use super::stopped::Stopped;
 use crate::cross_check::{copies, odd_torque, stuck_encoders};
-use crate::error::{Finding, Mistake, Result};
+use crate::error::{Finding, Result};
 use crate::robot::Robot;
 use crate::signal::{Log, Logs, Pipeline, Trajectory};
 
@@ -34,30 +33,4 @@ pub(super) fn as_filtered(
 ) -> Vec<Finding> {
     let all: Vec<&Trajectory> = trajectories.all().collect();
     odd_torque(robot, pipeline, &all, compared.is_empty())
-}
-
-/// The end of a calibration with the findings of [`as_recorded`] first. Nothing is guaranteed by a log that is no recording of its own.
-pub(super) fn told(
-    calibration: Result<Calibration>,
-    mut as_recorded: Vec<Finding>,
-    findings: Vec<Finding>,
-) -> std::result::Result<Calibration, Stopped> {
-    let copied = (as_recorded.iter()).any(|f| f.mistake() == Some(Mistake::Copy));
-    match calibration {
-        Ok(mut calibration) => {
-            if copied {
-                calibration.validation.conformal = None;
-            }
-            as_recorded.append(&mut calibration.findings);
-            calibration.findings = as_recorded;
-            Ok(calibration)
-        }
-        Err(error) => {
-            as_recorded.extend(findings);
-            Err(Stopped {
-                error,
-                findings: as_recorded,
-            })
-        }
-    }
 }

@@ -1,10 +1,9 @@
 //! The logs of a calibration as rows, with what was read, dropped and masked.
 
+use super::log::Log;
 use super::reader::{Reader, Role};
-use super::result::LogSummary;
 use crate::error::{Error, Finding, Result, Severity};
 use crate::gram::Gram;
-use crate::incidents::Incident;
 use crate::likelihood::Columns;
 use crate::observations::{GramSum, Observations, Part};
 use crate::robot::Robot;
@@ -19,18 +18,6 @@ use rayon::prelude::*;
 const ZERO: f64 = 1e-12;
 /// Rows per column of the largest joint below which nothing is fitted (case 7).
 const ROWS_PER_COLUMN: usize = 3;
-
-/// One log, ready.
-pub(super) struct Log {
-    /// Contacts and protective stops, which are left out.
-    pub(super) incidents: Vec<Incident>,
-    pub(super) observations: Observations,
-    pub(super) summary: LogSummary,
-    /// First and last stamp, s.
-    pub(super) ends: [f64; 2],
-    /// Of a log in chapters, statistics at the cut-offs of the sweep with nothing left out: made while its chapters were there.
-    pub(super) elsewhere: Vec<Option<Gram>>,
-}
 
 /// The logs' motion, apart from their rows: it is dropped first.
 #[derive(Default)]

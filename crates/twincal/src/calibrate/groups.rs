@@ -1,6 +1,7 @@
 //! Which components say the same: in these logs, or for every motion of this robot.
 
-use super::result::{Alike, Calibration, Group};
+use super::result::{Calibration, Group};
+use super::status::Alike;
 use crate::linear_algebra::Cholesky;
 use crate::posterior::{Posterior, Problem};
 use crate::term::{Library, levels};

@@ -1,8 +1,9 @@
 //! Held-out truth: what to leave out, fit without it, predict it, score it.
 
-use super::data::{Data, Log, Trajectories};
+use super::data::{Data, Trajectories};
 use super::fitted::{Fitted, estimate};
 use super::independent_rows::LEAST_EFFECTIVE_ROWS;
+use super::log::Log;
 use super::noise_of::noise_of;
 use super::progress::{Stage, Watch};
 use super::settings::CalibrationSettings;

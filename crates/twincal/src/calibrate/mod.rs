@@ -14,6 +14,7 @@ mod dissipative;
 mod drift;
 mod drive_scale;
 mod effects;
+mod ended;
 mod exit;
 mod fitted;
 mod friction_only;
@@ -24,10 +25,13 @@ mod heredity;
 mod history;
 mod independent_rows;
 mod left_out;
+mod log;
+mod log_summary;
 mod lower_band;
 mod misfit;
 mod negative_friction;
 mod noise_of;
+mod other_cutoffs;
 mod outlook;
 mod prior_conflict;
 mod progress;
@@ -39,6 +43,7 @@ mod result;
 mod room;
 mod sandwich;
 mod settings;
+mod settle;
 mod smaller_library;
 mod stages;
 mod status;
@@ -57,17 +62,20 @@ mod worse;
 #[cfg(test)]
 mod testing;
 
+pub use compact::{Compact, CompactTerm};
 pub use effects::Effect;
 pub use left_out::{LeftOutData, LeftOutError};
+pub use log_summary::LogSummary;
 pub use outlook::{LookedAt, Outlook, outlook};
 pub use progress::Stage;
 pub use result::{
-    Alike, Along, Calibration, Compact, CompactTerm, ComponentSummary, Curve, Draws, Group,
-    LikelihoodUsed, LogSummary, ParameterSummary, PriorUsed, SweepPoint, TermSummary,
+    Along, Calibration, ComponentSummary, Curve, Draws, Group, LikelihoodUsed, ParameterSummary,
+    PriorUsed, TermSummary,
 };
 pub use settings::{CalibrationSettings, UnaskedRipple};
-pub use status::{Status, StatusReason};
+pub use status::{Alike, Status, StatusReason};
 pub use stopped::Stopped;
+pub use sweep::SweepPoint;
 
 use crate::error::{Error, Finding, Result};
 use crate::robot::Robot;
@@ -120,7 +128,7 @@ pub(crate) fn calibrate_watched(
         Some(failure) => Err(failure),
         None => calibration,
     };
-    cross_checked::told(calibration, as_recorded, findings)
+    ended::ended(calibration, as_recorded, findings)
 }
 
 /// Passes over the logs, with the settings that the end of one asks for in the next, until one has a result; `findings` are those of

@@ -1,14 +1,13 @@
 //! One log to rows, whole or chapter by chapter.
 
-use super::data::Log;
-use super::result::LogSummary;
+use super::log::Log;
+use super::log_summary::LogSummary;
 use crate::error::{Finding, Result, Severity};
 use crate::incidents::{Evidence, Incident, incident_findings, leave_out, left_out};
 use crate::observations::{GramSum, JointObservations, Observations, Room, observe};
 use crate::robot::Robot;
 use crate::signal::{
-    FewChapters, LongReady, Payload, Pipeline, PreparedLog, Raw, ReadyLog, Recording, Trajectory,
-    median_step,
+    FewChapters, LongReady, Payload, Pipeline, PreparedLog, Raw, ReadyLog, Trajectory,
 };
 use crate::term::Library;
 
@@ -149,7 +148,7 @@ impl Reader<'_> {
         let ends = time.first().zip(time.last()).map(|(a, b)| [*a, *b]);
         let log = Log {
             incidents: Vec::new(),
-            summary: summary(recording, role.word(), pipeline, &trajectory),
+            summary: LogSummary::of(recording, role.word(), pipeline, &trajectory),
             observations,
             ends: ends.unwrap_or_default(),
             elsewhere: Vec::new(),
@@ -187,63 +186,5 @@ impl Reader<'_> {
         let (mut trajectory, _) = self.trajectory(log, Raw::None)?;
         leave_out(self.pipeline, &mut trajectory, incidents);
         observe(self.robot, self.library, self.pipeline, &trajectory)
-    }
-}
-
-impl LogSummary {
-    /// Of chapters, which last `duration` s together.
-    fn joined(chapters: Vec<Self>, duration: f64) -> Option<Self> {
-        let mut rates: Vec<f64> = chapters.iter().map(|chapter| chapter.rate_hz).collect();
-        rates.sort_by(f64::total_cmp);
-        let longest = chapters.iter().max_by_key(|chapter| chapter.samples)?;
-        let kept_rate_hz = longest.kept_rate_hz;
-        let mut chapters = chapters.into_iter();
-        let mut all = chapters.next()?;
-        for chapter in chapters {
-            all.segments += chapter.segments;
-        }
-        Some(Self {
-            duration,
-            rate_hz: rates[rates.len() / 2],
-            kept_rate_hz,
-            ..all
-        })
-    }
-
-    /// Counts the rows of each joint, moving and not.
-    fn count_rows(&mut self, observations: &Observations) {
-        let still = |joint: &JointObservations| {
-            let still = joint.standstill.iter().filter(|still| **still);
-            still.count() as u64
-        };
-        self.standstill = observations.joints.iter().map(still).collect();
-        let moving = |still: &u64| observations.len() as u64 - still;
-        self.rows = self.standstill.iter().map(moving).collect();
-    }
-}
-
-fn summary(
-    recording: &Recording,
-    role: &str,
-    pipeline: &Pipeline,
-    trajectory: &Trajectory,
-) -> LogSummary {
-    let median = median_step(&recording.time).unwrap_or(f64::INFINITY);
-    let ends = (
-        recording.time.first().copied().unwrap_or(0.0),
-        recording.time.last().copied().unwrap_or(0.0),
-    );
-    let longest = trajectory.segments.iter().max_by_key(|s| s.time.len());
-    LogSummary {
-        name: recording.name.clone(),
-        role: role.into(),
-        samples: recording.time.len() as u64,
-        duration: ends.1 - ends.0,
-        rate_hz: 1.0 / median,
-        kept_rate_hz: longest.map_or(0.0, |segment| pipeline.kept_rate(segment.interval)),
-        segments: trajectory.segments.len() as u64,
-        rows: Vec::new(),
-        standstill: Vec::new(),
-        incidents: Vec::new(),
     }
 }

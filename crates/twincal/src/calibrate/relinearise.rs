@@ -1,6 +1,7 @@
 //! Columns about what a fit found, where found effects multiply each other.
 
-use super::data::{Data, Log};
+use super::data::Data;
+use super::log::Log;
 use super::settings::CalibrationSettings;
 use crate::error::{Finding, Result, Severity};
 use crate::observations::Part;

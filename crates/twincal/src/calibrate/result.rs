@@ -1,8 +1,10 @@
 //! What a calibration returns: plain values that can be printed, compared and written.
 
-use super::status::{Status, StatusReason};
+use super::compact::Compact;
+use super::log_summary::LogSummary;
+use super::status::{Alike, Status, StatusReason};
+use super::sweep::SweepPoint;
 use crate::error::Finding;
-use crate::incidents::Incident;
 use crate::lag::Lags;
 use crate::likelihood::{JointNoise, NoiseModel};
 use crate::prior::Inclusion;
@@ -214,17 +216,6 @@ fn yes() -> bool {
     true
 }
 
-/// Why the members of a [`Group`] cannot be told apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Alike {
-    /// Their torque is the same for every motion of this robot: only the prior prefers one.
-    EveryMotion,
-    /// Their torque is the same in these logs; another motion would separate them.
-    #[default]
-    TheseLogs,
-}
-
 /// Components that these data cannot tell apart.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Group {
@@ -241,41 +232,6 @@ pub struct Group {
     /// In a sentence.
     #[serde(default)]
     pub words: String,
-}
-
-/// How an estimate moves when the cut-off does (method section 1).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SweepPoint {
-    /// Cut-off, Hz.
-    pub cutoff_hz: f64,
-    /// E[β | y] of every column at that cut-off.
-    pub mean: Vec<f64>,
-}
-
-/// The median-probability model (PIP ≥ 0.5) refitted jointly (Barbieri & Berger 2004); its held-out loss stands in
-/// [`Validation::compact`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Compact {
-    /// Names of its components.
-    pub components: Vec<String>,
-    /// Its coefficients.
-    pub terms: Vec<CompactTerm>,
-    /// RMSE over the moving training rows of all joints, N·m: of the model average, and of the compact twin.
-    pub training_rmse: [f64; 2],
-}
-
-/// One coefficient of the compact twin.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CompactTerm {
-    /// Term.
-    pub name: String,
-    /// Unit.
-    pub unit: String,
-    /// E[β | y, the compact twin's structure].
-    pub mean: f64,
-    /// Its sd.
-    #[serde(deserialize_with = "nan_if_null")]
-    pub sd: f64,
 }
 
 /// The prior as used.
@@ -309,33 +265,6 @@ pub struct LikelihoodUsed {
     pub model: NoiseModel,
     /// Rounds of the plug-in iteration.
     pub rounds: usize,
-}
-
-/// What became of one log.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LogSummary {
-    /// Name as given.
-    pub name: String,
-    /// `fit` or `heldout`.
-    pub role: String,
-    /// Samples read.
-    pub samples: u64,
-    /// Duration, s.
-    pub duration: f64,
-    /// Median rate, Hz.
-    pub rate_hz: f64,
-    /// Rate of the kept rows, Hz: a whole fraction of the log's own; 0 in results that do not say it yet.
-    #[serde(default)]
-    pub kept_rate_hz: f64,
-    /// Segments after cutting.
-    pub segments: u64,
-    /// Rows used per joint (standstill and saturated torque excluded).
-    pub rows: Vec<u64>,
-    /// Rows masked per joint: standstill and saturated torque.
-    pub standstill: Vec<u64>,
-    /// Contacts and protective stops, which are left out for all joints.
-    #[serde(default)]
-    pub incidents: Vec<Incident>,
 }
 
 /// Kept coefficients' joint posterior draws, for the pair plot (paper fig. 3).

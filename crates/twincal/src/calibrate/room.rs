@@ -1,6 +1,6 @@
 //! What fitting all logs will take in memory, told when it is known how many rows they have and before these are made.
 
-use super::sweep::{FACTORS, scaled};
+use super::other_cutoffs::{FACTORS, scaled};
 use crate::error::{Error, Result};
 use crate::signal::{Pipeline, ReadyLog};
 use crate::term::Library;

@@ -10,7 +10,6 @@
 //! (Huber 1967; blocks for dependent rows as in Liang & Zeger 1986; the second part is the prior's own, so that what the data
 //! do not see stays as wide as the prior). The tempering cancels: A⁻¹ grows with max(τ, λ) as s_b sinks.
 
-use super::result::TermSummary;
 use crate::error::{Finding, Severity};
 use crate::linear_algebra::Cholesky;
 use crate::observations::Part;
@@ -23,6 +22,14 @@ const BLOCKS: (usize, usize) = (32, 8);
 const TIMES: f64 = 4.0;
 /// Ratio of the two sds from which they disagree.
 const DISAGREE: f64 = 2.0;
+
+/// Both opinions on the sd of a term's coefficient.
+pub(super) struct Sds<'a> {
+    /// Name of the term.
+    pub(super) term: &'a str,
+    pub(super) sandwich: Option<f64>,
+    pub(super) likelihood: Option<f64>,
+}
 
 /// Sandwich sd of every column of the compact twin, K; `None` of the others, and where there are too few blocks.
 pub(super) fn sds(fit: &Fit, compact: &Posterior, training: &[Part<'_>]) -> Vec<Option<f64>> {
@@ -106,15 +113,12 @@ fn score(fit: &Fit, compact: &Posterior, model: &Model, block: &Part<'_>) -> Vec
 }
 
 /// One finding for all terms whose block scores spread more than twice as far as the likelihood says.
-pub(super) fn findings(terms: &[TermSummary]) -> Vec<Finding> {
-    let ratio = |term: &TermSummary| -> Option<f64> {
-        let ratio = term.sandwich_sd? / term.conditional_sd?;
-        (ratio > DISAGREE).then_some(ratio)
+pub(super) fn findings<'a>(terms: impl Iterator<Item = Sds<'a>>) -> Vec<Finding> {
+    let ratio = |sds: Sds<'a>| -> Option<(&'a str, f64)> {
+        let ratio = sds.sandwich? / sds.likelihood?;
+        (ratio > DISAGREE).then_some((sds.term, ratio))
     };
-    let mut found: Vec<(&str, f64)> = terms
-        .iter()
-        .filter_map(|term| Some((term.term.name.as_str(), ratio(term)?)))
-        .collect();
+    let mut found: Vec<(&str, f64)> = terms.filter_map(ratio).collect();
     found.sort_by(|a, b| b.1.total_cmp(&a.1));
     let Some((name, ratio)) = found.first() else {
         return Vec::new();

@@ -1,16 +1,18 @@
 //! From posterior to what people read: terms, statuses, groups, sensitivity, autocorrelation.
 
+use super::compact::Compact;
 use super::components::{NOT_SEEN, components};
 use super::data::Data;
 use super::drive_scale::{self, DriveScale};
 use super::fitted::Fitted;
 use super::groups::{groups, told_as};
-use super::result::{
-    Calibration, Draws, Group, LikelihoodUsed, PriorUsed, SweepPoint, TermSummary,
-};
-use super::result::{Compact, ends};
+use super::prior_conflict;
+use super::result::ends;
+use super::result::{Calibration, Draws, Group, LikelihoodUsed, PriorUsed, TermSummary};
+use super::sandwich::{self, Sds};
 use super::settings::CalibrationSettings;
-use super::{prior_conflict, sandwich, status};
+use super::settle;
+use super::sweep::SweepPoint;
 use crate::error::{Finding, Result, Severity};
 use crate::infer::approximate;
 use crate::likelihood::{Columns, mean_squares};
@@ -79,7 +81,12 @@ pub(super) fn summarise(
     for (&index, sd) in library.columns().iter().zip(&opinion.sandwich) {
         terms[index].sandwich_sd = *sd;
     }
-    findings.extend(sandwich::findings(&terms));
+    let sds = terms.iter().map(|term| Sds {
+        term: &term.term.name,
+        sandwich: term.sandwich_sd,
+        likelihood: term.conditional_sd,
+    });
+    findings.extend(sandwich::findings(sds));
     let conditional: Vec<(f64, f64)> = (library.columns().iter())
         .map(|&index| {
             let number = |value: Option<f64>| value.unwrap_or(0.0);
@@ -103,7 +110,7 @@ pub(super) fn summarise(
         component.told_as = told_as;
     }
     let mut groups = groups(&fit.problem, &fit.posterior, told_apart);
-    status::settle(&mut components, &mut groups, &fit, told_apart, &training);
+    settle::settle(&mut components, &mut groups, &fit, told_apart, &training);
     let names = names(library, columns);
     let is_forced = |(_, forced): &(&String, &bool)| **forced;
     let mut sure: Vec<String> = (names.iter().zip(&columns.forced))

@@ -1,7 +1,7 @@
 //! Does an estimate depend on the cut-off? The same fit at 0.7 and 1.4 times f_c (method section 1).
 
 use super::data::{Data, grams_at};
-use super::result::SweepPoint;
+use super::other_cutoffs::pipelines;
 use super::settings::CalibrationSettings;
 use crate::error::{Finding, Result, Severity};
 use crate::gram::Gram;
@@ -9,14 +9,21 @@ use crate::infer::approximate;
 use crate::likelihood::{Columns, assemble};
 use crate::plug_in::Fit;
 use crate::posterior::Posterior;
-use crate::signal::{Pipeline, ReadyLog};
+use crate::signal::ReadyLog;
 use crate::term::Library;
 use crate::twin::Twin;
 use crate::words::significant;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
-/// Factors on the cut-off.
-pub(super) const FACTORS: [f64; 2] = [0.7, 1.4];
+/// How an estimate moves when the cut-off does (method section 1).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SweepPoint {
+    /// Cut-off, Hz.
+    pub cutoff_hz: f64,
+    /// E[β | y] of every column at that cut-off.
+    pub mean: Vec<f64>,
+}
 
 /// Posterior means at 0.7, 1 and 1.4 f_c with the plug-ins of the fit; empty with the filter off, and where rows are weighed
 /// (`noise.robust`, `noise.varies_with_speed`, `noise.varies_with_load`): rows of another cut-off have no weights.
@@ -60,24 +67,6 @@ pub(super) fn cutoff(
     points.extend(moved);
     points.sort_by(|a, b| a.cutoff_hz.total_cmp(&b.cutoff_hz));
     Ok(points)
-}
-
-/// The pipelines of the sweep beside that of the fit: none without a filter, and where rows are weighed.
-pub(super) fn pipelines(pipeline: &Pipeline, settings: &CalibrationSettings) -> Vec<Pipeline> {
-    if pipeline.is_off() || settings.noise.weighs_rows() {
-        return Vec::new();
-    }
-    FACTORS.iter().map(|f| scaled(pipeline, *f)).collect()
-}
-
-/// The same filters at `factor` times the cut-off.
-pub(super) fn scaled(pipeline: &Pipeline, factor: f64) -> Pipeline {
-    Pipeline {
-        cutoff_hz: factor * pipeline.cutoff_hz,
-        motion_cutoff_hz: factor * pipeline.motion_cutoff_hz,
-        rate_hz: factor * pipeline.rate_hz,
-        ..pipeline.clone()
-    }
 }
 
 /// Selected terms whose estimate moves by more than its sd over the sweep, those that move most of their sd first.

@@ -3,8 +3,8 @@
 use super::prepare::Prepared;
 use super::rows::Rows;
 use super::validate::Validated;
-use crate::calibrate::result::SweepPoint;
 use crate::calibrate::summary::SecondOpinion;
+use crate::calibrate::sweep::SweepPoint;
 use crate::calibrate::{compact, sandwich, sweep, unseen};
 use crate::error::{Finding, Result};
 use crate::excitation::Excitation;

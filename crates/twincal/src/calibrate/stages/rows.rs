@@ -6,7 +6,7 @@ use crate::calibrate::data::{self, Data, Trajectories};
 use crate::calibrate::exit::{Exit, Pass};
 use crate::calibrate::lower_band::TooFew;
 use crate::calibrate::request::Goal;
-use crate::calibrate::{aligned, cross_checked, dissipative, room, sweep, weigh};
+use crate::calibrate::{aligned, cross_checked, dissipative, other_cutoffs, room, weigh};
 use crate::error::{Error, Finding, Result};
 use crate::lag::Lags;
 use crate::likelihood::{Columns, Spread};
@@ -95,7 +95,7 @@ fn observe(prepared: &Prepared<'_, '_>) -> Result<(Data, Trajectories)> {
     let logs = (&prepared.ready[..], &heldout[..]);
     let sweeps = !settings.noise.weighs_rows();
     room::require(settings.most_bytes, library, pipeline, logs, sweeps)?;
-    let elsewhere = sweep::pipelines(pipeline, settings);
+    let elsewhere = other_cutoffs::pipelines(pipeline, settings);
     let pipelines = (pipeline, &elsewhere[..]);
     Data::read(robot, library, pipelines, logs.0, logs.1)
 }
