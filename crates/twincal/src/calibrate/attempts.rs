@@ -1,12 +1,12 @@
 //! What is tried where a pass over the logs ends early: a list, and the first attempt that applies sets up the next pass.
 
 use super::exit::Exit;
-use super::lower_band::{Band, TooFew, clear, lower, lowered, most_rows};
+use super::fit::lower_band::{Band, TooFew, clear, lower, lowered, most_rows};
+use super::fit::ripples::Seen;
+use super::fit::smaller_library::{Smaller, smaller, without_memory};
+use super::fit::wider_band::not_wider;
 use super::request::Goal;
-use super::ripples::Seen;
 use super::settings::CalibrationSettings;
-use super::smaller_library::{Smaller, smaller, without_memory};
-use super::wider_band::not_wider;
 use crate::error::{Error, Finding};
 use crate::signal::Auto;
 

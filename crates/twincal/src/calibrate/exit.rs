@@ -1,8 +1,8 @@
 //! Where a pass over the logs ends before its result, with what another pass needs to know.
 
-use super::lower_band::TooFew;
-use super::ripples::Seen;
-use super::wider_band::Wider;
+use super::fit::lower_band::TooFew;
+use super::fit::ripples::Seen;
+use super::fit::wider_band::Wider;
 use crate::error::Error;
 use std::collections::BTreeMap;
 

@@ -1,90 +1,45 @@
-//! The whole road, from a robot and its logs to a calibrated twin, in one function that reads like the paper.
+//! The whole road, from a robot and its logs to a calibrated twin, in one function, `road`, that reads like the paper.
 
-mod aligned;
-mod another_state;
 mod attempts;
-mod columns;
-mod compact;
-mod components;
-mod correlate;
-mod cross_checked;
-mod curves;
+mod checks;
 mod data;
-mod dissipative;
-mod drift;
-mod drive_scale;
-mod effects;
-mod ended;
 mod exit;
-mod fitted;
-mod friction_only;
-mod groups;
-mod heavy_tails;
-mod held_out;
-mod heredity;
-mod history;
-mod independent_rows;
-mod left_out;
-mod log;
-mod log_summary;
-mod lower_band;
-mod misfit;
-mod negative_friction;
-mod noise_of;
-mod other_cutoffs;
+mod fit;
 mod outlook;
-mod prior_conflict;
 mod progress;
-mod reader;
-mod ripples;
-mod relinearise;
 mod request;
 mod result;
-mod room;
-mod sandwich;
 mod settings;
-mod settle;
-mod smaller_library;
 mod stages;
-mod status;
 mod stopped;
-mod summary;
-mod sweep;
-mod turning;
-mod unphysical;
-mod uneven_noise;
-mod unseen;
-mod unsettled;
-mod weigh;
-mod whiteness;
-mod wider_band;
-mod worse;
 #[cfg(test)]
 mod testing;
 
-pub use compact::{Compact, CompactTerm};
-pub use effects::Effect;
-pub use left_out::{LeftOutData, LeftOutError};
-pub use log_summary::LogSummary;
+pub use checks::left_out::{LeftOutData, LeftOutError};
+pub use checks::sweep::SweepPoint;
+pub use data::log_summary::LogSummary;
+pub use fit::compact::{Compact, CompactTerm};
 pub use outlook::{LookedAt, Outlook, outlook};
 pub use progress::Stage;
-pub use result::{
+pub use result::calibration::{
     Along, Calibration, ComponentSummary, Curve, Draws, Group, LikelihoodUsed, ParameterSummary,
     PriorUsed, TermSummary,
 };
+pub use result::effects::Effect;
+pub use result::status::{Alike, Status, StatusReason};
 pub use settings::{CalibrationSettings, UnaskedRipple};
-pub use status::{Alike, Status, StatusReason};
 pub use stopped::Stopped;
-pub use sweep::SweepPoint;
 
 use crate::error::{Error, Finding, Result};
 use crate::robot::Robot;
 use crate::signal::{Log, Logs};
 use attempts::{Attempts, Ended};
+use data::cross_checked;
 use exit::{Exit, Pass};
-use lower_band::Band;
+use fit::lower_band::Band;
 use progress::Watch;
 use request::{Goal, Recorded, Request};
+use result::ended::ended;
 
 /// Finds what the nominal robot misses in `logs` and says how well the calibrated twin predicts.
 ///
@@ -128,7 +83,7 @@ pub(crate) fn calibrate_watched(
         Some(failure) => Err(failure),
         None => calibration,
     };
-    ended::ended(calibration, as_recorded, findings)
+    ended(calibration, as_recorded, findings)
 }
 
 /// Passes over the logs, with the settings that the end of one asks for in the next, until one has a result; `findings` are those of

@@ -3,9 +3,12 @@
 use super::prepare::Prepared;
 use super::rows::Rows;
 use super::validate::Validated;
-use crate::calibrate::summary::SecondOpinion;
-use crate::calibrate::sweep::SweepPoint;
-use crate::calibrate::{compact, sandwich, sweep, unseen};
+use crate::calibrate::checks::sandwich;
+use crate::calibrate::checks::sweep;
+use crate::calibrate::checks::sweep::SweepPoint;
+use crate::calibrate::fit::compact;
+use crate::calibrate::result::summary::SecondOpinion;
+use crate::calibrate::result::unseen;
 use crate::error::{Finding, Result};
 use crate::excitation::Excitation;
 

@@ -3,8 +3,12 @@
 use super::check::Checked;
 use super::rows::Rows;
 use super::validate::Validated;
-use crate::calibrate::result::Calibration;
-use crate::calibrate::{curves, negative_friction, summary, unphysical, unseen};
+use crate::calibrate::result::calibration::Calibration;
+use crate::calibrate::result::curves;
+use crate::calibrate::result::negative_friction;
+use crate::calibrate::result::summary;
+use crate::calibrate::result::unphysical;
+use crate::calibrate::result::unseen;
 use crate::error::{Finding, Result};
 use crate::posterior::draws::Drawer;
 

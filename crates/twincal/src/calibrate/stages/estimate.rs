@@ -2,16 +2,16 @@
 
 use super::prepare::Prepared;
 use super::rows::Rows;
+use crate::calibrate::checks::held_out::{self, Plan};
+use crate::calibrate::checks::independent_rows::{self, Counted};
 use crate::calibrate::exit::{Exit, Pass};
-use crate::calibrate::fitted::{self, Fitted};
-use crate::calibrate::held_out::{self, Plan};
-use crate::calibrate::independent_rows::{self, Counted};
-use crate::calibrate::lower_band::{self, Band};
-use crate::calibrate::relinearise::{self, Linear};
+use crate::calibrate::fit::fitted::{self, Fitted};
+use crate::calibrate::fit::lower_band::{self, Band};
+use crate::calibrate::fit::relinearise::{self, Linear};
+use crate::calibrate::fit::ripples::{self, Seen};
+use crate::calibrate::fit::wider_band::wider;
 use crate::calibrate::request::Goal;
-use crate::calibrate::ripples::{self, Seen};
 use crate::calibrate::settings::UnaskedRipple;
-use crate::calibrate::wider_band::wider;
 use crate::error::{Finding, Result};
 use crate::infer::infer_near;
 

@@ -1,9 +1,12 @@
 //! Stage 1: logs on one clock behind the same filters, and the candidates for this robot.
 
-use crate::calibrate::data;
+use crate::calibrate::data::aligned;
+use crate::calibrate::data::all_logs;
+use crate::calibrate::data::history;
+use crate::calibrate::fit::smaller_library;
+use crate::calibrate::fit::turning;
 use crate::calibrate::request::{Recorded, Request};
 use crate::calibrate::settings::CalibrationSettings;
-use crate::calibrate::{aligned, history, smaller_library, turning};
 use crate::error::{Finding, Result};
 use crate::lag::Lags;
 use crate::signal::{Log, Pipeline, ReadyLog, choose_and_prepare, constant_torque, hardly_driven};
@@ -27,7 +30,7 @@ pub(in crate::calibrate) struct Prepared<'a, 'r> {
     pub(in crate::calibrate) library: Library,
     /// Whether nobody chose the families.
     pub(in crate::calibrate) usual: bool,
-    /// See [`data::carry_something`].
+    /// See [`all_logs::carry_something`].
     pub(in crate::calibrate) unknown: bool,
 }
 
@@ -74,7 +77,7 @@ pub(in crate::calibrate) fn prepare<'a, 'r>(
         settings: followed.settings,
         library_settings,
         library,
-        unknown: data::carry_something(recorded.all().map(Log::payload)),
+        unknown: all_logs::carry_something(recorded.all().map(Log::payload)),
     };
     prepared.choose_reversal_velocity(findings)?;
     Ok(prepared)

@@ -1,12 +1,17 @@
 //! Stage 2: rows of residual torque and columns of the candidates, filtered alike (eq. (1)–(4)).
 
 use super::prepare::Prepared;
-use crate::calibrate::columns::columns_of;
-use crate::calibrate::data::{self, Data, Trajectories};
+use crate::calibrate::data::aligned;
+use crate::calibrate::data::all_logs::{self, Data, Trajectories};
+use crate::calibrate::data::cross_checked;
+use crate::calibrate::data::other_cutoffs;
+use crate::calibrate::data::room;
 use crate::calibrate::exit::{Exit, Pass};
-use crate::calibrate::lower_band::TooFew;
+use crate::calibrate::fit::columns::columns_of;
+use crate::calibrate::fit::dissipative;
+use crate::calibrate::fit::lower_band::TooFew;
+use crate::calibrate::fit::weigh;
 use crate::calibrate::request::Goal;
-use crate::calibrate::{aligned, cross_checked, dissipative, other_cutoffs, room, weigh};
 use crate::error::{Error, Finding, Result};
 use crate::lag::Lags;
 use crate::likelihood::{Columns, Spread};
@@ -52,7 +57,7 @@ pub(in crate::calibrate) fn read<'a, 'r>(
     findings.extend(compared);
     let of_all = aligned::of_every_log(robot, pipeline, settings, &trajectories, findings);
     let (library, zero_columns) = data.drop_zero_columns(prepared.library.clone());
-    let payload_apart = data::tell_payload_apart(prepared.recorded.fit);
+    let payload_apart = all_logs::tell_payload_apart(prepared.recorded.fit);
     let mut columns = columns_of(robot, &library, settings, payload_apart)?;
     columns.one_motion = prepared.recorded.fit.len() == 1;
     let hull = data.hull(robot);

@@ -3,12 +3,17 @@
 use super::estimate::Estimated;
 use super::prepare::Prepared;
 use super::rows::Rows;
-use crate::calibrate::fitted::Fitted;
-use crate::calibrate::noise_of::noise_of;
+use crate::calibrate::checks::drift;
+use crate::calibrate::checks::heavy_tails;
+use crate::calibrate::checks::held_out;
+use crate::calibrate::checks::misfit;
+use crate::calibrate::checks::uneven_noise;
+use crate::calibrate::checks::unsettled;
+use crate::calibrate::checks::worse;
+use crate::calibrate::fit::compact;
+use crate::calibrate::fit::fitted::Fitted;
+use crate::calibrate::fit::noise_of::noise_of;
 use crate::calibrate::progress::Watch;
-use crate::calibrate::{
-    compact, drift, heavy_tails, held_out, misfit, uneven_noise, unsettled, worse,
-};
 use crate::error::{Finding, Result};
 use crate::posterior::Posterior;
 use crate::twin::Twin;
