@@ -1,6 +1,7 @@
-//! Arrows go one way: a module of the core uses only modules whose `mod` line stands above its own in lib.rs, and no part
-//! of the core touches files, clocks, the environment or the terminal.
+//! Arrows go one way: a module of the core uses only modules whose `mod` line stands above its own in lib.rs, no files of
+//! `calibrate` use each other in a circle, and no part of the core touches files, clocks, the environment or the terminal.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -27,8 +28,8 @@ struct Source {
     path: PathBuf,
     /// Top-level module that it belongs to; `lib` for lib.rs itself.
     module: String,
-    /// How many `super::` lead from its top to the crate's root.
-    depth: usize,
+    /// Modules from the crate's root to it.
+    parts: Vec<String>,
     code: String,
     /// The same without `#[cfg(test)]` items; empty for files that are tests as a whole.
     shipped: String,
@@ -46,7 +47,7 @@ fn modules_use_only_what_stands_above_them() {
         let own = order.iter().position(|name| *name == source.module);
         let own =
             own.unwrap_or_else(|| panic!("{}: its module is not in lib.rs", source.path.display()));
-        for used in uses(&source.code, source.depth) {
+        for used in uses(&source.code, source.parts.len()) {
             if order
                 .iter()
                 .position(|name| *name == used)
@@ -66,6 +67,59 @@ fn modules_use_only_what_stands_above_them() {
         arrows.len(),
         arrows.join("\n")
     );
+}
+
+/// A file that uses an item of a module above it closes a circle as well: that module has it as a part. Folders are held to the same.
+#[test]
+fn no_files_and_no_folders_of_calibrate_use_each_other_in_a_circle() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let sources = sources(&root);
+    let own = |source: &&Source| source.module == "calibrate" && !source.shipped.is_empty();
+    let codes: Vec<(String, &str)> = (sources.iter().filter(own))
+        .map(|source| (source.parts.join("::"), source.shipped.as_str()))
+        .collect();
+    assert!(codes.len() > 40, "{} files", codes.len());
+    let arrows = arrows(&codes);
+    assert!(arrows["calibrate"].len() > 5, "{:?}", arrows["calibrate"]);
+    for arrows in [folders(&arrows), arrows] {
+        let circle = circle(&arrows);
+        assert!(circle.is_none(), "{}", circle.unwrap().join(" uses "));
+    }
+}
+
+#[test]
+fn a_circle_is_found_whatever_its_paths_look_like() {
+    let closed = |user: &str| {
+        let codes = [
+            ("a".to_owned(), "mod b; pub(super) mod c; fn call() {}"),
+            ("a::b".to_owned(), "use super::c::{self, deep::Thing};"),
+            ("a::c".to_owned(), "mod deep; pub(in crate::a) fn f() {}"),
+            ("a::c::deep".to_owned(), user),
+        ];
+        circle(&arrows(&codes)).map(|circle| circle.join(" "))
+    };
+    assert_eq!(
+        closed("use crate::z; use std::fmt; pub(super) fn f();"),
+        None
+    );
+    let through_b = Some("a::b a::c::deep a::b".to_owned());
+    assert_eq!(closed("use crate::{z, a::b::Other};"), through_b);
+    assert_eq!(closed("fn f() { super::super::b::f() }"), through_b);
+    let to_parent = Some("a::c a::c::deep a::c".to_owned());
+    assert_eq!(closed("use super::f;"), to_parent);
+    assert_eq!(closed("fn f() { super::f() }"), to_parent);
+    assert_eq!(closed("use super::*;"), to_parent);
+    let to_top = closed("use crate::a::call;").unwrap();
+    assert!(to_top.ends_with("a::c::deep a"), "{to_top}");
+    let codes = [
+        ("a::b::x".to_owned(), "use crate::a::c::x;"),
+        ("a::b::y".to_owned(), ""),
+        ("a::c::x".to_owned(), ""),
+        ("a::c::y".to_owned(), "use crate::a::b::y;"),
+    ];
+    assert_eq!(circle(&arrows(&codes)), None);
+    let between = circle(&folders(&arrows(&codes))).unwrap();
+    assert_eq!(between, ["a::b", "a::c", "a::b"]);
 }
 
 #[test]
@@ -141,7 +195,7 @@ fn sources(root: &Path) -> Vec<Source> {
                 sources.push(Source {
                     path,
                     module: parts[0].clone(),
-                    depth: parts.len(),
+                    parts,
                     code,
                     shipped,
                 });
@@ -195,16 +249,22 @@ fn uses(code: &str, depth: usize) -> Vec<String> {
 
 /// The first name of a path, or of each path in a `{…}` list.
 fn heads(rest: &str, names: &mut Vec<String>) {
-    let word = |text: &str| -> String {
-        text.chars()
-            .take_while(|c| c.is_alphanumeric() || *c == '_')
-            .collect()
-    };
-    let Some(list) = rest.strip_prefix('{') else {
-        names.push(word(rest));
-        return;
-    };
-    let (mut level, mut start) = (1, 0);
+    match rest.strip_prefix('{') {
+        None => names.push(word(rest).to_owned()),
+        Some(list) => names.extend(listed(list).into_iter().map(|path| word(path).to_owned())),
+    }
+    names.retain(|name| !name.is_empty());
+}
+
+/// The name with which a path begins; `*` for all names.
+fn word(path: &str) -> &str {
+    let end = path.find(|c: char| !c.is_alphanumeric() && c != '_' && c != '*');
+    &path[..end.unwrap_or(path.len())]
+}
+
+/// What stands between commas up to the brace that closes a list.
+fn listed(list: &str) -> Vec<&str> {
+    let (mut level, mut start, mut items) = (1, 0, Vec::new());
     for (at, c) in list.char_indices() {
         level += match c {
             '{' => 1,
@@ -212,14 +272,119 @@ fn heads(rest: &str, names: &mut Vec<String>) {
             _ => 0,
         };
         if level == 0 || (level == 1 && c == ',') {
-            names.push(word(list[start..at].trim()));
+            items.push(list[start..at].trim());
             start = at + 1;
         }
         if level == 0 {
             break;
         }
     }
-    names.retain(|name| !name.is_empty());
+    items
+}
+
+/// Which of these modules each of them uses; one with parts uses them all.
+fn arrows(codes: &[(String, &str)]) -> BTreeMap<String, BTreeSet<String>> {
+    let modules: BTreeSet<&String> = codes.iter().map(|(module, _)| module).collect();
+    let known = |path: &[String]| {
+        let prefixes = (1..=path.len()).rev().map(|end| path[..end].join("::"));
+        prefixes.into_iter().find(|prefix| modules.contains(prefix))
+    };
+    let of = |(module, code): &(String, &str)| {
+        let used = full_paths(code, module);
+        let mut used: BTreeSet<String> = used.iter().filter_map(|path| known(path)).collect();
+        let is_part = |other: &&&String| {
+            let own = other.strip_prefix(module.as_str());
+            own.and_then(|own| own.strip_prefix("::"))
+                .is_some_and(|own| !own.contains("::"))
+        };
+        used.extend(modules.iter().filter(is_part).map(|part| (*part).clone()));
+        used.remove(module);
+        (module.clone(), used)
+    };
+    codes.iter().map(of).collect()
+}
+
+/// The same between the parts of the topmost module.
+fn folders(arrows: &BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTreeSet<String>> {
+    let folder = |module: &String| {
+        let parts: Vec<&str> = module.split("::").take(2).collect();
+        parts.join("::")
+    };
+    let mut all: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for (module, used) in arrows {
+        let own = all.entry(folder(module)).or_default();
+        own.extend(used.iter().map(folder));
+        own.remove(&folder(module));
+    }
+    all
+}
+
+/// Paths from the crate's root that follow `crate::` or `super::` in a module, lists spelled out.
+fn full_paths(code: &str, module: &str) -> Vec<Vec<String>> {
+    let mut paths = Vec::new();
+    let starts = |at: usize| {
+        let before = &code[..at];
+        let inside = before.ends_with(|c: char| c.is_alphanumeric() || "_$:".contains(c));
+        !inside && !before.ends_with("(in ")
+    };
+    for (at, root) in code.match_indices("crate::") {
+        if starts(at) {
+            spell(&code[at + root.len()..], &[], &mut paths);
+        }
+    }
+    let parts: Vec<String> = module.split("::").map(str::to_owned).collect();
+    for (at, _) in code.match_indices("super::") {
+        let rest = code[at..].trim_start_matches("super::");
+        let up = (code.len() - at - rest.len()) / "super::".len();
+        if starts(at) && up <= parts.len() {
+            spell(rest, &parts[..parts.len() - up], &mut paths);
+        }
+    }
+    paths
+}
+
+/// The paths of a use tree behind `before`.
+fn spell(tree: &str, before: &[String], paths: &mut Vec<Vec<String>>) {
+    if let Some(list) = tree.strip_prefix('{') {
+        listed(list)
+            .into_iter()
+            .for_each(|tree| spell(tree, before, paths));
+        return;
+    }
+    let name = word(tree);
+    let mut path = before.to_vec();
+    if name != "self" {
+        path.push(name.to_owned());
+    }
+    match tree[name.len()..].strip_prefix("::") {
+        Some(rest) => spell(rest, &path, paths),
+        None => paths.push(path),
+    }
+}
+
+/// A shortest way from a module back to itself, if there is one.
+fn circle(arrows: &BTreeMap<String, BTreeSet<String>>) -> Option<Vec<String>> {
+    let from = |start: &String| {
+        let mut ways = vec![vec![start.clone()]];
+        let mut seen = BTreeSet::new();
+        while !ways.is_empty() {
+            let mut longer = Vec::new();
+            for way in ways {
+                for next in way.last().and_then(|last| arrows.get(last))? {
+                    let way = [&way[..], std::slice::from_ref(next)].concat();
+                    if next == start {
+                        return Some(way);
+                    }
+                    if seen.insert(next.clone()) {
+                        longer.push(way);
+                    }
+                }
+            }
+            ways = longer;
+        }
+        None
+    };
+    arrows.keys().filter_map(from).min_by_key(Vec::len)
 }
 
 /// Code without its `#[cfg(test)]` items (to the end of their block or their semicolon).

@@ -1,6 +1,5 @@
 //! What a calibration can be told.
 
-use super::UnaskedRipple;
 use crate::infer::{Choice, InferenceSettings};
 use crate::likelihood::{NoiseModel, NoiseSettings, NoiseUncertainty};
 use crate::prior::PriorSettings;
@@ -79,4 +78,16 @@ impl Default for CalibrationSettings {
             most_bytes: None,
         }
     }
+}
+
+/// What becomes of gear ripple that is no candidate and that the residual shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum UnaskedRipple {
+    /// A candidate, where `library.families` are the usual ones: nobody said otherwise.
+    #[default]
+    Candidate,
+    /// The warning `ripple_seen`: families were chosen.
+    Told,
+    /// Nothing, it is not looked for: `ripple = {}`.
+    Ignored,
 }

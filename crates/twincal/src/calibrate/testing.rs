@@ -1,6 +1,6 @@
 //! Small regressions with known truth for the tests of this module: one joint, white columns, no robot behind them.
 
-use super::compact::refit;
+use super::fit::compact::refit;
 use crate::likelihood::{Columns, assemble};
 use crate::observations::{JointObservations, Observations, Part};
 use crate::plug_in::{Fit, start, total};
@@ -10,17 +10,17 @@ use crate::random::Random;
 use crate::signal::Auto;
 use crate::term::Family;
 
-pub(super) struct Regression {
-    pub(super) random: Random,
+pub(in crate::calibrate) struct Regression {
+    pub(in crate::calibrate) random: Random,
     rows: usize,
 }
 
-pub(super) fn part(log: &Observations) -> Part<'_> {
+pub(in crate::calibrate) fn part(log: &Observations) -> Part<'_> {
     log.whole()
 }
 
 impl Regression {
-    pub(super) fn new(seed: u64, rows: usize) -> Self {
+    pub(in crate::calibrate) fn new(seed: u64, rows: usize) -> Self {
         Self {
             random: Random::new(seed, 0),
             rows,
@@ -28,7 +28,7 @@ impl Regression {
     }
 
     /// Rows `y = Xβ + σε` with standard normal X and ε.
-    pub(super) fn log(&mut self, beta: &[f64], sigma: f64) -> Observations {
+    pub(in crate::calibrate) fn log(&mut self, beta: &[f64], sigma: f64) -> Observations {
         let rows = self.rows;
         let x: Vec<f64> = (0..rows * beta.len())
             .map(|_| self.random.normal())
@@ -80,7 +80,7 @@ impl Regression {
         }
     }
 
-    pub(super) fn prior() -> PriorSettings {
+    pub(in crate::calibrate) fn prior() -> PriorSettings {
         PriorSettings {
             scaled_variance: Auto::Value(100.0),
             inclusion: Some(Inclusion::Probability(0.5)),
@@ -92,7 +92,7 @@ impl Regression {
     }
 
     /// Independent rows, and the structure with both columns.
-    pub(super) fn fitted(&self, logs: &[Part<'_>]) -> (Fit, Posterior) {
+    pub(in crate::calibrate) fn fitted(&self, logs: &[Part<'_>]) -> (Fit, Posterior) {
         let (columns, prior) = (Self::columns(), Self::prior());
         let plug_in = start(logs, &columns, &prior);
         let gram = total(logs);

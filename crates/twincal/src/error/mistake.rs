@@ -45,7 +45,7 @@ const TABLE: &[(&str, Severity, Mistake)] = &[
     ("encoder_stuck", Warning, Mistake::OddMotion),
     // signal/jumps.rs
     ("position_step", Warning, Mistake::OddMotion),
-    // calibrate/another_state.rs
+    // calibrate/checks/another_state.rs
     ("another_state", Warning, Mistake::AnotherState),
 ];
 

@@ -124,7 +124,7 @@ BUGS = [
     ),
     (
         "blocks of left-out rows counted as one",
-        "calibrate/left_out.rs",
+        "calibrate/checks/left_out.rs",
         "(square / (count - 1.0) / count).sqrt()",
         "(square / (count - 1.0)).sqrt()",
     ),

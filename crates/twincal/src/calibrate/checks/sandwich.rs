@@ -1,0 +1,192 @@
+//! A second opinion on every sd that does not believe the likelihood: the spread of block scores (method section 5).
+//!
+//! With the compact twin's `A = Σ x xᵀ + V⁻¹` and the score `s_b = Σ_{rows of b} x r` of a stretch of time b over all joints
+//! (both weighted as in the fit)
+//!
+//! ```text
+//! Cov(β̂ − β) ≈ A⁻¹ (B/(B−1) Σ_b s_b s_bᵀ + φ V⁻¹) A⁻¹
+//! ```
+//!
+//! (Huber 1967; blocks for dependent rows as in Liang & Zeger 1986; the second part is the prior's own, so that what the data
+//! do not see stays as wide as the prior). The tempering cancels: A⁻¹ grows with max(τ, λ) as s_b sinks.
+
+use crate::error::{Finding, Severity};
+use crate::linear_algebra::Cholesky;
+use crate::observations::Part;
+use crate::plug_in::Fit;
+use crate::posterior::{Model, Posterior};
+
+/// Blocks at most and at least: each sd has a relative error of about 1/√(2B).
+const BLOCKS: (usize, usize) = (32, 8);
+/// Shortest block, in autocorrelation times.
+const TIMES: f64 = 4.0;
+/// Ratio of the two sds from which they disagree.
+const DISAGREE: f64 = 2.0;
+
+/// Both opinions on the sd of a term's coefficient.
+pub(in crate::calibrate) struct Sds<'a> {
+    /// Name of the term.
+    pub(in crate::calibrate) term: &'a str,
+    pub(in crate::calibrate) sandwich: Option<f64>,
+    pub(in crate::calibrate) likelihood: Option<f64>,
+}
+
+/// Sandwich sd of every column of the compact twin, K; `None` of the others, and where there are too few blocks.
+pub(in crate::calibrate) fn sds(
+    fit: &Fit,
+    compact: &Posterior,
+    training: &[Part<'_>],
+) -> Vec<Option<f64>> {
+    let nothing = vec![None; compact.mean.len()];
+    let Some(model) = compact.models.first() else {
+        return nothing;
+    };
+    let blocks = blocks(fit, training);
+    if blocks.len() < BLOCKS.1 || model.members.is_empty() {
+        return nothing;
+    }
+    let scores: Vec<Vec<f64>> = blocks
+        .iter()
+        .map(|block| score(fit, compact, model, block))
+        .collect();
+    let size = model.members.len();
+    let inverse = Cholesky::from_lower(model.factor.clone(), size).inverse();
+    let count = scores.len() as f64;
+    let mut out = nothing;
+    for (place, &member) in model.members.iter().enumerate() {
+        let row = &inverse[place * size..(place + 1) * size];
+        let along = |score: &Vec<f64>| row.iter().zip(score).map(|(a, s)| a * s).sum::<f64>();
+        let square: f64 = scores.iter().map(|score| along(score).powi(2)).sum();
+        let slab = |m: &u32| fit.problem.prior.slab[*m as usize];
+        let own = row.iter().zip(&model.members).map(|(a, m)| a * a / slab(m));
+        let prior = compact.noise * own.sum::<f64>();
+        out[member as usize] = Some((square * count / (count - 1.0) + prior).sqrt());
+    }
+    out
+}
+
+/// Stretches of time of about equal length, none shorter than a few autocorrelation times where that is possible.
+fn blocks<'a>(fit: &Fit, training: &[Part<'a>]) -> Vec<Part<'a>> {
+    let rows: usize = training.iter().map(|part| part.rows.len()).sum();
+    let times = fit.plug_in.autocorrelation_time.iter().copied();
+    let shortest = (TIMES * times.fold(1.0, f64::max)).ceil() as usize;
+    let count = (rows / shortest.max(1)).clamp(BLOCKS.1, BLOCKS.0);
+    let mut out = Vec::new();
+    for part in training {
+        let own = (count * part.rows.len()).div_ceil(rows.max(1));
+        let cut = |i: usize| part.rows.start + i * part.rows.len() / own;
+        for i in 0..own {
+            let rows = cut(i)..cut(i + 1);
+            if !rows.is_empty() {
+                out.push(Part {
+                    observations: part.observations,
+                    rows,
+                });
+            }
+        }
+    }
+    out
+}
+
+/// `Σ w/(cτ) x r` over the moving rows of a block, in the order of the model's members.
+fn score(fit: &Fit, compact: &Posterior, model: &Model, block: &Part<'_>) -> Vec<f64> {
+    let mut place = vec![None; compact.mean.len()];
+    for (at, &member) in model.members.iter().enumerate() {
+        place[member as usize] = Some(at);
+    }
+    let (all, len) = (block.observations, block.observations.len());
+    let mut score = vec![0.0; model.members.len()];
+    for (joint, rows) in all.joints.iter().enumerate() {
+        let mut residual = block.residual(joint, &compact.mean, block.rows.clone());
+        for (r, row) in residual.iter_mut().zip(block.rows.clone()) {
+            let counts = rows.weight.get(row).copied().unwrap_or(1.0);
+            *r *= if rows.standstill[row] { 0.0 } else { counts };
+        }
+        let factor = fit.plug_in.factor(joint);
+        rows.visit_columns(len, block.rows.clone(), &mut |piece, columns| {
+            let residual = &residual[piece.start - block.rows.start..][..piece.len()];
+            for (i, &column) in rows.columns.iter().enumerate() {
+                let Some(at) = place[column] else { continue };
+                let x = columns.of(i, 0, piece.len());
+                let sum: f64 = x.iter().zip(residual).map(|(x, r)| x * r).sum();
+                score[at] += factor * sum;
+            }
+        });
+    }
+    score
+}
+
+/// One finding for all terms whose block scores spread more than twice as far as the likelihood says.
+pub(in crate::calibrate) fn findings<'a>(terms: impl Iterator<Item = Sds<'a>>) -> Vec<Finding> {
+    let ratio = |sds: Sds<'a>| -> Option<(&'a str, f64)> {
+        let ratio = sds.sandwich? / sds.likelihood?;
+        (ratio > DISAGREE).then_some((sds.term, ratio))
+    };
+    let mut found: Vec<(&str, f64)> = terms.filter_map(ratio).collect();
+    found.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let Some((name, ratio)) = found.first() else {
+        return Vec::new();
+    };
+    let others = match found.len() {
+        1 => String::new(),
+        n => format!(" and {} more (terms[].sandwich_sd)", n - 1),
+    };
+    vec![Finding::new(
+        Severity::Warning,
+        "sd_too_small",
+        *name,
+        format!(
+            "the sd of `{name}`{others} may be too small: stretches of the logs disagree on it {ratio:.1} times more than the \
+             likelihood says"
+        ),
+        found.len() as u64,
+    )]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::testing::{Regression, part};
+
+    /// Sandwich over likelihood sd of both columns.
+    fn ratios(random: &Regression, log: &crate::observations::Observations) -> Vec<f64> {
+        let logs = [part(log)];
+        let (fit, compact) = random.fitted(&logs);
+        let sds = sds(&fit, &compact, &logs);
+        sds.iter()
+            .zip(&compact.sd)
+            .map(|(s, sd)| s.unwrap() / sd)
+            .collect()
+    }
+
+    /// White rows: both agree (32 blocks: relative error 1/√64 = 0.125, 4.5 of them allowed).
+    #[test]
+    fn on_white_noise_both_opinions_agree() {
+        let mut random = Regression::new(8, 6400);
+        let log = random.log(&[2.0, -1.0], 1.0);
+        for ratio in ratios(&random, &log) {
+            assert!((ratio - 1.0).abs() < 0.56, "{ratio}");
+        }
+    }
+
+    /// A column and an error that are both constant over 50 rows: √50 = 7.1 times the sd of white rows, within 56 %.
+    #[test]
+    fn a_correlated_residual_is_seen_by_the_blocks() {
+        let mut random = Regression::new(9, 6400);
+        let mut log = random.log(&[2.0, -1.0], 1.0);
+        let joint = &mut log.joints[0];
+        for start in (0..6400).step_by(50) {
+            let (x, noise) = (joint.x[start], random.random.normal());
+            for row in start..start + 50 {
+                joint.x[row] = x;
+                joint.y[row] = 2.0 * x - joint.x[6400 + row] + noise;
+            }
+        }
+        let ratios = ratios(&random, &log);
+        assert!(
+            (ratios[0] / 50.0_f64.sqrt() - 1.0).abs() < 0.56,
+            "{ratios:?}"
+        );
+        assert!((ratios[1] - 1.0).abs() < 0.56, "{ratios:?}");
+    }
+}

@@ -1,0 +1,66 @@
+//! What a fit must say of itself: chains that disagree, an iteration that did not settle, correlation that the likelihood ignores.
+
+use crate::calibrate::fit::fitted::Fitted;
+use crate::calibrate::settings::CalibrationSettings;
+use crate::error::{Finding, Severity};
+use crate::infer::R_HAT_LIMIT;
+use crate::likelihood::NoiseModel;
+use crate::observations::Part;
+use crate::plug_in::residual_correlation_time;
+use crate::posterior::Method;
+use crate::robot::Robot;
+
+/// What the fit itself must say: residual correlation that the likelihood ignores, an iteration that did not settle.
+pub(in crate::calibrate) fn findings(
+    robot: &Robot,
+    fitted: &Fitted,
+    settings: &CalibrationSettings,
+    training: &[Part<'_>],
+) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    if let Method::Gibbs { chains, r_hat, .. } = fitted.fit.posterior.method
+        && r_hat > R_HAT_LIMIT
+    {
+        findings.push(Finding::new(
+            Severity::Warning,
+            "chains_disagree",
+            "",
+            format!(
+                "the {chains} chains disagree (R-hat {r_hat:.3}, limit {R_HAT_LIMIT}) and were accepted as allowed: \
+                 probabilities and coefficients may change with the seed; raise inference.draws"
+            ),
+            chains as u64,
+        ));
+    }
+    if !fitted.fit.converged {
+        findings.push(Finding::new(
+            Severity::Warning,
+            "plug_ins_not_settled",
+            "",
+            format!(
+                "noise weights or slab scale still moved after {} rounds; probabilities near 0.5 may change in the second digit",
+                fitted.fit.rounds
+            ),
+            fitted.fit.rounds as u64,
+        ));
+    }
+    if settings.noise.model == NoiseModel::Iid {
+        for (joint, name) in robot.joint_names().into_iter().enumerate() {
+            let time = residual_correlation_time(training, joint, &fitted.fit.posterior.mean);
+            if time > 2.0 {
+                findings.push(Finding::new(
+                    Severity::Warning,
+                    "residual_correlated",
+                    name,
+                    format!(
+                        "joint `{name}`: the residual stays alike for {time:.1} rows, which noise.model = \"iid\" ignores: \
+                         sds are about {:.1} times too small; use \"tempered\"",
+                        time.sqrt()
+                    ),
+                    0,
+                ));
+            }
+        }
+    }
+    findings
+}

@@ -1,0 +1,183 @@
+//! Found inertias that no rigid body has (case 94).
+
+use super::calibration::Calibration;
+use super::status::{Status, StatusReason};
+use crate::error::{Finding, Severity};
+use crate::posterior::draws::Drawer;
+use crate::robot::{Robot, base_parameters, inertia_of, principal_axes};
+use crate::term::{Library, ModelColumn};
+
+/// Draws that are looked at.
+const DRAWS: usize = 1000;
+/// Random stream of those draws.
+const STREAM: u64 = (1 << 32) + 2;
+/// Share of consistent draws below which the found inertia contradicts every rigid body; above, it is uncertain.
+const CONTRADICTS: f64 = 0.05;
+/// Share below which it is worth telling.
+const WORTH_TELLING: f64 = 0.5;
+/// Behind the words of a component that contradicts every rigid body.
+const NO_BODY: &str = "; no rigid body has such an inertia";
+/// Rounding in the triangle inequality, as a share of the largest moment.
+const ROUNDING: f64 = 1e-9;
+/// The same share for draws: a point mass or a thin rod lies on the bound, and half of what is found of it beyond.
+const NEARLY: f64 = 0.01;
+
+/// A found inertia that is none.
+pub(in crate::calibrate) struct Unphysical {
+    finding: Finding,
+    /// Share of the draws that are those of a rigid body.
+    share: f64,
+    /// What was found of it.
+    components: Vec<usize>,
+}
+
+/// One finding for each body with a found inertial component of which fewer than half of the posterior draws are those of a
+/// rigid body: positive mass and a positive semidefinite pseudo-inertia, which is that the principal moments about the
+/// centre of mass obey the triangle inequality. Where torque shows nothing of the moments across the joint's axis, only
+/// the mass and the moment about the axis are judged.
+///
+/// # Source
+/// Wensing, Kim, Slotine 2018 (linear matrix inequalities for physically consistent inertial parameters).
+pub(in crate::calibrate) fn findings(
+    robot: &Robot,
+    library: &Library,
+    calibration: &Calibration,
+    drawer: &Drawer<'_>,
+    seed: u64,
+) -> Vec<Unphysical> {
+    let found = |column: usize| {
+        let term = &library.terms()[library.columns()[column]];
+        calibration.components[term.component].is_in()
+    };
+    let mut columns: Vec<Vec<(usize, [f64; 10])>> = vec![Vec::new(); robot.bodies().len()];
+    let mut asked = vec![false; columns.len()];
+    for column in 0..library.columns().len() {
+        if let Some(ModelColumn::Inertia { body, weights }) = library.model_column(column) {
+            columns[*body].push((column, *weights));
+            asked[*body] |= found(column);
+        }
+    }
+    if !asked.contains(&true) {
+        return Vec::new();
+    }
+    let hidden = base_parameters(robot).unidentifiable;
+    let draws = drawer.draw(DRAWS, seed, STREAM);
+    let count = draws.models.len();
+    let mut all = Vec::new();
+    for (body, name) in robot.bodies().into_iter().enumerate() {
+        let across = ["Ixx", "Iyy"].map(|moment| hidden.contains(&format!("{name}.{moment}")));
+        let whole = !across.contains(&true);
+        let nominal = robot.parameters_of_body(body);
+        if !asked[body] || !is_physical(&nominal, whole, ROUNDING) {
+            continue;
+        }
+        let parameters = |row: usize| {
+            let beta = &draws.beta[row * draws.columns..(row + 1) * draws.columns];
+            let mut parameters = nominal;
+            for (column, weights) in &columns[body] {
+                for (parameter, weight) in parameters.iter_mut().zip(weights) {
+                    *parameter += weight * beta[*column];
+                }
+            }
+            parameters
+        };
+        let bodies = (0..count).filter(|row| is_physical(&parameters(*row), whole, NEARLY));
+        let share = bodies.count() as f64 / count.max(1) as f64;
+        if share < WORTH_TELLING {
+            let of_column = |(column, _): &(usize, [f64; 10])| {
+                library.terms()[library.columns()[*column]].component
+            };
+            let mut components: Vec<usize> = columns[body].iter().map(of_column).collect();
+            components.dedup();
+            components.retain(|component| calibration.components[*component].is_in());
+            all.push(Unphysical {
+                finding: finding(name, share),
+                share,
+                components,
+            });
+        }
+    }
+    all
+}
+
+/// Says it, and at once where the numbers stand.
+pub(in crate::calibrate) fn tell(calibration: &mut Calibration, unphysical: Vec<Unphysical>) {
+    for Unphysical {
+        finding,
+        share,
+        components,
+    } in unphysical
+    {
+        for component in components {
+            let own = &mut calibration.components[component];
+            own.rigid_share = Some(share);
+            own.no_rigid_body = share < CONTRADICTS;
+            if own.no_rigid_body {
+                (own.status, own.reason) = (Status::Tentative, StatusReason::NoRigidBody { share });
+                own.words.push_str(NO_BODY);
+            }
+        }
+        calibration.findings.push(finding);
+    }
+}
+
+fn finding(link: &str, share: f64) -> Finding {
+    let (severity, remedy) = if share < CONTRADICTS {
+        (
+            Severity::Warning,
+            "torque is predicted as measured, but do not read these numbers as a body: look for an effect that is missing \
+             among the candidates, or for wrong inertias in the model",
+        )
+    } else {
+        (
+            Severity::Note,
+            "these logs leave its inertia open: motion that shows more of it would narrow it",
+        )
+    };
+    Finding::new(
+        severity,
+        "unphysical_inertia_found",
+        link,
+        format!(
+            "link `{link}`: {:.1} % of the posterior draws of its inertia (with what it carries) are those of a rigid body; \
+             {remedy}",
+            100.0 * share
+        ),
+        0,
+    )
+}
+
+/// Positive mass, and moments that a distribution of mass can have; without `whole` only the one about z.
+fn is_physical(parameters: &[f64; 10], whole: bool, rounding: f64) -> bool {
+    let Some(inertia) = inertia_of(parameters) else {
+        return false;
+    };
+    let ([small, middle, large], _) = principal_axes(&inertia.tensor);
+    let rounding = rounding * (large.abs() + parameters[9].abs());
+    if whole {
+        small >= -rounding && small + middle >= large - rounding
+    } else {
+        inertia.tensor[2][2] >= -rounding
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rods_and_plates_are_on_the_bound_and_less_is_beyond() {
+        // A thin rod of 1 kg and 1 m along x about its end, a plate, and a body whose moments no mass has.
+        let rod = [1.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / 3.0, 0.0, 1.0 / 3.0];
+        let plate = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, 0.0, 3.0];
+        let is_physical = |parameters: &[f64; 10], whole| is_physical(parameters, whole, ROUNDING);
+        assert!(is_physical(&rod, true) && is_physical(&plate, true));
+        let mut wrong = plate;
+        wrong[9] = 3.01;
+        assert!(!is_physical(&wrong, true) && is_physical(&wrong, false));
+        let mut hollow = rod;
+        hollow[9] = 0.24; // less than m c²
+        assert!(!is_physical(&hollow, false));
+        assert!(!is_physical(&[0.0; 10], true));
+    }
+}

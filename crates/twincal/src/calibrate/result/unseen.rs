@@ -1,0 +1,154 @@
+//! What the fit logs do not show, why, and which motion would.
+
+use super::calibration::Calibration;
+use super::status::{Status as Said, StatusReason};
+use crate::calibrate::data::all_logs::Data;
+use crate::error::{Finding, Severity};
+use crate::excitation::{Excitation, STATES, Seen, States, excitation as compare, sentence};
+use crate::gram::Gram;
+use crate::robot::Robot;
+use crate::term::{Family, Library, Status};
+
+/// Sentences at most.
+const TOLD: usize = 5;
+/// Names that a sentence holds at most.
+const NAMES: usize = 4;
+
+/// What the fit logs, whose statistics are `gram`, show of all candidates, those included whose columns (`dropped`) are zero on all rows.
+pub(in crate::calibrate) fn excitation(
+    robot: &Robot,
+    library: &Library,
+    dropped: &[usize],
+    gram: &Gram,
+    data: &Data,
+) -> Excitation {
+    let kept: Vec<u32> = (0..library.columns().len())
+        .filter(|column| !dropped.contains(column))
+        .map(|column| column as u32)
+        .collect();
+    let mut joints = gram.joints.clone();
+    for joint in &mut joints {
+        let columns = joint.columns.iter_mut();
+        columns.for_each(|column| *column = kept[*column as usize]);
+    }
+    compare(robot, library, &Gram { joints }, &states(robot, data))
+}
+
+/// Rows of all fit logs, evenly taken.
+fn states(robot: &Robot, data: &Data) -> States {
+    let count: usize = data.fit.iter().map(|log| log.observations.len()).sum();
+    let step = (count / STATES).max(1);
+    let mut states = States::default();
+    for joint in 0..robot.dof() {
+        for log in &data.fit {
+            let all = &log.observations;
+            let motion = [&all.q, &all.qd, &all.qdd].map(|motion| motion[joint].get());
+            for row in (0..all.len()).step_by(step) {
+                let [q, qd, qdd] = [0, 1, 2].map(|channel| motion[channel][row]);
+                states.q.push(q);
+                states.qd.push(qd);
+                states.qdd.push(qdd);
+                states.still.push(all.joints[joint].standstill[row]);
+            }
+        }
+    }
+    states.len = states.q.len() / robot.dof();
+    states
+}
+
+/// Says what is not seen and why: in findings, and in the words of the components.
+pub(in crate::calibrate) fn tell(calibration: &mut Calibration, excitation: &Excitation) {
+    let mut weak: Vec<String> = Vec::new();
+    let mut never: Vec<String> = Vec::new();
+    for (component, excited) in calibration
+        .components
+        .iter_mut()
+        .zip(&excitation.components)
+    {
+        let is_zero = |name: &String| {
+            let term = calibration.terms.iter().find(|t| t.term.name == *name);
+            term.is_some_and(|t| t.term.status == Status::ZeroColumn)
+        };
+        if component.reason == StatusReason::NoColumn && component.columns.iter().any(is_zero) {
+            component.reason = StatusReason::NoTorqueInLogs;
+        }
+        if !component.is_unseen() {
+            continue;
+        }
+        let joints = excitation.unseen.iter().filter(|unseen| {
+            let in_list = |list: &[String]| list.contains(&component.name);
+            in_list(&unseen.nothing_of) || in_list(&unseen.not_apart)
+        });
+        let joints: Vec<String> = joints
+            .filter_map(|unseen| Some(format!("`{}`", unseen.joint.as_ref()?)))
+            .collect();
+        let why = if !joints.is_empty() {
+            format!("move {} more", joints.join(" and "))
+        } else if component.family == Family::Hysteresis {
+            "the joint travels too little in these logs".to_owned()
+        } else if excited.seen == Seen::Never {
+            "no motion of this robot shows it".to_owned()
+        } else if !component.alias_of.is_empty() {
+            never.push(component.name.clone());
+            let others = some(&component.alias_of);
+            format!("in every motion of this robot its torque is also that of {others}")
+        } else {
+            weak.push(component.name.clone());
+            "its torque in these logs is small against the noise: move faster, or log longer"
+                .to_owned()
+        };
+        component.words = format!("{}: not seen: {why}", component.story);
+    }
+    // What others tell is not lost.
+    let unseen: Vec<&String> = calibration.unseen().map(|own| &own.name).collect();
+    weak.retain(|name| unseen.contains(&name));
+    never.retain(|name| unseen.contains(&name));
+    let mut findings = Vec::new();
+    // What hides only behind absent candidates is nobody's question.
+    let matters = |name: &String| {
+        let summary = calibration.components.iter().find(|c| c.name == *name);
+        summary.is_some_and(|c| c.status != Said::Absent)
+    };
+    let asked = excitation
+        .unseen
+        .iter()
+        .filter(|unseen| !unseen.nothing_of.is_empty() || unseen.not_apart.iter().any(matters));
+    for unseen in asked.take(TOLD) {
+        findings.push(Finding::new(
+            Severity::Note,
+            "unseen_motion",
+            unseen.joint.clone().unwrap_or_default(),
+            sentence(unseen),
+            unseen.directions as u64,
+        ));
+    }
+    if !weak.is_empty() {
+        let message = format!(
+            "not seen: {}; their torque in these logs is small against the noise: move faster, or log longer",
+            some(&weak)
+        );
+        findings.push(not_seen(message, &weak));
+    }
+    if !never.is_empty() {
+        let message = format!(
+            "not seen: {}; in every motion of this robot their torque is also that of other candidates",
+            some(&never)
+        );
+        findings.push(not_seen(message, &never));
+    }
+    calibration.findings.extend(findings);
+}
+
+fn not_seen(message: String, names: &[String]) -> Finding {
+    let (subject, count) = (names.join(", "), names.len() as u64);
+    Finding::new(Severity::Note, "not_seen", subject, message, count)
+}
+
+/// "a, b and 3 more".
+fn some(names: &[String]) -> String {
+    if names.len() > NAMES {
+        let (shown, rest) = names.split_at(NAMES - 1);
+        return format!("{} and {} more", shown.join(", "), rest.len());
+    }
+    names.join(", ")
+}
