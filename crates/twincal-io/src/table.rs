@@ -291,8 +291,8 @@ mod tests {
 
     #[test]
     fn parquet_reads_back_to_the_same_doubles() {
-        use parquet::file::reader::{FileReader, SerializedFileReader};
-        use parquet::record::RowAccessor;
+        use ::parquet::file::reader::{FileReader, SerializedFileReader};
+        use ::parquet::record::RowAccessor;
         let mut file = tempfile::tempfile().unwrap();
         file.write_all(&written(TableFormat::Parquet)).unwrap();
         let reader = SerializedFileReader::new(file).unwrap();

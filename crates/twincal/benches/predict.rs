@@ -64,7 +64,6 @@ fn main() {
         misfit: 1.0,
         interval_factor: 1.0,
         spread: Default::default(),
-        sampled: None,
         out_of_band: 0.0,
     };
     let columns: Vec<usize> = (0..COLUMNS).collect();

@@ -70,8 +70,7 @@ pub struct Prior {
     pub odds: Vec<f64>,
     /// β_k ≥ lower_k (≤ 0, so that 0 is allowed); −∞: free, K. The slab is truncated there and normalised again.
     pub lower: Vec<f64>,
-    /// Bounds on sums of coefficients; the slab of a model is truncated to what acts there and normalised again. Not kept where noise is
-    /// sampled ([`crate::infer::sample`]).
+    /// Bounds on sums of coefficients; the slab of a model is truncated to what acts there and normalised again.
     pub halves: Vec<HalfSpace>,
     /// Inclusion.
     pub inclusion: Inclusion,

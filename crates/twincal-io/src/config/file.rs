@@ -385,7 +385,7 @@ pub struct SignalTable {
     pub lag: Option<LagOrAuto>,
     /// Default true: where what is left of the torque is noise of one memory (an AR(1)) on every joint, the fit goes on up to four
     /// times the automatic cut-off with `noise.model = "ar1"`; a note says so. false: never. Nor does it where `cutoff_hz`, `rate_hz` or
-    /// `noise.model` is stated, rows are weighed (`noise.robust`, `varies_with_…`) or the noise is sampled.
+    /// `noise.model` is stated, or rows are weighed (`noise.robust`, `varies_with_…`).
     pub wider_band: Option<bool>,
     /// "logged": as logged, where they are; "position": not used but derived from position. Default: as logged, but from position where the
     /// logged one has by far more noise (finding `noisy_velocity`).
@@ -496,19 +496,6 @@ pub struct NoiseTable {
     pub varies_with_speed: Option<bool>,
     /// The noise of a joint may change with the size of its nominal torque (likewise); with "tempered" only; default false.
     pub varies_with_load: Option<bool>,
-    /// "plug_in" (default): noise and autocorrelation at their estimates; "sampled": drawn together with structure and
-    /// coefficients, with "ar1" and "iid" only.
-    pub uncertainty: Option<UncertaintyWord>,
-}
-
-/// How the noise itself is known.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum UncertaintyWord {
-    /// At its estimate.
-    PlugIn,
-    /// Drawn like everything else.
-    Sampled,
 }
 
 /// A likelihood.

@@ -24,7 +24,7 @@ pub use file::{
     Allow, AutoWord, BaseTable, CheckTable, ConfigFile, FamilyWord, Friction, InclusionTable,
     InferenceTable, LagOrAuto, LibraryTable, LogEntry, LogTable, MethodWord, ModelTable,
     NoisePrior, NoiseTable, NoiseWord, NumberOrAuto, OutputTable, PayloadKey, PresetWord,
-    PriorTable, SignalTable, Slab, Topics, TorqueWord, UncertaintyWord, UnknownWord, VelocityWord,
+    PriorTable, SignalTable, Slab, Topics, TorqueWord, UnknownWord, VelocityWord,
 };
 pub use kept_columns::Attempt;
 pub use log_form::LogForm;

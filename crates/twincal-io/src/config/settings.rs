@@ -2,7 +2,7 @@
 
 use super::{
     Allow, Config, LagOrAuto, LogForm, MethodWord, NoisePrior, NoiseWord, NumberOrAuto, PayloadKey,
-    PerJoint, Slab, UncertaintyWord, VelocityWord,
+    PerJoint, Slab, VelocityWord,
 };
 use crate::error::Result;
 use crate::log::LogOptions;
@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use twincal::calibrate::CalibrationSettings;
 use twincal::infer::{Choice, InferenceSettings, LEAST_CHAINS, LEAST_DRAWS};
-use twincal::likelihood::{NoiseModel, NoiseSettings, NoiseUncertainty};
+use twincal::likelihood::{NoiseModel, NoiseSettings};
 use twincal::prior::{Inclusion, PriorSettings};
 use twincal::signal::{Auto, Corrections, DerivedFrom, Lag, Payload, SignalSettings};
 use twincal::term::{Family, LibrarySettings};
@@ -500,10 +500,6 @@ impl Config {
             robust: table.robust.unwrap_or(false),
             varies_with_speed: table.varies_with_speed.unwrap_or(false),
             varies_with_load: table.varies_with_load.unwrap_or(false),
-            uncertainty: match table.uncertainty {
-                None | Some(UncertaintyWord::PlugIn) => NoiseUncertainty::PlugIn,
-                Some(UncertaintyWord::Sampled) => NoiseUncertainty::Sampled,
-            },
         }
     }
 

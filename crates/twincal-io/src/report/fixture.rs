@@ -207,7 +207,6 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
             interval_factor: 1.08,
             out_of_band: 0.021,
             spread: Default::default(),
-            sampled: None,
         })
         .collect();
     let decay = |memory: f64| {

@@ -153,14 +153,8 @@ pub(super) fn noise(joints: &[Joint<'_>]) -> Table {
         let noise = joint.noise;
         table.rows.push(vec![
             joint.name.into(),
-            with_interval(
-                with_unit(noise.sigma, joint.units.torque),
-                noise.sampled.map(|sampled| sampled.sigma95),
-            ),
-            with_interval(
-                number(noise.rho, 3),
-                noise.sampled.and_then(|sampled| sampled.rho95),
-            ),
+            with_unit(noise.sigma, joint.units.torque),
+            number(noise.rho, 3),
             number(noise.weight, 3),
             count(noise.n.max(0.0).round() as u64),
             number(noise.n_eff, 3),
@@ -173,14 +167,6 @@ pub(super) fn noise(joints: &[Joint<'_>]) -> Table {
         table.drop_column(RHO);
     }
     table
-}
-
-/// A number with the central 95 % of its draws, where it was drawn.
-fn with_interval(value: String, interval: Option<[f64; 2]>) -> String {
-    match interval {
-        None => value,
-        Some([low, high]) => format!("{value} ({} … {})", number(low, 3), number(high, 3)),
-    }
 }
 
 /// The motion that the twin knows, per joint.

@@ -1,7 +1,7 @@
 //! What a calibration can be told.
 
 use crate::infer::{Choice, InferenceSettings};
-use crate::likelihood::{NoiseModel, NoiseSettings, NoiseUncertainty};
+use crate::likelihood::{NoiseModel, NoiseSettings};
 use crate::prior::PriorSettings;
 use crate::signal::{Auto, Corrections, SignalSettings};
 use crate::term::{Family, LibrarySettings};
@@ -62,7 +62,6 @@ impl Default for CalibrationSettings {
                 robust: false,
                 varies_with_speed: false,
                 varies_with_load: false,
-                uncertainty: NoiseUncertainty::PlugIn,
             },
             inference: InferenceSettings {
                 method: Choice::Auto,

@@ -12,7 +12,6 @@ mod gibbs;
 mod kin;
 mod moments;
 mod pivot;
-mod sampled;
 mod search;
 mod standard;
 mod tableau;
@@ -21,7 +20,6 @@ mod walker;
 mod testing;
 
 pub use gibbs::{LEAST_CHAINS, LEAST_DRAWS, R_HAT_LIMIT};
-pub use sampled::{Given, Sampled, sample, sampled_likelihood};
 
 use crate::error::{Error, Result};
 use crate::posterior::{Posterior, Problem};

@@ -2,8 +2,8 @@
 //!
 //! No unsafe code here: [`pulp`] holds the dispatch. A kernel is a type whose work sits in `#[inline(always)]` functions
 //! over `[f64; 8]`; `pulp::Arch::new().dispatch(kernel)` runs the copy of it that was compiled for this machine's
-//! widest vectors. The functions below use only + − × and bit operations, each rounded once: every instruction set
-//! gives the same bytes; [`sin_cos_fused`], for the robot's recursion, fuses where the instructions can.
+//! widest vectors. [`sin_cos`] uses only + − × and bit operations, each rounded once: every
+//! instruction set gives the same bytes. [`sin_cos_fused`], [`exp`], [`ln`] and [`tanh`] fuse where the instructions can.
 
 mod aligned;
 mod log_exp;

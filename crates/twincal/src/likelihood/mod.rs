@@ -25,32 +25,12 @@ pub enum NoiseModel {
     Ar1,
 }
 
-/// `[noise] uncertainty`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum NoiseUncertainty {
-    /// Weights and autocorrelation at their estimates.
-    #[default]
-    PlugIn,
-    /// Drawn together with structure and coefficients; with [`NoiseModel::Ar1`] and [`NoiseModel::Iid`].
-    Sampled,
-}
-
-/// What draws say of the noise of a joint.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct NoiseInterval {
-    /// Central 95 % of the stationary sd √(σ²/(1−ρ²)), N·m or N.
-    pub sigma95: [f64; 2],
-    /// Central 95 % of ρ; `None` unless `ar1`.
-    pub rho95: Option<[f64; 2]>,
-}
-
 /// `[noise]`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseSettings {
     /// Likelihood.
     pub model: NoiseModel,
-    /// One variance per joint; false: all w_j = 1 and, plugged in, one ρ.
+    /// One variance per joint; false: all w_j = 1 and one ρ.
     pub per_joint: bool,
     /// Outliers count less: Student-t weights of rows; with [`NoiseModel::Tempered`] only.
     pub robust: bool,
@@ -58,8 +38,6 @@ pub struct NoiseSettings {
     pub varies_with_speed: bool,
     /// The noise of a joint may change with the size of its nominal torque; with [`NoiseModel::Tempered`] only.
     pub varies_with_load: bool,
-    /// Plug-in noise or sampled noise.
-    pub uncertainty: NoiseUncertainty,
 }
 
 impl NoiseSettings {
@@ -96,9 +74,6 @@ pub struct JointNoise {
     /// How the noise in the band changes with the joint's speed and load.
     #[serde(default)]
     pub spread: Spread,
-    /// What draws say of sigma and ρ; `None` where they are plug-ins.
-    #[serde(default)]
-    pub sampled: Option<NoiseInterval>,
 }
 
 impl JointNoise {

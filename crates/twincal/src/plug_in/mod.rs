@@ -18,7 +18,7 @@ use crate::diagnostics::integrated_autocorrelation_time;
 use crate::error::Result;
 use crate::gram::Gram;
 use crate::infer::approximate;
-use crate::likelihood::{Columns, NoiseModel, NoiseSettings, NoiseUncertainty, PlugIn, assemble};
+use crate::likelihood::{Columns, NoiseModel, NoiseSettings, PlugIn, assemble};
 use crate::observations::Part;
 use crate::posterior::{Posterior, Problem};
 use crate::prior::PriorSettings;
@@ -197,9 +197,9 @@ pub fn moving_rows(parts: &[Part<'_>], joint: usize) -> f64 {
     parts.iter().map(moving).sum()
 }
 
-/// The filter that an autoregression of rows has to be told of. Where noise is drawn, it is one of the rows as they are.
+/// The filter that an autoregression of rows has to be told of.
 fn passband(training: &[Part<'_>], noise: NoiseSettings) -> Option<Passband> {
-    if noise.model != NoiseModel::Ar1 || noise.uncertainty != NoiseUncertainty::PlugIn {
+    if noise.model != NoiseModel::Ar1 {
         return None;
     }
     let cutoffs = training.iter().map(|part| part.observations.cutoff);

@@ -1,7 +1,7 @@
 //! The fixed point on a regression whose answer is known in closed form.
 
 use super::*;
-use crate::likelihood::{AUTO_SHAPE, NoiseUncertainty};
+use crate::likelihood::AUTO_SHAPE;
 use crate::observations::{JointObservations, Observations};
 use crate::prior::Inclusion;
 use crate::random::Random;
@@ -79,7 +79,6 @@ pub(super) fn noise(model: NoiseModel) -> NoiseSettings {
         robust: false,
         varies_with_speed: false,
         varies_with_load: false,
-        uncertainty: NoiseUncertainty::PlugIn,
     }
 }
 

@@ -267,7 +267,6 @@ fn the_metric_is_the_square_of_the_torque_between_two_robots() {
             interval_factor: 1.0,
             out_of_band: 0.0,
             spread: Spread::default(),
-            sampled: None,
         })
         .collect();
     let [q, qd, qdd] = random_states(&robot, 150);

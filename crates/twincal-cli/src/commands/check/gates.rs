@@ -194,7 +194,6 @@ pub(super) mod tests {
             interval_factor: 1.0,
             out_of_band: 0.0,
             spread: twincal::likelihood::Spread::default(),
-            sampled: None,
         };
         let own = Own {
             scores: own,

@@ -37,7 +37,6 @@ pub(in crate::calibrate) fn noise_of(
                     .map_or_else(|| left.sqrt(), |factors| factors[j]),
                 out_of_band: out_of_band[j],
                 spread: spreads[j].clone(),
-                sampled: fitted.sampled.get(j).copied(),
             }
         })
         .collect()

@@ -16,7 +16,7 @@
 use super::whiteness::{CUMULATED, Judged, Run, VARIANCES, judge};
 use crate::calibrate::settings::CalibrationSettings;
 use crate::error::{Error, Finding, Result, Severity};
-use crate::likelihood::{NoiseModel, NoiseUncertainty};
+use crate::likelihood::NoiseModel;
 use crate::observations::{Observations, observe};
 use crate::plug_in::Fit;
 use crate::robot::Robot;
@@ -108,7 +108,6 @@ fn may_widen(settings: &CalibrationSettings) -> bool {
         && signal.cutoff_hz == Auto::Auto
         && signal.rate_hz == Auto::Auto
         && noise.model == NoiseModel::Tempered
-        && noise.uncertainty == NoiseUncertainty::PlugIn
         && !noise.weighs_rows()
 }
 

@@ -55,10 +55,8 @@ pub(in crate::calibrate) fn estimate<'d>(
         return Err(Exit::Masked(masked));
     }
     findings.extend(seen.iter().map(Seen::told));
-    if fitted.sampled.is_empty() {
-        let fit = &fitted.fit;
-        fitted.fit.posterior = infer_near(&fit.problem, &fit.posterior, &settings.inference)?;
-    }
+    let fit = &fitted.fit;
+    fitted.fit.posterior = infer_near(&fit.problem, &fit.posterior, &settings.inference)?;
     Ok(Estimated {
         fitted,
         plan,
