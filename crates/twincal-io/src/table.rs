@@ -289,6 +289,7 @@ mod tests {
         }
     }
 
+    #[cfg(feature = "tables")]
     #[test]
     fn parquet_reads_back_to_the_same_doubles() {
         use ::parquet::file::reader::{FileReader, SerializedFileReader};
