@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 const MEDIAN: f64 = 0.5;
 
 /// The median-probability model (PIP ≥ 0.5) refitted jointly (Barbieri & Berger 2004); its held-out loss stands in
-/// [`Validation::compact`].
+/// [`Validation::compact`](crate::validate::Validation::compact).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Compact {
     /// Names of its components.

@@ -87,7 +87,7 @@ pub(in crate::calibrate) fn is_open(pip: f64, mcse: f64) -> bool {
     (pip - MEDIAN).abs() < 3.0 * mcse
 }
 
-/// Why the members of a [`Group`] cannot be told apart.
+/// Why the members of a [`Group`](crate::calibrate::Group) cannot be told apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Alike {
