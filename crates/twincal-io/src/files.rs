@@ -13,7 +13,7 @@ use twincal::calibrate::Calibration;
 use twincal::robot::Robot;
 use twincal::signal::Recording;
 
-/// A robot of a URDF or MJCF file, every movable joint moving. What the file left to be assumed is told by
+/// A robot of a URDF or MJCF file, every movable joint moving. What the file left to be assumed is in the findings of
 /// [`read_model`](crate::model::read_model), which also takes settings.
 ///
 /// # Errors
@@ -30,7 +30,7 @@ pub fn read_robot(path: impl AsRef<Path>) -> Result<Robot> {
     Ok(model.robot(&BTreeMap::new())?.0)
 }
 
-/// A log of any kind that is read, its columns matched to the joints by name. What had to be dropped or assumed is told by
+/// A log of any kind that is read, its columns matched to the joints by name. What had to be dropped or assumed is in the findings of
 /// [`read_log`](crate::log::read_log), which also takes options.
 ///
 /// # Errors

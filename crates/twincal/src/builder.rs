@@ -30,7 +30,11 @@ fn unwatched(_: Stage) -> ControlFlow<()> {
 /// let fit = Calibrate::new(&robot).logs([log]).heldout([other]).settings(settings).run()?;
 /// let payload = fit.effects().find(|effect| effect.name() == "payload").ok_or("none")?;
 /// let mass = payload.parameter("mass").ok_or("none")?;
-/// assert!((mass.mean - 0.6).abs() < 4.0 * mass.sd && payload.status() == Status::Established);
+/// let [low, high] = mass.interval95;
+/// assert!(low < 0.6 && 0.6 < high && payload.status() == Status::Established);
+/// for finding in &fit.findings {
+///     println!("{}", finding.message); // what was dropped, assumed or looks wrong
+/// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Calibrate<'a> {
@@ -38,7 +42,7 @@ pub struct Calibrate<'a> {
     logs: Vec<Log<'a>>,
     heldout: Vec<Log<'a>>,
     settings: CalibrationSettings,
-    watch: Box<dyn Fn(Stage) -> ControlFlow<()> + Sync + 'a>,
+    watch: Box<dyn Fn(Stage) -> ControlFlow<()> + Send + Sync + 'a>,
 }
 
 impl<'a> Calibrate<'a> {
@@ -75,9 +79,9 @@ impl<'a> Calibrate<'a> {
         self
     }
 
-    /// Is told of each stage before it begins, from the thread that runs; `Break` ends the calibration with [`Error::Cancelled`].
+    /// Is called with each stage before it begins, by the thread that runs; `Break` ends the calibration with [`Error::Cancelled`].
     #[must_use]
-    pub fn progress(mut self, watch: impl Fn(Stage) -> ControlFlow<()> + Sync + 'a) -> Self {
+    pub fn progress(mut self, watch: impl Fn(Stage) -> ControlFlow<()> + Send + Sync + 'a) -> Self {
         self.watch = Box::new(watch);
         self
     }

@@ -87,7 +87,12 @@ fn effects_come_by_status_and_probability_and_print_as_a_line() {
     );
     for pair in effects.windows(2) {
         let [a, b] = [&pair[0], &pair[1]];
-        assert!(a.status() != b.status() || a.pip() >= b.pip());
+        let rank = |effect: &Effect<'_>| match effect.status() {
+            Status::Established => 0,
+            Status::Equivalent => 1,
+            _ => 2,
+        };
+        assert!(rank(a) < rank(b) || rank(a) == rank(b) && a.pip() >= b.pip());
     }
     let payload = effects
         .iter()
@@ -164,6 +169,12 @@ fn torque_of_arrays_is_that_of_a_log_and_of_the_program() {
     let one = twin.torque(&q[..2], &qd[..2], &qdd[..2]).expect("torque");
     assert_eq!(one.low, torque.low[..2]);
     assert_eq!(twin.torque(&[], &[], &[]).expect("torque").mean, []);
+    let unknown = twin.torque(&[0.1, f64::NAN], &[0.0; 2], &[0.0; 2]);
+    let said = unknown.expect_err("not a number").to_string();
+    assert!(
+        said.starts_with("setting `q`: NaN for joint 2 of state 0"),
+        "{said}"
+    );
     for wrong in [&q[..3], &q[..4]] {
         let error = twin
             .torque(&q[..2], wrong, &qdd[..2])
@@ -172,8 +183,32 @@ fn torque_of_arrays_is_that_of_a_log_and_of_the_program() {
     }
 }
 
+/// Truth: the program that is exported, which carries what was found as well.
 #[test]
-fn whoever_watches_is_told_of_every_stage_and_can_end_it() {
+fn an_unknown_payload_that_was_found_is_carried() {
+    let study = study();
+    let loaded = study.training.clone().carrying(Payload::Unknown);
+    let empty = two_link::log("empty", 0.8, &study.robot, &mut Random::new(2, 0));
+    let fit = Calibrate::new(&study.robot).logs([loaded, empty]);
+    let fit = fit
+        .settings(study.settings.clone())
+        .run()
+        .expect("a calibration");
+    assert!(fit.twin.payload_where_unknown);
+    let state = [[0.2, 0.3], [0.5, -0.2], [0.1, 0.4]];
+    let torque = fit
+        .twin
+        .torque(&state[0], &state[1], &state[2])
+        .expect("torque");
+    let program = Evaluator::new(&fit.twin, None).expect("a program");
+    let (mean, _) = program.evaluate(&state[0], &state[1], &state[2]);
+    for (found, mean) in torque.mean.iter().zip(&mean) {
+        assert!((found - mean).abs() < 1e-9, "{found} {mean}");
+    }
+}
+
+#[test]
+fn whoever_watches_sees_every_stage_and_can_end_it() {
     let study = study();
     let fit = || Calibrate::new(&study.robot).logs([&study.training, &study.heldout]);
     let seen = Mutex::new(Vec::new());

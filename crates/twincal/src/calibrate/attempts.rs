@@ -191,6 +191,7 @@ impl<'s> Attempts<'s> {
         self.settings = smaller.settings;
         // Effects that are no candidates any more are nothing to be linearised about.
         self.settings.library.linearised_at.clear();
+        self.settings.relinearise = self.asked.relinearise;
         self.findings.push(smaller.finding);
         true
     }

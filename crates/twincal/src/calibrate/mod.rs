@@ -110,6 +110,7 @@ fn attempt(
             Err(exit) => exit,
         };
         let mut count = |settings: &CalibrationSettings| {
+            progress(Stage::Rows).ok()?;
             let request = Request {
                 robot,
                 settings,

@@ -201,6 +201,10 @@ impl Gram {
             return Err(refused(format!("of {theirs} joints, the others of {ours}")));
         }
         for (joint, (own, more)) in self.joints.iter().zip(&other.joints).enumerate() {
+            // A default has no columns yet and adopts the other's.
+            if own.s0.size == 0 || more.s0.size == 0 {
+                continue;
+            }
             let (ours, theirs) = (own.columns.len(), more.columns.len());
             let of = format!(
                 "joint {} has {theirs} columns, the others {ours}",

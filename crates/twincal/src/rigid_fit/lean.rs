@@ -13,7 +13,7 @@ pub(crate) const LEANS: usize = 3;
 const MATTERS: f64 = 0.1;
 
 /// The robot as a fit has it, with gravity turned in its base by these m/s² and all inertias changed (ten parameters of each body in turn); `None`
-/// where gravity turns little. Its size stays: it is known better than a log tells it, and together with all masses no log may tell it at all.
+/// where gravity turns little. Its size stays: it is known better than a log shows it, and beside free masses no log may show it at all.
 pub(crate) fn leaning(robot: &Robot, change: [f64; 3], inertia: &[f64]) -> Option<Robot> {
     let own = robot.description().gravity;
     let mut turned = [0, 1, 2].map(|axis| own[axis] + change[axis]);
@@ -41,7 +41,7 @@ pub(crate) struct Settled<'a> {
     pub(crate) solution: Solution,
 }
 
-/// Fits rigid bodies and friction to bins; `None` where they are too few.
+/// Fits rigid bodies and friction to bins; `None` where they are too few. About each lean the prior is that of the robot as it is then.
 pub(crate) fn settle<'a>(robot: &'a Robot, bins: &[Bins]) -> Option<Settled<'a>> {
     let mut robot = Cow::Borrowed(robot);
     let parts = sample(&robot, bins);

@@ -102,15 +102,16 @@ impl Recording {
         what: &str,
         put: impl FnOnce(&mut Channels, Vec<f64>),
     ) -> Result<Self> {
-        let values = self.checked(values, what, self.joints.len())?;
-        let Some(joint) = self.joints.last_mut() else {
+        let joint = self.joints.len();
+        let Some(mut last) = self.joints.pop() else {
             return Err(Error::Log {
                 log: self.name,
                 problem: format!("has {what} before its first joint"),
                 remedy: "add the joint with its positions first".into(),
             });
         };
-        put(joint, values);
+        put(&mut last, self.checked(values, what, joint)?);
+        self.joints.push(last);
         Ok(self)
     }
 
@@ -137,7 +138,7 @@ mod tests {
         let joint = log().joint([1.0, 2.0, 3.0], [0.0; 2]).unwrap_err();
         let said = "log `run1`: joint 1 has 2 torques for 3 stamps; give one value for each stamp, NaN where it is not known";
         assert_eq!(joint.to_string(), said);
-        let early = log().velocity([0.0; 3]).unwrap_err().to_string();
+        let early = log().velocity([0.0; 2]).unwrap_err().to_string();
         assert!(early.contains("before its first joint"), "{early}");
         let whole = log().joint([1.0, 2.0, 3.0], [0.0; 3]).unwrap();
         let second = whole.clone().joint([0.0; 4], [0.0; 3]).unwrap_err();

@@ -36,11 +36,13 @@ pub struct TorqueModel<'a> {
 impl Twin {
     /// Torque of states, each joint's position, velocity and acceleration, `state * joints + joint`: eq. (1) with the posterior of β.
     ///
-    /// A state has no history: friction that remembers the motion slides steadily, friction that warms up is at the mean of the logs. For many
+    /// The robot carries what was found of an unknown payload, as in exported programs; a payload that a log stated as known is not carried. A
+    /// state has no history: friction that remembers the motion slides steadily, friction that warms up is at the mean of the logs. For many
     /// calls make [`Twin::torque_model`] once.
     ///
     /// # Errors
-    /// [`Error::Setting`] with the key `q`, `qd` or `qdd` where a length is no multiple of the joints, or differs; those of [`Twin::library`].
+    /// [`Error::Setting`] with the key `q`, `qd` or `qdd` where a length is no multiple of the joints, or differs, or a number is not finite;
+    /// those of [`Twin::library`].
     pub fn torque(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Result<Torque> {
         self.torque_model()?.torque(q, qd, qdd)
     }
@@ -83,6 +85,18 @@ impl TorqueModel<'_> {
                     key: key.into(),
                     problem,
                     remedy: "give every joint of every state: state * joints + joint".into(),
+                });
+            }
+            if let Some(place) = values.iter().position(|value| !value.is_finite()) {
+                return Err(Error::Setting {
+                    key: key.into(),
+                    problem: format!(
+                        "{} for joint {} of state {place_of_state}",
+                        values[place],
+                        place % dof + 1,
+                        place_of_state = place / dof
+                    ),
+                    remedy: "leave out states that are not known".into(),
                 });
             }
         }
@@ -129,7 +143,7 @@ impl TorqueModel<'_> {
                 logged_interval: 1.0,
             }],
             payload: Payload::None,
-            payload_acts: !self.twin.payload_where_unknown,
+            payload_acts: true,
         };
         let mut torque = Torque {
             mean: vec![0.0; dof * count],
@@ -145,7 +159,8 @@ impl TorqueModel<'_> {
                     torque.mean[at] = own.calibrated[i];
                     torque.low[at] = own.low[i];
                     torque.high[at] = own.high[i];
-                    torque.outside[at] = own.extrapolating[i];
+                    // A term may have a pole.
+                    torque.outside[at] = own.extrapolating[i] || !own.calibrated[i].is_finite();
                 }
             }
             Ok(())

@@ -76,18 +76,35 @@ pub(in crate::calibrate) fn elsewhere(
     }
     let moves = moves.sqrt();
     Ok(match settings.relinearise {
-        _ if moves <= MOVES => Linear::Enough,
+        // Not a number is no reason for another pass.
+        _ if moves <= MOVES || moves.is_nan() => Linear::Enough,
         0 => Linear::Open(moves),
         _ => Linear::Elsewhere(found),
     })
 }
 
-/// Says that columns stand about what was found.
-pub(in crate::calibrate) fn finding(
+/// Components of which columns stand about what was found; first those that act on others.
+pub(in crate::calibrate) fn components<'a>(
+    library: &'a Library,
     point: &BTreeMap<String, f64>,
-    open: Option<f64>,
-) -> Option<Finding> {
-    let names: Vec<&str> = point.keys().map(String::as_str).collect();
+) -> Vec<&'a str> {
+    let terms = library.terms().iter();
+    let mut own: Vec<_> = terms
+        .filter(|term| point.contains_key(&term.name))
+        .collect();
+    own.sort_by_key(|term| !term.family.multiplies());
+    let mut names: Vec<&str> = Vec::new();
+    for term in own {
+        let name = library.components()[term.component].name.as_str();
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
+}
+
+/// Says that columns stand about what was found of these components.
+pub(in crate::calibrate) fn finding(names: &[&str], open: Option<f64>) -> Option<Finding> {
     if names.is_empty() {
         return None;
     }
@@ -109,8 +126,7 @@ pub(in crate::calibrate) fn finding(
         ),
         Some(moves) => {
             let message = format!(
-                "{about}, and once more would move a coefficient by up to {} of its standard deviations. Log the robot with known load or a level base, so that these \
-                 effects are told apart",
+                "{about}. Once more would move a coefficient by up to {} of its standard deviations. A log with a known payload tells such effects from each other",
                 significant(moves, 2)
             );
             Finding::new(
@@ -214,14 +230,11 @@ mod tests {
 
     #[test]
     fn what_was_not_settled_is_a_warning_with_its_size() {
-        let point: BTreeMap<String, f64> = ["base.tilt.x", "payload.m"]
-            .map(|name| (name.to_owned(), 1.0))
-            .into();
-        assert_eq!(finding(&BTreeMap::new(), Some(0.3)), None);
-        let settled = finding(&point, None).unwrap();
+        assert_eq!(finding(&[], Some(0.3)), None);
+        let settled = finding(&["base.tilt", "payload"], None).unwrap();
         assert_eq!((settled.severity, settled.count), (Severity::Note, 2));
-        let open = finding(&point, Some(0.34)).unwrap();
+        let open = finding(&["base.tilt", "payload"], Some(0.34)).unwrap();
         assert_eq!(open.severity, Severity::Warning);
-        assert!(open.message.contains("base.tilt.x, payload.m") && open.message.contains("0.34"));
+        assert!(open.message.contains("base.tilt, payload") && open.message.contains("0.34"));
     }
 }

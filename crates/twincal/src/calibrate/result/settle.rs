@@ -168,10 +168,13 @@ impl Effects<'_> {
             }
             let of_its_own = matches!(own.reason, StatusReason::LeftOut(_));
             if own.status == Status::Equivalent || own.status == Status::Tentative && !of_its_own {
-                own.reason = StatusReason::SameTorque {
-                    members: group.members.clone(),
-                    pip: group.pip,
-                    alike: group.alike,
+                own.reason = match &lowered {
+                    Some(lowered) if !clear => StatusReason::LeftOut(lowered.clone()),
+                    _ => StatusReason::SameTorque {
+                        members: group.members.clone(),
+                        pip: group.pip,
+                        alike: group.alike,
+                    },
                 };
             }
         }

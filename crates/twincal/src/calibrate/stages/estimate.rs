@@ -105,7 +105,8 @@ fn reconsider(
         Linear::Open(moves) => Some(moves),
         Linear::Enough => None,
     };
-    findings.extend(relinearise::finding(&library_settings.linearised_at, open));
+    let about = relinearise::components(&rows.library, &library_settings.linearised_at);
+    findings.extend(relinearise::finding(&about, open));
     let training = rows.data.training();
     let seen = match settings.unasked_ripple {
         UnaskedRipple::Ignored => Vec::new(),
