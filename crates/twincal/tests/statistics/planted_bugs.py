@@ -53,14 +53,14 @@ BUGS = [
     (
         "a stale tableau: gradients not updated when a column leaves",
         "infer/tableau.rs",
-        "self.gradient[k] -= self.sign[k] * s * step;",
-        "self.gradient[k] -= 0.0 * s * step;",
+        "gradient[lane] += signed * b;",
+        "gradient[lane] += 0.0 * signed * b;",
     ),
     (
         "an asymmetric swap: the slabs' ratio upside down",
         "infer/gibbs/swaps.rs",
-        "(standard.precision[j] / standard.precision[i]).sqrt()",
-        "(standard.precision[i] / standard.precision[j]).sqrt()",
+        "slabs: both_ways(precision[1] / precision[0]),",
+        "slabs: both_ways(precision[0] / precision[1]),",
     ),
     (
         "conditionals kept after a flip",
@@ -71,7 +71,7 @@ BUGS = [
     (
         "prior odds of a family not updated after a flip",
         "infer/gibbs/chain.rs",
-        "            self.update_odds(self.walker.standard.blocks[block].family);\n",
+        "        self.family_odds[family] = self.walker.family_odds(family);\n",
         "",
     ),
     (
@@ -83,8 +83,8 @@ BUGS = [
     (
         "the difference over a cut lost",
         "gram/accumulate.rs",
-        "*self.rows.before_mut(i) = last[i];",
-        "*self.rows.before_mut(i) = column[0];",
+        "self.before.copy_from_slice(last);",
+        "self.before.copy_from_slice(&last.iter().map(|_| 0.0).collect::<Vec<_>>());",
     ),
     (
         "a component leaves and its square does not follow",
