@@ -15,7 +15,7 @@ use crate::robot::{Motion, Robot, did_you_mean, nominal_torque};
 
 /// Most columns a library may have.
 const TERM_LIMIT: usize = 1000;
-/// Moving joints at most: the time of a fit grows with their cube. A fit of 44 took 93 s of CPU time (Talos, 10 s at 500 Hz).
+/// Moving joints at most: the time of a fit grows with their cube. A fit of 44 took 228 s of CPU time on a busy machine (Talos, 10 s at 500 Hz).
 const MOST_JOINTS: usize = 64;
 /// Joints up to which the generic family is proposed unasked.
 const GENERIC_JOINTS: usize = 3;
