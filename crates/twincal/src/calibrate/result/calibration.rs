@@ -99,7 +99,8 @@ pub struct ParameterSummary {
     /// in JSON where it does not exist (the centre of no mass) or no joint shows it.
     #[serde(deserialize_with = "nan_if_null")]
     pub mean: f64,
-    /// Standard deviation; of a ratio half the width of its central 68.3 % interval.
+    /// Standard deviation over all models, of a ratio half the width of its central 68.3 % interval. Rare models far off make it several times what
+    /// `interval68` says: words and tables print that.
     #[serde(deserialize_with = "nan_if_null")]
     pub sd: f64,
     /// Central 95 % interval.
