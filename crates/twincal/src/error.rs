@@ -20,7 +20,7 @@ pub enum Error {
         culprit: String,
         /// What is wrong, with the number.
         problem: String,
-        /// How to mend it.
+        /// How to fix it.
         remedy: String,
     },
     /// The log cannot be turned into trajectories.
@@ -30,7 +30,7 @@ pub enum Error {
         log: String,
         /// What is wrong, with channel, row or time.
         problem: String,
-        /// How to mend it.
+        /// How to fix it.
         remedy: String,
     },
     /// A term of the library cannot be built.
@@ -42,7 +42,7 @@ pub enum Error {
         column: usize,
         /// What is wrong.
         problem: String,
-        /// How to mend it.
+        /// How to fix it.
         remedy: String,
     },
     /// A setting is out of its range.
@@ -52,7 +52,7 @@ pub enum Error {
         key: String,
         /// What is wrong, with the value.
         problem: String,
-        /// How to mend it.
+        /// How to fix it.
         remedy: String,
     },
     /// The data cannot answer the question (exit code 4).
@@ -60,7 +60,7 @@ pub enum Error {
     Refused {
         /// What is missing, with the counts.
         problem: String,
-        /// How to mend it.
+        /// How to fix it.
         remedy: String,
     },
     /// A number that must be finite is not; names the column.
@@ -70,7 +70,7 @@ pub enum Error {
         what: String,
         /// Name of the column (term or `torque`).
         column: String,
-        /// How to mend it.
+        /// How to fix it.
         remedy: String,
     },
     /// Statistics that do not belong together.
@@ -78,7 +78,7 @@ pub enum Error {
     Statistics {
         /// What differs, with the counts.
         problem: String,
-        /// How to mend it.
+        /// How to fix it.
         remedy: String,
     },
     /// Whoever watches the progress asked for an end.

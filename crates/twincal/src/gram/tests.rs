@@ -298,6 +298,11 @@ fn statistics_that_do_not_belong_together_are_refused_and_nothing_is_added() {
     assert_eq!(sum.joints[0].n, 10.0);
     let mut none = Gram::default();
     assert!(none.try_merge(&sum).is_ok() && none == sum);
+    // A joint without columns yet adopts the other's.
+    let mut new = Gram {
+        joints: vec![JointGram::default(); 2],
+    };
+    assert!(new.try_merge(&sum).is_ok() && new == sum);
 }
 
 #[test]

@@ -19,7 +19,7 @@ pub struct Torque {
     pub low: Vec<f64>,
     /// Upper end.
     pub high: Vec<f64>,
-    /// The joint is where the logs have not been, or its torque is less certain than the noise.
+    /// The joint is where the logs have not been, its torque is less certain than the noise, or no number (a term may have a pole).
     pub outside: Vec<bool>,
 }
 
@@ -159,7 +159,6 @@ impl TorqueModel<'_> {
                     torque.mean[at] = own.calibrated[i];
                     torque.low[at] = own.low[i];
                     torque.high[at] = own.high[i];
-                    // A term may have a pole.
                     torque.outside[at] = own.extrapolating[i] || !own.calibrated[i].is_finite();
                 }
             }
