@@ -1,5 +1,6 @@
 //! What predicting left-out training data says of the noise: how wide intervals have to be.
 
+use super::usual::at_least_usual;
 use super::{Fit, FitSettings, total};
 use crate::error::Result;
 use crate::gram::Gram;
@@ -94,11 +95,12 @@ pub(super) fn interval_factors(
     whole: &Fit,
 ) -> Result<Vec<f64>> {
     let predicted = predict(folds, columns, settings, whole)?;
-    Ok(if settings.noise.robust {
+    let own = if settings.noise.robust {
         factors_of_coverage(&predicted, &whole.plug_in)
     } else {
         factors_of_variance(&predicted, &whole.plug_in)
-    })
+    };
+    Ok(at_least_usual(&own))
 }
 
 fn predict(
@@ -164,8 +166,8 @@ impl LeftOutJoint {
     }
 }
 
-/// Factor that lets the 95 % interval of a normal distribution hold 95 % of the left-out rows, at least 1.
-fn factors_of_coverage(predictions: &[Prediction], plug_in: &PlugIn) -> Vec<f64> {
+/// Factor that lets the 95 % interval of a normal distribution hold 95 % of the left-out rows, at least 1; `None` without such rows.
+fn factors_of_coverage(predictions: &[Prediction], plug_in: &PlugIn) -> Vec<Option<f64>> {
     (0..plug_in.weight.len())
         .map(|joint| {
             // |error| ≤ 1.96 √(f² noise + epistemic) where f² ≥ (error²/1.96² − epistemic)/noise.
@@ -181,14 +183,15 @@ fn factors_of_coverage(predictions: &[Prediction], plug_in: &PlugIn) -> Vec<f64>
             needed.sort_by(f64::total_cmp);
             let enough = (0.95 * needed.len() as f64).ceil() as usize;
             let factor = needed.get(enough.saturating_sub(1)).copied();
-            factor.unwrap_or(1.0).max(1.0).sqrt()
+            factor.map(|factor| factor.max(1.0).sqrt())
         })
         .collect()
 }
 
 /// `f_j² = Σ (squared error − epistemic variance) / Σ noise variance`, at least 1: left-out data may say that the noise
-/// on the training data was too small, never that it was too large (with few effective rows E[φ] is wide for a reason).
-fn factors_of_variance(predictions: &[Prediction], plug_in: &PlugIn) -> Vec<f64> {
+/// on the training data was too small, never that it was too large (with few effective rows E[φ] is wide for a reason). `None` without
+/// left-out rows.
+fn factors_of_variance(predictions: &[Prediction], plug_in: &PlugIn) -> Vec<Option<f64>> {
     (0..plug_in.weight.len())
         .map(|joint| {
             let (mut excess, mut noise) = (0.0, 0.0);
@@ -197,11 +200,7 @@ fn factors_of_variance(predictions: &[Prediction], plug_in: &PlugIn) -> Vec<f64>
                 excess += sums.excess;
                 noise += sums.spread * prediction.noise / plug_in.weight[joint];
             }
-            if noise > 0.0 {
-                (excess / noise).max(1.0).sqrt()
-            } else {
-                1.0
-            }
+            (noise > 0.0).then(|| (excess / noise).max(1.0).sqrt())
         })
         .collect()
 }

@@ -11,6 +11,7 @@ mod memory;
 mod misfit;
 mod passband;
 mod tempering;
+mod usual;
 
 pub use tempering::fit_tempered;
 

@@ -7,6 +7,7 @@
 use super::decoys::JointDecoys;
 use super::left_out::{folds, interval_factors};
 use super::misfit::{Fold, misfit};
+use super::usual::at_least_usual;
 use super::{
     Fit, FitSettings, Moving, fit_gram, is_rounding, residual_correlation_time, start, total,
     weights,
@@ -64,16 +65,14 @@ pub fn fit_tempered(
         let found = misfit(measured, (columns, settings.prior), &fitted)?;
         let mut plug_in = fitted.plug_in.clone();
         plug_in.autocorrelation_time.clone_from(&times);
-        plug_in.misfit = (found.largest().into_iter().enumerate())
+        let own = found.largest().into_iter().enumerate();
+        let own: Vec<Option<f64>> = own
             .map(|(joint, largest)| {
                 let squares = found.variance[joint] * gram.joints[joint].n;
-                if is_rounding(training, joint, squares) {
-                    1.0
-                } else {
-                    largest
-                }
+                (squares > 0.0 && !is_rounding(training, joint, squares)).then_some(largest)
             })
             .collect();
+        plug_in.misfit = at_least_usual(&own);
         if settings.noise.per_joint && found.variance.iter().any(|variance| *variance > 0.0) {
             plug_in.weight = weights(&gram, &found.variance);
         }
