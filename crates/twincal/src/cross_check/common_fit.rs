@@ -108,29 +108,34 @@ impl CommonFit {
         self.solve();
     }
 
-    /// Sum of squares with the torque of one log turned, over that as it is.
-    pub(super) fn turned(&self, log: usize) -> f64 {
-        let of = |turned: Option<usize>| {
-            let sign = |own: &Rows| {
-                if Some(own.block.log) == turned {
-                    -1.0
-                } else {
-                    1.0
-                }
-            };
-            let (right, square) = self.right(sign);
-            let mut solution = right.clone();
+    /// Sum of squares with the torque of one of these logs turned, over that as it is.
+    pub(super) fn turned(&self, logs: &[usize]) -> Vec<f64> {
+        let (right, square) = self.right();
+        let left = |right: &[f64], square: f64| {
+            let mut solution = right.to_vec();
             self.matrix.solve(&mut solution);
-            square - dot(&right, &solution)
+            square - dot(right, &solution)
         };
-        of(Some(log)) / of(None)
+        let as_it_is = left(&right, square);
+        let of = |log: &usize| {
+            let (mut right, mut square) = (right.clone(), square);
+            for own in self.rows.iter().filter(|own| own.block.log == *log) {
+                let turn = -2.0 * own.weight * own.weight / own.factor;
+                for (&k, tau) in own.block.columns.iter().zip(&own.right[0]) {
+                    right[k] += turn * tau;
+                }
+                square -= 2.0 * turn * own.squares[1];
+            }
+            left(&right, square) / as_it_is
+        };
+        logs.iter().map(of).collect()
     }
 
-    /// Right side of the normal equations and sum of squares, torque times `sign`.
-    fn right(&self, sign: impl Fn(&Rows) -> f64) -> (Vec<f64>, f64) {
+    /// Right side of the normal equations and sum of squares.
+    fn right(&self) -> (Vec<f64>, f64) {
         let (mut right, mut square) = (vec![0.0; self.size], 0.0);
         for own in &self.rows {
-            let (w, s) = (own.weight * own.weight, sign(own) / own.factor);
+            let (w, s) = (own.weight * own.weight, 1.0 / own.factor);
             for ((&k, tau), nominal) in own
                 .block
                 .columns
@@ -147,7 +152,7 @@ impl CommonFit {
     }
 
     fn solve(&mut self) {
-        (self.theta, _) = self.right(|_| 1.0);
+        (self.theta, _) = self.right();
         self.matrix.solve(&mut self.theta);
         for own in &mut self.rows {
             own.update(&self.theta);

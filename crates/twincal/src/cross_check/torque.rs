@@ -174,7 +174,7 @@ fn next_factor(fit: &mut CommonFit, joints_too: bool) -> Option<(Whose, f64, f64
     let mut factor = 1.0;
     let mut whose = None;
     if logs.len() > 1 {
-        let turned = logs.iter().map(|&log| (fit.turned(log), log));
+        let turned = fit.turned(&logs).into_iter().zip(logs.iter().copied());
         if let Some((_, log)) = turned
             .filter(|(share, _)| *share < TURNED)
             .min_by(|a, b| a.0.total_cmp(&b.0))

@@ -1,6 +1,7 @@
 //! Decoys: functions of one joint's own state that no candidate is made of. What the candidates leave along them says
 //! how much of the residual comes again with the motion.
 
+use crate::linear_algebra::{dot, product_transposed};
 use crate::observations::Part;
 use std::ops::AddAssign;
 
@@ -8,6 +9,8 @@ use std::ops::AddAssign;
 const HARMONICS: usize = 8;
 /// 1, cos kq and sin kq, each alone and times the direction of motion.
 pub(super) const DECOYS: usize = 2 * (1 + 2 * HARMONICS);
+/// Rows that are multiplied at a time.
+const BLOCK: usize = 512;
 /// Speed within which the direction of motion changes, rad/s or m/s.
 const REVERSAL: f64 = 0.02;
 
@@ -48,23 +51,33 @@ impl JointDecoys {
         rows.visit_signals(all.len(), part.rows.clone(), &mut |range, columns| {
             let motion = [&all.q[joint], &all.qd[joint]];
             let [q, qd] = motion.map(|values| values.some(range.clone()));
-            for (i, row) in range.enumerate() {
-                if rows.standstill[row] {
-                    continue;
-                }
-                let weight = rows.weight.get(row).copied().unwrap_or(1.0);
-                let decoys = decoys(q[i], qd[i]);
-                for ((phi, sums), square) in (decoys.iter())
-                    .zip(sums.chunks_exact_mut(width))
-                    .zip(&mut square)
-                {
-                    let weighted = weight * phi;
-                    *square += weighted * phi;
-                    for (signal, sum) in sums[..signals].iter_mut().enumerate() {
-                        *sum += weighted * columns.x[signal * columns.stride + i];
+            for from in (0..range.len()).step_by(BLOCK) {
+                let count = BLOCK.min(range.len() - from);
+                let (mut phi, mut weighted) =
+                    (vec![0.0; DECOYS * count], vec![0.0; DECOYS * count]);
+                for i in 0..count {
+                    let row = range.start + from + i;
+                    if rows.standstill[row] {
+                        continue;
                     }
-                    sums[signals] += weighted * rows.y[row];
+                    let weight = rows.weight.get(row).copied().unwrap_or(1.0);
+                    let decoys = decoys(q[from + i], qd[from + i]);
+                    for (k, decoy) in decoys.iter().enumerate() {
+                        phi[k * count + i] = *decoy;
+                        weighted[k * count + i] = weight * decoy;
+                    }
                 }
+                let own = phi.chunks_exact(count).zip(weighted.chunks_exact(count));
+                for (square, (phi, weighted)) in square.iter_mut().zip(own) {
+                    *square += dot(phi, weighted);
+                }
+                let mut x: Vec<f64> = (0..signals)
+                    .flat_map(|signal| columns.of(signal, from, count))
+                    .copied()
+                    .collect();
+                x.extend_from_slice(&rows.y[range.start + from..][..count]);
+                let products = product_transposed(&weighted, &x, [DECOYS, count, width]);
+                (sums.iter_mut().zip(products)).for_each(|(sum, product)| *sum += product);
             }
         });
         let cross = match &rows.recipes {

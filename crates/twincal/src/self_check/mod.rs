@@ -116,10 +116,11 @@ pub fn look<'a>(
     pipeline: &Pipeline,
     trajectories: impl IntoIterator<Item = &'a Trajectory>,
 ) -> Result<Look> {
+    let trajectories: Vec<&Trajectory> = trajectories.into_iter().collect();
     let mut samples = Vec::new();
     let mut logs = Vec::new();
-    for trajectory in trajectories {
-        let Some(sample) = Sample::take(pipeline, trajectory) else {
+    for &trajectory in &trajectories {
+        let Some(sample) = Sample::take(pipeline, trajectory, trajectories.len()) else {
             continue;
         };
         refuse_degrees(robot, &trajectory.name, &sample)?;

@@ -138,7 +138,7 @@ fn no_reading_is_proposed_that_explains_less_on_any_joint() {
             3 => rows(&mut s.q, 2).iter_mut().for_each(|q| *q *= -1.0),
             _ => (),
         }
-        let sample = Sample::take(&pipeline(), &trajectory).unwrap();
+        let sample = Sample::take(&pipeline(), &trajectory, 1).unwrap();
         let as_logged = explain(&model, &sample, &Reading::as_logged(4));
         let read = Read::of(&model, &sample, &as_logged);
         let is_other = read.base.is_some() || !read.is_as_logged();

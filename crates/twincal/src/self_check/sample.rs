@@ -2,8 +2,10 @@
 
 use crate::signal::{Agreement, Pipeline, Segment, Trajectory, velocity_agreement};
 
-/// Samples that are taken of one trajectory at most.
+/// Samples that are taken of one trajectory, at least and at most where it has as many, and of all about.
+const LEAST: usize = 100;
 const MOST: usize = 800;
+const OF_ALL: usize = 24_000;
 /// Width of the moving average in periods of the cut-off.
 const WINDOW: f64 = 0.5;
 
@@ -30,14 +32,14 @@ pub(super) struct Sample {
 }
 
 impl Sample {
-    /// Takes samples that are spread evenly over a trajectory; `None` without torque.
-    pub(super) fn take(pipeline: &Pipeline, trajectory: &Trajectory) -> Option<Self> {
+    /// Takes samples that are spread evenly over one of `logs` trajectories; `None` without torque.
+    pub(super) fn take(pipeline: &Pipeline, trajectory: &Trajectory, logs: usize) -> Option<Self> {
         let dof = trajectory.dof;
         let total: usize = trajectory.segments.iter().map(|s| s.time.len()).sum();
         if total == 0 || trajectory.segments.iter().any(|s| s.tau.is_empty()) {
             return None;
         }
-        let step = total.div_ceil(MOST);
+        let step = total.div_ceil((OF_ALL / logs.max(1)).clamp(LEAST, MOST));
         let agreement = velocity_agreement(trajectory, &pipeline.standstill_velocity);
         let mut sample = Self {
             len: 0,

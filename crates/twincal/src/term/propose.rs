@@ -104,7 +104,7 @@ pub(super) fn proposals(
     if let Some(robot) = about.robot {
         all.extend(inertial(robot, settings, findings)?);
         if settings.has(Family::Tilt) {
-            all.push(base_tilt::proposal());
+            all.push(base_tilt::proposal(robot.description().gravity));
         }
     }
     let mut per_joint = |family: Family, make: &mut dyn FnMut(&Joint) -> Option<Proposal>| {

@@ -15,6 +15,8 @@ const FIFTHS: usize = 5;
 const LEAST_ROWS: usize = 8;
 /// Folds of logs at most; more logs are grouped.
 const MOST_FOLDS: usize = 6;
+/// Logs with blocks of their own at most: of more, fifths of every so many logs are one block. Whole groups are left out together.
+const MOST_APART: usize = 7 * MOST_FOLDS;
 /// Probability below two standard deviations of a normal distribution.
 const TWO_SD: f64 = 0.977_249_868_051_820_8;
 /// Prior variance of a coefficient over that of its estimate from a fold alone, from which the fold shows it.
@@ -103,10 +105,10 @@ impl LeftOut {
         let pieces: Vec<_> = pieces(training);
         let blocks: Vec<Block> = pieces
             .into_par_iter()
-            .map(|(log, fifth, part)| Block {
+            .map(|(log, fifth, parts)| Block {
                 log,
                 fifth,
-                sums: sums(&part, fit, &columns),
+                sums: sums(&parts, fit, &columns),
             })
             .collect();
         let (slab, lower) = (of(&prior.slab), of(&prior.lower));
@@ -263,8 +265,8 @@ fn difference(sums: &[f64], b1: &[f64], b0: &[f64]) -> f64 {
         .sum()
 }
 
-/// Contiguous blocks of every log, of about the same length: `(log, fifth, rows)`.
-fn pieces<'a>(training: &[Part<'a>]) -> Vec<(usize, usize, Part<'a>)> {
+/// Contiguous blocks of every log, of about the same length: `(log, fifth, rows)`; of many logs the fifths of some are one block.
+fn pieces<'a>(training: &[Part<'a>]) -> Vec<(usize, usize, Vec<Part<'a>>)> {
     let rows: usize = training.iter().map(|part| part.rows.len()).sum();
     let length = rows.div_ceil(BLOCKS).max(LEAST_ROWS);
     let mut pieces = Vec::new();
@@ -275,17 +277,26 @@ fn pieces<'a>(training: &[Part<'a>]) -> Vec<(usize, usize, Part<'a>)> {
         pieces.extend((0..count).map(|i| {
             let rows = cut(i)..cut(i + 1);
             let observations = part.observations;
-            (log, i / each, Part { observations, rows })
+            (log, i / each, vec![Part { observations, rows }])
         }));
     }
-    pieces
+    if training.len() <= MOST_APART {
+        return pieces;
+    }
+    let mut grouped: Vec<(usize, usize, Vec<Part<'a>>)> = (0..MOST_APART * FIFTHS)
+        .map(|at| (at / FIFTHS, at % FIFTHS, Vec::new()))
+        .collect();
+    for (log, fifth, parts) in pieces {
+        grouped[log % MOST_APART * FIFTHS + fifth].2.extend(parts);
+    }
+    grouped
 }
 
 /// The weighted sums of one block over these columns and y.
-fn sums(part: &Part<'_>, fit: &Fit, columns: &[usize]) -> Vec<f64> {
+fn sums(parts: &[Part<'_>], fit: &Fit, columns: &[usize]) -> Vec<f64> {
     let size = columns.len() + 1;
     let mut sums = vec![0.0; size * size];
-    let gram = total(std::slice::from_ref(part));
+    let gram = total(parts);
     for (j, joint) in gram.joints.iter().enumerate() {
         let factor = fit.plug_in.factor(j);
         let statistics = joint.stationary(fit.plug_in.rho[j]);

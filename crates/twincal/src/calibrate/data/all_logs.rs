@@ -18,6 +18,8 @@ use rayon::prelude::*;
 const ZERO: f64 = 1e-12;
 /// Rows per column of the largest joint below which nothing is fitted (case 7).
 const ROWS_PER_COLUMN: usize = 3;
+/// Logs at most that the torque outside the band is measured on.
+const LOGS_OF_RAW: usize = 40;
 
 /// The logs' motion, apart from their rows: it is dropped first.
 #[derive(Default)]
@@ -218,7 +220,9 @@ impl Data {
             return Ok(vec![0.0; dof]);
         }
         let (mut raw, mut in_band) = (vec![(0.0, 0.0); dof], vec![(0.0, 0.0); dof]);
-        for (log, trajectory) in self.fit.iter().zip(&trajectories.fit) {
+        // Of many logs every so many.
+        let step = self.fit.len().div_ceil(LOGS_OF_RAW).max(1);
+        for (log, trajectory) in self.fit.iter().zip(&trajectories.fit).step_by(step) {
             let (slices, times) = spread(pipeline, trajectory);
             let sums: Vec<Vec<(f64, f64)>> = slices
                 .into_par_iter()

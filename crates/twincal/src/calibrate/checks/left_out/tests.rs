@@ -137,16 +137,17 @@ fn by_rows(
     rest: &[usize],
 ) -> (f64, f64) {
     let blocks = pieces(logs);
-    let fold = |block: &(usize, usize, Part<'_>)| match kind {
-        LeftOutData::Logs => block.0,
+    let fold = |block: &(usize, usize, Vec<Part<'_>>)| match kind {
+        LeftOutData::Logs => block.0 % logs.len().min(MOST_FOLDS),
         LeftOutData::Fifths => block.1,
     };
+    let of = |parts: &[Part<'_>]| -> Vec<_> { parts.iter().flat_map(|p| rows(p, fit)).collect() };
     let slab = &fit.problem.prior.slab;
     let (mut gained, mut all) = (Vec::new(), 0.0);
     for block in &blocks {
         let kept = blocks.iter().filter(|other| fold(other) != fold(block));
-        let kept: Vec<_> = kept.flat_map(|(_, _, part)| rows(part, fit)).collect();
-        let out = rows(&block.2, fit);
+        let kept: Vec<_> = kept.flat_map(|(_, _, parts)| of(parts)).collect();
+        let out = of(&block.2);
         let [b1, b0] = [with, rest].map(|columns| error(&out, &refit(&kept, columns, slab)));
         gained.push(b0 - b1);
         all += b0;
@@ -233,15 +234,36 @@ fn blocks_are_the_rows_of_every_log_in_order_fifths_of_about_the_same_length() {
         let of = || blocks.iter().filter(move |block| block.0 == index);
         assert_eq!(of().count() % FIFTHS, 0);
         let mut next = 0;
-        for (_, _, part) in of() {
-            assert_eq!(part.rows.start, next);
-            next = part.rows.end;
+        for (_, _, parts) in of() {
+            assert_eq!((parts.len(), parts[0].rows.start), (1, next));
+            next = parts[0].rows.end;
         }
         assert_eq!(next, rows);
         let fifths: Vec<usize> = of().map(|block| block.1).collect();
         assert!(fifths.is_sorted() && fifths.last() == Some(&(FIFTHS - 1)));
     }
     assert_eq!(blocks.iter().filter(|block| block.0 == 0).count(), 35);
+}
+
+/// Of more logs than have blocks of their own every row is in one block, whole groups are left out, and the algebra is that of refits by rows.
+#[test]
+fn fifths_of_many_logs_are_one_block() {
+    let mut random = Random::new(8, 0);
+    let own: Vec<Observations> = (0..MOST_APART + 3)
+        .map(|_| log(&mut random, 30, [0.6, 0.0, 0.3, 0.2]))
+        .collect();
+    let logs: Vec<Part<'_>> = own.iter().map(Observations::whole).collect();
+    let blocks = pieces(&logs);
+    assert_eq!(blocks.len(), MOST_APART * FIFTHS);
+    let rows = |parts: &Vec<Part<'_>>| parts.iter().map(|part| part.rows.len()).sum::<usize>();
+    let all: usize = blocks.iter().map(|block| rows(&block.2)).sum();
+    assert_eq!(all, 30 * logs.len());
+    let fit = fit(&logs, f64::NEG_INFINITY);
+    let left_out = LeftOut::new(&logs, &fit, &[true; 3]);
+    let first = left_out.lowered(&[false, true, true], &[0]).unwrap();
+    assert_eq!(first.left_out, LeftOutData::Logs);
+    let truth = by_rows(&logs, &fit, first.left_out, &[0, 1, 2, 3], &[2, 3]);
+    near(&first, truth);
 }
 
 /// 200 logs with an effect of about 8 standard errors and a column without one: the first is clear in nearly all (t is about
