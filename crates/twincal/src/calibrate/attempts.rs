@@ -30,7 +30,7 @@ impl Ended<'_> {
         match self.exit {
             _ if !self.recordings_kept => None,
             Exit::TooFew(few) => Some(few.clone()),
-            Exit::Failed(error) => Some(TooFew::from(error.clone())),
+            Exit::Failed(error) | Exit::Disagreeing(error) => Some(TooFew::from(error.clone())),
             _ => None,
         }
     }
@@ -86,7 +86,7 @@ impl<'s> Attempts<'s> {
                 *findings = found;
                 error
             }
-            (None, Exit::Failed(error)) => error,
+            (None, Exit::Failed(error) | Exit::Disagreeing(error)) => error,
             (None, Exit::TooFew(few) | Exit::Masked(few)) => few.error,
             (None, Exit::Ripple(_) | Exit::Elsewhere(_) | Exit::Wider(_)) => {
                 unreachable!("the list has an attempt for it")
@@ -142,9 +142,12 @@ impl<'s> Attempts<'s> {
         true
     }
 
-    /// Candidates without memory, which need fewer rows.
+    /// Candidates without memory, which need fewer rows; where chains disagree rows are not what is missing.
     fn without_memory(&mut self, ended: &mut Ended<'_>) -> bool {
-        let failure = ended.failure();
+        let failure = match ended.exit {
+            Exit::Disagreeing(_) => None,
+            _ => ended.failure(),
+        };
         let fewer = failure.and_then(|few| without_memory(&few.error, &self.settings));
         fewer.is_some_and(|fewer| self.with(fewer))
     }
@@ -221,5 +224,51 @@ impl<'s> Attempts<'s> {
             (ended.count)(&settings)
         });
         bands.collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(problem: &str) -> Error {
+        Error::Refused {
+            problem: problem.into(),
+            remedy: String::new(),
+        }
+    }
+
+    /// Sets up the pass after one that ended so.
+    fn next(attempts: &mut Attempts<'_>, exit: &Exit) -> bool {
+        attempts.next(Ended {
+            exit,
+            findings: &[],
+            recordings_kept: true,
+            count: &mut |_| None,
+        })
+    }
+
+    /// Rows are not what chains lack: every pass with them costs up to [`crate::infer`]'s limit of work.
+    #[test]
+    fn disagreeing_chains_get_the_smaller_library_at_once_and_once() {
+        let asked = CalibrationSettings::default();
+        let mut attempts = Attempts::new(&asked);
+        assert!(next(&mut attempts, &Exit::Disagreeing(refused("first"))));
+        assert_eq!(attempts.settings.library.families.len(), 6);
+        let last = Exit::Disagreeing(refused("second"));
+        assert!(!next(&mut attempts, &last));
+        assert_eq!(attempts.failure(last, &mut Vec::new()), refused("first"));
+    }
+
+    #[test]
+    fn too_few_rows_lose_the_candidates_with_memory_first() {
+        let asked = CalibrationSettings::default();
+        let mut attempts = Attempts::new(&asked);
+        let few = Exit::TooFew(TooFew::from(refused("few")));
+        assert!(next(&mut attempts, &few));
+        let families = &attempts.settings.library.families;
+        assert_eq!(families.len() + 2, asked.library.families.len());
+        assert!(next(&mut attempts, &few));
+        assert_eq!(attempts.settings.library.families.len(), 6);
     }
 }

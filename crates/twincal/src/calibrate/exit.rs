@@ -18,6 +18,8 @@ pub(super) enum Exit {
     TooFew(TooFew),
     /// A coarse encoder masks the torque of the model in this band.
     Masked(TooFew),
+    /// Chains over the models of all candidates disagree.
+    Disagreeing(Error),
     /// An error that has nothing to do with the band.
     Failed(Error),
 }

@@ -1,4 +1,5 @@
-//! Fewer candidates where the rows are too few for all of them, unless somebody chose the candidates: friction and base parameters.
+//! Fewer candidates where the rows are too few for all of them, or their models too many for the chains, unless somebody chose the candidates:
+//! friction and base parameters.
 
 use crate::calibrate::settings::{CalibrationSettings, UnaskedRipple};
 use crate::error::{Error, Finding, Severity};
@@ -72,7 +73,7 @@ pub(in crate::calibrate) fn smaller(
     settings.unasked_ripple = UnaskedRipple::Ignored;
     settings.may_widen = false;
     let message = format!(
-        "too few rows for all candidates ({problem}): fitted with friction, motor inertia and link inertias only; log longer and faster motion \
+        "no result with all candidates ({problem}): fitted with friction, motor inertia and link inertias only; log longer and faster motion \
          for the others"
     );
     let finding = Finding::new(Severity::Warning, "smaller_library", "", message, 0);

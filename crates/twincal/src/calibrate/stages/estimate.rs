@@ -12,7 +12,7 @@ use crate::calibrate::fit::ripples::{self, Seen};
 use crate::calibrate::fit::wider_band::wider;
 use crate::calibrate::request::Goal;
 use crate::calibrate::settings::UnaskedRipple;
-use crate::error::{Finding, Result};
+use crate::error::{Error, Finding, Result};
 use crate::infer::infer_near;
 
 /// The fit to all logs, and those that do not know what is held out.
@@ -56,7 +56,11 @@ pub(in crate::calibrate) fn estimate<'d>(
     }
     findings.extend(seen.iter().map(Seen::told));
     let fit = &fitted.fit;
-    fitted.fit.posterior = infer_near(&fit.problem, &fit.posterior, &settings.inference)?;
+    let inferred = infer_near(&fit.problem, &fit.posterior, &settings.inference);
+    fitted.fit.posterior = inferred.map_err(|error| match error {
+        Error::Refused { .. } => Exit::Disagreeing(error),
+        other => Exit::Failed(other),
+    })?;
     Ok(Estimated {
         fitted,
         plan,

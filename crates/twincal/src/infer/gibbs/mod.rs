@@ -30,8 +30,8 @@ const SCANS_PER_DRAW: [usize; 6] = [1, 4, 4, 16, 64, 256];
 /// The shortest run counts only if it is far better than chains that agree have to be: share of independent draws among
 /// all of them, and standard error of the probabilities.
 const MIXED: (f64, f64) = (0.25, 0.004);
-/// Multiplications after which no longer run is tried (about a minute).
-pub(super) const WORK_LIMIT: f64 = 1e11;
+/// Multiplications after which no longer run is tried (about 20 s).
+pub(super) const WORK_LIMIT: f64 = 3e10;
 /// Fewest chains that can disagree, and fewest draws per chain that can be judged.
 pub const LEAST_CHAINS: usize = 2;
 /// See [`LEAST_CHAINS`].
