@@ -13,6 +13,8 @@ const JITTER: f64 = 0.2;
 const CROWDED: f64 = 0.1;
 /// Share of NaN or infinite rows beyond which the log counts as degraded.
 const NOT_FINITE_LIMIT: f64 = 0.01;
+/// Size of a value that is no measurement of any robot in any unit; squares of much larger ones overflow.
+const LARGEST: f64 = 1e12;
 /// Share of contradicting duplicates beyond which the log counts as degraded.
 const CONTRADICTION_LIMIT: f64 = 0.001;
 /// Largest distance from an even grid, in intervals, that still counts as even.
@@ -141,15 +143,16 @@ pub(crate) fn read_clock(
     })
 }
 
-/// Rows whose every channel is finite, and for each whether rows were dropped right before it.
+/// Rows whose every channel has a sample, and for each whether rows were dropped right before it.
 fn finite_rows(
     log: &Recording,
     channels: &[(String, &[f64])],
     findings: &mut Vec<Finding>,
 ) -> (Vec<usize>, Vec<bool>) {
     let samples = log.time.len();
-    let is_finite = |(_, values): &(String, &[f64])| values.iter().all(|v| v.is_finite());
-    if channels.par_iter().all(is_finite) {
+    let is_sample = |value: &f64| value.abs() < LARGEST;
+    let all_are = |(_, values): &(String, &[f64])| values.iter().all(is_sample);
+    if channels.par_iter().all(all_are) {
         return ((0..samples).collect(), vec![false; samples]);
     }
     let (mut kept, mut cut_before) = (Vec::with_capacity(samples), Vec::with_capacity(samples));
@@ -158,7 +161,7 @@ fn finite_rows(
     for row in 0..samples {
         let mut finite = true;
         for (count, (_, values)) in per_channel.iter_mut().zip(channels) {
-            if !values[row].is_finite() {
+            if !is_sample(&values[row]) {
                 *count += 1;
                 finite = false;
             }
@@ -210,7 +213,7 @@ fn finite_rows(
             "not_finite_rows",
             &log.name,
             format!(
-                "{lost} of {samples} rows ({:.2} %) have NaN or infinite values ({}) and were dropped; the log is cut there",
+                "{lost} of {samples} rows ({:.2} %) have values that are NaN, infinite or beyond {LARGEST:e} ({}) and were dropped; the log is cut there",
                 100.0 * share,
                 worst.join(", ")
             ),

@@ -4,6 +4,7 @@ use super::cutoff::JointSpectra;
 use super::fir::{MotionKernels, noise_gain};
 use super::prepare::JointFacts;
 use super::spectrum::Noise;
+use super::travel::usual_size;
 use super::{DerivedFrom, Pipeline};
 use crate::error::{Finding, Severity};
 use crate::words::significant;
@@ -106,8 +107,8 @@ pub(crate) fn quantum<'a>(runs: impl Iterator<Item = &'a [f64]> + Clone) -> Opti
             .flat_map(|run| run.windows(2))
             .map(|pair| (pair[1] - pair[0]).abs())
     };
-    // What is smaller is rounding of the file's decimals.
-    let scale = runs.clone().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
+    // What is smaller is rounding of the file's decimals. A few glitches are no scale.
+    let scale = usual_size(runs.clone().flatten());
     let step = changes()
         .filter(|c| *c > 1e-7 * scale)
         .fold(f64::INFINITY, f64::min);
@@ -136,6 +137,23 @@ pub(crate) fn quantum<'a>(runs: impl Iterator<Item = &'a [f64]> + Clone) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// One glitch of 1e8 rad among 2000 samples: the step is that of the encoder, and smooth data has none.
+    #[test]
+    fn a_glitch_is_no_encoder_step() {
+        let smooth: Vec<f64> = (0..2000).map(|i| (f64::from(i) * 0.003).sin()).collect();
+        let coarse: Vec<f64> = smooth
+            .iter()
+            .map(|q| (q / 3.8e-4).round() * 3.8e-4)
+            .collect();
+        for (clean, expected) in [(smooth, None), (coarse, Some(3.8e-4))] {
+            let mut q = clean;
+            q[1000] = 1e8;
+            let step = quantum(std::iter::once(q.as_slice()));
+            let near = |step: f64| expected.is_some_and(|e: f64| (step / e - 1.0).abs() < 1e-6);
+            assert!(step.map_or(expected.is_none(), near), "{step:?}");
+        }
+    }
 
     #[test]
     fn the_encoder_step_is_found_and_smooth_data_has_none() {

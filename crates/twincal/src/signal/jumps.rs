@@ -6,7 +6,7 @@
 use super::Recording;
 use super::clock::{Clock, Run};
 use super::prepare::JointFacts;
-use super::travel::{ROUNDING, median};
+use super::travel::{ROUNDING, median, usual_size};
 use crate::error::{Finding, Severity};
 use crate::robot::JointKind;
 use rayon::prelude::*;
@@ -79,9 +79,7 @@ pub(crate) fn jumps(time: &[f64], values: &[f64], interval: f64) -> Jumps {
 
 /// Smallest change of a channel that is no rounding: one count of an encoder.
 fn count(values: &[f64]) -> f64 {
-    let scale = values
-        .iter()
-        .fold(0.0_f64, |scale, value| scale.max(value.abs()));
+    let scale = usual_size(values.iter());
     let changes = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let count = changes
         .filter(|change| *change > ROUNDING * scale)

@@ -1,6 +1,6 @@
 //! When a joint is at rest: where its position is constant. There friction is anywhere between ± its Coulomb value and says nothing.
 
-use super::travel::{ROUNDING, white_noise};
+use super::travel::{ROUNDING, usual_size, white_noise};
 use std::collections::VecDeque;
 
 /// Shortest rest, s.
@@ -18,8 +18,7 @@ const SAMPLED: usize = 1 << 16;
 
 /// What the position of a joint spans at most in [`SHORTEST`] at rest, rad or m; `logged`: as logged, `pieces`: the same on even clocks.
 pub(crate) fn span<'a>(logged: &[f64], pieces: impl Iterator<Item = &'a [f64]> + Clone) -> f64 {
-    let finite = || logged.iter().filter(|q| q.is_finite());
-    let scale = finite().fold(0.0_f64, |largest, q| largest.max(q.abs()));
+    let scale = usual_size(logged.iter());
     let changes = logged.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let count = changes
         .filter(|change| *change > ROUNDING * scale)

@@ -204,7 +204,7 @@ fn slope(time: &[f64], q: &[f64], k: usize, w: usize) -> f64 {
 /// standard deviations of its noise (from third differences in the faster half of the rows; the lower half of them, so that
 /// steps over missing or repeated rows do not count).
 fn least(q: &[f64], step: &[f64], usual: &[f64], joined: &[bool]) -> f64 {
-    let scale = q.iter().fold(0.0_f64, |largest, q| largest.max(q.abs()));
+    let scale = usual_size(q.iter());
     let changes = step.iter().map(|step| step.abs());
     let count = changes
         .filter(|change| *change > ROUNDING * scale)
@@ -242,4 +242,14 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
         return 0.0;
     }
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Size that one value in a hundred is beyond: a glitch is no scale of what a channel rounds to.
+pub(super) fn usual_size<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
+    let mut sizes: Vec<f64> = values.map(|v| v.abs()).filter(|v| v.is_finite()).collect();
+    let at = sizes.len() - sizes.len() / 100;
+    match at.checked_sub(1) {
+        Some(at) => *sizes.select_nth_unstable_by(at, f64::total_cmp).1,
+        None => 0.0,
+    }
 }
