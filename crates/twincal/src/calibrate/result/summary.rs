@@ -11,7 +11,6 @@ use crate::calibrate::checks::sandwich::{self, Sds};
 use crate::calibrate::checks::sweep::SweepPoint;
 use crate::calibrate::data::all_logs::Data;
 use crate::calibrate::fit::compact::Compact;
-use crate::calibrate::fit::fitted::Fitted;
 use crate::calibrate::settings::CalibrationSettings;
 use crate::error::{Finding, Result, Severity};
 use crate::infer::approximate;
@@ -44,40 +43,98 @@ pub(in crate::calibrate) struct SecondOpinion {
     pub(in crate::calibrate) compact: Compact,
 }
 
+/// What [`summarise`] joins.
+pub(in crate::calibrate) struct Pieces<'a> {
+    pub(in crate::calibrate) twin: Twin,
+    pub(in crate::calibrate) library: &'a Library,
+    pub(in crate::calibrate) data: &'a Data,
+    pub(in crate::calibrate) columns: &'a Columns,
+    pub(in crate::calibrate) settings: &'a CalibrationSettings,
+    pub(in crate::calibrate) fit: Fit,
+    pub(in crate::calibrate) validation: Validation,
+    pub(in crate::calibrate) sweep: Vec<SweepPoint>,
+    pub(in crate::calibrate) opinion: SecondOpinion,
+}
+
 /// Everything a reader gets, from the pieces of [`crate::calibrate::calibrate`].
-#[expect(
-    clippy::too_many_arguments,
-    reason = "the last step joins every piece once"
-)]
+///
+/// # Errors
+/// Those of [`approximate`] under other priors.
 pub(in crate::calibrate) fn summarise(
-    twin: Twin,
-    library: &Library,
-    data: &Data,
-    columns: &Columns,
-    settings: &CalibrationSettings,
-    fitted: Fitted,
-    validation: Validation,
-    sweep: Vec<SweepPoint>,
-    opinion: SecondOpinion,
+    pieces: Pieces<'_>,
     findings: &mut Vec<Finding>,
 ) -> Result<Calibration> {
-    let Fitted { fit, .. } = fitted;
-    let training: Vec<Part<'_>> = data
-        .fit
-        .iter()
-        .map(|log| log.observations.whole())
-        .collect();
-    let rms: Vec<f64> = mean_squares(&fit.gram, columns.names.len(), &fit.plug_in.weight)
-        .into_iter()
-        .map(f64::sqrt)
-        .collect();
-    let sensitivity = sensitivity(&fit.problem, &fit.posterior)?;
+    let Pieces {
+        library,
+        data,
+        columns,
+        settings,
+        ref fit,
+        ref opinion,
+        ..
+    } = pieces;
+    let training = data.training();
     let drive_sd = drive_scale::left(settings.drive_gain_sd, data.payloads.iter().copied());
     let scale = DriveScale::new(drive_sd, library, &fit.problem, &fit.posterior);
     findings.extend(drive_scale::ignored(drive_sd, scale.as_ref(), library));
     findings.extend(scale.as_ref().and_then(DriveScale::finding));
     let scale = scale.as_ref();
-    let mut terms = terms(library, &fit, &rms, &sensitivity, scale);
+    let terms = judged_terms(&pieces, scale, findings)?;
+    let apart = data.payload_apart.then(|| library.with_payload_apart());
+    let told_apart = apart.as_ref().unwrap_or(library);
+    let seed = settings.inference.seed;
+    let mut components = components(told_apart, &fit.posterior, &terms, seed, scale);
+    let told = told_as(&fit.problem, &fit.posterior, told_apart);
+    for (component, told_as) in components.iter_mut().zip(told) {
+        component.told_as = told_as;
+    }
+    let mut groups = groups(&fit.problem, &fit.posterior, told_apart);
+    settle::settle(&mut components, &mut groups, fit, told_apart, &training);
+    let prior = prior_used(library, columns, settings, fit);
+    findings.extend(prior.forced.iter().map(forced));
+    findings.extend(findings_of_posterior(&groups, &fit.problem, data));
+    let logs = data.fit.iter().chain(&data.heldout);
+    Ok(Calibration {
+        noise: pieces.twin.noise.clone(),
+        curves: Vec::new(),
+        lags: None,
+        draws: pair_plot_draws(library, columns, &terms, &fit.posterior, seed),
+        twin: pieces.twin,
+        terms,
+        components,
+        prior,
+        likelihood: LikelihoodUsed {
+            model: settings.noise.model,
+            rounds: fit.rounds,
+        },
+        groups,
+        sweep: pieces.sweep,
+        compact: Some(opinion.compact.clone()),
+        validation: pieces.validation,
+        autocorrelation: autocorrelation(&training, &fit.posterior.mean),
+        logs: logs.map(|log| log.summary.clone()).collect(),
+        findings: std::mem::take(findings),
+    })
+}
+
+/// Every term, with what blocks of rows and the prior say of it.
+fn judged_terms(
+    pieces: &Pieces<'_>,
+    scale: Option<&DriveScale>,
+    findings: &mut Vec<Finding>,
+) -> Result<Vec<TermSummary>> {
+    let Pieces {
+        library,
+        columns,
+        settings,
+        fit,
+        opinion,
+        ..
+    } = pieces;
+    let squares = mean_squares(&fit.gram, columns.names.len(), &fit.plug_in.weight);
+    let rms: Vec<f64> = squares.into_iter().map(f64::sqrt).collect();
+    let sensitivity = sensitivity(&fit.problem, &fit.posterior)?;
+    let mut terms = terms(library, fit, &rms, &sensitivity, scale);
     for (&index, sd) in library.columns().iter().zip(&opinion.sandwich) {
         terms[index].sandwich_sd = *sd;
     }
@@ -101,16 +158,16 @@ pub(in crate::calibrate) fn summarise(
         &fit.posterior,
         &conditional,
     ));
-    let apart = data.payload_apart.then(|| library.with_payload_apart());
-    let told_apart = apart.as_ref().unwrap_or(library);
-    let seed = settings.inference.seed;
-    let mut components = components(told_apart, &fit.posterior, &terms, seed, scale);
-    let told = told_as(&fit.problem, &fit.posterior, told_apart);
-    for (component, told_as) in components.iter_mut().zip(told) {
-        component.told_as = told_as;
-    }
-    let mut groups = groups(&fit.problem, &fit.posterior, told_apart);
-    settle::settle(&mut components, &mut groups, &fit, told_apart, &training);
+    Ok(terms)
+}
+
+/// The prior as it was used.
+fn prior_used(
+    library: &Library,
+    columns: &Columns,
+    settings: &CalibrationSettings,
+    fit: &Fit,
+) -> PriorUsed {
     let names = names(library, columns);
     let is_forced = |(_, forced): &(&String, &bool)| **forced;
     let mut sure: Vec<String> = (names.iter().zip(&columns.forced))
@@ -118,72 +175,42 @@ pub(in crate::calibrate) fn summarise(
         .map(|(name, _)| name.clone())
         .collect();
     sure.dedup();
-    findings.extend(sure.iter().map(forced));
-    findings.extend(findings_of_posterior(&groups, &fit.problem, data));
-    let selected = pair_plot_columns(library, &terms);
-    let draws = draw(
-        &fit.posterior,
-        PAIR_PLOT.1,
-        settings.inference.seed,
-        DRAW_STREAM,
-    );
-    Ok(Calibration {
-        noise: twin.noise.clone(),
-        curves: Vec::new(),
-        lags: None,
-        draws: Draws {
-            terms: selected.iter().map(|&k| columns.names[k].clone()).collect(),
-            values: selected
-                .iter()
-                .map(|&k| {
-                    draws
-                        .beta
-                        .iter()
-                        .skip(k)
-                        .step_by(draws.columns)
-                        .copied()
-                        .collect()
-                })
-                .collect(),
-        },
-        twin,
-        terms,
-        components,
-        prior: PriorUsed {
-            scaled_variance: columns
-                .families
-                .iter()
-                .copied()
-                .zip(fit.plug_in.scaled_variance.iter().copied())
-                .collect(),
-            learned: settings.prior.scaled_variance == Auto::Auto,
-            inclusion: fit.problem.prior.inclusion,
-            families: settings.prior.families.clone(),
-            forced: sure,
-            heredity: (columns.parent.iter().enumerate())
-                .filter_map(|(c, parent)| Some((names[c].clone(), names[(*parent)?].clone())))
-                .filter(|(child, parent)| child != parent)
-                .collect(),
-            shape: fit.problem.prior.shape,
-            scale: fit.problem.prior.scale,
-        },
-        likelihood: LikelihoodUsed {
-            model: settings.noise.model,
-            rounds: fit.rounds,
-        },
-        groups,
-        sweep,
-        compact: Some(opinion.compact),
-        validation,
-        autocorrelation: autocorrelation(&training, &fit.posterior.mean),
-        logs: data
-            .fit
-            .iter()
-            .chain(&data.heldout)
-            .map(|log| log.summary.clone())
+    let families = columns.families.iter().copied();
+    PriorUsed {
+        scaled_variance: families
+            .zip(fit.plug_in.scaled_variance.iter().copied())
             .collect(),
-        findings: std::mem::take(findings),
-    })
+        learned: settings.prior.scaled_variance == Auto::Auto,
+        inclusion: fit.problem.prior.inclusion,
+        families: settings.prior.families.clone(),
+        forced: sure,
+        heredity: (columns.parent.iter().enumerate())
+            .filter_map(|(c, parent)| Some((names[c].clone(), names[(*parent)?].clone())))
+            .filter(|(child, parent)| child != parent)
+            .collect(),
+        shape: fit.problem.prior.shape,
+        scale: fit.problem.prior.scale,
+    }
+}
+
+/// Draws of the terms in the pair plot.
+fn pair_plot_draws(
+    library: &Library,
+    columns: &Columns,
+    terms: &[TermSummary],
+    posterior: &Posterior,
+    seed: u64,
+) -> Draws {
+    let selected = pair_plot_columns(library, terms);
+    let draws = draw(posterior, PAIR_PLOT.1, seed, DRAW_STREAM);
+    let of_column = |&k: &usize| {
+        let values = draws.beta.iter().skip(k).step_by(draws.columns);
+        values.copied().collect()
+    };
+    Draws {
+        terms: selected.iter().map(|&k| columns.names[k].clone()).collect(),
+        values: selected.iter().map(of_column).collect(),
+    }
 }
 
 /// Name of each component.

@@ -6,7 +6,7 @@ use super::validate::Validated;
 use crate::calibrate::result::calibration::Calibration;
 use crate::calibrate::result::curves;
 use crate::calibrate::result::negative_friction;
-use crate::calibrate::result::summary;
+use crate::calibrate::result::summary::{self, Pieces};
 use crate::calibrate::result::unphysical;
 use crate::calibrate::result::unseen;
 use crate::error::{Finding, Result};
@@ -24,18 +24,18 @@ pub(in crate::calibrate) fn conclude(
 ) -> Result<Calibration> {
     let (robot, settings) = (rows.prepared.request.robot, &rows.prepared.settings);
     let library = &rows.library;
-    let mut calibration = summary::summarise(
-        validated.twin,
+    let pieces = Pieces {
+        twin: validated.twin,
         library,
-        &rows.data,
-        &rows.columns,
+        data: &rows.data,
+        columns: &rows.columns,
         settings,
-        validated.fitted,
-        validated.validation,
-        checked.sweep,
-        checked.opinion,
-        findings,
-    )?;
+        fit: validated.fitted.fit,
+        validation: validated.validation,
+        sweep: checked.sweep,
+        opinion: checked.opinion,
+    };
+    let mut calibration = summary::summarise(pieces, findings)?;
     unseen::tell(&mut calibration, &checked.excitation);
     let seed = settings.inference.seed;
     let twin = &calibration.twin;
