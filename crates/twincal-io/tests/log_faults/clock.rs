@@ -96,6 +96,12 @@ fn case_12_stamps_that_are_all_zero_suggest_a_rate() {
         &refused(run(&log.csv())),
         &["run.csv", "every time stamp is 0", "--rate HZ"],
     );
+    let mut backwards = LogText::moving(2, 200.0, 20.0);
+    backwards.map("t", |row, _| (-0.005 * row as f64).to_string());
+    contains(
+        &refused(run(&backwards.csv())),
+        &["run.csv", "time runs backwards", "fall from 0 to -", "--rate HZ"],
+    );
     // and the remedy works
     let with_rate = LogOptions {
         rate_hz: Some(200.0),

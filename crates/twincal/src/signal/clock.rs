@@ -257,10 +257,15 @@ fn median_interval(
         .windows(2)
         .map(|pair| log.time[pair[1]] - log.time[pair[0]]);
     let Some(interval) = median_positive(steps) else {
-        let stamp = kept.first().map_or(f64::NAN, |&row| log.time[row]);
+        let stamp = |row: Option<&usize>| row.map_or(f64::NAN, |&row| log.time[row]);
+        let (first, last) = (stamp(kept.first()), stamp(kept.last()));
+        let problem = match last < first {
+            true => format!("time runs backwards: the stamps fall from {first} to {last} s"),
+            false => format!("no time passes: every time stamp is {first}"),
+        };
         return Err(log_error(
             log,
-            format!("no time passes: every time stamp is {stamp}"),
+            problem,
             "map the right time column, or give the sampling rate with --rate HZ",
         ));
     };
