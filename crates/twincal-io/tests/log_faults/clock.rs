@@ -100,7 +100,12 @@ fn case_12_stamps_that_are_all_zero_suggest_a_rate() {
     backwards.map("t", |row, _| (-0.005 * row as f64).to_string());
     contains(
         &refused(run(&backwards.csv())),
-        &["run.csv", "time runs backwards", "fall from 0 to -", "--rate HZ"],
+        &[
+            "run.csv",
+            "time runs backwards",
+            "fall from 0 to -",
+            "--rate HZ",
+        ],
     );
     // and the remedy works
     let with_rate = LogOptions {
