@@ -26,10 +26,10 @@ pub const R_HAT_LIMIT: f64 = 1.01;
 /// Largest difference of a PIP between chains that agree.
 pub(super) const SPREAD_LIMIT: f64 = 0.1;
 /// Scans per draw, tried in this order. A run that knows what the ones before it found is tried at the same length once more.
-const SCANS_PER_DRAW: [usize; 6] = [1, 4, 4, 16, 64, 256];
-/// The shortest run counts only if it is far better than chains that agree have to be: share of independent draws among
+const SCANS_PER_DRAW: [usize; 7] = [1, 1, 4, 4, 16, 64, 256];
+/// The shortest runs count only if they are far better than chains that agree have to be: share of independent draws among
 /// all of them, and standard error of the probabilities.
-const MIXED: (f64, f64) = (0.25, 0.004);
+const MIXED: (f64, f64) = (0.05, 0.004);
 /// Multiplications after which no longer run is tried (about 20 s).
 pub(super) const WORK_LIMIT: f64 = 3e10;
 /// Fewest chains that can disagree, and fewest draws per chain that can be judged.
