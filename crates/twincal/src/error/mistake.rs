@@ -34,6 +34,8 @@ const TABLE: &[(&str, Severity, Mistake)] = &[
     ("torque_copied", Degraded, Mistake::Contradiction),
     ("torque_constant", Degraded, Mistake::NoMeasurement),
     ("torque_held", Degraded, Mistake::NoMeasurement),
+    // calibrate/result/common_gain.rs; a warning where torque comes from currents
+    ("common_factor", Degraded, Mistake::Contradiction),
     // signal/torque.rs; a warning where one joint of several is passive
     ("constant_torque", Degraded, Mistake::NoMeasurement),
     // cross_check

@@ -40,6 +40,8 @@ const MANY_ROUGH_ROUNDS: usize = 2;
 const MANY_TOLERANCE: f64 = 3e-3;
 /// A residual below this share of the torque's squares is rounding.
 const ROUNDING: f64 = 1e-22;
+/// Share of E[φ] that is noise at least.
+const LEAST_SHARE: f64 = 1e-3;
 /// Bounds of a learned slab scale v.
 const SLAB_BOUNDS: (f64, f64) = (1e-2, 1e9);
 /// v before anything is known.
@@ -69,6 +71,24 @@ pub struct Fit {
     pub rounds: usize,
     /// False if the iteration was still moving after the last round.
     pub converged: bool,
+}
+
+/// What coefficients with a physical prior add to E[φ] by their size, Σ E[z_k β_k²]/v_k / n: their slab v_k = sd²/φ is a matter of β and sd, not of
+/// noise. Left in, a coefficient of more than √n prior sd would raise φ, narrow its own slab by that, and be lost.
+fn held_by_physics(
+    columns: &Columns,
+    prior: &PriorSettings,
+    problem: &Problem,
+    posterior: &Posterior,
+) -> f64 {
+    if prior.scaled_variance != Auto::Auto {
+        return 0.0;
+    }
+    let second =
+        |k: usize| posterior.sd[k] * posterior.sd[k] + posterior.mean[k] * posterior.mean[k];
+    let physical = (0..columns.names.len()).filter(|&k| columns.prior_sd[k].is_some());
+    let sum: f64 = physical.map(|k| second(k) / problem.prior.slab[k]).sum();
+    sum / problem.n
 }
 
 /// Which plug-ins an iteration may move, and how long.
@@ -154,7 +174,8 @@ fn fit_gram(
             next.scaled_variance = slab_scales(gram, columns, &plug_in, &problem, &posterior);
         }
         if posterior.noise.is_finite() {
-            next.noise = posterior.noise;
+            let held = held_by_physics(columns, settings.prior, &problem, &posterior);
+            next.noise = (posterior.noise - held).max(LEAST_SHARE * posterior.noise);
         }
         let converged = largest_change(&plug_in, &next) < tolerance;
         if converged || rounds == moving.rounds(components) {

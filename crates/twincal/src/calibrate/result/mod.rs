@@ -1,6 +1,7 @@
 //! A checked fit becomes what people read: one status per effect, sets, curves and findings.
 
 pub(super) mod calibration;
+pub(super) mod common_gain;
 pub(super) mod components;
 pub(super) mod curves;
 pub(super) mod drive_scale;

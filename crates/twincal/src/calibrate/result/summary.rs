@@ -2,6 +2,7 @@
 
 use super::calibration::ends;
 use super::calibration::{Calibration, Draws, Group, LikelihoodUsed, PriorUsed, TermSummary};
+use super::common_gain;
 use super::components::{NOT_SEEN, components};
 use super::drive_scale::{self, DriveScale};
 use super::groups::{groups, told_as};
@@ -90,6 +91,7 @@ pub(in crate::calibrate) fn summarise(
     }
     let mut groups = groups(&fit.problem, &fit.posterior, told_apart);
     settle::settle(&mut components, &mut groups, fit, told_apart, &training);
+    findings.extend(common_gain::finding(&components, drive_sd > 0.0));
     let prior = prior_used(library, columns, settings, fit);
     findings.extend(prior.forced.iter().map(forced));
     findings.extend(findings_of_posterior(&groups, &fit.problem, data));
