@@ -97,13 +97,13 @@ fn case_12_stamps_that_are_all_zero_suggest_a_rate() {
         &["run.csv", "every time stamp is 0", "--rate HZ"],
     );
     let mut backwards = LogText::moving(2, 200.0, 20.0);
-    backwards.map("t", |row, _| (-0.005 * row as f64).to_string());
+    backwards.map("t", |row, _| (1.0 - 0.005 * row as f64).to_string());
     contains(
         &refused(run(&backwards.csv())),
         &[
             "run.csv",
             "time runs backwards",
-            "fall from 0 to -",
+            "fall from 1 to -",
             "--rate HZ",
         ],
     );
