@@ -5,7 +5,7 @@
 Every row is one `twincal fit`. Held-out torque: RMSE divided by the standard deviation of the measured torque, joint by joint,
 low-passed like the training rows. The baseline is the nominal model plus least-squares viscous and Coulomb friction and
 offset, by the same program (every candidate in, wide slab, independent rows). With --motor-inertia it has the motors' inertia as well, which no model
-file of these robots has; its ratios are then told and have no limit.
+file of these robots has; its ratios have no limit.
 """
 
 import argparse

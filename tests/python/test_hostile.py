@@ -34,6 +34,7 @@ MISTAKES = [
     ("torque_constant", "ur5", "fourier"),
     ("turned_one_log", "panda", "pick_and_place"),
     ("scaled_one_joint", "xarm7", "fourier"),
+    ("scaled_all", "ur5", "fourier"),
     ("less_gravity", "ur5", "point_to_point"),
     ("upside_down", "panda", "point_to_point"),
     ("zero_moved", "xarm7", "pick_and_place"),

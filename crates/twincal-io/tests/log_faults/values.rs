@@ -40,9 +40,11 @@ fn case_01_nan_in_q_is_dropped_counted_and_cuts() {
 fn case_02_infinite_torque_is_dropped_like_nan() {
     let mut log = LogText::moving(2, 200.0, 20.0);
     log.set(1000, "tau2", "inf").set(3000, "tau1", "-Infinity");
+    // No measurement in any unit: its squares would overflow.
+    log.set(2000, "tau1", "1e300");
     let (trajectory, findings) = run(&log.csv()).unwrap();
-    assert_eq!(says(&findings, "not_finite_rows").count, 2);
-    assert_eq!(trajectory.segments.len(), 3);
+    assert_eq!(says(&findings, "not_finite_rows").count, 3);
+    assert_eq!(trajectory.segments.len(), 4);
     assert!(
         trajectory
             .segments
@@ -137,31 +139,31 @@ fn case_23_a_wrapped_angle_is_unfolded_and_counted_a_slider_never() {
 
 #[test]
 fn a_position_that_is_wrong_in_one_sample_is_named_and_left_out() {
-    let mut log = LogText::moving(2, 200.0, 20.0).without(&["qd1", "qdd1", "qd2", "qdd2"]);
-    let (clean, _) = run(&log.csv()).unwrap();
-    log.map("q1", |i, q| {
-        let q: f64 = q.parse().unwrap();
-        format!("{:.12}", if i == 1503 { q + 0.5 } else { q })
-    });
-    let (trajectory, findings) = run(&log.csv()).unwrap();
-    let said = says(&findings, "motion_spike");
-    assert_eq!(said.count, 1);
-    contains(
-        &said.message,
-        &["position", "+0.500 rad", "7.515 s", "once"],
-    );
-    assert_eq!(trajectory.segments.len(), 2);
-    // What is left of motion and of its noise is as if it had not been there.
-    let still = |trajectory: &Trajectory| -> usize {
-        let all = trajectory.segments.iter().flat_map(|s| &s.standstill);
-        all.filter(|still| **still).count()
-    };
-    assert!(still(&trajectory) <= still(&clean));
-    let smooth = &clean.segments[0];
-    for segment in &trajectory.segments {
-        for (i, row) in segment.input_rows.iter().enumerate() {
-            let at = smooth.input_rows.binary_search(row).unwrap();
-            assert!((segment.q[i] - smooth.q[at]).abs() < 1e-6);
+    for size in [0.5, 1e5] {
+        let mut log = LogText::moving(2, 200.0, 20.0).without(&["qd1", "qdd1", "qd2", "qdd2"]);
+        let (clean, _) = run(&log.csv()).unwrap();
+        log.map("q1", |i, q| {
+            let q: f64 = q.parse().unwrap();
+            format!("{:.12}", if i == 1503 { q + size } else { q })
+        });
+        let (trajectory, findings) = run(&log.csv()).unwrap();
+        let said = says(&findings, "motion_spike");
+        assert_eq!(said.count, 1);
+        let leaves = format!("+{size:.3} rad");
+        contains(&said.message, &["position", &leaves, "7.515 s", "once"]);
+        assert_eq!(trajectory.segments.len(), 2);
+        // What is left of motion and of its noise is as if it had not been there.
+        let still = |trajectory: &Trajectory| -> usize {
+            let all = trajectory.segments.iter().flat_map(|s| &s.standstill);
+            all.filter(|still| **still).count()
+        };
+        assert!(still(&trajectory) <= still(&clean));
+        let smooth = &clean.segments[0];
+        for segment in &trajectory.segments {
+            for (i, row) in segment.input_rows.iter().enumerate() {
+                let at = smooth.input_rows.binary_search(row).unwrap();
+                assert!((segment.q[i] - smooth.q[at]).abs() < 1e-6);
+            }
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Readings of a log: how the base stands, what the torque columns hold, which clock; no reading explains less than the log as it is.
 
+use super::sample;
 use super::testing::{INTERVAL, LEN, arm, log, log_of};
 use super::*;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -139,6 +140,8 @@ fn no_reading_is_proposed_that_explains_less_on_any_joint() {
             _ => (),
         }
         let sample = Sample::take(&pipeline(), &trajectory, 1).unwrap();
+        let of_many = Sample::take(&pipeline(), &trajectory, 500).unwrap();
+        assert!(of_many.len <= sample::LEAST && of_many.len < sample.len);
         let as_logged = explain(&model, &sample, &Reading::as_logged(4));
         let read = Read::of(&model, &sample, &as_logged);
         let is_other = read.base.is_some() || !read.is_as_logged();

@@ -3,7 +3,7 @@
 use crate::signal::{Agreement, Pipeline, Segment, Trajectory, velocity_agreement};
 
 /// Samples that are taken of one trajectory, at least and at most where it has as many, and of all about.
-const LEAST: usize = 100;
+pub(super) const LEAST: usize = 100;
 const MOST: usize = 800;
 const OF_ALL: usize = 24_000;
 /// Width of the moving average in periods of the cut-off.

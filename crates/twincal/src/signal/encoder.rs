@@ -138,14 +138,18 @@ pub(crate) fn quantum<'a>(runs: impl Iterator<Item = &'a [f64]> + Clone) -> Opti
 mod tests {
     use super::*;
 
+    /// A motion, and the same by an encoder of 3.8e-4 rad.
+    fn smooth_and_coarse() -> (Vec<f64>, Vec<f64>) {
+        let smooth: Vec<f64> = (0..2000).map(|i| (f64::from(i) * 0.003).sin()).collect();
+        let coarse = smooth.iter().map(|q| (q / 3.8e-4).round() * 3.8e-4);
+        let coarse = coarse.collect();
+        (smooth, coarse)
+    }
+
     /// One glitch of 1e8 rad among 2000 samples: the step is that of the encoder, and smooth data has none.
     #[test]
     fn a_glitch_is_no_encoder_step() {
-        let smooth: Vec<f64> = (0..2000).map(|i| (f64::from(i) * 0.003).sin()).collect();
-        let coarse: Vec<f64> = smooth
-            .iter()
-            .map(|q| (q / 3.8e-4).round() * 3.8e-4)
-            .collect();
+        let (smooth, coarse) = smooth_and_coarse();
         for (clean, expected) in [(smooth, None), (coarse, Some(3.8e-4))] {
             let mut q = clean;
             q[1000] = 1e8;
@@ -157,11 +161,7 @@ mod tests {
 
     #[test]
     fn the_encoder_step_is_found_and_smooth_data_has_none() {
-        let smooth: Vec<f64> = (0..2000).map(|i| (f64::from(i) * 0.003).sin()).collect();
-        let coarse: Vec<f64> = smooth
-            .iter()
-            .map(|q| (q / 3.8e-4).round() * 3.8e-4)
-            .collect();
+        let (smooth, coarse) = smooth_and_coarse();
         let step = quantum(std::iter::once(coarse.as_slice())).unwrap();
         assert!((step / 3.8e-4 - 1.0).abs() < 1e-6);
         assert_eq!(quantum(std::iter::once(smooth.as_slice())), None);

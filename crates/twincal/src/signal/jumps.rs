@@ -6,7 +6,7 @@
 use super::Recording;
 use super::clock::{Clock, Run};
 use super::prepare::JointFacts;
-use super::travel::{ROUNDING, median, usual_size};
+use super::travel::{count, median};
 use crate::error::{Finding, Severity};
 use crate::robot::JointKind;
 use rayon::prelude::*;
@@ -75,16 +75,6 @@ pub(crate) fn jumps(time: &[f64], values: &[f64], interval: f64) -> Jumps {
         i += 1;
     }
     found
-}
-
-/// Smallest change of a channel that is no rounding: one count of an encoder.
-fn count(values: &[f64]) -> f64 {
-    let scale = usual_size(values.iter());
-    let changes = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-    let count = changes
-        .filter(|change| *change > ROUNDING * scale)
-        .fold(f64::INFINITY, f64::min);
-    if count.is_finite() { count } else { 0.0 }
 }
 
 /// Whether the velocity about sample `i` explains that position changes by `size` there. The median of four samples: a drive that differences

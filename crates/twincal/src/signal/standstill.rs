@@ -1,6 +1,6 @@
 //! When a joint is at rest: where its position is constant. There friction is anywhere between ± its Coulomb value and says nothing.
 
-use super::travel::{ROUNDING, usual_size, white_noise};
+use super::travel::{count, white_noise};
 use std::collections::VecDeque;
 
 /// Shortest rest, s.
@@ -18,17 +18,12 @@ const SAMPLED: usize = 1 << 16;
 
 /// What the position of a joint spans at most in [`SHORTEST`] at rest, rad or m; `logged`: as logged, `pieces`: the same on even clocks.
 pub(crate) fn span<'a>(logged: &[f64], pieces: impl Iterator<Item = &'a [f64]> + Clone) -> f64 {
-    let scale = usual_size(logged.iter());
-    let changes = logged.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-    let count = changes
-        .filter(|change| *change > ROUNDING * scale)
-        .fold(f64::INFINITY, f64::min);
+    let count = count(logged);
     let all: usize = pieces.clone().map(<[f64]>::len).sum();
     let stride = all.div_ceil(SAMPLED).max(1);
     let third = |w: &[f64]| w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0];
     let squares = pieces.flat_map(|q| q.windows(4).step_by(stride).map(|w| third(w).powi(2)));
     let noise = white_noise(squares.collect());
-    let count = if count.is_finite() { count } else { 0.0 };
     let beyond = (noise.powi(2) - (COUNTING * count).powi(2)).max(0.0).sqrt();
     (SLOWEST * SHORTEST).max(COUNTS * count + DEVIATIONS * beyond)
 }

@@ -18,7 +18,7 @@ const COUNTS: f64 = 4.0;
 /// The same in standard deviations of the position noise: two readings agree all the same with a probability of 6e-12.
 const DEVIATIONS: f64 = 10.0;
 /// Changes below this share of the largest position are rounding.
-pub(super) const ROUNDING: f64 = 1e-7;
+const ROUNDING: f64 = 1e-7;
 /// Third differences that the noise is estimated from, about.
 const SAMPLED: usize = 1 << 16;
 /// Variance of a standard normal variable below its median modulus.
@@ -204,11 +204,7 @@ fn slope(time: &[f64], q: &[f64], k: usize, w: usize) -> f64 {
 /// standard deviations of its noise (from third differences in the faster half of the rows; the lower half of them, so that
 /// steps over missing or repeated rows do not count).
 fn least(q: &[f64], step: &[f64], usual: &[f64], joined: &[bool]) -> f64 {
-    let scale = usual_size(q.iter());
-    let changes = step.iter().map(|step| step.abs());
-    let count = changes
-        .filter(|change| *change > ROUNDING * scale)
-        .fold(f64::INFINITY, f64::min);
+    let count = least_change(q, step.iter().copied());
     if !count.is_finite() {
         return f64::INFINITY;
     }
@@ -242,6 +238,22 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
         return 0.0;
     }
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Smallest change of a channel that is no rounding, one count of an encoder; 0 without a change.
+pub(super) fn count(values: &[f64]) -> f64 {
+    let changes = values.windows(2).map(|pair| pair[1] - pair[0]);
+    let count = least_change(values, changes);
+    if count.is_finite() { count } else { 0.0 }
+}
+
+/// The smallest of these changes of a channel that is no rounding; infinite without one.
+fn least_change(values: &[f64], changes: impl Iterator<Item = f64>) -> f64 {
+    let rounding = ROUNDING * usual_size(values.iter());
+    changes
+        .map(f64::abs)
+        .filter(|change| *change > rounding)
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// Size that one value in a hundred is beyond: a glitch is no scale of what a channel rounds to.

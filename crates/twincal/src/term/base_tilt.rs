@@ -33,3 +33,20 @@ pub(super) fn proposal(gravity: [f64; 3]) -> Proposal {
         .collect();
     Proposal { name, columns }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_size_of_gravity_is_known_along_an_axis_alone() {
+        let known = |gravity| -> Vec<Option<f64>> {
+            let columns = proposal(gravity).columns.into_iter();
+            columns.map(|column| column.prior_sd).collect()
+        };
+        assert_eq!(known([0.0, 0.0, -9.81]), [None, None, Some(SIZE * 9.81)]);
+        assert_eq!(known([-9.81, 0.0, 0.0]), [Some(SIZE * 9.81), None, None]);
+        assert_eq!(known([0.0, 6.0, -8.0]), [None; 3]);
+        assert_eq!(known([0.0; 3]), [None; 3]);
+    }
+}

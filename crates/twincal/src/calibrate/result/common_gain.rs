@@ -1,6 +1,6 @@
 //! One factor on the torque of all drives that is far from 1: less a drive constant than another unit or gain of the columns.
 
-use super::calibration::{ComponentSummary, ParameterSummary};
+use super::calibration::ComponentSummary;
 use super::status::Status;
 use crate::error::{Finding, Severity};
 use crate::term::Family;
@@ -19,13 +19,12 @@ pub(in crate::calibrate) fn finding(
         component.family == Family::Gain && component.name == "drives.gain"
     };
     let found = components.iter().find(common)?;
-    let ParameterSummary {
-        median,
-        interval68: [low, high],
-        ..
-    } = found.parameters.first()?;
-    (found.status == Status::Established)
-        .then(|| of_factor(1.0 + median, 0.5 * (high - low), from_currents))?
+    let gain = found.parameters.first()?;
+    if found.status != Status::Established {
+        return None;
+    }
+    let [low, high] = gain.interval68;
+    of_factor(1.0 + gain.median, 0.5 * (high - low), from_currents)
 }
 
 /// The same of torque that is `factor` ± `sd` times the model's.

@@ -91,7 +91,10 @@ pub(in crate::calibrate) fn summarise(
     }
     let mut groups = groups(&fit.problem, &fit.posterior, told_apart);
     settle::settle(&mut components, &mut groups, fit, told_apart, &training);
-    findings.extend(common_gain::finding(&components, drive_sd > 0.0));
+    findings.extend(common_gain::finding(
+        &components,
+        settings.drive_gain_sd > 0.0,
+    ));
     let prior = prior_used(library, columns, settings, fit);
     findings.extend(prior.forced.iter().map(forced));
     findings.extend(findings_of_posterior(&groups, &fit.problem, data));
