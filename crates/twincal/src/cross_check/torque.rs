@@ -7,7 +7,6 @@ use crate::rigid_fit::{Bins, bins, leaning, settle};
 use crate::robot::Robot;
 use crate::signal::{Pipeline, Trajectory};
 use crate::words::significant;
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// Standard deviations from which a factor is believed. Real logs without a fault reach 10 (double pendulum, whose friction is not the same in each run), simulated
@@ -129,7 +128,7 @@ fn common_fit(robot: &Robot, pipeline: &Pipeline, logs: &[&Trajectory]) -> Optio
         .flat_map(|log| bins(robot, pipeline, log, &[]))
         .collect();
     match settle(robot, &bins).map(|settled| settled.robot) {
-        Some(Cow::Owned(turned)) => fit(&turned),
+        Some(turned) if turned.description().gravity != robot.description().gravity => fit(&turned),
         _ => Some(upright),
     }
 }

@@ -31,7 +31,7 @@ pub(super) fn approximate(problem: &Problem, warm: Option<&Posterior>) -> Result
     };
     let certain = certain::components(&standard, problem, warm);
     let reduced = Reduced::new(&standard, &certain);
-    let found = search(&reduced, problem, warm, budget, care);
+    let found = search(&reduced, problem, models_of(warm, &standard), budget, care);
     let total = found.sums.total() / (1.0 - found.missing);
     let heaviest = shares(&reduced, &found, total, LISTED_MODELS);
     let all = total.ln() + found.sums.reference;
@@ -66,40 +66,26 @@ pub(super) fn approximate(problem: &Problem, warm: Option<&Posterior>) -> Result
     ))
 }
 
-/// Runs the search on a problem; `warm` gives starts.
+/// Runs the search on a problem from the first two of the given models; without any, from the empty and the full one.
 pub(super) fn search(
     reduced: &Reduced<'_>,
     problem: &Problem,
-    warm: Option<&Posterior>,
+    warm: &[Model],
     budget: usize,
     care: Care,
 ) -> Found {
     let standard = &reduced.open;
-    let active = &reduced.active;
-    let starts: Vec<Vec<usize>> = warm
-        .filter(|warm| warm.component == standard.component)
-        .map(|warm| {
-            let mut starts: Vec<Vec<usize>> = warm
-                .models
-                .iter()
-                .take(2)
-                .map(|model| {
-                    let mut holds = vec![false; problem.prior.components()];
-                    model
-                        .members
-                        .iter()
-                        .for_each(|&k| holds[standard.component[k as usize]] = true);
-                    active
-                        .iter()
-                        .copied()
-                        .filter(|&b| holds[standard.blocks[b].component])
-                        .collect()
-                })
-                .collect();
-            starts.dedup();
-            starts
-        })
-        .unwrap_or_default();
+    let start = |model: &Model| -> Vec<usize> {
+        let mut holds = vec![false; problem.prior.components()];
+        let members = model.members.iter();
+        members.for_each(|&k| holds[standard.component[k as usize]] = true);
+        let active = reduced.active.iter().copied();
+        active
+            .filter(|&b| holds[standard.blocks[b].component])
+            .collect()
+    };
+    let mut starts: Vec<Vec<usize>> = warm.iter().take(2).map(start).collect();
+    starts.dedup();
     search::run(
         reduced,
         &problem.prior,
@@ -109,6 +95,12 @@ pub(super) fn search(
             care,
         },
     )
+}
+
+/// Models of a posterior of the same components.
+pub(super) fn models_of<'a>(warm: Option<&'a Posterior>, standard: &Standard) -> &'a [Model] {
+    warm.filter(|warm| warm.component == standard.component)
+        .map_or(&[], |warm| &warm.models)
 }
 
 /// (share of `total`, columns, positions) of the heaviest models found.

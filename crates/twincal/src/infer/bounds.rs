@@ -178,7 +178,7 @@ pub(super) fn settle(
     if !standard.bounded {
         return Ok((listed, 0.0));
     }
-    let found = approximate::search(reduced, problem, None, BUDGET, Care::Full);
+    let found = approximate::search(reduced, problem, &listed.models, BUDGET, Care::Full);
     let known: BTreeSet<Vec<u32>> = listed
         .models
         .iter()

@@ -5,6 +5,7 @@
 //! Expansion ends when what a further one would add is negligible, or at a fixed number of models. No random numbers,
 //! one thread: the same bytes everywhere.
 
+use super::MANY_COLUMNS;
 use super::bounds::{Weights, truncate};
 use super::exchanges::{Exchange, exchanges};
 use super::moments::{Moments, Sums, after_exchange, after_flip, present};
@@ -227,7 +228,7 @@ impl Search<'_> {
         }
     }
 
-    /// Climbs from the given models, or from the empty and the full one.
+    /// Climbs from the given models, or from the empty one and, where the columns are not very many, the full one.
     #[inline(always)]
     fn begin<S: Simd>(&mut self, simd: S, warm: &[Vec<usize>]) {
         let words = self.walker.standard.blocks.len().div_ceil(64);
@@ -238,7 +239,10 @@ impl Search<'_> {
         };
         let mut starts: Vec<Set> = warm.iter().map(|blocks| bits(blocks)).collect();
         if starts.is_empty() {
-            starts.extend([bits(&[]), bits(self.active)]);
+            starts.push(bits(&[]));
+            if self.walker.standard.size() <= MANY_COLUMNS {
+                starts.push(bits(self.active));
+            }
         }
         let mut found: Vec<(f64, Set)> = Vec::new();
         for set in starts {

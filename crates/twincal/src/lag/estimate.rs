@@ -1,10 +1,9 @@
 //! Lags by Gauss–Newton: joint by joint with all parameters free, log by log beside them.
 
 use super::rows::{REACH, Rows};
-use crate::rigid_fit::{LEANS, leaning};
+use crate::rigid_fit::{Fit, about_lean, leaning};
 use crate::robot::Robot;
 use crate::signal::{Pipeline, Trajectory};
-use std::borrow::Cow;
 
 /// Steps before lags are looked at, and with them; longest step, s.
 const FITS: usize = 4;
@@ -81,18 +80,16 @@ fn settled<'a>(
     pipeline: &Pipeline,
     logs: &[&'a Trajectory],
 ) -> Option<(Rows<'a>, Vec<f64>)> {
-    let mut robot = Cow::Borrowed(robot);
-    let mut leans = 0;
-    loop {
-        let rows = Rows::new(&robot, pipeline, logs)?;
+    about_lean(robot, |robot| {
+        let rows = Rows::new(robot, pipeline, logs)?;
         let theta = without_lag(&rows)?;
         let (gravity, inertia) = rows.design.gravity_and_inertia(&theta);
-        match leaning(&robot, gravity, inertia) {
-            Some(turned) if leans < LEANS => robot = Cow::Owned(turned),
-            _ => return Some((rows, theta)),
-        }
-        leans += 1;
-    }
+        Some(Fit {
+            size: rows.size(&rows.design.residual(&theta)),
+            leaning: leaning(robot, gravity, &inertia),
+            value: (rows, theta),
+        })
+    })
 }
 
 /// Parameters without lags, in a few steps of weights.

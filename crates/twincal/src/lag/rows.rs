@@ -177,6 +177,13 @@ impl<'a> Rows<'a> {
         };
         joints.map(of_joint).unzip()
     }
+
+    /// Mean over the joints of ln of what is left of most of their rows.
+    pub(super) fn size(&self, residual: &[Vec<f64>]) -> f64 {
+        let (_, spread) = self.weights(residual);
+        let finite = spread.iter().filter(|spread| spread.is_finite());
+        finite.clone().map(|spread| spread.ln()).sum::<f64>() / finite.count().max(1) as f64
+    }
 }
 
 /// Gives every joint a parameter and a column for its lag, behind all others.

@@ -2,13 +2,12 @@
 
 use super::bins::Bins;
 use super::design::{Design, Part, prior, sample};
-use super::robust::{Solution, robust};
+use super::robust::{BETTER, Solution, robust};
 use crate::linear_algebra::dot;
 use crate::robot::{Change, Robot};
-use std::borrow::Cow;
 
 /// Times that a fit is made anew about the lean that the one before found.
-pub(crate) const LEANS: usize = 3;
+const LEANS: usize = 3;
 /// Change of gravity in the base from which that matters, m/s²: half a degree.
 const MATTERS: f64 = 0.1;
 
@@ -31,10 +30,37 @@ pub(crate) fn leaning(robot: &Robot, change: [f64; 3], inertia: &[f64]) -> Optio
     })
 }
 
+/// A fit about one lean of the base.
+pub(crate) struct Fit<T> {
+    pub(crate) value: T,
+    /// ln of what it leaves.
+    pub(crate) size: f64,
+    /// The robot with the lean and the inertias that it found; `None` where it turns little.
+    pub(crate) leaning: Option<Robot>,
+}
+
+/// The fit about the lean that it finds itself. A lean about which as much is left as about none is none: poor motion, and what no rigid body
+/// explains, can look like one.
+pub(crate) fn about_lean<T>(robot: &Robot, fit: impl Fn(&Robot) -> Option<Fit<T>>) -> Option<T> {
+    let upright = fit(robot)?;
+    let mut leans = upright.leaning;
+    let mut last = None;
+    for _ in 0..LEANS {
+        let Some(robot) = leans else { break };
+        let found = fit(&robot)?;
+        leans = found.leaning;
+        last = Some((found.value, found.size));
+    }
+    match last {
+        Some((value, size)) if size < upright.size + BETTER.ln() => Some(value),
+        _ => Some(upright.value),
+    }
+}
+
 /// The robust fit about the lean that it found.
-pub(crate) struct Settled<'a> {
+pub(crate) struct Settled {
     /// The robot; where its base leans with the lean and the inertias that were found.
-    pub(crate) robot: Cow<'a, Robot>,
+    pub(crate) robot: Robot,
     /// Which bins were looked at, and their rows.
     pub(crate) parts: Vec<Part>,
     pub(crate) design: Design,
@@ -42,27 +68,25 @@ pub(crate) struct Settled<'a> {
 }
 
 /// Fits rigid bodies and friction to bins; `None` where they are too few. About each lean the prior is that of the robot as it is then.
-pub(crate) fn settle<'a>(robot: &'a Robot, bins: &[Bins]) -> Option<Settled<'a>> {
-    let mut robot = Cow::Borrowed(robot);
-    let parts = sample(&robot, bins);
-    let mut leans = 0;
-    loop {
-        let design = Design::new(&robot, bins, &parts);
-        let solution = robust(&design, &prior(&robot))?;
+pub(crate) fn settle(robot: &Robot, bins: &[Bins]) -> Option<Settled> {
+    let parts = sample(robot, bins);
+    let fit = |robot: &Robot| {
+        let design = Design::new(robot, bins, &parts);
+        let solution = robust(&design, &prior(robot))?;
         let (gravity, inertia) = design.gravity_and_inertia(&solution.theta);
-        match leaning(&robot, gravity, inertia) {
-            Some(turned) if leans < LEANS => robot = Cow::Owned(turned),
-            _ => {
-                return Some(Settled {
-                    robot,
-                    parts,
-                    design,
-                    solution,
-                });
-            }
-        }
-        leans += 1;
-    }
+        Some(Fit {
+            size: solution.size(&design),
+            leaning: leaning(robot, gravity, &inertia),
+            value: (robot.clone(), design, solution),
+        })
+    };
+    let (robot, design, solution) = about_lean(robot, fit)?;
+    Some(Settled {
+        robot,
+        parts,
+        design,
+        solution,
+    })
 }
 
 fn norm(vector: &[f64; 3]) -> f64 {
@@ -73,6 +97,25 @@ fn norm(vector: &[f64; 3]) -> f64 {
 mod tests {
     use super::*;
     use crate::self_check::testing::arm;
+
+    /// A lean that leaves less is taken, with the robot that leans; one that leaves as much is none.
+    #[test]
+    fn a_lean_must_leave_less() {
+        let robot = arm(1.0);
+        let lean_of = |left: f64| {
+            let fit = |robot: &Robot| {
+                let along = robot.description().gravity[0];
+                Some(Fit {
+                    value: along,
+                    size: if along == 0.0 { 0.0 } else { left.ln() },
+                    leaning: leaning(robot, [if along == 0.0 { 2.0 } else { 0.0 }, 0.0, 0.0], &[]),
+                })
+            };
+            about_lean(&robot, fit).unwrap()
+        };
+        assert!(lean_of(0.5) > 1.9);
+        assert_eq!(lean_of(0.9), 0.0);
+    }
 
     #[test]
     fn gravity_turns_and_keeps_its_size() {

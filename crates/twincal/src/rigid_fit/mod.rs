@@ -14,7 +14,7 @@ mod robust;
 
 pub(crate) use bins::{Bins, Zone, bins};
 pub(crate) use design::{Design, JointRows, prior, sample};
-pub(crate) use lean::{LEANS, Settled, leaning, settle};
+pub(crate) use lean::{Fit, Settled, about_lean, leaning, settle};
 pub(crate) use robust::{Normal, mad};
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ const SHARE: f64 = 0.4;
 const MOST_PARAMETERS: usize = 400;
 /// Share of the sliding rows by which fits are compared, and what the better one must leave of the other's.
 const MOST: f64 = 0.7;
-const BETTER: f64 = 0.8;
+pub(super) const BETTER: f64 = 0.8;
 /// Rows below which a spread is not measured.
 const FEWEST: usize = 10;
 /// Added to the diagonal of the columns' correlations.
@@ -262,7 +262,7 @@ impl Search<'_> {
 
 impl Solution {
     /// Mean over the joints of ln of what is left of most sliding rows.
-    fn size(&self, design: &Design) -> f64 {
+    pub(super) fn size(&self, design: &Design) -> f64 {
         let (mut sum, mut joints) = (0.0, 0.0);
         for (rows, left) in design.joints.iter().zip(&self.residual) {
             let own = left.iter().zip(&rows.zones);

@@ -49,6 +49,7 @@ impl Jumps {
 
     /// What a search finds, from the models of a near posterior where there is one.
     pub(super) fn of(reduced: &Reduced<'_>, problem: &Problem, near: Option<&Posterior>) -> Self {
+        let near = approximate::models_of(near, reduced.full);
         let found = approximate::search(reduced, problem, near, BUDGET, Care::Loop);
         let models = found.models.into_iter().map(|(_, set)| set);
         Self::heaviest(models.take(MODELS).collect(), reduced, problem)
