@@ -37,7 +37,9 @@ const FEW: f64 = 0.01;
 const FAR: f64 = 8.0;
 
 /// Models that the search beside another method expands, and how many of its models join the list.
-const BUDGET: usize = 1024;
+const BUDGET: (usize, usize) = (12, 1024);
+/// That many times the columns squared: what an expansion costs.
+const WORK: usize = 64_000_000;
 const JOINED: usize = 300;
 /// A model lighter than this share without bounds was not listed for its weight.
 const JOINED_SHARE: f64 = 1e-12;
@@ -178,7 +180,9 @@ pub(super) fn settle(
     if !standard.bounded {
         return Ok((listed, 0.0));
     }
-    let found = approximate::search(reduced, problem, &listed.models, BUDGET, Care::Full);
+    let size = reduced.open.size().max(1);
+    let budget = (WORK / (size * size)).clamp(BUDGET.0, BUDGET.1);
+    let found = approximate::search(reduced, problem, &listed.models, budget, Care::Full);
     let known: BTreeSet<Vec<u32>> = listed
         .models
         .iter()

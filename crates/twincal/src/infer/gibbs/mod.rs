@@ -11,6 +11,7 @@ mod swaps;
 
 use super::answer::{Averages, LISTED_MASS, LISTED_MODELS, Listed, posterior};
 use super::exchanges::exchanges;
+use super::search::Set;
 use super::standard::{Reduced, Standard};
 use super::{InferenceSettings, bounds, certain};
 use crate::diagnostics::{NormalScores, convergence, mcse_mean};
@@ -19,7 +20,8 @@ use crate::posterior::{Method, Posterior, Problem};
 use chain::{Length, Target, Trace};
 use jumps::Jumps;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Largest R̂ of chains that agree.
 pub const R_HAT_LIMIT: f64 = 1.01;
@@ -32,6 +34,10 @@ const SCANS_PER_DRAW: [usize; 7] = [1, 1, 4, 4, 16, 64, 256];
 const MIXED: (f64, f64) = (0.05, 0.004);
 /// Multiplications after which no longer run is tried (about 20 s).
 pub(super) const WORK_LIMIT: f64 = 3e10;
+/// The same where chains agree already.
+const WORK_FOR_PRECISION: f64 = 5e9;
+/// Models of a run that the next one is told of at most: weighing each costs about as much as a scan.
+const MOST_VISITED: usize = 4096;
 /// Fewest chains that can disagree, and fewest draws per chain that can be judged.
 pub const LEAST_CHAINS: usize = 2;
 /// See [`LEAST_CHAINS`].
@@ -57,6 +63,47 @@ impl Agreement {
         let error = self.mcse.iter().copied().fold(0.0, f64::max);
         independent >= MIXED.0 * draws && error <= MIXED.1
     }
+}
+
+/// Chains of one length.
+struct Run {
+    traces: Vec<Trace>,
+    agreement: Agreement,
+    /// The list that they jumped on.
+    jumps: Jumps,
+    /// They may be reported.
+    agree: bool,
+    /// A further run would say nothing new.
+    mixed: bool,
+}
+
+impl Run {
+    /// Multiplications that another run may cost: chains that agree are only made more precise by it.
+    fn work_for_another(&self) -> f64 {
+        if self.agree {
+            WORK_FOR_PRECISION
+        } else {
+            WORK_LIMIT
+        }
+    }
+}
+
+/// Multiplications of a run over `columns` columns.
+fn work(settings: &InferenceSettings, length: Length, columns: usize) -> f64 {
+    let scans = settings.chains * settings.draws * length.scans_per_draw;
+    1.5 * scans as f64 * (columns as f64).powi(2)
+}
+
+/// The models that chains visited most often.
+fn most_visited(traces: &[Trace]) -> BTreeSet<Set> {
+    let mut counts: BTreeMap<&Set, u64> = BTreeMap::new();
+    for (set, count) in traces.iter().flat_map(|trace| &trace.visits) {
+        *counts.entry(set).or_default() += count;
+    }
+    let mut visited: Vec<(&Set, u64)> = counts.into_iter().collect();
+    visited.sort_by_key(|&(_, count)| Reverse(count));
+    let most = visited.into_iter().take(MOST_VISITED);
+    most.map(|(set, _)| set.clone()).collect()
 }
 
 /// The posterior by Markov chains; `near`: one that is known to be near.
@@ -109,17 +156,20 @@ fn chains(
 ) -> Result<Posterior> {
     let standard = &reduced.open;
     let exchanges = exchanges(standard, &reduced.active, false);
-    let mut best: Option<(Vec<Trace>, Agreement, Jumps)> = None;
+    let mut best: Option<Run> = None;
     for scans_per_draw in SCANS_PER_DRAW {
         let length = Length {
             warm_up: settings.draws / 4,
             draws: settings.draws,
             scans_per_draw,
         };
-        let size = standard.size() as f64;
-        let work = 1.5 * (settings.chains * settings.draws * scans_per_draw) as f64 * size * size;
-        if best.is_some() && work > WORK_LIMIT {
-            break;
+        if let Some(run) = &best {
+            if work(settings, length, standard.size()) > run.work_for_another() {
+                break;
+            }
+            if share {
+                jumps = jumps.joined(most_visited(&run.traces), reduced, problem);
+            }
         }
         let target = Target {
             reduced,
@@ -132,21 +182,21 @@ fn chains(
             .map(|chain| chain::run(target, settings.seed, chain, length))
             .collect();
         let agreement = judge(reduced, &traces, settings.draws);
-        let mut agree = disagreement(reduced, &agreement).is_none();
-        if scans_per_draw == SCANS_PER_DRAW[0] {
-            agree &= agreement.mixed((settings.chains * settings.draws) as f64);
-        }
-        let known = jumps.clone();
-        if share && !agree {
-            let visited = traces.iter().flat_map(|trace| trace.visits.keys().cloned());
-            jumps = jumps.joined(visited.collect(), reduced, problem);
-        }
-        best = Some((traces, agreement, known));
-        if agree {
+        let run = Run {
+            agree: disagreement(reduced, &agreement).is_none(),
+            mixed: scans_per_draw > SCANS_PER_DRAW[0]
+                || agreement.mixed((settings.chains * settings.draws) as f64),
+            traces,
+            agreement,
+            jumps: jumps.clone(),
+        };
+        let enough = run.agree && run.mixed;
+        best = Some(run);
+        if enough {
             break;
         }
     }
-    let Some((traces, agreement, jumps)) = best else {
+    let Some(run) = best else {
         return Err(Error::Setting {
             key: "inference.draws".into(),
             problem: "no run was tried".into(),
@@ -154,7 +204,7 @@ fn chains(
         });
     };
     if let Some((d, why)) =
-        disagreement(reduced, &agreement).filter(|_| !settings.allow_disagreement)
+        disagreement(reduced, &run.agreement).filter(|_| !settings.allow_disagreement)
     {
         return Err(Error::Refused {
             problem: format!(
@@ -165,7 +215,7 @@ fn chains(
                 .into(),
         });
     }
-    summarise(problem, reduced, &traces, &jumps, &agreement, settings)
+    summarise(problem, reduced, &run, settings)
 }
 
 /// See [`super::scan`].
@@ -296,11 +346,15 @@ fn disagreement(reduced: &Reduced<'_>, agreement: &Agreement) -> Option<(usize, 
 fn summarise(
     problem: &Problem,
     reduced: &Reduced<'_>,
-    traces: &[Trace],
-    jumps: &Jumps,
-    agreement: &Agreement,
+    run: &Run,
     settings: &InferenceSettings,
 ) -> Result<Posterior> {
+    let Run {
+        traces,
+        agreement,
+        jumps,
+        ..
+    } = run;
     let standard = reduced.full;
     let draws = (settings.chains * settings.draws) as f64;
     let mean_of = |sums: fn(&Trace) -> &[f64], d: usize| {
