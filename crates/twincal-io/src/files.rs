@@ -2,10 +2,10 @@
 
 use crate::artifact::{Artifact, Claim, Inputs, Maker, Replace};
 use crate::config::Gates;
+use crate::context::ReportContext;
 use crate::error::Result;
 use crate::log::{LogOptions, read_log};
 use crate::model::{ModelSettings, read_model};
-use crate::report::ReportContext;
 use crate::twin_json::StoredTwin;
 use std::collections::BTreeMap;
 use std::path::Path;

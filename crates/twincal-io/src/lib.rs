@@ -18,12 +18,13 @@
 //! `tests/library.rs` runs the same on files.
 //!
 //! # Features
-//! | feature | logs |
+//! | feature | what it adds |
 //! |---|---|
-//! | `tables` (default) | Parquet, Arrow, NPZ; predictions as Parquet |
-//! | `bags` (default) | MCAP, SQLite bags, rosbag2 folders; predictions as MCAP |
+//! | `tables` (default) | logs in Parquet, Arrow, NPZ; predictions as Parquet |
+//! | `bags` (default) | logs in MCAP, SQLite bags, rosbag2 folders; predictions as MCAP |
+//! | `report` (default) | `report.html`, and what stands in it in words (`report::answer`) |
 //!
-//! CSV is always read and written. Without them nothing in C is compiled.
+//! CSV is always read and written. Without `tables` and `bags` nothing in C is compiled.
 
 #![cfg_attr(
     not(all(feature = "tables", feature = "bags")),
@@ -41,7 +42,9 @@ pub mod memory;
 pub mod config;
 pub mod log;
 pub mod table;
+pub mod context;
 pub mod artifact;
+#[cfg(feature = "report")]
 pub mod report;
 pub mod result_json;
 pub mod twin_json;

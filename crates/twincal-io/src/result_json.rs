@@ -3,8 +3,8 @@
 //! Nothing in it depends on the machine, the clock, the number of threads or the folder: the same input, settings and
 //! seed give the same bytes. Numbers are the shortest that read back the same; what is not a number is `null`.
 
+use crate::context::ReportContext;
 use crate::error::{Error, Result};
-use crate::report::ReportContext;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use twincal::Finding;

@@ -2,8 +2,8 @@
 
 use crate::artifact::{Artifact, Claim, Maker, REPORT, RESULT, RUN_LOG, TWIN};
 use crate::config::{Gates, ReadAs};
+use crate::context::ReportContext;
 use crate::error::{Error, Place, Result};
-use crate::report::ReportContext;
 use crate::result_json::result_json;
 use serde::{Deserialize, Serialize};
 use twincal::calibrate::Calibration;
@@ -74,25 +74,28 @@ impl StoredTwin {
                 .map_err(|e| internal(format!("{e}, after `{}`", before(&twin, e.column()))))?;
             Ok(twin)
         };
-        let shown = || {
-            let report = crate::report::render(&self.calibration, &self.context);
-            (self.result_json(), report)
-        };
+        let shown = || (self.result_json(), self.report());
         let (twin, (result, report)) = rayon::join(twin, shown);
-        let mut files = vec![
-            (RESULT, result?.into_bytes()),
-            (TWIN, twin?),
-            (REPORT, report?.into_bytes()),
-            (RUN_LOG, run_log.into_bytes()),
-        ];
+        let mut files = vec![(RESULT, result?.into_bytes()), (TWIN, twin?)];
+        files.extend(report?.map(|report| (REPORT, report.into_bytes())));
+        files.push((RUN_LOG, run_log.into_bytes()));
         files.extend(more);
         claim.commit(made_by, files)
+    }
+
+    /// `None` in a build without the feature `report`.
+    fn report(&self) -> Result<Option<String>> {
+        #[cfg(feature = "report")]
+        return crate::report::render(&self.calibration, &self.context).map(Some);
+        #[cfg(not(feature = "report"))]
+        Ok(None)
     }
 
     /// Writes the artefact again with a new report and everything else as it is.
     ///
     /// # Errors
     /// A damaged file, or the system's refusal; then nothing has changed.
+    #[cfg(feature = "report")]
     pub fn rewrite_report(&self, artifact: &Artifact, claim: Claim) -> Result<()> {
         let report = crate::report::render(&self.calibration, &self.context)?;
         let mut files = vec![(REPORT, report.into_bytes())];

@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 use twincal::calibrate::{Calibration, CalibrationSettings, Stage, Stopped, calibrate};
 use twincal_io::artifact::{Claim, Maker, REPORT};
 use twincal_io::config::{Config, ReadAs, Settings};
+use twincal_io::context::{FileHash, ReportContext};
 use twincal_io::memory;
 use twincal_io::open::system_text;
-use twincal_io::report::{FileHash, ReportContext};
 use twincal_io::twin_json::StoredTwin;
 
 /// One calibration, ready to run.

@@ -20,7 +20,7 @@ use twincal::validate::{
 use twincal::words::{listed, significant};
 use twincal::{Finding, Result, Severity};
 use twincal_io::artifact::Artifact;
-use twincal_io::report::FileHash;
+use twincal_io::context::FileHash;
 use twincal_io::twin_json::StoredTwin;
 
 /// What `--json` prints.

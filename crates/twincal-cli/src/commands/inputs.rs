@@ -11,9 +11,9 @@ use twincal::robot::Robot;
 use twincal::signal::{Auto, Log};
 use twincal_io::artifact::{MODEL_MJCF, MODEL_URDF, sha256, sha256_unless};
 use twincal_io::config::{LogSettings, Settings};
+use twincal_io::context::FileHash;
 use twincal_io::log::{LogOptions, files_of, open_log, parse_log, read_log};
 use twincal_io::model::{Model, ModelFormat, read_model};
-use twincal_io::report::FileHash;
 use twincal_io::twin_json::StoredTwin;
 use twincal_io::{Error, memory};
 

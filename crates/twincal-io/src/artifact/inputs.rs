@@ -1,8 +1,8 @@
 //! What a command reads, and what belongs to the twin it reads: no output takes its place, whatever `--force` says.
 
 use super::manifest::sha256_of_file;
+use crate::context::FileHash;
 use crate::error::{Error, Place, Result};
-use crate::report::FileHash;
 use std::fs::{self, Metadata};
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};

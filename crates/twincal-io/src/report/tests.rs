@@ -1,6 +1,7 @@
 //! The page as a whole: safe, self-contained, repeatable, small, and complete for every kind of result.
 
-use super::{FileHash, ReportContext, fixture, render};
+use super::{fixture, render};
+use crate::context::{FileHash, ReportContext};
 use quick_xml::events::Event;
 use twincal::calibrate::Calibration;
 

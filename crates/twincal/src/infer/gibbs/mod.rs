@@ -151,9 +151,39 @@ fn chains(
     problem: &Problem,
     settings: &InferenceSettings,
     reduced: &Reduced<'_>,
-    mut jumps: Jumps,
+    jumps: Jumps,
     share: bool,
 ) -> Result<Posterior> {
+    let Some(run) = longest(problem, settings, reduced, jumps, share) else {
+        return Err(Error::Setting {
+            key: "inference.draws".into(),
+            problem: "no run was tried".into(),
+            remedy: "use fewer draws".into(),
+        });
+    };
+    if let Some((d, why)) =
+        disagreement(reduced, &run.agreement).filter(|_| !settings.allow_disagreement)
+    {
+        return Err(Error::Refused {
+            problem: format!(
+                "{} chains of {} draws disagree, most about `{}`: {why}",
+                settings.chains, settings.draws, problem.names[reduced.full.order[d]]
+            ),
+            remedy: "raise inference.draws, or remove columns that the data cannot tell apart, or allow disagreement"
+                .into(),
+        });
+    }
+    summarise(problem, reduced, &run, settings)
+}
+
+/// Runs of growing length, until one is enough or the next would cost too much: the last of them.
+fn longest(
+    problem: &Problem,
+    settings: &InferenceSettings,
+    reduced: &Reduced<'_>,
+    mut jumps: Jumps,
+    share: bool,
+) -> Option<Run> {
     let standard = &reduced.open;
     let exchanges = exchanges(standard, &reduced.active, false);
     let mut best: Option<Run> = None;
@@ -196,26 +226,7 @@ fn chains(
             break;
         }
     }
-    let Some(run) = best else {
-        return Err(Error::Setting {
-            key: "inference.draws".into(),
-            problem: "no run was tried".into(),
-            remedy: "use fewer draws".into(),
-        });
-    };
-    if let Some((d, why)) =
-        disagreement(reduced, &run.agreement).filter(|_| !settings.allow_disagreement)
-    {
-        return Err(Error::Refused {
-            problem: format!(
-                "{} chains of {} draws disagree, most about `{}`: {why}",
-                settings.chains, settings.draws, problem.names[reduced.full.order[d]]
-            ),
-            remedy: "raise inference.draws, or remove columns that the data cannot tell apart, or allow disagreement"
-                .into(),
-        });
-    }
-    summarise(problem, reduced, &run, settings)
+    best
 }
 
 /// See [`super::scan`].
