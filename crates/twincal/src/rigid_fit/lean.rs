@@ -46,8 +46,9 @@ pub(crate) fn about_lean<T>(robot: &Robot, fit: impl Fn(&Robot) -> Option<Fit<T>
     let mut leans = upright.leaning;
     let mut last = None;
     for _ in 0..LEANS {
-        let Some(robot) = leans else { break };
-        let found = fit(&robot)?;
+        let Some(found) = leans.and_then(|robot| fit(&robot)) else {
+            break;
+        };
         leans = found.leaning;
         last = Some((found.value, found.size));
     }
