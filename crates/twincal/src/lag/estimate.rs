@@ -86,7 +86,7 @@ fn settled<'a>(
         let (gravity, inertia) = rows.design.gravity_and_inertia(&theta);
         Some(Fit {
             size: rows.size(&rows.design.residual(&theta)),
-            leaning: leaning(robot, gravity, &inertia),
+            leaning: leaning(robot, gravity, inertia),
             value: (rows, theta),
         })
     })

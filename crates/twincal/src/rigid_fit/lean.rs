@@ -77,7 +77,7 @@ pub(crate) fn settle(robot: &Robot, bins: &[Bins]) -> Option<Settled> {
         let (gravity, inertia) = design.gravity_and_inertia(&solution.theta);
         Some(Fit {
             size: solution.size(&design),
-            leaning: leaning(robot, gravity, &inertia),
+            leaning: leaning(robot, gravity, inertia),
             value: (robot.clone(), design, solution),
         })
     };
