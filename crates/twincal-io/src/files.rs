@@ -39,7 +39,7 @@ pub fn read_recording(path: impl AsRef<Path>, robot: &Robot) -> Result<Recording
     Ok(read_log(path.as_ref(), robot, &LogOptions::default())?.0)
 }
 
-/// Writes a calibration as `twincal fit` does: `result.json`, `twin.json`, `report.html` in a new folder, complete or not at all. The model file is
+/// Writes a calibration as `twincal fit` does: `result.json`, `twin.json` and, with the feature `report`, `report.html` in a new folder, complete or not at all. The model file is
 /// not among them, so that `twincal export` has to be given one.
 ///
 /// # Errors

@@ -12,7 +12,7 @@
 //! for effect in fit.effects() {
 //!     println!("{effect}");
 //! }
-//! save(&fit, "twin")?; // as `twincal fit` writes it: result.json, twin.json, report.html
+//! save(&fit, "twin")?; // as `twincal fit` writes it: result.json, twin.json, with the feature `report` report.html
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //! `tests/library.rs` runs the same on files.

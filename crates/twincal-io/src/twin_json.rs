@@ -52,7 +52,7 @@ impl StoredTwin {
         result_json(&self.calibration, &self.context)
     }
 
-    /// Writes the whole artefact with result, report, twin, log and `more` files.
+    /// Writes the whole artefact with result, report (with the feature `report`), twin, log and `more` files.
     ///
     /// # Errors
     /// The system's refusal; then nothing has changed.

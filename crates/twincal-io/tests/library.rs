@@ -62,5 +62,6 @@ fn from_files_to_a_calibration_and_back() {
     );
     assert!(save(&fit, path("twin")).is_err(), "nothing is replaced");
     assert!(load(path("arm.urdf")).is_err());
-    assert!(path("twin").join("report.html").is_file());
+    let page = path("twin").join("report.html").is_file();
+    assert_eq!(page, cfg!(feature = "report"));
 }

@@ -66,7 +66,7 @@ pub(super) fn approximate(problem: &Problem, warm: Option<&Posterior>) -> Result
     ))
 }
 
-/// Runs the search on a problem from the first two of the given models; without any, from the empty and the full one.
+/// Runs the search on a problem from the first two of the given models; without any, from the empty one and, of up to [`MANY_COLUMNS`](super::MANY_COLUMNS), the full one.
 pub(super) fn search(
     reduced: &Reduced<'_>,
     problem: &Problem,

@@ -17,6 +17,7 @@
 mod acting;
 mod propagation;
 
+use super::MANY_COLUMNS;
 use super::answer::{Averages, Listed};
 use super::approximate;
 use super::moments::{FORBIDDEN, log_normal_mass};
@@ -36,10 +37,11 @@ const FEW: f64 = 0.01;
 /// A bound this many standard deviations below the mean does not act: its mass is 1 − 6e-16.
 const FAR: f64 = 8.0;
 
-/// Models that the search beside another method expands, and how many of its models join the list.
+/// Models that the search beside another method expands: fewest and most.
 const BUDGET: (usize, usize) = (12, 1024);
-/// That many times the columns squared: what an expansion costs.
+/// Models that it expands, times the columns squared: what one costs.
 const WORK: usize = 64_000_000;
+/// How many of its models join the list.
 const JOINED: usize = 300;
 /// A model lighter than this share without bounds was not listed for its weight.
 const JOINED_SHARE: f64 = 1e-12;
@@ -182,7 +184,12 @@ pub(super) fn settle(
     }
     let size = reduced.open.size().max(1);
     let budget = (WORK / (size * size)).clamp(BUDGET.0, BUDGET.1);
-    let found = approximate::search(reduced, problem, &listed.models, budget, Care::Full);
+    // Bounds may forbid what the list holds: only where the columns are very many it is what there is time to start from.
+    let near = match size > MANY_COLUMNS {
+        true => &listed.models[..],
+        false => &[],
+    };
+    let found = approximate::search(reduced, problem, near, budget, Care::Full);
     let known: BTreeSet<Vec<u32>> = listed
         .models
         .iter()

@@ -54,7 +54,7 @@ pub(super) struct Found {
 
 /// What a search is told.
 pub(super) struct Start<'a> {
-    /// Components of models to start from, beside the two of its own.
+    /// Components of models to start from; none: the empty and the full one, see [`Search::begin`].
     pub(super) warm: &'a [Vec<usize>],
     /// Models that are expanded at most.
     pub(super) budget: usize,

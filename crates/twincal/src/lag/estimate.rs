@@ -1,6 +1,6 @@
 //! Lags by Gauss–Newton: joint by joint with all parameters free, log by log beside them.
 
-use super::rows::{REACH, Rows};
+use super::rows::{FEWEST, REACH, Rows};
 use crate::rigid_fit::{Fit, about_lean, leaning};
 use crate::robot::Robot;
 use crate::signal::{Pipeline, Trajectory};
@@ -14,8 +14,6 @@ const PIECES: usize = 8;
 /// Standard deviations of few pieces are made longer by this number of pieces over theirs: four Gaussian ones (6e-5) are 8.7 of Student's t with the
 /// seven degrees of freedom of one log, 4.9 with the 23 of three.
 const STUDENT: f64 = 8.0;
-/// Fewest rows of a joint, and of a log.
-const FEWEST: usize = 40;
 /// What is left of a row counts with this many spreads at most where left-out rows are scored.
 const CAPPED: f64 = 6.0;
 

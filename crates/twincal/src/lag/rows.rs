@@ -4,6 +4,8 @@ use crate::rigid_fit::{Bins, Design, JointRows, Normal, Zone, bins, mad, prior, 
 use crate::robot::Robot;
 use crate::signal::{Pipeline, Segment, Trajectory};
 
+/// Fewest rows of a joint, and of a log.
+pub(super) const FEWEST: usize = 40;
 /// Longest lag that is looked for, s.
 pub(super) const REACH: f64 = 0.1;
 /// Residuals beyond this many robust standard deviations do not count.
@@ -178,12 +180,20 @@ impl<'a> Rows<'a> {
         joints.map(of_joint).unzip()
     }
 
-    /// Mean over the joints of ln of what is left of most of their rows.
+    /// Mean over the joints with enough rows of ln of the spread of what is left; not a number without such a joint.
     pub(super) fn size(&self, residual: &[Vec<f64>]) -> f64 {
-        let (_, spread) = self.weights(residual);
-        let finite = spread.iter().filter(|spread| spread.is_finite());
-        finite.clone().map(|spread| spread.ln()).sum::<f64>() / finite.count().max(1) as f64
+        size(residual, &self.used)
     }
+}
+
+fn size(residual: &[Vec<f64>], used: &[Vec<bool>]) -> f64 {
+    let of_joint = |(left, used): (&Vec<f64>, &Vec<bool>)| {
+        let own = left.iter().zip(used).filter(|(_, used)| **used);
+        let own: Vec<f64> = own.map(|(left, _)| *left).collect();
+        (own.len() >= FEWEST).then(|| mad(own).max(f64::MIN_POSITIVE).ln())
+    };
+    let sizes: Vec<f64> = residual.iter().zip(used).filter_map(of_joint).collect();
+    sizes.iter().sum::<f64>() / sizes.len() as f64
 }
 
 /// Gives every joint a parameter and a column for its lag, behind all others.
@@ -221,4 +231,24 @@ fn at(sums: &[f64], place: f64) -> f64 {
     let place = place.clamp(0.0, (sums.len() - 1) as f64);
     let before = (place as usize).min(sums.len() - 2);
     sums[before] + (place - before as f64) * (sums[before + 1] - sums[before])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::slice;
+
+    /// A few rows that a joint's own parameters reach exactly say nothing of a lean; without any joint there is nothing to compare.
+    #[test]
+    fn joints_with_few_rows_do_not_count() {
+        let left: Vec<f64> = (0..80)
+            .map(|i| if i % 2 == 0 { 2.0 } else { -2.0 })
+            .collect();
+        let (many, few) = (vec![true; 80], [vec![true; 5], vec![false; 75]].concat());
+        let alone = size(slice::from_ref(&left), slice::from_ref(&many));
+        let beside = size(&[left.clone(), vec![1e-12; 80]], &[many, few.clone()]);
+        assert!(alone.is_finite() && alone == beside, "{alone} {beside}");
+        assert!(size(&[left], &[few]).is_nan());
+        assert!(size(&[vec![0.0; 80]], &[vec![true; 80]]).is_finite());
+    }
 }

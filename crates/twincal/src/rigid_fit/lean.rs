@@ -39,23 +39,25 @@ pub(crate) struct Fit<T> {
     pub(crate) leaning: Option<Robot>,
 }
 
-/// The fit about the lean that it finds itself. A lean about which as much is left as about none is none: poor motion, and what no rigid body
-/// explains, can look like one.
+/// The fit about the lean that it finds itself, of several in turn the one that leaves least. A lean that does not leave less than [`BETTER`] of what the
+/// upright fit leaves is none: poor motion, and what no rigid body explains, can look like one.
 pub(crate) fn about_lean<T>(robot: &Robot, fit: impl Fn(&Robot) -> Option<Fit<T>>) -> Option<T> {
-    let upright = fit(robot)?;
-    let mut leans = upright.leaning;
-    let mut last = None;
+    let Fit {
+        value: mut best,
+        size,
+        leaning: mut leans,
+    } = fit(robot)?;
+    let mut least = size + BETTER.ln();
     for _ in 0..LEANS {
         let Some(found) = leans.and_then(|robot| fit(&robot)) else {
             break;
         };
         leans = found.leaning;
-        last = Some((found.value, found.size));
+        if found.size < least {
+            (best, least) = (found.value, found.size);
+        }
     }
-    match last {
-        Some((value, size)) if size < upright.size + BETTER.ln() => Some(value),
-        _ => Some(upright.value),
-    }
+    Some(best)
 }
 
 /// The robust fit about the lean that it found.
@@ -98,24 +100,34 @@ fn norm(vector: &[f64; 3]) -> f64 {
 mod tests {
     use super::*;
     use crate::self_check::testing::arm;
+    use std::cell::Cell;
 
-    /// A lean that leaves less is taken, with the robot that leans; one that leaves as much is none.
-    #[test]
-    fn a_lean_must_leave_less() {
-        let robot = arm(1.0);
-        let lean_of = |left: f64| {
-            let fit = |robot: &Robot| {
-                let along = robot.description().gravity[0];
-                Some(Fit {
-                    value: along,
-                    size: if along == 0.0 { 0.0 } else { left.ln() },
-                    leaning: leaning(robot, [if along == 0.0 { 2.0 } else { 0.0 }, 0.0, 0.0], &[]),
-                })
-            };
-            about_lean(&robot, fit).unwrap()
+    /// What fits that leave these shares make of a robot that seems to lean on and on: number of the fit that is taken, 0 the upright one.
+    fn taken(left: &[Option<f64>]) -> Option<usize> {
+        let count = Cell::new(0);
+        let fit = |robot: &Robot| {
+            let own = count.replace(count.get() + 1);
+            let size = (*left.get(own)?)?.ln();
+            Some(Fit {
+                value: own,
+                size,
+                leaning: leaning(robot, [2.0, 0.0, 0.0], &[]),
+            })
         };
-        assert!(lean_of(0.5) > 1.9);
-        assert_eq!(lean_of(0.9), 0.0);
+        about_lean(&arm(1.0), fit)
+    }
+
+    #[test]
+    fn a_lean_must_leave_less_and_the_best_is_taken() {
+        let [one, none] = [Some(1.0), None];
+        assert_eq!(taken(&[one, Some(0.9), Some(0.85), Some(0.81)]), Some(0));
+        assert_eq!(taken(&[one, Some(0.5), Some(0.4), Some(0.3)]), Some(3));
+        assert_eq!(taken(&[one, Some(0.2), Some(0.85), Some(0.9)]), Some(1));
+        // a lean that cannot be fitted, at once or later, and what cannot be compared
+        assert_eq!(taken(&[one, none]), Some(0));
+        assert_eq!(taken(&[one, Some(0.2), none]), Some(1));
+        assert_eq!(taken(&[one, Some(f64::NAN), Some(f64::NAN)]), Some(0));
+        assert_eq!(taken(&[none]), None);
     }
 
     #[test]

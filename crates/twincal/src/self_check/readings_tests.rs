@@ -140,7 +140,7 @@ fn no_reading_is_proposed_that_explains_less_on_any_joint() {
             _ => (),
         }
         let sample = Sample::take(&pipeline(), &trajectory, 1).unwrap();
-        let of_many = Sample::take(&pipeline(), &trajectory, 500).unwrap();
+        let of_many = Sample::take(&pipeline(), &trajectory, 500).expect("a log that moves");
         assert!(of_many.len <= sample::LEAST && of_many.len < sample.len);
         let as_logged = explain(&model, &sample, &Reading::as_logged(4));
         let read = Read::of(&model, &sample, &as_logged);

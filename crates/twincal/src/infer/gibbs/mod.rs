@@ -11,7 +11,6 @@ mod swaps;
 
 use super::answer::{Averages, LISTED_MASS, LISTED_MODELS, Listed, posterior};
 use super::exchanges::exchanges;
-use super::search::Set;
 use super::standard::{Reduced, Standard};
 use super::{InferenceSettings, bounds, certain};
 use crate::diagnostics::{NormalScores, convergence, mcse_mean};
@@ -20,8 +19,7 @@ use crate::posterior::{Method, Posterior, Problem};
 use chain::{Length, Target, Trace};
 use jumps::Jumps;
 use rayon::prelude::*;
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Largest R̂ of chains that agree.
 pub const R_HAT_LIMIT: f64 = 1.01;
@@ -36,8 +34,6 @@ const MIXED: (f64, f64) = (0.05, 0.004);
 pub(super) const WORK_LIMIT: f64 = 3e10;
 /// The same where chains agree already.
 const WORK_FOR_PRECISION: f64 = 5e9;
-/// Models of a run that the next one is told of at most: weighing each costs about as much as a scan.
-const MOST_VISITED: usize = 4096;
 /// Fewest chains that can disagree, and fewest draws per chain that can be judged.
 pub const LEAST_CHAINS: usize = 2;
 /// See [`LEAST_CHAINS`].
@@ -71,9 +67,9 @@ struct Run {
     agreement: Agreement,
     /// The list that they jumped on.
     jumps: Jumps,
-    /// They may be reported.
+    /// Chains do not disagree.
     agree: bool,
-    /// A further run would say nothing new.
+    /// Probabilities are precise enough, or the run is longer than the shortest.
     mixed: bool,
 }
 
@@ -92,18 +88,6 @@ impl Run {
 fn work(settings: &InferenceSettings, length: Length, columns: usize) -> f64 {
     let scans = settings.chains * settings.draws * length.scans_per_draw;
     1.5 * scans as f64 * (columns as f64).powi(2)
-}
-
-/// The models that chains visited most often.
-fn most_visited(traces: &[Trace]) -> BTreeSet<Set> {
-    let mut counts: BTreeMap<&Set, u64> = BTreeMap::new();
-    for (set, count) in traces.iter().flat_map(|trace| &trace.visits) {
-        *counts.entry(set).or_default() += count;
-    }
-    let mut visited: Vec<(&Set, u64)> = counts.into_iter().collect();
-    visited.sort_by_key(|&(_, count)| Reverse(count));
-    let most = visited.into_iter().take(MOST_VISITED);
-    most.map(|(set, _)| set.clone()).collect()
 }
 
 /// The posterior by Markov chains; `near`: one that is known to be near.
@@ -145,8 +129,8 @@ pub(super) fn require_draws(settings: &InferenceSettings) -> Result<()> {
     })
 }
 
-/// [`sample`] with a given list of models to jump between; with `share`, chains that disagree are run again and know what
-/// all of them visited.
+/// [`sample`] with a given list of models to jump between; with `share`, chains that are run again know what all of them
+/// visited.
 fn chains(
     problem: &Problem,
     settings: &InferenceSettings,
@@ -198,7 +182,8 @@ fn longest(
                 break;
             }
             if share {
-                jumps = jumps.joined(most_visited(&run.traces), reduced, problem);
+                let visited = run.traces.iter().flat_map(|trace| trace.visits.keys());
+                jumps = jumps.joined(visited.cloned().collect(), reduced, problem);
             }
         }
         let target = Target {
