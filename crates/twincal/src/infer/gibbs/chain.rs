@@ -6,6 +6,7 @@
 //! product Π(1 − f), says where the next flip is. A scan without flips is C/8 multiplications.
 //! Columns that every model with weight holds are integrated out ([`Reduced`]) or, where a bound may act, in from the start.
 
+mod admission;
 mod ratios;
 
 use super::jumps::Jumps;
@@ -17,6 +18,7 @@ use crate::infer::standard::{Reduced, Response};
 use crate::infer::walker::Walker;
 use crate::lanes::LANES;
 use crate::prior::Prior;
+use admission::Admission;
 use pulp::{Simd, WithSimd};
 use ratios::Chunk;
 pub(super) use ratios::to_the;
@@ -73,6 +75,11 @@ pub(super) struct Trace {
     pub(super) visits: BTreeMap<Vec<u64>, u64>,
     /// Accepted moves.
     pub(super) moves: u64,
+}
+
+/// Probability that an exchange is accepted which multiplies the weight with `e^gain`.
+pub(super) fn exchange_chance(gain: f64) -> f64 {
+    LAZY * gain.exp().min(1.0)
 }
 
 /// Runs one chain.
@@ -175,6 +182,8 @@ struct Chain<'a> {
     precision: Vec<f64>,
     slab: Vec<f64>,
     chunks: Vec<Chunk>,
+    /// What bounds say of a move; `None` where there are none.
+    admission: Option<Admission>,
     version: u64,
     /// Uniform number that the running product has not reached yet, and that product.
     target: f64,
@@ -224,6 +233,7 @@ impl<'a> Chain<'a> {
             odds: vec![0.0; chunks.len() * LANES],
             sums: vec![0.0; chunks.len() * LANES],
             chunks,
+            admission: (target.reduced.full.bounded).then(|| Admission::new(standard)),
             version: 1,
             target: uniform,
             product: 1.0,
@@ -254,6 +264,7 @@ impl<'a> Chain<'a> {
                 self.flip(simd, block);
             }
         }
+        self.weigh_present();
     }
 
     /// `P(z_j flips)/P(z_j stays)` a priori, where heredity has a say.
@@ -317,7 +328,9 @@ impl<'a> Chain<'a> {
                 for l in from..=lane {
                     sums[l] += chunk.conditional[l];
                 }
-                self.flip(simd, self.active[index * LANES + lane]);
+                let block = self.active[index * LANES + lane];
+                let guide = self.guide(block);
+                self.attempt(simd, &[block], guide);
                 self.renew();
                 from = lane + 1;
             }
@@ -341,12 +354,9 @@ impl<'a> Chain<'a> {
             return;
         };
         let (gain, ..) = self.walker.exchange_gain(&step);
-        if self.source.uniform() < LAZY * gain.exp() {
-            for &block in step.leaving.iter().chain(&step.entering) {
-                self.flip(simd, block);
-                self.moves -= 1;
-            }
-            self.moves += 1;
+        if self.source.uniform() < exchange_chance(gain) {
+            let blocks = [step.leaving, step.entering].concat();
+            self.attempt(simd, &blocks, 0.0);
         }
     }
 
@@ -375,8 +385,8 @@ impl<'a> Chain<'a> {
         if !self.is_listed(jumps) {
             return;
         }
-        let goal = jumps.draw(self.source.uniform());
-        let goal = jumps.set(goal);
+        let model = jumps.draw(self.source.uniform());
+        let goal = jumps.set(model);
         let mut changes = 0;
         for block in 0..self.walker.standard.blocks.len() {
             let inside = goal[block / 64] >> (block % 64) & 1 == 1;
@@ -387,6 +397,9 @@ impl<'a> Chain<'a> {
         }
         if changes > 0 {
             self.moves -= changes - 1;
+            if let Some(admission) = &mut self.admission {
+                admission.set_present(jumps.bounds(model));
+            }
             self.renew();
         }
     }
@@ -417,10 +430,7 @@ impl<'a> Chain<'a> {
             };
             left -= proposal;
             let blocks = group.pick(self.source.uniform());
-            for block in blocks {
-                self.flip(simd, block);
-            }
-            self.moves -= 1;
+            self.attempt(simd, &blocks, 0.0);
             self.renew();
         }
     }
