@@ -409,7 +409,8 @@ pub(super) fn log_ratio(
         bound.terms.iter().map(term).sum()
     };
     let place = |bound: &Bound| {
-        let of = |variance: f64, mean: f64| (variance.sqrt(), (mean - bound.lower) / variance.sqrt());
+        let of =
+            |variance: f64, mean: f64| (variance.sqrt(), (mean - bound.lower) / variance.sqrt());
         let known = shared(bound, bound).zip(mean(bound));
         known.map_or((1.0, f64::INFINITY), |(variance, mean)| of(variance, mean))
     };

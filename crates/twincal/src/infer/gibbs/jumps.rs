@@ -6,10 +6,10 @@
 //! whatever the list is.
 
 use super::state::State;
-use crate::infer::{approximate, bounds};
 use crate::infer::search::{Care, Set};
 use crate::infer::standard::{Reduced, Response};
 use crate::infer::walker::Walker;
+use crate::infer::{approximate, bounds};
 use crate::posterior::{Posterior, Problem};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -216,7 +216,12 @@ impl WithSimd for Walk<'_> {
                     true => bounds::log_ratio(self.reduced, &walker.tableau, set, &mut masses),
                     false => 0.0,
                 };
-                (set.clone(), walker.log_weight() + log_ratio, log_ratio, state)
+                (
+                    set.clone(),
+                    walker.log_weight() + log_ratio,
+                    log_ratio,
+                    state,
+                )
             })
             .collect()
     }

@@ -341,11 +341,7 @@ fn disagreement(reduced: &Reduced<'_>, agreement: &Agreement) -> Option<(usize, 
         })
 }
 
-fn summarise(
-    reduced: &Reduced<'_>,
-    run: &Run,
-    settings: &InferenceSettings,
-) -> Result<Posterior> {
+fn summarise(reduced: &Reduced<'_>, run: &Run, settings: &InferenceSettings) -> Result<Posterior> {
     let Run {
         traces,
         agreement,

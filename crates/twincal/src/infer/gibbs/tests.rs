@@ -124,7 +124,10 @@ fn over_all_models(problem: &Problem, parents: &[(usize, usize)]) -> Vec<f64> {
     let mut log_weights = Vec::new();
     for set in 0..1usize << components {
         let holds = |component: usize| set >> component & 1 == 1;
-        if parents.iter().any(|&(child, parent)| holds(child) && !holds(parent)) {
+        if parents
+            .iter()
+            .any(|&(child, parent)| holds(child) && !holds(parent))
+        {
             continue;
         }
         let inside = |&d: &usize| holds(problem.prior.component[standard.order[d]]);

@@ -8,7 +8,7 @@
 //! min(1, ρ(z') / (ρ(z) g))
 //! ```
 //!
-//! where g, the guide, is the growth of the mass above each of the bounds that the flipped coefficients take part in.
+//! where g, the guide, is about the growth of the mass above the bounds that the flipped coefficients take part in.
 //! It is the inverse on the way back, so that any g keeps `π ρ`; a good one makes refusals rare. Swaps and exchanges have g = 1.
 
 use super::Chain;
@@ -19,6 +19,7 @@ use crate::infer::standard::{Block, Standard};
 use crate::infer::tableau::Tableau;
 use crate::lanes::{LANES, Lane};
 use crate::linear_algebra::Cholesky;
+use crate::prior::HalfSpace;
 use pulp::Simd;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -135,7 +136,7 @@ pub(super) struct Admission {
     single: Vec<Vec<usize>>,
     /// Places in `standard.halves` of the sums that one of its coefficients is part of, likewise.
     sums: Vec<Vec<usize>>,
-    /// Growth of ln ρ by the slab's part, where all that these sums are about is in, likewise: near enough for a guide.
+    /// Growth of ln ρ by the slab's part beside the columns that these sums need, likewise: near enough for a guide.
     slab: Vec<f64>,
     masses: SlabMasses,
     /// ln ρ of models.
@@ -158,8 +159,10 @@ impl Admission {
         let sums: Vec<Vec<usize>> = standard.blocks.iter().map(sums).collect();
         let mut masses = SlabMasses::default();
         let mut slab = |(block, sums): (&Block, &Vec<usize>)| {
+            // The columns without which none of these sums acts.
             let halves = sums.iter().map(|&place| &standard.halves[place]);
-            let mut all: Vec<usize> = halves.flat_map(|h| h.terms.iter().map(|t| t.0)).collect();
+            let mut all: Vec<usize> = halves.filter_map(|half| half.replaces).collect();
+            all.extend(block.range());
             all.sort_unstable();
             all.dedup();
             let with = bounds::slab_ratio(standard, &all, &mut masses);
@@ -238,18 +241,24 @@ impl Chain<'_> {
             let (place, _) = turn.both(&[(d, 1.0)]);
             log_growth += mass(place, standard.lower[d], with);
         }
+        // Sums of one component are much alike: the least mass above one of them is nearer to that above all than the product.
+        let stays = |d: usize| !turn.own.contains(&d) && tableau.includes(d);
+        let enters = |d: usize| turn.own.contains(&d) || stays(d);
+        let of = |place: Place, half: &HalfSpace, phi: f64, inside: &dyn Fn(usize) -> bool| match (
+            half.acts(inside),
+            half.forbids(inside),
+        ) {
+            (false, _) => 0.0,
+            (true, true) => FORBIDDEN,
+            (true, false) => mass(place, half.lower, phi),
+        };
+        let (mut more, mut less) = (0.0f64, 0.0f64);
         for half in sums.iter().map(|&place| &standard.halves[place]) {
-            let stays = |d: usize| !turn.own.contains(&d) && tableau.includes(d);
-            let enters = |d: usize| turn.own.contains(&d) || stays(d);
-            let (more, less) = turn.both(&half.terms);
-            let of = |place: Place, phi: f64, acts: bool, forbids: bool| match (acts, forbids) {
-                (false, _) => 0.0,
-                (true, true) => FORBIDDEN,
-                (true, false) => mass(place, half.lower, phi),
-            };
-            log_growth += of(more, with, half.acts(enters), half.forbids(enters))
-                - of(less, without, half.acts(stays), half.forbids(stays));
+            let (then, before) = turn.both(&half.terms);
+            more = more.min(of(then, half, with, &enters));
+            less = less.min(of(before, half, without, &stays));
         }
+        log_growth += more - less;
         let log_growth = log_growth.clamp(-MOST, MOST);
         if turn.inside { -log_growth } else { log_growth }
     }
