@@ -11,8 +11,8 @@
 //! Hennig & Lacoste-Julien 2011): each bound becomes a normal site that matches mean and variance. φ is set to b_z/a_n.
 //!
 //! Listed models are treated one by one; the others, light by construction, are scaled as the listed ones are on
-//! average. Where that moves weight to models that a method without bounds does not list, a search that knows the bounds
-//! lists them.
+//! average. Where that moves weight to models that a sum without bounds does not list, a search that knows the bounds
+//! lists them. Chains know the bounds themselves (`gibbs/chain/admission.rs`): of their models only the moments change.
 
 mod acting;
 mod propagation;

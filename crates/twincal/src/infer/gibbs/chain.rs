@@ -54,7 +54,7 @@ pub(super) struct Target<'a> {
 /// [`Reduced::open`], `beta`, `shift` and `moment` about all positions. Arrays are `[row * draws + draw]`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Trace {
-    /// P(z = 1 | all other z), mean over a draw's scans.
+    /// P(z = 1 | all other z), mean over a draw's scans; with bounds only about that, and no part of a result.
     pub(super) conditional: Vec<f32>,
     /// z before the jump, or of a listed model P(z = 1 | list): what jumping from there would give on average.
     pub(super) jumped: Vec<f32>,
