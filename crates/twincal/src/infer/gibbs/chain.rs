@@ -136,6 +136,7 @@ impl Run<'_> {
         for scan in 0..length.warm_up * length.scans_per_draw {
             state.scan(simd);
             if scan % (JUMP_EVERY * length.scans_per_draw) == 0 {
+                state.settle_in(simd, target.jumps);
                 state.jump(simd, target.jumps);
             }
         }
@@ -382,10 +383,28 @@ impl<'a> Chain<'a> {
     /// A Gibbs step over the listed models, see [`Jumps`].
     #[inline(always)]
     fn jump<S: Simd>(&mut self, simd: S, jumps: &Jumps) {
-        if !self.is_listed(jumps) {
+        if self.is_listed(jumps) {
+            let model = jumps.draw(self.source.uniform());
+            self.go(simd, jumps, model);
+        }
+    }
+
+    /// While a chain warms up: to a listed model that weighs more than an unlisted one where the chain may be caught between bounds.
+    #[inline(always)]
+    fn settle_in<S: Simd>(&mut self, simd: S, jumps: &Jumps) {
+        if jumps.is_empty() || self.is_listed(jumps) {
             return;
         }
         let model = jumps.draw(self.source.uniform());
+        let bounds = self.admission.as_ref().map_or(0.0, |own| own.present());
+        if jumps.log_weight(model) > self.walker.log_weight() + bounds {
+            self.go(simd, jumps, model);
+        }
+    }
+
+    /// To a listed model.
+    #[inline(always)]
+    fn go<S: Simd>(&mut self, simd: S, jumps: &Jumps, model: usize) {
         let goal = jumps.set(model);
         let mut changes = 0;
         for block in 0..self.walker.standard.blocks.len() {

@@ -27,7 +27,8 @@ const PIECE: usize = 256;
 pub(super) struct Jumps {
     places: BTreeSet<Set>,
     models: Vec<Set>,
-    /// ln of what bounds multiply each model's weight with.
+    /// ln of each model's weight and of the part of it that is the bounds'.
+    log_weights: Vec<f64>,
     bounds: Vec<f64>,
     /// Running sum of the weights, the last one 1.
     cumulative: Vec<f64>,
@@ -43,6 +44,7 @@ impl Jumps {
         Self {
             places: BTreeSet::new(),
             models: Vec::new(),
+            log_weights: Vec::new(),
             bounds: Vec::new(),
             cumulative: Vec::new(),
             inclusion: Vec::new(),
@@ -94,12 +96,14 @@ impl Jumps {
             })
             .collect();
         cumulative.iter_mut().for_each(|value| *value /= sum);
+        let log_weights = kept.iter().map(|(_, weight, ..)| *weight).collect();
         let bounds = kept.iter().map(|(_, _, bounds, _)| *bounds).collect();
         let pairs = kept.into_iter().map(|(set, _, _, state)| (set, state));
         let (models, states): (Vec<Set>, Vec<State>) = pairs.unzip();
         let mut jumps = Self {
             places: models.iter().cloned().collect(),
             models,
+            log_weights,
             bounds,
             cumulative,
             inclusion: Vec::new(),
@@ -139,6 +143,11 @@ impl Jumps {
 
     pub(super) fn set(&self, model: usize) -> &[u64] {
         &self.models[model]
+    }
+
+    /// ln of its weight, bounds included.
+    pub(super) fn log_weight(&self, model: usize) -> f64 {
+        self.log_weights[model]
     }
 
     /// ln of what bounds multiply its weight with.

@@ -179,6 +179,11 @@ impl Admission {
         }
     }
 
+    /// ln ρ of the present model.
+    pub(super) fn present(&self) -> f64 {
+        self.present
+    }
+
     /// ln ρ of the model that the chain has come to otherwise.
     pub(super) fn set_present(&mut self, log_ratio: f64) {
         self.present = log_ratio;
