@@ -26,7 +26,7 @@ pub const R_HAT_LIMIT: f64 = 1.01;
 /// Largest difference of a PIP between chains that agree.
 pub(super) const SPREAD_LIMIT: f64 = 0.1;
 /// Scans per draw, tried in this order. Runs that know what the ones before them found are tried at the same length first.
-const SCANS_PER_DRAW: [usize; 8] = [1, 1, 1, 4, 4, 16, 64, 256];
+const SCANS_PER_DRAW: [usize; 9] = [1, 1, 1, 1, 4, 4, 16, 64, 256];
 /// The shortest runs count only if they are far better than chains that agree have to be: share of independent draws among
 /// all of them, and standard error of the probabilities.
 const MIXED: (f64, f64) = (0.05, 0.004);
