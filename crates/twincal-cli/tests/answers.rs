@@ -71,7 +71,7 @@ fn case_92_outliers_are_named_and_coverage_stays() {
 }
 
 /// Chains that are too short to agree are no result, unless the user says so; then the result says it. Many candidates that
-/// the data hardly speak of, under a narrow slab, make chains of 100 draws disagree at four of six seeds, this one among them.
+/// the data hardly speak of, under a narrow slab, make chains of 100 draws disagree at two of twelve seeds, this one among them.
 #[test]
 fn case_90_and_91_chains_that_disagree_are_refused() {
     let folder = folder();
@@ -93,7 +93,7 @@ fn case_90_and_91_chains_that_disagree_are_refused() {
     let terms = terms.map(|term| format!("\"{term}\""));
     let config = format!(
         "{}[noise]\nmodel = \"iid\"\n[prior]\ninclusion = {{ probability = 0.5 }}\nslab = {{ scaled_variance = 0.1 }}\n\
-         [inference]\nmethod = \"gibbs\"\nchains = 4\ndraws = 100\nseed = 4\n",
+         [inference]\nmethod = \"gibbs\"\nchains = 4\ndraws = 100\nseed = 2\n",
         QUICK.replace("\"sin(q2)\"", &terms.join(", "))
     );
     fs::write(folder.path().join("quick.toml"), config).unwrap();

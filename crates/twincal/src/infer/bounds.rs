@@ -11,23 +11,23 @@
 //! Hennig & Lacoste-Julien 2011): each bound becomes a normal site that matches mean and variance. φ is set to b_z/a_n.
 //!
 //! Listed models are treated one by one; the others, light by construction, are scaled as the listed ones are on
-//! average. Where that moves weight to models that a method without bounds does not list, a search that knows the bounds
-//! lists them.
+//! average. Where that moves weight to models that a sum without bounds does not list, a search that knows the bounds
+//! lists them. Chains know the bounds themselves (`gibbs/chain/admission.rs`): of their models only the moments change.
 
 mod acting;
 mod propagation;
 
-use super::MANY_COLUMNS;
 use super::answer::{Averages, Listed};
 use super::approximate;
 use super::moments::{FORBIDDEN, log_normal_mass};
 use super::search::Care;
 use super::standard::{Reduced, Standard, nudged};
+use super::tableau::Tableau;
 use crate::error::Result;
 use crate::linear_algebra::Cholesky;
 use crate::posterior::{Model, Problem};
-use acting::Acting;
-pub(super) use acting::most_of_sums;
+use acting::{Acting, Bound};
+pub(super) use acting::{SlabMasses, most_of_sums};
 use propagation::propagate;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -37,10 +37,8 @@ const FEW: f64 = 0.01;
 /// A bound this many standard deviations below the mean does not act: its mass is 1 − 6e-16.
 const FAR: f64 = 8.0;
 
-/// Models that the search beside another method expands: fewest and most.
-const BUDGET: (usize, usize) = (12, 1024);
-/// Models that it expands, times the columns squared: what one costs.
-const WORK: usize = 64_000_000;
+/// Models that the search beside another method expands.
+const BUDGET: usize = 1024;
 /// How many of its models join the list.
 const JOINED: usize = 300;
 /// A model lighter than this share without bounds was not listed for its weight.
@@ -51,6 +49,8 @@ const JOINED_SHARE: f64 = 1e-12;
 pub(super) enum Weights {
     /// The mass of the slab within the bounds, nothing of the posterior's.
     Free,
+    /// All of it: the models are those of chains that know the bounds.
+    Whole,
     /// Also the posterior's mass as if coefficients were independent.
     Guided,
 }
@@ -182,14 +182,7 @@ pub(super) fn settle(
     if !standard.bounded {
         return Ok((listed, 0.0));
     }
-    let size = reduced.open.size().max(1);
-    let budget = (WORK / (size * size)).clamp(BUDGET.0, BUDGET.1);
-    // Bounds may forbid what the list holds: only where the columns are very many it is what there is time to start from.
-    let near = match size > MANY_COLUMNS {
-        true => &listed.models[..],
-        false => &[],
-    };
-    let found = approximate::search(reduced, problem, near, budget, Care::Full);
+    let found = approximate::search(reduced, problem, &[], BUDGET, Care::Full);
     let known: BTreeSet<Vec<u32>> = listed
         .models
         .iter()
@@ -286,7 +279,13 @@ pub(super) fn truncate(
     let phi = model.scale / standard.shape;
     let count = positions.len();
     let factor = Cholesky::from_lower(model.factor.clone(), count);
-    let mut log_ratio = acting.slab_ratio(standard, positions, model.scale);
+    let mut log_ratio = match weights {
+        Weights::Whole => 0.0,
+        Weights::Free | Weights::Guided => {
+            let masses = &mut SlabMasses::default();
+            acting.slab_ratio(standard, positions, model.scale, masses)
+        }
+    };
     // A⁻¹ a of every bound, for the covariance in units of φ.
     let solved = |terms: &[(usize, f64)]| {
         let mut x = vec![0.0; count];
@@ -306,18 +305,14 @@ pub(super) fn truncate(
         log_ratio -= own.map(|(_, t)| log_normal_mass(t)).sum::<f64>();
         log_ratio -= acting.guided(standard, positions, model, &factor);
     }
-    let near: Vec<usize> = (0..columns.len()).filter(|&a| place(a).1 < FAR).collect();
-    if near.is_empty() {
+    let places: Vec<(f64, f64)> = (0..columns.len()).map(place).collect();
+    let shared = |a: usize, b: usize| phi * acting.bounds[b].sum(&columns[a]);
+    let Some((near, log_mass, sites)) = mass(&places, shared) else {
         return Ok(log_ratio);
+    };
+    if weights != Weights::Whole {
+        log_ratio += log_mass;
     }
-    let score: Vec<f64> = near.iter().map(|&a| place(a).1).collect();
-    let correlation: Vec<f64> = near
-        .iter()
-        .flat_map(|&a| near.iter().map(move |&b| (a, b)))
-        .map(|(a, b)| phi * acting.bounds[b].sum(&columns[a]) / (place(a).0 * place(b).0))
-        .collect();
-    let (log_mass, sites) = propagate(&score, &correlation);
-    log_ratio += log_mass;
     // Sites are in x = (aᵀβ − lower)/sd: −½ τ x² + ν x.
     let mut matrix = multiply_transposed(&model.factor, count);
     let mut right = vec![0.0; count];
@@ -327,7 +322,7 @@ pub(super) fn truncate(
             .sum();
     }
     for (&a, (precision, shift)) in near.iter().zip(sites) {
-        let (bound, sd) = (&acting.bounds[a], place(a).0);
+        let (bound, sd) = (&acting.bounds[a], places[a].0);
         let precision = phi * precision / (sd * sd);
         let shift = phi * shift / sd + precision * bound.lower;
         for &(i, f) in &bound.terms {
@@ -343,6 +338,85 @@ pub(super) fn truncate(
     model.mean = right;
     model.factor = factor.into_lower();
     Ok(log_ratio)
+}
+
+/// The bounds that act, ln of the mass within them and their sites, from (standard deviation, distance in it) of the mean from every bound
+/// and the covariance of two of them; `None` where none acts.
+#[expect(clippy::type_complexity, reason = "named where it is used, twice")]
+fn mass(
+    places: &[(f64, f64)],
+    shared: impl Fn(usize, usize) -> f64,
+) -> Option<(Vec<usize>, f64, Vec<(f64, f64)>)> {
+    let near: Vec<usize> = (0..places.len()).filter(|&a| places[a].1 < FAR).collect();
+    if near.is_empty() {
+        return None;
+    }
+    let score: Vec<f64> = near.iter().map(|&a| places[a].1).collect();
+    let correlation: Vec<f64> = near
+        .iter()
+        .flat_map(|&a| near.iter().map(move |&b| (a, b)))
+        .map(|(a, b)| shared(a, b) / (places[a].0 * places[b].0))
+        .collect();
+    let (log_mass, sites) = propagate(&score, &correlation);
+    Some((near, log_mass, sites))
+}
+
+/// The slab's part of [`log_ratio`] in a model of these positions that fits as the full one does; 0 where a bound forbids it.
+pub(super) fn slab_ratio(standard: &Standard, positions: &[usize], masses: &mut SlabMasses) -> f64 {
+    let scale = standard.scale_of(1.0);
+    Acting::new(standard, positions).map_or(0.0, |acting| {
+        acting.slab_ratio(standard, positions, scale, masses)
+    })
+}
+
+/// What [`truncate`] multiplies the weight of the model in a tableau with, ln, without a factor of its own; `set` by place in `open.blocks`.
+///
+/// Columns that were integrated out have no bound that acts ([`Reduced`]).
+pub(super) fn log_ratio(
+    reduced: &Reduced<'_>,
+    tableau: &Tableau<'_>,
+    set: &[u64],
+    masses: &mut SlabMasses,
+) -> f64 {
+    let standard = reduced.full;
+    let (_, positions) = reduced.members(set);
+    let Some(acting) = Acting::new(standard, &positions) else {
+        return FORBIDDEN;
+    };
+    let misfit = 1.0 + tableau.excess;
+    let slab = acting.slab_ratio(standard, &positions, standard.scale_of(misfit), masses);
+    // By place in `positions`, as the bounds: the position of `open` and its units per unit of the coefficient.
+    let mut unit = vec![None; standard.size()];
+    for (k, (d, stretch)) in reduced.left().enumerate() {
+        unit[d] = Some((k, stretch * standard.natural(d)));
+    }
+    let open: Vec<Option<(usize, f64)>> = positions.iter().map(|&d| unit[d]).collect();
+    let phi = 0.5 * misfit / standard.shape;
+    let shared = |a: &Bound, b: &Bound| -> Option<f64> {
+        let mut sum = 0.0;
+        for &(i, f) in &a.terms {
+            let (k, own) = open[i]?;
+            let row = tableau.row(k);
+            for &(j, g) in &b.terms {
+                let (l, other) = open[j]?;
+                sum += f * g * row[l] / (own * other);
+            }
+        }
+        Some(phi * sum)
+    };
+    let mean = |bound: &Bound| -> Option<f64> {
+        let term = |&(i, f): &(usize, f64)| open[i].map(|(k, own)| f * tableau.gradient[k] / own);
+        bound.terms.iter().map(term).sum()
+    };
+    let place = |bound: &Bound| {
+        let of =
+            |variance: f64, mean: f64| (variance.sqrt(), (mean - bound.lower) / variance.sqrt());
+        let known = shared(bound, bound).zip(mean(bound));
+        known.map_or((1.0, f64::INFINITY), |(variance, mean)| of(variance, mean))
+    };
+    let places: Vec<(f64, f64)> = acting.bounds.iter().map(place).collect();
+    let both = |a: usize, b: usize| shared(&acting.bounds[a], &acting.bounds[b]).unwrap_or(0.0);
+    slab + mass(&places, both).map_or(0.0, |(_, log_mass, _)| log_mass)
 }
 
 /// `L Lᵀ`.

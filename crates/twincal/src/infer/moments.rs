@@ -86,6 +86,10 @@ pub(super) fn half_mass(
 
 /// `ln Φ(t)`, also far below 0.
 pub(super) fn log_normal_mass(t: f64) -> f64 {
+    if t > 9.0 {
+        // 1 to the last digit.
+        return 0.0;
+    }
     if t > -30.0 {
         return (0.5 * erfc(-t * std::f64::consts::FRAC_1_SQRT_2)).ln();
     }

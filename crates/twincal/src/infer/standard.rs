@@ -265,6 +265,11 @@ impl Standard {
         (scale / self.full_scale).max(1.0)
     }
 
+    /// b_z of a model from its `1 + c`.
+    pub(super) fn scale_of(&self, misfit: f64) -> f64 {
+        self.full_scale * misfit
+    }
+
     /// Natural units per unit of the coefficient.
     pub(super) fn natural(&self, d: usize) -> f64 {
         self.scale[d] / self.unit

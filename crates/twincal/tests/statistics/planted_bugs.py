@@ -182,6 +182,18 @@ BUGS = [
         "Some(log_weight(problem, standard, &model) + moments",
         "Some(log_weight(problem, standard, &model) - 1.0 + moments",
     ),
+    (
+        "a move under bounds is guided, but not admitted by what the guide said",
+        "infer/gibbs/chain/admission.rs",
+        "(log_ratio - present - guide).exp()",
+        "(log_ratio - present).exp()",
+    ),
+    (
+        "an exchange that is never refused where it gains little",
+        "infer/gibbs/chain.rs",
+        "LAZY * gain.exp().min(1.0)",
+        "(LAZY * gain.exp()).min(1.0)",
+    ),
 ]
 
 

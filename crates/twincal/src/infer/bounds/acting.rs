@@ -5,6 +5,7 @@ use crate::infer::moments::{half_mass, log_normal_mass};
 use crate::infer::standard::{Standard, slab_mass};
 use crate::linear_algebra::Cholesky;
 use crate::posterior::{Model, Site};
+use std::collections::BTreeMap;
 
 /// A bound `Σ f β_i ≥ lower` on coefficients of a model, by their place in it.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,6 +35,10 @@ impl Bound {
         }
     }
 }
+
+/// Masses of slabs within bounds at 0, which depend on a group's members alone: the same for many models.
+#[derive(Debug, Default)]
+pub(in crate::infer) struct SlabMasses(BTreeMap<Vec<(usize, u64)>, f64>);
 
 /// The bounds of a model.
 pub(super) struct Acting {
@@ -88,7 +93,13 @@ impl Acting {
 
     /// ln of the mass that single bounds leave of the slab at the full model's φ over the mass that all bounds leave of it at φ of a model
     /// with this b_z: the former is in a model's weight, the latter should be.
-    pub(super) fn slab_ratio(&self, standard: &Standard, positions: &[usize], scale: f64) -> f64 {
+    pub(super) fn slab_ratio(
+        &self,
+        standard: &Standard,
+        positions: &[usize],
+        scale: f64,
+        masses: &mut SlabMasses,
+    ) -> f64 {
         let misfit = standard.misfit(scale);
         let single = |&(i, group): &(usize, Option<usize>)| {
             let d = positions[i];
@@ -105,11 +116,16 @@ impl Acting {
             phi / (standard.precision[d] * standard.precision_unit(d))
         };
         let of_single: f64 = self.single.iter().map(single).sum();
-        of_single - self.log_slab(variance)
+        of_single - self.log_slab(positions, variance, masses)
     }
 
     /// ln of the mass within the bounds of all groups, coefficients being independent with mean 0.
-    fn log_slab(&self, variance: impl Fn(usize) -> f64) -> f64 {
+    fn log_slab(
+        &self,
+        positions: &[usize],
+        variance: impl Fn(usize) -> f64,
+        masses: &mut SlabMasses,
+    ) -> f64 {
         let mut groups: Vec<usize> = self.bounds.iter().filter_map(|b| b.group).collect();
         groups.sort_unstable();
         groups.dedup();
@@ -137,7 +153,25 @@ impl Acting {
                 .collect();
             propagate(&score, &correlation).0
         };
-        groups.into_iter().map(mass).sum()
+        let mut known = |group: usize| match self.key(positions, group) {
+            Some(key) => *masses.0.entry(key).or_insert_with(|| mass(group)),
+            None => mass(group),
+        };
+        groups.into_iter().map(&mut known).sum()
+    }
+
+    /// What decides the slab's mass within the bounds of a group; `None` where φ does, too.
+    fn key(&self, positions: &[usize], group: usize) -> Option<Vec<(usize, u64)>> {
+        let mut key = Vec::new();
+        for bound in self.bounds.iter().filter(|b| b.group == Some(group)) {
+            if bound.lower != 0.0 {
+                return None;
+            }
+            let terms = bound.terms.iter();
+            key.extend(terms.map(|&(i, factor)| (positions[i], factor.to_bits())));
+            key.push((usize::MAX, 0));
+        }
+        Some(key)
     }
 
     /// ln of the mass that the search's guide gave to the bounds of the groups, see [`crate::infer::moments::Moments::log_mass`].
@@ -180,5 +214,8 @@ pub(in crate::infer) fn most_of_sums(standard: &Standard) -> f64 {
     let positions: Vec<usize> = (0..standard.size()).collect();
     let phi = standard.noise(1.0 / (2.0 * standard.shape));
     let variance = |d: usize| phi / (standard.precision[d] * standard.precision_unit(d));
-    Acting::new(standard, &positions).map_or(0.0, |acting| -acting.log_slab(variance).min(0.0))
+    let masses = &mut SlabMasses::default();
+    Acting::new(standard, &positions).map_or(0.0, |acting| {
+        -acting.log_slab(&positions, variance, masses).min(0.0)
+    })
 }

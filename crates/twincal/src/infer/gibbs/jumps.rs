@@ -6,10 +6,10 @@
 //! whatever the list is.
 
 use super::state::State;
-use crate::infer::approximate;
 use crate::infer::search::{Care, Set};
 use crate::infer::standard::{Reduced, Response};
 use crate::infer::walker::Walker;
+use crate::infer::{approximate, bounds};
 use crate::posterior::{Posterior, Problem};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -27,6 +27,9 @@ const PIECE: usize = 256;
 pub(super) struct Jumps {
     places: BTreeSet<Set>,
     models: Vec<Set>,
+    /// ln of each model's weight and of the part of it that is the bounds'.
+    log_weights: Vec<f64>,
+    bounds: Vec<f64>,
     /// Running sum of the weights, the last one 1.
     cumulative: Vec<f64>,
     /// P(z = 1 | list) by component.
@@ -41,6 +44,8 @@ impl Jumps {
         Self {
             places: BTreeSet::new(),
             models: Vec::new(),
+            log_weights: Vec::new(),
+            bounds: Vec::new(),
             cumulative: Vec::new(),
             inclusion: Vec::new(),
             states: Vec::new(),
@@ -71,7 +76,7 @@ impl Jumps {
     fn heaviest(models: Vec<Set>, reduced: &Reduced<'_>, problem: &Problem) -> Self {
         let mut weighed: Vec<(f64, Set)> = walked(models, reduced, problem, false)
             .into_iter()
-            .map(|(set, weight, _)| (weight, set))
+            .map(|(set, weight, ..)| (weight, set))
             .collect();
         weighed.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
         weighed.truncate(MODELS);
@@ -85,17 +90,21 @@ impl Jumps {
         let mut sum = 0.0;
         let mut cumulative: Vec<f64> = kept
             .iter()
-            .map(|(_, weight, _)| {
+            .map(|(_, weight, ..)| {
                 sum += (weight - largest).exp();
                 sum
             })
             .collect();
         cumulative.iter_mut().for_each(|value| *value /= sum);
-        let (models, states): (Vec<Set>, Vec<State>) =
-            kept.into_iter().map(|(set, _, state)| (set, state)).unzip();
+        let log_weights = kept.iter().map(|(_, weight, ..)| *weight).collect();
+        let bounds = kept.iter().map(|(_, _, bounds, _)| *bounds).collect();
+        let pairs = kept.into_iter().map(|(set, _, _, state)| (set, state));
+        let (models, states): (Vec<Set>, Vec<State>) = pairs.unzip();
         let mut jumps = Self {
             places: models.iter().cloned().collect(),
             models,
+            log_weights,
+            bounds,
             cumulative,
             inclusion: Vec::new(),
             states,
@@ -136,6 +145,16 @@ impl Jumps {
         &self.models[model]
     }
 
+    /// ln of its weight, bounds included.
+    pub(super) fn log_weight(&self, model: usize) -> f64 {
+        self.log_weights[model]
+    }
+
+    /// ln of what bounds multiply its weight with.
+    pub(super) fn bounds(&self, model: usize) -> f64 {
+        self.bounds[model]
+    }
+
     pub(super) fn state(&self, model: usize) -> &State {
         &self.states[model]
     }
@@ -150,13 +169,14 @@ impl Jumps {
     }
 }
 
-/// Models in another order, with ln weights as the chain counts them and, if asked for, their moments.
+/// Models in another order, with ln weights as the chain counts them, ln of what bounds multiply them with and, if asked for, their
+/// moments without bounds.
 fn walked(
     mut models: Vec<Set>,
     reduced: &Reduced<'_>,
     problem: &Problem,
     moments: bool,
-) -> Vec<(Set, f64, State)> {
+) -> Vec<(Set, f64, f64, State)> {
     // Neighbours in this order differ by few components; a piece has its own walk, whatever the threads.
     models.sort_unstable();
     models
@@ -181,13 +201,14 @@ struct Walk<'a> {
 }
 
 impl WithSimd for Walk<'_> {
-    type Output = Vec<(Set, f64, State)>;
+    type Output = Vec<(Set, f64, f64, State)>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let standard = &self.reduced.open;
         let mut walker = Walker::new(standard, &self.problem.prior);
         let mut response = Response::default();
+        let mut masses = bounds::SlabMasses::default();
         self.models
             .iter()
             .map(|set| {
@@ -200,7 +221,16 @@ impl WithSimd for Walk<'_> {
                 if self.moments {
                     state.read(self.reduced, &walker.tableau, &mut response);
                 }
-                (set.clone(), walker.log_weight(), state)
+                let log_ratio = match self.reduced.full.bounded {
+                    true => bounds::log_ratio(self.reduced, &walker.tableau, set, &mut masses),
+                    false => 0.0,
+                };
+                (
+                    set.clone(),
+                    walker.log_weight() + log_ratio,
+                    log_ratio,
+                    state,
+                )
             })
             .collect()
     }

@@ -25,8 +25,8 @@ use std::collections::BTreeMap;
 pub const R_HAT_LIMIT: f64 = 1.01;
 /// Largest difference of a PIP between chains that agree.
 pub(super) const SPREAD_LIMIT: f64 = 0.1;
-/// Scans per draw, tried in this order. A run that knows what the ones before it found is tried at the same length once more.
-const SCANS_PER_DRAW: [usize; 7] = [1, 1, 4, 4, 16, 64, 256];
+/// Scans per draw, tried in this order. Runs that know what the ones before them found are tried at the same length first.
+const SCANS_PER_DRAW: [usize; 9] = [1, 1, 1, 1, 4, 4, 16, 64, 256];
 /// The shortest runs count only if they are far better than chains that agree have to be: share of independent draws among
 /// all of them, and standard error of the probabilities.
 const MIXED: (f64, f64) = (0.05, 0.004);
@@ -157,7 +157,7 @@ fn chains(
                 .into(),
         });
     }
-    summarise(problem, reduced, &run, settings)
+    summarise(reduced, &run, settings)
 }
 
 /// Runs of growing length, until one is enough or the next would cost too much: the last of them.
@@ -280,7 +280,9 @@ fn judge(reduced: &Reduced<'_>, traces: &[Trace], draws: usize) -> Agreement {
                 .max(standard_error(scanned.clone()));
             let list = mcse_mean(&rows(traces, draws, b, |t| &t.jumped))
                 .max(standard_error(jumped.clone()));
-            let (error, spread) = if list < scans {
+            // The conditionals know no bounds.
+            let by_list = reduced.full.bounded || list < scans;
+            let (error, spread) = if by_list {
                 (list, range(jumped))
             } else {
                 (scans, range(scanned))
@@ -288,7 +290,7 @@ fn judge(reduced: &Reduced<'_>, traces: &[Trace], draws: usize) -> Agreement {
             // A model that N draws never met may have about 1/N of the mass.
             let known = reduced.certain.contains(&b);
             let error = if known { 0.0 } else { error.hypot(unseen) };
-            (error, list < scans, spread)
+            (error, by_list, spread)
         })
         .collect();
     Agreement {
@@ -339,12 +341,7 @@ fn disagreement(reduced: &Reduced<'_>, agreement: &Agreement) -> Option<(usize, 
         })
 }
 
-fn summarise(
-    problem: &Problem,
-    reduced: &Reduced<'_>,
-    run: &Run,
-    settings: &InferenceSettings,
-) -> Result<Posterior> {
+fn summarise(reduced: &Reduced<'_>, run: &Run, settings: &InferenceSettings) -> Result<Posterior> {
     let Run {
         traces,
         agreement,
@@ -388,7 +385,9 @@ fn summarise(
         LISTED_MASS,
         LISTED_MODELS,
     )?;
-    let (listed, _) = bounds::settle(problem, reduced, &mut averages, listed)?;
+    let log_weights = listed.models.iter().map(|m| m.weight.ln()).collect();
+    let whole = bounds::Weights::Whole;
+    let (listed, _) = bounds::apply(standard, &mut averages, listed, log_weights, whole)?;
     let method = Method::Gibbs {
         chains: settings.chains,
         draws: settings.draws,

@@ -114,7 +114,8 @@ impl Chain<'_> {
                 sign[lane] = tableau.sign[standard.blocks[block].start];
             }
         }
-        let odds = self.chunk_odds(index, &sign);
+        let mut odds = self.chunk_odds(index, &sign);
+        self.guide_odds(index, &mut odds);
         let chunk = &mut self.chunks[index];
         let mut stay = [0.0; LANES];
         let (odds, d) = (S::as_simd_f64s(&odds).0, S::as_simd_f64s(&d).0);
