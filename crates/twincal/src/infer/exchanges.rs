@@ -3,9 +3,11 @@
 //! A payload and the last link's mass moments together with its tensor say almost the same. Going from one story to the
 //! other by flips alone passes through models that nobody believes.
 
+use super::kin::Kin;
 use super::standard::Standard;
 use super::walker::{Step, Walker};
 use crate::linear_algebra::Cholesky;
+use crate::prior::Prior;
 
 /// Components that share less of their columns than this are no pair: two flips do the same.
 const ALIKE: f64 = 0.3;
@@ -40,10 +42,22 @@ impl Exchange {
     }
 }
 
-/// Exchanges among `active` components: one for one, and one of several columns for two. `single` keeps those of two
-/// single columns as well.
-pub(super) fn exchanges(standard: &Standard, active: &[usize], single: bool) -> Vec<Exchange> {
+/// Exchanges among `active` components: one for one, one of several columns for two, and one for one with its parents: a
+/// child can be far better than what it stands for, and its parent alone far worse. `single` keeps those of two single columns as well.
+pub(super) fn exchanges(
+    standard: &Standard,
+    prior: &Prior,
+    active: &[usize],
+    single: bool,
+) -> Vec<Exchange> {
     let shared = Shared::new(standard, active);
+    let kin = Kin::new(standard, prior);
+    let with_parents = |b: usize| -> Vec<usize> {
+        let mut line = kin.as_ref().map_or(vec![b], |kin| kin.line(b));
+        line.retain(|b| active.contains(b));
+        line.sort_unstable();
+        line
+    };
     let mut all: Vec<Exchange> = Vec::new();
     for (place, &a) in active.iter().enumerate() {
         let mut alike: Vec<(f64, usize)> = active
@@ -61,6 +75,13 @@ pub(super) fn exchanges(standard: &Standard, active: &[usize], single: bool) -> 
                 all.push(Exchange {
                     left: vec![a.min(b)],
                     right: vec![a.max(b)],
+                });
+            }
+            let line = with_parents(b);
+            if line.len() > 1 && !line.contains(&a) {
+                all.push(Exchange {
+                    left: vec![a],
+                    right: line,
                 });
             }
         }

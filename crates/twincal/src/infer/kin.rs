@@ -31,6 +31,11 @@ impl Kin {
         any.then_some(Self { parent, children })
     }
 
+    /// A component and its ancestors.
+    pub(super) fn line(&self, block: usize) -> Vec<usize> {
+        std::iter::successors(Some(block), |&b| self.parent[b]).collect()
+    }
+
     /// Whether a component may come in, or leave, as the others are.
     #[inline]
     pub(super) fn may_flip(&self, tableau: &Tableau<'_>, block: usize) -> bool {

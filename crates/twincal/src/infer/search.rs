@@ -113,7 +113,7 @@ impl WithSimd for Run<'_> {
             start,
         } = self;
         let standard = &reduced.open;
-        let exchanges = exchanges(standard, &reduced.active, true);
+        let exchanges = exchanges(standard, prior, &reduced.active, true);
         let mut walker = Walker::new(standard, prior);
         for &block in &reduced.certain {
             walker.flip(simd, block);

@@ -169,7 +169,7 @@ fn longest(
     share: bool,
 ) -> Option<Run> {
     let standard = &reduced.open;
-    let exchanges = exchanges(standard, &reduced.active, false);
+    let exchanges = exchanges(standard, &problem.prior, &reduced.active, false);
     let mut best: Option<Run> = None;
     for scans_per_draw in SCANS_PER_DRAW {
         let length = Length {
@@ -221,7 +221,7 @@ pub(super) fn scan(problem: &Problem, scans: usize, seed: u64) -> Result<u64> {
     let target = Target {
         reduced: &reduced,
         prior: &problem.prior,
-        exchanges: &exchanges(&standard, &reduced.active, false),
+        exchanges: &exchanges(&standard, &problem.prior, &reduced.active, false),
         jumps: &Jumps::none(),
     };
     let length = Length {

@@ -1,7 +1,7 @@
 //! The sampler against the sum over all models.
 
 use super::*;
-use crate::infer::testing::{grouped, problem};
+use crate::infer::testing::{acting, grouped, problem};
 use crate::infer::{Choice, exact, infer};
 use crate::prior::{HalfSpace, Inclusion};
 
@@ -200,13 +200,29 @@ fn chains_keep_to_bounds() {
             let both = [1.0, -1.0].map(|sign| both_ways(own, own + 1, sign));
             sums.prior.halves.extend(both);
         }
+        // One that is in for certain, far from its bound, beside ten columns with theirs.
+        let mut sure = acting(seed, &[1, 1, 10, 1, 1, 1], 400, false, 12.0).problem;
+        let ten = sure.prior.columns()[2].clone();
+        for k in ten {
+            (sure.prior.lower[k], sure.prior.slab[k]) = (-0.01, 0.002);
+        }
+        sure.prior.odds = vec![4.0, 0.3, 4.0];
+        let standard = Standard::new(&sure).unwrap();
+        let certain = certain::components(&standard, &sure, None);
+        assert!(Reduced::new(&standard, &certain).shrinks());
         if seed % 2 == 1 {
             // Every effect on the other side of its bound.
             for problem in [&mut alike, &mut wide, &mut sums] {
                 problem.xy.iter_mut().for_each(|x| *x = -*x);
             }
         }
-        for (problem, parents) in [(&alike, &[][..]), (&wide, &[]), (&sums, &heredity)] {
+        let cases = [
+            (&alike, &[][..]),
+            (&wide, &[]),
+            (&sums, &heredity),
+            (&sure, &[]),
+        ];
+        for (problem, parents) in cases {
             let mut free = problem.clone();
             free.prior.lower.fill(f64::NEG_INFINITY);
             free.prior.halves.clear();
@@ -217,6 +233,36 @@ fn chains_keep_to_bounds() {
         }
     }
     assert!(worst > 0.7, "the bounds decide nothing: {worst}");
+}
+
+/// A column that explains the torque and is rare a priori, and the same column as the child of a component of three that explains
+/// nothing: what lies between holds too much or explains nothing (1e-5 of the weight), so that only parent and child together can
+/// stand for it.
+#[test]
+fn a_child_comes_in_with_its_parent() {
+    for seed in 0..3 {
+        let parents = [(4, 1)];
+        let data = acting(90 + seed, &[1, 3, 1, 1, 1, 1], 60, false, 1.0);
+        let mut problem = data.with_parents(&parents).problem;
+        let (size, columns) = (problem.xy.len(), problem.prior.columns());
+        let (own, child) = (columns[0][0], columns[4][0]);
+        for k in 0..size {
+            let inner = problem.gram[own * size + k];
+            problem.gram[child * size + k] = inner;
+            problem.gram[k * size + child] = inner;
+        }
+        problem.gram[child * size + child] = problem.gram[own * size + own] * (1.0 + 1e-9);
+        problem.xy[child] = problem.xy[own];
+        let prior = &mut problem.prior;
+        prior.slab[child] = prior.slab[own];
+        columns[1].iter().for_each(|&k| prior.slab[k] = 1e-4);
+        prior.family = vec![0, 1, 2, 2, 3, 2];
+        prior.odds = vec![1e-5, 1e-5, 1.0, 10.0];
+        let truth = agrees_blindly(&problem, &parents, seed);
+        for component in [0, 1, 4] {
+            assert!((0.05..0.95).contains(&truth[component]), "{truth:?}");
+        }
+    }
 }
 
 /// There and back as the weights are, also where the ratio is within what keeps the chain lazy.
