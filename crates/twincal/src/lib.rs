@@ -24,6 +24,7 @@ pub mod term;
 pub mod rows;
 pub mod gram;
 pub mod observations;
+mod statistics;
 pub mod excitation;
 pub mod prior;
 pub mod posterior;

@@ -387,6 +387,12 @@ impl Part<'_> {
             .collect()
     }
 
+    /// Rows at which a joint moves: n of its [`Part::gram`].
+    pub fn moving_rows(&self, joint: usize) -> f64 {
+        let standstill = &self.observations.joints[joint].standstill[self.rows.clone()];
+        standstill.iter().filter(|still| !**still).count() as f64
+    }
+
     /// Residuals `y − Xβ` of a joint as runs of consecutive moving rows.
     pub fn residual_runs(&self, joint: usize, beta: &[f64]) -> Vec<Vec<f64>> {
         self.runs(joint, beta, &[])
@@ -433,17 +439,7 @@ impl Part<'_> {
 
     /// `xᵀ C x` of every row of a joint; C: `covariance[a * count + b]` of columns a and b out of `count`.
     pub fn quadratic_forms(&self, joint: usize, covariance: &[f64], count: usize) -> Vec<f64> {
-        self.forms(joint, &self.quadratic_form(joint, covariance, count))
-    }
-
-    /// What [`Part::forms`] takes, for all parts whose columns are made alike.
-    pub(crate) fn quadratic_form(
-        &self,
-        joint: usize,
-        covariance: &[f64],
-        count: usize,
-    ) -> QuadraticForm {
-        let rows = &self.observations.joints[joint];
+        let (len, rows) = (self.observations.len(), &self.observations.joints[joint]);
         let columns = || rows.columns.iter();
         let mut matrix: Vec<f64> = columns()
             .flat_map(|a| columns().map(move |b| covariance[a * count + b]))
@@ -451,35 +447,14 @@ impl Part<'_> {
         if let Some(recipes) = &rows.recipes {
             matrix = recipes.to_parts(&matrix);
         }
-        QuadraticForm {
-            recipes: rows.recipes.clone(),
-            matrix,
-        }
-    }
-
-    /// Whether a form is that of these columns, too.
-    pub(crate) fn has_form(&self, joint: usize, form: &QuadraticForm) -> bool {
-        self.observations.joints[joint].recipes == form.recipes
-    }
-
-    /// `xᵀ C x` of every row of a joint.
-    pub(crate) fn forms(&self, joint: usize, form: &QuadraticForm) -> Vec<f64> {
-        let (len, rows) = (self.observations.len(), &self.observations.joints[joint]);
         let mut forms = vec![0.0; self.rows.len()];
         let first = self.rows.start;
         rows.visit_signals(len, self.rows.clone(), &mut |piece, columns| {
             let forms = &mut forms[piece.start - first..piece.end - first];
-            products::quadratic(columns, &form.matrix, forms);
+            products::quadratic(columns, &matrix, forms);
         });
         forms
     }
-}
-
-/// A quadratic form of a joint's columns as one of what they are made of.
-#[derive(Debug)]
-pub(crate) struct QuadraticForm {
-    recipes: Option<Arc<Recipes>>,
-    matrix: Vec<f64>,
 }
 
 impl JointObservations {

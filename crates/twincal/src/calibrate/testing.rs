@@ -3,11 +3,12 @@
 use super::fit::compact::refit;
 use crate::likelihood::{Columns, assemble};
 use crate::observations::{JointObservations, Observations, Part};
-use crate::plug_in::{Fit, start, total};
+use crate::plug_in::{Fit, start};
 use crate::posterior::Posterior;
 use crate::prior::{Inclusion, PriorSettings};
 use crate::random::Random;
 use crate::signal::Auto;
+use crate::statistics::Training;
 use crate::term::Family;
 
 pub(in crate::calibrate) struct Regression {
@@ -94,8 +95,8 @@ impl Regression {
     /// Independent rows, and the structure with both columns.
     pub(in crate::calibrate) fn fitted(&self, logs: &[Part<'_>]) -> (Fit, Posterior) {
         let (columns, prior) = (Self::columns(), Self::prior());
-        let plug_in = start(logs, &columns, &prior);
-        let gram = total(logs);
+        let plug_in = start(&Training::whole(logs), &columns, &prior);
+        let gram = logs.iter().collect();
         let problem = assemble(&gram, &columns, &plug_in, &prior).unwrap();
         let posterior = crate::infer::approximate(&problem, None).unwrap();
         let compact = refit(&problem, &[true, true], &posterior).unwrap();

@@ -1,10 +1,15 @@
 //! AR(1) coefficient of a residual: the maximum of its exact stationary likelihood.
 
+use crate::gram::{JointGram, Symmetric};
+use crate::statistics::{of_joint, residual_form};
+use std::iter::Sum;
+
 /// Largest |ρ| that is tried.
 const LIMIT: f64 = 0.999;
 
-/// Sums over runs that the stationary AR(1) likelihood of a series needs.
-struct Sums {
+/// Sums over the runs of a joint's residual that the stationary AR(1) likelihood needs; those of several joints add.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Residual {
     rows: f64,
     starts: f64,
     square: f64,
@@ -12,26 +17,26 @@ struct Sums {
     ends: f64,
 }
 
-impl Sums {
-    fn of(runs: &[&[f64]]) -> Self {
-        let mut sums = Sums {
-            rows: 0.0,
-            starts: 0.0,
-            square: 0.0,
-            difference: 0.0,
-            ends: 0.0,
-        };
-        for run in runs.iter().filter(|run| !run.is_empty()) {
-            sums.rows += run.len() as f64;
-            sums.starts += 1.0;
-            sums.square += run.iter().map(|r| r * r).sum::<f64>();
-            sums.difference += run
-                .windows(2)
-                .map(|w| (w[1] - w[0]) * (w[1] - w[0]))
-                .sum::<f64>();
-            sums.ends += run[0] * run[0] + run[run.len() - 1] * run[run.len() - 1];
+impl Residual {
+    /// `y − Xβ` of a joint, `beta` of all columns; squares of at most `rounding` are none.
+    pub(super) fn new(joint: &JointGram, beta: &[f64], rounding: f64) -> Self {
+        let beta = of_joint(joint, beta);
+        let form = |sums: &Symmetric| residual_form(sums, &beta).max(0.0);
+        let square = form(&joint.s0);
+        if square <= rounding || joint.n == 0.0 {
+            return Self {
+                rows: joint.n,
+                starts: joint.starts,
+                ..Self::default()
+            };
         }
-        sums
+        Self {
+            rows: joint.n,
+            starts: joint.starts,
+            square,
+            difference: form(&joint.d),
+            ends: form(&joint.first) + form(&joint.last),
+        }
     }
 
     /// `G(ρ) = (1−ρ)² S0 + ρ D + ρ(1−ρ)(F + L)` of the residual itself.
@@ -46,42 +51,64 @@ impl Sums {
         0.5 * self.starts * (-rho * rho).ln_1p()
             - 0.5 * self.rows * self.innovation(rho).max(f64::MIN_POSITIVE).ln()
     }
-}
 
-/// ρ in (−0.999, 0.999) that maximises the exact stationary AR(1) likelihood of the runs; 0 with fewer than 3 rows.
-///
-/// Golden-section search: the profile likelihood of a stationary AR(1) has one maximum.
-pub(super) fn coefficient(runs: &[&[f64]]) -> f64 {
-    let sums = Sums::of(runs);
-    if sums.rows < 3.0 || sums.square <= 0.0 {
-        return 0.0;
+    /// ρ in (−0.999, 0.999) that maximises the exact stationary AR(1) likelihood; 0 with fewer than 3 rows.
+    ///
+    /// Golden-section search: the profile likelihood of a stationary AR(1) has one maximum.
+    pub(super) fn coefficient(&self) -> f64 {
+        if self.rows < 3.0 || self.square <= 0.0 {
+            return 0.0;
+        }
+        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+        let (mut low, mut high) = (-LIMIT, LIMIT);
+        while high - low > 1e-9 {
+            let (a, b) = (high - golden * (high - low), low + golden * (high - low));
+            if self.log_likelihood(a) < self.log_likelihood(b) {
+                low = a
+            } else {
+                high = b
+            }
+        }
+        0.5 * (low + high)
     }
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let (mut low, mut high) = (-LIMIT, LIMIT);
-    while high - low > 1e-9 {
-        let (a, b) = (high - golden * (high - low), low + golden * (high - low));
-        if sums.log_likelihood(a) < sums.log_likelihood(b) {
-            low = a
+
+    /// Mean innovation variance at a given ρ (the plain mean square for ρ = 0); 0 without rows.
+    pub(super) fn innovation_variance(&self, rho: f64) -> f64 {
+        if self.rows > 0.0 {
+            self.innovation(rho) / self.rows
         } else {
-            high = b
+            0.0
         }
     }
-    0.5 * (low + high)
 }
 
-/// Mean innovation variance of the runs at a given ρ (the plain mean square for ρ = 0); 0 without rows.
-pub(super) fn innovation_variance(runs: &[&[f64]], rho: f64) -> f64 {
-    let sums = Sums::of(runs);
-    if sums.rows > 0.0 {
-        sums.innovation(rho) / sums.rows
-    } else {
-        0.0
+impl<'a> Sum<&'a Residual> for Residual {
+    fn sum<I: Iterator<Item = &'a Residual>>(all: I) -> Self {
+        all.fold(Self::default(), |sum, own| Self {
+            rows: sum.rows + own.rows,
+            starts: sum.starts + own.starts,
+            square: sum.square + own.square,
+            difference: sum.difference + own.difference,
+            ends: sum.ends + own.ends,
+        })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gram::{JointAccumulator, Workspace};
+
+    /// Of runs of rows without a column.
+    fn residual(runs: &[&[f64]]) -> Residual {
+        let mut sums = JointAccumulator::new(Vec::new());
+        for run in runs {
+            let keep = vec![true; run.len()];
+            let workspace = &mut Workspace::default();
+            sums.push_block(&[], run.len(), run, &keep, true, workspace);
+        }
+        Residual::new(&sums.finish(), &[], 0.0)
+    }
 
     /// Two runs of a stationary AR(1); |ρ̂ − ρ| beyond 5 standard errors √((1−ρ²)/n) has a chance below 6e-7.
     #[test]
@@ -108,10 +135,11 @@ mod tests {
                 })
                 .collect();
             let slices: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
-            let error = (coefficient(&slices) - rho).abs();
+            let found = residual(&slices);
+            let error = (found.coefficient() - rho).abs();
             let standard_error = ((1.0 - rho * rho) / 8000.0_f64).sqrt();
             assert!(error < 5.0 * standard_error, "rho {rho}: off by {error}");
-            assert!((innovation_variance(&slices, rho) - 1.0).abs() < 0.08);
+            assert!((found.innovation_variance(rho) - 1.0).abs() < 0.08);
         }
     }
 
@@ -125,7 +153,8 @@ mod tests {
                     .windows(2)
                     .map(|w| (w[1] - rho * w[0]) * (w[1] - rho * w[0]))
                     .sum::<f64>();
-            assert!((innovation_variance(&[&run], rho) * 5.0 - brute).abs() < 1e-14);
+            let found = residual(&[&run]).innovation_variance(rho);
+            assert!((found * 5.0 - brute).abs() < 1e-14);
         }
     }
 }

@@ -2,25 +2,17 @@
 //! not average it out, so it has to count as noise.
 
 use super::Fit;
-use super::decoys::{DECOYS, JointDecoys};
 use crate::error::Result;
 use crate::gram::{Gram, JointGram};
 use crate::likelihood::{Columns, assemble};
 use crate::linear_algebra::Cholesky;
 use crate::prior::PriorSettings;
+use crate::statistics::{DECOYS, Unit, of_joint, residual_form};
 
 /// Columns that are in with this probability at least may have taken something from the decoys.
 const IN_SOME_MODEL: f64 = 0.05;
 /// Share of a decoy's squares that the columns have to leave.
 const LEFT: f64 = 0.05;
-
-/// Statistics of one left-out piece and of everything else.
-pub(super) struct Fold<'a> {
-    /// Of all other pieces.
-    pub(super) kept: &'a Gram,
-    /// Of the piece, per joint.
-    pub(super) out: Vec<JointDecoys>,
-}
 
 /// What the noise of a fit is made of, per joint.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,13 +34,13 @@ impl Misfit {
     }
 }
 
-/// Measures the residual along the decoys, in the training rows and in left-out pieces.
+/// Measures the residual along the decoys, in the training rows and in left-out units; `kept` has, unit by unit, the sums of all others.
 ///
 /// ```text
 /// λ¹_j = Σ_k (φ_kᵀr_j)² / (σ_j² Σ_k v_k)      v_k = φ_kᵀφ_k − f_j g_kᵀA⁻¹g_k,   g_k = X_jᵀφ_k
-/// λ²_j = the same over left-out pieces,        v_k = φ_kᵀφ_k + f_j g_kᵀA⁻¹g_k,   A of the other pieces
+/// λ²_j = the same over left-out units,        v_k = φ_kᵀφ_k + f_j g_kᵀA⁻¹g_k,   A of the other units
 /// ```
-/// r_j is the residual at the posterior mean (of a piece: at the mean of the other pieces with every column in that acts in some model), k
+/// r_j is the residual at the posterior mean (of a unit: at the mean of the others with every column in that acts in some model), k
 /// runs over the decoys whose squares the columns do not explain, f_j = w_j/max(τ_j, λ_j) of the fit is the joint's factor in A = Σ f_j G_j + V⁻¹. v_k σ_j² is
 /// what independent noise leaves along φ_k, so that such noise gives 1. Sums are divided and not ratios averaged: a decoy that the columns
 /// nearly explain says next to nothing.
@@ -56,10 +48,11 @@ impl Misfit {
 /// # Errors
 /// Those of [`assemble`].
 pub(super) fn misfit(
-    (gram, decoys, folds): (&Gram, &[JointDecoys], &[Fold<'_>]),
+    (total, units, kept): (&Unit, &[Unit], &[Gram]),
     prior: (&Columns, &PriorSettings),
     fit: &Fit,
 ) -> Result<Misfit> {
+    let gram = &total.gram;
     let joints = gram.joints.len();
     let mut found = Misfit {
         variance: vec![0.0; joints],
@@ -69,32 +62,32 @@ pub(super) fn misfit(
     let Some(whole) = Acting::new(gram, prior, fit)? else {
         return Ok(found);
     };
-    let others: Vec<Option<Acting>> = (folds.iter())
-        .map(|fold| Acting::new(fold.kept, prior, fit))
+    let others: Vec<Option<Acting>> = (kept.iter())
+        .map(|kept| Acting::new(kept, prior, fit))
         .collect::<Result<_>>()?;
     for (joint, own) in gram.joints.iter().enumerate() {
         let factor = fit.plug_in.factor(joint);
-        let mean = at(own, &fit.posterior.mean);
+        let mean = of_joint(own, &fit.posterior.mean);
         let free = own.n - factor * whole.trace(own);
-        let variance = residual_squares(own, &mean) / free;
+        let variance = residual_form(&own.s0, &mean) / free;
         if !(free > 0.0 && variance > 0.0) {
             continue;
         }
         let (mut within, mut left_out) = (Ratio::default(), Ratio::default());
         let mut unexplained = [false; DECOYS];
         for (k, unexplained) in unexplained.iter_mut().enumerate() {
-            let all = &decoys[joint];
+            let all = &total.joints[joint].decoys;
             let left = all.square(k) - factor * whole.form(own, all.columns(k));
             *unexplained = left > LEFT * all.square(k);
             if *unexplained {
                 within.add(all.residual(k, &mean).powi(2), left);
             }
         }
-        for (fold, acting) in folds.iter().zip(&others) {
-            let (Some(acting), out) = (acting, &fold.out[joint]) else {
+        for (unit, acting) in units.iter().zip(&others) {
+            let (Some(acting), out) = (acting, &unit.joints[joint].decoys) else {
                 continue;
             };
-            let beta = at(own, &acting.beta);
+            let beta = of_joint(own, &acting.beta);
             for k in (0..DECOYS).filter(|&k| unexplained[k]) {
                 let expected = out.square(k) + factor * acting.form(own, out.columns(k));
                 left_out.add(out.residual(k, &beta).powi(2), expected);
@@ -105,26 +98,6 @@ pub(super) fn misfit(
         found.left_out[joint] = left_out.over(variance);
     }
     Ok(found)
-}
-
-/// Coefficients of the columns of a joint.
-fn at(joint: &JointGram, beta: &[f64]) -> Vec<f64> {
-    let columns = joint.columns.iter();
-    columns.map(|&column| beta[column as usize]).collect()
-}
-
-/// Σ (y − Xβ)² of a joint; `beta` belongs to its columns.
-fn residual_squares(joint: &JointGram, beta: &[f64]) -> f64 {
-    let last = beta.len();
-    let with = |i: usize| -> f64 {
-        let products = beta.iter().enumerate();
-        products.map(|(k, b)| joint.s0.at(i, k) * b).sum()
-    };
-    let terms = beta.iter().enumerate();
-    let explained: f64 = terms
-        .map(|(i, b)| b * (2.0 * joint.s0.at(i, last) - with(i)))
-        .sum();
-    joint.s0.at(last, last) - explained
 }
 
 /// Squares that were found and those that noise of variance 1 gives.

@@ -5,7 +5,6 @@
 //! sampling share one target.
 
 mod autoregression;
-mod decoys;
 mod left_out;
 mod memory;
 mod misfit;
@@ -24,6 +23,8 @@ use crate::observations::Part;
 use crate::posterior::{Posterior, Problem};
 use crate::prior::PriorSettings;
 use crate::signal::Auto;
+use crate::statistics::{Training, Unit};
+use autoregression::Residual;
 use passband::Passband;
 
 /// Rounds of the fixed-point iteration at most.
@@ -38,8 +39,9 @@ const MANY: usize = 28;
 const MANY_ROUNDS: usize = 8;
 const MANY_ROUGH_ROUNDS: usize = 2;
 const MANY_TOLERANCE: f64 = 3e-3;
-/// A residual below this share of the torque's squares is rounding.
+/// A residual below this share of the torque's squares is rounding, from rows and from sums.
 const ROUNDING: f64 = 1e-22;
+const ROUNDING_OF_SUMS: f64 = 1e-14;
 /// Share of E[φ] that is noise at least.
 const LEAST_SHARE: f64 = 1e-3;
 /// Bounds of a learned slab scale v.
@@ -113,41 +115,35 @@ impl Moving {
     }
 }
 
-/// Iterates the plug-ins to their fixed point on the training parts.
+/// Iterates the plug-ins to their fixed point on the training data.
 ///
 /// τ and λ of `start` are kept as they are. `known` is the posterior of a similar problem, to start the search from.
 ///
 /// # Errors
 /// Those of [`assemble`] and [`approximate`].
 pub fn fit(
-    training: &[Part<'_>],
+    training: &Training,
     columns: &Columns,
     settings: FitSettings<'_>,
     start: &PlugIn,
     moving: Moving,
     known: Option<&Posterior>,
 ) -> Result<Fit> {
-    fit_gram(
-        training,
-        &total(training),
-        columns,
-        settings,
-        start,
-        moving,
-        known,
-    )
+    let total = training.total();
+    let data = (&total, training.cutoff);
+    fit_sums(data, columns, settings, start, moving, known)
 }
 
-/// [`fit`] with the statistics of `training` at hand.
-fn fit_gram(
-    training: &[Part<'_>],
-    gram: &Gram,
+/// [`fit`] to sums over all rows, behind a filter with a cut-off in cycles per row.
+fn fit_sums(
+    (total, cutoff): (&Unit, f64),
     columns: &Columns,
     settings: FitSettings<'_>,
     start: &PlugIn,
     moving: Moving,
     known: Option<&Posterior>,
 ) -> Result<Fit> {
+    let gram = &total.gram;
     let mut plug_in = start.clone();
     let mut known = known.cloned();
     let components = columns.family.len();
@@ -156,7 +152,7 @@ fn fit_gram(
     } else {
         TOLERANCE
     };
-    let passband = passband(training, settings.noise);
+    let passband = passband(cutoff, settings.noise);
     if let Some(passband) = &passband {
         plug_in.passed = passband.share();
     }
@@ -168,7 +164,7 @@ fn fit_gram(
         let mut next = plug_in.clone();
         if moving == Moving::All {
             let told = (settings.noise, passband.as_ref());
-            move_noise(&mut next, training, gram, told, &posterior);
+            move_noise(&mut next, total, told, &posterior.mean);
         }
         if settings.prior.scaled_variance == Auto::Auto {
             next.scaled_variance = slab_scales(gram, columns, &plug_in, &problem, &posterior);
@@ -194,62 +190,40 @@ fn fit_gram(
 }
 
 /// Where an iteration starts: white noise of equal size on every joint.
-pub fn start(training: &[Part<'_>], columns: &Columns, prior: &PriorSettings) -> PlugIn {
-    let joints = training
-        .first()
-        .map_or(0, |part| part.observations.joints.len());
+pub fn start(training: &Training, columns: &Columns, prior: &PriorSettings) -> PlugIn {
     let v = match prior.scaled_variance {
         Auto::Value(v) => v,
         Auto::Auto => FIRST_SLAB,
     };
-    PlugIn::start(joints, columns.families.len(), v)
-}
-
-/// Sum of the statistics of several parts.
-pub fn total(parts: &[Part<'_>]) -> Gram {
-    parts.iter().collect()
-}
-
-/// Moving rows of a joint over several parts: n of [`total`].
-pub fn moving_rows(parts: &[Part<'_>], joint: usize) -> f64 {
-    let moving = |part: &Part<'_>| {
-        let standstill = &part.observations.joints[joint].standstill[part.rows.clone()];
-        standstill.iter().filter(|still| !**still).count() as f64
-    };
-    parts.iter().map(moving).sum()
+    PlugIn::start(training.joints(), columns.families.len(), v)
 }
 
 /// The filter that an autoregression of rows has to be told of.
-fn passband(training: &[Part<'_>], noise: NoiseSettings) -> Option<Passband> {
-    if noise.model != NoiseModel::Ar1 {
-        return None;
+fn passband(cutoff: f64, noise: NoiseSettings) -> Option<Passband> {
+    match noise.model {
+        NoiseModel::Ar1 => Passband::new(cutoff),
+        NoiseModel::Iid | NoiseModel::Tempered => None,
     }
-    let cutoffs = training.iter().map(|part| part.observations.cutoff);
-    Passband::new(cutoffs.fold(0.0, f64::max))
 }
 
 /// Weights and autoregression that the residual at the model average asks for; one ρ for all joints where they share one
 /// variance, so that they share σ too.
 fn move_noise(
     plug_in: &mut PlugIn,
-    training: &[Part<'_>],
-    gram: &Gram,
+    total: &Unit,
     (noise, passband): (NoiseSettings, Option<&Passband>),
-    posterior: &Posterior,
+    mean: &[f64],
 ) {
-    let residual: Vec<Vec<Vec<f64>>> = (0..gram.joints.len())
-        .map(|joint| residual_runs(training, joint, &posterior.mean))
+    let joints = total.gram.joints.iter().zip(&total.joints);
+    let sums: Vec<Residual> = joints
+        .map(|(gram, own)| Residual::new(gram, mean, ROUNDING_OF_SUMS * own.torque))
         .collect();
-    fn slices(runs: &[Vec<f64>]) -> Vec<&[f64]> {
-        runs.iter().map(Vec::as_slice).collect()
-    }
     if noise.model == NoiseModel::Ar1 {
         plug_in.rho = if noise.per_joint {
-            let of_joint = |runs: &Vec<Vec<f64>>| autoregression::coefficient(&slices(runs));
-            residual.iter().map(of_joint).collect()
+            sums.iter().map(Residual::coefficient).collect()
         } else {
-            let all = residual.concat();
-            vec![autoregression::coefficient(&slices(&all)); residual.len()]
+            let all: Residual = sums.iter().sum();
+            vec![all.coefficient(); sums.len()]
         };
         if let Some(passband) = passband {
             let found = plug_in.rho.iter().map(|rho| passband.autoregression(*rho));
@@ -258,12 +232,12 @@ fn move_noise(
         }
     }
     if noise.per_joint {
-        let variance: Vec<f64> = residual
+        let variance: Vec<f64> = sums
             .iter()
             .zip(&plug_in.rho)
-            .map(|(runs, rho)| autoregression::innovation_variance(&slices(runs), *rho))
+            .map(|(sums, rho)| sums.innovation_variance(*rho))
             .collect();
-        plug_in.weight = weights(gram, &variance);
+        plug_in.weight = weights(&total.gram, &variance);
     }
 }
 

@@ -4,23 +4,20 @@
 //! The residual of a real robot is mostly model error: slow, repeatable on one trajectory, different on the next. An
 //! in-sample noise level cannot see that. Decoys see it: functions of the state that nobody proposes as a cause.
 
-use super::decoys::JointDecoys;
-use super::left_out::{folds, interval_factors};
-use super::misfit::{Fold, misfit};
+use super::left_out::interval_factors;
+use super::misfit::misfit;
 use super::usual::at_least_usual;
 use super::{
-    Fit, FitSettings, Moving, fit_gram, is_rounding, residual_correlation_time, start, total,
-    weights,
+    Fit, FitSettings, Moving, ROUNDING_OF_SUMS, fit_sums, residual_correlation_time, start, weights,
 };
 use crate::error::Result;
+use crate::gram::Gram;
 use crate::likelihood::Columns;
 use crate::observations::Part;
-use rayon::prelude::*;
+use crate::statistics::{JointUnit, Training};
 
 /// Times that misfit and noise are measured and the fit is made anew.
 const ROUNDS: usize = 3;
-/// Degrees of freedom of the t likelihood that robust rows have.
-const FREEDOM: f64 = 4.0;
 
 /// Measures noise and autocorrelation with independent rows, then what no candidate describes, in turn with the fit under it.
 ///
@@ -33,132 +30,52 @@ const FREEDOM: f64 = 4.0;
 /// # Errors
 /// Those of [`super::fit`].
 pub fn fit_tempered(
-    training: &[Part<'_>],
+    rows: &[Part<'_>],
     columns: &Columns,
     settings: FitSettings<'_>,
 ) -> Result<(Fit, Vec<f64>)> {
-    let gram = total(training);
-    let white = start(training, columns, settings.prior);
+    let training = Training::new(rows);
+    let total = training.total();
+    let data = (&total, training.cutoff);
+    let white = start(&training, columns, settings.prior);
     let (all, known) = (Moving::All, None);
-    let mut fitted = fit_gram(training, &gram, columns, settings, &white, all, known)?;
-    let joints = 0..gram.joints.len();
-    let time = |joint: usize| {
-        residual_correlation_time(training, joint, &fitted.posterior.mean)
-            * weighing(training, joint, settings.noise.robust)
+    let mut fitted = fit_sums(data, columns, settings, &white, all, known)?;
+    let time = |(joint, own): (usize, &JointUnit)| {
+        residual_correlation_time(rows, joint, &fitted.posterior.mean)
+            * if settings.noise.robust {
+                own.weighing.cost()
+            } else {
+                1.0
+            }
     };
-    let times: Vec<f64> = joints.clone().map(time).collect();
-    let folds = folds(training);
-    let pieces: Vec<Fold<'_>> = (folds.iter())
-        .map(|fold| Fold {
-            kept: &fold.kept,
-            out: decoys(&fold.out, joints.len()),
-        })
+    let times: Vec<f64> = total.joints.iter().enumerate().map(time).collect();
+    let units = &training.units;
+    let kept: Vec<Gram> = (0..units.len())
+        .map(|unit| training.without(unit))
         .collect();
-    // The pieces are all of the rows.
-    let mut decoys = vec![JointDecoys::default(); joints.len()];
-    for piece in &pieces {
-        let sums = decoys.iter_mut().zip(&piece.out);
-        sums.for_each(|(sum, own)| *sum += own);
-    }
     for round in 1..=ROUNDS {
-        let measured = (&gram, &decoys[..], &pieces[..]);
+        let measured = (&total, &units[..], &kept[..]);
         let found = misfit(measured, (columns, settings.prior), &fitted)?;
         let mut plug_in = fitted.plug_in.clone();
         plug_in.autocorrelation_time.clone_from(&times);
         let own = found.largest().into_iter().enumerate();
         let own: Vec<Option<f64>> = own
             .map(|(joint, largest)| {
-                let squares = found.variance[joint] * gram.joints[joint].n;
-                (squares > 0.0 && !is_rounding(training, joint, squares)).then_some(largest)
+                let squares = found.variance[joint] * total.gram.joints[joint].n;
+                (squares > ROUNDING_OF_SUMS * total.joints[joint].torque).then_some(largest)
             })
             .collect();
         plug_in.misfit = at_least_usual(&own);
         if settings.noise.per_joint && found.variance.iter().any(|variance| *variance > 0.0) {
-            plug_in.weight = weights(&gram, &found.variance);
+            plug_in.weight = weights(&total.gram, &found.variance);
         }
         let moving = match round {
             ROUNDS => Moving::SlabScale,
             _ => Moving::SlabScaleRoughly,
         };
         let known = Some(&fitted.posterior);
-        fitted = fit_gram(training, &gram, columns, settings, &plug_in, moving, known)?;
+        fitted = fit_sums(data, columns, settings, &plug_in, moving, known)?;
     }
-    let factors = interval_factors(&folds, columns, settings, &fitted)?;
+    let factors = interval_factors((&training, &kept, rows), columns, settings, &fitted)?;
     Ok((fitted, factors))
-}
-
-/// Sums over the rows of some parts, joint by joint.
-fn decoys(parts: &[Part<'_>], joints: usize) -> Vec<JointDecoys> {
-    let of_joint = |joint: usize| {
-        let mut sum = JointDecoys::default();
-        parts
-            .iter()
-            .for_each(|part| sum += &JointDecoys::of(part, joint));
-        sum
-    };
-    (0..joints).into_par_iter().map(of_joint).collect()
-}
-
-/// What weighing rows costs: the variance of the t likelihood's estimate over the one that known weights would give, from
-/// the weights alone (t² = (ν+1)/u − ν); 1 without weights. With ψ = u t (Huber 1981, eq. 4.6.11)
-///
-/// ```text
-/// κ = E[ψ²]/E[ψ']² · E[u]/E[u t²],     ψ' = u² (ν − t²)/(ν + 1)
-/// ```
-fn weighing(training: &[Part<'_>], joint: usize, robust: bool) -> f64 {
-    if !robust {
-        return 1.0;
-    }
-    let (mut score, mut slope, mut known, mut square) = (0.0, 0.0, 0.0, 0.0);
-    let mut count = 0.0;
-    for part in training {
-        let rows = &part.observations.joints[joint];
-        let Some(weights) = rows.weight.get(part.rows.clone()) else {
-            continue;
-        };
-        for (row, weight) in part.rows.clone().zip(weights) {
-            if !rows.standstill[row] {
-                let u = weight * rows.spread.get(row).copied().unwrap_or(1.0);
-                let t2 = (FREEDOM + 1.0) / u - FREEDOM;
-                score += u * u * t2;
-                slope += u * u * (FREEDOM - t2) / (FREEDOM + 1.0);
-                known += u;
-                square += u * t2;
-                count += 1.0;
-            }
-        }
-    }
-    let cost = score * count / (slope * slope) * known / square;
-    if cost.is_finite() { cost.max(1.0) } else { 1.0 }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::observations::{JointObservations, Observations};
-    use statrs::distribution::{ContinuousCDF, StudentsT};
-
-    /// t rows: the Fisher information is (ν+1)/(ν+3) of what known weights would give, κ = 7/5.
-    #[test]
-    fn weighing_costs_what_the_information_says() {
-        let t = StudentsT::new(0.0, 1.0, FREEDOM).unwrap();
-        let count = 40_000;
-        let weight = (0..count)
-            .map(|i| t.inverse_cdf((i as f64 + 0.5) / count as f64))
-            .map(|r| (FREEDOM + 1.0) / (FREEDOM + r * r))
-            .collect();
-        let mut observations = Observations {
-            joints: vec![JointObservations {
-                standstill: vec![false; count],
-                weight,
-                ..JointObservations::default()
-            }],
-            time: vec![0.0; count],
-            ..Observations::default()
-        };
-        let kappa = weighing(&[observations.whole()], 0, true);
-        assert!((kappa - 1.4).abs() < 2e-3, "{kappa}");
-        observations.joints[0].weight.clear();
-        assert_eq!(weighing(&[observations.whole()], 0, true), 1.0);
-    }
 }

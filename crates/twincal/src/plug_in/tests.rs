@@ -98,9 +98,9 @@ fn the_automatic_prior_adds_no_noise_where_nearly_all_is_explained() {
         noise: noise(NoiseModel::Iid),
         prior: &prior,
     };
-    let parts = [log.whole()];
-    let first = start(&parts, &columns, &prior);
-    let fit = fit(&parts, &columns, settings, &first, Moving::All, None).unwrap();
+    let training = Training::whole(&[log.whole()]);
+    let first = start(&training, &columns, &prior);
+    let fit = fit(&training, &columns, settings, &first, Moving::All, None).unwrap();
     // The slab adds β²/(2v) to b_n: less than one unit of noise at the scale that it learns.
     let exact = left / (ROWS as f64 + 2.0 * AUTO_SHAPE - 2.0);
     assert!(fit.converged && fit.posterior.inclusion[0] > 0.999);
@@ -156,9 +156,9 @@ fn a_shape_that_the_motion_hardly_shows_has_a_coefficient_of_usual_size() {
             noise: noise(NoiseModel::Iid),
             prior: &prior,
         };
-        let parts = [log.whole()];
-        let first = start(&parts, &columns, &prior);
-        let fit = fit(&parts, &columns, settings, &first, Moving::All, None).unwrap();
+        let training = Training::whole(&[log.whole()]);
+        let first = start(&training, &columns, &prior);
+        let fit = fit(&training, &columns, settings, &first, Moving::All, None).unwrap();
         assert!(fit.posterior.inclusion[0] > 0.999);
         [fit.posterior.mean[1].abs(), fit.posterior.sd[1]]
     };

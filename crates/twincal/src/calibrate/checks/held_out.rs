@@ -109,7 +109,7 @@ pub(in crate::calibrate) fn validate(
                 compact: own.compact.clone(),
                 friction: friction_only::fitted(library, own.fit),
             },
-            Some(fitted) => refitted(twin, library, &fold.training, fitted)?,
+            Some(fitted) => refitted(twin, library, fitted)?,
         };
         if !fold.training.is_empty() && !says_something(&average.noise) {
             findings.push(not_scored(&fold.held_out, &average.noise));
@@ -177,16 +177,11 @@ fn not_scored(held_out: &[LeftOut<'_>], noise: &[JointNoise]) -> Finding {
     )
 }
 
-/// `twin` with the posterior and noise of a fit to `training`, and its rivals.
-fn refitted(
-    twin: &Twin,
-    library: &Library,
-    training: &[Part<'_>],
-    fitted: Fitted,
-) -> Result<Rivals> {
+/// `twin` with posterior and noise of another fit, and its rivals.
+fn refitted(twin: &Twin, library: &Library, fitted: Fitted) -> Result<Rivals> {
     let out_of_band: Vec<f64> = twin.noise.iter().map(|noise| noise.out_of_band).collect();
     let spreads: Vec<_> = twin.noise.iter().map(|n| n.spread.clone()).collect();
-    let noise = noise_of(&twin.robot, &fitted, training, &out_of_band, &spreads);
+    let noise = noise_of(&twin.robot, &fitted, &out_of_band, &spreads);
     let Fitted { fit, .. } = fitted;
     let inside = compact::members(&fit.problem, &fit.posterior);
     let compact = compact::refit(&fit.problem, &inside, &fit.posterior)?;

@@ -4,7 +4,7 @@ use super::correlate::strongest;
 use crate::calibrate::data::all_logs::{Data, refuse};
 use crate::error::{Finding, Result, Severity};
 use crate::observations::Part;
-use crate::plug_in::{Fit, moving_rows};
+use crate::plug_in::Fit;
 use crate::robot::Robot;
 
 /// Effective rows below which nothing is concluded (case 7).
@@ -12,8 +12,8 @@ pub(in crate::calibrate) const LEAST_EFFECTIVE_ROWS: f64 = 10.0;
 
 /// Rows of a joint that are not at standstill, and the independent rows that they count as once the autocorrelation of what is left is
 /// counted. What no candidate describes is no matter of the rows: more of them would not help.
-fn of_joint(fit: &Fit, training: &[Part<'_>], joint: usize) -> [f64; 2] {
-    let (n, rho) = (moving_rows(training, joint), fit.plug_in.rho[joint]);
+fn of_joint(fit: &Fit, joint: usize) -> [f64; 2] {
+    let (n, rho) = (fit.gram.joints[joint].n, fit.plug_in.rho[joint]);
     let counted = fit.plug_in.passed / fit.plug_in.autocorrelation_time[joint];
     [n, n * counted * (1.0 - rho) / (1.0 + rho)]
 }
@@ -40,7 +40,7 @@ pub(in crate::calibrate) fn require(
     };
     let names = robot.joint_names();
     let joints = (0..names.len()).filter(|joint| has_columns(*joint));
-    let counted = joints.map(|joint| (names[joint], of_joint(fit, training, joint)));
+    let counted = joints.map(|joint| (names[joint], of_joint(fit, joint)));
     let (few, enough): (Vec<_>, Vec<_>) = counted
         .filter(|(_, [rows, _])| *rows > 0.0)
         .partition(|(_, [_, independent])| *independent < LEAST_EFFECTIVE_ROWS);

@@ -1,8 +1,9 @@
 //! Does an effect lower the error of data that were left out? Algebra on Grams of contiguous blocks of rows.
 
+use crate::gram::Gram;
 use crate::linear_algebra::{Cholesky, dot};
 use crate::observations::Part;
-use crate::plug_in::{Fit, total};
+use crate::plug_in::Fit;
 use crate::posterior::student::StudentT;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -296,7 +297,7 @@ fn pieces<'a>(training: &[Part<'a>]) -> Vec<(usize, usize, Vec<Part<'a>>)> {
 fn sums(parts: &[Part<'_>], fit: &Fit, columns: &[usize]) -> Vec<f64> {
     let size = columns.len() + 1;
     let mut sums = vec![0.0; size * size];
-    let gram = total(parts);
+    let gram: Gram = parts.iter().collect();
     for (j, joint) in gram.joints.iter().enumerate() {
         let factor = fit.plug_in.factor(j);
         let statistics = joint.stationary(fit.plug_in.rho[j]);

@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::likelihood::{Columns, NoiseModel};
 use crate::observations::Part;
 use crate::plug_in::{Fit, FitSettings, Moving, fit, fit_tempered, start};
+use crate::statistics::Training;
 
 /// A fit together with what left-out training data said of it.
 pub(in crate::calibrate) struct Fitted {
@@ -32,8 +33,9 @@ pub(in crate::calibrate) fn estimate(
             })
         }
         NoiseModel::Iid | NoiseModel::Ar1 => {
-            let start = start(training, columns, &settings.prior);
-            let fit = fit(training, columns, fit_settings, &start, Moving::All, None)?;
+            let training = Training::whole(training);
+            let start = start(&training, columns, &settings.prior);
+            let fit = fit(&training, columns, fit_settings, &start, Moving::All, None)?;
             Ok(Fitted {
                 fit,
                 interval_factors: None,

@@ -2,15 +2,12 @@
 
 use super::fitted::Fitted;
 use crate::likelihood::{JointNoise, Spread};
-use crate::observations::Part;
-use crate::plug_in::moving_rows;
 use crate::robot::Robot;
 
 /// Noise per joint as reported; σ_j = √E[φ/(w_j(1−ρ_j²)) | y].
 pub(in crate::calibrate) fn noise_of(
     robot: &Robot,
     fitted: &Fitted,
-    training: &[Part<'_>],
     out_of_band: &[f64],
     spreads: &[Spread],
 ) -> Vec<JointNoise> {
@@ -20,7 +17,7 @@ pub(in crate::calibrate) fn noise_of(
         .into_iter()
         .enumerate()
         .map(|(j, name)| {
-            let (n, rho) = (moving_rows(training, j), plug_in.rho[j]);
+            let (n, rho) = (fitted.fit.gram.joints[j].n, plug_in.rho[j]);
             let left = plug_in.variance.get(j).copied().unwrap_or(1.0);
             JointNoise {
                 joint: name.to_owned(),

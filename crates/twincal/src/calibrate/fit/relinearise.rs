@@ -5,7 +5,7 @@ use crate::calibrate::data::log::Log;
 use crate::calibrate::settings::CalibrationSettings;
 use crate::error::{Finding, Result, Severity};
 use crate::observations::Part;
-use crate::plug_in::{Fit, moving_rows};
+use crate::plug_in::Fit;
 use crate::robot::{Motion, Robot, nominal_torque};
 use crate::signal::{Numbers, Payload};
 use crate::term::{Library, LibrarySettings};
@@ -215,9 +215,10 @@ fn missing(
 /// Σ_j n_j d_j² / σ_j² of one log.
 fn weighed(square: &[f64], fit: &Fit, log: &[Part<'_>]) -> f64 {
     let (plug_in, noise) = (&fit.plug_in, fit.posterior.noise);
+    let of_logs = |joint: usize| log.iter().map(|part| part.moving_rows(joint)).sum::<f64>();
     let of_joint = |(joint, square): (usize, &f64)| {
         let rho = plug_in.rho[joint];
-        let rows = moving_rows(log, joint) * plug_in.counted(joint) * (1.0 - rho) / (1.0 + rho);
+        let rows = of_logs(joint) * plug_in.counted(joint) * (1.0 - rho) / (1.0 + rho);
         let left = plug_in.variance.get(joint).copied().unwrap_or(1.0);
         rows * square * plug_in.weight[joint] * (1.0 - rho * rho) / (left * noise)
     };

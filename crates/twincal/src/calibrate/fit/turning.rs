@@ -18,12 +18,11 @@ use crate::calibrate::settings::CalibrationSettings;
 use crate::error::{Finding, Result, Severity};
 use crate::likelihood::{NoiseModel, NoiseSettings};
 use crate::observations::{Observations, Part, observe};
-use crate::plug_in::{
-    Fit, FitSettings, Moving, fit, moving_rows, residual_correlation_time, start,
-};
+use crate::plug_in::{Fit, FitSettings, Moving, fit, residual_correlation_time, start};
 use crate::posterior::Posterior;
 use crate::robot::Robot;
 use crate::signal::{Log, Payload, Pipeline, ReadyLog, Trajectory, ready, stretches};
+use crate::statistics::Training;
 use crate::term::{Family, Library, LibrarySettings};
 
 /// Factors between neighbouring v_s, and how often one may be applied.
@@ -233,9 +232,9 @@ impl Trial<'_> {
             log.drop_columns(&zero);
         }
         let library = library.without_columns(&zero);
-        let training: Vec<Part<'_>> = logs.iter().map(Observations::whole).collect();
+        let parts: Vec<Part<'_>> = logs.iter().map(Observations::whole).collect();
         let joints = 0..self.robot.dof();
-        let moves = |joint: usize| moving_rows(&training, joint) > 0.0;
+        let moves = |joint: usize| parts.iter().any(|part| part.moving_rows(joint) > 0.0);
         if library.columns().is_empty() || !joints.clone().any(moves) {
             return Ok(None);
         }
@@ -254,6 +253,7 @@ impl Trial<'_> {
             },
             prior: &self.settings.prior,
         };
+        let training = Training::whole(&parts);
         let fit = match like {
             None => {
                 let start = start(&training, &columns, &self.settings.prior);
@@ -280,14 +280,14 @@ impl Trial<'_> {
         let beta = &fit.posterior.mean;
         let of_joint = |joint: usize| {
             let (mut sum, mut rows) = (0.0, 0.0);
-            for run in (training.iter()).flat_map(|part| part.residual_runs(joint, beta)) {
+            for run in (parts.iter()).flat_map(|part| part.residual_runs(joint, beta)) {
                 sum += run.iter().map(|r| r * r).sum::<f64>();
                 rows += run.len() as f64;
             }
             Left {
                 rows,
                 mean_square: sum / rows,
-                time: residual_correlation_time(&training, joint, beta),
+                time: residual_correlation_time(&parts, joint, beta),
             }
         };
         Ok(Some((joints.map(of_joint).collect(), fit)))

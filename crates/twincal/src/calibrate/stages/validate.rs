@@ -97,14 +97,13 @@ fn twin(rows: &Rows<'_, '_>, fitted: &Fitted) -> Result<Twin> {
     let (robot, data, posterior) = (request.robot, &rows.data, &fitted.fit.posterior);
     let (library, trajectories) = (&rows.library, &rows.trajectories);
     let out_of_band = data.out_of_band(robot, library, pipeline, trajectories, &posterior.mean)?;
-    let training = data.training();
     Ok(Twin {
         robot: robot.clone(),
         library: library_settings.clone(),
         zero_columns: rows.zero_columns.clone(),
         pipeline: pipeline.clone(),
         posterior: posterior.clone(),
-        noise: noise_of(robot, fitted, &training, &out_of_band, &rows.spreads),
+        noise: noise_of(robot, fitted, &out_of_band, &rows.spreads),
         hull: data.hull(robot),
         payload_where_unknown: *unknown,
     })

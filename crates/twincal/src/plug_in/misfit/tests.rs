@@ -1,11 +1,12 @@
 //! The definitions row by row, noise that has no misfit, and misfit that grows with the log.
 
 use super::super::tests::{log_of, noise, prior};
-use super::super::{FitSettings, Moving, fit, start, total};
+use super::super::{FitSettings, Moving, fit, start};
 use super::*;
 use crate::likelihood::NoiseModel;
 use crate::observations::Observations;
 use crate::random::Random;
+use crate::statistics::Training;
 use crate::term::Family;
 
 /// A joint that swings, with two columns (q̇ and q̈ like) and what no column describes: `unknown` times sin 3q.
@@ -46,28 +47,17 @@ fn fitted(log: &Observations, columns: &Columns) -> Fit {
         noise: noise(NoiseModel::Tempered),
         prior: &prior,
     };
-    let parts = [log.whole()];
-    let first = start(&parts, columns, &prior);
-    fit(&parts, columns, settings, &first, Moving::All, None).unwrap()
+    let training = Training::whole(&[log.whole()]);
+    let first = start(&training, columns, &prior);
+    fit(&training, columns, settings, &first, Moving::All, None).unwrap()
 }
 
 /// The misfit of a log, with fifths left out.
 fn measured(log: &Observations, columns: &Columns, fit: &Fit) -> Misfit {
-    let pieces = log.cut(5);
-    let kept: Vec<Gram> = (0..5)
-        .map(|out| {
-            let others = pieces.iter().enumerate().filter(|(i, _)| *i != out);
-            total(&others.map(|(_, part)| part.clone()).collect::<Vec<_>>())
-        })
-        .collect();
-    let folds: Vec<Fold<'_>> = (kept.iter().zip(&pieces))
-        .map(|(kept, piece)| Fold {
-            kept,
-            out: vec![JointDecoys::of(piece, 0)],
-        })
-        .collect();
-    let decoys = [JointDecoys::of(&log.whole(), 0)];
-    misfit((&fit.gram, &decoys, &folds), (columns, &prior()), fit).unwrap()
+    let training = Training::new(&[log.whole()]);
+    let kept: Vec<Gram> = (0..5).map(|unit| training.without(unit)).collect();
+    let sums = (&training.total(), &training.units[..], &kept[..]);
+    misfit(sums, (columns, &prior()), fit).unwrap()
 }
 
 /// λ¹ and λ² by sums over rows: decoys as they are defined, the normal equations of two columns by Cramer's rule.
@@ -150,7 +140,7 @@ fn both_are_their_definitions() {
             .filter(|p| *p != piece)
             .map(|p| log.cut(5)[p].clone())
             .collect();
-        let problem = assemble(&total(&others), &columns, &fit.plug_in, &prior()).unwrap();
+        let problem = assemble(&others.iter().collect(), &columns, &fit.plug_in, &prior()).unwrap();
         let c = inverse(a, &problem.prior.slab);
         let beta = [c[0] * b[0] + c[1] * b[1], c[2] * b[0] + c[3] * b[1]];
         for &k in &kept {

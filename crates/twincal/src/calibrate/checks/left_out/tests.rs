@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::calibrate::testing::Regression;
+use crate::gram::Gram;
 use crate::likelihood::{Columns, PlugIn, assemble};
 use crate::observations::{JointObservations, Observations};
 use crate::random::Random;
@@ -67,7 +68,7 @@ fn fit(logs: &[Part<'_>], lower: f64) -> Fit {
     let mut plug_in = PlugIn::start(JOINTS, 1, 3.0);
     plug_in.weight = vec![2.0, 0.5];
     plug_in.autocorrelation_time = vec![1.5, 4.0];
-    let gram = total(logs);
+    let gram: Gram = logs.iter().collect();
     let problem = assemble(&gram, &columns, &plug_in, &Regression::prior()).unwrap();
     let posterior = crate::infer::approximate(&problem, None).unwrap();
     Fit {

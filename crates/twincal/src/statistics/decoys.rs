@@ -8,7 +8,7 @@ use std::ops::AddAssign;
 /// Harmonics of the joint's position.
 const HARMONICS: usize = 8;
 /// 1, cos kq and sin kq, each alone and times the direction of motion.
-pub(super) const DECOYS: usize = 2 * (1 + 2 * HARMONICS);
+pub(crate) const DECOYS: usize = 2 * (1 + 2 * HARMONICS);
 /// Rows that are multiplied at a time.
 const BLOCK: usize = 512;
 /// Speed within which the direction of motion changes, rad/s or m/s.
@@ -20,7 +20,7 @@ const REVERSAL: f64 = 0.02;
 /// φ = {1, cos k q, sin k q; k = 1…8} × {1, tanh(q̇/v)}        φᵀ[X | y],   φ_kᵀφ_k
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct JointDecoys {
+pub(crate) struct JointDecoys {
     /// Columns of the joint.
     columns: usize,
     /// φ_kᵀ[X | y], `k * (columns + 1) + column`.
@@ -42,7 +42,7 @@ impl Default for JointDecoys {
 
 impl JointDecoys {
     /// Sums over the rows of a part as the fit weighs them.
-    pub(super) fn of(part: &Part<'_>, joint: usize) -> Self {
+    pub(crate) fn of(part: &Part<'_>, joint: usize) -> Self {
         let (all, rows) = (part.observations, &part.observations.joints[joint]);
         let signals = rows.signals();
         let width = signals + 1;
@@ -98,12 +98,12 @@ impl JointDecoys {
     }
 
     /// φ_kᵀφ_k.
-    pub(super) fn square(&self, decoy: usize) -> f64 {
+    pub(crate) fn square(&self, decoy: usize) -> f64 {
         self.square[decoy]
     }
 
     /// φ_kᵀX, one number per column of the joint; empty without rows.
-    pub(super) fn columns(&self, decoy: usize) -> &[f64] {
+    pub(crate) fn columns(&self, decoy: usize) -> &[f64] {
         let first = decoy * (self.columns + 1);
         self.cross
             .get(first..first + self.columns)
@@ -111,7 +111,7 @@ impl JointDecoys {
     }
 
     /// φ_kᵀ(y − Xβ); `beta` belongs to the columns of the joint.
-    pub(super) fn residual(&self, decoy: usize, beta: &[f64]) -> f64 {
+    pub(crate) fn residual(&self, decoy: usize, beta: &[f64]) -> f64 {
         let products = self.columns(decoy).iter().zip(beta);
         let explained: f64 = products.map(|(x, beta)| x * beta).sum();
         let torque = self.cross.get(decoy * (self.columns + 1) + self.columns);
