@@ -370,7 +370,7 @@ impl Part<'_> {
     }
 
     /// The part's rows split at the starts of segments.
-    fn runs_between_starts(&self) -> Vec<Range<usize>> {
+    pub(crate) fn runs_between_starts(&self) -> Vec<Range<usize>> {
         let mut edges = vec![self.rows.start];
         edges.extend(
             self.observations

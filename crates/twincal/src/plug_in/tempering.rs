@@ -7,14 +7,12 @@
 use super::left_out::interval_factors;
 use super::misfit::misfit;
 use super::usual::at_least_usual;
-use super::{
-    Fit, FitSettings, Moving, ROUNDING_OF_SUMS, fit_sums, residual_correlation_time, start, weights,
-};
+use super::{Fit, FitSettings, Moving, ROUNDING_OF_SUMS, fit_sums, memory, start, weights};
 use crate::error::Result;
 use crate::gram::Gram;
-use crate::likelihood::Columns;
+use crate::likelihood::{Columns, NoiseSettings};
 use crate::observations::Part;
-use crate::statistics::{JointUnit, Training};
+use crate::statistics::{Training, Unit, of_joint, residual_form};
 
 /// Times that misfit and noise are measured and the fit is made anew.
 const ROUNDS: usize = 3;
@@ -40,15 +38,7 @@ pub fn fit_tempered(
     let white = start(&training, columns, settings.prior);
     let (all, known) = (Moving::All, None);
     let mut fitted = fit_sums(data, columns, settings, &white, all, known)?;
-    let time = |(joint, own): (usize, &JointUnit)| {
-        residual_correlation_time(rows, joint, &fitted.posterior.mean)
-            * if settings.noise.robust {
-                own.weighing.cost()
-            } else {
-                1.0
-            }
-    };
-    let times: Vec<f64> = total.joints.iter().enumerate().map(time).collect();
+    let times = correlation_times(&training, &total, (settings.noise, &fitted));
     let units = &training.units;
     let kept: Vec<Gram> = (0..units.len())
         .map(|unit| training.without(unit))
@@ -78,4 +68,29 @@ pub fn fit_tempered(
     }
     let factors = interval_factors((&training, &kept, rows), columns, settings, &fitted)?;
     Ok((fitted, factors))
+}
+
+/// τ of each joint, in rows: the autocorrelation time of its residual, and what weighing the rows costs.
+fn correlation_times(
+    training: &Training,
+    total: &Unit,
+    (noise, fitted): (NoiseSettings, &Fit),
+) -> Vec<f64> {
+    let mean = &fitted.posterior.mean;
+    let joints = training.spectra.iter().zip(&total.joints).enumerate();
+    joints
+        .map(|(joint, (spectrum, own))| {
+            let cost = if noise.robust {
+                own.weighing.cost()
+            } else {
+                1.0
+            };
+            let gram = &total.gram.joints[joint];
+            let left = residual_form(&gram.s0, &of_joint(gram, mean));
+            if left <= ROUNDING_OF_SUMS * own.torque {
+                return cost; // rounding has no memory that means anything
+            }
+            memory::behind_filter(spectrum.autocorrelation_time(mean), training.cutoff) * cost
+        })
+        .collect()
 }

@@ -1,9 +1,11 @@
 //! What a fit takes of its rows: sums that add, joint by joint. Up to here cost grows with the logs, and not beyond.
 
 mod decoys;
+mod spectrum;
 mod weighing;
 
 pub(crate) use decoys::{DECOYS, JointDecoys};
+pub(crate) use spectrum::Spectrum;
 pub(crate) use weighing::Weighing;
 
 use crate::gram::{Gram, JointGram, Symmetric};
@@ -17,10 +19,12 @@ const PARTS: usize = 5;
 const MOST_UNITS: usize = 6;
 
 /// The rows of a fit as a few sums, each of which can be left out.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Training {
     /// Contiguous parts of one or two logs, whole logs or groups of them.
     pub(crate) units: Vec<Unit>,
+    /// Of each joint over all units; empty where nothing is to be left out.
+    pub(crate) spectra: Vec<Spectrum>,
     /// Largest cut-off of the filters that made the rows, cycles per row; 0 without a filter.
     pub(crate) cutoff: f64,
 }
@@ -46,7 +50,10 @@ pub(crate) struct JointUnit {
 impl Training {
     /// Units that can be left out, see [`units`].
     pub fn new(parts: &[Part<'_>]) -> Self {
-        Self::of(&units(parts), parts)
+        Self {
+            spectra: spectra(parts),
+            ..Self::of(&units(parts), parts)
+        }
     }
 
     /// Every log a unit, with its runs of rows as they are: nothing is to be left out.
@@ -59,6 +66,7 @@ impl Training {
         let cutoffs = parts.iter().map(|part| part.observations.cutoff);
         Self {
             units: units.par_iter().map(|parts| Unit::of(parts)).collect(),
+            spectra: Vec::new(),
             cutoff: cutoffs.fold(0.0, f64::max),
         }
     }
@@ -84,6 +92,18 @@ impl Training {
             .for_each(|(_, unit)| kept += &unit.gram);
         kept
     }
+}
+
+fn spectra(parts: &[Part<'_>]) -> Vec<Spectrum> {
+    let joints = parts
+        .first()
+        .map_or(0, |part| part.observations.joints.len());
+    let of_joint = |joint: usize| {
+        let mut sum = Spectrum::default();
+        parts.iter().for_each(|part| sum.add(part, joint));
+        sum
+    };
+    (0..joints).into_par_iter().map(of_joint).collect()
 }
 
 impl Unit {
