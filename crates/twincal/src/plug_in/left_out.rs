@@ -84,7 +84,7 @@ fn needed_by_rows<'r>(
         })
 }
 
-/// `f_j² = Σ (squared error − epistemic variance) / Σ noise variance`, at least 1: left-out data may say that the noise
+/// `f_j² = Σ u (squared error − epistemic variance) / Σ noise variance`, u what a row counts, at least 1: left-out data may say that the noise
 /// on the training data was too small, never that it was too large (with few effective rows E[φ] is wide for a reason). `None` without
 /// left-out rows.
 fn factors_of_variance(

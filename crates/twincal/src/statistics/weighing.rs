@@ -57,7 +57,7 @@ mod tests {
     /// t rows: the Fisher information is (ν+1)/(ν+3) of what known weights would give, κ = 7/5; also of sums of sums.
     #[test]
     fn weighing_costs_what_the_information_says() {
-        let t = StudentsT::new(0.0, 1.0, FREEDOM).unwrap();
+        let t = StudentsT::new(0.0, 1.0, FREEDOM).expect("a scale of 1");
         let count = 40_000;
         let mut halves = [Weighing::default(), Weighing::default()];
         for i in 0..count {
