@@ -8,26 +8,18 @@ pub fn nearest_names<'a>(
     name: &str,
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Vec<&'a str> {
-    let wanted: Vec<char> = (name.chars().take(64))
-        .flat_map(char::to_lowercase)
-        .take(64)
-        .collect();
+    let wanted: Vec<char> = letters(name).collect();
     let limit = wanted.len().div_ceil(3).min(wanted.len().saturating_sub(1));
-    let mut scored: Vec<(usize, &str)> = candidates
-        .into_iter()
-        .map(|candidate| {
-            (
-                distance(
-                    &wanted,
-                    &(candidate.chars().take(64))
-                        .flat_map(char::to_lowercase)
-                        .take(64)
-                        .collect::<Vec<_>>(),
-                ),
-                candidate,
-            )
+    let mut letters_of: Vec<char> = Vec::new();
+    let mut scored: Vec<(usize, &str)> = (candidates.into_iter())
+        .filter_map(|candidate| {
+            letters_of.clear();
+            letters_of.extend(letters(candidate));
+            // Every letter more or less is an edit.
+            let near = letters_of.len().abs_diff(wanted.len()) <= limit;
+            let d = near.then(|| distance(&wanted, &letters_of))?;
+            (d <= limit).then_some((d, candidate))
         })
-        .filter(|&(d, _)| d <= limit)
         .collect();
     scored.sort_by_key(|&(d, _)| d);
     scored
@@ -35,6 +27,13 @@ pub fn nearest_names<'a>(
         .take(3)
         .map(|(_, candidate)| candidate)
         .collect()
+}
+
+/// The first 64 letters of a name in lower case.
+fn letters(name: &str) -> impl Iterator<Item = char> {
+    (name.chars().take(64))
+        .flat_map(char::to_lowercase)
+        .take(64)
 }
 
 /// "did you mean `a` or `b`?", or a list of what there is.
@@ -51,24 +50,24 @@ pub fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str
     }
 }
 
-/// Edit distance with swaps of neighbours (optimal string alignment).
+/// Edit distance with swaps of neighbours (optimal string alignment); only the last two rows of its table are kept.
 fn distance(a: &[char], b: &[char]) -> usize {
-    let mut rows = vec![vec![0usize; b.len() + 1]; a.len() + 1];
-    for i in 0..=a.len() {
-        for j in 0..=b.len() {
-            rows[i][j] = if i == 0 || j == 0 {
-                i + j
-            } else {
-                let replaced = rows[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
-                let mut best = replaced.min(rows[i - 1][j] + 1).min(rows[i][j - 1] + 1);
-                if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
-                    best = best.min(rows[i - 2][j - 2] + 1);
-                }
-                best
-            };
+    let mut before: Vec<usize> = Vec::new();
+    let mut last: Vec<usize> = (0..=b.len()).collect();
+    for i in 1..=a.len() {
+        let mut row = Vec::with_capacity(b.len() + 1);
+        row.push(i);
+        for j in 1..=b.len() {
+            let replaced = last[j - 1] + usize::from(a[i - 1] != b[j - 1]);
+            let mut best = replaced.min(last[j] + 1).min(row[j - 1] + 1);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                best = best.min(before[j - 2] + 1);
+            }
+            row.push(best);
         }
+        before = std::mem::replace(&mut last, row);
     }
-    rows[a.len()][b.len()]
+    last[b.len()]
 }
 
 #[cfg(test)]

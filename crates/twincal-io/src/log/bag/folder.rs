@@ -11,6 +11,8 @@ const METADATA: &str = "metadata.yaml";
 /// Largest metadata, bytes, and deepest nesting in it.
 const MAX_METADATA: u64 = 16 << 20;
 const MAX_DEPTH: usize = 32;
+/// Most values, keys and brackets of the metadata: 10 000 files and 4000 topics have about 300 000. Ten million of them take seconds.
+const MAX_ITEMS: usize = 1_000_000;
 /// Most files of a bag: 24 hours in files of 10 s are 8640.
 const MAX_FILES: usize = 10_000;
 /// Endings of files that hold messages.
@@ -183,10 +185,16 @@ fn listed_files(place: &str, text: &str) -> Result<Vec<String>> {
         )
     };
     let (mut levels, mut files): (Vec<Level>, Vec<String>) = (Vec::new(), Vec::new());
-    for event in Parser::new_from_str(text) {
+    for (item, event) in Parser::new_from_str(text).enumerate() {
         let (event, span) =
             event.map_err(|e| refuse(e.marker().line(), format!("is not YAML: {}", e.info())))?;
         let line = span.start.line();
+        if item >= MAX_ITEMS {
+            return Err(refuse(
+                line,
+                format!("has more than {MAX_ITEMS} values, keys and brackets"),
+            ));
+        }
         let tag = match &event {
             Event::Alias(_) => {
                 return Err(refuse(line, "has a YAML alias, which is refused".into()));

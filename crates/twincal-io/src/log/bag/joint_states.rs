@@ -19,7 +19,7 @@ use crate::log::{
 };
 use crate::memory;
 use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, HashSet};
 use std::rc::Rc;
 use topics::CONVERT;
 use twincal::robot::Robot;
@@ -80,7 +80,7 @@ struct Layout {
 struct Foreign {
     /// As they came.
     in_order: Vec<String>,
-    names: BTreeSet<String>,
+    names: HashSet<String>,
 }
 
 /// Gathers the messages of one log.
@@ -383,12 +383,10 @@ impl<'a> JointStates<'a> {
         for joint in named {
             self.refuse_long("joint", joint)?;
         }
-        let mut sorted: Vec<&String> = named.iter().collect();
-        sorted.sort_unstable();
-        if let Some(twice) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+        let mut before = HashSet::with_capacity(named.len());
+        if let Some(twice) = named.iter().find(|joint| !before.insert(*joint)) {
             self.unfit(format!(
-                "message {number} on `{name}`: joint `{}` stands twice in name[]",
-                twice[0]
+                "message {number} on `{name}`: joint `{twice}` stands twice in name[]"
             ))?;
             return Ok(None);
         }
@@ -405,11 +403,10 @@ impl<'a> JointStates<'a> {
                 entries.push(entry);
             }
         }
-        let wanted: BTreeSet<&String> = self.wanted.iter().collect();
+        let wanted: HashSet<&String> = self.wanted.iter().collect();
         for name in named.iter().filter(|name| !wanted.contains(name)) {
-            if !self.foreign.names.contains(name) {
+            if self.foreign.names.insert(name.clone()) {
                 self.foreign.in_order.push(name.clone());
-                self.foreign.names.insert(name.clone());
             }
         }
         let same = |(part, of): (&Part, &usize)| {
