@@ -63,6 +63,21 @@ Examples:
   twincal fit run*.csv --model arm.urdf --config twincal.toml --force --json
 ")]
     Fit(Fit),
+    /// What a fit takes of each log, as a small file: such files add, and `fit`
+    /// takes them in the place of the logs.
+    #[command(before_help = "\
+Examples:
+  twincal statistics run*.mcap --model arm.urdf -o statistics
+  twincal statistics new.mcap --model arm.urdf --plan statistics/plan.json -o statistics
+  twincal fit --statistics statistics/*.arrow --heldout other.mcap
+")]
+    Statistics(StatisticsFlags),
+    /// One file of statistics from several.
+    #[command(before_help = "\
+Example:
+  twincal merge statistics/*.arrow -o all.arrow
+")]
+    Merge(Merge),
     /// Score a twin on new logs: exit code 0, or 1 where a gate says no.
     #[command(
         before_help = "\
@@ -119,6 +134,8 @@ impl Command {
             Self::Inspect(flags) => flags.log.json,
             Self::Doctor(flags) => flags.look.log.json,
             Self::Fit(flags) => flags.log.json,
+            Self::Statistics(flags) => flags.log.json,
+            Self::Merge(flags) => flags.json,
             Self::Check(flags) => flags.log.json,
             Self::Predict(flags) => flags.log.json,
             Self::Diff(flags) => flags.json,
@@ -268,6 +285,10 @@ pub(crate) struct Fit {
     /// of its own [default: those of [[log]] in the config].
     #[arg(value_name = "LOG")]
     pub(crate) logs: Vec<PathBuf>,
+    /// Files that `twincal statistics` wrote, in the place of logs and model;
+    /// without --heldout the twin is not tested.
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["logs", "model"])]
+    pub(crate) statistics: Vec<PathBuf>,
     /// Robot model (URDF, MJCF).
     #[arg(long, value_name = "MODEL")]
     pub(crate) model: Option<PathBuf>,
@@ -291,6 +312,53 @@ pub(crate) struct Fit {
     pub(crate) no_config: bool,
     #[command(flatten)]
     pub(crate) log: LogFlags,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct StatisticsFlags {
+    /// Logs (CSV, Parquet, Arrow, NPZ, MCAP, rosbag2).
+    #[arg(value_name = "LOG", required = true)]
+    pub(crate) logs: Vec<PathBuf>,
+    /// Robot model (URDF, MJCF).
+    #[arg(long, value_name = "MODEL")]
+    pub(crate) model: Option<PathBuf>,
+    /// A plan that was written before, or `auto`: that of the folder where there
+    /// is one, else one is made by a fit to these logs (twelve of them at most).
+    #[arg(long, value_name = "FILE", default_value = "auto")]
+    pub(crate) plan: PathBuf,
+    /// The robot that was logged [default: the model's name].
+    #[arg(long, value_name = "NAME")]
+    pub(crate) robot: Option<String>,
+    /// Folder for plan.json and a file per log; what is there already is kept.
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// Make files anew that are there already.
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Accept with a warning what would be refused.
+    #[arg(long, value_name = "WHAT", value_enum)]
+    pub(crate) allow: Vec<AllowModel>,
+    /// Leave out ./twincal.toml.
+    #[arg(long, conflicts_with = "config")]
+    pub(crate) no_config: bool,
+    #[command(flatten)]
+    pub(crate) log: LogFlags,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Merge {
+    /// Files that `twincal statistics` or `twincal merge` wrote.
+    #[arg(value_name = "FILE", required = true)]
+    pub(crate) files: Vec<PathBuf>,
+    /// File to write.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    /// Replace an existing file.
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Print the result as JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]

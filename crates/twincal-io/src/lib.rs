@@ -45,8 +45,12 @@ pub mod table;
 pub mod context;
 pub mod artifact;
 #[cfg(feature = "report")]
+mod assessment;
+#[cfg(feature = "report")]
 pub mod report;
 pub mod result_json;
+#[cfg(feature = "tables")]
+pub mod statistics;
 pub mod twin_json;
 pub mod export;
 

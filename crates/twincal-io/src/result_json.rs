@@ -3,6 +3,8 @@
 //! Nothing in it depends on the machine, the clock, the number of threads or the folder: the same input, settings and
 //! seed give the same bytes. Numbers are the shortest that read back the same; what is not a number is `null`.
 
+#[cfg(feature = "report")]
+use crate::assessment::Assessment;
 use crate::context::ReportContext;
 use crate::error::{Error, Result};
 use serde::Serialize;
@@ -44,6 +46,8 @@ struct ResultFile<'a> {
     twincal: &'static str,
     model: &'a str,
     config: Option<ConfigRow<'a>>,
+    #[cfg(feature = "report")]
+    assessment: Assessment<'a>,
     components: &'a [ComponentSummary],
     terms: Vec<TermRow<'a>>,
     groups: &'a [Group],
@@ -223,6 +227,8 @@ impl<'a> ResultFile<'a> {
                 path: &config.name,
                 sha256: &config.sha256,
             }),
+            #[cfg(feature = "report")]
+            assessment: Assessment::of(calibration),
             components: &calibration.components,
             terms: calibration.terms.iter().map(TermRow::of).collect(),
             groups: &calibration.groups,

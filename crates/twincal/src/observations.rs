@@ -340,18 +340,30 @@ impl Part<'_> {
 
     /// Adds these rows of a joint, as runs of their own.
     fn add_joint(&self, joint: usize, accumulator: &mut JointAccumulator) {
+        self.add_joint_on(joint, true, accumulator);
+    }
+
+    /// Adds these rows of a joint; unless `apart` the first of them goes on from the row before it.
+    pub(crate) fn add_joint_on(
+        &self,
+        joint: usize,
+        apart: bool,
+        accumulator: &mut JointAccumulator,
+    ) {
         let (all, rows) = (self.observations, &self.observations.joints[joint]);
         let signals = rows.signals();
         let mut workspace = Workspace::default();
-        let keep: Vec<bool> = rows.standstill.iter().map(|still| !still).collect();
         for range in self.runs_between_starts() {
             let start = range.start;
+            let starts = apart || start > self.rows.start || all.starts.contains(&start);
             rows.visit_signals(all.len(), range, &mut |range, columns| {
-                let (keep, first) = (&keep[range.clone()], range.start == start);
+                let still = &rows.standstill[range.clone()];
+                let keep: Vec<bool> = still.iter().map(|still| !still).collect();
+                let first = starts && range.start == start;
                 let x = if signals == 0 { &[] } else { columns.x };
                 if rows.weight.is_empty() {
                     let y = &rows.y[range];
-                    accumulator.push_block(x, columns.stride, y, keep, first, &mut workspace);
+                    accumulator.push_block(x, columns.stride, y, &keep, first, &mut workspace);
                     return;
                 }
                 let roots = rows.weight[range.clone()].iter().map(|u| u.sqrt());
@@ -364,7 +376,7 @@ impl Part<'_> {
                     .flat_map(|i| scaled(columns.of(i, 0, count)))
                     .collect();
                 let y = scaled(&rows.y[range]);
-                accumulator.push_block(&x, count, &y, keep, first, &mut workspace);
+                accumulator.push_block(&x, count, &y, &keep, first, &mut workspace);
             });
         }
     }

@@ -9,7 +9,9 @@ use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use twincal::calibrate::{Calibration, CalibrationSettings, Stage, Stopped, calibrate};
+use twincal::calibrate::{
+    Calibration, CalibrationSettings, Stage, Statistics, Stopped, calibrate, calibrate_statistics,
+};
 use twincal_io::artifact::{Claim, Maker, REPORT};
 use twincal_io::config::{Config, ReadAs, Settings};
 use twincal_io::context::{FileHash, ReportContext};
@@ -25,6 +27,8 @@ pub(super) struct Job<'a> {
     pub(super) settings: &'a Settings,
     pub(super) robot: RobotInput,
     pub(super) logs: LogInput,
+    /// Of the logs, where a fit takes these and not the logs.
+    pub(super) statistics: Option<Statistics>,
     pub(super) heldout: LogInput,
     /// Folder of the result.
     pub(super) output: &'a Path,
@@ -79,13 +83,14 @@ impl Job<'_> {
             most_bytes: memory::spare(),
             ..self.settings.calibration.clone()
         };
-        let mut calibration = calibrate(
-            &self.robot.robot,
-            std::mem::take(&mut logs.logs),
-            std::mem::take(&mut heldout.logs),
-            &settings,
-            &step,
-        );
+        let held_out = std::mem::take(&mut heldout.logs);
+        let mut calibration = match &self.statistics {
+            Some(statistics) => calibrate_statistics(statistics, held_out, &settings, &step),
+            None => {
+                let logs = std::mem::take(&mut logs.logs);
+                calibrate(&self.robot.robot, logs, held_out, &settings, &step)
+            }
+        };
         let read = [&self.robot.findings, &logs.findings, &heldout.findings];
         let findings = match &mut calibration {
             Ok(calibration) => &mut calibration.findings,
@@ -171,6 +176,15 @@ pub(super) fn command(model: &Path, logs: &[PathBuf], heldout: &[PathBuf], confi
     display_names(logs).iter().for_each(|name| add(name));
     add("--model");
     add(&display_names(&[model]).remove(0));
+    with_heldout(text, heldout, config)
+}
+
+/// The end of such a command.
+pub(super) fn with_heldout(mut text: String, heldout: &[PathBuf], config: &str) -> String {
+    let mut add = |word: &str| {
+        text.push(' ');
+        text.push_str(&quoted(word));
+    };
     if !heldout.is_empty() {
         add("--heldout");
         display_names(heldout).iter().for_each(|name| add(name));
@@ -183,7 +197,7 @@ pub(super) fn command(model: &Path, logs: &[PathBuf], heldout: &[PathBuf], confi
 }
 
 /// A word as a POSIX shell reads it.
-fn quoted(word: &str) -> String {
+pub(super) fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=+:,@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         word.to_owned()

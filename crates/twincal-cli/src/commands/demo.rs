@@ -80,6 +80,7 @@ pub(super) fn run(flags: &Demo, terminal: &mut Terminal) -> Outcome<u8> {
         settings: &settings,
         robot,
         logs,
+        statistics: None,
         heldout,
         output,
         watch,

@@ -1,21 +1,26 @@
 //! `twincal fit`: from logs and a model to a calibrated twin.
 
-use super::calibration::{Job, command, say_where};
+use super::calibration::{Job, command, quoted, say_where, with_heldout};
 use super::inputs::{LogInput, Long, RobotInput};
-use super::{reads, settings, start_threads};
+use super::{merge, reads, settings, start_threads};
 use crate::args::Fit;
 use crate::clock::Stopwatch;
 use crate::failure::{Failure, Outcome};
+use crate::names::display_names;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use twincal_io::artifact::{Claim, Inputs, Maker, Replace};
+use twincal_io::config::{Config, Settings};
 
 pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     let watch = Stopwatch::start();
     let config = settings::of_fit(flags, terminal)?;
     let settings = config.settings()?;
+    if !flags.statistics.is_empty() {
+        return of_statistics(flags, &config, &settings, watch, terminal);
+    }
     let named = settings.log.named();
     let given = if flags.logs.is_empty() {
         &named
@@ -66,6 +71,7 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
         settings: &settings,
         robot,
         logs,
+        statistics: None,
         heldout,
         output: &settings.output,
         watch,
@@ -75,6 +81,68 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
     Ok(code)
 }
 
+/// From statistics of logs to a calibrated twin.
+fn of_statistics(
+    flags: &Fit,
+    config: &Config,
+    settings: &Settings,
+    watch: Stopwatch,
+    terminal: &mut Terminal,
+) -> Outcome<u8> {
+    let mut inputs = Inputs::default();
+    let given = reads::Given {
+        flags: &flags.log,
+        config,
+        settings,
+    };
+    reads::add_given(&mut inputs, &given, &flags.statistics);
+    let replace = match settings.force {
+        true => Replace::Artifact,
+        false => Replace::Never,
+    };
+    let claim = Claim::new(&settings.output, replace, &inputs)?;
+    start_threads(settings.threads)?;
+    let progress = Progress::new();
+    let (file, hashes) = merge::read(&flags.statistics, &progress)?;
+    let robot = RobotInput::of_statistics(&file);
+    let long = Long::of_pipeline(&file.statistics.plan.pipeline);
+    let paths = &settings.log.heldout;
+    let heldout = LogInput::read(paths, &robot.robot, &settings.log, long, &progress)?;
+    for held_out in &heldout.files {
+        let mut sources = file.statistics.sources();
+        if sources.any(|source| source == held_out.sha256) {
+            return Err(fitted_and_held_out(&held_out.name));
+        }
+    }
+    let mut command = "twincal fit --statistics".to_owned();
+    for name in display_names(&flags.statistics) {
+        command.push(' ');
+        command.push_str(&quoted(&name));
+    }
+    let job = Job {
+        maker: Maker::Fit,
+        command: with_heldout(command, paths, &config.in_force()),
+        config,
+        settings,
+        robot,
+        logs: LogInput::of_files(&flags.statistics, hashes),
+        statistics: Some(file.statistics),
+        heldout,
+        output: &settings.output,
+        watch,
+    };
+    let code = job.run(claim, Vec::new(), progress, terminal)?;
+    say_where(&settings.output, settings.json, terminal);
+    Ok(code)
+}
+
+fn fitted_and_held_out(name: &str) -> Failure {
+    Failure::usage(
+        format!("`{name}` is fitted and held out"),
+        "hold out a log that the fit does not see, or leave --heldout away",
+    )
+}
+
 /// A log that is fitted says nothing of what was not, and counts for one experiment only.
 fn every_log_once(logs: &LogInput, heldout: &LogInput) -> Outcome<()> {
     let fitted: BTreeSet<&str> = logs.files.iter().map(|file| file.sha256.as_str()).collect();
@@ -82,10 +150,7 @@ fn every_log_once(logs: &LogInput, heldout: &LogInput) -> Outcome<()> {
         let mut seen = BTreeSet::new();
         for file in files {
             if std::ptr::eq(files, &heldout.files) && fitted.contains(file.sha256.as_str()) {
-                return Err(Failure::usage(
-                    format!("`{}` is fitted and held out", file.name),
-                    "hold out a log that the fit does not see, or leave --heldout away",
-                ));
+                return Err(fitted_and_held_out(&file.name));
             }
             if !seen.insert(&file.sha256) {
                 return Err(twice(&file.name));

@@ -8,12 +8,13 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use twincal::Finding;
 use twincal::robot::Robot;
-use twincal::signal::{Auto, Log};
+use twincal::signal::{Auto, Log, Pipeline};
 use twincal_io::artifact::{MODEL_MJCF, MODEL_URDF, sha256, sha256_unless};
 use twincal_io::config::{LogSettings, Settings};
 use twincal_io::context::FileHash;
 use twincal_io::log::{LogOptions, files_of, open_log, parse_log, read_log};
 use twincal_io::model::{Model, ModelFormat, read_model};
+use twincal_io::statistics::{ModelFile, StatisticsFile};
 use twincal_io::twin_json::StoredTwin;
 use twincal_io::{Error, memory};
 
@@ -60,6 +61,37 @@ impl RobotInput {
     }
 }
 
+impl RobotInput {
+    /// The robot of statistics, and its model file as it was.
+    pub(super) fn of_statistics(file: &StatisticsFile) -> Self {
+        let model = &file.model;
+        let stored = match model.stored_as == MODEL_MJCF {
+            true => MODEL_MJCF,
+            false => MODEL_URDF,
+        };
+        Self {
+            robot: file.statistics.robot.clone(),
+            name: model.robot.clone(),
+            file: FileHash {
+                name: model.name.clone(),
+                sha256: sha256(model.text.as_bytes()),
+            },
+            source: (stored, model.text.clone().into_bytes()),
+            findings: Vec::new(),
+        }
+    }
+
+    /// The model file as statistics keep it.
+    pub(super) fn model_file(&self) -> ModelFile {
+        ModelFile {
+            name: self.file.name.clone(),
+            stored_as: self.source.0.to_owned(),
+            robot: self.name.clone(),
+            text: String::from_utf8_lossy(&self.source.1).into_owned(),
+        }
+    }
+}
+
 /// Logs as read, with what was dropped or assumed.
 pub(super) struct LogInput {
     pub(super) logs: Vec<Log<'static>>,
@@ -88,6 +120,11 @@ impl Long {
         } else {
             Self::InMemory
         }
+    }
+
+    /// As behind these filters.
+    pub(super) fn of_pipeline(pipeline: &Pipeline) -> Self {
+        Self::with_filter(!pipeline.is_off())
     }
 
     /// As a fit with these settings reads them.
@@ -121,12 +158,35 @@ impl LogInput {
         progress: &Progress,
     ) -> Outcome<Self> {
         let read = |path: &Path| long.read(path, robot, &settings.options(path));
-        Self::read_each(paths, robot, progress, &read)
+        let names = display_names(paths);
+        Self::read_each(paths, names, robot, progress, &read)
+    }
+
+    /// Reads one log under the name that it has in results.
+    pub(super) fn read_one(
+        (path, name): (&Path, &str),
+        robot: &Robot,
+        settings: &LogSettings,
+        long: Long,
+        progress: &Progress,
+    ) -> Outcome<Self> {
+        let read = |path: &Path| long.read(path, robot, &settings.options(path));
+        let (paths, names) = ([path.to_owned()], vec![name.to_owned()]);
+        Self::read_each(&paths, names, robot, progress, &read)
+    }
+
+    /// Files that stand for logs.
+    pub(super) fn of_files(given: &[PathBuf], files: Vec<FileHash>) -> Self {
+        Self {
+            files,
+            ..Self::new(given.to_vec())
+        }
     }
 
     /// Reads logs, each as `read_one` does.
     fn read_each(
         paths: &[PathBuf],
+        names: Vec<String>,
         robot: &Robot,
         progress: &Progress,
         read_one: &(dyn Fn(&Path) -> ReadLog + Sync),
@@ -134,7 +194,7 @@ impl LogInput {
         let mut samples = 0;
         let mut input = Self::new(paths.to_vec());
         let said = paths.len().div_ceil(MOST_SAID).max(1);
-        for (number, (path, name)) in paths.iter().zip(display_names(paths)).enumerate() {
+        for (number, (path, name)) in paths.iter().zip(names).enumerate() {
             if number % said == 0 {
                 let of = match said {
                     1 => String::new(),
@@ -172,9 +232,10 @@ impl LogInput {
     ) -> Outcome<Self> {
         let (as_fitted, findings) = AsFitted::new(stored, settings, paths);
         let twin = &stored.calibration.twin;
-        let long = Long::with_filter(!twin.pipeline.is_off());
+        let long = Long::of_pipeline(&twin.pipeline);
         let read = |path: &Path| as_fitted.read(path, long);
-        let mut input = Self::read_each(paths, &twin.robot, progress, &read)?;
+        let names = display_names(paths);
+        let mut input = Self::read_each(paths, names, &twin.robot, progress, &read)?;
         input.findings.splice(0..0, findings);
         Ok(input)
     }
@@ -252,6 +313,11 @@ fn in_memory(log: &Log<'_>) -> u64 {
         Log::Whole(_) => log.samples(),
         Log::Long(long) => long.samples().iter().copied().max().unwrap_or(0) as u64,
     }
+}
+
+/// Checksum of a log.
+pub(super) fn checksum_of_log(path: &Path) -> Result<String, Error> {
+    sha256_of_log(path, &AtomicBool::new(false))
 }
 
 /// Checksum of a log, given up once the log is `refused`; of a folder that of the lines `sha256sum` prints for its files, in the order of their recording.

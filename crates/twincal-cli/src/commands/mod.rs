@@ -11,11 +11,13 @@ mod export;
 mod fit;
 mod inputs;
 mod inspect;
+mod merge;
 mod not_kept;
 mod predict;
 mod reads;
 mod report;
 mod settings;
+mod statistics;
 mod summary;
 mod table;
 mod verdict;
@@ -34,6 +36,8 @@ pub(crate) fn run(command: &Command, terminal: &mut Terminal) -> Outcome<u8> {
         Command::Doctor(flags) => doctor::run(flags, terminal),
         Command::Init(flags) => doctor::init(flags, terminal),
         Command::Fit(flags) => fit::run(flags, terminal),
+        Command::Statistics(flags) => statistics::run(flags, terminal),
+        Command::Merge(flags) => merge::run(flags, terminal),
         Command::Check(flags) => check::run(flags, terminal),
         Command::Predict(flags) => predict::run(flags, terminal),
         Command::Diff(flags) => diff::run(flags, terminal),

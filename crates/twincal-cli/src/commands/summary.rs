@@ -91,6 +91,15 @@ fn validation(calibration: &Calibration, terminal: &mut Terminal) {
         Split::LeaveOneLogOut => "each log predicted from the others",
         Split::LeaveLogGroupsOut => "each fifth of the logs predicted from the others",
         Split::LastThirty => "last 30 % of each log",
+        Split::NotTested => {
+            terminal.heading("Held-out torque: not tested");
+            paragraph(
+                "--heldout LOG predicts a log that was not fitted.",
+                terminal,
+            );
+            terminal.say("");
+            return;
+        }
     };
     let judged = report::decisive(validation);
     let moving = if report::has_standstill(validation) {

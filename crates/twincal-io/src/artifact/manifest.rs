@@ -126,7 +126,7 @@ pub fn sha256(bytes: &[u8]) -> String {
 ///
 /// # Errors
 /// The file cannot be read.
-pub(super) fn sha256_of_file(path: &Path) -> Result<String> {
+pub fn sha256_of_file(path: &Path) -> Result<String> {
     sha256_unless(path, &AtomicBool::new(false))
 }
 

@@ -21,7 +21,7 @@ mod read;
 mod write;
 
 pub use inputs::Inputs;
-pub use manifest::{FORMAT, FileEntry, Maker, Manifest, sha256, sha256_unless};
+pub use manifest::{FORMAT, FileEntry, Maker, Manifest, sha256, sha256_of_file, sha256_unless};
 pub use output_file::OutputFile;
 pub use read::Artifact;
 pub use write::{Claim, Replace};

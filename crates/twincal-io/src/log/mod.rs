@@ -38,6 +38,8 @@ mod shared_file;
 pub(crate) mod stamps;
 mod torque;
 
+#[cfg(feature = "tables")]
+pub(crate) use arrow::numbers as arrow_numbers;
 pub(crate) use assemble::assemble;
 pub(crate) use cells::Cells;
 pub(crate) use columns::has_columns;

@@ -69,6 +69,7 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
             1 => "the last 30 % of the log, by a fit of the rest",
             _ => "the last 30 % of each log, by a fit of the rest",
         },
+        Split::NotTested => "nothing was held out",
     };
     let below = below_cutoff(calibration);
     let which = match has_standstill(validation) {

@@ -18,6 +18,7 @@ mod limits;
 mod next_recording;
 mod page;
 mod plot;
+mod reason;
 mod remarks;
 mod scale;
 mod shape;
@@ -41,13 +42,14 @@ pub const MENTIONED: f64 = 0.05;
 pub use grounds::friction_only;
 pub use honesty::{drawn_alike, stretched};
 pub use limits::{decisive, has_standstill};
+pub use reason::{Conclusion, Reason};
 pub use status::reason;
 
 /// Whether the calibrated torque can be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Answer {
-    /// True where it is a yes without exceptions.
-    pub plain: bool,
+    /// What decides; [`Reason::conclusion`] is the answer.
+    pub reason: Reason,
     /// One sentence.
     pub headline: String,
     /// What it rests on.
@@ -66,7 +68,7 @@ pub fn answer(calibration: &Calibration) -> Answer {
     let joints = view::joints(calibration);
     let verdict = verdict::judge(calibration, &joints);
     Answer {
-        plain: verdict.grade == verdict::Grade::Good,
+        reason: verdict.reason,
         headline: verdict.headline,
         grounds: verdict.grounds,
         limits: verdict.limits,

@@ -6,6 +6,7 @@ use super::limits::{
     too_narrow, worse,
 };
 use super::next_recording;
+use super::reason::Reason;
 use super::shape;
 use super::standstill;
 use super::status;
@@ -31,6 +32,8 @@ pub(super) enum Grade {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Verdict {
     pub(super) grade: Grade,
+    /// What decides.
+    pub(super) reason: Reason,
     /// One sentence.
     pub(super) headline: String,
     /// What the headline rests on.
@@ -54,6 +57,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     if rows == 0 || !(scores.rmse_nominal.is_finite() && scores.rmse_calibrated.is_finite()) {
         return Verdict {
             grade: Grade::Bad,
+            reason: Reason::NotTested,
             headline: "Not yet: there are no held-out rows to judge this twin by.".into(),
             grounds: grounds::effects_found(calibration),
             limits: Vec::new(),
@@ -85,36 +89,42 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         .iter()
         .filter_map(Finding::mistake)
         .min();
-    let (grade, headline) = if let Some(mistake) = mistake {
-        (Grade::Bad, mistake_words(mistake))
+    let (grade, reason, headline) = if let Some(mistake) = mistake {
+        (Grade::Bad, Reason::from(mistake), mistake_words(mistake))
     } else if independent_rows(calibration, joints) < FEW {
         (
             Grade::Care,
+            Reason::FewHeldOutRows,
             "Hard to say: the held-out rows count as too few independent ones to judge this twin by.",
         )
     } else if ratio > WORSE {
         (
             Grade::Bad,
+            Reason::WorseThanNominal,
             "No: on held-out data the calibrated torque is worse than the nominal one.",
         )
     } else if lost > 0 && lost == joints.len() {
         (
             Grade::Bad,
+            Reason::ErrorAboveTorque,
             "No: the error left is larger than the torque itself.",
         )
     } else if 2 * lost > joints.len() {
         (
             Grade::Bad,
+            Reason::ErrorAboveTorqueOnMostJoints,
             "No: on most joints the error left is larger than the torque itself.",
         )
     } else if found == 0 && ratio > BETTER {
         (
             Grade::Care,
+            Reason::NothingFound,
             "Nothing to correct was found: none of the candidate effects is in this log.",
         )
     } else if ratio > BETTER {
         (
             Grade::Care,
+            Reason::NoBetterThanNominal,
             "Hardly: on held-out data the calibrated torque is no better than the nominal one.",
         )
     } else if grounds::friction_only(scores)
@@ -122,36 +132,46 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     {
         (
             Grade::Care,
+            Reason::FrictionAloneIsBetter,
             "Hardly: friction and an offset alone predict held-out torque better.",
         )
     } else if found > 0 && sure == 0 {
         (
             Grade::Care,
+            Reason::NothingEstablished,
             "Perhaps: low-passed torque is better with it, but none of its effects is established.",
         )
     } else if large > 0 && large == joints.len() {
         (
             Grade::Care,
+            Reason::LargeError,
             "Better than the model alone, but the error that is left is large.",
         )
     } else if 2 * large > joints.len() {
         (
             Grade::Care,
+            Reason::LargeErrorOnMostJoints,
             "Better than the model alone, but on most joints the error that is left is large.",
         )
     } else if no_bodies(calibration) > 1 {
         (
             Grade::Care,
+            Reason::UnphysicalLinks,
             "With care: what was found of several links is no rigid body. Is this the robot's model?",
         )
     } else if !worse.is_empty() {
         (
             Grade::Care,
+            Reason::WorseOnSomeJoints,
             "With care: better than the model alone, but on some joints torque got worse.",
         )
     } else if scores.coverage95 < COVERAGE.0 {
         (
             Grade::Care,
+            match rest_worse {
+                false => Reason::NarrowIntervals,
+                true => Reason::NarrowIntervalsInMotion,
+            },
             match rest_worse {
                 false => "The torque yes, its intervals not: they are too narrow.",
                 true => "While joints move the torque yes, its intervals not: they are too narrow.",
@@ -160,28 +180,33 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
     } else if !honest {
         (
             Grade::Care,
+            Reason::WideIntervals,
             "Yes; its intervals are wider than they need to be.",
         )
     } else if rest_worse {
         (
             Grade::Care,
+            Reason::WorseAtRest,
             "While joints move, yes; at standstill it is worse than your model.",
         )
     } else if let Some(shape) = off.all.filter(|shape| !shape.contradicts(scores, joints)) {
-        (Grade::Care, shape.headline())
+        (Grade::Care, Reason::ErrorDistribution, shape.headline())
     } else if !serious && !off.single && !too_narrow {
         (
             Grade::Good,
+            Reason::Passed,
             "Yes, to predict torque on motions like the ones it was tested on.",
         )
     } else {
         (
             Grade::Care,
+            Reason::Exceptions,
             "Yes, to predict torque, with the exceptions below.",
         )
     };
     Verdict {
         grade,
+        reason,
         headline: in_band(calibration, headline),
         grounds: grounds::grounds(calibration, joints),
         limits,

@@ -5,8 +5,12 @@ mod checks;
 mod data;
 mod exit;
 mod fit;
+mod from_statistics;
+mod log_statistics;
 mod outlook;
+mod plan;
 mod progress;
+mod records;
 mod request;
 mod result;
 mod settings;
@@ -19,8 +23,12 @@ pub use checks::left_out::{LeftOutData, LeftOutError};
 pub use checks::sweep::SweepPoint;
 pub use data::log_summary::LogSummary;
 pub use fit::compact::{Compact, CompactTerm};
+pub use from_statistics::calibrate_statistics;
+pub use log_statistics::Statistics;
 pub use outlook::{LookedAt, Outlook, outlook};
+pub use plan::{Plan, VERSION as PLAN_VERSION};
 pub use progress::Stage;
+pub use records::{Header, Quantity, Record};
 pub use result::calibration::{
     Along, Calibration, ComponentSummary, Curve, Draws, Group, LikelihoodUsed, ParameterSummary,
     PriorUsed, TermSummary,
@@ -66,6 +74,43 @@ pub fn calibrate<'a>(
     calibrate_watched(robot, (logs.into(), heldout.into()), settings, &watch)
 }
 
+/// How these logs, and others of the same robot, become statistics; with what was found on the way.
+///
+/// The plan is that of a fit: filters, the band that the noise allows, candidates, gear ripple that the residual shows, the effects that
+/// columns are worked out about.
+///
+/// # Errors
+/// Those of [`calibrate`].
+pub fn plan<'a>(
+    robot: &Robot,
+    logs: impl Into<Logs<'a>>,
+    settings: &CalibrationSettings,
+    progress: &dyn Fn(Stage),
+) -> std::result::Result<(Plan, Vec<Finding>), Stopped> {
+    let watch = |stage: Stage| {
+        progress(stage);
+        Ok(())
+    };
+    let mut findings = Vec::new();
+    let recordings = (logs.into(), Logs(Vec::new()));
+    let mut way = |request: Request<'_>,
+                   recordings: &mut Option<(Logs<'_>, Logs<'_>)>,
+                   findings: &mut Vec<Finding>| {
+        watch(Stage::Rows)?;
+        plan::road(request, recordings, findings)
+    };
+    match attempt(
+        robot,
+        recordings,
+        settings,
+        (&watch, &mut way),
+        &mut findings,
+    ) {
+        Ok(plan) => Ok((plan, findings)),
+        Err(error) => Err(Stopped { error, findings }),
+    }
+}
+
 /// [`calibrate`] under eyes that may end it with an error.
 pub(crate) fn calibrate_watched(
     robot: &Robot,
@@ -77,7 +122,17 @@ pub(crate) fn calibrate_watched(
     let every_log = recordings.0.0.iter().chain(&recordings.1.0);
     let shelves: Vec<_> = every_log.filter_map(Log::shelf).collect();
     let as_recorded = cross_checked::as_recorded(robot, &recordings)?;
-    let calibration = attempt(robot, recordings, settings, progress, &mut findings);
+    let mut way =
+        |request: Request<'_>,
+         recordings: &mut Option<(Logs<'_>, Logs<'_>)>,
+         findings: &mut Vec<Finding>| { road(request, recordings, progress, findings) };
+    let calibration = attempt(
+        robot,
+        recordings,
+        settings,
+        (progress, &mut way),
+        &mut findings,
+    );
     // Numbers that could not be read back are behind whatever came out.
     let calibration = match shelves.iter().find_map(|shelf| shelf.failure()) {
         Some(failure) => Err(failure),
@@ -86,15 +141,19 @@ pub(crate) fn calibrate_watched(
     ended(calibration, as_recorded, findings)
 }
 
+/// One pass over the logs, to a result.
+type Way<'w, T> =
+    dyn FnMut(Request<'_>, &mut Option<(Logs<'_>, Logs<'_>)>, &mut Vec<Finding>) -> Pass<T> + 'w;
+
 /// Passes over the logs, with the settings that the end of one asks for in the next, until one has a result; `findings` are those of
 /// the last one.
-fn attempt(
+fn attempt<T>(
     robot: &Robot,
     recordings: (Logs<'_>, Logs<'_>),
     settings: &CalibrationSettings,
-    progress: &Watch<'_>,
+    (progress, road): (&Watch<'_>, &mut Way<'_, T>),
     findings: &mut Vec<Finding>,
-) -> Result<Calibration> {
+) -> Result<T> {
     let mut recordings = Some(recordings);
     let mut attempts = Attempts::new(settings);
     loop {
@@ -104,8 +163,8 @@ fn attempt(
             settings: &attempts.settings,
             goal: attempts.goal,
         };
-        let exit = match road(request, &mut recordings, progress, findings) {
-            Ok(calibration) => return Ok(calibration),
+        let exit = match road(request, &mut recordings, findings) {
+            Ok(result) => return Ok(result),
             Err(Exit::Failed(Error::Cancelled)) => return Err(Error::Cancelled),
             Err(exit) => exit,
         };

@@ -7,6 +7,7 @@ use crate::robot::{JointKind, Motion, Robot, nominal_torque};
 use crate::term::Library;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// Velocity and acceleration of ordinary motion, rad/s and rad/s² (m/s, m/s²), at most.
@@ -14,7 +15,7 @@ const VELOCITY: f64 = 2.0;
 const ACCELERATION: f64 = 5.0;
 
 /// Some states of a robot, `[joint * len + state]`.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct States {
     /// How many.
     pub len: usize,

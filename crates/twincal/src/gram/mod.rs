@@ -9,6 +9,7 @@ pub use accumulate::{JointAccumulator, OpenRun};
 pub use block::Workspace;
 
 use crate::error::{Error, Result};
+use crate::term::Recipes;
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
@@ -47,7 +48,7 @@ impl Symmetric {
 
 impl Symmetric {
     /// The part of some rows and the same columns.
-    fn of(&self, rows: &[usize]) -> Self {
+    pub(crate) fn of(&self, rows: &[usize]) -> Self {
         let entries = rows
             .iter()
             .flat_map(|i| rows.iter().map(|j| self.at(*i, *j)));
@@ -124,6 +125,9 @@ impl JointGram {
     /// # Source
     /// method section 4; no term is a difference of large numbers as ρ → 1.
     pub fn stationary(&self, rho: f64) -> Symmetric {
+        if rho == 0.0 {
+            return self.s0.clone();
+        }
         let (a, b, c) = ((1.0 - rho) * (1.0 - rho), rho, rho * (1.0 - rho));
         let values = self
             .s0
@@ -136,6 +140,46 @@ impl JointGram {
         Symmetric {
             size: self.s0.size,
             values,
+        }
+    }
+}
+
+impl JointGram {
+    /// Without what is kept of consecutive rows: then ρ has to be 0.
+    pub(crate) fn forget_runs(&mut self) {
+        for sum in [&mut self.d, &mut self.first, &mut self.last] {
+            *sum = Symmetric::default();
+        }
+    }
+
+    /// Keeps some of the columns, by their place, which are numbered anew, and y.
+    pub(crate) fn keep(&mut self, kept: &[usize]) {
+        let rows: Vec<usize> = kept.iter().copied().chain([self.columns.len()]).collect();
+        for sum in [&mut self.s0, &mut self.d, &mut self.first, &mut self.last] {
+            if sum.size > 0 {
+                *sum = sum.of(&rows);
+            }
+        }
+        self.columns = (0..kept.len() as u32).collect();
+    }
+
+    /// The statistics of columns that follow from these, y among them.
+    pub(crate) fn combined(&self, recipes: &Recipes) -> Self {
+        let of = |sums: &Symmetric| match sums.size {
+            0 => Symmetric::default(),
+            _ => Symmetric {
+                size: recipes.columns(),
+                values: recipes.to_columns(&sums.values),
+            },
+        };
+        Self {
+            columns: Vec::new(),
+            n: self.n,
+            starts: self.starts,
+            s0: of(&self.s0),
+            d: of(&self.d),
+            first: of(&self.first),
+            last: of(&self.last),
         }
     }
 }

@@ -18,10 +18,13 @@ pub(super) struct Residual {
 }
 
 impl Residual {
-    /// `y − Xβ` of a joint, `beta` of all columns; squares of at most `rounding` are none.
+    /// `y − Xβ` of a joint, `beta` of all columns; squares of at most `rounding` are none. Where runs were forgotten ρ has to be 0.
     pub(super) fn new(joint: &JointGram, beta: &[f64], rounding: f64) -> Self {
         let beta = of_joint(joint, beta);
-        let form = |sums: &Symmetric| residual_form(sums, &beta).max(0.0);
+        let form = |sums: &Symmetric| match sums.size {
+            0 => 0.0,
+            _ => residual_form(sums, &beta).max(0.0),
+        };
         let square = form(&joint.s0);
         if square <= rounding || joint.n == 0.0 {
             return Self {

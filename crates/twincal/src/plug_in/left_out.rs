@@ -8,7 +8,7 @@ use crate::infer::approximate;
 use crate::likelihood::{Columns, PlugIn, assemble};
 use crate::observations::Part;
 use crate::posterior::Posterior;
-use crate::statistics::{Training, of_joint, residual_form, units};
+use crate::statistics::{Training, of_joint, residual_form, rows_of_units};
 use rayon::prelude::*;
 
 /// 1.96².
@@ -45,7 +45,7 @@ fn factors_of_coverage(
     rows: &[Part<'_>],
     plug_in: &PlugIn,
 ) -> Vec<Option<f64>> {
-    let units = units(rows);
+    let units = rows_of_units(rows);
     let joints = (0..plug_in.weight.len()).into_par_iter();
     let factor = |joint: usize| {
         let mut needed: Vec<f64> = Vec::new();

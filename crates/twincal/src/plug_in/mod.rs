@@ -1,7 +1,7 @@
 //! Noise weights, autocorrelation, misfit and slab scale: everything that is plugged into the posterior.
 //!
-//! [`fit`] iterates likelihood → infer → residual at the model average until nothing moves (method section 5);
-//! [`fit_tempered`] lets what no candidate describes count as noise. Given the plug-ins, exact enumeration and Gibbs
+//! `fit` iterates likelihood → infer → residual at the model average until nothing moves (method section 5);
+//! `fit_tempered` lets what no candidate describes count as noise. Given the plug-ins, exact enumeration and Gibbs
 //! sampling share one target.
 
 mod autoregression;
@@ -12,7 +12,7 @@ mod passband;
 mod tempering;
 mod usual;
 
-pub use tempering::fit_tempered;
+pub(crate) use tempering::fit_tempered;
 
 use crate::diagnostics::integrated_autocorrelation_time;
 use crate::error::Result;
@@ -23,7 +23,7 @@ use crate::observations::Part;
 use crate::posterior::{Posterior, Problem};
 use crate::prior::PriorSettings;
 use crate::signal::Auto;
-use crate::statistics::{Training, Unit};
+use crate::statistics::{Sums, Unit, of_joint, residual_form};
 use autoregression::Residual;
 use passband::Passband;
 
@@ -121,16 +121,16 @@ impl Moving {
 ///
 /// # Errors
 /// Those of [`assemble`] and [`approximate`].
-pub fn fit(
-    training: &Training,
+pub(crate) fn fit(
+    sums: &Sums,
     columns: &Columns,
     settings: FitSettings<'_>,
     start: &PlugIn,
     moving: Moving,
     known: Option<&Posterior>,
 ) -> Result<Fit> {
-    let total = training.total();
-    let data = (&total, training.cutoff);
+    let total = sums.total();
+    let data = (&total, sums.cutoff);
     fit_sums(data, columns, settings, start, moving, known)
 }
 
@@ -190,12 +190,12 @@ fn fit_sums(
 }
 
 /// Where an iteration starts: white noise of equal size on every joint.
-pub fn start(training: &Training, columns: &Columns, prior: &PriorSettings) -> PlugIn {
+pub(crate) fn start(sums: &Sums, columns: &Columns, prior: &PriorSettings) -> PlugIn {
     let v = match prior.scaled_variance {
         Auto::Value(v) => v,
         Auto::Auto => FIRST_SLAB,
     };
-    PlugIn::start(training.joints(), columns.families.len(), v)
+    PlugIn::start(sums.joints(), columns.families.len(), v)
 }
 
 /// The filter that an autoregression of rows has to be told of.
@@ -259,6 +259,16 @@ pub fn residual_correlation_time(training: &[Part<'_>], joint: usize, beta: &[f6
     let cutoffs = training.iter().map(|part| part.observations.cutoff);
     let cutoff = cutoffs.fold(0.0, f64::max);
     memory::behind_filter(integrated_autocorrelation_time(&runs), cutoff)
+}
+
+/// The same from the power of the rows behind these sums by bands of frequency; `gram` is that of all of them.
+pub(crate) fn correlation_time((sums, gram): (&Sums, &Gram), joint: usize, beta: &[f64]) -> f64 {
+    let own = &gram.joints[joint];
+    let left = residual_form(&own.s0, &of_joint(own, beta));
+    if left <= ROUNDING_OF_SUMS * sums.torque_squares()[joint] {
+        return 1.0; // rounding has no memory that means anything
+    }
+    memory::behind_filter(sums.spectra[joint].autocorrelation_time(beta), sums.cutoff)
 }
 
 /// Whether residual squares of a joint are what rounding leaves of its torque.

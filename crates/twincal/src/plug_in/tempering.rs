@@ -7,12 +7,14 @@
 use super::left_out::interval_factors;
 use super::misfit::misfit;
 use super::usual::at_least_usual;
-use super::{Fit, FitSettings, Moving, ROUNDING_OF_SUMS, fit_sums, memory, start, weights};
+use super::{
+    Fit, FitSettings, Moving, ROUNDING_OF_SUMS, correlation_time, fit_sums, start, weights,
+};
 use crate::error::Result;
 use crate::gram::Gram;
 use crate::likelihood::{Columns, NoiseSettings};
 use crate::observations::Part;
-use crate::statistics::{Training, Unit, of_joint, residual_form};
+use crate::statistics::{Sums, Training, Unit};
 
 /// Times that misfit and noise are measured and the fit is made anew.
 const ROUNDS: usize = 3;
@@ -23,22 +25,23 @@ const ROUNDS: usize = 3;
 /// rows → fewer effects → a longer correlated residual → fewer effective rows) until nothing is left. Misfit and weights
 /// follow the fit for three rounds.
 ///
-/// With the fit comes the factor per joint on the noise sd of an interval so that left-out residuals have the stated variance.
+/// `rows` are those behind the sums; only robust noise asks for them. With the fit comes the factor per joint on the noise sd of an interval so that left-out residuals have the stated variance.
 ///
 /// # Errors
 /// Those of [`super::fit`].
-pub fn fit_tempered(
+pub(crate) fn fit_tempered(
+    sums: &Sums,
     rows: &[Part<'_>],
     columns: &Columns,
     settings: FitSettings<'_>,
 ) -> Result<(Fit, Vec<f64>)> {
-    let training = Training::new(rows);
+    let training = Training::new(sums);
     let total = training.total();
-    let data = (&total, training.cutoff);
-    let white = start(&training, columns, settings.prior);
+    let data = (&total, sums.cutoff);
+    let white = start(sums, columns, settings.prior);
     let (all, known) = (Moving::All, None);
     let mut fitted = fit_sums(data, columns, settings, &white, all, known)?;
-    let times = correlation_times(&training, &total, (settings.noise, &fitted));
+    let times = correlation_times(sums, &total, (settings.noise, &fitted));
     let units = &training.units;
     let kept: Vec<Gram> = (0..units.len())
         .map(|unit| training.without(unit))
@@ -72,25 +75,20 @@ pub fn fit_tempered(
 
 /// τ of each joint, in rows: the autocorrelation time of its residual, and what weighing the rows costs.
 fn correlation_times(
-    training: &Training,
+    sums: &Sums,
     total: &Unit,
     (noise, fitted): (NoiseSettings, &Fit),
 ) -> Vec<f64> {
     let mean = &fitted.posterior.mean;
-    let joints = training.spectra.iter().zip(&total.joints).enumerate();
+    let joints = total.joints.iter().enumerate();
     joints
-        .map(|(joint, (spectrum, own))| {
+        .map(|(joint, own)| {
             let cost = if noise.robust {
                 own.weighing.cost()
             } else {
                 1.0
             };
-            let gram = &total.gram.joints[joint];
-            let left = residual_form(&gram.s0, &of_joint(gram, mean));
-            if left <= ROUNDING_OF_SUMS * own.torque {
-                return cost; // rounding has no memory that means anything
-            }
-            memory::behind_filter(spectrum.autocorrelation_time(mean), training.cutoff) * cost
+            correlation_time((sums, &total.gram), joint, mean) * cost
         })
         .collect()
 }

@@ -5,6 +5,7 @@ use crate::likelihood::AUTO_SHAPE;
 use crate::observations::{JointObservations, Observations};
 use crate::prior::Inclusion;
 use crate::random::Random;
+use crate::statistics::{Runs, Sums};
 use crate::term::Family;
 
 const ROWS: usize = 300;
@@ -98,7 +99,7 @@ fn the_automatic_prior_adds_no_noise_where_nearly_all_is_explained() {
         noise: noise(NoiseModel::Iid),
         prior: &prior,
     };
-    let training = Training::whole(&[log.whole()]);
+    let training = Sums::of(&[log.whole()], Runs::Joined);
     let first = start(&training, &columns, &prior);
     let fit = fit(&training, &columns, settings, &first, Moving::All, None).unwrap();
     // The slab adds β²/(2v) to b_n: less than one unit of noise at the scale that it learns.
@@ -121,7 +122,13 @@ fn rows_too_few_to_predict_widen_nothing() {
     };
     for rows in [2, ROWS] {
         let log = log(rows);
-        let (fit, factors) = fit_tempered(&[log.whole()], &columns, settings).unwrap();
+        let (fit, factors) = fit_tempered(
+            &Sums::of(&[log.whole()], Runs::Apart),
+            &[log.whole()],
+            &columns,
+            settings,
+        )
+        .unwrap();
         assert!(factors.iter().all(|f| f.is_finite() && *f >= 1.0), "{rows}");
         assert!(
             fit.plug_in
@@ -156,7 +163,7 @@ fn a_shape_that_the_motion_hardly_shows_has_a_coefficient_of_usual_size() {
             noise: noise(NoiseModel::Iid),
             prior: &prior,
         };
-        let training = Training::whole(&[log.whole()]);
+        let training = Sums::of(&[log.whole()], Runs::Joined);
         let first = start(&training, &columns, &prior);
         let fit = fit(&training, &columns, settings, &first, Moving::All, None).unwrap();
         assert!(fit.posterior.inclusion[0] > 0.999);

@@ -3,6 +3,7 @@
 
 use crate::linear_algebra::{dot, product_transposed};
 use crate::observations::Part;
+use crate::term::Recipes;
 use std::ops::AddAssign;
 
 /// Harmonics of the joint's position.
@@ -21,7 +22,7 @@ const REVERSAL: f64 = 0.02;
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct JointDecoys {
-    /// Columns of the joint.
+    /// Columns of the joint, or signals that they are made of.
     columns: usize,
     /// φ_kᵀ[X | y], `k * (columns + 1) + column`.
     cross: Vec<f64>,
@@ -41,7 +42,7 @@ impl Default for JointDecoys {
 }
 
 impl JointDecoys {
-    /// Sums over the rows of a part as the fit weighs them.
+    /// Sums over the rows of a part as the fit weighs them, over signals.
     pub(crate) fn of(part: &Part<'_>, joint: usize) -> Self {
         let (all, rows) = (part.observations, &part.observations.joints[joint]);
         let signals = rows.signals();
@@ -80,20 +81,56 @@ impl JointDecoys {
                 (sums.iter_mut().zip(products)).for_each(|(sum, product)| *sum += product);
             }
         });
-        let cross = match &rows.recipes {
-            None => sums,
-            Some(recipes) => (sums.chunks_exact(width))
-                .flat_map(|sums| {
-                    let mut columns = recipes.row(&sums[..signals]);
-                    columns.push(sums[signals]);
-                    columns
-                })
-                .collect(),
-        };
         Self {
-            columns: rows.columns.len(),
+            columns: signals,
+            cross: sums,
+            square,
+        }
+    }
+
+    /// φ_kᵀ[X | y] and φ_kᵀφ_k; `None` where there are none.
+    pub(crate) fn numbers(&self) -> Option<(&[f64], &[f64; DECOYS])> {
+        (!self.cross.is_empty()).then_some((&self.cross, &self.square))
+    }
+
+    /// Sums over so many signals from [`Self::numbers`]; `None` for another number of them.
+    pub(crate) fn of_numbers(columns: usize, cross: Vec<f64>, square: &[f64]) -> Option<Self> {
+        let square = square.try_into().ok()?;
+        (cross.len() == DECOYS * (columns + 1)).then_some(Self {
+            columns,
             cross,
             square,
+        })
+    }
+
+    /// Of some of the columns.
+    pub(super) fn keep(&self, columns: &[usize]) -> Self {
+        let own = (self.cross.chunks_exact(self.columns + 1)).flat_map(|sums| {
+            let kept = columns.iter().map(|&column| sums[column]);
+            kept.chain([sums[self.columns]])
+        });
+        Self {
+            columns: columns.len(),
+            cross: own.collect(),
+            square: self.square,
+        }
+    }
+
+    /// The same over columns that follow from the signals.
+    pub(crate) fn of_columns(&self, recipes: Option<&Recipes>) -> Self {
+        let Some(recipes) = recipes else {
+            return self.clone();
+        };
+        let signals = self.columns;
+        let cross = (self.cross.chunks_exact(signals + 1)).flat_map(|sums| {
+            let mut columns = recipes.row(&sums[..signals]);
+            columns.push(sums[signals]);
+            columns
+        });
+        Self {
+            columns: recipes.columns(),
+            cross: cross.collect(),
+            square: self.square,
         }
     }
 
@@ -123,6 +160,9 @@ impl AddAssign<&JointDecoys> for JointDecoys {
     /// # Panics
     /// If the two belong to other columns (an empty default adopts the other's).
     fn add_assign(&mut self, other: &JointDecoys) {
+        if other.cross.is_empty() {
+            return;
+        }
         if self.cross.is_empty() {
             *self = other.clone();
             return;

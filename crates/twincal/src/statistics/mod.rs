@@ -1,32 +1,32 @@
 //! What a fit takes of its rows: sums that add, joint by joint. Up to here cost grows with the logs, and not beyond.
 
 mod decoys;
+mod log_sums;
 mod spectrum;
+mod sums;
 mod weighing;
 
 pub(crate) use decoys::{DECOYS, JointDecoys};
-pub(crate) use spectrum::Spectrum;
+pub(crate) use log_sums::{BLOCKS, JointBlock, JointSums, LogSums};
+pub(crate) use spectrum::{Bands, Spectrum};
+pub(crate) use sums::{GROUPS, Runs, Sums};
 pub(crate) use weighing::Weighing;
 
 use crate::gram::{Gram, JointGram, Symmetric};
 use crate::observations::Part;
-use rayon::prelude::*;
-use std::ops::AddAssign;
+use log_sums::stretch;
+use std::ops::{AddAssign, Range};
 
-/// Units that one or two logs are cut into, together; of three logs or more each is one.
+/// Units that one or two logs are cut into; of three logs or more each is one.
 const PARTS: usize = 5;
-/// Units at most; more logs are grouped.
+/// Units of three logs or more at most; more logs are grouped.
 const MOST_UNITS: usize = 6;
 
-/// The rows of a fit as a few sums, each of which can be left out.
+/// The rows of a fit as a few sums over columns and torque, each of which can be left out.
 #[derive(Debug, Clone, Default)]
-pub struct Training {
+pub(crate) struct Training {
     /// Contiguous parts of one or two logs, whole logs or groups of them.
     pub(crate) units: Vec<Unit>,
-    /// Of each joint over all units; empty where nothing is to be left out.
-    pub(crate) spectra: Vec<Spectrum>,
-    /// Largest cut-off of the filters that made the rows, cycles per row; 0 without a filter.
-    pub(crate) cutoff: f64,
 }
 
 /// Sums over some rows.
@@ -49,31 +49,11 @@ pub(crate) struct JointUnit {
 
 impl Training {
     /// Units that can be left out, see [`units`].
-    pub fn new(parts: &[Part<'_>]) -> Self {
+    pub(crate) fn new(sums: &Sums) -> Self {
+        let units = units(sums.groups());
         Self {
-            spectra: spectra(parts),
-            ..Self::of(&units(parts), parts)
+            units: units.iter().map(|unit| sums.unit(unit)).collect(),
         }
-    }
-
-    /// Every log a unit, with its runs of rows as they are: nothing is to be left out.
-    pub fn whole(parts: &[Part<'_>]) -> Self {
-        let units: Vec<Vec<Part<'_>>> = parts.iter().map(|part| vec![part.clone()]).collect();
-        Self::of(&units, parts)
-    }
-
-    fn of(units: &[Vec<Part<'_>>], parts: &[Part<'_>]) -> Self {
-        let cutoffs = parts.iter().map(|part| part.observations.cutoff);
-        Self {
-            units: units.par_iter().map(|parts| Unit::of(parts)).collect(),
-            spectra: Vec::new(),
-            cutoff: cutoffs.fold(0.0, f64::max),
-        }
-    }
-
-    /// Number of moving joints; 0 without rows.
-    pub fn joints(&self) -> usize {
-        self.units.first().map_or(0, |unit| unit.joints.len())
     }
 
     /// Sum of all units.
@@ -91,35 +71,6 @@ impl Training {
             .filter(|(unit, _)| *unit != left_out)
             .for_each(|(_, unit)| kept += &unit.gram);
         kept
-    }
-}
-
-fn spectra(parts: &[Part<'_>]) -> Vec<Spectrum> {
-    let joints = parts
-        .first()
-        .map_or(0, |part| part.observations.joints.len());
-    let of_joint = |joint: usize| {
-        let mut sum = Spectrum::default();
-        parts.iter().for_each(|part| sum.add(part, joint));
-        sum
-    };
-    (0..joints).into_par_iter().map(of_joint).collect()
-}
-
-impl Unit {
-    fn of(parts: &[Part<'_>]) -> Self {
-        let joints = parts
-            .first()
-            .map_or(0, |part| part.observations.joints.len());
-        let of_joint = |joint: usize| {
-            let mut sum = JointUnit::default();
-            parts.iter().for_each(|part| sum.add(part, joint));
-            sum
-        };
-        Self {
-            gram: parts.iter().collect(),
-            joints: (0..joints).into_par_iter().map(of_joint).collect(),
-        }
     }
 }
 
@@ -141,18 +92,19 @@ impl AddAssign<&Unit> for Unit {
 }
 
 impl JointUnit {
-    fn add(&mut self, part: &Part<'_>, joint: usize) {
-        let rows = &part.observations.joints[joint];
-        let measured = rows.measured.some(part.rows.clone());
-        self.decoys += &JointDecoys::of(part, joint);
-        self.torque += measured.iter().map(|tau| tau * tau).sum::<f64>();
-        if rows.weight.is_empty() {
-            return;
-        }
-        for row in part.rows.clone().filter(|&row| !rows.standstill[row]) {
-            let spread = rows.spread.get(row).copied().unwrap_or(1.0);
-            self.weighing.add(rows.weight[row] * spread);
-        }
+    fn split(sums: JointBlock) -> (JointGram, Self) {
+        let JointBlock {
+            gram,
+            decoys,
+            torque,
+            weighing,
+        } = sums;
+        let rest = Self {
+            decoys,
+            torque,
+            weighing,
+        };
+        (gram, rest)
     }
 }
 
@@ -176,24 +128,53 @@ pub(crate) fn residual_form(sums: &Symmetric, beta: &[f64]) -> f64 {
     sums.at(last, last) - explained
 }
 
-/// Rows that are left out together: three logs or more one by one (more than six in six groups), otherwise equal parts of each log.
-pub(crate) fn units<'a>(parts: &[Part<'a>]) -> Vec<Vec<Part<'a>>> {
-    let each = if parts.len() < 3 {
-        PARTS.div_ceil(parts.len().max(1))
-    } else {
-        1
-    };
-    let cut = |part: &Part<'a>, i: usize| part.rows.start + i * part.rows.len() / each;
-    let piece = |part: &Part<'a>, i: usize| Part {
+/// What is left out together, as stretches of groups of logs: three logs or more one by one (more than six in six groups), otherwise one fifth of
+/// each log after the other.
+pub(crate) fn units(groups: usize) -> Vec<Vec<(usize, Range<usize>)>> {
+    if groups >= 3 {
+        let count = groups.min(MOST_UNITS);
+        let unit = |unit| {
+            (unit..groups)
+                .step_by(count)
+                .map(|group| (group, 0..BLOCKS))
+        };
+        return (0..count).map(|own| unit(own).collect()).collect();
+    }
+    let cut = |i: usize| i * BLOCKS / PARTS;
+    let unit = |i: usize| (0..groups).map(move |group| (group, cut(i)..cut(i + 1)));
+    let count = if groups == 0 { 0 } else { PARTS };
+    (0..count).map(|own| unit(own).collect()).collect()
+}
+
+/// The rows of some stretches of a group of these parts, each of another log.
+pub(crate) fn rows_of<'a>(
+    parts: &[Part<'a>],
+    (group, stretches): (usize, Range<usize>),
+) -> Vec<Part<'a>> {
+    let mut logs: Vec<&Part<'a>> = parts.iter().collect();
+    logs.sort_by(|a, b| a.observations.log.cmp(&b.observations.log));
+    let piece = |part: &Part<'a>| Part {
         observations: part.observations,
-        rows: cut(part, i)..cut(part, i + 1),
+        rows: stretch(&part.rows, stretches.start).start
+            ..stretch(&part.rows, stretches.end - 1).end,
     };
-    let pieces: Vec<Part<'a>> = parts
-        .iter()
-        .flat_map(|part| (0..each).map(move |i| piece(part, i)))
-        .collect();
-    let count = pieces.len().min(MOST_UNITS);
-    (0..count)
-        .map(|unit| pieces.iter().skip(unit).step_by(count).cloned().collect())
+    logs.into_iter()
+        .skip(group)
+        .step_by(GROUPS)
+        .map(piece)
         .collect()
 }
+
+/// The rows of the [`units`] of these parts.
+pub(crate) fn rows_of_units<'a>(parts: &[Part<'a>]) -> Vec<Vec<Part<'a>>> {
+    let units = units(parts.len().min(GROUPS)).into_iter();
+    let rows = |unit: Vec<_>| {
+        unit.into_iter()
+            .flat_map(|own| rows_of(parts, own))
+            .collect()
+    };
+    units.map(rows).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -8,6 +8,7 @@
 //! Bands grow by a quarter with frequency: a lag at which noise of some memory still correlates is short beside 1 over the width of the
 //! bands in which that noise has its power. Sums of runs, parts and logs add.
 
+use super::log_sums::JointSums;
 use super::residual_form;
 use crate::diagnostics::initial_positive_sequence;
 use crate::gram::Symmetric;
@@ -17,7 +18,7 @@ use crate::term::Recipes;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 use std::f64::consts::TAU;
-use std::ops::Range;
+use std::ops::{AddAssign, Range};
 use std::sync::Arc;
 
 /// Upper end of the lowest band, cycles per row, and how much higher that of the next one is.
@@ -28,38 +29,41 @@ const LONGEST: usize = 4096;
 /// A short run is padded to eight times its length, but to no more than this: its power between bins is what says which band it is in.
 const PADDED: usize = 1024;
 
-/// Of one joint.
+/// Of one joint over all logs.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Spectrum {
     /// One for all rows whose columns follow alike from what is kept: two where a payload acts in some logs only.
-    sums: Vec<Bands>,
-    /// Rows of the longest run, at most [`LONGEST`].
-    longest: usize,
+    sums: Vec<Kind>,
 }
 
-/// Sums of rows whose columns follow from signals.
+/// Power of signals, and the columns that follow from them.
 #[derive(Debug, Clone)]
-struct Bands {
+struct Kind {
     columns: Vec<usize>,
     recipes: Option<Arc<Recipes>>,
-    /// P_b of the signals and y.
-    power: Vec<Symmetric>,
+    bands: Bands,
 }
 
-impl Spectrum {
-    /// Adds the moving rows of a joint, as the fit weighs them.
-    pub(super) fn add(&mut self, part: &Part<'_>, joint: usize) {
+/// P_b of the signals of one joint and y, band by band.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Bands {
+    pub(crate) power: Vec<Symmetric>,
+    /// Rows of the longest run, at most [`LONGEST`].
+    pub(crate) longest: usize,
+}
+
+impl Bands {
+    /// Number of bands.
+    pub(crate) const COUNT: usize = 26;
+
+    /// Of the moving rows of a joint, as the fit weighs them.
+    pub(super) fn of(part: &Part<'_>, joint: usize) -> Self {
         let (all, rows) = (part.observations, &part.observations.joints[joint]);
         let signals = rows.signals();
-        let known = (self.sums.iter()).position(|own| own.recipes == rows.recipes);
-        let place = known.unwrap_or_else(|| {
-            self.sums.push(Bands {
-                columns: rows.columns.clone(),
-                recipes: rows.recipes.clone(),
-                power: vec![Symmetric::zeros(signals + 1); edges().len() - 1],
-            });
-            self.sums.len() - 1
-        });
+        let mut bands = Self {
+            power: vec![Symmetric::zeros(signals + 1); edges().len() - 1],
+            longest: 0,
+        };
         let mut run = Run {
             values: vec![Vec::new(); signals + 1],
             planner: RealFftPlanner::new(),
@@ -70,7 +74,7 @@ impl Spectrum {
                 let mut from = range.start;
                 while from < range.end {
                     if !moving(&from) {
-                        self.end(place, &mut run);
+                        bands.end(&mut run);
                         from += 1;
                         continue;
                     }
@@ -82,41 +86,99 @@ impl Spectrum {
                     run.values[signals].extend_from_slice(&rows.y[from..to]);
                     run.weigh(&rows.weight, from..to);
                     if run.len() == LONGEST {
-                        self.end(place, &mut run);
+                        bands.end(&mut run);
                     }
                     from = to;
                 }
             });
-            self.end(place, &mut run);
+            bands.end(&mut run);
+        }
+        bands
+    }
+
+    /// Of some of the signals.
+    pub(super) fn of_signals(&self, signals: &[usize]) -> Self {
+        let of = |sums: &Symmetric| {
+            let rows: Vec<usize> = signals.iter().copied().chain([sums.size - 1]).collect();
+            sums.of(&rows)
+        };
+        Self {
+            power: self.power.iter().map(of).collect(),
+            longest: self.longest,
         }
     }
 
-    fn end(&mut self, place: usize, run: &mut Run) {
+    fn end(&mut self, run: &mut Run) {
         self.longest = self.longest.max(run.len());
-        run.add_to(&mut self.sums[place].power);
+        run.add_to(&mut self.power);
+    }
+}
+
+impl AddAssign<&Bands> for Bands {
+    /// # Panics
+    /// If the two belong to different signals.
+    fn add_assign(&mut self, other: &Bands) {
+        self.longest = self.longest.max(other.longest);
+        for (sum, own) in self.power.iter_mut().zip(&other.power) {
+            *sum += own;
+        }
+    }
+}
+
+impl Spectrum {
+    /// Adds the rows of one log.
+    pub(super) fn add(&mut self, log: &JointSums) {
+        let known = self.sums.iter_mut().find(|own| own.recipes == log.recipes);
+        match known {
+            Some(known) => known.bands += &log.bands,
+            None => self.sums.push(Kind {
+                columns: log.columns.clone(),
+                recipes: log.recipes.clone(),
+                bands: log.bands.clone(),
+            }),
+        }
     }
 
-    /// Integrated autocorrelation time of `y − Xβ` in rows, as Geyer's initial positive sequence has it; 1 where there is no power.
-    pub(crate) fn autocorrelation_time(&self, beta: &[f64]) -> f64 {
-        let edges = edges();
-        let mut power = vec![0.0; edges.len() - 1];
+    /// Power of `y − Xβ` in each band.
+    fn power(&self, beta: &[f64]) -> Vec<f64> {
+        let mut power = vec![0.0; edges().len() - 1];
         for own in &self.sums {
             let mut beta: Vec<f64> = own.columns.iter().map(|&column| beta[column]).collect();
             if let Some(recipes) = &own.recipes {
                 beta = recipes.of_parts(&beta);
             }
-            let forms = own.power.iter().map(|sums| residual_form(sums, &beta));
+            let forms = own.bands.power.iter();
+            let forms = forms.map(|sums| residual_form(sums, &beta));
             (power.iter_mut().zip(forms)).for_each(|(sum, form)| *sum += form.max(0.0));
         }
+        power
+    }
+
+    /// Autocorrelation of `y − Xβ` at the lags 0, 1, … rows; `None` where there is no power.
+    fn correlation(&self, beta: &[f64]) -> Option<impl Fn(usize) -> f64> {
+        let (edges, power) = (edges(), self.power(beta));
         let total: f64 = power.iter().sum();
-        if !(total > 0.0 && total.is_finite()) {
-            return 1.0;
-        }
-        let correlation = |lag: usize| {
+        (total > 0.0 && total.is_finite()).then_some(move |lag: usize| {
             let bands = edges.windows(2).zip(&power);
             bands.map(|(band, p)| p * cosine(band, lag)).sum::<f64>() / total
+        })
+    }
+
+    /// Autocorrelation of `y − Xβ` at the lags below `lags`, in rows; zeros where there is no power.
+    pub(crate) fn autocorrelation(&self, beta: &[f64], lags: usize) -> Vec<f64> {
+        match self.correlation(beta) {
+            Some(correlation) => (0..lags).map(correlation).collect(),
+            None => vec![0.0; lags],
+        }
+    }
+
+    /// Integrated autocorrelation time of `y − Xβ` in rows, as Geyer's initial positive sequence has it; 1 where there is no power.
+    pub(crate) fn autocorrelation_time(&self, beta: &[f64]) -> f64 {
+        let Some(correlation) = self.correlation(beta) else {
+            return 1.0;
         };
-        initial_positive_sequence(self.longest, correlation).max(1.0)
+        let longest = self.sums.iter().map(|own| own.bands.longest);
+        initial_positive_sequence(longest.max().unwrap_or(0), correlation).max(1.0)
     }
 }
 
@@ -214,6 +276,7 @@ mod tests {
     use crate::observations::{JointObservations, Observations};
     use crate::random::Random;
     use crate::signal::fir::column_kernel;
+    use crate::statistics::{Runs, Sums};
 
     /// Rows of one column and of noise with a memory of `time` rows behind the default filter, `y = 2 x + noise`, and what a pause
     /// of one row every `every` rows leaves of them.
@@ -240,6 +303,8 @@ mod tests {
             log: "log".into(),
             time: (0..rows).map(|row| row as f64).collect(),
             starts: vec![0],
+            q: vec![vec![0.0; rows].into()],
+            qd: vec![vec![1.0; rows].into()],
             joints: vec![JointObservations {
                 columns: vec![0],
                 x,
@@ -254,9 +319,7 @@ mod tests {
     }
 
     fn spectrum(parts: &[Part<'_>]) -> Spectrum {
-        let mut spectrum = Spectrum::default();
-        parts.iter().for_each(|part| spectrum.add(part, 0));
-        spectrum
+        Sums::of(parts, Runs::Apart).spectra.swap_remove(0)
     }
 
     /// The time from bands beside that from rows, white noise to a memory of 19 rows, in one run and in runs of 99 rows: each of twelve
@@ -289,6 +352,11 @@ mod tests {
         }
     }
 
+    #[test]
+    fn there_are_as_many_bands_as_files_hold() {
+        assert_eq!(edges().len() - 1, Bands::COUNT);
+    }
+
     /// All power is that of the rows, wherever they are cut, weighed or not.
     #[test]
     fn bands_hold_all_power() {
@@ -300,7 +368,11 @@ mod tests {
             parts
                 .iter()
                 .for_each(|part| gram += &part.gram().joints[0].s0);
-            spectrum.sums[0].power.iter().for_each(|own| sum += own);
+            spectrum.sums[0]
+                .bands
+                .power
+                .iter()
+                .for_each(|own| sum += own);
             for (a, b) in sum.values.iter().zip(&gram.values) {
                 assert!((a / b - 1.0).abs() < 1e-10, "{a} {b}");
             }

@@ -114,6 +114,8 @@ pub enum Split {
     LeaveLogGroupsOut,
     /// The last 30 % of each log after a gap.
     LastThirty,
+    /// Nothing was held out: the fit took statistics of logs, and no log beside them.
+    NotTested,
 }
 
 /// One held-out stretch for figures: rows of one joint in one trajectory, at most [`MAX_POINTS`] of them.

@@ -136,6 +136,7 @@ fn own_rows(split: &Split) -> &'static str {
         Split::LeaveOneLogOut => "of the twin on its logs, each left out in turn",
         Split::LeaveLogGroupsOut => "of the twin on its logs, left out in five groups",
         Split::LastThirty => "of the twin on the last 30 % of each of its logs",
+        Split::NotTested => "of the twin, which was never tested",
     }
 }
 

@@ -39,7 +39,7 @@ pub(super) fn print(
         warn(&format!("warning: {text}"), terminal);
     }
     let seen = match calibration.validation.split {
-        Split::HeldoutLogs => "",
+        Split::HeldoutLogs | Split::NotTested => "",
         Split::LeaveOneLogOut | Split::LeaveLogGroupsOut | Split::LastThirty => {
             " The file comes from all logs: these rows are among those that it was fitted to."
         }

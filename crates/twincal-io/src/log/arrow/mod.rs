@@ -65,6 +65,35 @@ pub(super) fn read(
     Ok((log, findings))
 }
 
+/// All numbers of one column of an uncompressed Arrow IPC file, and a text of its schema's metadata.
+pub(crate) fn numbers(
+    source: impl Read + Seek,
+    name: &str,
+    (key, column): (&str, &str),
+) -> Result<(Option<String>, Vec<f64>)> {
+    let mut log = Log::open(source, name)?;
+    let metadata = log.schema()?.custom_metadata().unwrap_or_default();
+    let own = metadata.iter().find(|pair| pair.key() == Some(key));
+    let Some(text) = own.and_then(|pair| pair.value()).map(str::to_owned) else {
+        return Ok((None, Vec::new()));
+    };
+    let index = log.header()?.iter().position(|own| own == column);
+    let index = index.ok_or_else(|| log.refuse(format!("has no column `{column}`")))?;
+    let columns = log.columns(&[index], &mut Vec::new())?;
+    let mut numbers = Vec::new();
+    for at in log.batches.clone() {
+        let batch = log.batch(at, &columns)?;
+        if batch.compression.is_some() {
+            return Err(log.refuse("is compressed, which statistics are not".into()));
+        }
+        let form = columns[0].numbers.form;
+        let mut sink = Sink::Memory(&mut numbers);
+        let appended = log.append(&batch, batch.chunks[0], form, &mut sink);
+        appended.map_err(|error| log.refuse(format!("column `{column}`: {}", reason(&error))))?;
+    }
+    Ok((Some(text), numbers))
+}
+
 /// Column names of an Arrow IPC file or stream.
 pub(super) fn header(source: impl Read + Seek, name: &str) -> Result<Vec<String>> {
     Log::open(source, name)?.header()

@@ -5,7 +5,7 @@ use super::independent_rows::LEAST_EFFECTIVE_ROWS;
 use crate::calibrate::data::all_logs::{Data, Trajectories};
 use crate::calibrate::data::log::Log;
 use crate::calibrate::fit::compact;
-use crate::calibrate::fit::fitted::{Fitted, estimate};
+use crate::calibrate::fit::fitted::{Fitted, estimate, sums};
 use crate::calibrate::fit::friction_only;
 use crate::calibrate::fit::noise_of::noise_of;
 use crate::calibrate::progress::{Stage, Watch};
@@ -74,11 +74,14 @@ impl Plan<'_> {
         settings: &CalibrationSettings,
     ) -> Result<Vec<Fitted>> {
         match self.split {
-            Split::HeldoutLogs => Ok(Vec::new()),
+            Split::HeldoutLogs | Split::NotTested => Ok(Vec::new()),
             Split::LeaveOneLogOut | Split::LeaveLogGroupsOut | Split::LastThirty => self
                 .folds
                 .par_iter()
-                .map(|fold| estimate(&fold.training, columns, settings))
+                .map(|fold| {
+                    let sums = sums(&fold.training, settings);
+                    estimate(&sums, &fold.training, columns, settings)
+                })
                 .collect(),
         }
     }
@@ -198,27 +201,44 @@ fn refitted(twin: &Twin, library: &Library, fitted: Fitted) -> Result<Rivals> {
     })
 }
 
+fn whole<'a>((log, motion): (&'a Log, &'a Trajectory)) -> LeftOut<'a> {
+    LeftOut {
+        rows: &log.observations,
+        motion,
+        from: f64::NEG_INFINITY,
+    }
+}
+
+/// All rows of the held-out logs; nothing where there are none.
+pub(in crate::calibrate) fn plan_of_heldout<'a>(
+    data: &'a Data,
+    trajectories: &'a Trajectories,
+) -> Plan<'a> {
+    if data.heldout.is_empty() {
+        return Plan {
+            split: Split::NotTested,
+            folds: Vec::new(),
+        };
+    }
+    let held_out = data.heldout.iter().zip(&trajectories.heldout).map(whole);
+    let fold = Fold {
+        training: Vec::new(),
+        held_out: held_out.collect(),
+    };
+    Plan {
+        split: Split::HeldoutLogs,
+        folds: vec![fold],
+    }
+}
+
 /// Which rows train and which are held out.
 pub(in crate::calibrate) fn plan<'a>(
     data: &'a Data,
     trajectories: &'a Trajectories,
     pipeline: &Pipeline,
 ) -> Plan<'a> {
-    let whole = |(log, motion): (&'a Log, &'a Trajectory)| LeftOut {
-        rows: &log.observations,
-        motion,
-        from: f64::NEG_INFINITY,
-    };
     if !data.heldout.is_empty() {
-        let held_out = data.heldout.iter().zip(&trajectories.heldout).map(whole);
-        let fold = Fold {
-            training: Vec::new(),
-            held_out: held_out.collect(),
-        };
-        return Plan {
-            split: Split::HeldoutLogs,
-            folds: vec![fold],
-        };
+        return plan_of_heldout(data, trajectories);
     }
     let count = data.fit.len();
     if count >= 3 {

@@ -1,7 +1,7 @@
 //! How many independent rows a fit rests on, and what is said where they are few.
 
 use super::correlate::strongest;
-use crate::calibrate::data::all_logs::{Data, refuse};
+use crate::calibrate::data::all_logs::refuse;
 use crate::error::{Finding, Result, Severity};
 use crate::observations::Part;
 use crate::plug_in::Fit;
@@ -27,17 +27,14 @@ pub(in crate::calibrate) struct Counted {
 }
 
 /// Names the joints whose rows say next to nothing, and refuses a fit in which those of every joint do. A joint that stands
-/// still throughout has no rows, one without a candidate has no columns: neither takes part.
+/// still throughout has no rows, one without a candidate has no columns: neither takes part. `training` are the rows, where they are there: what
+/// their residual goes with is said.
 pub(in crate::calibrate) fn require(
     robot: &Robot,
-    data: &Data,
     fit: &Fit,
     training: &[Part<'_>],
 ) -> Result<Counted> {
-    let has_columns = |joint: usize| {
-        let mut logs = data.fit.iter();
-        logs.any(|log| !log.observations.joints[joint].columns.is_empty())
-    };
+    let has_columns = |joint: usize| !fit.gram.joints[joint].columns.is_empty();
     let names = robot.joint_names();
     let joints = (0..names.len()).filter(|joint| has_columns(*joint));
     let counted = joints.map(|joint| (names[joint], of_joint(fit, joint)));

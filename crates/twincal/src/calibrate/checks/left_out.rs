@@ -2,22 +2,21 @@
 
 use crate::gram::Gram;
 use crate::linear_algebra::{Cholesky, dot};
-use crate::observations::Part;
 use crate::plug_in::Fit;
 use crate::posterior::student::StudentT;
+use crate::statistics::{BLOCKS, Sums};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
-/// Blocks of all logs together, about; every log is cut into a multiple of [`FIFTHS`].
-const BLOCKS: usize = 40;
+/// Tenths of all logs together at most; of more logs fifths are compared.
+const MOST_BLOCKS: usize = 40;
 /// Parts of each log of which one is left out.
 const FIFTHS: usize = 5;
-/// Rows of a block at least, where there are as many.
+/// Rows of a tenth at least, on average.
 const LEAST_ROWS: usize = 8;
 /// Folds of logs at most; more logs are grouped.
 const MOST_FOLDS: usize = 6;
-/// Logs with blocks of their own at most: of more, fifths of every so many logs are one block. Whole groups are left out together.
-const MOST_APART: usize = 7 * MOST_FOLDS;
 /// Probability below two standard deviations of a normal distribution.
 const TWO_SD: f64 = 0.977_249_868_051_820_8;
 /// Prior variance of a coefficient over that of its estimate from a fold alone, from which the fold shows it.
@@ -92,24 +91,22 @@ struct Folds {
 }
 
 impl LeftOut {
-    /// Grams of blocks of the training rows over the columns of the components `inside`, weighted as in the likelihood of `fit`:
+    /// Grams of stretches of the logs over the columns of the components `inside`, weighted as in the likelihood of `fit`:
     ///
     /// ```text
     /// G = Σ_j w_j/max(τ_j, λ_j) G_j(ρ_j)
     /// ```
-    pub(in crate::calibrate) fn new(training: &[Part<'_>], fit: &Fit, inside: &[bool]) -> Self {
+    pub(in crate::calibrate) fn new(training: &Sums, fit: &Fit, inside: &[bool]) -> Self {
         let prior = &fit.problem.prior;
         let columns: Vec<usize> = (0..prior.component.len())
             .filter(|&k| inside[prior.component[k]])
             .collect();
         let of = |numbers: &[f64]| columns.iter().map(|&k| numbers[k]).collect::<Vec<f64>>();
-        let pieces: Vec<_> = pieces(training);
-        let blocks: Vec<Block> = pieces
-            .into_par_iter()
-            .map(|(log, fifth, parts)| Block {
+        let blocks: Vec<Block> = (places(training).into_par_iter())
+            .map(|(log, fifth, stretches)| Block {
                 log,
                 fifth,
-                sums: sums(&parts, fit, &columns),
+                sums: sums(&training.unit(&[(log, stretches)]).gram, fit, &columns),
             })
             .collect();
         let (slab, lower) = (of(&prior.slab), of(&prior.lower));
@@ -266,38 +263,23 @@ fn difference(sums: &[f64], b1: &[f64], b0: &[f64]) -> f64 {
         .sum()
 }
 
-/// Contiguous blocks of every log, of about the same length: `(log, fifth, rows)`; of many logs the fifths of some are one block.
-fn pieces<'a>(training: &[Part<'a>]) -> Vec<(usize, usize, Vec<Part<'a>>)> {
-    let rows: usize = training.iter().map(|part| part.rows.len()).sum();
-    let length = rows.div_ceil(BLOCKS).max(LEAST_ROWS);
-    let mut pieces = Vec::new();
-    for (log, part) in training.iter().enumerate() {
-        let each = (part.rows.len() / (FIFTHS * length)).max(1);
-        let count = FIFTHS * each;
-        let cut = |i: usize| part.rows.start + i * part.rows.len() / count;
-        pieces.extend((0..count).map(|i| {
-            let rows = cut(i)..cut(i + 1);
-            let observations = part.observations;
-            (log, i / each, vec![Part { observations, rows }])
-        }));
-    }
-    if training.len() <= MOST_APART {
-        return pieces;
-    }
-    let mut grouped: Vec<(usize, usize, Vec<Part<'a>>)> = (0..MOST_APART * FIFTHS)
-        .map(|at| (at / FIFTHS, at % FIFTHS, Vec::new()))
-        .collect();
-    for (log, fifth, parts) in pieces {
-        grouped[log % MOST_APART * FIFTHS + fifth].2.extend(parts);
-    }
-    grouped
+/// Which stretches of which group of logs are compared as one block: `(group, fifth, stretches)`. Tenths of each log while that makes no more
+/// than [`MOST_BLOCKS`] of [`LEAST_ROWS`] rows or more, else fifths.
+fn places(sums: &Sums) -> Vec<(usize, usize, Range<usize>)> {
+    let groups = sums.groups();
+    let tenths = groups * BLOCKS;
+    let few = tenths <= MOST_BLOCKS && sums.rows() >= LEAST_ROWS * tenths;
+    let each = if few { BLOCKS } else { FIFTHS };
+    let cut = |i: usize| i * BLOCKS / each;
+    let of_group =
+        |group: usize| (0..each).map(move |i| (group, i * FIFTHS / each, cut(i)..cut(i + 1)));
+    (0..groups).flat_map(of_group).collect()
 }
 
 /// The weighted sums of one block over these columns and y.
-fn sums(parts: &[Part<'_>], fit: &Fit, columns: &[usize]) -> Vec<f64> {
+fn sums(gram: &Gram, fit: &Fit, columns: &[usize]) -> Vec<f64> {
     let size = columns.len() + 1;
     let mut sums = vec![0.0; size * size];
-    let gram: Gram = parts.iter().collect();
     for (j, joint) in gram.joints.iter().enumerate() {
         let factor = fit.plug_in.factor(j);
         let statistics = joint.stationary(fit.plug_in.rho[j]);

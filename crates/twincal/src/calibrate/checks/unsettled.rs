@@ -5,17 +5,17 @@ use crate::calibrate::settings::CalibrationSettings;
 use crate::error::{Finding, Severity};
 use crate::infer::R_HAT_LIMIT;
 use crate::likelihood::NoiseModel;
-use crate::observations::Part;
-use crate::plug_in::residual_correlation_time;
+use crate::plug_in::correlation_time;
 use crate::posterior::Method;
 use crate::robot::Robot;
+use crate::statistics::Sums;
 
 /// What the fit itself must say: residual correlation that the likelihood ignores, an iteration that did not settle.
 pub(in crate::calibrate) fn findings(
     robot: &Robot,
     fitted: &Fitted,
     settings: &CalibrationSettings,
-    training: &[Part<'_>],
+    sums: &Sums,
 ) -> Vec<Finding> {
     let mut findings = Vec::new();
     if let Method::Gibbs { chains, r_hat, .. } = fitted.fit.posterior.method
@@ -46,7 +46,8 @@ pub(in crate::calibrate) fn findings(
     }
     if settings.noise.model == NoiseModel::Iid {
         for (joint, name) in robot.joint_names().into_iter().enumerate() {
-            let time = residual_correlation_time(training, joint, &fitted.fit.posterior.mean);
+            let time =
+                correlation_time((sums, &fitted.fit.gram), joint, &fitted.fit.posterior.mean);
             if time > 2.0 {
                 findings.push(Finding::new(
                     Severity::Warning,

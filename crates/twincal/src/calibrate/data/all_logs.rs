@@ -1,6 +1,7 @@
 //! The logs of a calibration as rows, with what was read, dropped and masked.
 
 use super::log::Log;
+use super::log_summary::LogSummary;
 use super::reader::{Reader, Role};
 use crate::error::{Error, Finding, Result, Severity};
 use crate::gram::Gram;
@@ -19,7 +20,7 @@ const ZERO: f64 = 1e-12;
 /// Rows per column of the largest joint below which nothing is fitted (case 7).
 const ROWS_PER_COLUMN: usize = 3;
 /// Logs at most that the torque outside the band is measured on.
-const LOGS_OF_RAW: usize = 40;
+pub(in crate::calibrate) const LOGS_OF_RAW: usize = 40;
 
 /// The logs' motion, apart from their rows: it is dropped first.
 #[derive(Default)]
@@ -42,8 +43,6 @@ pub(in crate::calibrate) struct Data {
     pub(in crate::calibrate) findings: Vec<Finding>,
     /// See [`carry_something`].
     unknown: bool,
-    /// See [`tell_payload_apart`].
-    pub(in crate::calibrate) payload_apart: bool,
     /// What the robot carried in each fit log.
     pub(in crate::calibrate) payloads: Vec<Payload>,
 }
@@ -76,12 +75,36 @@ impl Data {
             heldout,
             findings,
             unknown: reader.unknown,
-            payload_apart: in_some_only(logs.iter().map(ReadyLog::payload)),
             payloads: logs.iter().map(ReadyLog::payload).collect(),
         };
         let trajectories = Trajectories {
             fit: of_fit,
             heldout: of_heldout,
+        };
+        Ok((data, trajectories))
+    }
+
+    /// Held-out logs alone.
+    pub(in crate::calibrate) fn read_heldout(
+        reader: Reader<'_>,
+        logs: &[ReadyLog<'_>],
+    ) -> Result<(Self, Trajectories)> {
+        let mut findings = Vec::new();
+        let read = logs
+            .iter()
+            .map(|log| reader.log(log, Role::HeldOut, &mut findings))
+            .collect::<Result<Vec<_>>>()?;
+        let (heldout, motion) = read.into_iter().unzip();
+        let data = Self {
+            fit: Vec::new(),
+            heldout,
+            findings,
+            unknown: reader.unknown,
+            payloads: Vec::new(),
+        };
+        let trajectories = Trajectories {
+            fit: Vec::new(),
+            heldout: motion,
         };
         Ok((data, trajectories))
     }
@@ -104,21 +127,7 @@ impl Data {
     ) -> (Library, Vec<usize>) {
         let fit = self.fit.iter().map(|log| &log.observations);
         let zero = zero_columns(fit, &library);
-        for &column in &zero {
-            let term = &library.terms()[library.columns()[column]];
-            let name = &term.name;
-            // What was not followed is no fault of the logs.
-            if term.family.remembers() {
-                continue;
-            }
-            self.findings.push(Finding::new(
-                Severity::Warning,
-                "zero_column",
-                name.clone(),
-                format!("term `{name}` has no torque on any row of these logs and was left out: its joints do not move"),
-                0,
-            ));
-        }
+        self.findings.extend(zero_findings(&library, &zero));
         for log in self.fit.iter_mut().chain(&mut self.heldout) {
             log.observations.drop_columns(&zero);
             for gram in log.elsewhere.iter_mut().flatten() {
@@ -126,56 +135,6 @@ impl Data {
             }
         }
         (library.without_columns(&zero), zero)
-    }
-
-    /// Refuses a question with fewer rows than it needs.
-    ///
-    /// Columns with a physical prior do not count: what the data do not say about an inertia, the prior does. Nor do those that remember,
-    /// which change friction that is counted.
-    pub(in crate::calibrate) fn require_enough(
-        &self,
-        robot: &Robot,
-        asking: &Columns,
-        cutoff: Auto,
-    ) -> Result<()> {
-        let names = robot.joint_names();
-        let (mut rows, mut columns, mut culprit) = (0, 0, 0);
-        for joint in 0..names.len() {
-            let kept: u64 = self.fit.iter().map(|log| log.summary.rows[joint]).sum();
-            rows = rows.max(kept as usize);
-            let family = |column: usize| asking.families[asking.family_of(column)];
-            let asks = |column: &&usize| {
-                asking.prior_sd[**column].is_none() && !family(**column).remembers()
-            };
-            let count = self.fit.first().map_or(0, |log| {
-                let columns = &log.observations.joints[joint].columns;
-                columns.iter().filter(asks).count()
-            });
-            if count > columns {
-                (columns, culprit) = (count, joint);
-            }
-        }
-        let needed = ROWS_PER_COLUMN * columns.max(1);
-        if rows < needed {
-            let times = (needed as f64 / rows as f64 * 10.0).ceil() / 10.0;
-            let longer = match rows {
-                0 => "log motion".to_owned(),
-                _ => format!("log {times} times as much motion or more"),
-            };
-            return Err(refuse(
-                format!(
-                    "the logs give {rows} rows, fewer than {ROWS_PER_COLUMN} × the {columns} candidate columns of joint `{}`",
-                    names[culprit]
-                ),
-                &match cutoff {
-                    Auto::Auto => format!("{longer}, or ask for fewer candidates ([library])"),
-                    Auto::Value(_) => format!(
-                        "{longer}, raise signal.cutoff_hz, or ask for fewer candidates ([library])"
-                    ),
-                },
-            ));
-        }
-        Ok(())
     }
 
     /// How far the nominal torque is from the measured one, of the joint that moves where it is least far: its number and the root mean squares of
@@ -247,29 +206,25 @@ impl Data {
             .map(|j| (mean(raw[j]) - mean(in_band[j])).max(0.0).sqrt())
             .collect())
     }
+}
 
-    /// Range of the training motion per joint: `[q_min, q_max, qd_min, qd_max, qdd_min, qdd_max]`.
-    pub(in crate::calibrate) fn hull(&self, robot: &Robot) -> Vec<[f64; 6]> {
-        (0..robot.dof())
-            .map(|joint| {
-                let mut hull = [f64::INFINITY, f64::NEG_INFINITY].repeat(3);
-                for log in &self.fit {
-                    let motion = [
-                        &log.observations.q[joint],
-                        &log.observations.qd[joint],
-                        &log.observations.qdd[joint],
-                    ];
-                    for (i, values) in motion.into_iter().enumerate() {
-                        for &value in &*values.get() {
-                            hull[2 * i] = hull[2 * i].min(value);
-                            hull[2 * i + 1] = hull[2 * i + 1].max(value);
-                        }
-                    }
-                }
-                [hull[0], hull[1], hull[2], hull[3], hull[4], hull[5]]
-            })
-            .collect()
-    }
+/// What is said of columns that were left out.
+pub(in crate::calibrate) fn zero_findings(library: &Library, zero: &[usize]) -> Vec<Finding> {
+    let terms = zero
+        .iter()
+        .map(|&column| &library.terms()[library.columns()[column]]);
+    // What was not followed is no fault of the logs.
+    let said = terms.filter(|term| !term.family.remembers()).map(|term| {
+        let name = &term.name;
+        Finding::new(
+            Severity::Warning,
+            "zero_column",
+            name.clone(),
+            format!("term `{name}` has no torque on any row of these logs and was left out: its joints do not move"),
+            0,
+        )
+    });
+    said.collect()
 }
 
 /// Columns of the library that are zero on these rows.
@@ -291,7 +246,17 @@ pub(in crate::calibrate) fn zero_columns<'a>(
             });
         }
     }
-    let cells = (logs.map(Observations::len).sum::<usize>() * library.joints()).max(1) as f64;
+    let rows = logs.map(Observations::len).sum();
+    hardly_act(&square, rows, library)
+}
+
+/// Columns whose squares over so many rows are next to nothing.
+pub(in crate::calibrate) fn hardly_act(
+    square: &[f64],
+    rows: usize,
+    library: &Library,
+) -> Vec<usize> {
+    let cells = (rows * library.joints()).max(1) as f64;
     let typical = library.typical_sizes();
     let is_zero = |k: &usize| {
         let size = (square[*k] / cells).sqrt();
@@ -350,6 +315,52 @@ pub(in crate::calibrate) fn grams_at(
     Ok(both.collect())
 }
 
+/// Refuses a question with fewer rows than it needs.
+///
+/// Columns with a physical prior do not count: what the data do not say about an inertia, the prior does. Nor do those that remember,
+/// which change friction that is counted.
+pub(in crate::calibrate) fn require_enough(
+    (robot, library): (&Robot, &Library),
+    logs: &[LogSummary],
+    asking: &Columns,
+    cutoff: Auto,
+) -> Result<()> {
+    let names = robot.joint_names();
+    let (mut rows, mut columns, mut culprit) = (0, 0, 0);
+    for joint in 0..names.len() {
+        let kept: u64 = logs.iter().map(|log| log.rows[joint]).sum();
+        rows = rows.max(kept as usize);
+        let family = |column: usize| asking.families[asking.family_of(column)];
+        let asks =
+            |column: &&usize| asking.prior_sd[**column].is_none() && !family(**column).remembers();
+        let count = library.columns_of_joint(joint).iter().filter(asks).count();
+        if count > columns {
+            (columns, culprit) = (count, joint);
+        }
+    }
+    let needed = ROWS_PER_COLUMN * columns.max(1);
+    if rows < needed {
+        let times = (needed as f64 / rows as f64 * 10.0).ceil() / 10.0;
+        let longer = match rows {
+            0 => "log motion".to_owned(),
+            _ => format!("log {times} times as much motion or more"),
+        };
+        return Err(refuse(
+            format!(
+                "the logs give {rows} rows, fewer than {ROWS_PER_COLUMN} × the {columns} candidate columns of joint `{}`",
+                names[culprit]
+            ),
+            &match cutoff {
+                Auto::Auto => format!("{longer}, or ask for fewer candidates ([library])"),
+                Auto::Value(_) => format!(
+                    "{longer}, raise signal.cutoff_hz, or ask for fewer candidates ([library])"
+                ),
+            },
+        ));
+    }
+    Ok(())
+}
+
 /// True if some log says that the robot carried something unknown: then the payload component acts in those logs only.
 pub(in crate::calibrate) fn carry_something(mut payloads: impl Iterator<Item = Payload>) -> bool {
     payloads.any(|payload| payload == Payload::Unknown)
@@ -366,7 +377,10 @@ fn in_some_only(payloads: impl Iterator<Item = Payload> + Clone) -> bool {
 }
 
 /// Raw rows of a log that a standard deviation is measured on, and the times that they cover, s.
-fn spread(pipeline: &Pipeline, trajectory: &Trajectory) -> (Vec<Slice>, Vec<[f64; 2]>) {
+pub(in crate::calibrate) fn spread(
+    pipeline: &Pipeline,
+    trajectory: &Trajectory,
+) -> (Vec<Slice>, Vec<[f64; 2]>) {
     let kept = spread_raw(pipeline, trajectory, f64::NEG_INFINITY);
     let rows: usize = kept.iter().map(|slice| slice.rows.len()).sum();
     if rows == count_rows(pipeline, trajectory, RowSignal::Raw) {
@@ -387,7 +401,7 @@ fn spread(pipeline: &Pipeline, trajectory: &Trajectory) -> (Vec<Slice>, Vec<[f64
 }
 
 /// Whether a time lies in one of the ranges, which ascend.
-fn within(ranges: &[[f64; 2]], time: f64) -> bool {
+pub(in crate::calibrate) fn within(ranges: &[[f64; 2]], time: f64) -> bool {
     let after = ranges.partition_point(|range| range[0] <= time);
     after > 0 && time <= ranges[after - 1][1]
 }

@@ -3,6 +3,7 @@
 pub(super) mod aligned;
 pub(super) mod all_logs;
 pub(super) mod cross_checked;
+pub(super) mod facts;
 pub(super) mod history;
 pub(super) mod log;
 pub(super) mod log_summary;

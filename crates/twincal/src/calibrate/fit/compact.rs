@@ -2,9 +2,10 @@
 
 use super::heredity;
 use crate::error::Result;
+use crate::gram::{Gram, JointGram};
 use crate::infer::approximate;
-use crate::observations::Part;
 use crate::posterior::{Posterior, Problem};
+use crate::statistics::{of_joint, residual_form};
 use crate::term::Library;
 use crate::validate::nan_if_null;
 use serde::{Deserialize, Serialize};
@@ -74,7 +75,7 @@ pub(in crate::calibrate) fn summary(
     problem: &Problem,
     average: &Posterior,
     compact: &Posterior,
-    training: &[Part<'_>],
+    gram: &Gram,
 ) -> Compact {
     let inside = members(problem, average);
     let component = |k: usize| &library.components()[library.terms()[k].component].name;
@@ -97,22 +98,15 @@ pub(in crate::calibrate) fn summary(
     Compact {
         components,
         terms,
-        training_rmse: [average, compact].map(|posterior| rmse(training, &posterior.mean)),
+        training_rmse: [average, compact].map(|posterior| rmse(gram, &posterior.mean)),
     }
 }
 
-/// RMSE over the moving training rows of all joints.
-fn rmse(training: &[Part<'_>], beta: &[f64]) -> f64 {
-    let (mut sum, mut rows) = (0.0, 0.0);
-    for part in training {
-        for joint in 0..part.observations.joints.len() {
-            for run in part.residual_runs(joint, beta) {
-                sum += run.iter().map(|r| r * r).sum::<f64>();
-                rows += run.len() as f64;
-            }
-        }
-    }
-    (sum / rows).sqrt()
+/// RMSE over the moving training rows of all joints, as the fit weighs them.
+fn rmse(gram: &Gram, beta: &[f64]) -> f64 {
+    let of_joint = |gram: &JointGram| residual_form(&gram.s0, &of_joint(gram, beta)).max(0.0);
+    let squares: f64 = gram.joints.iter().map(of_joint).sum();
+    (squares / gram.joints.iter().map(|gram| gram.n).sum::<f64>()).sqrt()
 }
 
 #[cfg(test)]

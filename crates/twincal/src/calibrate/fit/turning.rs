@@ -22,7 +22,7 @@ use crate::plug_in::{Fit, FitSettings, Moving, fit, residual_correlation_time, s
 use crate::posterior::Posterior;
 use crate::robot::Robot;
 use crate::signal::{Log, Payload, Pipeline, ReadyLog, Trajectory, ready, stretches};
-use crate::statistics::Training;
+use crate::statistics::{Runs, Sums};
 use crate::term::{Family, Library, LibrarySettings};
 
 /// Factors between neighbouring v_s, and how often one may be applied.
@@ -253,24 +253,17 @@ impl Trial<'_> {
             },
             prior: &self.settings.prior,
         };
-        let training = Training::whole(&parts);
+        let sums = Sums::of(&parts, Runs::Apart);
         let fit = match like {
             None => {
-                let start = start(&training, &columns, &self.settings.prior);
-                fit(&training, &columns, fit_settings, &start, Moving::All, None)
+                let start = start(&sums, &columns, &self.settings.prior);
+                fit(&sums, &columns, fit_settings, &start, Moving::All, None)
             }
             Some(like) => {
                 let alike = |known: &&Posterior| known.mean.len() == columns.names.len();
                 let known = Some(&like.posterior).filter(alike);
                 let moving = Moving::SlabScaleRoughly;
-                fit(
-                    &training,
-                    &columns,
-                    fit_settings,
-                    &like.plug_in,
-                    moving,
-                    known,
-                )
+                fit(&sums, &columns, fit_settings, &like.plug_in, moving, known)
             }
         };
         // All components at once may be more than the data and the user's prior can bear, where those that are there are not.

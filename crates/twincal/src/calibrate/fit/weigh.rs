@@ -10,7 +10,7 @@
 //! and a row enters every sum multiplied by √u, so that `φ = Σ u r²/n` estimates s². The 95 % intervals are made wide enough for
 //! 95 % of the left-out rows, outliers included (`interval_factor`).
 
-use super::fitted::estimate;
+use super::fitted::{estimate, sums};
 use crate::calibrate::data::all_logs::Data;
 use crate::calibrate::settings::CalibrationSettings;
 use crate::error::{Error, Finding, Result, Severity};
@@ -57,7 +57,8 @@ pub(in crate::calibrate) fn weigh(
     }
     let mut down = vec![(0, 0); robot.dof()];
     for _ in 0..PASSES {
-        let fitted = estimate(&data.training(), columns, settings)?;
+        let rows = data.training();
+        let fitted = estimate(&sums(&rows, settings), &rows, columns, settings)?;
         let beta = &fitted.fit.posterior.mean;
         for (joint, spread) in spreads.iter_mut().enumerate() {
             let memory = fitted.fit.plug_in.autocorrelation_time[joint];

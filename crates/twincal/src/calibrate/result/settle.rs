@@ -5,8 +5,8 @@ use super::status::{MEDIAN, Status, StatusReason, is_open};
 use crate::calibrate::checks::left_out::{LeftOut, LeftOutError};
 use crate::calibrate::fit::compact;
 use crate::calibrate::fit::heredity;
-use crate::observations::Part;
 use crate::plug_in::Fit;
+use crate::statistics::Sums;
 use crate::term::Library;
 use rayon::prelude::*;
 
@@ -50,7 +50,7 @@ pub(in crate::calibrate) fn settle(
     groups: &mut Vec<Group>,
     fit: &Fit,
     library: &Library,
-    training: &[Part<'_>],
+    training: &Sums,
 ) {
     let prior = &fit.problem.prior;
     let mut own = vec![None; components.len()];

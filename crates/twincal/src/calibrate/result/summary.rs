@@ -10,19 +10,19 @@ use super::settle;
 use crate::calibrate::checks::prior_conflict;
 use crate::calibrate::checks::sandwich::{self, Sds};
 use crate::calibrate::checks::sweep::SweepPoint;
-use crate::calibrate::data::all_logs::Data;
+use crate::calibrate::data::facts::Facts;
 use crate::calibrate::fit::compact::Compact;
 use crate::calibrate::settings::CalibrationSettings;
 use crate::error::{Finding, Result, Severity};
 use crate::infer::approximate;
 use crate::likelihood::{Columns, mean_squares};
-use crate::observations::Part;
-use crate::plug_in::{Fit, residual_runs};
+use crate::plug_in::Fit;
 use crate::posterior::draws::draw;
 use crate::posterior::summary::{ColumnSummary, summarise as summarise_columns};
 use crate::posterior::{Posterior, Problem};
 use crate::prior::Inclusion;
 use crate::signal::Auto;
+use crate::statistics::{Spectrum, Sums};
 use crate::term::Library;
 use crate::twin::Twin;
 use crate::validate::Validation;
@@ -48,7 +48,9 @@ pub(in crate::calibrate) struct SecondOpinion {
 pub(in crate::calibrate) struct Pieces<'a> {
     pub(in crate::calibrate) twin: Twin,
     pub(in crate::calibrate) library: &'a Library,
-    pub(in crate::calibrate) data: &'a Data,
+    pub(in crate::calibrate) facts: &'a Facts,
+    /// Of all rows.
+    pub(in crate::calibrate) sums: &'a Sums,
     pub(in crate::calibrate) columns: &'a Columns,
     pub(in crate::calibrate) settings: &'a CalibrationSettings,
     pub(in crate::calibrate) fit: Fit,
@@ -67,21 +69,21 @@ pub(in crate::calibrate) fn summarise(
 ) -> Result<Calibration> {
     let Pieces {
         library,
-        data,
+        facts,
+        sums,
         columns,
         settings,
         ref fit,
         ref opinion,
         ..
     } = pieces;
-    let training = data.training();
-    let drive_sd = drive_scale::left(settings.drive_gain_sd, data.payloads.iter().copied());
+    let drive_sd = drive_scale::left(settings.drive_gain_sd, facts.payloads.iter().copied());
     let scale = DriveScale::new(drive_sd, library, &fit.problem, &fit.posterior);
     findings.extend(drive_scale::ignored(drive_sd, scale.as_ref(), library));
     findings.extend(scale.as_ref().and_then(DriveScale::finding));
     let scale = scale.as_ref();
     let terms = judged_terms(&pieces, scale, findings)?;
-    let apart = data.payload_apart.then(|| library.with_payload_apart());
+    let apart = facts.payload_apart.then(|| library.with_payload_apart());
     let told_apart = apart.as_ref().unwrap_or(library);
     let seed = settings.inference.seed;
     let mut components = components(told_apart, &fit.posterior, &terms, seed, scale);
@@ -90,15 +92,14 @@ pub(in crate::calibrate) fn summarise(
         component.told_as = told_as;
     }
     let mut groups = groups(&fit.problem, &fit.posterior, told_apart);
-    settle::settle(&mut components, &mut groups, fit, told_apart, &training);
+    settle::settle(&mut components, &mut groups, fit, told_apart, sums);
     findings.extend(common_gain::finding(
         &components,
         settings.drive_gain_sd > 0.0,
     ));
     let prior = prior_used(library, columns, settings, fit);
     findings.extend(prior.forced.iter().map(forced));
-    findings.extend(findings_of_posterior(&groups, &fit.problem, data));
-    let logs = data.fit.iter().chain(&data.heldout);
+    findings.extend(findings_of_posterior(&groups, &fit.problem, sums));
     Ok(Calibration {
         noise: pieces.twin.noise.clone(),
         curves: Vec::new(),
@@ -116,8 +117,8 @@ pub(in crate::calibrate) fn summarise(
         sweep: pieces.sweep,
         compact: Some(opinion.compact.clone()),
         validation: pieces.validation,
-        autocorrelation: autocorrelation(&training, &fit.posterior.mean),
-        logs: logs.map(|log| log.summary.clone()).collect(),
+        autocorrelation: autocorrelation(sums, &fit.posterior.mean),
+        logs: facts.summaries.clone(),
         findings: std::mem::take(findings),
     })
 }
@@ -364,14 +365,9 @@ fn dropped(term: &crate::term::Term) -> TermSummary {
     }
 }
 
-fn findings_of_posterior(groups: &[Group], problem: &Problem, data: &Data) -> Vec<Finding> {
+fn findings_of_posterior(groups: &[Group], problem: &Problem, sums: &Sums) -> Vec<Finding> {
     let mut findings = Vec::new();
-    let measured: f64 = data
-        .fit
-        .iter()
-        .flat_map(|log| &log.observations.joints)
-        .map(|joint| joint.measured.get().iter().map(|m| m * m).sum::<f64>())
-        .sum();
+    let measured: f64 = sums.torque_squares().iter().sum();
     if problem.yy <= 1e-18 * measured {
         findings.push(Finding::new(
             Severity::Note,
@@ -417,22 +413,10 @@ fn pair_plot_columns(library: &Library, terms: &[TermSummary]) -> Vec<usize> {
 }
 
 /// Per joint: normalised autocorrelation of the residual before and after calibration, lags 0..=20 rows each.
-fn autocorrelation(training: &[Part<'_>], beta: &[f64]) -> Vec<Vec<f64>> {
-    let joints = training
-        .first()
-        .map_or(0, |part| part.observations.joints.len());
+fn autocorrelation(sums: &Sums, beta: &[f64]) -> Vec<Vec<f64>> {
     let nothing = vec![0.0; beta.len()];
-    let of = |(joint, coefficients): (usize, &[f64])| {
-        let runs = residual_runs(training, joint, coefficients);
-        let along = |run: &Vec<f64>, lag: usize| {
-            let pairs = run.iter().zip(run.iter().skip(lag));
-            pairs.map(|(a, b)| a * b).sum::<f64>()
-        };
-        let sum = |lag: usize| runs.iter().map(|run| along(run, lag)).sum::<f64>();
-        let zero = sum(0);
-        let normalised = |lag| if zero > 0.0 { sum(lag) / zero } else { 0.0 };
-        (0..=LAGS).map(normalised).collect()
+    let of_joint = |spectrum: &Spectrum| {
+        [&nothing[..], beta].map(|beta| spectrum.autocorrelation(beta, LAGS + 1))
     };
-    let both = (0..joints).flat_map(|joint| [(joint, &nothing[..]), (joint, beta)]);
-    both.collect::<Vec<_>>().into_par_iter().map(of).collect()
+    sums.spectra.iter().flat_map(of_joint).collect()
 }

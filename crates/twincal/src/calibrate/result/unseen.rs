@@ -2,9 +2,8 @@
 
 use super::calibration::Calibration;
 use super::status::{Status as Said, StatusReason};
-use crate::calibrate::data::all_logs::Data;
 use crate::error::{Finding, Severity};
-use crate::excitation::{Excitation, STATES, Seen, States, excitation as compare, sentence};
+use crate::excitation::{Excitation, Seen, States, excitation as compare, sentence};
 use crate::gram::Gram;
 use crate::robot::Robot;
 use crate::term::{Family, Library, Status};
@@ -14,13 +13,14 @@ const TOLD: usize = 5;
 /// Names that a sentence holds at most.
 const NAMES: usize = 4;
 
-/// What the fit logs, whose statistics are `gram`, show of all candidates, those included whose columns (`dropped`) are zero on all rows.
+/// What the fit logs, whose statistics are `gram` and of which these are some states, show of all candidates, those included whose columns (`dropped`) are zero on
+/// all rows.
 pub(in crate::calibrate) fn excitation(
     robot: &Robot,
     library: &Library,
     dropped: &[usize],
     gram: &Gram,
-    data: &Data,
+    states: &States,
 ) -> Excitation {
     let kept: Vec<u32> = (0..library.columns().len())
         .filter(|column| !dropped.contains(column))
@@ -31,29 +31,7 @@ pub(in crate::calibrate) fn excitation(
         let columns = joint.columns.iter_mut();
         columns.for_each(|column| *column = kept[*column as usize]);
     }
-    compare(robot, library, &Gram { joints }, &states(robot, data))
-}
-
-/// Rows of all fit logs, evenly taken.
-fn states(robot: &Robot, data: &Data) -> States {
-    let count: usize = data.fit.iter().map(|log| log.observations.len()).sum();
-    let step = (count / STATES).max(1);
-    let mut states = States::default();
-    for joint in 0..robot.dof() {
-        for log in &data.fit {
-            let all = &log.observations;
-            let motion = [&all.q, &all.qd, &all.qdd].map(|motion| motion[joint].get());
-            for row in (0..all.len()).step_by(step) {
-                let [q, qd, qdd] = [0, 1, 2].map(|channel| motion[channel][row]);
-                states.q.push(q);
-                states.qd.push(qd);
-                states.qdd.push(qdd);
-                states.still.push(all.joints[joint].standstill[row]);
-            }
-        }
-    }
-    states.len = states.q.len() / robot.dof();
-    states
+    compare(robot, library, &Gram { joints }, states)
 }
 
 /// Says what is not seen and why: in findings, and in the words of the components.

@@ -38,14 +38,14 @@ pub(in crate::calibrate) fn check(
     let ready = &rows.prepared.ready;
     let elsewhere = || sweep::cutoff(twin, library, ready, data, columns, settings, fit);
     let beside = || {
-        let training = data.training();
         let opinion = SecondOpinion {
-            sandwich: sandwich::sds(fit, compact, &training),
-            compact: compact::summary(library, problem, posterior, compact, &training),
+            sandwich: sandwich::sds(fit, compact, &rows.sums),
+            compact: compact::summary(library, problem, posterior, compact, &fit.gram),
         };
         let (robot, every_candidate) = (request.robot, &rows.prepared.library);
         let zero = &twin.zero_columns;
-        let excitation = unseen::excitation(robot, every_candidate, zero, &fit.gram, data);
+        let excitation =
+            unseen::excitation(robot, every_candidate, zero, &fit.gram, &rows.facts.states);
         (opinion, excitation)
     };
     let (sweep, (opinion, excitation)) = rayon::join(elsewhere, beside);

@@ -37,7 +37,7 @@ pub(in crate::calibrate) fn estimate<'d>(
     let training = rows.data.training();
     let plan = held_out::plan(&rows.data, &rows.trajectories, pipeline);
     let (fitted, fits_of_folds) = rayon::join(
-        || fitted::estimate(&training, &rows.columns, settings),
+        || fitted::estimate(&rows.sums, &training, &rows.columns, settings),
         || plan.fits(&rows.columns, settings),
     );
     let (mut fitted, fits_of_folds) = (fitted?, fits_of_folds?);
@@ -74,7 +74,8 @@ pub(in crate::calibrate) fn estimate<'d>(
 /// [`Exit::Failed`] with too few independent rows, and those of the fit.
 pub(in crate::calibrate) fn count(rows: &Rows<'_, '_>) -> Pass<Band> {
     let settings = &rows.prepared.settings;
-    let fitted = fitted::estimate(&rows.data.training(), &rows.columns, settings)?;
+    let (sums, training) = (&rows.sums, rows.data.training());
+    let fitted = fitted::estimate(sums, &training, &rows.columns, settings)?;
     let counted = independent(rows, &fitted)?;
     let cutoff_hz = rows.prepared.pipeline.cutoff_hz;
     Ok(Band::new(cutoff_hz, counted.most, rows.misfit))
@@ -82,7 +83,7 @@ pub(in crate::calibrate) fn count(rows: &Rows<'_, '_>) -> Pass<Band> {
 
 fn independent(rows: &Rows<'_, '_>, fitted: &Fitted) -> Result<Counted> {
     let robot = rows.prepared.request.robot;
-    independent_rows::require(robot, &rows.data, &fitted.fit, &rows.data.training())
+    independent_rows::require(robot, &fitted.fit, &rows.data.training())
 }
 
 /// Whether the fit asks for other columns, other candidates or another band; gear ripple that it shows and that is no candidate.

@@ -8,7 +8,7 @@ mod rows;
 mod validate;
 
 pub(super) use check::check;
-pub(super) use conclude::conclude;
+pub(super) use conclude::{conclude, told};
 pub(super) use estimate::{count, estimate};
 pub(super) use prepare::prepare;
 pub(super) use rows::read;

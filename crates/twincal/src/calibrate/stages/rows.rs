@@ -4,11 +4,13 @@ use super::prepare::Prepared;
 use crate::calibrate::data::aligned;
 use crate::calibrate::data::all_logs::{self, Data, Trajectories};
 use crate::calibrate::data::cross_checked;
+use crate::calibrate::data::facts::Facts;
 use crate::calibrate::data::other_cutoffs;
 use crate::calibrate::data::room;
 use crate::calibrate::exit::{Exit, Pass};
 use crate::calibrate::fit::columns::columns_of;
 use crate::calibrate::fit::dissipative;
+use crate::calibrate::fit::fitted;
 use crate::calibrate::fit::lower_band::TooFew;
 use crate::calibrate::fit::weigh;
 use crate::calibrate::request::Goal;
@@ -17,6 +19,7 @@ use crate::lag::Lags;
 use crate::likelihood::{Columns, Spread};
 use crate::self_check::self_check;
 use crate::signal::{ReadyLog, ready};
+use crate::statistics::Sums;
 use crate::term::Library;
 
 /// Rows and columns of all logs.
@@ -34,6 +37,10 @@ pub(in crate::calibrate) struct Rows<'a, 'r> {
     pub(in crate::calibrate) misfit: Option<(usize, [f64; 2])>,
     /// How the noise of each joint varies, once rows are weighed.
     pub(in crate::calibrate) spreads: Vec<Spread>,
+    /// What a fit takes of the rows, once they are weighed.
+    pub(in crate::calibrate) sums: Sums,
+    /// What else is known of the logs.
+    pub(in crate::calibrate) facts: Facts,
 }
 
 /// Makes the rows, compares logs with each other, and drops columns without torque.
@@ -60,14 +67,18 @@ pub(in crate::calibrate) fn read<'a, 'r>(
     let payload_apart = all_logs::tell_payload_apart(prepared.recorded.fit);
     let mut columns = columns_of(robot, &library, settings, payload_apart)?;
     columns.one_motion = prepared.recorded.fit.len() == 1;
-    let hull = data.hull(robot);
-    columns.halves = dissipative::halves(robot, &prepared.library_settings, &columns, &hull);
+    let facts = data.facts();
+    columns.halves = dissipative::halves(robot, &prepared.library_settings, &columns, &facts.hull);
     findings.append(&mut data.findings);
-    let enough = data.require_enough(robot, &columns, settings.signal.cutoff_hz);
+    let fitted = &facts.summaries[..data.fit.len()];
+    let cutoff = settings.signal.cutoff_hz;
+    let enough = all_logs::require_enough((robot, &library), fitted, &columns, cutoff);
     let rows = Rows {
         lags: of_all.or(prepared.lags.take()),
         misfit: None,
         spreads: Vec::new(),
+        sums: Sums::default(),
+        facts,
         prepared,
         data,
         trajectories,
@@ -106,7 +117,7 @@ fn observe(prepared: &Prepared<'_, '_>) -> Result<(Data, Trajectories)> {
 }
 
 impl<'r> Rows<'_, 'r> {
-    /// Weighs the rows of the fit logs as the settings ask.
+    /// Weighs the rows of the fit logs as the settings ask, and adds them up.
     ///
     /// # Errors
     /// Those of [`weigh::weigh`].
@@ -116,6 +127,7 @@ impl<'r> Rows<'_, 'r> {
         } = &self.prepared;
         let (data, columns) = (&mut self.data, &self.columns);
         self.spreads = weigh::weigh(request.robot, data, columns, settings, findings)?;
+        self.sums = fitted::sums(&data.training(), settings);
         Ok(())
     }
 
@@ -140,6 +152,8 @@ impl<'r> Rows<'_, 'r> {
             columns: self.columns,
             misfit: self.misfit,
             spreads: self.spreads,
+            sums: self.sums,
+            facts: self.facts,
         }
     }
 }

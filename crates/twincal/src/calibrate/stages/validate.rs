@@ -71,7 +71,7 @@ pub(in crate::calibrate) fn validate(
 fn of_residual(rows: &Rows<'_, '_>, fitted: &Fitted) -> Vec<Finding> {
     let (robot, settings) = (rows.prepared.request.robot, &rows.prepared.settings);
     let training = rows.data.training();
-    let mut findings = unsettled::findings(robot, fitted, settings, &training);
+    let mut findings = unsettled::findings(robot, fitted, settings, &rows.sums);
     let mean = &fitted.fit.posterior.mean;
     let robust = settings.noise.robust;
     let (tails, (drifts, uneven)) = rayon::join(
@@ -104,7 +104,7 @@ fn twin(rows: &Rows<'_, '_>, fitted: &Fitted) -> Result<Twin> {
         pipeline: pipeline.clone(),
         posterior: posterior.clone(),
         noise: noise_of(robot, fitted, &out_of_band, &rows.spreads),
-        hull: data.hull(robot),
+        hull: rows.facts.hull.clone(),
         payload_where_unknown: *unknown,
     })
 }

@@ -4,8 +4,9 @@ use super::*;
 use crate::calibrate::testing::Regression;
 use crate::gram::Gram;
 use crate::likelihood::{Columns, PlugIn, assemble};
-use crate::observations::{JointObservations, Observations};
+use crate::observations::{JointObservations, Observations, Part};
 use crate::random::Random;
+use crate::statistics::{GROUPS, Runs, rows_of};
 use crate::term::Family;
 
 const COLUMNS: usize = 4;
@@ -40,6 +41,8 @@ fn log(random: &mut Random, rows: usize, beta: [f64; COLUMNS]) -> Observations {
     Observations {
         time: (0..rows).map(|row| row as f64).collect(),
         starts: vec![0],
+        q: vec![vec![0.0; rows].into(), vec![0.0; rows].into()],
+        qd: vec![vec![1.0; rows].into(), vec![1.0; rows].into()],
         joints: vec![joint(vec![0, 1, 2], random), joint(vec![1, 2, 3], random)],
         ..Observations::default()
     }
@@ -129,6 +132,14 @@ fn error(rows: &[(f64, [f64; COLUMNS], f64)], beta: &[f64]) -> f64 {
         .sum()
 }
 
+/// The rows of each block, see [`places`].
+fn pieces<'a>(logs: &[Part<'a>]) -> Vec<(usize, usize, Vec<Part<'a>>)> {
+    let places = places(&Sums::of(logs, Runs::Apart)).into_iter();
+    places
+        .map(|(group, fifth, stretches)| (group, fifth, rows_of(logs, (group, stretches))))
+        .collect()
+}
+
 /// `(share, standard errors)` by rows.
 fn by_rows(
     logs: &[Part<'_>],
@@ -178,7 +189,7 @@ fn the_algebra_is_what_refits_by_rows_say() {
         (&two[..1], LeftOutData::Fifths),
     ] {
         let fit = fit(logs, f64::NEG_INFINITY);
-        let left_out = LeftOut::new(logs, &fit, &[true; 3]);
+        let left_out = LeftOut::new(&Sums::of(logs, Runs::Apart), &fit, &[true; 3]);
         let says = |rest: [bool; 3], own: usize| left_out.lowered(&rest, &[own]).unwrap();
         let first = says([false, true, true], 0);
         assert_eq!((first.left_out, first.blocks), (kind, pieces(logs).len()));
@@ -189,7 +200,7 @@ fn the_algebra_is_what_refits_by_rows_say() {
             by_rows(logs, &fit, kind, &[0, 1, 2, 3], &[0, 1, 3]),
         );
         // With what is out of the structure nothing is compared.
-        let left_out = LeftOut::new(logs, &fit, &[true, false, true]);
+        let left_out = LeftOut::new(&Sums::of(logs, Runs::Apart), &fit, &[true, false, true]);
         let third = left_out.lowered(&[true, false, false], &[2]).unwrap();
         near(&third, by_rows(logs, &fit, kind, &[0, 1, 3], &[0, 1]));
     }
@@ -201,7 +212,7 @@ fn a_bound_holds_in_every_refit() {
     let own = log(&mut Random::new(4, 0), 240, [0.6, 0.4, 0.3, -0.8]);
     let logs = [own.whole()];
     let fit = fit(&logs, 0.0);
-    let left_out = LeftOut::new(&logs, &fit, &[true; 3]);
+    let left_out = LeftOut::new(&Sums::of(&logs, Runs::Apart), &fit, &[true; 3]);
     let bounded = left_out.lowered(&[true, false, true], &[1]).unwrap();
     near(
         &bounded,
@@ -220,7 +231,7 @@ fn what_one_log_alone_shows_is_judged_by_fifths() {
     own[1].joints[1].x[400..].fill(0.0);
     let logs = own.each_ref().map(|log| log.whole());
     let fit = fit(&logs, f64::NEG_INFINITY);
-    let left_out = LeftOut::new(&logs, &fit, &[true; 3]);
+    let left_out = LeftOut::new(&Sums::of(&logs, Runs::Apart), &fit, &[true; 3]);
     let says = |rest: [bool; 3], own: usize| left_out.lowered(&rest, &[own]).unwrap().left_out;
     assert_eq!(says([true, true, false], 2), LeftOutData::Fifths);
     assert_eq!(says([false, true, true], 0), LeftOutData::Logs);
@@ -243,24 +254,24 @@ fn blocks_are_the_rows_of_every_log_in_order_fifths_of_about_the_same_length() {
         let fifths: Vec<usize> = of().map(|block| block.1).collect();
         assert!(fifths.is_sorted() && fifths.last() == Some(&(FIFTHS - 1)));
     }
-    assert_eq!(blocks.iter().filter(|block| block.0 == 0).count(), 35);
+    assert_eq!(blocks.iter().filter(|block| block.0 == 0).count(), 10);
 }
 
 /// Of more logs than have blocks of their own every row is in one block, whole groups are left out, and the algebra is that of refits by rows.
 #[test]
 fn fifths_of_many_logs_are_one_block() {
     let mut random = Random::new(8, 0);
-    let own: Vec<Observations> = (0..MOST_APART + 3)
+    let own: Vec<Observations> = (0..GROUPS + 3)
         .map(|_| log(&mut random, 30, [0.6, 0.0, 0.3, 0.2]))
         .collect();
     let logs: Vec<Part<'_>> = own.iter().map(Observations::whole).collect();
     let blocks = pieces(&logs);
-    assert_eq!(blocks.len(), MOST_APART * FIFTHS);
+    assert_eq!(blocks.len(), GROUPS * FIFTHS);
     let rows = |parts: &Vec<Part<'_>>| parts.iter().map(|part| part.rows.len()).sum::<usize>();
     let all: usize = blocks.iter().map(|block| rows(&block.2)).sum();
     assert_eq!(all, 30 * logs.len());
     let fit = fit(&logs, f64::NEG_INFINITY);
-    let left_out = LeftOut::new(&logs, &fit, &[true; 3]);
+    let left_out = LeftOut::new(&Sums::of(&logs, Runs::Apart), &fit, &[true; 3]);
     let first = left_out.lowered(&[false, true, true], &[0]).unwrap();
     assert_eq!(first.left_out, LeftOutData::Logs);
     let truth = by_rows(&logs, &fit, first.left_out, &[0, 1, 2, 3], &[2, 3]);
@@ -279,7 +290,7 @@ fn a_true_effect_is_clear_and_a_column_without_one_is_not() {
         let own = log(&mut random, 200, [0.75, 0.0, 0.0, 0.0]);
         let logs = [own.whole()];
         let fit = fit(&logs, f64::NEG_INFINITY);
-        let left_out = LeftOut::new(&logs, &fit, &[true; 3]);
+        let left_out = LeftOut::new(&Sums::of(&logs, Runs::Apart), &fit, &[true; 3]);
         let clear = |rest: [bool; 3], own| left_out.lowered(&rest, &[own]).unwrap().is_clear();
         found += usize::from(clear([false, true, true], 0));
         false_alarms += usize::from(clear([true, true, false], 2));

@@ -1,0 +1,296 @@
+//! `twincal statistics`: what a fit takes of each log, as a file that stands for it.
+
+use super::calibration::stage_words;
+use super::inputs::{LogInput, Long, RobotInput, checksum_of_log};
+use super::settings::{Look, Usual};
+use super::{code_of, merge, print_json, reads, require_strict, settings, start_threads, summary};
+use crate::args::StatisticsFlags;
+use crate::failure::{Failure, Outcome};
+use crate::names::display_names;
+use crate::progress::Progress;
+use crate::terminal::Terminal;
+use serde::Serialize;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use twincal::Finding;
+use twincal::calibrate::{CalibrationSettings, Plan, Statistics, plan};
+use twincal_io::artifact::{Inputs, OutputFile};
+use twincal_io::config::Settings;
+use twincal_io::memory;
+use twincal_io::open::InputFile;
+use twincal_io::statistics::StatisticsFile;
+use twincal_io::{Error, Place};
+
+/// Name of the plan in the folder, and ending of the files.
+const PLAN: &str = "plan.json";
+const ENDING: &str = "arrow";
+/// Logs that a plan is made from at most.
+const MOST_FOR_PLAN: usize = 12;
+/// Longest plan, bytes.
+const MAX_PLAN: u64 = 16 << 20;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Made {
+    directory: String,
+    plan: String,
+    robot: String,
+    files: Vec<Entry>,
+    findings: Vec<Finding>,
+}
+
+/// A log and its file.
+#[derive(Serialize)]
+struct Entry {
+    log: String,
+    file: String,
+    /// False if it was there already.
+    made: bool,
+}
+
+/// What all logs of a run share.
+struct Road<'a> {
+    flags: &'a StatisticsFlags,
+    settings: &'a Settings,
+    inputs: &'a Inputs,
+    robot: RobotInput,
+    robot_name: String,
+    progress: Progress,
+    findings: Vec<Finding>,
+}
+
+pub(super) fn run(flags: &StatisticsFlags, terminal: &mut Terminal) -> Outcome<u8> {
+    let look = Look {
+        model: &flags.model,
+        allow: &flags.allow,
+        log: &flags.log,
+        usual: Usual::unless(flags.no_config),
+    };
+    let config = settings::of_look(&look, terminal)?;
+    let settings = config.settings()?;
+    let Some(model) = &settings.model_file else {
+        return Err(super::no_model());
+    };
+    let mut inputs = Inputs::default();
+    let given = reads::Given {
+        flags: &flags.log,
+        config: &config,
+        settings: &settings,
+    };
+    reads::add_given(&mut inputs, &given, &flags.logs);
+    start_threads(settings.threads)?;
+    let progress = Progress::new();
+    progress.step(&format!("reading {}", model.to_string_lossy()));
+    let robot = RobotInput::read(model, &settings)?;
+    let named = flags.robot.clone().filter(|name| !name.is_empty());
+    let mut road = Road {
+        flags,
+        settings: &settings,
+        inputs: &inputs,
+        robot_name: named.unwrap_or_else(|| robot.name.clone()),
+        findings: robot.findings.clone(),
+        robot,
+        progress,
+    };
+    road.require_folder()?;
+    let plan = road.plan()?;
+    let names = display_names(&flags.logs);
+    let mut files = Vec::new();
+    for (path, name) in flags.logs.iter().zip(&names) {
+        files.push(road.log(&plan, (path, name))?);
+    }
+    let Road {
+        robot_name,
+        progress,
+        findings,
+        ..
+    } = road;
+    drop(progress);
+    let code = code_of(&findings);
+    let directory = flags.output.to_string_lossy().into_owned();
+    if settings.json {
+        let made = Made {
+            plan: flags.output.join(PLAN).to_string_lossy().into_owned(),
+            directory,
+            robot: robot_name,
+            files,
+            findings,
+        };
+        print_json(terminal, &made)?;
+    } else {
+        summary::before_the_error(&findings, terminal);
+        let made = files.iter().filter(|file| file.made).count();
+        let there = match files.len() - made {
+            0 => String::new(),
+            count => format!(", {count} there already"),
+        };
+        terminal.say(&format!(
+            "statistics of {made} logs of robot `{robot_name}` made{there}"
+        ));
+        terminal.say(&directory);
+    }
+    Ok(code)
+}
+
+impl Road<'_> {
+    /// A folder to write in, which is made if it is not there.
+    fn require_folder(&self) -> Outcome<()> {
+        let folder = &self.flags.output;
+        std::fs::create_dir_all(folder).map_err(|e| {
+            let remedy = "give a folder that you may write in with -o";
+            Error::system(folder.to_string_lossy(), "make", &e, remedy).into()
+        })
+    }
+
+    /// The plan that was given, that of the folder, or a new one.
+    fn plan(&mut self) -> Outcome<Plan> {
+        let own = self.flags.output.join(PLAN);
+        let given = Path::new("auto") != self.flags.plan;
+        let there = own.symlink_metadata().is_ok();
+        let plan = match (given, there) {
+            (true, _) => read_plan(&self.flags.plan)?,
+            (false, true) => {
+                self.progress
+                    .step(&format!("using the plan {}", own.to_string_lossy()));
+                return read_plan(&own);
+            }
+            (false, false) => self.new_plan()?,
+        };
+        if given && there {
+            if read_plan(&own)? != plan {
+                return Err(Failure::usage(
+                    format!("{} holds another plan", self.flags.output.to_string_lossy()),
+                    "give another folder with -o: statistics of two plans do not add",
+                ));
+            }
+            return Ok(plan);
+        }
+        self.write_plan(&own, &plan)?;
+        Ok(plan)
+    }
+
+    fn new_plan(&mut self) -> Outcome<Plan> {
+        let logs = &self.flags.logs;
+        let step = logs.len().div_ceil(MOST_FOR_PLAN);
+        let some: Vec<PathBuf> = logs.iter().step_by(step).cloned().collect();
+        let long = Long::of_settings(self.settings);
+        let (robot, log) = (&self.robot.robot, &self.settings.log);
+        let mut read = LogInput::read(&some, robot, log, long, &self.progress)?;
+        let settings = CalibrationSettings {
+            most_bytes: memory::spare(),
+            ..self.settings.calibration.clone()
+        };
+        let step = |stage| self.progress.step(&stage_words(stage));
+        let logs = std::mem::take(&mut read.logs);
+        let made = plan(robot, logs, &settings, &step);
+        let (plan, findings) =
+            made.map_err(|stopped| Failure::from(read.as_given(stopped.error)))?;
+        self.findings.extend(findings);
+        Ok(plan)
+    }
+
+    fn write_plan(&self, path: &Path, plan: &Plan) -> Outcome<()> {
+        let mut text = serde_json::to_string_pretty(plan).map_err(|e| Error::Internal {
+            what: "a plan as JSON".into(),
+            problem: e.to_string(),
+        })?;
+        text.push('\n');
+        let mut output = OutputFile::create(path, false, self.inputs)?;
+        let written = match output.file() {
+            Some(file) => file.write_all(text.as_bytes()),
+            None => Ok(()),
+        };
+        Ok(output.commit(written)?)
+    }
+
+    /// Makes the file of a log, if it is not there.
+    fn log(&mut self, plan: &Plan, (path, name): (&Path, &str)) -> Outcome<Entry> {
+        let target = self.flags.output.join(file_name(name));
+        let entry = |made| Entry {
+            log: name.to_owned(),
+            file: target.to_string_lossy().into_owned(),
+            made,
+        };
+        if !self.flags.force && target.symlink_metadata().is_ok() {
+            let known = StatisticsFile::read(&target)?.statistics;
+            let same = known.plan == *plan
+                && known.robot == self.robot.robot
+                && known.robot_name == self.robot_name
+                && known.log_names().eq([name])
+                && known.sources().eq([checksum_of_log(path)?.as_str()]);
+            if same {
+                return Ok(entry(false));
+            }
+            return Err(Failure::usage(
+                format!(
+                    "{} is there, of another plan, robot or log",
+                    target.to_string_lossy()
+                ),
+                "make it anew with --force, or give another folder with -o",
+            ));
+        }
+        let long = Long::of_pipeline(&plan.pipeline);
+        let (robot, settings) = (&self.robot.robot, &self.settings.log);
+        let read = LogInput::read_one((path, name), robot, settings, long, &self.progress)?;
+        self.findings.extend(read.findings.iter().cloned());
+        require_strict(settings.strict, &read.findings)?;
+        let output = OutputFile::create(&target, self.flags.force, self.inputs)?;
+        let (Some(log), Some(file)) = (read.logs.first(), read.files.first()) else {
+            return Err(Failure::usage(
+                format!("`{name}` holds no log"),
+                "leave it out",
+            ));
+        };
+        let model = (self.robot_name.as_str(), robot);
+        let statistics = Statistics::of(model, plan, log, &file.sha256);
+        let statistics = statistics.map_err(|error| Failure::from(read.as_given(error)))?;
+        let file = StatisticsFile {
+            statistics: statistics.with_findings(read.findings),
+            model: self.robot.model_file(),
+        };
+        merge::write(&file, output)?;
+        Ok(entry(true))
+    }
+}
+
+/// A plan that was written before.
+fn read_plan(path: &Path) -> Outcome<Plan> {
+    let name = path.to_string_lossy().into_owned();
+    let remedy = "give a plan that `twincal statistics` wrote, or --plan auto";
+    let bytes = InputFile::new(path, MAX_PLAN)
+        .read()
+        .map_err(|refusal| refusal.into_error(&name, remedy))?;
+    let plan: Plan = serde_json::from_slice(&bytes).map_err(|e| {
+        let problem = format!("is no plan: {e}");
+        Error::content(Place::file(&name), problem, remedy)
+    })?;
+    plan.require_version()?;
+    Ok(plan)
+}
+
+/// A log's name as that of a file in one folder.
+fn file_name(log: &str) -> String {
+    let plain = |c: char| {
+        if c.is_alphanumeric() || "-_.=+@".contains(c) {
+            c
+        } else {
+            '_'
+        }
+    };
+    let mut name: String = log.chars().map(plain).collect();
+    if name.starts_with('.') {
+        name.insert(0, '_');
+    }
+    format!("{name}.{ENDING}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::file_name;
+
+    #[test]
+    fn names_of_files_stay_in_the_folder() {
+        assert_eq!(file_name("run 1.csv"), "run_1.csv.arrow");
+        assert_eq!(file_name("../day/run.mcap"), "_.._day_run.mcap.arrow");
+    }
+}

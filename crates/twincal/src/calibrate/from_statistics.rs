@@ -1,0 +1,331 @@
+//! The road from statistics to a calibrated twin: no rows but those of held-out logs.
+
+use super::checks::held_out;
+use super::checks::independent_rows;
+use super::checks::misfit;
+use super::checks::sandwich;
+use super::checks::unsettled;
+use super::checks::worse;
+use super::data::all_logs::{self, Data};
+use super::data::facts::{Facts, LogFacts};
+use super::data::reader::Reader;
+use super::fit::columns::columns_of;
+use super::fit::compact;
+use super::fit::dissipative;
+use super::fit::fitted::{self, Fitted};
+use super::fit::noise_of::noise_of;
+use super::log_statistics::{LogStatistics, Statistics};
+use super::plan::require_even_rows;
+use super::progress::{Stage, Watch};
+use super::result::calibration::Calibration;
+use super::result::summary::{Pieces, SecondOpinion};
+use super::result::unseen;
+use super::settings::CalibrationSettings;
+use super::stages;
+use super::stopped::Stopped;
+use crate::error::{Error, Finding, Result};
+use crate::gram::Gram;
+use crate::infer::infer_near;
+use crate::likelihood::{Columns, Spread};
+use crate::robot::Robot;
+use crate::self_check::self_check;
+use crate::signal::{Logs, ReadyLog, ready};
+use crate::statistics::{Sums, residual_form};
+use crate::term::Library;
+use crate::twin::Twin;
+
+/// [`calibrate`](super::calibrate) from the statistics of the logs: the same numbers wherever no row is asked for.
+///
+/// Without `heldout` recordings nothing is predicted, and [`Validation::split`](crate::validate::Validation) says so. What only rows say
+/// is not looked for: drift, heavy tails, noise that varies, other cut-offs.
+///
+/// # Errors
+/// [`Error::Statistics`] without logs or with a plan of another version, [`Error::Setting`] for noise that weighs rows, and those of a
+/// calibration; each with what was found before.
+pub fn calibrate_statistics<'a>(
+    statistics: &Statistics,
+    heldout: impl Into<Logs<'a>>,
+    settings: &CalibrationSettings,
+    progress: &dyn Fn(Stage),
+) -> std::result::Result<Calibration, Stopped> {
+    let watch = |stage: Stage| {
+        progress(stage);
+        Ok(())
+    };
+    let (heldout, mut findings) = (heldout.into(), Vec::new());
+    road(statistics, &heldout, settings, &watch, &mut findings).map_err(|error| Stopped {
+        error,
+        findings: findings.clone(),
+    })
+}
+
+/// The logs' statistics over the columns that act, and what else is known.
+struct Known {
+    library: Library,
+    every_candidate: Library,
+    zero_columns: Vec<usize>,
+    columns: Columns,
+    sums: Sums,
+    facts: Facts,
+}
+
+fn road(
+    statistics: &Statistics,
+    heldout: &Logs<'_>,
+    settings: &CalibrationSettings,
+    progress: &Watch<'_>,
+    findings: &mut Vec<Finding>,
+) -> Result<Calibration> {
+    let (robot, plan) = (&statistics.robot, &statistics.plan);
+    plan.require_version()?;
+    require_even_rows(settings)?;
+    require_like(statistics)?;
+    let mut settings = settings.clone();
+    settings.library = plan.library.clone();
+    settings.noise.model = plan.noise;
+    progress(Stage::Rows)?;
+    let known = known(statistics, &settings, findings)?;
+    progress(Stage::Inference)?;
+    let Known {
+        library,
+        columns,
+        sums,
+        facts,
+        ..
+    } = &known;
+    let fitted = estimated((robot, sums, columns), &settings, findings)?;
+    let fit = &fitted.fit;
+    let inside = compact::members(&fit.problem, &fit.posterior);
+    let compact = compact::refit(&fit.problem, &inside, &fit.posterior)?;
+    let twin = twin(statistics, &known, &fitted);
+    let own = held_out::Own {
+        twin: &twin,
+        compact: &compact,
+        fit,
+    };
+    let (data, trajectories) = held_out_rows(statistics, library, heldout)?;
+    findings.extend(data.findings.iter().cloned());
+    let pipeline = &statistics.plan.pipeline;
+    findings.extend(self_check(robot, pipeline, trajectories.heldout.iter())?);
+    let plan = held_out::plan_of_heldout(&data, &trajectories);
+    let (validation, more) = held_out::validate(own, library, plan, Vec::new(), progress)?;
+    findings.extend(more);
+    findings.extend(worse::findings(robot, &validation.filtered));
+    findings.extend(worse::of_compact(validation.compact));
+    progress(Stage::Sensitivity)?;
+    let opinion = SecondOpinion {
+        sandwich: sandwich::sds(fit, &compact, sums),
+        compact: compact::summary(library, &fit.problem, &fit.posterior, &compact, &fit.gram),
+    };
+    let (zero, states) = (&known.zero_columns, &facts.states);
+    let excitation = unseen::excitation(robot, &known.every_candidate, zero, &fit.gram, states);
+    let mut facts = facts.clone();
+    let heldout = data.heldout.iter().map(|log| log.summary.clone());
+    facts.summaries.extend(heldout);
+    let pieces = Pieces {
+        twin,
+        library,
+        facts: &facts,
+        sums,
+        columns,
+        settings: &settings,
+        fit: fitted.fit,
+        validation,
+        sweep: Vec::new(),
+        opinion,
+    };
+    stages::told(pieces, &excitation, findings)
+}
+
+/// The fit, with what chains and plug-ins say of it.
+fn estimated(
+    (robot, sums, columns): (&Robot, &Sums, &Columns),
+    settings: &CalibrationSettings,
+    findings: &mut Vec<Finding>,
+) -> Result<Fitted> {
+    let mut fitted = fitted::estimate(sums, &[], columns, settings)?;
+    findings.extend(independent_rows::require(robot, &fitted.fit, &[])?.findings);
+    let fit = &fitted.fit;
+    fitted.fit.posterior = infer_near(&fit.problem, &fit.posterior, &settings.inference)?;
+    findings.extend(unsettled::findings(robot, &fitted, settings, sums));
+    findings.extend(misfit::findings(robot, &fitted.fit.plug_in));
+    Ok(fitted)
+}
+
+fn known(
+    statistics: &Statistics,
+    settings: &CalibrationSettings,
+    findings: &mut Vec<Finding>,
+) -> Result<Known> {
+    let (robot, plan) = (&statistics.robot, &statistics.plan);
+    let (every_candidate, more) = Library::propose(robot, &plan.library)?;
+    findings.extend(more);
+    for log in &statistics.logs {
+        findings.extend(log.about.findings.iter().cloned());
+    }
+    let logs: Vec<LogFacts> = (statistics.logs.iter())
+        .map(|log| log.about.facts.clone())
+        .collect();
+    let facts = Facts::of(&logs, &[]);
+    let all = sums(&statistics.logs, settings, &[]);
+    let squares = squares(&all.total().gram, every_candidate.columns().len());
+    let zero_columns = all_logs::hardly_act(&squares, all.rows(), &every_candidate);
+    findings.extend(all_logs::zero_findings(&every_candidate, &zero_columns));
+    let library = every_candidate.without_columns(&zero_columns);
+    let mut columns = columns_of(robot, &library, settings, facts.payload_apart)?;
+    columns.one_motion = logs.len() == 1;
+    columns.halves = dissipative::halves(robot, &plan.library, &columns, &facts.hull);
+    let cutoff = settings.signal.cutoff_hz;
+    all_logs::require_enough((robot, &library), &facts.summaries, &columns, cutoff)?;
+    Ok(Known {
+        sums: sums(&statistics.logs, settings, &zero_columns),
+        library,
+        every_candidate,
+        zero_columns,
+        columns,
+        facts,
+    })
+}
+
+/// The sums of all logs without these columns.
+fn sums(logs: &[LogStatistics], settings: &CalibrationSettings, dropped: &[usize]) -> Sums {
+    let mut sums = Sums::empty(fitted::runs(settings));
+    for log in logs {
+        if dropped.is_empty() {
+            sums.add(&log.sums);
+        } else {
+            sums.add(&log.sums.without(dropped));
+        }
+    }
+    sums
+}
+
+/// Squares of each column over all rows and joints.
+fn squares(gram: &Gram, columns: usize) -> Vec<f64> {
+    let mut squares = vec![0.0; columns];
+    for joint in &gram.joints {
+        for (i, &column) in joint.columns.iter().enumerate() {
+            squares[column as usize] += joint.s0.at(i, i);
+        }
+    }
+    squares
+}
+
+fn twin(statistics: &Statistics, known: &Known, fitted: &Fitted) -> Twin {
+    let (robot, plan) = (&statistics.robot, &statistics.plan);
+    let posterior = &fitted.fit.posterior;
+    let out_of_band = out_of_band(statistics, known, &posterior.mean);
+    let spreads = vec![Spread::default(); robot.dof()];
+    Twin {
+        robot: robot.clone(),
+        library: plan.library.clone(),
+        zero_columns: known.zero_columns.clone(),
+        pipeline: plan.pipeline.clone(),
+        posterior: posterior.clone(),
+        noise: noise_of(robot, fitted, &out_of_band, &spreads),
+        hull: known.facts.hull.clone(),
+        payload_where_unknown: plan.payload_where_unknown,
+    }
+}
+
+/// sd per joint of the torque outside the filter's band; 0 with the filter off.
+fn out_of_band(statistics: &Statistics, known: &Known, beta: &[f64]) -> Vec<f64> {
+    let mut kept = 0;
+    let all = (0..known.every_candidate.columns().len()).map(|column| {
+        if known.zero_columns.contains(&column) {
+            return 0.0;
+        }
+        kept += 1;
+        beta[kept - 1]
+    });
+    let beta: Vec<f64> = all.collect();
+    let step = statistics.logs.len().div_ceil(all_logs::LOGS_OF_RAW).max(1);
+    let of_joint = |joint: usize| {
+        let mut sums = [(0.0, 0.0); 2];
+        for log in statistics.logs.iter().step_by(step) {
+            let Some(raw) = log.raw.get(joint) else {
+                continue;
+            };
+            let own = &log.sums.joints[joint];
+            let mut of_signals: Vec<f64> = own.columns.iter().map(|&k| beta[k]).collect();
+            if let Some(recipes) = &own.recipes {
+                of_signals = recipes.of_parts(&of_signals);
+            }
+            for (sum, gram) in sums.iter_mut().zip(raw) {
+                sum.0 += residual_form(&gram.s0, &of_signals);
+                sum.1 += gram.n;
+            }
+        }
+        let [raw, in_band] = sums.map(|(sum, n)| if n > 0.0 { sum / n } else { 0.0 });
+        (raw - in_band).max(0.0).sqrt()
+    };
+    (0..statistics.robot.dof()).map(of_joint).collect()
+}
+
+/// Rows and motion of the held-out logs.
+fn held_out_rows(
+    statistics: &Statistics,
+    library: &Library,
+    heldout: &Logs<'_>,
+) -> Result<(Data, all_logs::Trajectories)> {
+    let (robot, plan) = (&statistics.robot, &statistics.plan);
+    let reader = Reader {
+        robot,
+        library,
+        pipeline: &plan.pipeline,
+        unknown: plan.payload_where_unknown,
+    };
+    let logs: Vec<ReadyLog<'_>> = (heldout.0.iter())
+        .map(|log| ready(robot, log, &plan.pipeline))
+        .collect::<Result<_>>()?;
+    Data::read_heldout(reader, &logs)
+}
+
+/// The robot's torque in some unit that the other logs do not have is seen by its size: of three logs or more each has to be within this factor of
+/// the median on some joint that moves.
+const ODD: f64 = 30.0;
+
+/// # Errors
+/// [`Error::Statistics`] without logs, and for a log whose torque is of another size than that of all others on every joint.
+fn require_like(statistics: &Statistics) -> Result<()> {
+    let refused = |problem: String, remedy: &str| {
+        Err(Error::Statistics {
+            problem,
+            remedy: remedy.into(),
+        })
+    };
+    let logs = &statistics.logs;
+    if logs.is_empty() {
+        return refused("no log".into(), "give statistics of one log at least");
+    }
+    if logs.len() < 3 {
+        return Ok(());
+    }
+    let size = |log: &LogStatistics, joint: usize| {
+        let sums = &log.sums;
+        let squares: f64 = sums.joints[joint].blocks.iter().map(|own| own.torque).sum();
+        (squares / sums.rows.iter().sum::<usize>().max(1) as f64).sqrt()
+    };
+    for log in logs {
+        let odd = |joint: usize| {
+            let mut sizes: Vec<f64> = logs.iter().map(|log| size(log, joint)).collect();
+            sizes.sort_by(f64::total_cmp);
+            let ratio = size(log, joint) / sizes[sizes.len() / 2];
+            (ratio > 0.0 && ratio.is_finite()).then_some(ratio)
+        };
+        let ratios: Vec<f64> = (0..statistics.robot.dof()).filter_map(odd).collect();
+        let all = |is: fn(f64) -> bool| !ratios.is_empty() && ratios.iter().all(|ratio| is(*ratio));
+        if all(|ratio| ratio > ODD) || all(|ratio| ratio < 1.0 / ODD) {
+            let mean = ratios.iter().map(|ratio| ratio.ln()).sum::<f64>() / ratios.len() as f64;
+            return refused(
+                format!(
+                    "the torque of log `{}` is {} times that of the others on every joint",
+                    log.name(),
+                    crate::words::significant(mean.exp(), 2)
+                ),
+                "leave the log out, or make its statistics with its unit of torque",
+            );
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,328 @@
+//! Statistics of logs: what a fit takes of them, apart from the logs themselves.
+
+use super::data::all_logs::{spread, within};
+use super::data::facts::LogFacts;
+use super::data::log::Log;
+use super::data::reader::{Reader, Role};
+use super::plan::{Plan, VERSION};
+use crate::cross_check::stuck_encoders;
+use crate::error::{Error, Finding, Result};
+use crate::gram::{JointAccumulator, JointGram, Workspace};
+use crate::observations::Observations;
+use crate::robot::Robot;
+use crate::rows::{RowBlock, RowSignal, visit_parts};
+use crate::self_check::self_check;
+use crate::signal::{self, Payload, Trajectory, constant_torque, hardly_driven, ready};
+use crate::statistics::LogSums;
+use crate::term::Library;
+use serde::{Deserialize, Serialize};
+
+/// Statistics of logs of one robot under one plan, in the order of their names. Those of other logs can be added, and a fit takes nothing else.
+///
+/// # Example
+/// ```
+/// # #[path = "../../examples/two_link.rs"] mod two_link;
+/// use twincal::calibrate::{Statistics, calibrate_statistics, plan};
+/// use twincal::prelude::*;
+///
+/// # let mut noise = twincal::random::Random::new(1, 0);
+/// # let (robot, real) = (two_link::arm(2.0)?, two_link::arm(2.6)?);
+/// # let logs = [("run1", 0.3), ("run2", 1.1), ("run3", 2.2)];
+/// # let logs = logs.map(|(name, phase)| two_link::log(name, phase, &real, &mut noise));
+/// let mut settings = Settings::default();
+/// settings.library.families = vec![Family::Payload, Family::Viscous];
+/// let (plan, _) = plan(&robot, &logs[..1], &settings, &|_| {})?; // filters, candidates: once
+/// let of = |log: &Recording| Statistics::of(("arm", &robot), &plan, &Log::from(log), "");
+/// let mut sum = of(&logs[0])?; // each where its log is
+/// sum.try_merge(&of(&logs[1])?)?;
+/// let fit = calibrate_statistics(&sum, &logs[2..], &settings, &|_| {})?;
+/// assert!(fit.effects().any(|effect| effect.name() == "payload"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Statistics {
+    /// The robot that was logged; two of one type have the same model and another name.
+    pub robot_name: String,
+    /// The nominal robot.
+    pub robot: Robot,
+    /// How the logs were read.
+    pub plan: Plan,
+    /// Log by log.
+    pub(crate) logs: Vec<LogStatistics>,
+}
+
+/// Statistics of one log.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct LogStatistics {
+    pub(crate) about: About,
+    pub(crate) sums: LogSums,
+    /// Per joint, over the signals: of torque as logged, and of filtered rows at the same times. Empty without a filter.
+    pub(crate) raw: Vec<[JointGram; 2]>,
+}
+
+/// What else is known of a log.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct About {
+    pub(crate) facts: LogFacts,
+    /// SHA-256 of the file, where there is one: the same log twice is found by it.
+    pub(crate) source: String,
+    /// What was found while it was read.
+    pub(crate) findings: Vec<Finding>,
+}
+
+impl Statistics {
+    /// Statistics of one log; `source` is the checksum of its file, or empty.
+    ///
+    /// # Errors
+    /// [`Error::Statistics`] for a plan of another version, and those of logs.
+    pub fn of(
+        (robot_name, robot): (&str, &Robot),
+        plan: &Plan,
+        log: &signal::Log<'_>,
+        source: &str,
+    ) -> Result<Self> {
+        plan.require_version()?;
+        let names = robot.joint_names();
+        log.any_recording(|recording| recording.require_torque(&names))?;
+        let payload = log.payload();
+        if payload == Payload::Unknown && !plan.payload_where_unknown {
+            return Err(Error::Statistics {
+                problem: format!(
+                    "log `{}` carries something unknown, which no log of the plan did",
+                    log.name()
+                ),
+                remedy: "make a plan from logs of which some carry it and some do not".into(),
+            });
+        }
+        let (library, _) = Library::propose(robot, &plan.library)?;
+        let mut findings = as_recorded(robot, log)?;
+        let read = ready(robot, log, &plan.pipeline)?;
+        let reader = Reader {
+            robot,
+            library: &library,
+            pipeline: &plan.pipeline,
+            unknown: plan.payload_where_unknown,
+        };
+        let (log, trajectory) = reader.log(&read, Role::Fit(&[]), &mut findings)?;
+        let motion = std::iter::once(&trajectory);
+        findings.extend(self_check(robot, &plan.pipeline, motion)?);
+        if log.observations.is_empty() {
+            return Err(Error::Statistics {
+                problem: format!("log `{}` has no row behind the filters", log.summary.name),
+                remedy: "leave the log out".into(),
+            });
+        }
+        Ok(Self {
+            robot_name: robot_name.to_owned(),
+            robot: robot.clone(),
+            plan: plan.clone(),
+            logs: vec![LogStatistics {
+                sums: LogSums::of(&log.observations.whole()).with_runs(plan.runs()),
+                raw: raw((robot, &library), plan, &log, &trajectory)?,
+                about: About {
+                    facts: LogFacts::of(&log, payload),
+                    source: source.to_owned(),
+                    findings,
+                },
+            }],
+        })
+    }
+
+    /// The same with what was found while the file of its only log was read.
+    #[must_use]
+    pub fn with_findings(mut self, findings: Vec<Finding>) -> Self {
+        if let Some(log) = self.logs.first_mut() {
+            log.about.findings.splice(0..0, findings);
+        }
+        self
+    }
+
+    /// Names of the logs.
+    pub fn log_names(&self) -> impl Iterator<Item = &str> {
+        self.logs
+            .iter()
+            .map(|log| log.about.facts.summary.name.as_str())
+    }
+
+    /// Checksums of the files of the logs, where they are known.
+    pub fn sources(&self) -> impl Iterator<Item = &str> {
+        let sources = self.logs.iter().map(|log| log.about.source.as_str());
+        sources.filter(|source| !source.is_empty())
+    }
+
+    /// Adds the statistics of other logs of the same robot under the same plan.
+    ///
+    /// # Errors
+    /// [`Error::Statistics`] for another plan, version or robot, for a log that is there already, under this or another name, and for logs of
+    /// one robot that overlap in time (by absolute stamps); then nothing was added.
+    pub fn try_merge(&mut self, other: &Self) -> Result<()> {
+        let refused = |problem: String, remedy: &str| {
+            Err(Error::Statistics {
+                problem,
+                remedy: remedy.into(),
+            })
+        };
+        if self.plan.version != other.plan.version {
+            let versions = (other.plan.version, self.plan.version);
+            return refused(
+                format!(
+                    "made with version {} of the plan, the others with {}",
+                    versions.0, versions.1
+                ),
+                "make all of them with one version of the program",
+            );
+        }
+        if self.robot_name != other.robot_name || self.robot != other.robot {
+            return refused(
+                format!(
+                    "of robot `{}`, the others of `{}`, or of another model file",
+                    other.robot_name, self.robot_name
+                ),
+                "merge statistics of one robot; say with --robot which one was logged",
+            );
+        }
+        if self.plan != other.plan {
+            return refused(
+                "made with another plan than the others".into(),
+                "make all of them with one plan: twincal statistics --plan FILE",
+            );
+        }
+        for log in &other.logs {
+            self.require_new(log)?;
+        }
+        self.logs.extend_from_slice(&other.logs);
+        self.logs.sort_by(|a, b| a.name().cmp(b.name()));
+        Ok(())
+    }
+
+    fn require_new(&self, log: &LogStatistics) -> Result<()> {
+        let refused = |problem: String| {
+            Err(Error::Statistics {
+                problem,
+                remedy: "give every log once".into(),
+            })
+        };
+        for own in &self.logs {
+            if own.name() == log.name() {
+                return refused(format!("log `{}` is there twice", own.name()));
+            }
+            let same_file = !own.about.source.is_empty() && own.about.source == log.about.source;
+            if same_file || own.sums == log.sums {
+                return refused(format!(
+                    "log `{}` is log `{}` under another name",
+                    log.name(),
+                    own.name()
+                ));
+            }
+            let [a, b] = [own, log].map(|log| log.about.facts.ends);
+            let absolute = a[0] > ABSOLUTE && b[0] > ABSOLUTE;
+            if absolute && a[0] < b[1] && b[0] < a[1] {
+                return refused(format!(
+                    "logs `{}` and `{}` overlap in time by {:.1} s",
+                    own.name(),
+                    log.name(),
+                    a[1].min(b[1]) - a[0].max(b[0])
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What a log as recorded says of itself.
+fn as_recorded(robot: &Robot, log: &signal::Log<'_>) -> Result<Vec<Finding>> {
+    let one = || vec![log.lent()];
+    let mut findings = constant_torque(robot, one())?;
+    findings.extend(hardly_driven(robot, one())?);
+    findings.extend(stuck_encoders(robot, &one())?);
+    Ok(findings)
+}
+
+/// Stamps behind it are seconds since 1970, s: September 2001.
+const ABSOLUTE: f64 = 1e9;
+
+impl LogStatistics {
+    pub(crate) fn name(&self) -> &str {
+        &self.about.facts.summary.name
+    }
+}
+
+impl Plan {
+    /// # Errors
+    /// [`Error::Statistics`] for a plan of another version.
+    pub fn require_version(&self) -> Result<()> {
+        if self.version == VERSION {
+            return Ok(());
+        }
+        Err(Error::Statistics {
+            problem: format!(
+                "the plan has version {}, this program {VERSION}",
+                self.version
+            ),
+            remedy: "make the plan with this program: twincal statistics --plan auto".into(),
+        })
+    }
+}
+
+/// Sums of the torque as logged and of the filtered rows at the same times, of about 8000 samples of a log.
+fn raw(
+    (robot, library): (&Robot, &Library),
+    plan: &Plan,
+    log: &Log,
+    trajectory: &Trajectory,
+) -> Result<Vec<[JointGram; 2]>> {
+    let pipeline = &plan.pipeline;
+    if pipeline.cutoff_hz == 0.0 {
+        return Ok(Vec::new());
+    }
+    let (slices, times) = spread(pipeline, trajectory);
+    let signals = |joint: usize| log.observations.joints[joint].signals() as u32;
+    let sums = |joint: usize| JointAccumulator::new((0..signals(joint)).collect());
+    let mut raw: Vec<JointAccumulator> = (0..robot.dof()).map(sums).collect();
+    let mut workspace = Workspace::default();
+    let mut add = |block: &RowBlock<'_>| {
+        for (rows, sum) in block.joints.iter().zip(&mut raw) {
+            let torques = rows.measured.iter().zip(rows.nominal);
+            let mut y: Vec<f64> = torques.map(|(m, n)| m - n).collect();
+            // There are none where no effects multiply each other.
+            (y.iter_mut().zip(rows.products)).for_each(|(y, product)| *y -= product);
+            let keep: Vec<bool> = rows.standstill.iter().map(|still| !still).collect();
+            sum.push_block(rows.x, rows.stride, &y, &keep, block.first, &mut workspace);
+        }
+        Ok(())
+    };
+    let signal = RowSignal::Raw;
+    visit_parts(
+        robot, library, pipeline, trajectory, signal, &slices, &mut add,
+    )?;
+    let in_band = (0..robot.dof()).map(|joint| in_band(&log.observations, joint, &times));
+    let both = raw.into_iter().map(JointAccumulator::finish).zip(in_band);
+    Ok(both
+        .map(|(mut raw, mut in_band)| {
+            raw.forget_runs();
+            in_band.forget_runs();
+            [raw, in_band]
+        })
+        .collect())
+}
+
+/// Sums of the moving rows of a joint within some times.
+fn in_band(all: &Observations, joint: usize, times: &[[f64; 2]]) -> JointGram {
+    let rows = &all.joints[joint];
+    let mut sums = JointAccumulator::new((0..rows.signals() as u32).collect());
+    let mut workspace = Workspace::default();
+    rows.visit_signals(all.len(), 0..all.len(), &mut |range, columns| {
+        let keep = |row: usize| !rows.standstill[row] && within(times, all.time[row]);
+        let keep: Vec<bool> = range.clone().map(keep).collect();
+        let x = if rows.signals() == 0 { &[] } else { columns.x };
+        sums.push_block(
+            x,
+            columns.stride,
+            &rows.y[range],
+            &keep,
+            true,
+            &mut workspace,
+        );
+    });
+    sums.finish()
+}

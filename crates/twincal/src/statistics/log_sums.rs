@@ -1,0 +1,220 @@
+//! What is kept of one log: sums over ten stretches of its rows, of the signals that columns are made of.
+
+use super::decoys::JointDecoys;
+use super::spectrum::Bands;
+use super::sums::Runs;
+use super::weighing::Weighing;
+use crate::gram::{JointAccumulator, JointGram, OpenRun};
+use crate::observations::Part;
+use crate::term::Recipes;
+use rayon::prelude::*;
+use std::ops::{AddAssign, Range};
+use std::sync::Arc;
+
+/// Stretches of a log, of about the same number of rows.
+pub(crate) const BLOCKS: usize = 10;
+
+/// Sums over the rows of one log, or of a part of it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct LogSums {
+    /// Of the filter that made the rows, cycles per row; 0 without a filter.
+    pub(crate) cutoff: f64,
+    /// Rows of each stretch, moving or not.
+    pub(crate) rows: Vec<usize>,
+    pub(crate) joints: Vec<JointSums>,
+}
+
+/// Those of one joint.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct JointSums {
+    /// Columns of the library, ascending.
+    pub(crate) columns: Vec<usize>,
+    /// How they follow from the signals; `None`: they are the signals.
+    pub(crate) recipes: Option<Arc<Recipes>>,
+    /// Stretch by stretch.
+    pub(crate) blocks: Vec<JointBlock>,
+    pub(crate) bands: Bands,
+}
+
+/// Sums over some rows of one joint, over its signals.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct JointBlock {
+    /// Its columns are the numbers of the signals.
+    pub(crate) gram: JointGram,
+    pub(crate) decoys: JointDecoys,
+    /// Squares of the measured torque at all rows, (N·m)².
+    pub(crate) torque: f64,
+    pub(crate) weighing: Weighing,
+}
+
+/// Ends of the stretches of some rows.
+pub(crate) fn stretch(rows: &Range<usize>, block: usize) -> Range<usize> {
+    let cut = |block: usize| rows.start + block * rows.len() / BLOCKS;
+    cut(block)..cut(block + 1)
+}
+
+impl LogSums {
+    /// Sums over the rows of a part, as the fit weighs them. Runs of rows go on from one stretch to the next, so that all stretches together have
+    /// the sums of the uncut part.
+    pub(crate) fn of(part: &Part<'_>) -> Self {
+        let joints = 0..part.observations.joints.len();
+        Self {
+            cutoff: part.observations.cutoff,
+            rows: (0..BLOCKS)
+                .map(|block| stretch(&part.rows, block).len())
+                .collect(),
+            joints: joints
+                .into_par_iter()
+                .map(|joint| JointSums::of(part, joint))
+                .collect(),
+        }
+    }
+}
+
+impl LogSums {
+    /// Decoys by fifths, for what is left out together is never less; where runs are joined none of them, else nothing of runs.
+    pub(crate) fn with_runs(mut self, runs: Runs) -> Self {
+        for joint in &mut self.joints {
+            for pair in joint.blocks.chunks_exact_mut(2) {
+                let second = std::mem::take(&mut pair[1].decoys);
+                pair[0].decoys += &second;
+            }
+            for own in &mut joint.blocks {
+                match runs {
+                    Runs::Joined => own.decoys = JointDecoys::default(),
+                    Runs::Apart => own.gram.forget_runs(),
+                }
+            }
+        }
+        self
+    }
+
+    /// Without some columns, by their numbers; those behind move up.
+    pub(crate) fn without(&self, dropped: &[usize]) -> Self {
+        Self {
+            cutoff: self.cutoff,
+            rows: self.rows.clone(),
+            joints: (self.joints.iter())
+                .map(|joint| joint.without(dropped))
+                .collect(),
+        }
+    }
+}
+
+impl JointSums {
+    fn without(&self, dropped: &[usize]) -> Self {
+        let kept: Vec<usize> = (0..self.columns.len())
+            .filter(|&i| !dropped.contains(&self.columns[i]))
+            .collect();
+        let (recipes, needed) = match &self.recipes {
+            Some(recipes) => {
+                let (rest, needed) = recipes.some(&kept);
+                (Some(Arc::new(rest)), needed)
+            }
+            None => (None, kept.clone()),
+        };
+        let moved = |&i: &usize| {
+            let column = self.columns[i];
+            column - dropped.iter().filter(|&&d| d < column).count()
+        };
+        Self {
+            columns: kept.iter().map(moved).collect(),
+            recipes,
+            blocks: self.blocks.iter().map(|own| own.of(&needed)).collect(),
+            bands: self.bands.of_signals(&needed),
+        }
+    }
+
+    fn of(part: &Part<'_>, joint: usize) -> Self {
+        let rows = &part.observations.joints[joint];
+        let (blocks, bands) = rayon::join(|| blocks(part, joint), || Bands::of(part, joint));
+        Self {
+            columns: rows.columns.clone(),
+            recipes: rows.recipes.clone(),
+            blocks,
+            bands,
+        }
+    }
+}
+
+fn blocks(part: &Part<'_>, joint: usize) -> Vec<JointBlock> {
+    let signals = part.observations.joints[joint].signals() as u32;
+    let mut run = OpenRun::default();
+    let mut blocks = Vec::with_capacity(BLOCKS);
+    for block in 0..BLOCKS {
+        let own = Part {
+            observations: part.observations,
+            rows: stretch(&part.rows, block),
+        };
+        let mut sums = JointAccumulator::resume((0..signals).collect(), std::mem::take(&mut run));
+        own.add_joint_on(joint, block == 0, &mut sums);
+        let gram = if block + 1 == BLOCKS {
+            sums.finish()
+        } else {
+            let (gram, open) = sums.cut();
+            run = open;
+            gram
+        };
+        let mut own_sums = JointBlock {
+            gram,
+            decoys: JointDecoys::of(&own, joint),
+            ..JointBlock::default()
+        };
+        own_sums.add_torque(&own, joint);
+        blocks.push(own_sums);
+    }
+    blocks
+}
+
+impl JointBlock {
+    /// Of some of the signals.
+    fn of(&self, signals: &[usize]) -> Self {
+        let mut gram = self.gram.clone();
+        gram.keep(signals);
+        Self {
+            gram,
+            decoys: self.decoys.keep(signals),
+            torque: self.torque,
+            weighing: self.weighing.clone(),
+        }
+    }
+
+    /// The same over columns that follow from the signals.
+    pub(crate) fn of_columns(&self, columns: &[usize], recipes: Option<&Recipes>) -> Self {
+        let mut gram = match recipes {
+            Some(recipes) => self.gram.combined(&recipes.and_one()),
+            None => self.gram.clone(),
+        };
+        gram.columns = columns.iter().map(|&column| column as u32).collect();
+        Self {
+            gram,
+            decoys: self.decoys.of_columns(recipes),
+            torque: self.torque,
+            weighing: self.weighing.clone(),
+        }
+    }
+
+    fn add_torque(&mut self, part: &Part<'_>, joint: usize) {
+        let rows = &part.observations.joints[joint];
+        let measured = rows.measured.some(part.rows.clone());
+        self.torque += measured.iter().map(|tau| tau * tau).sum::<f64>();
+        if rows.weight.is_empty() {
+            return;
+        }
+        for row in part.rows.clone().filter(|&row| !rows.standstill[row]) {
+            let spread = rows.spread.get(row).copied().unwrap_or(1.0);
+            self.weighing.add(rows.weight[row] * spread);
+        }
+    }
+}
+
+impl AddAssign<&JointBlock> for JointBlock {
+    /// # Panics
+    /// If the two belong to different signals (an empty default adopts the other's).
+    fn add_assign(&mut self, other: &JointBlock) {
+        self.gram += &other.gram;
+        self.decoys += &other.decoys;
+        self.torque += other.torque;
+        self.weighing += &other.weighing;
+    }
+}

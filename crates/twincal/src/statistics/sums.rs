@@ -1,0 +1,177 @@
+//! The sums of all logs of a fit: as many cells as a fit needs to leave some out, however many logs there are.
+
+use super::log_sums::{BLOCKS, JointBlock, LogSums};
+use super::spectrum::Spectrum;
+use super::{JointUnit, Unit};
+use crate::gram::Gram;
+use crate::observations::Part;
+use crate::term::Recipes;
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Groups of logs at most, each with its stretches: seven for each of six units.
+pub(crate) const GROUPS: usize = 42;
+/// Logs that are added up at a time.
+const BATCH: usize = 16;
+
+/// Sums over the rows of some logs. Logs come in the order of their names; of more than 42, every 42nd is in one group.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Sums {
+    /// Group by group, stretch by stretch.
+    cells: Vec<Vec<Cell>>,
+    /// Of each joint over all rows.
+    pub(crate) spectra: Vec<Spectrum>,
+    /// Largest cut-off of the filters that made the rows, cycles per row; 0 without a filter.
+    pub(crate) cutoff: f64,
+    logs: usize,
+    runs: Runs,
+}
+
+/// What is kept of consecutive rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Runs {
+    /// Nothing: rows are independent, or tempered.
+    #[default]
+    Apart,
+    /// First differences, first and last rows: the likelihood is autoregressive.
+    Joined,
+}
+
+/// Sums over one stretch of one group of logs.
+#[derive(Debug, Clone, Default)]
+struct Cell {
+    rows: usize,
+    joints: Vec<JointCell>,
+}
+
+/// Of one joint: one or two, where a payload acts in some logs only, of which columns follow alike.
+#[derive(Debug, Clone, Default)]
+struct JointCell {
+    columns: Vec<usize>,
+    sums: Vec<(Option<Arc<Recipes>>, JointBlock)>,
+}
+
+impl Sums {
+    /// Without rows yet.
+    pub(crate) fn empty(runs: Runs) -> Self {
+        Self {
+            runs,
+            ..Self::default()
+        }
+    }
+
+    /// Of the rows of these parts, each of another log.
+    pub(crate) fn of(parts: &[Part<'_>], runs: Runs) -> Self {
+        let mut parts: Vec<&Part<'_>> = parts.iter().collect();
+        parts.sort_by(|a, b| a.observations.log.cmp(&b.observations.log));
+        let mut sums = Self::empty(runs);
+        for batch in parts.chunks(BATCH) {
+            let logs: Vec<LogSums> = batch.par_iter().map(|part| LogSums::of(part)).collect();
+            logs.iter().for_each(|log| sums.add(log));
+        }
+        sums
+    }
+
+    /// Adds the log whose name is next.
+    ///
+    /// # Panics
+    /// If it belongs to another robot or library than those before.
+    pub(crate) fn add(&mut self, log: &LogSums) {
+        let group = self.logs % GROUPS;
+        self.logs += 1;
+        self.cutoff = self.cutoff.max(log.cutoff);
+        if self.cells.len() == group {
+            self.cells.push(vec![Cell::default(); BLOCKS]);
+        }
+        self.spectra
+            .resize_with(log.joints.len(), Spectrum::default);
+        for (spectrum, joint) in self.spectra.iter_mut().zip(&log.joints) {
+            spectrum.add(joint);
+        }
+        for (block, cell) in self.cells[group].iter_mut().enumerate() {
+            cell.rows += log.rows[block];
+            cell.joints
+                .resize_with(log.joints.len(), JointCell::default);
+            for (sum, joint) in cell.joints.iter_mut().zip(&log.joints) {
+                let mut own = joint.blocks[block].clone();
+                if self.runs == Runs::Apart {
+                    own.gram.forget_runs();
+                }
+                sum.columns.clone_from(&joint.columns);
+                match sum
+                    .sums
+                    .iter_mut()
+                    .find(|(recipes, _)| *recipes == joint.recipes)
+                {
+                    Some((_, sum)) => *sum += &own,
+                    None => sum.sums.push((joint.recipes.clone(), own)),
+                }
+            }
+        }
+    }
+
+    /// Number of groups of logs that can be left out: one per log up to [`GROUPS`].
+    pub(crate) fn groups(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// Rows of all logs, moving or not.
+    pub(crate) fn rows(&self) -> usize {
+        self.cells.iter().flatten().map(|cell| cell.rows).sum()
+    }
+
+    /// Squares of the measured torque of each joint at all rows, (N·m)².
+    pub(crate) fn torque_squares(&self) -> Vec<f64> {
+        let of_joint = |joint: usize| -> f64 {
+            let cells = self.cells.iter().flatten();
+            let sums = cells.flat_map(|cell| &cell.joints[joint].sums);
+            sums.map(|(_, block)| block.torque).sum()
+        };
+        (0..self.joints()).map(of_joint).collect()
+    }
+
+    /// Number of moving joints; 0 without rows.
+    pub(crate) fn joints(&self) -> usize {
+        self.spectra.len()
+    }
+
+    /// Sums over columns and torque of some stretches of some groups.
+    pub(crate) fn unit(&self, which: &[(usize, Range<usize>)]) -> Unit {
+        let of_joint = |joint: usize| {
+            let mut kinds: Vec<(&Option<Arc<Recipes>>, JointBlock)> = Vec::new();
+            let mut columns: &[usize] = &[];
+            let cells = which
+                .iter()
+                .flat_map(|(group, blocks)| &self.cells[*group][blocks.clone()]);
+            for cell in cells {
+                let own = &cell.joints[joint];
+                columns = &own.columns;
+                for (recipes, sums) in &own.sums {
+                    match kinds.iter_mut().find(|(known, _)| *known == recipes) {
+                        Some((_, sum)) => *sum += sums,
+                        None => kinds.push((recipes, sums.clone())),
+                    }
+                }
+            }
+            let mut sum = JointBlock::default();
+            for (recipes, own) in kinds {
+                sum += &own.of_columns(columns, recipes.as_deref());
+            }
+            sum
+        };
+        let joints = (0..self.joints()).into_par_iter().map(of_joint);
+        let joints: Vec<JointBlock> = joints.collect();
+        let (grams, rest) = joints.into_iter().map(JointUnit::split).unzip();
+        Unit {
+            gram: Gram { joints: grams },
+            joints: rest,
+        }
+    }
+
+    /// Sums over all rows.
+    pub(crate) fn total(&self) -> Unit {
+        let all: Vec<_> = (0..self.groups()).map(|group| (group, 0..BLOCKS)).collect();
+        self.unit(&all)
+    }
+}

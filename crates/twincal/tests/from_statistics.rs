@@ -1,0 +1,336 @@
+//! Statistics of logs, and fits from them: the same numbers as from the logs; sums that do not depend on who adds them; refusals.
+
+#[path = "../examples/two_link.rs"]
+#[allow(dead_code, reason = "its `main` and its study are not needed here")]
+mod two_link;
+
+use twincal::calibrate::{
+    Calibration, CalibrationSettings, Plan, Quantity, Record, Statistics, calibrate,
+    calibrate_statistics, plan,
+};
+use twincal::prelude::*;
+use twincal::random::Random;
+use twincal::validate::Split;
+
+struct Study {
+    robot: Robot,
+    logs: Vec<Recording>,
+    settings: CalibrationSettings,
+}
+
+/// A two-link arm whose payload is 0.6 kg heavier than its model says; `count` logs.
+fn study(count: usize) -> Study {
+    let robot = two_link::arm(2.0).expect("an arm");
+    let real = two_link::arm(2.6).expect("an arm");
+    let mut noise = Random::new(1, 0);
+    let log = |number: usize| {
+        let name = format!("log{number}");
+        two_link::log(&name, 0.3 + 0.8 * number as f64, &real, &mut noise)
+    };
+    let mut settings = CalibrationSettings::default();
+    settings.library.families = vec![
+        Family::Payload,
+        Family::Viscous,
+        Family::Coulomb,
+        Family::MotorInertia,
+    ];
+    Study {
+        robot,
+        logs: (0..count).map(log).collect(),
+        settings,
+    }
+}
+
+impl Study {
+    fn plan(&self) -> Plan {
+        let made = plan(&self.robot, &self.logs[..], &self.settings, &|_| {});
+        made.expect("a plan").0
+    }
+
+    fn statistics(&self, plan: &Plan, log: usize) -> Statistics {
+        let model = ("arm", &self.robot);
+        let log = Log::from(&self.logs[log]);
+        Statistics::of(model, plan, &log, "").expect("statistics")
+    }
+
+    /// Of these logs, added in this order.
+    fn merged(&self, plan: &Plan, logs: impl IntoIterator<Item = usize>) -> Statistics {
+        let mut logs = logs.into_iter().map(|log| self.statistics(plan, log));
+        let mut sum = logs.next().expect("a log");
+        logs.for_each(|other| sum.try_merge(&other).expect("the same plan"));
+        sum
+    }
+}
+
+/// Every number of terms, effects, noise and prior.
+fn numbers(fit: &Calibration) -> Vec<f64> {
+    let mut all = Vec::new();
+    for term in &fit.terms {
+        let own = [
+            term.pip,
+            term.mean,
+            term.sd,
+            term.conditional_median,
+            term.column_rms,
+        ];
+        all.extend(own.into_iter().chain([term.sandwich_sd]).flatten());
+    }
+    for component in &fit.components {
+        all.extend(component.pip);
+        all.extend(
+            component
+                .parameters
+                .iter()
+                .flat_map(|own| [own.median, own.sd]),
+        );
+    }
+    for noise in &fit.noise {
+        all.extend([noise.sigma, noise.rho, noise.weight, noise.n, noise.n_eff]);
+        all.extend([noise.autocorrelation_time, noise.misfit]);
+        all.extend([noise.interval_factor, noise.out_of_band]);
+    }
+    all.extend(fit.autocorrelation.iter().flatten());
+    all.extend(fit.twin.hull.iter().flatten());
+    all.extend(fit.prior.scaled_variance.iter().map(|own| own.1));
+    all
+}
+
+/// A fit from statistics has the numbers of the fit to the logs, whatever their number: one, two, and more than are left out one by one.
+#[test]
+fn numbers_are_those_of_the_logs() {
+    for count in [1, 2, 8] {
+        let study = study(count);
+        let plan = study.plan();
+        let statistics = study.merged(&plan, 0..count);
+        let none: &[Recording] = &[];
+        let own = calibrate_statistics(&statistics, none, &study.settings, &|_| {});
+        let own = own.expect("a calibration");
+        let whole = calibrate(
+            &study.robot,
+            &study.logs[..],
+            none,
+            &study.settings,
+            &|_| {},
+        );
+        let whole = whole.expect("a calibration");
+        let statuses = |fit: &Calibration| -> Vec<_> {
+            fit.components
+                .iter()
+                .map(|own| (own.name.clone(), own.status))
+                .collect()
+        };
+        assert_eq!(statuses(&own), statuses(&whole), "{count} logs");
+        let (a, b) = (numbers(&own), numbers(&whole));
+        assert_eq!(a.len(), b.len());
+        for (at, (a, b)) in a.iter().zip(&b).enumerate() {
+            let near = (a - b).abs() <= 1e-9 * (1e-3 + b.abs()) || (a.is_nan() && b.is_nan());
+            assert!(near, "{count} logs, number {at}: {a} {b}");
+        }
+        assert_eq!(own.validation.split, Split::NotTested);
+        assert!(own.sweep.is_empty());
+    }
+}
+
+/// Held-out logs are predicted as by the fit to the logs.
+#[test]
+fn held_out_logs_are_scored() {
+    let study = study(4);
+    let (fitted, heldout) = study.logs.split_at(3);
+    let settings = &study.settings;
+    let whole = calibrate(&study.robot, fitted, heldout, settings, &|_| {});
+    let whole = whole.expect("a calibration");
+    let plan = plan(&study.robot, fitted, settings, &|_| {})
+        .expect("a plan")
+        .0;
+    let statistics = study.merged(&plan, 0..3);
+    let own = calibrate_statistics(&statistics, heldout, settings, &|_| {}).expect("a calibration");
+    assert_eq!(own.validation.split, Split::HeldoutLogs);
+    for (a, b) in own
+        .validation
+        .moving
+        .joints
+        .iter()
+        .zip(&whole.validation.moving.joints)
+    {
+        assert_eq!(a.joint, b.joint);
+        assert!(
+            (a.rmse_calibrated / b.rmse_calibrated - 1.0).abs() < 1e-9,
+            "{a:?} {b:?}"
+        );
+    }
+    assert_eq!(own.logs.len(), whole.logs.len());
+}
+
+/// The same bits for any split of the set of logs and any order of merging.
+#[test]
+fn the_order_of_merging_changes_no_bit() {
+    let study = study(5);
+    let plan = study.plan();
+    let sum = study.merged(&plan, 0..5);
+    assert_eq!(study.merged(&plan, [3, 0, 4, 2, 1]), sum);
+    let mut halves = study.merged(&plan, [4, 1]);
+    halves
+        .try_merge(&study.merged(&plan, [2, 3, 0]))
+        .expect("the same plan");
+    assert_eq!(halves, sum);
+    assert_eq!(
+        sum.log_names().collect::<Vec<_>>(),
+        ["log0", "log1", "log2", "log3", "log4"]
+    );
+}
+
+/// Header and records give the statistics back, to the last bit.
+#[test]
+fn records_hold_everything() {
+    let study = study(2);
+    let sum = study.merged(&study.plan(), 0..2);
+    let back = Statistics::from_records(sum.header(), sum.records()).expect("statistics");
+    assert_eq!(back, sum);
+}
+
+#[track_caller]
+fn refused<T>(result: Result<T, Error>, words: &str) {
+    let Err(error) = result else {
+        panic!("was taken");
+    };
+    let text = error.to_string();
+    assert!(text.contains(words), "{text}");
+}
+
+#[test]
+fn what_does_not_belong_together_is_refused() {
+    let study = study(3);
+    let plan = study.plan();
+    let sum = study.merged(&plan, 0..2);
+    let third = study.statistics(&plan, 2);
+    let with = |change: &dyn Fn(&mut Statistics)| {
+        let mut other = third.clone();
+        change(&mut other);
+        sum.clone().try_merge(&other)
+    };
+    assert!(with(&|_| ()).is_ok());
+    refused(
+        with(&|other| other.plan.version += 1),
+        "version 2 of the plan",
+    );
+    refused(
+        with(&|other| other.plan.pipeline.cutoff_hz *= 2.0),
+        "another plan",
+    );
+    refused(
+        with(&|other| other.robot_name = "other".into()),
+        "of robot `other`",
+    );
+    refused(
+        with(&|other| other.robot = two_link::arm(2.1).expect("an arm")),
+        "or of another model file",
+    );
+    let mut twice = sum.clone();
+    refused(
+        twice.try_merge(&study.statistics(&plan, 1)),
+        "log `log1` is there twice",
+    );
+    assert_eq!(twice, sum);
+    let mut renamed = study.logs[1].clone();
+    renamed.name = "other".into();
+    let renamed = Statistics::of(("arm", &study.robot), &plan, &Log::from(&renamed), "");
+    refused(
+        twice.try_merge(&renamed.expect("statistics")),
+        "log `other` is log `log1` under another name",
+    );
+    // Stamps since 1970 that overlap.
+    let late = |number: usize, shift: f64| {
+        let mut log = study.logs[number].clone();
+        log.time.iter_mut().for_each(|time| *time += 1.7e9 + shift);
+        Statistics::of(("arm", &study.robot), &plan, &Log::from(&log), "").expect("statistics")
+    };
+    refused(late(0, 0.0).try_merge(&late(1, 3.0)), "overlap in time by");
+    assert!(late(0, 0.0).try_merge(&late(1, 3600.0)).is_ok());
+}
+
+/// What a log says of itself is kept with its statistics: torque with the other sign on one joint forbids a "Yes" from them too.
+#[test]
+fn what_is_wrong_with_a_log_stays_with_it() {
+    let study = study(3);
+    let plan = study.plan();
+    let mut wrong = study.logs[2].clone();
+    wrong.joints[1]
+        .tau
+        .iter_mut()
+        .flatten()
+        .for_each(|tau| *tau = -*tau);
+    let wrong = Statistics::of(("arm", &study.robot), &plan, &Log::from(&wrong), "");
+    let note = Finding::new(Severity::Degraded, "rows_dropped", "log2", "half of it", 7);
+    let wrong = wrong.expect("statistics").with_findings(vec![note.clone()]);
+    let mut sum = study.merged(&plan, 0..2);
+    sum.try_merge(&wrong).expect("the same plan");
+    let none: &[Recording] = &[];
+    let fit = calibrate_statistics(&sum, none, &study.settings, &|_| {}).expect("a calibration");
+    assert!(fit.findings.contains(&note));
+    let mistakes: Vec<_> = fit.findings.iter().filter_map(Finding::mistake).collect();
+    assert!(!mistakes.is_empty(), "{:?}", fit.findings);
+}
+
+/// A payload that acts in some logs only is one of the plan's logs or none.
+#[test]
+fn an_unknown_payload_has_to_be_in_the_plan() {
+    let study = study(2);
+    let plan = study.plan();
+    let mut carries = study.logs[1].clone();
+    carries.payload = Payload::Unknown;
+    let own = Statistics::of(("arm", &study.robot), &plan, &Log::from(&carries), "");
+    refused(
+        own,
+        "carries something unknown, which no log of the plan did",
+    );
+}
+
+#[test]
+fn damaged_tables_and_odd_logs_are_refused() {
+    let study = study(4);
+    let plan = study.plan();
+    let sum = study.merged(&plan, 0..2);
+    let with = |change: &dyn Fn(&mut Vec<Record>)| {
+        let mut records = sum.records();
+        change(&mut records);
+        Statistics::from_records(sum.header(), records)
+    };
+    refused(
+        with(&|all| drop(all.remove(5))),
+        "the table of log `log0` has no",
+    );
+    refused(with(&|all| all[5].log = 7), "has no");
+    refused(
+        with(&|all| all.push(all[0].clone())),
+        "holds a record twice",
+    );
+    refused(
+        with(&|all| all[0].values[0] = f64::NAN),
+        "numbers that are none",
+    );
+    refused(with(&|all| all[0].values.push(1.0)), "of another size");
+    let more = |all: &mut Vec<Record>| {
+        let mut more = all[0].clone();
+        more.block = 77;
+        all.push(more);
+    };
+    refused(with(&more), "more records than its header says");
+    assert_eq!(Quantity::of_name("power"), Some(Quantity::Power));
+    // A million times the torque of the others.
+    let mut loud = study.logs[3].clone();
+    for joint in &mut loud.joints {
+        joint.tau.iter_mut().flatten().for_each(|tau| *tau *= 1e6);
+    }
+    let loud = Statistics::of(("arm", &study.robot), &plan, &Log::from(&loud), "");
+    let mut all = study.merged(&plan, 0..3);
+    all.try_merge(&loud.expect("statistics"))
+        .expect("the same plan");
+    let none: &[Recording] = &[];
+    let fit = calibrate_statistics(&all, none, &study.settings, &|_| {});
+    refused(fit.map_err(Error::from), "the torque of log `log3` is");
+    // Rows are weighed one by one.
+    let mut robust = study.settings.clone();
+    robust.noise.robust = true;
+    let fit = calibrate_statistics(&sum, none, &robust, &|_| {});
+    refused(fit.map_err(Error::from), "weigh rows one by one");
+}
