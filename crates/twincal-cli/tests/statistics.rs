@@ -116,6 +116,10 @@ fn a_fit_to_statistics_is_the_fit_to_the_logs() {
     );
     assert_eq!(result(at, "alone")["validation"]["split"], "not_tested");
     compare(&result(at, "alone")["terms"], &whole["terms"], "terms");
+    let line = "check run3.csv --twin alone";
+    run(at, line.split(' '))
+        .expect(2)
+        .says(&["was never tested", "--heldout LOG"]);
 }
 
 /// What is done is kept, byte for byte; a log that changed, or another plan, is not mixed in.

@@ -8,7 +8,7 @@ use super::summary::{Notes, findings, paragraph, percent};
 use super::table::{print_table, table};
 use super::{code_of, print_json, require_strict, settings, start_threads};
 use crate::args::Check;
-use crate::failure::{DEGRADED, GATE, Outcome};
+use crate::failure::{DEGRADED, Failure, GATE, Outcome};
 use crate::progress::Progress;
 use crate::terminal::{Terminal, clean};
 use gates::{ALL, ENOUGH, Gate, Own, judge};
@@ -50,6 +50,12 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     let progress = Progress::new();
     progress.step(&format!("reading {}", flags.twin.to_string_lossy()));
     let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, false)?;
+    if stored.calibration.validation.split == Split::NotTested {
+        return Err(Failure::usage(
+            "the twin was never tested: it has no error that new ones could be compared with",
+            "fit again with --heldout LOG",
+        ));
+    }
     let twin = &stored.calibration.twin;
     let mut logs = LogInput::for_twin(&flags.logs, &stored, settings.log.clone(), &progress)?;
     progress.step("predicting the logs");

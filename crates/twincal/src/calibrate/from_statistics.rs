@@ -14,7 +14,7 @@ use super::fit::compact;
 use super::fit::dissipative;
 use super::fit::fitted::{self, Fitted};
 use super::fit::noise_of::noise_of;
-use super::log_statistics::{LogStatistics, Statistics};
+use super::log_statistics::{LogStatistics, Statistics, require_read_back};
 use super::plan::require_even_rows;
 use super::progress::{Stage, Watch};
 use super::result::calibration::Calibration;
@@ -53,10 +53,9 @@ pub fn calibrate_statistics<'a>(
         Ok(())
     };
     let (heldout, mut findings) = (heldout.into(), Vec::new());
-    road(statistics, &heldout, settings, &watch, &mut findings).map_err(|error| Stopped {
-        error,
-        findings: findings.clone(),
-    })
+    let fit = road(statistics, &heldout, settings, &watch, &mut findings);
+    let read_back = heldout.0.iter().try_for_each(require_read_back);
+    (read_back.and(fit)).map_err(|error| Stopped { error, findings })
 }
 
 /// The logs' statistics over the columns that act, and what else is known.

@@ -74,7 +74,8 @@ impl Statistics {
     /// Statistics of one log; `source` is the checksum of its file, or empty.
     ///
     /// # Errors
-    /// [`Error::Statistics`] for a plan of another version, and those of logs.
+    /// [`Error::Statistics`] for a plan of another version, for a log without rows and for one that carries something unknown where no log of
+    /// the plan did; those of logs.
     pub fn of(
         (robot_name, robot): (&str, &Robot),
         plan: &Plan,
@@ -103,6 +104,7 @@ impl Statistics {
             pipeline: &plan.pipeline,
             unknown: plan.payload_where_unknown,
         };
+        let given = log;
         let (log, trajectory) = reader.log(&read, Role::Fit(&[]), &mut findings)?;
         let motion = std::iter::once(&trajectory);
         findings.extend(self_check(robot, &plan.pipeline, motion)?);
@@ -112,13 +114,16 @@ impl Statistics {
                 remedy: "leave the log out".into(),
             });
         }
+        let raw = raw((robot, &library), plan, &log, &trajectory)?;
+        let sums = LogSums::of(&log.observations.whole()).with_runs(plan.runs());
+        require_read_back(given)?;
         Ok(Self {
             robot_name: robot_name.to_owned(),
             robot: robot.clone(),
             plan: plan.clone(),
             logs: vec![LogStatistics {
-                sums: LogSums::of(&log.observations.whole()).with_runs(plan.runs()),
-                raw: raw((robot, &library), plan, &log, &trajectory)?,
+                sums,
+                raw,
                 about: About {
                     facts: LogFacts::of(&log, payload),
                     source: source.to_owned(),
@@ -226,6 +231,17 @@ impl Statistics {
             }
         }
         Ok(())
+    }
+}
+
+/// Numbers of a long log that could not be read back are behind whatever was made of it.
+///
+/// # Errors
+/// Why they could not.
+pub(super) fn require_read_back(log: &signal::Log<'_>) -> Result<()> {
+    match log.shelf().and_then(|shelf| shelf.failure()) {
+        Some(failure) => Err(failure),
+        None => Ok(()),
     }
 }
 

@@ -40,7 +40,7 @@ pub use stopped::Stopped;
 
 use crate::error::{Error, Finding, Result};
 use crate::robot::Robot;
-use crate::signal::{Log, Logs};
+use crate::signal::{Log, Logs, Shelf};
 use attempts::{Attempts, Ended};
 use data::cross_checked;
 use exit::{Exit, Pass};
@@ -48,6 +48,7 @@ use fit::lower_band::Band;
 use progress::Watch;
 use request::{Goal, Recorded, Request};
 use result::ended::ended;
+use std::sync::Arc;
 
 /// Finds what the nominal robot misses in `logs` and says how well the calibrated twin predicts.
 ///
@@ -92,20 +93,22 @@ pub fn plan<'a>(
         Ok(())
     };
     let mut findings = Vec::new();
-    let recordings = (logs.into(), Logs(Vec::new()));
+    let recordings: (Logs<'a>, Logs<'a>) = (logs.into(), Logs(Vec::new()));
+    let shelves: Vec<_> = recordings.0.0.iter().filter_map(Log::shelf).collect();
     let mut way = |request: Request<'_>,
                    recordings: &mut Option<(Logs<'_>, Logs<'_>)>,
                    findings: &mut Vec<Finding>| {
         watch(Stage::Rows)?;
         plan::road(request, recordings, findings)
     };
-    match attempt(
+    let plan = attempt(
         robot,
         recordings,
         settings,
         (&watch, &mut way),
         &mut findings,
-    ) {
+    );
+    match read_back(plan, &shelves) {
         Ok(plan) => Ok((plan, findings)),
         Err(error) => Err(Stopped { error, findings }),
     }
@@ -133,12 +136,16 @@ pub(crate) fn calibrate_watched(
         (progress, &mut way),
         &mut findings,
     );
-    // Numbers that could not be read back are behind whatever came out.
-    let calibration = match shelves.iter().find_map(|shelf| shelf.failure()) {
-        Some(failure) => Err(failure),
-        None => calibration,
-    };
+    let calibration = read_back(calibration, &shelves);
     ended(calibration, as_recorded, findings)
+}
+
+/// A result, unless numbers that could not be read back are behind it.
+fn read_back<T>(result: Result<T>, shelves: &[Arc<dyn Shelf>]) -> Result<T> {
+    match shelves.iter().find_map(|shelf| shelf.failure()) {
+        Some(failure) => Err(failure),
+        None => result,
+    }
 }
 
 /// One pass over the logs, to a result.

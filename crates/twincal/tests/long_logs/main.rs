@@ -7,7 +7,7 @@ mod motion;
 
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex};
-use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
+use twincal::calibrate::{Calibration, CalibrationSettings, Statistics, calibrate, plan};
 use twincal::random::Random;
 use twincal::robot::{Workspace, inverse_dynamics};
 use twincal::signal::{Channels, Log, LongLog, Payload, ReadChapter, Recording, Shelf};
@@ -298,15 +298,18 @@ fn rows_that_do_not_come_back_end_the_calibration_with_the_reason() {
 /// No room is no fault of a chapter, wherever it is noticed: nothing is fitted to a part of the log.
 #[test]
 fn a_shelf_that_is_full_ends_the_calibration() {
+    let nominal = two_link::arm(2.0).expect("an arm");
+    let settings = CalibrationSettings::default();
+    let (known, _) = plan(&nominal, vec![recording()], &settings, &|_| {}).expect("a plan");
     for room in [0, 20_000, 100_000, 200_000] {
         let attic = Attic {
             room: Some(room),
             ..Attic::default()
         };
         let log = with_shelf(in_chapters(recording()), Arc::new(attic));
-        let nominal = two_link::arm(2.0).expect("an arm");
         let none: &[Recording] = &[];
-        let settings = CalibrationSettings::default();
+        let error = Statistics::of(("arm", &nominal), &known, &log, "").expect_err("no room");
+        assert!(error.to_string().contains("the attic is full"), "{room}");
         let stopped =
             calibrate(&nominal, vec![log], none, &settings, &|_| {}).expect_err("no room");
         assert!(
