@@ -291,6 +291,9 @@ fn rows_that_do_not_come_back_end_the_calibration_with_the_reason() {
     let nominal = two_link::arm(2.0).expect("an arm");
     let none: &[Recording] = &[];
     let settings = CalibrationSettings::default();
+    let (known, _) = plan(&nominal, vec![recording()], &settings, &|_| {}).expect("a plan");
+    let error = Statistics::of(("arm", &nominal), &known, &log, "").expect_err("no rows");
+    assert!(error.to_string().contains("the attic burnt down"));
     let stopped = calibrate(&nominal, vec![log], none, &settings, &|_| {}).expect_err("no rows");
     assert!(stopped.error.to_string().contains("the attic burnt down"));
 }
