@@ -30,7 +30,7 @@ use crate::likelihood::{Columns, Spread};
 use crate::robot::Robot;
 use crate::self_check::self_check;
 use crate::signal::{Logs, ReadyLog, ready};
-use crate::statistics::{Sums, residual_form};
+use crate::statistics::{Purpose, Sums, residual_form};
 use crate::term::Library;
 use crate::twin::Twin;
 
@@ -188,7 +188,7 @@ fn known(
 
 /// The sums of all logs without these columns.
 fn sums(logs: &[LogStatistics], settings: &CalibrationSettings, dropped: &[usize]) -> Sums {
-    let mut sums = Sums::empty(fitted::runs(settings));
+    let mut sums = Sums::empty(fitted::runs(settings), (logs.len(), Purpose::Result));
     for log in logs {
         if dropped.is_empty() {
             sums.add(&log.sums);

@@ -13,7 +13,7 @@ use crate::robot::Robot;
 use crate::rows::{RowBlock, RowSignal, visit_parts};
 use crate::self_check::self_check;
 use crate::signal::{self, Payload, Trajectory, constant_torque, hardly_driven, ready};
-use crate::statistics::LogSums;
+use crate::statistics::{BLOCKS, LogSums};
 use crate::term::Library;
 use serde::{Deserialize, Serialize};
 
@@ -115,7 +115,7 @@ impl Statistics {
             });
         }
         let raw = raw((robot, &library), plan, &log, &trajectory)?;
-        let sums = LogSums::of(&log.observations.whole()).with_runs(plan.runs());
+        let sums = LogSums::of(&log.observations.whole(), BLOCKS).with_runs(plan.runs());
         require_read_back(given)?;
         Ok(Self {
             robot_name: robot_name.to_owned(),

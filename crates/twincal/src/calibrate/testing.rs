@@ -8,7 +8,7 @@ use crate::posterior::Posterior;
 use crate::prior::{Inclusion, PriorSettings};
 use crate::random::Random;
 use crate::signal::Auto;
-use crate::statistics::{Runs, Sums};
+use crate::statistics::{Purpose, Runs, Sums};
 use crate::term::Family;
 
 pub(in crate::calibrate) struct Regression {
@@ -95,7 +95,11 @@ impl Regression {
     /// Independent rows, and the structure with both columns.
     pub(in crate::calibrate) fn fitted(&self, logs: &[Part<'_>]) -> (Fit, Posterior) {
         let (columns, prior) = (Self::columns(), Self::prior());
-        let plug_in = start(&Sums::of(logs, Runs::Joined), &columns, &prior);
+        let plug_in = start(
+            &Sums::of(logs, Runs::Joined, Purpose::Result),
+            &columns,
+            &prior,
+        );
         let gram = logs.iter().collect();
         let problem = assemble(&gram, &columns, &plug_in, &prior).unwrap();
         let posterior = crate::infer::approximate(&problem, None).unwrap();

@@ -5,7 +5,7 @@ use crate::likelihood::AUTO_SHAPE;
 use crate::observations::{JointObservations, Observations};
 use crate::prior::Inclusion;
 use crate::random::Random;
-use crate::statistics::{Runs, Sums};
+use crate::statistics::{Purpose, Runs, Sums};
 use crate::term::Family;
 
 const ROWS: usize = 300;
@@ -99,7 +99,7 @@ fn the_automatic_prior_adds_no_noise_where_nearly_all_is_explained() {
         noise: noise(NoiseModel::Iid),
         prior: &prior,
     };
-    let training = Sums::of(&[log.whole()], Runs::Joined);
+    let training = Sums::of(&[log.whole()], Runs::Joined, Purpose::Result);
     let first = start(&training, &columns, &prior);
     let fit = fit(&training, &columns, settings, &first, Moving::All, None).unwrap();
     // The slab adds β²/(2v) to b_n: less than one unit of noise at the scale that it learns.
@@ -123,7 +123,7 @@ fn rows_too_few_to_predict_widen_nothing() {
     for rows in [2, ROWS] {
         let log = log(rows);
         let (fit, factors) = fit_tempered(
-            &Sums::of(&[log.whole()], Runs::Apart),
+            &Sums::of(&[log.whole()], Runs::Apart, Purpose::Result),
             &[log.whole()],
             &columns,
             settings,
@@ -163,7 +163,7 @@ fn a_shape_that_the_motion_hardly_shows_has_a_coefficient_of_usual_size() {
             noise: noise(NoiseModel::Iid),
             prior: &prior,
         };
-        let training = Sums::of(&[log.whole()], Runs::Joined);
+        let training = Sums::of(&[log.whole()], Runs::Joined, Purpose::Result);
         let first = start(&training, &columns, &prior);
         let fit = fit(&training, &columns, settings, &first, Moving::All, None).unwrap();
         assert!(fit.posterior.inclusion[0] > 0.999);

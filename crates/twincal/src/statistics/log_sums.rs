@@ -55,8 +55,8 @@ pub(crate) fn stretch(rows: &Range<usize>, block: usize) -> Range<usize> {
 
 impl LogSums {
     /// Sums over the rows of a part, as the fit weighs them. Runs of rows go on from one stretch to the next, so that all stretches together have
-    /// the sums of the uncut part.
-    pub(crate) fn of(part: &Part<'_>) -> Self {
+    /// the sums of the uncut part. Of fewer than ten `stretches` each stands in the place of its first tenth.
+    pub(crate) fn of(part: &Part<'_>, stretches: usize) -> Self {
         let joints = 0..part.observations.joints.len();
         Self {
             cutoff: part.observations.cutoff,
@@ -65,7 +65,7 @@ impl LogSums {
                 .collect(),
             joints: joints
                 .into_par_iter()
-                .map(|joint| JointSums::of(part, joint))
+                .map(|joint| JointSums::of(part, joint, stretches))
                 .collect(),
         }
     }
@@ -125,9 +125,10 @@ impl JointSums {
         }
     }
 
-    fn of(part: &Part<'_>, joint: usize) -> Self {
+    fn of(part: &Part<'_>, joint: usize, stretches: usize) -> Self {
         let rows = &part.observations.joints[joint];
-        let (blocks, bands) = rayon::join(|| blocks(part, joint), || Bands::of(part, joint));
+        let (blocks, bands) =
+            rayon::join(|| blocks(part, joint, stretches), || Bands::of(part, joint));
         Self {
             columns: rows.columns.clone(),
             recipes: rows.recipes.clone(),
@@ -137,18 +138,20 @@ impl JointSums {
     }
 }
 
-fn blocks(part: &Part<'_>, joint: usize) -> Vec<JointBlock> {
+fn blocks(part: &Part<'_>, joint: usize, stretches: usize) -> Vec<JointBlock> {
     let signals = part.observations.joints[joint].signals() as u32;
     let mut run = OpenRun::default();
-    let mut blocks = Vec::with_capacity(BLOCKS);
-    for block in 0..BLOCKS {
+    let mut blocks = vec![JointBlock::default(); BLOCKS];
+    let tenths = BLOCKS / stretches;
+    for block in (0..BLOCKS).step_by(tenths) {
+        let (first, last) = (block, block + tenths - 1);
         let own = Part {
             observations: part.observations,
-            rows: stretch(&part.rows, block),
+            rows: stretch(&part.rows, first).start..stretch(&part.rows, last).end,
         };
         let mut sums = JointAccumulator::resume((0..signals).collect(), std::mem::take(&mut run));
         own.add_joint_on(joint, block == 0, &mut sums);
-        let gram = if block + 1 == BLOCKS {
+        let gram = if last + 1 == BLOCKS {
             sums.finish()
         } else {
             let (gram, open) = sums.cut();
@@ -161,7 +164,7 @@ fn blocks(part: &Part<'_>, joint: usize) -> Vec<JointBlock> {
             ..JointBlock::default()
         };
         own_sums.add_torque(&own, joint);
-        blocks.push(own_sums);
+        blocks[block] = own_sums;
     }
     blocks
 }

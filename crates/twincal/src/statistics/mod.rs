@@ -9,7 +9,7 @@ mod weighing;
 pub(crate) use decoys::{DECOYS, JointDecoys};
 pub(crate) use log_sums::{BLOCKS, JointBlock, JointSums, LogSums};
 pub(crate) use spectrum::{Bands, Spectrum};
-pub(crate) use sums::{GROUPS, Runs, Sums};
+pub(crate) use sums::{GROUPS, Purpose, Runs, Sums};
 pub(crate) use weighing::Weighing;
 
 use crate::gram::{Gram, JointGram, Symmetric};

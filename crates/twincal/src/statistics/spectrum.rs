@@ -276,7 +276,7 @@ mod tests {
     use crate::observations::{JointObservations, Observations};
     use crate::random::Random;
     use crate::signal::fir::column_kernel;
-    use crate::statistics::{Runs, Sums};
+    use crate::statistics::{Purpose, Runs, Sums};
 
     /// Rows of one column and of noise with a memory of `time` rows behind the default filter, `y = 2 x + noise`, and what a pause
     /// of one row every `every` rows leaves of them.
@@ -319,7 +319,9 @@ mod tests {
     }
 
     fn spectrum(parts: &[Part<'_>]) -> Spectrum {
-        Sums::of(parts, Runs::Apart).spectra.swap_remove(0)
+        Sums::of(parts, Runs::Apart, Purpose::Result)
+            .spectra
+            .swap_remove(0)
     }
 
     /// The time from bands beside that from rows, white noise to a memory of 19 rows, in one run and in runs of 99 rows: each of twelve

@@ -12,8 +12,12 @@ use std::sync::Arc;
 
 /// Groups of logs at most, each with its stretches: seven for each of six units.
 pub(crate) const GROUPS: usize = 42;
+/// The same where nothing but the units is asked for.
+const UNITS: usize = 6;
+/// Logs up to which tenths of each are kept; of more fifths.
+const FEW_LOGS: usize = 4;
 /// Logs that are added up at a time.
-const BATCH: usize = 16;
+const BATCH: usize = 4;
 
 /// Sums over the rows of some logs. Logs come in the order of their names; of more than 42, every 42nd is in one group.
 #[derive(Debug, Clone, Default)]
@@ -25,7 +29,48 @@ pub(crate) struct Sums {
     /// Largest cut-off of the filters that made the rows, cycles per row; 0 without a filter.
     pub(crate) cutoff: f64,
     logs: usize,
+    keep: Keep,
+}
+
+/// What sums are for: how finely logs are cut follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    /// A fit, its left-out errors and the scores of its stretches.
+    Result,
+    /// A fit alone.
+    Fit,
+}
+
+/// What is kept of the rows of each log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Keep {
     runs: Runs,
+    /// Stretches of a log that are apart: 10, 5 or 1.
+    stretches: usize,
+    /// Groups of logs at most.
+    groups: usize,
+}
+
+impl Default for Keep {
+    fn default() -> Self {
+        Self::new(Runs::Apart, (1, Purpose::Result))
+    }
+}
+
+impl Keep {
+    fn new(runs: Runs, (logs, purpose): (usize, Purpose)) -> Self {
+        let (stretches, groups) = match purpose {
+            Purpose::Result if logs <= FEW_LOGS => (BLOCKS, GROUPS),
+            Purpose::Result => (BLOCKS / 2, GROUPS),
+            Purpose::Fit if logs < 3 => (BLOCKS / 2, UNITS),
+            Purpose::Fit => (1, UNITS),
+        };
+        Self {
+            runs,
+            stretches,
+            groups,
+        }
+    }
 }
 
 /// What is kept of consecutive rows.
@@ -53,21 +98,24 @@ struct JointCell {
 }
 
 impl Sums {
-    /// Without rows yet.
-    pub(crate) fn empty(runs: Runs) -> Self {
+    /// Without rows yet, for so many logs.
+    pub(crate) fn empty(runs: Runs, logs: (usize, Purpose)) -> Self {
         Self {
-            runs,
+            keep: Keep::new(runs, logs),
             ..Self::default()
         }
     }
 
     /// Of the rows of these parts, each of another log.
-    pub(crate) fn of(parts: &[Part<'_>], runs: Runs) -> Self {
+    pub(crate) fn of(parts: &[Part<'_>], runs: Runs, purpose: Purpose) -> Self {
         let mut parts: Vec<&Part<'_>> = parts.iter().collect();
         parts.sort_by(|a, b| a.observations.log.cmp(&b.observations.log));
-        let mut sums = Self::empty(runs);
+        let mut sums = Self::empty(runs, (parts.len(), purpose));
+        let stretches = sums.keep.stretches;
         for batch in parts.chunks(BATCH) {
-            let logs: Vec<LogSums> = batch.par_iter().map(|part| LogSums::of(part)).collect();
+            let logs: Vec<LogSums> = (batch.par_iter())
+                .map(|part| LogSums::of(part, stretches))
+                .collect();
             logs.iter().for_each(|log| sums.add(log));
         }
         sums
@@ -78,7 +126,8 @@ impl Sums {
     /// # Panics
     /// If it belongs to another robot or library than those before.
     pub(crate) fn add(&mut self, log: &LogSums) {
-        let group = self.logs % GROUPS;
+        let group = self.logs % self.keep.groups;
+        let merged = BLOCKS / self.keep.stretches;
         self.logs += 1;
         self.cutoff = self.cutoff.max(log.cutoff);
         if self.cells.len() == group {
@@ -89,13 +138,14 @@ impl Sums {
         for (spectrum, joint) in self.spectra.iter_mut().zip(&log.joints) {
             spectrum.add(joint);
         }
-        for (block, cell) in self.cells[group].iter_mut().enumerate() {
+        for block in 0..BLOCKS {
+            let cell = &mut self.cells[group][block / merged * merged];
             cell.rows += log.rows[block];
             cell.joints
                 .resize_with(log.joints.len(), JointCell::default);
             for (sum, joint) in cell.joints.iter_mut().zip(&log.joints) {
                 let mut own = joint.blocks[block].clone();
-                if self.runs == Runs::Apart {
+                if self.keep.runs == Runs::Apart {
                     own.gram.forget_runs();
                 }
                 sum.columns.clone_from(&joint.columns);
@@ -109,6 +159,11 @@ impl Sums {
                 }
             }
         }
+    }
+
+    /// Stretches of each log that can be told apart: 10, 5 or 1 of about equal length.
+    pub(crate) fn stretches(&self) -> usize {
+        self.keep.stretches
     }
 
     /// Number of groups of logs that can be left out: one per log up to [`GROUPS`].
@@ -125,7 +180,8 @@ impl Sums {
     pub(crate) fn torque_squares(&self) -> Vec<f64> {
         let of_joint = |joint: usize| -> f64 {
             let cells = self.cells.iter().flatten();
-            let sums = cells.flat_map(|cell| &cell.joints[joint].sums);
+            let own = cells.filter_map(|cell| cell.joints.get(joint));
+            let sums = own.flat_map(|own| &own.sums);
             sums.map(|(_, block)| block.torque).sum()
         };
         (0..self.joints()).map(of_joint).collect()
@@ -145,7 +201,10 @@ impl Sums {
                 .iter()
                 .flat_map(|(group, blocks)| &self.cells[*group][blocks.clone()]);
             for cell in cells {
-                let own = &cell.joints[joint];
+                // Where fewer stretches are apart, the cells between hold nothing.
+                let Some(own) = cell.joints.get(joint) else {
+                    continue;
+                };
                 columns = &own.columns;
                 for (recipes, sums) in &own.sums {
                     match kinds.iter_mut().find(|(known, _)| *known == recipes) {

@@ -58,7 +58,7 @@ fn near(a: &Symmetric, b: &Symmetric) {
 fn stretches_add_to_the_uncut_log() {
     let log = log(1, "log");
     let parts = [log.whole()];
-    let sums = Sums::of(&parts, Runs::Joined);
+    let sums = Sums::of(&parts, Runs::Joined, Purpose::Result);
     let (own, whole) = (sums.total().gram, log.whole().gram());
     let (own, whole) = (&own.joints[0], &whole.joints[0]);
     assert_eq!(
@@ -91,10 +91,18 @@ fn units_hold_every_row_once() {
     let logs: Vec<Observations> = (0..45)
         .map(|seed| log(seed, &format!("{seed:02}")))
         .collect();
-    for (count, units) in [(1, 5), (2, 5), (4, 4), (45, 6)] {
+    for (count, units) in [(1, 5), (2, 5), (4, 4), (5, 5), (45, 6)] {
         let parts: Vec<Part<'_>> = logs[..count].iter().map(Observations::whole).collect();
-        let training = Training::new(&Sums::of(&parts, Runs::Apart));
+        let training = Training::new(&Sums::of(&parts, Runs::Apart, Purpose::Result));
         assert_eq!(training.units.len(), units);
+        let alone = Training::new(&Sums::of(&parts, Runs::Apart, Purpose::Fit));
+        for (unit, own) in training.units.iter().zip(&alone.units) {
+            near(&unit.gram.joints[0].s0, &own.gram.joints[0].s0);
+            for decoy in 0..DECOYS {
+                let square = |unit: &Unit| unit.joints[0].decoys.square(decoy);
+                assert!((square(unit) / square(own) - 1.0).abs() < 1e-12);
+            }
+        }
         let rows = rows_of_units(&parts);
         for (unit, rows) in training.units.iter().zip(&rows) {
             let truth: Gram = rows.iter().collect();
@@ -113,7 +121,7 @@ fn the_order_of_logs_changes_no_bit() {
         .collect();
     let of = |logs: &[Observations]| {
         let parts: Vec<Part<'_>> = logs.iter().map(Observations::whole).collect();
-        Training::new(&Sums::of(&parts, Runs::Apart)).units
+        Training::new(&Sums::of(&parts, Runs::Apart, Purpose::Result)).units
     };
     let in_order = of(&logs);
     logs.swap(0, 3);
@@ -125,7 +133,7 @@ fn the_order_of_logs_changes_no_bit() {
 #[test]
 fn left_out_squares_are_those_of_rows() {
     let log = log(3, "log");
-    let unit = Sums::of(&[log.whole()], Runs::Apart).total();
+    let unit = Sums::of(&[log.whole()], Runs::Apart, Purpose::Result).total();
     let gram = &unit.gram.joints[0];
     let beta = [0.0, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0, -1.2];
     let own = residual_form(&gram.s0, &of_joint(gram, &beta));

@@ -16,6 +16,7 @@ use crate::observations::{Observations, Part};
 use crate::plug_in::Fit;
 use crate::posterior::Posterior;
 use crate::signal::{Pipeline, Trajectory};
+use crate::statistics::Purpose;
 use crate::term::Library;
 use crate::twin::Twin;
 use crate::validate::{HeldOut, LOG_GROUPS, Predictors, Split, Validation};
@@ -79,7 +80,7 @@ impl Plan<'_> {
                 .folds
                 .par_iter()
                 .map(|fold| {
-                    let sums = sums(&fold.training, settings);
+                    let sums = sums(&fold.training, settings, Purpose::Fit);
                     estimate(&sums, &fold.training, columns, settings)
                 })
                 .collect(),

@@ -9,8 +9,6 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// Tenths of all logs together at most; of more logs fifths are compared.
-const MOST_BLOCKS: usize = 40;
 /// Parts of each log of which one is left out.
 const FIFTHS: usize = 5;
 /// Rows of a tenth at least, on average.
@@ -263,13 +261,13 @@ fn difference(sums: &[f64], b1: &[f64], b0: &[f64]) -> f64 {
         .sum()
 }
 
-/// Which stretches of which group of logs are compared as one block: `(group, fifth, stretches)`. Tenths of each log while that makes no more
-/// than [`MOST_BLOCKS`] of [`LEAST_ROWS`] rows or more, else fifths.
+/// Which stretches of which group of logs are compared as one block: `(group, fifth, stretches)`. Tenths of each of a few logs, if they
+/// have [`LEAST_ROWS`] rows or more, else fifths.
 fn places(sums: &Sums) -> Vec<(usize, usize, Range<usize>)> {
     let groups = sums.groups();
     let tenths = groups * BLOCKS;
-    let few = tenths <= MOST_BLOCKS && sums.rows() >= LEAST_ROWS * tenths;
-    let each = if few { BLOCKS } else { FIFTHS };
+    let long = sums.rows() >= LEAST_ROWS * tenths;
+    let each = if long { sums.stretches() } else { FIFTHS };
     let cut = |i: usize| i * BLOCKS / each;
     let of_group =
         |group: usize| (0..each).map(move |i| (group, i * FIFTHS / each, cut(i)..cut(i + 1)));

@@ -68,8 +68,9 @@ fn blocks(fit: &Fit, sums: &Sums) -> Vec<Gram> {
     let times = fit.plug_in.autocorrelation_time.iter().copied();
     let shortest = (TIMES * times.fold(1.0, f64::max)).ceil() as usize;
     let count = (rows / shortest.max(1)).clamp(STRETCHES.1, STRETCHES.0);
-    let each = count.div_ceil(groups.max(1)).min(BLOCKS);
-    let cut = |i: usize| i * BLOCKS / each;
+    let apart = sums.stretches();
+    let each = count.div_ceil(groups.max(1)).min(apart);
+    let cut = |i: usize| i * apart / each * (BLOCKS / apart);
     let all = (0..groups).flat_map(|group| (0..each).map(move |i| (group, cut(i)..cut(i + 1))));
     let gram = |place| sums.unit(&[place]).gram;
     let moves = |gram: &Gram| gram.joints.iter().any(|joint| joint.n > 0.0);
@@ -128,13 +129,17 @@ mod tests {
     use super::*;
     use crate::calibrate::testing::{Regression, part};
     use crate::observations::Observations;
-    use crate::statistics::Runs;
+    use crate::statistics::{Purpose, Runs};
 
     /// Sandwich over likelihood sd of both columns, of three logs that the rows are cut into.
     fn ratios(random: &Regression, log: &Observations) -> Vec<f64> {
         let logs = log.cut(3);
         let (fit, compact) = random.fitted(&logs);
-        let sds = sds(&fit, &compact, &Sums::of(&logs, Runs::Joined));
+        let sds = sds(
+            &fit,
+            &compact,
+            &Sums::of(&logs, Runs::Joined, Purpose::Result),
+        );
         sds.iter()
             .zip(&compact.sd)
             .map(|(s, sd)| s.unwrap() / sd)
@@ -179,7 +184,7 @@ mod tests {
         let mut log = random.log(&[2.0, -1.0], 1.0);
         log.joints[0].weight = (0..400).map(|row| 0.5 + (row % 3) as f64).collect();
         let (fit, compact) = random.fitted(&[part(&log)]);
-        let blocks = blocks(&fit, &Sums::of(&[part(&log)], Runs::Apart));
+        let blocks = blocks(&fit, &Sums::of(&[part(&log)], Runs::Apart, Purpose::Result));
         assert_eq!(blocks.len(), 10);
         let factor = fit.plug_in.factor(0);
         for (block, gram) in blocks.iter().enumerate() {

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::likelihood::{Columns, NoiseModel};
 use crate::observations::Part;
 use crate::plug_in::{Fit, FitSettings, Moving, fit, fit_tempered, start};
-use crate::statistics::{Runs, Sums};
+use crate::statistics::{Purpose, Runs, Sums};
 
 /// A fit together with what left-out training data said of it.
 pub(in crate::calibrate) struct Fitted {
@@ -15,8 +15,12 @@ pub(in crate::calibrate) struct Fitted {
 }
 
 /// The sums that [`estimate`] takes of these rows.
-pub(in crate::calibrate) fn sums(rows: &[Part<'_>], settings: &CalibrationSettings) -> Sums {
-    Sums::of(rows, runs(settings))
+pub(in crate::calibrate) fn sums(
+    rows: &[Part<'_>],
+    settings: &CalibrationSettings,
+    purpose: Purpose,
+) -> Sums {
+    Sums::of(rows, runs(settings), purpose)
 }
 
 /// What a fit needs to know of consecutive rows.

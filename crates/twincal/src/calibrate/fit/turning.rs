@@ -22,7 +22,7 @@ use crate::plug_in::{Fit, FitSettings, Moving, fit, residual_correlation_time, s
 use crate::posterior::Posterior;
 use crate::robot::Robot;
 use crate::signal::{Log, Payload, Pipeline, ReadyLog, Trajectory, ready, stretches};
-use crate::statistics::{Runs, Sums};
+use crate::statistics::{Purpose, Runs, Sums};
 use crate::term::{Family, Library, LibrarySettings};
 
 /// Factors between neighbouring v_s, and how often one may be applied.
@@ -253,7 +253,7 @@ impl Trial<'_> {
             },
             prior: &self.settings.prior,
         };
-        let sums = Sums::of(&parts, Runs::Apart);
+        let sums = Sums::of(&parts, Runs::Apart, Purpose::Fit);
         let fit = match like {
             None => {
                 let start = start(&sums, &columns, &self.settings.prior);

@@ -17,6 +17,7 @@ use crate::error::{Error, Finding, Result, Severity};
 use crate::likelihood::{Columns, NoiseModel, NoiseSettings, Profile, Spread};
 use crate::observations::Part;
 use crate::robot::Robot;
+use crate::statistics::Purpose;
 
 /// Degrees of freedom ν.
 pub(crate) const FREEDOM: f64 = 4.0;
@@ -58,7 +59,12 @@ pub(in crate::calibrate) fn weigh(
     let mut down = vec![(0, 0); robot.dof()];
     for _ in 0..PASSES {
         let rows = data.training();
-        let fitted = estimate(&sums(&rows, settings), &rows, columns, settings)?;
+        let fitted = estimate(
+            &sums(&rows, settings, Purpose::Fit),
+            &rows,
+            columns,
+            settings,
+        )?;
         let beta = &fitted.fit.posterior.mean;
         for (joint, spread) in spreads.iter_mut().enumerate() {
             let memory = fitted.fit.plug_in.autocorrelation_time[joint];

@@ -19,7 +19,7 @@ use crate::lag::Lags;
 use crate::likelihood::{Columns, Spread};
 use crate::self_check::self_check;
 use crate::signal::{ReadyLog, ready};
-use crate::statistics::Sums;
+use crate::statistics::{Purpose, Sums};
 use crate::term::Library;
 
 /// Rows and columns of all logs.
@@ -127,7 +127,7 @@ impl<'r> Rows<'_, 'r> {
         } = &self.prepared;
         let (data, columns) = (&mut self.data, &self.columns);
         self.spreads = weigh::weigh(request.robot, data, columns, settings, findings)?;
-        self.sums = fitted::sums(&data.training(), settings);
+        self.sums = fitted::sums(&data.training(), settings, Purpose::Result);
         Ok(())
     }
 

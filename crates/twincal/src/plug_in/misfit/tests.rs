@@ -6,7 +6,7 @@ use super::*;
 use crate::likelihood::NoiseModel;
 use crate::observations::Observations;
 use crate::random::Random;
-use crate::statistics::{Runs, Sums, Training};
+use crate::statistics::{Purpose, Runs, Sums, Training};
 use crate::term::Family;
 
 /// A joint that swings, with two columns (q̇ and q̈ like) and what no column describes: `unknown` times sin 3q.
@@ -47,14 +47,14 @@ fn fitted(log: &Observations, columns: &Columns) -> Fit {
         noise: noise(NoiseModel::Tempered),
         prior: &prior,
     };
-    let training = Sums::of(&[log.whole()], Runs::Apart);
+    let training = Sums::of(&[log.whole()], Runs::Apart, Purpose::Result);
     let first = start(&training, columns, &prior);
     fit(&training, columns, settings, &first, Moving::All, None).unwrap()
 }
 
 /// The misfit of a log, with fifths left out.
 fn measured(log: &Observations, columns: &Columns, fit: &Fit) -> Misfit {
-    let training = Training::new(&Sums::of(&[log.whole()], Runs::Apart));
+    let training = Training::new(&Sums::of(&[log.whole()], Runs::Apart, Purpose::Result));
     let kept: Vec<Gram> = (0..5).map(|unit| training.without(unit)).collect();
     let sums = (&training.total(), &training.units[..], &kept[..]);
     misfit(sums, (columns, &prior()), fit).unwrap()

@@ -6,7 +6,7 @@ use crate::gram::Gram;
 use crate::likelihood::{Columns, PlugIn, assemble};
 use crate::observations::{JointObservations, Observations, Part};
 use crate::random::Random;
-use crate::statistics::{GROUPS, Runs, rows_of};
+use crate::statistics::{GROUPS, Purpose, Runs, rows_of};
 use crate::term::Family;
 
 const COLUMNS: usize = 4;
@@ -134,7 +134,7 @@ fn error(rows: &[(f64, [f64; COLUMNS], f64)], beta: &[f64]) -> f64 {
 
 /// The rows of each block, see [`places`].
 fn pieces<'a>(logs: &[Part<'a>]) -> Vec<(usize, usize, Vec<Part<'a>>)> {
-    let places = places(&Sums::of(logs, Runs::Apart)).into_iter();
+    let places = places(&Sums::of(logs, Runs::Apart, Purpose::Result)).into_iter();
     places
         .map(|(group, fifth, stretches)| (group, fifth, rows_of(logs, (group, stretches))))
         .collect()
@@ -189,7 +189,11 @@ fn the_algebra_is_what_refits_by_rows_say() {
         (&two[..1], LeftOutData::Fifths),
     ] {
         let fit = fit(logs, f64::NEG_INFINITY);
-        let left_out = LeftOut::new(&Sums::of(logs, Runs::Apart), &fit, &[true; 3]);
+        let left_out = LeftOut::new(
+            &Sums::of(logs, Runs::Apart, Purpose::Result),
+            &fit,
+            &[true; 3],
+        );
         let says = |rest: [bool; 3], own: usize| left_out.lowered(&rest, &[own]).unwrap();
         let first = says([false, true, true], 0);
         assert_eq!((first.left_out, first.blocks), (kind, pieces(logs).len()));
@@ -200,7 +204,11 @@ fn the_algebra_is_what_refits_by_rows_say() {
             by_rows(logs, &fit, kind, &[0, 1, 2, 3], &[0, 1, 3]),
         );
         // With what is out of the structure nothing is compared.
-        let left_out = LeftOut::new(&Sums::of(logs, Runs::Apart), &fit, &[true, false, true]);
+        let left_out = LeftOut::new(
+            &Sums::of(logs, Runs::Apart, Purpose::Result),
+            &fit,
+            &[true, false, true],
+        );
         let third = left_out.lowered(&[true, false, false], &[2]).unwrap();
         near(&third, by_rows(logs, &fit, kind, &[0, 1, 3], &[0, 1]));
     }
@@ -212,7 +220,11 @@ fn a_bound_holds_in_every_refit() {
     let own = log(&mut Random::new(4, 0), 240, [0.6, 0.4, 0.3, -0.8]);
     let logs = [own.whole()];
     let fit = fit(&logs, 0.0);
-    let left_out = LeftOut::new(&Sums::of(&logs, Runs::Apart), &fit, &[true; 3]);
+    let left_out = LeftOut::new(
+        &Sums::of(&logs, Runs::Apart, Purpose::Result),
+        &fit,
+        &[true; 3],
+    );
     let bounded = left_out.lowered(&[true, false, true], &[1]).unwrap();
     near(
         &bounded,
@@ -231,7 +243,11 @@ fn what_one_log_alone_shows_is_judged_by_fifths() {
     own[1].joints[1].x[400..].fill(0.0);
     let logs = own.each_ref().map(|log| log.whole());
     let fit = fit(&logs, f64::NEG_INFINITY);
-    let left_out = LeftOut::new(&Sums::of(&logs, Runs::Apart), &fit, &[true; 3]);
+    let left_out = LeftOut::new(
+        &Sums::of(&logs, Runs::Apart, Purpose::Result),
+        &fit,
+        &[true; 3],
+    );
     let says = |rest: [bool; 3], own: usize| left_out.lowered(&rest, &[own]).unwrap().left_out;
     assert_eq!(says([true, true, false], 2), LeftOutData::Fifths);
     assert_eq!(says([false, true, true], 0), LeftOutData::Logs);
@@ -271,7 +287,11 @@ fn fifths_of_many_logs_are_one_block() {
     let all: usize = blocks.iter().map(|block| rows(&block.2)).sum();
     assert_eq!(all, 30 * logs.len());
     let fit = fit(&logs, f64::NEG_INFINITY);
-    let left_out = LeftOut::new(&Sums::of(&logs, Runs::Apart), &fit, &[true; 3]);
+    let left_out = LeftOut::new(
+        &Sums::of(&logs, Runs::Apart, Purpose::Result),
+        &fit,
+        &[true; 3],
+    );
     let first = left_out.lowered(&[false, true, true], &[0]).unwrap();
     assert_eq!(first.left_out, LeftOutData::Logs);
     let truth = by_rows(&logs, &fit, first.left_out, &[0, 1, 2, 3], &[2, 3]);
@@ -290,7 +310,11 @@ fn a_true_effect_is_clear_and_a_column_without_one_is_not() {
         let own = log(&mut random, 200, [0.75, 0.0, 0.0, 0.0]);
         let logs = [own.whole()];
         let fit = fit(&logs, f64::NEG_INFINITY);
-        let left_out = LeftOut::new(&Sums::of(&logs, Runs::Apart), &fit, &[true; 3]);
+        let left_out = LeftOut::new(
+            &Sums::of(&logs, Runs::Apart, Purpose::Result),
+            &fit,
+            &[true; 3],
+        );
         let clear = |rest: [bool; 3], own| left_out.lowered(&rest, &[own]).unwrap().is_clear();
         found += usize::from(clear([false, true, true], 0));
         false_alarms += usize::from(clear([true, true, false], 2));
