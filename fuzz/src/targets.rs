@@ -329,7 +329,7 @@ fn model(name: &str, bytes: &[u8]) -> String {
             );
             findings
                 .iter()
-                .map(|f| f.code.clone())
+                .map(|f| f.code.as_str())
                 .collect::<Vec<_>>()
                 .join(" ")
         }
@@ -341,7 +341,7 @@ fn answer(read: twincal_io::Result<(twincal::signal::Recording, Vec<twincal::Fin
     match read {
         Ok((_, findings)) => findings
             .iter()
-            .map(|f| f.code.clone())
+            .map(|f| f.code.as_str())
             .collect::<Vec<_>>()
             .join(" "),
         Err(error) => error.to_string(),

@@ -4,7 +4,7 @@ use crate::report::{Conclusion, Reason, answer};
 use serde::Serialize;
 use twincal::calibrate::Calibration;
 use twincal::validate::Split;
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// Version of its layout.
 const VERSION: u64 = 1;
@@ -22,7 +22,7 @@ pub(crate) struct Assessment<'a> {
 /// Something that was found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Claim<'a> {
-    code: &'a str,
+    code: Code,
     role: Role,
     severity: Severity,
     /// Log, joint, link, component or term; empty for the whole run.
@@ -89,7 +89,7 @@ impl<'a> Claim<'a> {
             (None, Severity::Warning | Severity::Degraded) => Role::Limits,
         };
         Self {
-            code: &finding.code,
+            code: finding.code,
             role,
             severity: finding.severity,
             subject: &finding.subject,
@@ -110,7 +110,7 @@ fn requests(calibration: &Calibration, reason: Reason) -> Vec<Request<'_>> {
         requests.push(whole(RequestCode::LongerHeldOutLog));
     }
     let findings = calibration.findings.iter();
-    let unseen = findings.filter(|own| own.code == "unseen_motion" && !own.subject.is_empty());
+    let unseen = findings.filter(|own| own.code == Code::UnseenMotion && !own.subject.is_empty());
     requests.extend(unseen.map(|finding| Request {
         code: RequestCode::MoreMotion,
         subject: &finding.subject,

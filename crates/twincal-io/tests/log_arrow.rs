@@ -18,8 +18,8 @@ use logs::{arm, motion};
 use refusals::{contains, refused};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use twincal::Finding;
 use twincal::signal::Recording;
+use twincal::{Code, Finding};
 use twincal_io::Result;
 use twincal_io::log::{LogOptions, read_header, read_log};
 
@@ -71,7 +71,7 @@ fn files_streams_and_feather_hold_what_pyarrow_wrote() {
                 }
             }
         }
-        let said = findings.iter().any(|f| f.code == "timestamp_type");
+        let said = findings.iter().any(|f| f.code == Code::TimestampType);
         assert_eq!(said, name != "plain.arrow", "{name}");
     }
 }

@@ -8,6 +8,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use twincal::Code;
 use twincal::Severity;
 use twincal::robot::Robot;
 use twincal::signal::{
@@ -94,7 +95,7 @@ fn a_passive_elbow_and_one_that_rests_are_told() {
             let (_, findings) = align(&robot, &logs[run], &pipeline).unwrap();
             findings
                 .iter()
-                .any(|f| f.code == "joint_stands_still" && f.message.contains("`joint2`"))
+                .any(|f| f.code == Code::JointStandsStill && f.message.contains("`joint2`"))
         })
         .collect();
     assert_eq!(rests, [5]);
@@ -177,7 +178,7 @@ fn a_noisy_velocity_is_taken_from_position_and_no_other() {
         let mut expected = vec![DerivedFrom::Velocity; 6];
         expected[1] = DerivedFrom::Position;
         assert_eq!(pipeline.velocity_from, expected);
-        let said = said.iter().find(|f| f.code == "noisy_velocity").unwrap();
+        let said = said.iter().find(|f| f.code == Code::NoisyVelocity).unwrap();
         let stated = said.message.split("noise of ").nth(1).unwrap();
         let stated: f64 = stated.split(' ').next().unwrap().parse().unwrap();
         let left = 0.1 * (2.0 * pipeline.motion_cutoff_hz / 125.0).sqrt();
@@ -195,6 +196,6 @@ fn a_noisy_velocity_is_taken_from_position_and_no_other() {
         stated.corrections.velocity = Some(DerivedFrom::Velocity);
         let (pipeline, said) = choose_pipeline(&robot, &noisy, &stated).unwrap();
         assert_eq!(pipeline.velocity_from, []);
-        assert!(said.iter().all(|f| f.code != "noisy_velocity"));
+        assert!(said.iter().all(|f| f.code != Code::NoisyVelocity));
     }
 }

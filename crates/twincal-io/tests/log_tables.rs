@@ -16,9 +16,9 @@ use refusals::{contains, refused};
 use std::fs;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
-use twincal::Finding;
 use twincal::robot::JointKind;
 use twincal::signal::Recording;
+use twincal::{Code, Finding};
 use twincal_io::Result;
 use twincal_io::log::{LogOptions, Preset, TorqueSource, parse_log, read_csv, read_log};
 use zip::write::SimpleFileOptions;
@@ -132,7 +132,7 @@ fn arrays_and_their_columns_are_mapped_by_the_config() {
         recording.joints[0].tau.as_deref().unwrap(),
         [0.0, 2.0, 4.0, 6.0]
     );
-    let said = findings.iter().find(|f| f.code == "columns").unwrap();
+    let said = findings.iter().find(|f| f.code == Code::Columns).unwrap();
     contains(
         &said.message,
         &[
@@ -424,7 +424,10 @@ fn the_preset_ur_rtde_reads_currents_by_drive_constants() {
             12.5 * (18 + joint + 3) as f64
         );
     }
-    let said = findings.iter().find(|f| f.code == "torque_source").unwrap();
+    let said = findings
+        .iter()
+        .find(|f| f.code == Code::TorqueSource)
+        .unwrap();
     contains(
         &said.message,
         &[
@@ -452,7 +455,7 @@ fn temperatures_of_drives_are_read_where_they_are_named() {
     let mapped = columns("temperature = \"T*\"");
     let (recording, findings) = table(&text, 2, &mapped).unwrap();
     assert_eq!(temperature(&recording, 1), Some(41.0));
-    let said = findings.iter().find(|f| f.code == "columns").unwrap();
+    let said = findings.iter().find(|f| f.code == Code::Columns).unwrap();
     contains(&said.message, &["axis_1 = q1 T0", "axis_2 = q2 T1"]);
     let wrong = columns("temperature = { axis_1 = \"T7\" }");
     contains(
@@ -539,7 +542,7 @@ fn the_preset_franka_reads_both_forms_of_its_log() {
             assert_eq!(channels.qd.as_ref().unwrap()[2], (14 + joint + 2) as f64);
             assert_eq!(channels.tau.as_ref().unwrap()[2], (28 + joint + 2) as f64);
         }
-        assert!(findings.iter().any(|f| f.code == "time_unit"));
+        assert!(findings.iter().any(|f| f.code == Code::TimeUnit));
     }
 }
 

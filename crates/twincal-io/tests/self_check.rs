@@ -115,7 +115,7 @@ fn spoiled(spoil: impl Fn(&mut Recording)) -> Option<Result<Vec<(String, String)
     spoil(&mut logs[0]);
     let said = |f: Finding| {
         println!("{}", f.message);
-        (f.code, f.subject)
+        (f.code.to_string(), f.subject)
     };
     Some(
         check(&robot, &logs, Auto::Auto)
@@ -206,7 +206,9 @@ fn case_20_to_22_mistakes_that_friction_hides_are_named_on_real_robots() {
         let mut logs = logs.to_vec();
         logs.iter_mut().for_each(spoil);
         let findings = check(robot, &logs, Auto::Auto).unwrap();
-        let said = findings.into_iter().map(|f| (f.code, f.subject));
+        let said = findings
+            .into_iter()
+            .map(|f| (f.code.to_string(), f.subject));
         said.collect::<Vec<_>>()
     };
     let thousandths = |log: &mut Recording| {

@@ -1,7 +1,9 @@
 //! What can go wrong (`Error`: cannot go on) and what must be said (`Finding`: go on, but say so).
 
+mod code;
 mod mistake;
 
+pub use code::Code;
 pub use mistake::Mistake;
 
 use serde::{Deserialize, Serialize};
@@ -101,8 +103,8 @@ pub enum Severity {
 /// Something was dropped, changed, assumed or looks wrong. Shown in terminal, JSON and report; never silent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
-    /// Stable machine name in snake_case, e.g. `duplicate_stamps`.
-    pub code: String,
+    /// What it says, for programs.
+    pub code: Code,
     /// How much it matters.
     pub severity: Severity,
     /// What it is about: log, joint, term or link, by name. Empty when it is about the whole run.
@@ -117,13 +119,13 @@ impl Finding {
     /// A finding of the given severity about `subject`, counting `count` items.
     pub fn new(
         severity: Severity,
-        code: &str,
+        code: Code,
         subject: impl Into<String>,
         message: impl Into<String>,
         count: u64,
     ) -> Self {
         Self {
-            code: code.into(),
+            code,
             severity,
             subject: subject.into(),
             message: message.into(),

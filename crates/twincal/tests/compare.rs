@@ -119,7 +119,7 @@ fn friction_of_two_shapes_is_told() {
     let told = |a: &Twin, b: &Twin| hindrances(a, b).expect("twins");
     let said = told(&sharp, &soft);
     assert_eq!(said.len(), 1);
-    assert_eq!(said[0].code, "coulomb_velocity_differs");
+    assert_eq!(said[0].code, twincal::Code::CoulombVelocityDiffers);
     assert!(
         said[0]
             .message

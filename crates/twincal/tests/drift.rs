@@ -4,6 +4,7 @@
 #[allow(dead_code, reason = "its `main` prints, which a test does not need")]
 mod two_link;
 
+use twincal::Code;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::random::Random;
 use twincal::signal::Auto;
@@ -39,7 +40,7 @@ fn warmed(logged: bool) -> Calibration {
 #[test]
 fn friction_that_goes_with_the_logged_temperature_is_told_with_its_slope() {
     let said = |result: &Calibration, code: &str| {
-        let mut all = result.findings.iter().filter(|f| f.code == code);
+        let mut all = result.findings.iter().filter(|f| f.code.as_str() == code);
         all.next().map(|f| (f.subject.clone(), f.message.clone()))
     };
     let result = warmed(true);
@@ -57,7 +58,7 @@ fn friction_that_goes_with_the_logged_temperature_is_told_with_its_slope() {
         .parse()
         .expect("a number");
     assert!((slope + 0.04).abs() < 0.01, "{message}");
-    assert!(!result.findings.iter().any(|f| f.code == "drift"));
+    assert!(!result.findings.iter().any(|f| f.code == Code::Drift));
 
     assert_eq!(said(&warmed(false), "drift_with_temperature"), None);
 }

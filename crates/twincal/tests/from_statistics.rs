@@ -4,6 +4,7 @@
 #[allow(dead_code, reason = "its `main` and its study are not needed here")]
 mod two_link;
 
+use twincal::Code;
 use twincal::calibrate::{
     Calibration, CalibrationSettings, Plan, Quantity, Record, Statistics, calibrate,
     calibrate_statistics, plan,
@@ -260,7 +261,13 @@ fn what_is_wrong_with_a_log_stays_with_it() {
         .flatten()
         .for_each(|tau| *tau = -*tau);
     let wrong = Statistics::of(("arm", &study.robot), &plan, &Log::from(&wrong), "");
-    let note = Finding::new(Severity::Degraded, "rows_dropped", "log2", "half of it", 7);
+    let note = Finding::new(
+        Severity::Degraded,
+        Code::NotFiniteRows,
+        "log2",
+        "half of it",
+        7,
+    );
     let wrong = wrong.expect("statistics").with_findings(vec![note.clone()]);
     let mut sum = study.merged(&plan, 0..2);
     sum.try_merge(&wrong).expect("the same plan");

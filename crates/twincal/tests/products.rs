@@ -5,6 +5,7 @@
 #[allow(dead_code, reason = "its `main` and its study are not needed here")]
 mod two_link;
 
+use twincal::Code;
 use twincal::Severity;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::evaluator::Evaluator;
@@ -76,7 +77,7 @@ fn holds(calibration: &Calibration, component: &str, parameter: &str, truth: f64
 /// How bad it is that columns were worked out anew.
 fn severity(calibration: &Calibration) -> Option<Severity> {
     let mut findings = calibration.findings.iter();
-    let own = findings.find(|finding| finding.code == "relinearised");
+    let own = findings.find(|finding| finding.code == Code::Relinearised);
     own.map(|finding| finding.severity)
 }
 

@@ -114,8 +114,8 @@ fn fitted(log: Recording, cutoff_hz: f64, unasked_ripple: UnaskedRipple) -> Cali
 /// Code and message of what is said of ripple.
 fn said(result: &Calibration) -> Vec<(&str, &str)> {
     let all = result.findings.iter();
-    let ripple = all.filter(|finding| finding.code.starts_with("ripple_"));
-    ripple.map(|f| (&*f.code, &*f.message)).collect()
+    let ripple = all.filter(|finding| finding.code.as_str().starts_with("ripple_"));
+    ripple.map(|f| (f.code.as_str(), &*f.message)).collect()
 }
 
 /// 24 fits. Of noise alone one of them has a false ripple with a probability below 24 · 4000 · e⁻²⁵ < 1e-6; what friction leaves over at the

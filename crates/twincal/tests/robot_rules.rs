@@ -6,6 +6,7 @@
 )]
 
 use std::collections::BTreeMap;
+use twincal::Code;
 use twincal::robot::{
     Inertia, JointDescription, JointKind, LinkDescription, Mimic, Robot, RobotDescription,
 };
@@ -232,7 +233,7 @@ fn coordinates_follow_the_files_order_and_planarity_is_seen() {
     description.joints[1].axis = [0.0, 0.0, -3.0];
     let (robot, findings) = Robot::new(description.clone(), &BTreeMap::new()).unwrap();
     assert!(robot.is_planar(), "an axis the other way round is parallel");
-    assert_eq!(findings[0].code, "axis_normalised");
+    assert_eq!(findings[0].code, Code::AxisNormalised);
     description.joints[1].axis = [0.0, 0.1, 1.0];
     assert!(
         !Robot::new(description.clone(), &BTreeMap::new())
@@ -246,7 +247,7 @@ fn coordinates_follow_the_files_order_and_planarity_is_seen() {
     assert!(
         findings
             .iter()
-            .any(|f| f.code == "moves_no_mass" && f.subject == "wrist"),
+            .any(|f| f.code == Code::MovesNoMass && f.subject == "wrist"),
         "{findings:?}"
     );
 }

@@ -4,6 +4,7 @@
 #[allow(dead_code, reason = "its `main` prints, which a test does not need")]
 mod two_link;
 
+use twincal::Code;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::random::Random;
 use twincal::signal::{Auto, Recording};
@@ -63,7 +64,7 @@ fn case_92_robust_fits_are_sharper_and_their_intervals_hold() {
         let said = robust
             .findings
             .iter()
-            .filter(|f| f.code == "outliers_weighed");
+            .filter(|f| f.code == Code::OutliersWeighed);
         assert_eq!(said.count(), 2);
     }
 }
@@ -98,7 +99,7 @@ fn a_fold_of_a_handful_of_rows_is_told_and_not_scored() {
         let said = result
             .findings
             .iter()
-            .filter(|f| f.code == "heldout_not_scored");
+            .filter(|f| f.code == Code::HeldoutNotScored);
         assert_eq!(said.count(), usize::from(!scored), "{rows} rows");
         let joint = &result.validation.filtered.joints[0];
         assert_eq!(
@@ -159,7 +160,7 @@ fn coverage_by_speed(varies: bool) -> [f64; 2] {
     let said = result
         .findings
         .iter()
-        .any(|f| f.code == "noise_varies_with_speed");
+        .any(|f| f.code == Code::NoiseVariesWithSpeed);
     assert_eq!(said, !varies);
     let mut rows: Vec<(f64, bool)> = Vec::new();
     for trace in &result.validation.traces {
@@ -213,7 +214,7 @@ fn coverage_by_load(varies: bool) -> ([f64; 2], bool) {
     let result = calibrate(&nominal, &[training], &[heldout], &settings, &|_| {});
     let result = result.expect("a calibration");
     let mut findings = result.findings.iter();
-    let said = findings.any(|f| f.code == "noise_varies_with_load");
+    let said = findings.any(|f| f.code == Code::NoiseVariesWithLoad);
     let mut inside: [Vec<bool>; 2] = Default::default();
     for trace in &result.validation.traces {
         let rows = trace.measured.iter().enumerate().map(|(row, y)| {

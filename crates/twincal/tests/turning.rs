@@ -6,6 +6,7 @@ mod common;
 mod two_link;
 
 use std::sync::Arc;
+use twincal::Code;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::random::Random;
 use twincal::robot::{Workspace, inverse_dynamics};
@@ -67,7 +68,7 @@ fn fitted(logs: &[Recording], change: impl Fn(&mut CalibrationSettings)) -> Cali
 
 fn said(result: &Calibration) -> Option<&str> {
     let mut all = result.findings.iter();
-    let found = all.find(|finding| finding.code == "coulomb_velocity");
+    let found = all.find(|finding| finding.code == Code::CoulombVelocity);
     found.map(|finding| &*finding.message)
 }
 

@@ -5,6 +5,7 @@ mod common;
 #[allow(dead_code, reason = "its `main` prints, which a test does not need")]
 mod two_link;
 
+use twincal::Code;
 use twincal::calibrate::{Calibration, CalibrationSettings, Stopped, calibrate};
 use twincal::likelihood::NoiseModel;
 use twincal::random::Random;
@@ -70,7 +71,7 @@ fn used(result: &Calibration) -> (f64, NoiseModel, bool) {
     let said = result
         .findings
         .iter()
-        .any(|found| found.code == "wider_band");
+        .any(|found| found.code == Code::WiderBand);
     (
         result.twin.pipeline.cutoff_hz,
         result.likelihood.model,
@@ -152,7 +153,7 @@ fn where_the_wider_band_ends_early_the_usual_one_is_fitted() {
     assert_eq!(used(&result), (5.0, NoiseModel::Tempered, false));
     assert_eq!(result.twin.posterior, usual.twin.posterior);
     let (said, others): (Vec<_>, Vec<_>) =
-        (result.findings.into_iter()).partition(|found| found.code == "not_wider");
+        (result.findings.into_iter()).partition(|found| found.code == Code::NotWider);
     assert_eq!(others, usual.findings);
     assert!(
         said.len() == 1 && said[0].message.contains("MB are free"),

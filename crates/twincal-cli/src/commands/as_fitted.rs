@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use twincal::robot::Robot;
 use twincal::signal::Log;
 use twincal::words::significant;
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 use twincal_io::Error;
 use twincal_io::config::{FactorTable, LogSettings, key};
 use twincal_io::log::{LogOptions, read_header};
@@ -141,7 +141,7 @@ impl<'a> AsFitted<'a> {
             );
             doubts.push(Finding::new(
                 Severity::Warning,
-                "factor_in_doubt",
+                Code::FactorInDoubt,
                 joint,
                 message,
                 log.samples(),

@@ -13,6 +13,7 @@ use crate::progress::Progress;
 use crate::terminal::{Terminal, clean};
 use gates::{ALL, ENOUGH, Gate, Own, judge};
 use serde::Serialize;
+use twincal::Code;
 use twincal::twin::Twin;
 use twincal::validate::{
     Change, Changes, FALSE_ALARM, HeldOut, Scores, Split, Validation, least_share,
@@ -193,7 +194,7 @@ fn too_short(validation: &Validation, twin: &Twin) -> String {
 }
 
 /// Code of logs that the twin was fitted to.
-const FITTED: &str = "log_was_fitted";
+const FITTED: Code = Code::LogWasFitted;
 
 /// Logs that the twin knows already, by their checksums: what they show is no news.
 fn known_logs(files: &[FileHash], stored: &StoredTwin) -> Vec<Finding> {
@@ -207,7 +208,7 @@ fn known_logs(files: &[FileHash], stored: &StoredTwin) -> Vec<Finding> {
     let told = |file: &FileHash| {
         let (code, what) = match role(file)? {
             "heldout" => (
-                "log_was_heldout",
+                Code::LogWasHeldout,
                 "one that the twin was judged by when it was fitted: it repeats those scores",
             ),
             _ => (

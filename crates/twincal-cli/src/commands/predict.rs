@@ -15,7 +15,7 @@ use twincal::rows::{RowBlock, RowSignal, visit_rows};
 use twincal::signal::{Log, Recording, missing_torque};
 use twincal::term::Library;
 use twincal::twin::{Predictor, TorqueSignal, Twin};
-use twincal::{Finding, Result, Severity};
+use twincal::{Code, Finding, Result, Severity};
 use twincal_io::artifact::{Artifact, OutputFile};
 use twincal_io::table::{ColumnKind, TableFormat, TableWriter, Values};
 use twincal_io::twin_json::StoredTwin;
@@ -254,7 +254,7 @@ impl Prediction {
         }
         if written.is_ok() {
             // What is told of borders counts the rows of a fit, which has one filter more.
-            findings.retain(|finding| finding.code != "borders");
+            findings.retain(|finding| finding.code != Code::Borders);
             let missing = samples - (self.rows - before);
             findings.extend((missing > 0).then(|| unpredicted(&name, missing)));
         }
@@ -372,7 +372,7 @@ fn unpredicted(log: &str, rows: u64) -> Finding {
         "{rows} rows have no prediction: the motion filter needs some samples at either end of each stretch without a cut, and what else is \
          told here was left out"
     );
-    Finding::new(Severity::Note, "borders", log, message, rows)
+    Finding::new(Severity::Note, Code::Borders, log, message, rows)
 }
 
 fn columns(twin: &Twin) -> Vec<(String, ColumnKind)> {

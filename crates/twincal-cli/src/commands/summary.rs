@@ -6,7 +6,7 @@ use crate::terminal::{Terminal, clean};
 use twincal::calibrate::{Calibration, ParameterSummary};
 use twincal::validate::{Scores, Split};
 use twincal::words::significant;
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 use twincal_io::report;
 
 /// What to do about a log that contradicts the model.
@@ -293,7 +293,7 @@ fn lines(findings: &[Finding], severity: Severity, word: &str, place: Option<&st
         .filter(|finding| finding.severity == severity)
         .collect();
     // Code, how many say so, whom they name, what they say.
-    let mut texts: Vec<(&str, usize, Vec<&str>, String)> = Vec::new();
+    let mut texts: Vec<(Code, usize, Vec<&str>, String)> = Vec::new();
     for (number, finding) in of_severity.iter().enumerate() {
         let same =
             |other: &&&Finding| (&other.code, &other.message) == (&finding.code, &finding.message);
@@ -306,7 +306,7 @@ fn lines(findings: &[Finding], severity: Severity, word: &str, place: Option<&st
             .filter(|subject| !subject.is_empty())
             .collect();
         let text = format!("{}{}", about(&subjects, &finding.message), finding.message);
-        texts.push((&finding.code, alike().count(), subjects, text));
+        texts.push((finding.code, alike().count(), subjects, text));
     }
     let mut lines = Vec::new();
     let mut say = |text: &str| {
@@ -425,7 +425,7 @@ mod tests {
                 let words = format!("`term{i}` moves by {i} sd");
                 Finding::new(
                     Severity::Warning,
-                    "depends_on_cutoff",
+                    Code::DependsOnCutoff,
                     format!("term{i}"),
                     words,
                     0,
@@ -445,7 +445,7 @@ mod tests {
         );
         // Messages that several findings share: all of their subjects are named, and what has no name counts.
         let finding = |subject: &str, words: &str| {
-            Finding::new(Severity::Warning, "no_torque", subject, words, 0)
+            Finding::new(Severity::Warning, Code::MissingTorque, subject, words, 0)
         };
         let mut shared = vec![
             finding("a", "one"),

@@ -1,7 +1,7 @@
 //! The twin's own verdict, for commands that use it: nobody ought to meet it in the simulator first.
 
 use twincal::calibrate::Calibration;
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 use twincal_io::report::{Answer, Conclusion, answer};
 
 /// The verdict where it is not a plain yes: the answer and its first reason. It is of the fit, not of what the command does, so that exit codes
@@ -10,7 +10,7 @@ pub(super) fn doubt(calibration: &Calibration) -> Option<Finding> {
     let answer = answer(calibration);
     (answer.reason.conclusion() != Conclusion::Yes).then(|| {
         let words = words(&answer);
-        Finding::new(Severity::Warning, "verdict", "", words, 0)
+        Finding::new(Severity::Warning, Code::Verdict, "", words, 0)
     })
 }
 

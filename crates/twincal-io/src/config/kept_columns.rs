@@ -4,7 +4,7 @@
 use super::{ChannelNames, ColumnsTable, FactorTable, PerJoint, ReadAs};
 use crate::log::{LogOptions, has_columns};
 use twincal::words::listed;
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// Channels that a log may lack.
 const OPTIONAL: [&str; 4] = ["qd", "qdd", "tau", "temperature"];
@@ -61,7 +61,7 @@ impl Attempt {
     /// What is to be said of a log that was read so.
     pub fn findings(&self, log: &str) -> Vec<Finding> {
         let mut findings = Vec::new();
-        let mut say = |severity, code: &str, message| {
+        let mut say = |severity, code: Code, message| {
             findings.push(Finding::new(severity, code, log, message, 0));
         };
         if !self.kept.is_empty() {
@@ -69,7 +69,7 @@ impl Attempt {
             let message = format!(
                 "[columns] {keys} as in the fit; a key of [columns] in a --config says otherwise"
             );
-            say(Severity::Note, "columns_as_fitted", message);
+            say(Severity::Note, Code::ColumnsAsFitted, message);
         }
         if !self.given_up.is_empty() {
             let keys = self.given_up.join(", ");
@@ -77,7 +77,7 @@ impl Attempt {
                 "{log} does not have the columns that [columns] {keys} named in the fit: columns with the usual names are taken where \
                  there are some; [columns] in a --config says otherwise"
             );
-            say(Severity::Warning, "columns_not_as_fitted", message);
+            say(Severity::Warning, Code::ColumnsNotAsFitted, message);
         }
         findings
     }
@@ -152,7 +152,7 @@ impl ReadAs {
             "logged numbers are multiplied as in the fit: {}; [columns] factor of a --config says otherwise (1.0: as it is logged)",
             listed(&told, "; ")
         );
-        let finding = Finding::new(Severity::Note, "factor_as_fitted", "", message, 0);
+        let finding = Finding::new(Severity::Note, Code::FactorAsFitted, "", message, 0);
         Some((kept, finding))
     }
 }
@@ -209,7 +209,7 @@ mod tests {
         // milliseconds were those of the column `stamp`
         assert_eq!(usual.options.columns.time_unit, None);
         let said = usual.findings("new.csv");
-        assert_eq!(said[1].code, "columns_not_as_fitted");
+        assert_eq!(said[1].code, Code::ColumnsNotAsFitted);
         assert!(
             said[1].message.contains("[columns] q, time named"),
             "{said:?}"

@@ -4,6 +4,7 @@ use super::{ColumnsTable, FactorTable, LogSettings};
 use crate::log::{Preset, TorqueOptions, TorqueSource};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
+use twincal::Code;
 use twincal::{Finding, Severity};
 
 /// How the logs of a fit were understood.
@@ -80,7 +81,7 @@ impl ReadAs {
             }
             None => "the torque of the fit's logs was not of one kind ([[log]] torque): here it counts as joint torque; [[log]] torque of a --config says otherwise".into(),
         };
-        let code = "torque_as_fitted";
+        let code = Code::TorqueAsFitted;
         Some(Finding::new(Severity::Warning, code, "", message, 0))
     }
 

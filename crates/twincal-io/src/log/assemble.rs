@@ -12,7 +12,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use twincal::robot::Robot;
 use twincal::signal::{Channels, Log, LongLog, ReadChapter, Recording};
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// Share of rows dropped as unreadable beyond which the log counts as degraded.
 const DROPPED_LIMIT: f64 = 0.01;
@@ -210,7 +210,7 @@ impl Make {
                 let message = format!("time stamps were replaced by row / {rate} Hz as told");
                 findings.push(Finding::new(
                     Severity::Note,
-                    "time_replaced",
+                    Code::TimeReplaced,
                     name,
                     message,
                     self.rows as u64,
@@ -227,7 +227,7 @@ impl Make {
             );
             findings.push(Finding::new(
                 Severity::Note,
-                "time_origin",
+                Code::TimeOrigin,
                 name,
                 message,
                 0,
@@ -239,7 +239,13 @@ impl Make {
                 "time stamps were taken as {} as [columns] time_unit says",
                 unit.word()
             );
-            findings.push(Finding::new(Severity::Note, "time_unit", name, message, 0));
+            findings.push(Finding::new(
+                Severity::Note,
+                Code::TimeUnit,
+                name,
+                message,
+                0,
+            ));
         } else if let Some(preset) = options.preset.filter(|p| wants_ticks(*p, options)) {
             time.iter_mut().for_each(|time| *time /= preset.ticks());
             let message = format!(
@@ -247,7 +253,13 @@ impl Make {
                 preset.ticks(),
                 preset.name()
             );
-            findings.push(Finding::new(Severity::Note, "time_unit", name, message, 0));
+            findings.push(Finding::new(
+                Severity::Note,
+                Code::TimeUnit,
+                name,
+                message,
+                0,
+            ));
         }
         Ok(time)
     }
@@ -266,7 +278,7 @@ fn dropped(name: &str, rows: usize, cells: &mut Cells) -> Finding {
         cells.dropped,
         100.0 * share
     );
-    Finding::new(severity, "unreadable_rows", name, message, cells.dropped)
+    Finding::new(severity, Code::UnreadableRows, name, message, cells.dropped)
 }
 
 /// Whether a preset's own clock counts: not where the config states the unit.

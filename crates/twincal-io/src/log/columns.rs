@@ -23,7 +23,7 @@ use named::Header;
 use std::collections::{BTreeMap, BTreeSet};
 use twincal::robot::{Robot, did_you_mean};
 use twincal::words::{listed, quoted};
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// Words for position, velocity, acceleration, torque.
 const WORDS: [&[&str]; 4] = [
@@ -510,5 +510,5 @@ pub(super) fn say(
         };
         parts.push(format!("{joint} = {}{missing}", columns.join(" ")));
     }
-    Finding::new(Severity::Note, "columns", file, parts.join("; "), 0)
+    Finding::new(Severity::Note, Code::Columns, file, parts.join("; "), 0)
 }

@@ -6,7 +6,7 @@ use crate::error::Result;
 use twincal::robot::{Robot, did_you_mean};
 use twincal::signal::Recording;
 use twincal::words::listed;
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// Refuses factors that turn no number into another one, and joints that do not move in the model.
 ///
@@ -72,7 +72,7 @@ pub(super) fn apply(
     }
     findings.push(Finding::new(
         Severity::Note,
-        "column_factor",
+        Code::ColumnFactor,
         &recording.name,
         format!(
             "logged numbers are multiplied, as told: {}",

@@ -13,9 +13,9 @@ use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 use rayon::prelude::*;
 use std::io::{Read, Seek};
-use twincal::Finding;
 use twincal::Severity;
 use twincal::signal::Log;
+use twincal::{Code, Finding};
 
 /// Values read at a time.
 const BATCH: usize = 8192;
@@ -204,7 +204,7 @@ fn scale(name: &str, column: &ColumnDescriptor, findings: &mut Vec<Finding>) -> 
     };
     findings.push(Finding::new(
         Severity::Note,
-        "timestamp_type",
+        Code::TimestampType,
         name,
         format!("column `{path}` is a timestamp in {word} by its type and was turned into seconds"),
         0,

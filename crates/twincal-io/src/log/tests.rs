@@ -14,6 +14,7 @@ use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 use std::fmt::Write as _;
 use std::io::Write as _;
+use twincal::Code;
 use twincal::robot::JointKind;
 use twincal::signal::LongLog;
 use write::{Bag, Message};
@@ -156,7 +157,9 @@ fn numbers_are_multiplied_as_told() {
     )
     .unwrap();
     let (_, said) = read_log(&path, &robot(), &options).unwrap();
-    let told = said.iter().find(|finding| finding.code == "column_factor");
+    let told = said
+        .iter()
+        .find(|finding| finding.code == Code::ColumnFactor);
     assert_eq!(
         told.unwrap().message,
         "logged numbers are multiplied, as told: q of shoulder 0.5, q of elbow 0.5, tau of elbow -2"

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use twincal::robot::{Robot, did_you_mean};
 use twincal::signal::Recording;
 use twincal::words::listed;
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// What the logged torque is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -139,7 +139,7 @@ pub(super) fn to_joint_torque(
         );
         findings.push(Finding::new(
             Severity::Note,
-            "torque_source",
+            Code::TorqueSource,
             &recording.name,
             message,
             0,

@@ -9,7 +9,7 @@ use twincal::robot::{
     Inertia, JointDescription, JointKind, Limits, LinkDescription, Mimic, Placement,
     RobotDescription,
 };
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// Gravity that URDF takes for granted, m/s².
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
@@ -213,7 +213,7 @@ fn joint(
             );
             findings.push(Finding::new(
                 Severity::Note,
-                "urdf_dynamics",
+                Code::UrdfDynamics,
                 &name,
                 message,
                 1,
@@ -255,7 +255,13 @@ fn take_frames(
         let name = &link.name;
         let message =
             format!("link `{name}`: mass 0 and no moving joint of its own, taken as a frame{rest}");
-        findings.push(Finding::new(severity, "massless_frame", name, message, 1));
+        findings.push(Finding::new(
+            severity,
+            Code::MasslessFrame,
+            name,
+            message,
+            1,
+        ));
         link.inertia = None;
     }
 }
@@ -281,7 +287,7 @@ fn report_shapes_without_inertia(
             );
             findings.push(Finding::new(
                 Severity::Warning,
-                "link_without_inertia",
+                Code::LinkWithoutInertia,
                 name,
                 message,
                 1,
@@ -307,7 +313,7 @@ fn define_world(
         );
         findings.push(Finding::new(
             Severity::Note,
-            "undefined_world_link",
+            Code::UndefinedWorldLink,
             "world",
             "link `world` is used but not defined: taken as the fixed base (Drake's convention; Pinocchio refuses it)",
             1,

@@ -2,6 +2,7 @@
 
 use super::text::{fixed, list, percent};
 use super::view::Joint;
+use twincal::Code;
 use twincal::calibrate::Calibration;
 
 /// Two coefficients whose draws correlate this much are known as a combination.
@@ -43,7 +44,7 @@ pub(super) fn sentences(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<
     let unseen = calibration
         .findings
         .iter()
-        .filter(|f| f.code == "unseen_motion");
+        .filter(|f| f.code == Code::UnseenMotion);
     let mut unseen: Vec<String> = unseen.map(|finding| sentence(&finding.message)).collect();
     let more = unseen.len().saturating_sub(MOTIONS);
     unseen.truncate(MOTIONS);
@@ -100,7 +101,7 @@ mod tests {
     use super::*;
     use crate::report::{fixture, view};
     use twincal::calibrate::{Alike, Group};
-    use twincal::{Finding, Severity};
+    use twincal::{Code, Finding, Severity};
 
     #[test]
     fn effects_that_stand_for_each_other_are_named_together() {
@@ -126,7 +127,7 @@ mod tests {
         let message = "move `elbow` more: these logs show nothing of elbow.viscous";
         calibration.findings.push(Finding::new(
             Severity::Note,
-            "unseen_motion",
+            Code::UnseenMotion,
             "elbow",
             message,
             1,

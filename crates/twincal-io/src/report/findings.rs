@@ -3,14 +3,14 @@
 use super::text::count;
 use serde::Serialize;
 use twincal::calibrate::Calibration;
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// Findings of one kind, as the page shows them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Kind {
     pub(super) class: &'static str,
     pub(super) severity: &'static str,
-    pub(super) code: String,
+    pub(super) code: Code,
     /// Told in full.
     pub(super) told: Vec<Said>,
     /// Folded away.
@@ -38,7 +38,7 @@ pub(super) fn findings(calibration: &Calibration) -> Vec<Kind> {
             Severity::Degraded => ("bad", "degraded"),
         };
         for f in calibration.findings.iter().filter(|f| f.severity == wanted) {
-            let same = |kind: &&mut Kind| (kind.class, &kind.code) == (class, &f.code);
+            let same = |kind: &&mut Kind| (kind.class, kind.code) == (class, f.code);
             let said = Said {
                 subject: f.subject.clone(),
                 message: f.message.clone(),
@@ -53,7 +53,7 @@ pub(super) fn findings(calibration: &Calibration) -> Vec<Kind> {
                 None => kinds.push(Kind {
                     class,
                     severity,
-                    code: f.code.clone(),
+                    code: f.code,
                     told: vec![said],
                     more: Vec::new(),
                 }),
@@ -78,8 +78,8 @@ pub(super) fn is_about(finding: &Finding, joint: &str) -> bool {
 /// "There are 19 warnings of 6 kinds to read …"; `None` without any.
 pub(super) fn warnings(calibration: &Calibration) -> Option<String> {
     let findings = calibration.findings.iter();
-    let all: Vec<&str> = (findings.filter(|f| f.severity == Severity::Warning))
-        .map(|f| f.code.as_str())
+    let all: Vec<Code> = (findings.filter(|f| f.severity == Severity::Warning))
+        .map(|f| f.code)
         .collect();
     let mut kinds = all.clone();
     kinds.sort_unstable();
@@ -102,12 +102,15 @@ mod tests {
     use crate::report::fixture;
     use twincal::Finding;
 
-    fn with(codes: &[&str]) -> Calibration {
+    const A: Code = Code::Drift;
+    const B: Code = Code::Gaps;
+
+    fn with(codes: &[Code]) -> Calibration {
         let mut calibration = fixture::two_joints();
-        let finding = |(i, code): (usize, &&str)| {
+        let finding = |(i, code): (usize, &Code)| {
             Finding::new(
                 Severity::Warning,
-                code,
+                *code,
                 format!("joint{i}"),
                 format!("message {i}"),
                 0,
@@ -116,43 +119,35 @@ mod tests {
         calibration.findings = codes.iter().enumerate().map(finding).collect();
         calibration
             .findings
-            .push(Finding::new(Severity::Note, "n", "", "note", 0));
+            .push(Finding::new(Severity::Note, Code::Columns, "", "note", 0));
         calibration
     }
 
     #[test]
     fn of_many_of_one_kind_two_are_told_and_none_is_lost() {
-        let shape = |codes: &[&str]| -> Vec<(usize, usize)> {
+        let shape = |codes: &[Code]| -> Vec<(usize, usize)> {
             let kinds = findings(&with(codes));
             kinds.iter().map(|k| (k.told.len(), k.more.len())).collect()
         };
-        assert_eq!(shape(&["a"]), [(1, 0), (1, 0)]);
-        assert_eq!(shape(&["a", "b", "a", "a"]), [(3, 0), (1, 0), (1, 0)]);
-        assert_eq!(shape(&["a", "b", "a", "a", "a"]), [(2, 2), (1, 0), (1, 0)]);
-        let told = findings(&with(&["a", "a", "a", "a", "a"]));
+        assert_eq!(shape(&[A]), [(1, 0), (1, 0)]);
+        assert_eq!(shape(&[A, B, A, A]), [(3, 0), (1, 0), (1, 0)]);
+        assert_eq!(shape(&[A, B, A, A, A]), [(2, 2), (1, 0), (1, 0)]);
+        let told = findings(&with(&[A, A, A, A, A]));
         let messages: Vec<&str> = told[0].more.iter().map(|f| f.message.as_str()).collect();
         assert_eq!(messages, ["message 2", "message 3", "message 4"]);
     }
 
     #[test]
     fn warnings_are_counted_with_their_kinds() {
-        let words = |codes: &[&str]| warnings(&with(codes));
+        let words = |codes: &[Code]| warnings(&with(codes));
         assert_eq!(words(&[]), None);
-        assert!(words(&["a"]).unwrap().starts_with("There is one warning"));
+        assert!(words(&[A]).unwrap().starts_with("There is one warning"));
         assert!(
-            words(&["a", "b"])
+            words(&[A, B])
                 .unwrap()
                 .starts_with("There are 2 warnings to read")
         );
-        assert!(
-            words(&["a", "a"])
-                .unwrap()
-                .contains("2 warnings of one kind")
-        );
-        assert!(
-            words(&["a", "b", "a"])
-                .unwrap()
-                .contains("3 warnings of 2 kinds")
-        );
+        assert!(words(&[A, A]).unwrap().contains("2 warnings of one kind"));
+        assert!(words(&[A, B, A]).unwrap().contains("3 warnings of 2 kinds"));
     }
 }

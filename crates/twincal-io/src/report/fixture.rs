@@ -21,7 +21,7 @@ use twincal::signal::Pipeline;
 use twincal::term::{Family, LibrarySettings, Status};
 use twincal::twin::Twin;
 use twincal::validate::Trace;
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// Rate of the kept rows, Hz.
 const RATE: f64 = 25.0;
@@ -128,7 +128,7 @@ pub(super) fn hostile() -> Calibration {
     calibration.draws.terms[0] = calibration.terms[0].term.name.clone();
     calibration.findings.push(Finding::new(
         Severity::Degraded,
-        "<i>",
+        Code::Columns,
         "<u>",
         "<script>alert(7)</script>\u{7}",
         1,
@@ -285,7 +285,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
         findings: vec![
             Finding::new(
                 Severity::Warning,
-                "joint_barely_driven",
+                Code::JointNotDriven,
                 names[names.len() - 1],
                 format!(
                     "joint `{}`: 9.3 % of the rows stand still (|q̇| < 0.02 rad/s); its friction is known less well than the \
@@ -296,7 +296,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
             ),
             Finding::new(
                 Severity::Note,
-                "uniform_clock",
+                Code::TimeOrigin,
                 "run0.csv",
                 "log `run0.csv`: 3 stamps repeated; the later ones were dropped.",
                 3,

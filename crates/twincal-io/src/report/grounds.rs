@@ -6,6 +6,7 @@ use super::standstill::{at_standstill, held_at_rest, rest_got_worse};
 use super::status::with;
 use super::text::{count, first_of, list, number, percent};
 use super::view::{Joint, independent_rows, pooled_unit};
+use twincal::Code;
 use twincal::calibrate::{Calibration, ComponentSummary, Status};
 use twincal::validate::{JointScore, Scores, Split};
 
@@ -77,7 +78,7 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
         false => "",
     };
     let mut findings = calibration.findings.iter();
-    let which = match findings.any(|f| f.code == "urdf_dynamics") {
+    let which = match findings.any(|f| f.code == Code::UrdfDynamics) {
         true => format!("{which}; your model without the friction that its file states"),
         false => which.to_owned(),
     };
@@ -294,7 +295,7 @@ fn by_family(effects: &[&ComponentSummary]) -> String {
 mod tests {
     use super::super::verdict::tests::judged;
     use super::*;
-    use twincal::{Finding, Severity};
+    use twincal::{Code, Finding, Severity};
 
     /// Standstill rows as many as moving ones: of these the mean square is 4 before and 0.25 after; at rest `still` before and after, joint by joint.
     fn with_standstill(c: &mut Calibration, still: [[f64; 2]; 2]) {
@@ -405,7 +406,7 @@ mod tests {
             (joints[0].rmse_friction, joints[1].rmse_friction) = (Some(0.01), Some(9.0));
             c.findings = vec![Finding::new(
                 Severity::Note,
-                "urdf_dynamics",
+                Code::UrdfDynamics,
                 "elbow",
                 "",
                 0,

@@ -197,6 +197,7 @@ pub(super) fn compact(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<St
 mod tests {
     use super::*;
     use crate::report::fixture;
+    use twincal::Code;
 
     use twincal::Severity;
 
@@ -220,7 +221,7 @@ mod tests {
         assert!(!guarantee(&validation).contains("no more"));
         validation.conformal = None;
         assert!(guarantee(&validation).starts_with("No guarantee"));
-        let copy = Finding::new(Severity::Degraded, "copied_log", "run", "", 0);
+        let copy = Finding::new(Severity::Degraded, Code::CopiedLog, "run", "", 0);
         let text = super::guarantee(&fixture::two_joints().validation, &[copy]);
         assert!(
             text.starts_with("No guarantee") && !text.contains("guaranteed"),

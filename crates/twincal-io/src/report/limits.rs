@@ -9,7 +9,7 @@ use super::view::{Joint, independent_rows, memory, pooled_unit, standard_deviati
 use twincal::calibrate::Calibration;
 use twincal::posterior::Method;
 use twincal::validate::{JointScore, Scores, Validation, WORSE};
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// A 95 % interval is honest if it holds this share of the held-out rows.
 pub(super) const COVERAGE: (f64, f64) = (0.90, 0.99);
@@ -173,7 +173,7 @@ fn hardly_driven(names: &[String], calibration: &Calibration) -> &'static str {
     };
     let mut findings = calibration.findings.iter();
     let own = findings.any(|f| {
-        f.code == "joint_not_driven"
+        f.code == Code::JointNotDriven
             && held_out(&f.subject)
             && names.iter().any(|name| findings::is_about(f, name))
     });

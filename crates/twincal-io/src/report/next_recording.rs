@@ -7,6 +7,7 @@ use super::limits::FEW;
 use super::standstill::hardly_at_rest;
 use super::text::{first_of, list};
 use super::view::{Joint, independent_rows};
+use twincal::Code;
 use twincal::calibrate::{Alike, Calibration};
 use twincal::validate::Split;
 
@@ -15,7 +16,7 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
     let mut holds = Vec::new();
     let findings = || calibration.findings.iter();
     let mut more: Vec<String> = findings()
-        .filter(|f| f.code == "unseen_motion" && !f.subject.is_empty())
+        .filter(|f| f.code == Code::UnseenMotion && !f.subject.is_empty())
         .map(|f| f.subject.clone())
         .collect();
     more.dedup();
@@ -51,7 +52,7 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
             list(&first_of(apart, NAMED))
         ));
     }
-    if findings().any(|f| f.code == "quantised_encoder") {
+    if findings().any(|f| f.code == Code::QuantisedEncoder) {
         holds.push("with the encoder’s full resolution".into());
     }
     let untried = calibration.validation.split == Split::LastThirty;
@@ -90,7 +91,7 @@ fn driven_together(calibration: &Calibration) -> Option<(usize, usize)> {
     let passive = |log: &str, joint: &str| {
         let mut findings = calibration.findings.iter();
         findings.any(|f| {
-            matches!(&f.code[..], "joint_not_driven" | "joint_stands_still")
+            matches!(f.code, Code::JointNotDriven | Code::JointStandsStill)
                 && f.subject == log
                 && is_about(f, joint)
         })
@@ -112,7 +113,7 @@ mod tests {
     use super::*;
     use crate::report::{fixture, view};
     use twincal::calibrate::{Group, LogSummary};
-    use twincal::{Finding, Severity};
+    use twincal::{Code, Finding, Severity};
 
     #[test]
     fn it_holds_what_these_data_leave_open_and_nothing_else() {
@@ -131,7 +132,7 @@ mod tests {
         let test = "another motion, given with --heldout, as the test: so far only later parts of the fitted motion were tried.";
         assert_eq!(untried.as_deref(), Some(test));
         let encoder = of(&|c| {
-            let code = "quantised_encoder";
+            let code = Code::QuantisedEncoder;
             c.findings = vec![Finding::new(Severity::Warning, code, "elbow", "", 1)];
         });
         let said = "one to fit with these, with the encoder’s full resolution.";
@@ -145,7 +146,7 @@ mod tests {
                     ..one.clone()
                 };
                 c.logs = ["a", "b", "c", "d"].map(log).to_vec();
-                let codes = ["joint_not_driven", "joint_stands_still"];
+                let codes = [Code::JointNotDriven, Code::JointStandsStill];
                 let logs = c.logs.iter().zip(codes.into_iter().cycle());
                 for ((log, code), joint) in logs.zip(joints) {
                     let words = format!("joint `{joint}` …");

@@ -128,7 +128,7 @@ mod tests {
     use super::*;
     use crate::report::verdict::{Grade, tests::judged};
     use twincal::calibrate::Calibration;
-    use twincal::{Finding, Severity};
+    use twincal::{Code, Finding, Severity};
 
     /// Each reason where it holds, and "yes" where the page is green and nowhere else.
     #[test]
@@ -178,7 +178,7 @@ mod tests {
             ),
             (
                 |c| {
-                    let copy = Finding::new(Severity::Warning, "copied_log", "b", "a copy", 0);
+                    let copy = Finding::new(Severity::Warning, Code::CopiedLog, "b", "a copy", 0);
                     c.findings.push(copy);
                 },
                 Reason::CopiedLog,

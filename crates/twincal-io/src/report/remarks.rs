@@ -1,6 +1,7 @@
 //! What explains an effect's numbers: it stands at the effect's own line.
 
 use super::text::{number, percent};
+use twincal::Code;
 use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary};
 use twincal::term::Family;
 
@@ -28,7 +29,7 @@ fn joint_of(component: &ComponentSummary) -> Option<&str> {
 fn all_friction(component: &ComponentSummary, calibration: &Calibration) -> Option<String> {
     let is_stated = |joint: &str| {
         let mut findings = calibration.findings.iter();
-        findings.any(|f| f.code == "urdf_dynamics" && f.subject == joint)
+        findings.any(|f| f.code == Code::UrdfDynamics && f.subject == joint)
     };
     let friction = [Family::Viscous, Family::Coulomb].contains(&component.family);
     (friction && component.is_in() && joint_of(component).is_some_and(is_stated))
@@ -41,7 +42,7 @@ fn of_a_point_mass(component: &ComponentSummary, calibration: &Calibration) -> O
     let joints = &calibration.twin.robot.description().joints;
     let link = &joints.iter().find(|own| own.name == joint)?.child;
     let mut findings = calibration.findings.iter();
-    (component.is_in() && findings.any(|f| f.code == "point_mass" && f.subject == *link))
+    (component.is_in() && findings.any(|f| f.code == Code::PointMass && f.subject == *link))
         .then(|| format!("has in it the tensor that {link} lacks in your model"))
 }
 
@@ -120,7 +121,7 @@ mod tests {
     use super::*;
     use crate::report::fixture;
     use twincal::calibrate::Status;
-    use twincal::{Finding, Severity};
+    use twincal::{Code, Finding, Severity};
 
     fn of(change: impl Fn(&mut Calibration)) -> Vec<String> {
         let mut calibration = fixture::two_joints();
@@ -151,7 +152,7 @@ mod tests {
             let (name, child) = (joint.name.clone(), joint.child.clone());
             calibration.findings = vec![Finding::new(
                 Severity::Note,
-                "point_mass",
+                Code::PointMass,
                 child.as_str(),
                 "",
                 0,
@@ -168,7 +169,7 @@ mod tests {
 
     #[test]
     fn friction_that_a_file_states_is_remarked() {
-        let of = |code: &str, family: Family| {
+        let of = |code: Code, family: Family| {
             let mut calibration = fixture::two_joints();
             let subject = "elbow";
             calibration.findings = vec![Finding::new(Severity::Note, code, subject, "", 0)];
@@ -177,8 +178,8 @@ mod tests {
             remarks(&own, &calibration)
         };
         let said = "all of it: what your model file states is not counted".to_owned();
-        assert_eq!(of("urdf_dynamics", Family::Coulomb), [said]);
-        assert!(of("urdf_dynamics", Family::Spring).is_empty());
+        assert_eq!(of(Code::UrdfDynamics, Family::Coulomb), [said]);
+        assert!(of(Code::UrdfDynamics, Family::Spring).is_empty());
     }
 
     #[test]

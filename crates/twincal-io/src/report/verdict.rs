@@ -15,7 +15,7 @@ use super::view::{Joint, independent_rows, memory};
 use serde::Serialize;
 use twincal::calibrate::Calibration;
 use twincal::validate::WORSE;
-use twincal::{Finding, Mistake, Severity};
+use twincal::{Code, Finding, Mistake, Severity};
 
 /// Ratio of errors from which calibration counts as an improvement.
 const BETTER: f64 = 0.95;
@@ -224,7 +224,7 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
 fn no_bodies(calibration: &Calibration) -> usize {
     let findings = calibration.findings.iter();
     let sure = findings.filter(|f| f.severity == Severity::Warning);
-    sure.filter(|f| f.code == "unphysical_inertia_found")
+    sure.filter(|f| f.code == Code::UnphysicalInertiaFound)
         .count()
 }
 
@@ -404,7 +404,13 @@ pub(super) mod tests {
         let of = |links: &[&str]| {
             judged(|c| {
                 let finding = |link: &&str| {
-                    Finding::new(Severity::Warning, "unphysical_inertia_found", *link, "", 0)
+                    Finding::new(
+                        Severity::Warning,
+                        Code::UnphysicalInertiaFound,
+                        *link,
+                        "",
+                        0,
+                    )
                 };
                 c.findings = links.iter().map(finding).collect();
             })
@@ -427,17 +433,17 @@ pub(super) mod tests {
     #[test]
     fn no_recording_is_advised_of_a_log_that_contradicts_the_model() {
         use twincal::validate::Split;
-        let next = |codes: &[&str]| {
+        let next = |codes: &[Code]| {
             judged(|c| {
                 c.validation.split = Split::LastThirty;
-                let finding = |code: &&str| Finding::new(Severity::Degraded, code, "elbow", "", 0);
+                let finding = |code: &Code| Finding::new(Severity::Degraded, *code, "elbow", "", 0);
                 c.findings = codes.iter().map(finding).collect();
             })
             .next
         };
         assert!(next(&[]).is_some());
-        assert_eq!(next(&["constant_torque"]), None);
-        assert_eq!(next(&["sign_flip"]), None);
+        assert_eq!(next(&[Code::ConstantTorque]), None);
+        assert_eq!(next(&[Code::SignFlip]), None);
     }
 
     #[test]

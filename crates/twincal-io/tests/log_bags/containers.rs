@@ -3,6 +3,7 @@
 use super::write::{Bag, JOINT_STATE, Message, bag, both, plain};
 use super::{contains, is_the_motion, read, read_bytes, refused, says};
 use std::fs;
+use twincal::Code;
 use twincal::Severity;
 
 /// Byte ranges of the contents of all records outside chunks with this opcode.
@@ -233,7 +234,7 @@ fn the_checksum_of_the_data_section_is_compared() {
     let whole = writer.into_inner().into_inner();
     let (recording, findings) = read_bytes(&whole).unwrap();
     is_the_motion(&recording, 200, 1.0);
-    assert!(!findings.iter().any(|f| f.code == "damaged_data"));
+    assert!(!findings.iter().any(|f| f.code == Code::DamagedData));
     let mut changed = whole.clone();
     let end = records(&whole, DATA_END)[0].start - 9;
     changed[end - 3] ^= 0x10;
@@ -248,7 +249,7 @@ fn the_checksum_of_the_data_section_is_compared() {
     let claim = records(&whole, DATA_END)[0].clone();
     changed[claim].copy_from_slice(&[0; 4]);
     let (_, findings) = read_bytes(&changed).unwrap();
-    assert!(!findings.iter().any(|f| f.code == "damaged_data"));
+    assert!(!findings.iter().any(|f| f.code == Code::DamagedData));
 
     let mut chunks = bag(&both());
     let index = records(&chunks, 0x07)[0].clone();

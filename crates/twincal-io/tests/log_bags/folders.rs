@@ -5,6 +5,7 @@ use super::{START, contains, fixture, is_the_motion, read, refused, says};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
+use twincal::Code;
 
 /// A folder with the bag of `both` cut into parts, named so that the order of the alphabet is wrong.
 fn parts() -> TempDir {
@@ -55,7 +56,7 @@ fn case_62_a_folder_without_metadata_is_read_by_names() {
     metadata(folder.path(), &["run_2.mcap", "run_9.mcap", "run_10.mcap"]);
     let (same, findings) = read(folder.path()).unwrap();
     assert_eq!(same, recording);
-    assert!(!findings.iter().any(|f| f.code == "no_metadata"));
+    assert!(!findings.iter().any(|f| f.code == Code::NoMetadata));
     let empty = tempfile::tempdir().unwrap();
     contains(
         &refused(read(empty.path())),

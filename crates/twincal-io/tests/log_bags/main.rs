@@ -63,7 +63,7 @@ fn stamp(recording: &Recording, row: usize) -> f64 {
 fn says<'a>(findings: &'a [Finding], code: &str) -> &'a Finding {
     findings
         .iter()
-        .find(|f| f.code == code)
+        .find(|f| f.code.as_str() == code)
         .unwrap_or_else(|| panic!("no finding `{code}` in {findings:#?}"))
 }
 

@@ -6,6 +6,7 @@ use super::{
     START, contains, fixture, is_the_motion, read, read_bytes, read_bytes_with, refused, says,
     stamp,
 };
+use twincal::Code;
 use twincal::Severity;
 use twincal_io::log::{LogOptions, TorqueOptions, TorqueSource};
 
@@ -252,7 +253,7 @@ fn case_61_late_messages_are_put_in_the_order_of_their_stamps() {
         message.stamp -= 900_000_000;
     }
     let (recording, findings) = read_bytes(&bag(&messages)).unwrap();
-    assert!(!findings.iter().any(|f| f.code == "late_messages"));
+    assert!(!findings.iter().any(|f| f.code == Code::LateMessages));
     let back = recording.time.windows(2).filter(|w| w[1] < w[0]).count();
     assert_eq!((back, recording.time.len()), (1, 200));
 }

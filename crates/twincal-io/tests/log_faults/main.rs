@@ -56,13 +56,13 @@ fn run(text: &str) -> Result<(Trajectory, Vec<Finding>)> {
 fn says<'a>(findings: &'a [Finding], code: &str) -> &'a Finding {
     findings
         .iter()
-        .find(|f| f.code == code)
+        .find(|f| f.code.as_str() == code)
         .unwrap_or_else(|| panic!("no finding `{code}` in {findings:#?}"))
 }
 
 fn silent(findings: &[Finding], code: &str) {
     assert!(
-        !findings.iter().any(|f| f.code == code),
+        !findings.iter().any(|f| f.code.as_str() == code),
         "unexpected `{code}` in {findings:#?}"
     );
 }

@@ -7,7 +7,7 @@ use twincal::robot::JointKind;
 use twincal::signal::{
     Auto, DerivedFrom, Pipeline, SignalSettings, Trajectory, align, choose_pipeline,
 };
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 use twincal_io::log::read_csv;
 
 #[test]
@@ -115,7 +115,7 @@ fn case_23_a_wrapped_angle_is_unfolded_and_counted_a_slider_never() {
     let turns = ((turning(3999) + PI) / TAU).floor() as u64;
     let said: Vec<&Finding> = findings
         .iter()
-        .filter(|f| f.code == "wrapped_angle")
+        .filter(|f| f.code == Code::WrappedAngle)
         .collect();
     assert_eq!(said.len(), 1, "{findings:#?}");
     assert_eq!(said[0].count, turns);
@@ -123,7 +123,7 @@ fn case_23_a_wrapped_angle_is_unfolded_and_counted_a_slider_never() {
     // The slider keeps its jumps: as no slider moves so, the log is cut there and says it.
     let jumps: Vec<&Finding> = findings
         .iter()
-        .filter(|f| f.code == "position_step")
+        .filter(|f| f.code == Code::PositionStep)
         .collect();
     assert_eq!(jumps.len(), 1, "{findings:#?}");
     assert_eq!(jumps[0].count, turns);
@@ -241,7 +241,7 @@ fn case_26_saturated_torque_is_masked_with_what_the_filter_mixes_with_it() {
     let (trajectory, findings) = run(&log.csv()).unwrap();
     let said: Vec<&Finding> = findings
         .iter()
-        .filter(|f| f.code == "saturated_torque")
+        .filter(|f| f.code == Code::SaturatedTorque)
         .collect();
     assert_eq!(said.len(), 1, "{findings:#?}");
     assert_eq!(said[0].severity, Severity::Warning);

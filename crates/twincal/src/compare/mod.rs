@@ -6,7 +6,7 @@
 mod rivals;
 
 use crate::calibrate::{Calibration, Status};
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity};
 use crate::posterior::draws::{CoefficientDraws, draw};
 use crate::term::{Before, Estimate, Family, Library};
 use crate::twin::Twin;
@@ -247,7 +247,7 @@ pub fn hindrances(before: &Twin, after: &Twin) -> Result<Vec<Finding>> {
     );
     Ok(vec![Finding::new(
         Severity::Warning,
-        "coulomb_velocity_differs",
+        Code::CoulombVelocityDiffers,
         "",
         message,
         0,

@@ -8,7 +8,7 @@
 //! The limit of 0.5 is that of the median joint, so that repeatable ripple of a few joints makes no copy.
 
 use super::signature::{MOST_JOINTS, Signature};
-use crate::error::{Finding, Result, Severity};
+use crate::error::{Code, Finding, Result, Severity};
 use crate::signal::{Log, Recording, median_step};
 use crate::words::significant;
 use rayon::prelude::*;
@@ -220,7 +220,7 @@ fn finding([first, second]: [&Log<'_>; 2], found: &Match) -> Result<Finding> {
     };
     Ok(Finding::new(
         Severity::Degraded,
-        "copied_log",
+        Code::CopiedLog,
         second.name(),
         format!(
             "log `{}` is a copy of `{}`: {} s of both have the same torque noise (correlation {correlation:.2}, independent recordings have 0 ± \

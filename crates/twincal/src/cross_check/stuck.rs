@@ -3,7 +3,7 @@
 //! Position that is constant for a while is rest, unless the joint is somewhere else afterwards, from one sample to the next, or its logged
 //! velocity says that it moves as fast as it usually does.
 
-use crate::error::{Finding, Result, Severity};
+use crate::error::{Code, Finding, Result, Severity};
 use crate::robot::Robot;
 use crate::signal::{Channels, Log, Recording, median_step};
 use crate::words::significant;
@@ -63,7 +63,7 @@ fn finding(log: &str, joint: &str, held: &[Held]) -> Option<Finding> {
     };
     Some(Finding::new(
         Severity::Warning,
-        "encoder_stuck",
+        Code::EncoderStuck,
         joint,
         format!(
             "log `{log}`, joint `{joint}`: position holds one value from {from:.3} to {to:.3} s while the joint moves by {}{times}: repair the \

@@ -2,7 +2,7 @@
 
 use super::common_fit::{CommonFit, Effect, Fitted};
 use super::rows::{Block, blocks, parameters};
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::rigid_fit::{Bins, bins, leaning, settle};
 use crate::robot::Robot;
 use crate::signal::{Pipeline, Trajectory};
@@ -282,7 +282,7 @@ impl Names<'_> {
                     _ => "the other logs say of the same robot".to_owned(),
                 };
                 (
-                    "log_torque_factor",
+                    Code::LogTorqueFactor,
                     name,
                     format!("log `{name}`"),
                     others,
@@ -293,13 +293,19 @@ impl Names<'_> {
                 let (log, joint) = (self.logs[log], self.joints[joint]);
                 let what = format!("log `{log}`, joint `{joint}`");
                 let others = "the other logs and joints say of the same robot".to_owned();
-                ("log_torque_factor", log, what, others, "its torque column")
+                (
+                    Code::LogTorqueFactor,
+                    log,
+                    what,
+                    others,
+                    "its torque column",
+                )
             }
             Whose::Joint(joint) => {
                 let name = self.joints[joint];
                 let others = "the other joints say of the links that it moves".to_owned();
                 (
-                    "joint_torque_factor",
+                    Code::JointTorqueFactor,
                     name,
                     format!("joint `{name}`"),
                     others,
@@ -328,7 +334,7 @@ impl Names<'_> {
         let name = self.logs[log];
         Finding::new(
             Severity::Warning,
-            "log_torque_lag",
+            Code::LogTorqueLag,
             name,
             format!(
                 "log `{name}`: torque is written {:.0} ± {:.0} ms {} the motion than in the other logs: log it as the others, or move its stamps by that much",
@@ -355,7 +361,7 @@ impl Names<'_> {
         let order = if drift.size > 0.0 { "slower" } else { "faster" };
         Finding::new(
             Severity::Warning,
-            "clock_drift",
+            Code::ClockDrift,
             subject,
             format!(
                 "{what}: the clock of torque is {} % ± {} {order} than that of the motion, so that its lag grows by {} ms in 10 s: log both with one \

@@ -1,7 +1,7 @@
 //! The one list of findings that forbid a "Yes": a log or model is not what it is said to be.
 
-use super::Finding;
 use super::Severity::{self, Degraded, Note, Warning};
+use super::{Code, Finding};
 
 /// What a mistake is about. The order is that of the answer: the first kind that stands is its headline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -21,39 +21,39 @@ pub enum Mistake {
 }
 
 /// Every code that forbids a "Yes": from which severity on, and what it is about. Add a line for a new one; nothing else decides.
-const TABLE: &[(&str, Severity, Mistake)] = &[
+const TABLE: &[(Code, Severity, Mistake)] = &[
     // signal/agreement.rs, self_check
-    ("sign_flip", Note, Mistake::Contradiction),
-    ("joint_order", Note, Mistake::Contradiction),
-    ("torque_scale", Note, Mistake::Contradiction),
-    ("velocity_opposite", Note, Mistake::Contradiction),
-    ("base_orientation", Degraded, Mistake::Contradiction),
-    ("model_torque", Degraded, Mistake::Contradiction),
-    ("gravity_compensated", Degraded, Mistake::Contradiction),
-    ("clock_scale", Degraded, Mistake::Contradiction),
-    ("torque_copied", Degraded, Mistake::Contradiction),
-    ("torque_constant", Degraded, Mistake::NoMeasurement),
-    ("torque_held", Degraded, Mistake::NoMeasurement),
+    (Code::SignFlip, Note, Mistake::Contradiction),
+    (Code::JointOrder, Note, Mistake::Contradiction),
+    (Code::TorqueScale, Note, Mistake::Contradiction),
+    (Code::VelocityOpposite, Note, Mistake::Contradiction),
+    (Code::BaseOrientation, Degraded, Mistake::Contradiction),
+    (Code::ModelTorque, Degraded, Mistake::Contradiction),
+    (Code::GravityCompensated, Degraded, Mistake::Contradiction),
+    (Code::ClockScale, Degraded, Mistake::Contradiction),
+    (Code::TorqueCopied, Degraded, Mistake::Contradiction),
+    (Code::TorqueConstant, Degraded, Mistake::NoMeasurement),
+    (Code::TorqueHeld, Degraded, Mistake::NoMeasurement),
     // calibrate/result/common_gain.rs; a warning where torque comes from currents
-    ("common_factor", Degraded, Mistake::Contradiction),
+    (Code::CommonFactor, Degraded, Mistake::Contradiction),
     // signal/torque.rs; a warning where one joint of several is passive
-    ("constant_torque", Degraded, Mistake::NoMeasurement),
+    (Code::ConstantTorque, Degraded, Mistake::NoMeasurement),
     // cross_check
-    ("copied_log", Warning, Mistake::Copy),
-    ("log_torque_factor", Warning, Mistake::OddTorque),
-    ("joint_torque_factor", Warning, Mistake::OddTorque),
-    ("log_torque_lag", Warning, Mistake::OddTorque),
-    ("clock_drift", Warning, Mistake::OddMotion),
-    ("encoder_stuck", Warning, Mistake::OddMotion),
+    (Code::CopiedLog, Warning, Mistake::Copy),
+    (Code::LogTorqueFactor, Warning, Mistake::OddTorque),
+    (Code::JointTorqueFactor, Warning, Mistake::OddTorque),
+    (Code::LogTorqueLag, Warning, Mistake::OddTorque),
+    (Code::ClockDrift, Warning, Mistake::OddMotion),
+    (Code::EncoderStuck, Warning, Mistake::OddMotion),
     // signal/jumps.rs
-    ("position_step", Warning, Mistake::OddMotion),
+    (Code::PositionStep, Warning, Mistake::OddMotion),
     // calibrate/checks/another_state.rs
-    ("another_state", Warning, Mistake::AnotherState),
+    (Code::AnotherState, Warning, Mistake::AnotherState),
 ];
 
 impl Mistake {
     /// The codes that forbid a "Yes", with the severity from which on each does.
-    pub fn codes() -> impl Iterator<Item = (&'static str, Severity)> {
+    pub fn codes() -> impl Iterator<Item = (Code, Severity)> {
         TABLE.iter().map(|(code, severity, _)| (*code, *severity))
     }
 }
@@ -62,7 +62,7 @@ impl Finding {
     /// The mistake that it speaks of; `None` where a "Yes" may stand beside it.
     #[must_use]
     pub fn mistake(&self) -> Option<Mistake> {
-        let named = |(code, severity, _): &&(&str, Severity, Mistake)| {
+        let named = |(code, severity, _): &&(Code, Severity, Mistake)| {
             *code == self.code && self.severity >= *severity
         };
         TABLE.iter().find(named).map(|(_, _, mistake)| *mistake)
@@ -89,11 +89,11 @@ mod tests {
 
     #[test]
     fn codes_are_listed_once_and_forbid_from_their_severity_on() {
-        let codes: BTreeSet<&str> = Mistake::codes().map(|(code, _)| code).collect();
+        let codes: BTreeSet<Code> = Mistake::codes().map(|(code, _)| code).collect();
         assert_eq!(codes.len(), TABLE.len());
-        let passive = Finding::new(Severity::Warning, "constant_torque", "", "", 0);
+        let passive = Finding::new(Severity::Warning, Code::ConstantTorque, "", "", 0);
         assert!(!passive.forbids_yes());
-        assert!(!Finding::new(Severity::Degraded, "drift", "", "", 0).forbids_yes());
+        assert!(!Finding::new(Severity::Degraded, Code::Drift, "", "", 0).forbids_yes());
         for (code, severity) in Mistake::codes() {
             assert!(
                 Finding::new(severity, code, "", "", 0).forbids_yes(),

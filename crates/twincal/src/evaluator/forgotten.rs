@@ -1,6 +1,6 @@
 //! What a program loses because it knows one state and nothing of what was before.
 
-use crate::error::{Finding, Result, Severity};
+use crate::error::{Code, Finding, Result, Severity};
 use crate::signal::Warmth;
 use crate::term::Family;
 use crate::twin::Twin;
@@ -79,7 +79,7 @@ pub fn forgotten(twin: &Twin) -> Result<Option<Finding>> {
     };
     Ok(Some(Finding::new(
         Severity::Note,
-        "program_forgets",
+        Code::ProgramForgets,
         "",
         format!(
             "the program knows one state and nothing of what was before: it takes friction as that of steady sliding at mean warmth, which is \

@@ -6,6 +6,7 @@ mod contacts;
 mod repeats;
 mod stops;
 
+use crate::error::Code;
 use crate::error::{Finding, Result, Severity};
 use crate::rigid_fit::{Bins, bins};
 use crate::robot::Robot;
@@ -168,14 +169,14 @@ pub fn incident_findings(log: &str, incidents: &[Incident]) -> Vec<Finding> {
         let list = list.join(", ");
         let (code, message) = match kind {
             IncidentKind::Contact => (
-                "contact",
+                Code::Contact,
                 format!(
                     "contact, collision or push, {times}: torque that no rigid body and no friction explains, {list}{more}. These samples are \
                      left out of the fit, for all joints. Look at what touched the robot; nothing has to be done if that is known"
                 ),
             ),
             IncidentKind::DrivesOff => (
-                "drives_off",
+                Code::DrivesOff,
                 format!(
                     "brakes or a protective stop, {times}: all joints are at rest without the torque that would hold them \
                      (joint and torque in brackets), {list}{more}. These samples are left out of the fit"

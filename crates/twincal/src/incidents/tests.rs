@@ -2,6 +2,7 @@
 //! the motion before a reversal, whose model errs alike in every cycle, or whose position jumps.
 
 use super::*;
+use crate::error::Code;
 use crate::robot::{Motion, nominal_torque};
 use crate::self_check::testing::{INTERVAL, LEN, arm, log, remember};
 use std::f64::consts::PI;
@@ -50,7 +51,7 @@ fn case_29_a_contact_is_found_where_it_is_and_left_out_for_all_joints() {
     let all: Vec<bool> = (0..4).map(|j| still[j * LEN + 1630]).collect();
     assert_eq!(all, [true; 4]);
     assert!(!still[0] && !still[1400] && !still[1900]);
-    assert_eq!(incident_findings("run", &spikes)[0].code, "contact");
+    assert_eq!(incident_findings("run", &spikes)[0].code, Code::Contact);
 }
 
 #[test]

@@ -16,7 +16,7 @@ mod estimate;
 mod pool;
 mod rows;
 
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::robot::Robot;
 use crate::signal::{Lag, Pipeline, Trajectory};
 use crate::words::significant;
@@ -235,7 +235,7 @@ pub fn lag_findings(said: &Lag, lags: &Lags) -> Vec<Finding> {
         };
         findings.push(Finding::new(
             severity,
-            "torque_lag",
+            Code::TorqueLag,
             &joint.joint,
             message,
             0,
@@ -257,7 +257,7 @@ pub fn late_logs(lags: &Lags) -> Vec<Finding> {
         );
         Some(Finding::new(
             Severity::Degraded,
-            "torque_lag",
+            Code::TorqueLag,
             &log.log,
             message,
             0,
@@ -286,7 +286,7 @@ fn common_finding(said: &Lag, lags: &Lags, common: [f64; 2]) -> Finding {
             ),
         ),
     };
-    Finding::new(severity, "torque_lag", "", message, 0)
+    Finding::new(severity, Code::TorqueLag, "", message, 0)
 }
 
 /// A lag in words.

@@ -1,6 +1,7 @@
 //! A planted lag comes back in parts of a sample, with an error that is true; friction that remembers, a wrong model and a contact are no lag.
 
 use super::*;
+use crate::error::Code;
 use crate::self_check::testing::{INTERVAL, LEN, arm, leaning_and_loaded, log, log_of, remember};
 
 fn pipeline() -> Pipeline {
@@ -55,7 +56,7 @@ fn case_17_a_planted_lag_comes_back_in_parts_of_a_sample() {
             assert_eq!(said.len(), usize::from(lag != 0.0), "{said:?}");
             assert!(
                 said.iter()
-                    .all(|f| f.severity == Severity::Note && f.code == "torque_lag")
+                    .all(|f| f.severity == Severity::Note && f.code == Code::TorqueLag)
             );
             match found.correction(&arm(1.0)) {
                 Some(Lag::All(moved)) => {

@@ -7,7 +7,7 @@ use super::spatial::{
 };
 use super::tree::Tree;
 use super::{JointDescription, JointKind, Placement, RobotDescription};
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity};
 
 /// A moving body with everything that is rigidly attached to it.
 ///
@@ -153,7 +153,7 @@ fn unit_axis(joint: &JointDescription, findings: &mut Vec<Finding>) -> Result<[f
         );
         findings.push(Finding::new(
             Severity::Note,
-            "axis_normalised",
+            Code::AxisNormalised,
             &joint.name,
             message,
             1,

@@ -2,7 +2,7 @@
 
 use super::names::did_you_mean;
 use super::{JointKind, RobotDescription};
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity};
 use std::collections::BTreeMap;
 
 /// Where a joint's position comes from.
@@ -70,7 +70,7 @@ pub(crate) fn assign(
             );
             findings.push(Finding::new(
                 Severity::Note,
-                "locked_fixed_joint",
+                Code::LockedFixedJoint,
                 name,
                 message,
                 1,
@@ -88,7 +88,7 @@ pub(crate) fn assign(
             );
             findings.push(Finding::new(
                 Severity::Warning,
-                "locked_beyond_limits",
+                Code::LockedBeyondLimits,
                 name,
                 message,
                 1,

@@ -3,6 +3,7 @@
 use super::RobotDescription;
 use super::bodies::Body;
 use super::spatial::dot;
+use crate::error::Code;
 use crate::error::{Finding, Severity};
 use crate::words::significant;
 use std::f64::consts::PI;
@@ -29,8 +30,7 @@ pub(super) fn report(
         let (mass, link) = (body.moments.mass, &description.links[body.link].name);
         // An impossible tensor has no radius.
         let told = |finding: &Finding| {
-            [CODE, "unphysical_inertia"].contains(&finding.code.as_str())
-                && finding.subject == *link
+            [CODE, Code::UnphysicalInertia].contains(&finding.code) && finding.subject == *link
         };
         if mass <= WORTH_TELLING * all || findings.iter().any(told) {
             continue;
@@ -65,7 +65,7 @@ pub(super) fn report(
 }
 
 /// The same of links without any tensor.
-pub(super) const CODE: &str = "point_mass";
+pub(super) const CODE: Code = Code::PointMass;
 
 #[cfg(test)]
 mod tests {

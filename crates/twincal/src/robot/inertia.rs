@@ -2,7 +2,7 @@
 
 use super::spatial::{IDENTITY, Matrix, add, rotate_tensor, scale};
 use super::{Inertia, Placement};
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity};
 
 /// Rounding that a file may show: a thin rod or a flat plate sits exactly on the bound of what is possible.
 const TOLERANCE: f64 = 1e-9;
@@ -185,7 +185,7 @@ pub(crate) fn check(
         format!("link `{link}`: {problem}; used as it is because unphysical inertias are allowed");
     Ok(Some(Finding::new(
         Severity::Warning,
-        "unphysical_inertia",
+        Code::UnphysicalInertia,
         link,
         message,
         1,
@@ -254,7 +254,7 @@ mod tests {
                 .unwrap()
                 .unwrap()
                 .code,
-            "point_mass"
+            Code::PointMass
         );
         for bad in [f64::NAN, f64::INFINITY, -1.0] {
             let text = check("fore", &body(bad, [1.0; 3]), true)
@@ -271,13 +271,13 @@ mod tests {
                 .unwrap()
                 .unwrap()
                 .code,
-            "unphysical_inertia"
+            Code::UnphysicalInertia
         );
         for bad in [[-1e-3, 1.0, 1.0], [1.0, 2.0, 3.001], [-1.0, -1.0, -1.0]] {
             assert!(check("l", &turned(bad), false).is_err(), "{bad:?}");
             assert_eq!(
                 check("l", &turned(bad), true).unwrap().unwrap().code,
-                "unphysical_inertia"
+                Code::UnphysicalInertia
             );
         }
     }

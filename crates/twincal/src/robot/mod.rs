@@ -52,7 +52,7 @@ pub use names::{did_you_mean, nearest_names};
 pub use parameters::{PARAMETERS, PINOCCHIO_ORDER, body_parameters, inertia_of, to_body_frame};
 pub use regressor::{Pair, Regressor, RegressorBlock};
 
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity};
 pub(crate) use bodies::Body;
 use bodies::Home;
 pub(crate) use changed::Change;
@@ -228,7 +228,7 @@ fn report_massless(
             format!("joint `{name}`: nothing beyond it has mass; its nominal torque is 0");
         findings.push(Finding::new(
             Severity::Warning,
-            "moves_no_mass",
+            Code::MovesNoMass,
             name,
             message,
             1,

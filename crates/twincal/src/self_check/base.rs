@@ -10,7 +10,7 @@ use super::mend::explains_more;
 use super::parts::Parts;
 use super::sample::Sample;
 use super::shared;
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::linear_algebra::symmetric_eigen;
 use crate::robot::Robot;
 use crate::words::significant;
@@ -95,7 +95,7 @@ impl Base {
         let (joint, worst) = most_helped(robot, before, after);
         Finding::new(
             Severity::Degraded,
-            "base_orientation",
+            Code::BaseOrientation,
             "",
             format!(
                 "the torque shows gravity [{}] m/s² in the base frame, the model has [{}]: {degrees:.0}° apart, {place}; with it model and \

@@ -3,7 +3,7 @@
 use super::explain::Explained;
 use super::parts::{Parts, driven};
 use super::sample::Sample;
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::robot::Robot;
 use crate::words::significant;
 
@@ -59,7 +59,7 @@ fn copied(
             let count = sample.len as u64;
             let finding = Finding::new(
                 Severity::Degraded,
-                "torque_copied",
+                Code::TorqueCopied,
                 names[wrong],
                 message,
                 count,
@@ -88,7 +88,7 @@ fn constant(robot: &Robot, log: &str, sample: &Sample, parts: &Parts) -> Vec<Fin
                 significant(size, 2)
             );
             let count = sample.len as u64;
-            Finding::new(Severity::Degraded, "torque_constant", names[joint], message, count)
+            Finding::new(Severity::Degraded, Code::TorqueConstant, names[joint], message, count)
         })
         .collect()
 }

@@ -8,7 +8,7 @@ use super::columns::is_constant;
 use super::parts::{Torques, driven, payload};
 use super::sample::Sample;
 use super::shared::{self, CLEARLY, Estimate};
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::robot::Robot;
 use crate::words::significant;
 
@@ -145,11 +145,11 @@ pub(super) fn missing_finding(log: &str, part: Part, factors: &Factors) -> Findi
     let (gravity, inertia) = (factor(factors.gravity), factor(factors.inertia));
     let (code, looks_like) = match part {
         Part::NoModel => (
-            "model_torque",
+            Code::ModelTorque,
             "measured minus model torque, or an estimate of external torque",
         ),
         Part::NoGravity => (
-            "gravity_compensated",
+            Code::GravityCompensated,
             "torque with gravity compensated, as some controllers publish it",
         ),
     };
@@ -180,7 +180,7 @@ pub(super) fn factor_findings(factors: &Factors) -> Vec<Finding> {
         );
         return vec![Finding::new(
             Severity::Degraded,
-            "clock_scale",
+            Code::ClockScale,
             "",
             message,
             0,
@@ -197,7 +197,7 @@ pub(super) fn factor_findings(factors: &Factors) -> Vec<Finding> {
     );
     vec![Finding::new(
         Severity::Degraded,
-        "torque_scale",
+        Code::TorqueScale,
         "",
         message,
         0,

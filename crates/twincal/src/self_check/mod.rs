@@ -15,7 +15,7 @@ mod sample;
 mod shared;
 mod velocity;
 
-use crate::error::{Finding, Result, Severity};
+use crate::error::{Code, Finding, Result, Severity};
 use crate::robot::Robot;
 use crate::signal::{Pipeline, Trajectory};
 use crate::words::significant;
@@ -390,7 +390,7 @@ impl Scale {
         Self {
             finding: Finding::new(
                 Severity::Degraded,
-                "torque_scale",
+                Code::TorqueScale,
                 subject,
                 format!(
                     "{whose}{problem}; nothing was scaled: convert the {columns} and fit again"
@@ -504,7 +504,7 @@ fn signs_and_order(
         };
         findings.push(Finding::new(
             Severity::Degraded,
-            "sign_flip",
+            Code::SignFlip,
             *name,
             format!(
                 "joint `{name}`: {turned}: model and friction explain {} of its torque as logged, {} turned; nothing was \
@@ -522,7 +522,7 @@ fn signs_and_order(
         };
         findings.push(Finding::new(
             Severity::Degraded,
-            "joint_order",
+            Code::JointOrder,
             "",
             format!(
                 "the log's joints seem exchanged: try {}; model and friction then explain at least {} of every joint's torque \

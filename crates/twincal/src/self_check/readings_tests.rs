@@ -3,6 +3,7 @@
 use super::sample;
 use super::testing::{INTERVAL, LEN, arm, log, log_of};
 use super::*;
+use crate::error::Code;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 fn pipeline() -> Pipeline {
@@ -16,7 +17,7 @@ fn pipeline() -> Pipeline {
 fn said(robot: &Robot, trajectory: &Trajectory) -> Vec<(String, String)> {
     let findings = self_check(robot, &pipeline(), [trajectory]).unwrap();
     let findings = findings.into_iter().filter(|f| f.severity > Severity::Note);
-    findings.map(|f| (f.code, f.subject)).collect()
+    findings.map(|f| (f.code.to_string(), f.subject)).collect()
 }
 
 fn only(code: &str, subject: &str) -> Vec<(String, String)> {
@@ -67,7 +68,7 @@ fn a_robot_on_a_wall_or_a_ceiling_gets_its_base_proposed() {
             let robot = arm(1.15).with_gravity(gravity_of(rpy));
             let log = log_of(&robot, f64::from(seed) * 3.1);
             let seen = look(&arm(1.0), &pipeline(), [&log]).unwrap();
-            let codes: Vec<&str> = seen.findings.iter().map(|f| &*f.code).collect();
+            let codes: Vec<&str> = seen.findings.iter().map(|f| f.code.as_str()).collect();
             assert_eq!(codes, ["base_orientation"], "{rpy:?}: {:#?}", seen.findings);
             let base = seen.base.unwrap();
             assert!(
@@ -202,7 +203,7 @@ fn a_factor_on_all_torque_or_on_inertia_alone_is_named() {
     let findings = self_check(&arm(1.0), &pipeline(), [&doubled]).unwrap();
     assert_eq!(findings.len(), 1, "{findings:#?}");
     assert_eq!(
-        (&*findings[0].code, &*findings[0].subject),
+        (findings[0].code.as_str(), &*findings[0].subject),
         ("torque_scale", "")
     );
     // 2 × 1.15 of the model's is 2.3; the payload's columns take 1 % of it.
@@ -223,7 +224,10 @@ fn a_factor_on_all_torque_or_on_inertia_alone_is_named() {
     let s = &mut slow.segments[0];
     s.qd.iter_mut().for_each(|v| *v *= 1.4);
     let findings = self_check(&arm(1.15), &pipeline(), [&slow]).unwrap();
-    let clock = findings.iter().find(|f| f.code == "clock_scale").unwrap();
+    let clock = findings
+        .iter()
+        .find(|f| f.code == Code::ClockScale)
+        .unwrap();
     assert!(
         clock.message.contains("1.400 times too long"),
         "{}",
@@ -303,7 +307,7 @@ fn torque_that_is_held_while_its_joint_moves_is_named() {
         let findings = crate::signal::constant_torque(&arm(1.0), &logs).unwrap();
         findings
             .into_iter()
-            .map(|f| (f.code, f.subject, f.severity))
+            .map(|f| (f.code.to_string(), f.subject, f.severity))
             .collect()
     };
     let hold = (0.2 / INTERVAL) as usize;

@@ -2,6 +2,7 @@
 
 use super::testing::{INTERVAL, LEN, arm, log};
 use super::*;
+use crate::error::Code;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
@@ -15,7 +16,10 @@ fn check(trajectory: &Trajectory) -> Result<Vec<Finding>> {
 
 fn said(trajectory: &Trajectory) -> Vec<(String, String)> {
     let findings = check(trajectory).unwrap();
-    findings.into_iter().map(|f| (f.code, f.subject)).collect()
+    findings
+        .into_iter()
+        .map(|f| (f.code.to_string(), f.subject))
+        .collect()
 }
 
 /// The rows of one joint in a channel.
@@ -90,7 +94,7 @@ fn case_19_and_20_torque_of_another_unit_or_side_is_named_with_its_gain() {
         let findings = check(&scaled).unwrap();
         assert_eq!(findings.len(), 1, "{findings:#?}");
         assert_eq!(
-            (&*findings[0].code, &*findings[0].subject),
+            (findings[0].code.as_str(), &*findings[0].subject),
             ("torque_scale", "j2")
         );
         assert!(findings[0].message.contains(words), "{findings:#?}");
@@ -141,7 +145,9 @@ fn a_few_seconds_tell_no_factor_but_thousandths() {
         };
         let log = beginning(scaled, (seconds / INTERVAL) as usize);
         let findings = self_check(&arm(1.0), &pipeline, [&log]).unwrap();
-        let told = findings.into_iter().map(|f| (f.code, f.subject));
+        let told = findings
+            .into_iter()
+            .map(|f| (f.code.to_string(), f.subject));
         told.collect::<Vec<_>>()
     };
     let told = [("torque_scale".to_owned(), "j2".to_owned())];
@@ -167,7 +173,9 @@ fn case_19_and_20_torque_of_all_joints_of_quite_another_size_is_named_without_it
             ..Pipeline::off(4)
         };
         let findings = self_check(robot, &pipeline, [&log]).unwrap();
-        let said = findings.into_iter().map(|f| (f.code, f.subject));
+        let said = findings
+            .into_iter()
+            .map(|f| (f.code.to_string(), f.subject));
         said.collect::<Vec<_>>()
     };
     let of = |factor: f64, friction: f64| on(&arm(1.0), factor, friction);
@@ -221,7 +229,7 @@ fn case_20_torque_far_beyond_the_models_effort_limit_is_in_another_unit() {
     let seen = of(&robot, 1000.0);
     assert_eq!(seen.findings.len(), 1, "{:#?}", seen.findings);
     let said = &seen.findings[0];
-    assert_eq!((&*said.code, &*said.subject), ("torque_scale", "j4"));
+    assert_eq!((said.code.as_str(), &*said.subject), ("torque_scale", "j4"));
     assert!(said.message.contains("the effort limit of the model (10)"));
     let factors = seen.joints.iter().map(|joint| joint.torque_factor);
     assert!(factors.eq([None, None, None, Some(1e-3)]));
@@ -231,7 +239,7 @@ fn case_20_torque_far_beyond_the_models_effort_limit_is_in_another_unit() {
     let seen = look(&robot, &pipeline, [&all]).unwrap();
     assert_eq!(seen.findings.len(), 1, "{:#?}", seen.findings);
     assert_eq!(
-        (&*seen.findings[0].code, &*seen.findings[0].subject),
+        (seen.findings[0].code.as_str(), &*seen.findings[0].subject),
         ("torque_scale", "")
     );
     let factors = seen.joints.iter().map(|joint| joint.torque_factor);
@@ -352,7 +360,7 @@ fn case_22_exchanged_joints_are_named_with_the_order_to_try() {
         }
         let findings = check(&mixed).unwrap();
         assert_eq!(findings.len(), 1, "{findings:#?}");
-        assert_eq!(findings[0].code, "joint_order");
+        assert_eq!(findings[0].code, Code::JointOrder);
         assert!(findings[0].message.contains(words), "{findings:#?}");
     }
 }

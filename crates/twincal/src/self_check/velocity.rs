@@ -1,7 +1,7 @@
 //! Velocity that is the change of position times one number on all joints: a clock, or a unit, that is wrong.
 
 use super::sample::Sample;
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::words::significant;
 
 /// |ln slope| from which velocity is not the change of position: 3 %, where inertial torque is off by 6 %.
@@ -34,7 +34,7 @@ fn finding(log: &str, slope: f64) -> Finding {
     };
     Finding::new(
         Severity::Degraded,
-        "clock_scale",
+        Code::ClockScale,
         log,
         format!(
             "log `{log}`: the logged velocity of all joints is {} times the change of their position: looks like a clock whose time is {} times \

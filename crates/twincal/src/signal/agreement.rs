@@ -1,7 +1,7 @@
 //! Is the logged velocity the derivative of the logged position (case 24)?
 
 use super::Trajectory;
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use serde::{Deserialize, Serialize};
 
 /// Share of the velocity's power that the derivative of position must explain.
@@ -55,7 +55,7 @@ pub fn velocity_agreement(trajectory: &Trajectory, standstill: &[f64]) -> Vec<Op
 }
 
 /// Code of the finding on a velocity that is minus the derivative of position.
-const OPPOSITE: &str = "velocity_opposite";
+const OPPOSITE: Code = Code::VelocityOpposite;
 
 /// A warning for every joint whose velocity does not belong to its position.
 pub(crate) fn findings(names: &[&str], log: &str, agreement: &[Option<Agreement>]) -> Vec<Finding> {
@@ -75,7 +75,7 @@ pub(crate) fn findings(names: &[&str], log: &str, agreement: &[Option<Agreement>
                 "joint `{name}`: the logged velocity is not the change of position (R² {r2:.3}, slope {slope:.3}): scaled, \
                  late or of another joint; with [signal] velocity = \"position\" it is not used"
             );
-            Finding::new(Severity::Warning, "velocity_mismatch", log, message, 0)
+            Finding::new(Severity::Warning, Code::VelocityMismatch, log, message, 0)
         })
         .collect()
 }

@@ -9,7 +9,7 @@ use super::prepare::{JointFacts, Piece, Prepared, Values, pick, prepare, report_
 use super::standstill::{at_rest, slower_than};
 use super::thin::thin;
 use super::{Channels, DerivedFrom, LoggedSamples, Pipeline, Recording, Segment, Trajectory};
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity};
 use crate::words::significant;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -253,7 +253,7 @@ fn align(
     if cutoff < pipeline.motion_cutoff_hz {
         findings.push(Finding::new(
             Severity::Warning,
-            "motion_filter_capped",
+            Code::MotionFilterCapped,
             &log.name,
             format!(
                 "the motion filter's cut-off is {cutoff:.3} Hz here instead of {:.3} Hz: the log has only {rate:.3} Hz",
@@ -291,7 +291,7 @@ fn align(
     }
     findings.push(Finding::new(
         Severity::Note,
-        "borders",
+        Code::Borders,
         &log.name,
         format!(
             "the filters need {:.3} s at either end of each segment: {used:.3} of {:.3} s become rows",
@@ -539,9 +539,9 @@ fn report_standstill(
         }
         let share = 100.0 * still as f64 / all as f64;
         let (severity, code, rest) = if still as f64 >= HARDLY_MOVES * all as f64 {
-            (Severity::Warning, "joint_stands_still", "does not move")
+            (Severity::Warning, Code::JointStandsStill, "does not move")
         } else {
-            (Severity::Note, "standstill", "stands still")
+            (Severity::Note, Code::Standstill, "stands still")
         };
         let limit = pipeline.standstill_velocity[joint];
         // A coarse encoder tells slow motion from standing still only where the filter leaves little of its steps.

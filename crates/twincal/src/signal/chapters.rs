@@ -3,7 +3,7 @@
 
 use super::clock::{GAP, median_step};
 use super::{Channels, JointHistory, LongLog, Pipeline, Recording};
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity};
 use std::ops::Range;
 
 /// Share of the samples in chapters that cannot be used beyond which the log counts as degraded.
@@ -63,7 +63,7 @@ impl LongLog {
         self.walk(true, findings, |_, place, said| {
             visit(&place.motion(pipeline), said)?;
             // What filters trim of a part says nothing of the log: most of it is another chapter's.
-            said.retain(|finding| finding.code != "borders");
+            said.retain(|finding| finding.code != Code::Borders);
             Ok(())
         })
     }
@@ -142,7 +142,7 @@ impl LongLog {
             };
             findings.push(Finding::new(
                 severity,
-                "chapters_left_out",
+                Code::ChaptersLeftOut,
                 &self.name,
                 format!(
                     "{count} of {chapters} chapters cannot be used and were left out; the first is number {}: {problem}; {remedy}",
@@ -160,7 +160,7 @@ impl LongLog {
         let ends = if cut { ", each cut at its ends" } else { "" };
         Finding::new(
             Severity::Note,
-            "chapters",
+            Code::Chapters,
             &self.name,
             format!(
                 "the log is long ({samples} samples) and was read in {} chapters of up to {} samples{ends}",
@@ -396,7 +396,7 @@ mod tests {
         let finding = |severity, joint: &str, count| {
             Finding::new(
                 severity,
-                "standstill",
+                Code::Standstill,
                 "run",
                 format!("joint `{joint}` rests {count}"),
                 count,

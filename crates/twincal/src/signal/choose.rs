@@ -13,7 +13,7 @@ use super::thin::{coarsest, factor};
 use super::{
     Auto, DerivedFrom, Log, LongLog, LongReady, Pipeline, ReadyLog, Recording, SignalSettings,
 };
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity};
 use crate::words::{listed, significant};
 use rayon::prelude::*;
 
@@ -183,7 +183,7 @@ fn unexcited(joints: &[JointFacts], still: &[bool], limits: &[f64]) -> Result<Ve
         .map(|(joint, _)| {
             Finding::new(
                 Severity::Warning,
-                "joint_not_excited",
+                Code::JointNotExcited,
                 &joint.name,
                 format!(
                     "joint `{}` stands still in all training logs: its own effects cannot be seen",
@@ -220,7 +220,7 @@ fn off(
     if let Auto::Value(rate) = settings.rate_hz {
         findings.push(Finding::new(
             Severity::Warning,
-            "rate_ignored",
+            Code::RateIgnored,
             "",
             format!(
                 "signal.rate_hz = {rate} has no effect: with signal.cutoff_hz = 0 every input row is one row; leave one of them out"
@@ -278,7 +278,7 @@ fn replaced_velocity(facts: &JointFacts, noise: [f64; 2]) -> Finding {
         "joint `{name}`: the logged velocity has a noise of {logged} per s (after the motion filter), the change of position {travel}: velocity is \
          taken from position; [signal] velocity = \"logged\" takes the log's"
     );
-    Finding::new(Severity::Warning, "noisy_velocity", name, message, 0)
+    Finding::new(Severity::Warning, Code::NoisyVelocity, name, message, 0)
 }
 
 /// Pipeline on; and a wider cut-off, see [`Chosen::wider_hz`].
@@ -351,7 +351,7 @@ fn on(
     if motion_cutoff < 4.0 * cutoff {
         findings.push(Finding::new(
             Severity::Note,
-            "motion_filter_capped",
+            Code::MotionFilterCapped,
             "",
             format!(
                 "the motion filter's cut-off is {motion_cutoff:.3} Hz instead of 4 x {cutoff} Hz: the slowest log has only {lowest_rate:.3} Hz"
@@ -427,7 +427,7 @@ fn on(
     let taps = column_kernel(cutoff, 1.0 / lowest_rate);
     findings.push(Finding::new(
         Severity::Note,
-        "pipeline",
+        Code::Pipeline,
         "",
         format!(
             "columns and torque: symmetric FIR at {cutoff} Hz, {:.3} s to either side, white-noise gain {:.3}; motion: FIR at {motion_cutoff:.3} Hz, {:.3} s; rows at {} Hz",
@@ -469,7 +469,7 @@ fn limits(
     if rate > lowest_rate * 1.001 {
         findings.push(Finding::new(
             Severity::Note,
-            "rate_capped",
+            Code::RateCapped,
             "",
             format!("rows are kept at the slowest log's rate of {lowest_rate:.3} Hz instead of {rate} Hz"),
             0,
@@ -479,7 +479,7 @@ fn limits(
     if rate < 2.0 * cutoff {
         findings.push(Finding::new(
             Severity::Warning,
-            "rows_alias",
+            Code::RowsAlias,
             "",
             format!("rows at {rate} Hz are below twice the cut-off of {cutoff} Hz: torque between them folds into the estimates as noise"),
             0,

@@ -2,7 +2,7 @@
 
 use super::Recording;
 use super::repeats::{Sampled, sampled};
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity};
 use rayon::prelude::*;
 
 /// A step longer than this many median intervals is a gap: the log is cut there.
@@ -184,7 +184,7 @@ fn finite_rows(
         let ending = ["th", "st", "nd", "rd"][if every < 4 { every } else { 0 }];
         findings.push(Finding::new(
             Severity::Warning,
-            "slower_channels",
+            Code::SlowerChannels,
             &log.name,
             format!(
                 "{} have a value only in every {every}{ending} row: the log is read at that rate, from the {} rows that hold all channels; they share one clock, so no skew can be estimated",
@@ -210,7 +210,7 @@ fn finite_rows(
         };
         findings.push(Finding::new(
             severity,
-            "not_finite_rows",
+            Code::NotFiniteRows,
             &log.name,
             format!(
                 "{lost} of {samples} rows ({:.2} %) have values that are NaN, infinite or beyond {LARGEST:e} ({}) and were dropped; the log is cut there",
@@ -300,7 +300,7 @@ fn median_interval(
     if every_row {
         findings.push(Finding::new(
             Severity::Warning,
-            "implausible_time_step",
+            Code::ImplausibleTimeStep,
             &log.name,
             format!("{problem}; {remedy}. With the filter off time is only copied"),
             0,
@@ -365,14 +365,14 @@ fn cut(
     runs.push(run);
     runs.retain(|run| !run.rows.is_empty());
 
-    let mut say = |severity, code: &str, message: String, count| {
+    let mut say = |severity, code: Code, message: String, count| {
         findings.push(Finding::new(severity, code, &log.name, message, count));
     };
     if same > 0 {
         let text = format!(
             "{same} rows repeat the stamp and all values of the row before and were dropped"
         );
-        say(Severity::Note, "duplicate_rows", text, same);
+        say(Severity::Note, Code::DuplicateRows, text, same);
     }
     if contradicting > 0 {
         let share = contradicting as f64 / log.time.len() as f64;
@@ -385,25 +385,25 @@ fn cut(
             "{contradicting} rows ({:.3} %) repeat a stamp with other values; the first of each was kept: look at how the log was joined",
             100.0 * share
         );
-        say(severity, "contradicting_duplicates", text, contradicting);
+        say(severity, Code::ContradictingDuplicates, text, contradicting);
     }
     if crowded > 0 {
         let text = format!(
             "{crowded} rows follow the row before by less than {:.0} % of the median step and were dropped: stamp at the source, not at arrival",
             100.0 * CROWDED
         );
-        say(Severity::Warning, "crowded_stamps", text, crowded);
+        say(Severity::Warning, Code::CrowdedStamps, text, crowded);
     }
     if back > 0 {
         let text = format!("time steps back {back} times; the log is cut there");
-        say(Severity::Warning, "time_steps_back", text, back);
+        say(Severity::Warning, Code::TimeStepsBack, text, back);
     }
     if gaps > 0 {
         let text = format!(
             "{gaps} gaps longer than {GAP} median steps ({:.6} s), the longest {longest:.6} s; the log is cut there",
             interval
         );
-        say(Severity::Note, "gaps", text, gaps);
+        say(Severity::Note, Code::Gaps, text, gaps);
     }
     runs
 }
@@ -501,7 +501,7 @@ pub(crate) fn report_jitter(
     };
     findings.push(Finding::new(
         severity,
-        "resampled",
+        Code::Resampled,
         &log.name,
         format!(
             "the clock is uneven: 99 % of the steps are within {} % of the median ({:.3} Hz), the largest is off by {} %, {beyond} by more than {:.0} %; resampled by a cubic spline{advice}",

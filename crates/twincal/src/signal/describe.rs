@@ -4,7 +4,7 @@ use super::clock::GAP;
 use super::prepare::{JointFacts, Piece, Values, joint_facts, prepare};
 use super::travel::LONGEST;
 use super::{Corrections, Log, Logs, Recording};
-use crate::error::{Finding, Result, Severity};
+use crate::error::{Code, Finding, Result, Severity};
 use crate::robot::Robot;
 use crate::words::significant;
 use rayon::prelude::*;
@@ -254,7 +254,7 @@ pub fn hardly_driven<'a>(robot: &Robot, logs: impl Into<Logs<'a>>) -> Result<Vec
             };
             findings.push(Finding::new(
                 Severity::Note,
-                "joint_not_driven",
+                Code::JointNotDriven,
                 log.name(),
                 format!(
                     "joint `{name}` is hardly driven: rms torque {}, {:.1} % of its largest in any log",

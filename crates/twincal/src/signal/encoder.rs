@@ -6,7 +6,7 @@ use super::prepare::JointFacts;
 use super::spectrum::Noise;
 use super::travel::usual_size;
 use super::{DerivedFrom, Pipeline};
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::words::significant;
 
 /// What is known of the encoder of a joint before anything is filtered.
@@ -59,7 +59,7 @@ pub(crate) fn velocity_resolution(
         };
         findings.push(Finding::new(
             Severity::Note,
-            "derived_acceleration",
+            Code::DerivedAcceleration,
             &facts.name,
             format!(
                 "joint `{}`: acceleration is not logged and was derived from {source}, by the motion filter at {:.3} Hz; position noise of {}, as the spectrum has it, leaves a noise of {} in velocity and {} in acceleration (SI units, per sample)",
@@ -73,7 +73,7 @@ pub(crate) fn velocity_resolution(
         let [velocity, acceleration] = quantisation_floor(step, spectra, pipeline);
         findings.push(Finding::new(
             Severity::Warning,
-            "quantised_encoder",
+            Code::QuantisedEncoder,
             &facts.name,
             format!(
                 "joint `{}`: the encoder steps by {}: quantisation alone leaves a noise of {} in velocity and {} in acceleration derived from \

@@ -1,6 +1,7 @@
 //! Torque that holds its value while its joint moves: a stale value, or a drive that publishes it a few times a second.
 
 use super::{Channels, Logs, Recording};
+use crate::error::Code;
 use crate::error::{Finding, Result, Severity};
 use crate::robot::Robot;
 
@@ -110,10 +111,10 @@ impl Held {
         let (severity, code, remedy) = match spoils {
             true => (
                 Severity::Degraded,
-                "torque_held",
+                Code::TorqueHeld,
                 "log its torque in every row, or leave this log out",
             ),
-            false => (Severity::Note, "stale_torque", "nothing has to be done"),
+            false => (Severity::Note, Code::StaleTorque, "nothing has to be done"),
         };
         Finding::new(
             severity,

@@ -13,7 +13,7 @@
 //! Brokate & Sprekels 1996, section 2.3 (stop and play, Prandtl–Ishlinskii); Al-Bender, Lampaert, Swevers 2005 (Maxwell slip).
 
 use super::{Pipeline, Recording, Trajectory};
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::lanes::tanh;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -148,7 +148,7 @@ impl Pipeline {
         if cold > 0 {
             findings.push(Finding::new(
                 Severity::Warning,
-                "temperature_missing",
+                Code::TemperatureMissing,
                 &log.name,
                 format!("the log has no temperature of {cold} joints whose friction changes with it: the training logs' mean is taken"),
                 cold,

@@ -7,6 +7,7 @@ use super::Recording;
 use super::clock::{Clock, Run};
 use super::prepare::JointFacts;
 use super::travel::{count, median};
+use crate::error::Code;
 use crate::error::{Finding, Severity};
 use crate::robot::JointKind;
 use rayon::prelude::*;
@@ -217,19 +218,19 @@ fn tell(joints: &[JointFacts], log: &Recording, found: &Found, every_row: bool) 
     } = found;
     let kinds = [
         (
-            "motion_spike",
+            Code::MotionSpike,
             &jumps.spikes,
             "leaves its neighbours for one sample",
             "the samples were left out and the log is cut there",
         ),
         (
-            "position_step",
+            Code::PositionStep,
             &jumps.steps,
             "steps from one sample to the next",
             "the log is cut there; look whether the encoder was reset, then one side has a wrong zero",
         ),
     ];
-    let of_kind = |(code, jumps, what, done): (&str, &Vec<(usize, f64)>, &str, &str)| {
+    let of_kind = |(code, jumps, what, done): (Code, &Vec<(usize, f64)>, &str, &str)| {
         let largest = jumps
             .iter()
             .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;

@@ -3,7 +3,7 @@
 use super::prepare::JointFacts;
 use super::saturation::flat_runs;
 use super::{Channels, Pipeline, Recording, Trajectory};
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -93,7 +93,7 @@ impl Saturated {
             }
             findings.push(Finding::new(
                 Severity::Warning,
-                "saturated_torque",
+                Code::SaturatedTorque,
                 &log.name,
                 format!(
                     "joint `{}`: torque is flat at its limit of {:.4} in {} samples ({} times); the fit and the scores of \

@@ -8,7 +8,7 @@ use super::standstill::span;
 use super::units::refuse_degrees;
 use super::unwrap::{unfolded, unwrap_angle};
 use super::{Channels, Corrections, Recording};
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity};
 use crate::robot::{JointKind, Robot};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -311,7 +311,7 @@ pub(crate) fn report_short(log: &Recording, short: u64, rows: u64, findings: &mu
     if short > 0 {
         findings.push(Finding::new(
             Severity::Warning,
-            "short_segments",
+            Code::ShortSegments,
             &log.name,
             match short {
                 1 => format!("a segment between cuts ({rows} samples) is shorter than the motion filter and was dropped"),
@@ -385,7 +385,7 @@ fn unfold(
             let name = &facts.name;
             let finding = Finding::new(
                 Severity::Warning,
-                "wrapped_angle",
+                Code::WrappedAngle,
                 &log.name,
                 format!(
                     "joint `{name}`: {jumps} jumps by a full turn, left as logged because the filter is off: unfold them if the library has \

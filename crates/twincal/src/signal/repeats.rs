@@ -8,7 +8,7 @@ use super::clock::Cut;
 use super::ticks::{Ticks, ticks};
 use super::travel::{Rows, Travel};
 use super::{Channels, Recording};
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::words::significant;
 use std::ops::Range;
 
@@ -248,8 +248,8 @@ fn on_controllers_clock(rows: &Rows<'_>, ticks: &Ticks, every_row: bool) -> Find
         significant(100.0 * ticks.jitter, 2)
     );
     let (severity, code) = match count {
-        0 => (Severity::Note, "controller_clock"),
-        _ => (Severity::Warning, "repeated_samples"),
+        0 => (Severity::Note, Code::ControllerClock),
+        _ => (Severity::Warning, Code::RepeatedSamples),
     };
     Finding::new(severity, code, &rows.log.name, message, count)
 }
@@ -293,7 +293,7 @@ fn held_positions(
     );
     Finding::new(
         Severity::Warning,
-        "repeated_samples",
+        Code::RepeatedSamples,
         &rows.log.name,
         message,
         count as u64,

@@ -2,6 +2,7 @@
 
 use super::prepare::JointFacts;
 use super::*;
+use crate::error::Code;
 use crate::robot::JointKind;
 use rand::{RngExt, SeedableRng};
 use std::f64::consts::TAU;
@@ -254,10 +255,10 @@ fn unfit_settings_are_refused_with_the_key() {
         assert!(message.contains(part), "{message}");
     }
     let (_, findings) = choose(5.0, Auto::Value(6.0)).unwrap();
-    assert!(findings.iter().any(|f| f.code == "rows_alias"));
+    assert!(findings.iter().any(|f| f.code == Code::RowsAlias));
     let (pipeline, findings) = choose(20.0, Auto::Auto).unwrap();
     assert!((pipeline.motion_cutoff_hz - 45.0).abs() < 1e-9);
-    assert!(findings.iter().any(|f| f.code == "motion_filter_capped"));
+    assert!(findings.iter().any(|f| f.code == Code::MotionFilterCapped));
 }
 
 #[test]
@@ -339,7 +340,9 @@ fn a_noisy_velocity_gives_way_to_a_better_position() {
 
 /// The two numbers of "a of b s become rows".
 fn kept_and_all(findings: &[Finding]) -> [f64; 2] {
-    let said = findings.iter().find(|finding| finding.code == "borders");
+    let said = findings
+        .iter()
+        .find(|finding| finding.code == Code::Borders);
     let (_, numbers) = said.unwrap().message.split_once("segment: ").unwrap();
     let numbers: Vec<f64> = numbers
         .split_whitespace()
@@ -394,7 +397,7 @@ fn without_a_logged_velocity_nothing_is_said_of_it() {
         findings.extend(aligned(&log, &pipeline).unwrap().1);
         for finding in &findings {
             assert!(
-                !finding.code.starts_with("velocity_")
+                !finding.code.as_str().starts_with("velocity_")
                     && !finding.message.contains("logged velocity"),
                 "{finding:?}"
             );

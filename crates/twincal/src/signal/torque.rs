@@ -2,7 +2,7 @@
 
 use super::held::held_torque;
 use super::{Channels, Log, Logs, Recording};
-use crate::error::{Finding, Result, Severity};
+use crate::error::{Code, Finding, Result, Severity};
 use crate::robot::Robot;
 
 /// A joint that travels less in a log stands still there, rad or m.
@@ -43,7 +43,7 @@ pub fn missing_torque(robot: &Robot, log: &Log<'_>) -> Result<Option<Finding>> {
         let samples = log.samples();
         Finding::new(
             Severity::Warning,
-            "missing_torque",
+            Code::MissingTorque,
             log.name(),
             format!(
                 "measured torque is NaN or infinite in some of {samples} rows ({}): they are predicted all the same, with no \
@@ -100,7 +100,7 @@ pub fn constant_torque<'a>(robot: &Robot, logs: impl Into<Logs<'a>>) -> Result<V
         };
         findings.push(Finding::new(
             severity,
-            "constant_torque",
+            Code::ConstantTorque,
             log.name(),
             format!(
                 "torque never changes while the joint moves (joint {shown} throughout): {cause}; what is found there is wrong \

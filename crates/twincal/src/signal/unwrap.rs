@@ -2,7 +2,7 @@
 
 use super::clock::{GAP, median_step};
 use super::{ReadChapter, Recording};
-use crate::error::{Finding, Result, Severity};
+use crate::error::{Code, Finding, Result, Severity};
 use crate::robot::{JointKind, Robot};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
@@ -143,7 +143,7 @@ impl Folded {
 pub(crate) fn unfolded(log: &str, joint: &str, jumps: u64) -> Finding {
     Finding::new(
         Severity::Note,
-        "wrapped_angle",
+        Code::WrappedAngle,
         log,
         format!("joint `{joint}`: {jumps} jumps by a full turn, unfolded"),
         jumps,

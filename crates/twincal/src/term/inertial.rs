@@ -7,7 +7,7 @@ use super::library::random_motions;
 use super::model_column::{ModelColumn, ModelColumns, Scratch};
 use super::payload::{self, Mount};
 use super::{Family, LibrarySettings, density, mass_moments, tensor};
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity};
 use crate::robot::{Motion, Robot, did_you_mean};
 use std::sync::Arc;
 
@@ -160,7 +160,7 @@ fn floored(bodies: &[Body]) -> Option<Finding> {
     (!told.is_empty()).then(|| {
         Finding::new(
             Severity::Note,
-            "inertia_floor",
+            Code::InertiaFloor,
             "",
             format!(
                 "the model's inertia is a placeholder for {}: prior widths take at least 1 % of the mass that the joint moves and radii of a \

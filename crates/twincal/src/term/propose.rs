@@ -10,7 +10,7 @@ use super::{
     encoder_zero, gain, generic, hysteresis, load_friction, motor_inertia, offset, potential,
     quadratic_friction, ripple, spring, stribeck, user, viscous, warm_up,
 };
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity};
 use crate::robot::{Motion, Robot, did_you_mean, nominal_torque};
 
 /// Most columns a library may have.
@@ -245,7 +245,7 @@ fn wants_generic(
     if settings.generic.is_none() && !generic {
         findings.push(Finding::new(
             Severity::Note,
-            "generic_family_off",
+            Code::GenericFamilyOff,
             "",
             format!(
                 "the robot has {} moving joints: the generic family, which has {} terms for them, is proposed unasked up \

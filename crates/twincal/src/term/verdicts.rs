@@ -4,7 +4,7 @@ use super::aliases::Verdict;
 use super::candidate::Candidate;
 use super::expression::Graph;
 use super::{Family, Status};
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity};
 
 /// Verdicts as statuses, with a finding for everything the user wrote in vain.
 pub(super) fn statuses(
@@ -47,7 +47,7 @@ pub(super) fn statuses(
                 };
                 let message =
                     format!("term `{name}` has no torque for any motion ({why}): it is no column; delete it or correct it");
-                findings.push(Finding::new(severity, "null_lagrangian", name, message, 1));
+                findings.push(Finding::new(severity, Code::NullLagrangian, name, message, 1));
                 Status::NullLagrangian
             }
             Verdict::NotCompared => {
@@ -55,7 +55,7 @@ pub(super) fn statuses(
                     "term `{name}` is a finite number at too few states to be compared with the others: whether it repeats \
                      one of them was not checked; write it so that it exists for all motions of the robot"
                 );
-                findings.push(Finding::new(severity, "alias_unchecked", name, message, 1));
+                findings.push(Finding::new(severity, Code::AliasUnchecked, name, message, 1));
                 Status::Candidate
             }
             Verdict::Combination(combination) => {
@@ -67,7 +67,7 @@ pub(super) fn statuses(
                         "term `{name}` has the same torque as {} for every motion: it is no column; keep one of them",
                         formula.join(" ")
                     );
-                    findings.push(Finding::new(severity, "alias", name, message, 1));
+                    findings.push(Finding::new(severity, Code::Alias, name, message, 1));
                 } else {
                     repeated.push(format!("{name} (by {})", others.join(", ")));
                 }
@@ -92,7 +92,7 @@ pub(super) fn statuses(
         );
         findings.push(Finding::new(
             Severity::Note,
-            "alias",
+            Code::Alias,
             "",
             message,
             repeated.len() as u64,

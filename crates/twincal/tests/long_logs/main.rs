@@ -191,7 +191,7 @@ fn selected(result: &Calibration) -> Vec<&str> {
 }
 
 fn said<'a>(result: &'a Calibration, code: &str) -> Vec<&'a str> {
-    let all = result.findings.iter().filter(|f| f.code == code);
+    let all = result.findings.iter().filter(|f| f.code.as_str() == code);
     all.map(|finding| finding.message.as_str()).collect()
 }
 

@@ -2,7 +2,6 @@
 
 use super::{CHAPTERS, RATE, SAMPLES, in_chapters, recording, two_link};
 use std::f64::consts::{PI, TAU};
-use twincal::Finding;
 use twincal::calibrate::{LookedAt, outlook};
 use twincal::incidents::motion;
 use twincal::robot::Robot;
@@ -11,6 +10,7 @@ use twincal::signal::{
     Channels, Log, LongLog, Payload, Pipeline, Recording, Trajectory, align, describe,
 };
 use twincal::term::{Family, Library, LibrarySettings};
+use twincal::{Code, Finding};
 
 fn long(recording: Recording) -> LongLog {
     match in_chapters(recording) {
@@ -72,14 +72,14 @@ fn motion_is_that_of_the_whole_log_where_chapters_meet() {
         let findings = compare(&robot, recording, &pipeline, slack);
         // What was borrowed is not told: one row is NaN, in one chapter.
         let lost: Vec<u64> = (findings.iter())
-            .filter(|f| f.code == "not_finite_rows")
+            .filter(|f| f.code == Code::NotFiniteRows)
             .map(|f| f.count)
             .collect();
         assert_eq!(lost, [1]);
         assert!(
             findings
                 .iter()
-                .all(|f| f.code != "short_segments" && f.code != "borders")
+                .all(|f| f.code != Code::ShortSegments && f.code != Code::Borders)
         );
     }
 }
@@ -223,7 +223,10 @@ fn angles_are_unfolded_as_those_of_the_whole_log() {
     let (of_chapters, also_said) = describe(&robot, &Log::Long(log)).expect("a log");
     assert_eq!(of_whole.joints[1].q_range, of_chapters.joints[1].q_range);
     for said in [said, also_said] {
-        assert!(said.iter().all(|f| f.code != "wrapped_angle"), "{said:?}");
+        assert!(
+            said.iter().all(|f| f.code != Code::WrappedAngle),
+            "{said:?}"
+        );
     }
 }
 

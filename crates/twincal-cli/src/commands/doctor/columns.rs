@@ -3,9 +3,9 @@
 use super::examine::{Examination, JointColumns, Mapping};
 use super::units::Degrees;
 use std::collections::BTreeMap;
-use twincal::Finding;
 use twincal::self_check::JointCheck;
 use twincal::words::listed;
+use twincal::{Code, Finding};
 use twincal_io::config::{ChannelNames, ColumnsTable, PerJoint, Settings, key};
 
 /// `[columns]` of a proposed config.
@@ -13,13 +13,19 @@ pub(super) struct Columns {
     pub(super) table: ColumnsTable,
     /// Why numbers need factors.
     pub(super) why: String,
-    /// Codes of findings, and of refusals, that the table mends.
-    pub(super) mended: Vec<&'static str>,
+    /// What the table mends.
+    pub(super) mended: Vec<Mended>,
 }
 
-/// Refusals in [`Columns::mended`]: for degrees, and for ticks of a clock.
-pub(super) const DEGREES: &str = "degrees";
-pub(super) const TICKS: &str = "ticks";
+/// What a proposed config mends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Mended {
+    Finding(Code),
+    /// The refusal of positions in degrees.
+    Degrees,
+    /// The refusal of stamps in ticks of a clock.
+    Ticks,
+}
 
 /// What was said of columns, with what the logs ask for beside it.
 pub(super) fn columns(examination: &Examination, logs: usize, settings: &Settings) -> Columns {
@@ -30,7 +36,7 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
     };
     if let Some(unit) = examination.time_unit(logs, settings) {
         all.table.time_unit = Some(unit);
-        all.mended.push(TICKS);
+        all.mended.push(Mended::Ticks);
     }
     let is_logged = |column: fn(&JointColumns) -> bool| {
         let mut joints = examination.mappings.iter().flat_map(|(_, m)| &m.joints);
@@ -57,7 +63,7 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
             }
         }
         whys.push("Positions or velocities are logged in degrees.".to_owned());
-        all.mended.push(DEGREES);
+        all.mended.push(Mended::Degrees);
     }
     let joints = &examination.checkup.joints;
     for check in joints.iter().filter(|check| is_turned(check)) {
@@ -75,7 +81,7 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
             }
         }
         whys.push(format!("{} is turned round.", check.joint));
-        all.mended.push("sign_flip");
+        all.mended.push(Mended::Finding(Code::SignFlip));
     }
     let scaled: Vec<&JointCheck> = joints
         .iter()
@@ -93,15 +99,15 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
         };
         whys.push(format!("{whose} looks like thousandths of N·m."));
     }
-    let mut scales = (examination.findings.iter()).filter(|f| f.code == "torque_scale");
+    let mut scales = (examination.findings.iter()).filter(|f| f.code == Code::TorqueScale);
     let has_factor =
         |f: &Finding| f.subject.is_empty() || scaled.iter().any(|c| c.joint == f.subject);
     if !scaled.is_empty() && scales.all(has_factor) {
-        all.mended.push("torque_scale");
+        all.mended.push(Mended::Finding(Code::TorqueScale));
     }
     all.why = whys.join(" ");
     if joints.iter().any(is_moved) && reorder(examination, &mut all.table) {
-        all.mended.push("joint_order");
+        all.mended.push(Mended::Finding(Code::JointOrder));
     }
     all
 }

@@ -9,7 +9,6 @@ use crate::progress::Progress;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use twincal::Finding;
 use twincal::calibrate::{
     Calibration, CalibrationSettings, ComponentSummary, Outlook, Status, calibrate, outlook,
 };
@@ -19,6 +18,7 @@ use twincal::signal::{
     hardly_driven, steps,
 };
 use twincal::words::{listed, quoted};
+use twincal::{Code, Finding};
 use twincal_io::config::{Settings, TimeUnit};
 use twincal_io::log::{
     LogOptions, Preset, TorqueSource, joints_without_column, match_columns, read_header,
@@ -383,9 +383,9 @@ impl Examination {
                     && own.cutoff_hz != used.cutoff_hz
                 {
                     own.clone_from(used);
-                    let bands = ["lower_band", "wider_band"];
+                    let bands = [Code::LowerBand, Code::WiderBand];
                     let found = fitted.findings.iter();
-                    let why = found.filter(|f| bands.contains(&f.code.as_str()));
+                    let why = found.filter(|f| bands.contains(&f.code));
                     self.findings.extend(why.cloned());
                 }
                 let mut lower = settings.clone();
@@ -400,7 +400,7 @@ impl Examination {
 
     /// A cut-off at which a tenth of each joint's velocity can be told from standstill: an encoder of step s resolves `16 f_c s`.
     fn slower(&self) -> Option<f64> {
-        if !(self.findings.iter()).any(|finding| finding.code == "quantised_encoder") {
+        if !(self.findings.iter()).any(|finding| finding.code == Code::QuantisedEncoder) {
             return None;
         }
         let now = self.pipeline.as_ref()?.cutoff_hz;

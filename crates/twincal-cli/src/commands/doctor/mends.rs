@@ -5,7 +5,7 @@ use super::examine::Examination;
 use serde::Serialize;
 use std::fmt::Write as _;
 use twincal::self_check::JointCheck;
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 use twincal_io::config::key;
 
 /// One thing to mend.
@@ -58,194 +58,200 @@ const FOR_THE_NEXT: &str = "nothing has to be done for this log; for the next on
 const NOT_USED: &str = "nothing, if it does not act in these logs; else write its effect into the model in a form that is read";
 
 /// Findings in the order in which they matter, with what mends them.
-const ORDER: &[(&str, &str)] = &[
-    ("base_orientation", "twincal.toml: [model] base"),
+const ORDER: &[(Code, &str)] = &[
+    (Code::BaseOrientation, "twincal.toml: [model] base"),
     (
-        "torque_copied",
+        Code::TorqueCopied,
         "map the measured torque of that joint in [columns] tau, or log it again",
     ),
     (
-        "torque_constant",
+        Code::TorqueConstant,
         "map the measured torque of that joint in [columns] tau, or leave this log out",
     ),
     (
-        "model_torque",
+        Code::ModelTorque,
         "log the measured torque of the drives, or add the model's to this one",
     ),
     (
-        "gravity_compensated",
+        Code::GravityCompensated,
         "log the measured torque of the drives, or add the gravity that was taken off",
     ),
     (
-        "torque_held",
+        Code::TorqueHeld,
         "log that joint's torque in every row, or leave this log out",
     ),
     (
-        "clock_scale",
+        Code::ClockScale,
         "give the true rate: --rate HZ, or a factor for qd in [columns.factor]",
     ),
     (
-        "joint_order",
+        Code::JointOrder,
         "map the columns in [columns.q], [columns.qd], [columns.tau] of twincal.toml; twincal init writes them",
     ),
-    ("sign_flip", "twincal.toml: [columns.factor]"),
+    (Code::SignFlip, "twincal.toml: [columns.factor]"),
     (
-        "torque_scale",
+        Code::TorqueScale,
         "say what the torque is ([[log]] torque, gear_ratio, drive_constant), or give [columns.factor] tau",
     ),
     (
-        "unphysical_inertia",
+        Code::UnphysicalInertia,
         "correct the link's <inertial>, or accept it: --allow unphysical-inertia",
     ),
     (
-        "link_without_inertia",
+        Code::LinkWithoutInertia,
         "give the link an <inertial>, or let fit find it",
     ),
     (
-        "moves_no_mass",
+        Code::MovesNoMass,
         "give the link an <inertial>, or fix the joint with [model] locked",
     ),
-    ("torque_lag", "record torque by the clock of the motion"),
+    (Code::TorqueLag, "record torque by the clock of the motion"),
     (
-        "velocity_opposite",
+        Code::VelocityOpposite,
         "twincal.toml: [columns.factor] with q or qd of that joint, whichever is turned; the torque does not tell",
     ),
     (
-        "velocity_mismatch",
+        Code::VelocityMismatch,
         "twincal.toml: [signal] velocity = \"position\"",
     ),
     (
-        "noisy_velocity",
+        Code::NoisyVelocity,
         "nothing: velocity is taken from position; [signal] velocity = \"logged\" keeps the log's",
     ),
     (
-        "truncated",
+        Code::Truncated,
         "`mcap recover` makes a whole file of it, or copy it again",
     ),
-    ("damaged_chunks", "copy the file again; --strict refuses it"),
     (
-        "parts_merged",
+        Code::DamagedChunks,
+        "copy the file again; --strict refuses it",
+    ),
+    (
+        Code::PartsMerged,
         "publish joints and channels that belong together in one message",
     ),
     (
-        "log_time",
+        Code::LogTime,
         "fill in header.stamp where the message is made, or name another time: [columns] time",
     ),
     (
-        "not_finite_rows",
+        Code::NotFiniteRows,
         "look at those rows in the log; --strict refuses them",
     ),
     (
-        "unreadable_rows",
+        Code::UnreadableRows,
         "look at those rows in the log; --strict refuses them",
     ),
     (
-        "contradicting_duplicates",
+        Code::ContradictingDuplicates,
         "export each topic once; --strict refuses such logs",
     ),
     (
-        "time_steps_back",
+        Code::TimeStepsBack,
         "sort or cut the log where time steps back",
     ),
     (
-        "crowded_stamps",
+        Code::CrowdedStamps,
         "log the source's stamp, or give the rate: --rate HZ",
     ),
     (
-        "resampled",
+        Code::Resampled,
         "log the source's stamp, or give the rate: --rate HZ",
     ),
     (
-        "repeated_samples",
+        Code::RepeatedSamples,
         "log each sample of the controller once, with the controller's stamp",
     ),
-    ("slower_channels", "log all channels at one rate"),
-    ("short_segments", "record longer, or mend the gaps"),
-    ("contact", "nothing: left out; cut the log there to be sure"),
+    (Code::SlowerChannels, "log all channels at one rate"),
+    (Code::ShortSegments, "record longer, or mend the gaps"),
     (
-        "drives_off",
+        Code::Contact,
         "nothing: left out; cut the log there to be sure",
     ),
     (
-        "saturated_torque",
+        Code::DrivesOff,
+        "nothing: left out; cut the log there to be sure",
+    ),
+    (
+        Code::SaturatedTorque,
         "record a slower motion, with torque below the limit",
     ),
     (
-        "quantised_encoder",
+        Code::QuantisedEncoder,
         "log the full resolution of the encoder",
     ),
     (
-        "lower_band",
+        Code::LowerBand,
         "log the full resolution of the encoder, or longer and faster motion",
     ),
     (
-        "joint_not_excited",
+        Code::JointNotExcited,
         "record a log in which that joint moves",
     ),
     (
-        "joint_stands_still",
+        Code::JointStandsStill,
         "record a log in which that joint moves",
     ),
     (
-        "motion_spike",
+        Code::MotionSpike,
         "look at the encoder's cable and driver; the samples are left out",
     ),
     (
-        "position_step",
+        Code::PositionStep,
         "keep the side whose zero is right and cut the other off",
     ),
     (
-        "wrapped_angle",
+        Code::WrappedAngle,
         "unfold the angles, or leave [signal] cutoff_hz at \"auto\"",
     ),
     (
-        "implausible_time_step",
+        Code::ImplausibleTimeStep,
         "give time in seconds, or the rate: --rate HZ",
     ),
     (
-        "missing_torque",
+        Code::MissingTorque,
         "log the torque of every row, or cut the log to where it is there",
     ),
     (
-        "constant_torque",
+        Code::ConstantTorque,
         "map the measured torque in [columns] tau, or leave this log out",
     ),
     (
-        "chapters_left_out",
+        Code::ChaptersLeftOut,
         "cut the log to what can be used: the message says where",
     ),
     (
-        "late_messages",
+        Code::LateMessages,
         "nothing: put in order; publish in the order of header.stamp to be sure",
     ),
     (
-        "motion_filter_capped",
+        Code::MotionFilterCapped,
         "log faster, or lower [signal] cutoff_hz",
     ),
     (
-        "rows_alias",
+        Code::RowsAlias,
         "twincal.toml: leave [signal] rate_hz out, or raise it",
     ),
     (
-        "rate_ignored",
+        Code::RateIgnored,
         "twincal.toml: leave out [signal] rate_hz, or cutoff_hz = 0",
     ),
     (
-        "locked_beyond_limits",
+        Code::LockedBeyondLimits,
         "twincal.toml: correct [model] locked, or the joint's limits in the model",
     ),
     (
-        "no_metadata",
+        Code::NoMetadata,
         "copy the bag's metadata.yaml beside its files",
     ),
-    ("actuator_not_used", NOT_USED),
-    ("equality_not_used", NOT_USED),
-    ("tendon_not_used", NOT_USED),
-    ("gravcomp_not_used", NOT_USED),
-    ("fluid_not_used", NOT_USED),
-    ("flag_not_used", NOT_USED),
+    (Code::ActuatorNotUsed, NOT_USED),
+    (Code::EqualityNotUsed, NOT_USED),
+    (Code::TendonNotUsed, NOT_USED),
+    (Code::GravcompNotUsed, NOT_USED),
+    (Code::FluidNotUsed, NOT_USED),
+    (Code::FlagNotUsed, NOT_USED),
     (
-        "unknown_elements",
+        Code::UnknownElements,
         "nothing, if they do not matter here; else correct their names in the model",
     ),
 ];
@@ -266,26 +272,26 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
             rank: 0,
         })
         .collect();
-    let mut said: Vec<(&str, usize)> = Vec::new();
+    let mut said: Vec<(Code, usize)> = Vec::new();
     let turned = |joint: &str| {
         let mut all = examination.findings.iter();
-        all.any(|f| f.code == "sign_flip" && f.subject == joint)
+        all.any(|f| f.code == Code::SignFlip && f.subject == joint)
     };
-    let is_said = |code: &str| examination.findings.iter().any(|f| f.code == code);
+    let is_said = |code: Code| examination.findings.iter().any(|f| f.code == code);
     for finding in examination
         .findings
         .iter()
         .filter(|f| f.severity > Severity::Note)
         // Which of the two is turned is said there.
-        .filter(|f| f.code != "velocity_opposite" || !turned(&f.subject))
+        .filter(|f| f.code != Code::VelocityOpposite || !turned(&f.subject))
         // That it is no measurement is said there.
-        .filter(|f| f.code != "constant_torque" || !is_said("torque_constant"))
+        .filter(|f| f.code != Code::ConstantTorque || !is_said(Code::TorqueConstant))
     {
         // One of a kind is enough to know what to do.
         match said.iter_mut().find(|(code, _)| *code == finding.code) {
             Some((_, more)) => *more += 1,
             None => {
-                said.push((&finding.code, 0));
+                said.push((finding.code, 0));
                 all.push(of_finding(finding, examination));
             }
         }
@@ -324,11 +330,11 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
 
 fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
     let place = ORDER.iter().position(|(code, _)| *code == finding.code);
-    let how = match (finding.code.as_str(), place) {
-        ("torque_lag", _) if finding.subject.is_empty() => {
+    let how = match (finding.code, place) {
+        (Code::TorqueLag, _) if finding.subject.is_empty() => {
             "twincal.toml: [signal] lag = \"auto\"".into()
         }
-        ("sign_flip", _) => match of_joint(examination, &finding.subject) {
+        (Code::SignFlip, _) => match of_joint(examination, &finding.subject) {
             Some(check) => {
                 let or_the_axis = if is_axis(check) {
                     ", or turn the axis in the model"
@@ -340,7 +346,7 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
             }
             None => "turn the sign of the columns where the log is made".into(),
         },
-        ("torque_scale", Some(place)) => {
+        (Code::TorqueScale, Some(place)) => {
             let check = match finding.subject.is_empty() {
                 true => examination.checkup.joints.first(),
                 false => of_joint(examination, &finding.subject),
@@ -368,14 +374,14 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
                 _ => ORDER[place].1.into(),
             }
         }
-        ("base_orientation", _) => match &examination.checkup.base {
+        (Code::BaseOrientation, _) => match &examination.checkup.base {
             Some(base) => format!(
                 "twincal.toml: [model] {} (twincal init writes it)",
                 base.line()
             ),
             None => "twincal.toml: [model] base".into(),
         },
-        ("quantised_encoder", _) => match examination.lower_cutoff {
+        (Code::QuantisedEncoder, _) => match examination.lower_cutoff {
             Some(hz) => format!(
                 "twincal.toml: [signal] cutoff_hz = {hz:?}, or log the encoder's full resolution"
             ),

@@ -7,6 +7,7 @@ use super::super::table::{print_table, table};
 use super::examine::Mapping;
 use super::{Diagnosis, LogRow};
 use crate::terminal::{Terminal, clean};
+use twincal::Code;
 use twincal::Severity;
 use twincal::lag::{Lags, LogLag};
 use twincal::words::significant;
@@ -18,16 +19,16 @@ const NAMED: usize = 8;
 /// How lines begin that say what mends.
 const HOW: [&str; 2] = ["     → ", "       "];
 /// Notes on a log that are shown with it.
-const OF_LOG: [&str; 6] = [
-    "controller_clock",
-    "gaps",
-    "duplicate_rows",
-    "resampled",
-    "wrapped_angle",
-    "time_replaced",
+const OF_LOG: [Code; 6] = [
+    Code::ControllerClock,
+    Code::Gaps,
+    Code::DuplicateRows,
+    Code::Resampled,
+    Code::WrappedAngle,
+    Code::TimeReplaced,
 ];
 /// Notes that say what was matched where there is no table of columns: on bags and NPZ files.
-const OF_BAG: [&str; 3] = ["columns", "time_source", "model_order"];
+const OF_BAG: [Code; 3] = [Code::Columns, Code::TimeSource, Code::ModelOrder];
 /// Share of torque by which the model must explain more than friction for its factor to mean anything.
 const MEANS: f64 = 0.01;
 /// What stands where nothing is known.
@@ -41,7 +42,7 @@ pub(super) fn print(diagnosis: &Diagnosis, terminal: &mut Terminal) {
         indented(&mend.how, HOW, terminal);
     }
     let of_model = diagnosis.findings.iter();
-    for finding in of_model.filter(|finding| finding.code == "point_mass") {
+    for finding in of_model.filter(|finding| finding.code == Code::PointMass) {
         paragraph(&format!("note: {}", finding.message), terminal);
     }
     terminal.say("");
@@ -53,9 +54,8 @@ pub(super) fn print(diagnosis: &Diagnosis, terminal: &mut Terminal) {
         print_log(log, diagnosis.lags.as_ref(), terminal);
         for finding in &diagnosis.findings {
             let own = finding.subject == log.overview.name && finding.severity == Severity::Note;
-            let code = finding.code.as_str();
-            let matched = log.columns.is_none() && OF_BAG.contains(&code);
-            if own && (matched || OF_LOG.contains(&code)) {
+            let matched = log.columns.is_none() && OF_BAG.contains(&finding.code);
+            if own && (matched || OF_LOG.contains(&finding.code)) {
                 paragraph(&finding.message, terminal);
             }
         }

@@ -1,10 +1,11 @@
 //! The config that logs and model ask for.
 
 use super::Asked;
-use super::columns::{DEGREES, TICKS, columns};
+use super::columns::{Mended, columns};
 use super::examine::{Examination, Refusal};
 use super::mends::lag;
 use std::path::{Path, PathBuf};
+use twincal::Code;
 use twincal_io::config::{Config, LogEntry, Proposal};
 
 /// How a remark begins that says why a fit with the proposed config is refused.
@@ -40,7 +41,7 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
     let velocity = examination
         .findings
         .iter()
-        .filter(|finding| finding.code == "velocity_mismatch");
+        .filter(|finding| finding.code == Code::VelocityMismatch);
     let velocity: Vec<&str> = velocity.map(|finding| finding.message.as_str()).collect();
     let lag = lag(examination).map(|lag| {
         let logs = (examination.checkup.lags.iter()).flat_map(|lags| &lags.logs);
@@ -57,12 +58,12 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
     });
     let columns = columns(examination, logs.len(), settings);
     let base = examination.checkup.base;
-    let is_mended = |code: &str| {
-        columns.mended.contains(&code) || (code == "base_orientation" && base.is_some())
+    let is_mended = |what: Mended| {
+        columns.mended.contains(&what) || (what == Mended::Finding(Code::BaseOrientation) && base.is_some())
     };
     let mends_refusal = |refusal: &Refusal| {
-        (is_mended(TICKS) && refusal.time_unit.is_some())
-            || (is_mended(DEGREES) && refusal.degrees.is_some())
+        (is_mended(Mended::Ticks) && refusal.time_unit.is_some())
+            || (is_mended(Mended::Degrees) && refusal.degrees.is_some())
     };
     let mut locked = settings.locked.clone();
     locked.extend(examination.locked.clone());
@@ -80,7 +81,7 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
                 .findings
                 .iter()
                 .filter(|finding| finding.doubts_the_log())
-                .filter(|f| !is_mended(&f.code))
+                .filter(|f| !is_mended(Mended::Finding(f.code)))
                 .map(|finding| finding.message.clone()),
         )
         .chain(beside)
@@ -97,7 +98,7 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
             let said = examination
                 .findings
                 .iter()
-                .find(|f| f.code == "base_orientation");
+                .find(|f| f.code == Code::BaseOrientation);
             let why = said.map_or_else(String::new, |finding| finding.message.clone());
             (base.line(), why)
         }),

@@ -15,7 +15,7 @@ use arrow_ipc::{
 use layout::{Form, Numbers, Position};
 use std::io::{self, Read, Seek, SeekFrom};
 use twincal::signal::Log as GivenLog;
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// Longest footer or message without its values, bytes.
 const MAX_METADATA: u64 = 1 << 26;
@@ -351,7 +351,7 @@ impl<'a, R: Read + Seek> Log<'a, R> {
                 );
                 findings.push(Finding::new(
                     Severity::Note,
-                    "timestamp_type",
+                    Code::TimestampType,
                     self.name,
                     message,
                     0,

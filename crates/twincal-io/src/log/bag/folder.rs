@@ -5,7 +5,7 @@ use crate::open::{InputFile, Refusal};
 use saphyr_parser::{Event, Parser};
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 const METADATA: &str = "metadata.yaml";
 /// Largest metadata, bytes, and deepest nesting in it.
@@ -79,7 +79,7 @@ pub(super) fn files(folder: &Path) -> Result<(Vec<PathBuf>, Vec<Finding>)> {
         "the bag has no metadata.yaml: its {} files were taken in the order of their names; `ros2 bag reindex` writes it",
         files.len()
     );
-    let finding = Finding::new(Severity::Warning, "no_metadata", name, message, 0);
+    let finding = Finding::new(Severity::Warning, Code::NoMetadata, name, message, 0);
     Ok((
         files.into_iter().map(|(_, path)| path).collect(),
         vec![finding],

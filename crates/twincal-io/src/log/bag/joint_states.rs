@@ -22,6 +22,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, HashSet};
 use std::rc::Rc;
 use topics::CONVERT;
+use twincal::Code;
 use twincal::robot::Robot;
 use twincal::signal::Log;
 use twincal::words::{quoted, shortened};
@@ -523,13 +524,13 @@ impl<'a> JointStates<'a> {
 
     fn say(&self, findings: &mut Vec<Finding>) {
         let messages = self.rows as f64;
-        let mut say = |severity, code: &str, message: String, count| {
+        let mut say = |severity, code: Code, message: String, count| {
             findings.push(Finding::new(severity, code, self.file, message, count));
         };
         if self.states > 0 {
             say(
                 Severity::Note,
-                "time_source",
+                Code::TimeSource,
                 format!(
                     "time is header.stamp on topic {}, not the recorder's clock, which is later by {:.3} ms on average",
                     self.read_topics(),
@@ -541,7 +542,7 @@ impl<'a> JointStates<'a> {
         if self.options.torque_source() == TorqueSource::Joint {
             say(
                 Severity::Note,
-                "effort_is_joint_torque",
+                Code::EffortIsJointTorque,
                 "the logged torque (effort[], or what [columns] tau names) counts as torque on the joint's side of the gear, N·m (N for sliders); if it is of the motor or a current, say so with [[log]] torque".into(),
                 0,
             );
@@ -554,7 +555,7 @@ impl<'a> JointStates<'a> {
             };
             say(
                 severity,
-                "late_messages",
+                Code::LateMessages,
                 format!(
                     "{} of {messages} messages came late, by at most {:.3} ms, and were put in the order of their stamps",
                     self.late,
@@ -567,7 +568,7 @@ impl<'a> JointStates<'a> {
         if !foreign.is_empty() {
             say(
                 Severity::Note,
-                "joints_left_out",
+                Code::JointsLeftOut,
                 format!(
                     "joints that do not move in the model were left out: {}",
                     quoted(foreign)

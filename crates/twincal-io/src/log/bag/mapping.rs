@@ -16,7 +16,7 @@ use crate::log::columns::refuse_unknown_joints;
 use std::collections::BTreeSet;
 use twincal::robot::{Robot, did_you_mean};
 use twincal::words::quoted;
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 pub(super) use read::Problem;
 
@@ -379,7 +379,7 @@ impl Mapping {
                 }
                 Some(Time::Path(_, words)) => (
                     Severity::Note,
-                    "time_source",
+                    Code::TimeSource,
                     format!(
                         "time on topic `{name}` is {words}, not the recorder's clock, which is later by {:.3} ms on average",
                         found.lag / found.messages as f64 / 1e6
@@ -387,14 +387,14 @@ impl Mapping {
                 ),
                 _ if topic.log_time => (
                     Severity::Warning,
-                    LOG_TIME,
+                    Code::LogTime,
                     format!(
                         "time on topic `{name}` is the recorder's log time, as [columns] time says: it jitters with the network and the recorder's load"
                     ),
                 ),
                 _ => (
                     Severity::Warning,
-                    LOG_TIME,
+                    Code::LogTime,
                     format!(
                         "messages on topic `{name}` ({kind}) have neither header.stamp nor stamp: time is the recorder's log time, which jitters with the network and the recorder's load{beside}; if another field holds the time, say [columns] time = \"{}:field\"{}",
                         topic.asked, found.stamp_words
@@ -413,7 +413,7 @@ impl Mapping {
                 );
                 findings.push(Finding::new(
                     Severity::Note,
-                    "model_order",
+                    Code::ModelOrder,
                     file,
                     message,
                     0,

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::rc::Rc;
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// Largest record, and largest chunk when unpacked, bytes.
 pub(in super::super) const MAX_RECORD: u64 = 256 << 20;
@@ -202,7 +202,7 @@ pub(super) fn read(
         );
         findings.push(Finding::new(
             Severity::Degraded,
-            "damaged_chunks",
+            Code::DamagedChunks,
             file,
             message,
             reader.damaged,
@@ -219,7 +219,7 @@ pub(super) fn read(
         let message = format!(
             "some bytes of the file were changed, its checksum over all data is wrong: {values}; copy the file again"
         );
-        findings.push(Finding::new(severity, "damaged_data", file, message, 1));
+        findings.push(Finding::new(severity, Code::DamagedData, file, message, 1));
     }
     let cut = match end {
         End::Whole => None,
@@ -235,7 +235,7 @@ pub(super) fn read(
         )),
     };
     if let Some((severity, message)) = cut {
-        findings.push(Finding::new(severity, "truncated", file, message, 0));
+        findings.push(Finding::new(severity, Code::Truncated, file, message, 0));
     }
     Ok(findings)
 }

@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 use std::io;
 use twincal::robot::{JointKind, Robot};
 use twincal::words::{listed, quoted};
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// Neighbours further apart than this many median steps are not joined by a line.
 const GAP: f64 = 5.0;
@@ -212,7 +212,7 @@ pub(super) fn merge<'t>(
     };
     findings.push(Finding::new(
         severity,
-        "parts_merged",
+        Code::PartsMerged,
         file,
         format!(
             "joints or channels come in messages of their own: {others} brought to the stamps of {slowest} by linear interpolation; {lost} of {rows} rows lie outside or in gaps and are NaN"

@@ -1,7 +1,7 @@
 //! A table that ends within its last row: the recorder was killed, the disk was full, a copy broke off.
 
 use super::lines::Line;
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// Rows before the last one that its last field is compared with.
 const NEIGHBOURS: usize = 100;
@@ -64,7 +64,13 @@ impl LastFields {
         } else {
             return None;
         };
-        Some(Finding::new(Severity::Warning, "cut_row", file, message, 1))
+        Some(Finding::new(
+            Severity::Warning,
+            Code::CutRow,
+            file,
+            message,
+            1,
+        ))
     }
 }
 
@@ -72,6 +78,7 @@ impl LastFields {
 mod tests {
     use crate::log::{LogOptions, read_csv};
     use std::fmt::Write as _;
+    use twincal::Code;
     use twincal::robot::{Robot, RobotDescription};
 
     /// One joint, 200 rows of six decimals; the text up to each of its last bytes.
@@ -98,7 +105,7 @@ mod tests {
                 &LogOptions::default(),
             );
             let (recording, findings) = read.unwrap();
-            let said = findings.iter().any(|finding| finding.code == "cut_row");
+            let said = findings.iter().any(|finding| finding.code == Code::CutRow);
             // Nothing of the row is there, or all of it but perhaps the line feed.
             let is_whole = end + 1 >= table.len();
             assert_eq!(said, !is_whole && end > last, "{:?}", &table[last..end]);

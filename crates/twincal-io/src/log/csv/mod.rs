@@ -13,6 +13,7 @@ use cut::LastFields;
 use dialect::Dialect;
 use lines::Lines;
 use std::io::Read;
+use twincal::Code;
 use twincal::{Finding, Severity};
 
 /// Rows between two looks at whether the table is long.
@@ -162,18 +163,18 @@ impl<R: Read> Table<R> {
     /// What the reader assumed.
     pub(super) fn into_findings(self) -> Vec<Finding> {
         let mut findings: Vec<Finding> = self.cut.into_iter().collect();
-        let note = |code: &str, message: String| {
+        let note = |code: Code, message: String| {
             Finding::new(Severity::Note, code, &self.name, message, 0)
         };
         if self.header.len() > 1 {
             findings.push(note(
-                "delimiter",
+                Code::Delimiter,
                 format!("fields are separated by {}", self.dialect.delimiter_word()),
             ));
         }
         if self.dialect.decimal_comma {
             findings.push(note(
-                "decimal_comma",
+                Code::DecimalComma,
                 "numbers are written with a decimal comma".into(),
             ));
         }

@@ -11,7 +11,7 @@ use super::sites::{BodySite, JointSite, Sites};
 use crate::error::{Error, Result};
 use twincal::robot::spatial::{add, apply, axis_angle, norm, scale};
 use twincal::robot::{JointDescription, JointKind, Limits, LinkDescription, Placement};
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// An element inside a body, after `<frame>`s are taken away.
 #[derive(Debug, Clone)]
@@ -105,7 +105,7 @@ impl<'a> Tree<'a> {
             );
             self.findings.push(Finding::new(
                 Severity::Warning,
-                "gravcomp_not_used",
+                Code::GravcompNotUsed,
                 &name,
                 message,
                 1,
@@ -366,7 +366,7 @@ impl<'a> Tree<'a> {
             );
             self.findings.push(Finding::new(
                 Severity::Note,
-                "unnamed_joint",
+                Code::UnnamedJoint,
                 &name,
                 message,
                 1,
@@ -379,7 +379,7 @@ impl<'a> Tree<'a> {
             );
             self.findings.push(Finding::new(
                 Severity::Note,
-                "frictionloss_not_used",
+                Code::FrictionlossNotUsed,
                 &name,
                 message,
                 1,

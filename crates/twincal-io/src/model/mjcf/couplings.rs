@@ -5,7 +5,7 @@ use super::body::Tree;
 use crate::error::Result;
 use std::collections::BTreeMap;
 use twincal::robot::{Mimic, did_you_mean};
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// Reads `<equality>`, `<tendon>` and `<actuator>` into the joints, or reports them.
 ///
@@ -45,7 +45,7 @@ pub(super) fn read<'a>(tree: &mut Tree<'a>, root: &'a Element) -> Result<()> {
                 );
                 tree.findings.push(Finding::new(
                     Severity::Warning,
-                    "tendon_not_used",
+                    Code::TendonNotUsed,
                     name,
                     message,
                     1,
@@ -118,7 +118,7 @@ fn equality<'a>(tree: &mut Tree<'a>, joints: &Joints, element: &'a Element) -> R
             );
             tree.findings.push(Finding::new(
                 Severity::Note,
-                "mimic_from_equality",
+                Code::MimicFromEquality,
                 first,
                 message,
                 1,
@@ -139,7 +139,7 @@ fn equality<'a>(tree: &mut Tree<'a>, joints: &Joints, element: &'a Element) -> R
     );
     tree.findings.push(Finding::new(
         Severity::Warning,
-        "equality_not_used",
+        Code::EqualityNotUsed,
         name,
         message,
         1,
@@ -169,7 +169,7 @@ fn actuator<'a>(tree: &mut Tree<'a>, joints: &Joints, element: &'a Element) -> R
             );
             tree.findings.push(Finding::new(
                 Severity::Warning,
-                "actuator_not_used",
+                Code::ActuatorNotUsed,
                 name,
                 message,
                 1,
@@ -187,7 +187,7 @@ fn actuator<'a>(tree: &mut Tree<'a>, joints: &Joints, element: &'a Element) -> R
         );
         tree.findings.push(Finding::new(
             Severity::Note,
-            "actuator_gear",
+            Code::ActuatorGear,
             joint,
             message,
             1,

@@ -17,7 +17,7 @@ use body::Tree;
 use compiler::Compiler;
 use defaults::{Defaults, View};
 use twincal::robot::RobotDescription;
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// Reads the document, whose includes are expanded.
 ///
@@ -83,7 +83,7 @@ fn option(document: &Document, root: &Element, findings: &mut Vec<Finding>) -> R
         if fluid {
             findings.push(Finding::new(
                 Severity::Warning,
-                "fluid_not_used",
+                Code::FluidNotUsed,
                 "",
                 "<option> states a medium (density, viscosity): its drag is not part of the nominal torque",
                 1,
@@ -106,7 +106,7 @@ fn option(document: &Document, root: &Element, findings: &mut Vec<Finding>) -> R
         );
         findings.push(Finding::new(
             Severity::Warning,
-            "flag_not_used",
+            Code::FlagNotUsed,
             name,
             message,
             1,

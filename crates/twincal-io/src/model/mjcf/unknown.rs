@@ -1,7 +1,7 @@
 //! Elements and attributes that MJCF does not have: one finding lists them, so that a slip of the pen is seen.
 
 use super::super::xml::{Document, Element, shorten};
-use twincal::{Finding, Severity};
+use twincal::{Code, Finding, Severity};
 
 /// Sections under `<mujoco>`.
 const SECTIONS: [&str; 19] = [
@@ -172,7 +172,7 @@ pub(super) fn report(document: &Document, root: &Element, findings: &mut Vec<Fin
         );
         findings.push(Finding::new(
             Severity::Warning,
-            "unknown_elements",
+            Code::UnknownElements,
             "",
             message,
             count,

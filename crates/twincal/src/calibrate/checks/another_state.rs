@@ -1,6 +1,6 @@
 //! A held-out log whose intervals hold far less than they promise on motion that training had: another robot, or another state of it.
 
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::validate::Scores;
 
 /// Share of the rows within 95 % intervals below which no noise is the reason.
@@ -32,7 +32,7 @@ pub(in crate::calibrate) fn finding(log: &str, within: &Scores, memory: &[f64]) 
     (!low.is_empty()).then(|| {
         Finding::new(
             Severity::Warning,
-            "another_state",
+            Code::AnotherState,
             log,
             format!(
                 "log `{log}`: on motion that training had the 95 % intervals hold {all}, clearly less than {:.0} %: is it another robot, or \

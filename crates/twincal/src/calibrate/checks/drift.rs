@@ -1,7 +1,7 @@
 //! Drift within a run: a residual that is different at the end from what it was at the beginning (warming up), or that goes with
 //! the drive's temperature where that was logged.
 
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::observations::{Observations, Part};
 use crate::robot::Robot;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -67,7 +67,7 @@ fn finding(what: What, log: &str, joint: &str, change: f64, sd: f64) -> Finding 
     };
     Finding::new(
         Severity::Warning,
-        "drift",
+        Code::Drift,
         joint,
         format!(
             "log `{log}`, joint `{joint}`: {subject} by {change:+.3} (residual sd {sd:.3}) from the first third of the run to \
@@ -96,7 +96,7 @@ fn warms(what: What, log: &str, joint: &str, warming: &Warming) -> Finding {
     } = warming;
     Finding::new(
         Severity::Warning,
-        "drift_with_temperature",
+        Code::DriftWithTemperature,
         joint,
         format!(
             "log `{log}`, joint `{joint}`: {subject} goes with the temperature, {slope:+.3} ± {error:.3} per degree from {low:.1} to \

@@ -1,6 +1,6 @@
 //! Outliers: more large residuals than noise gives (case 92).
 
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::observations::Part;
 use crate::robot::Robot;
 use crate::words::significant;
@@ -40,7 +40,7 @@ pub(in crate::calibrate) fn findings(
         };
         findings.push(Finding::new(
             Severity::Warning,
-            "heavy_tails",
+            Code::HeavyTails,
             name,
             format!(
                 "joint `{name}`: {count} of {} residuals ({:.1} %) are beyond {FAR} robust sd ({}), normal noise has 0.006 %: \

@@ -10,7 +10,7 @@ use crate::calibrate::fit::friction_only;
 use crate::calibrate::fit::noise_of::noise_of;
 use crate::calibrate::progress::{Stage, Watch};
 use crate::calibrate::settings::CalibrationSettings;
-use crate::error::{Finding, Result, Severity};
+use crate::error::{Code, Finding, Result, Severity};
 use crate::likelihood::{Columns, JointNoise};
 use crate::observations::{Observations, Part};
 use crate::plug_in::Fit;
@@ -171,7 +171,7 @@ fn not_scored(held_out: &[LeftOut<'_>], noise: &[JointNoise]) -> Finding {
     let most = noise.iter().map(|joint| joint.n_eff).fold(0.0, f64::max);
     Finding::new(
         Severity::Warning,
-        "heldout_not_scored",
+        Code::HeldoutNotScored,
         names.clone(),
         format!(
             "what is left out of {names} is not predicted: the rows that remain for the fit count as {most:.1} independent \

@@ -2,7 +2,7 @@
 
 use super::correlate::strongest;
 use crate::calibrate::data::all_logs::refuse;
-use crate::error::{Finding, Result, Severity};
+use crate::error::{Code, Finding, Result, Severity};
 use crate::observations::Part;
 use crate::plug_in::Fit;
 use crate::robot::Robot;
@@ -70,7 +70,7 @@ pub(in crate::calibrate) fn require(
     let said = |(joint, [rows, independent]): (&str, [f64; 2])| {
         Finding::new(
             Severity::Warning,
-            "few_effective_rows",
+            Code::FewEffectiveRows,
             joint,
             format!(
                 "the {rows} rows of joint `{joint}` count as {independent:.1} independent rows, fewer than {LEAST_EFFECTIVE_ROWS}: what is \

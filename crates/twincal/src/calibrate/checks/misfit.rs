@@ -1,6 +1,6 @@
 //! What no candidate describes, where it is more than the noise.
 
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::likelihood::PlugIn;
 use crate::robot::Robot;
 use crate::words::significant;
@@ -19,7 +19,7 @@ pub(in crate::calibrate) fn findings(robot: &Robot, plug_in: &PlugIn) -> Vec<Fin
             let times = significant(share, 2);
             Finding::new(
                 Severity::Note,
-                "misfit",
+                Code::Misfit,
                 name,
                 format!(
                     "joint `{name}`: what no candidate describes counts as {times} times the noise; intervals and probabilities allow for it"

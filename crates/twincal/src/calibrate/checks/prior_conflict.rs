@@ -1,6 +1,6 @@
 //! Do data and prior contradict each other? Then one of them is wrong, and the estimate lies between them.
 
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::likelihood::Columns;
 use crate::posterior::{Posterior, Problem};
 use crate::prior::PriorSettings;
@@ -56,7 +56,7 @@ pub(in crate::calibrate) fn findings(
             let name = &columns.names[k];
             findings.push(Finding::new(
                 Severity::Warning,
-                "prior_conflict",
+                Code::PriorConflict,
                 name.clone(),
                 format!(
                     "`{name}` = {} ± {} is {} sd of its prior (sd {}) from 0, {:.1} sd of what the prior predicts for its estimate: look whether the \
@@ -80,7 +80,7 @@ pub(in crate::calibrate) fn findings(
         if gamma_lr(shape, x).min(gamma_ur(shape, x)) < TAIL {
             findings.push(Finding::new(
                 Severity::Warning,
-                "prior_conflict",
+                Code::PriorConflict,
                 "prior.noise",
                 format!(
                     "the noise variance is {} (N·m)², which prior.noise holds for impossible (it expects about {}): \

@@ -10,7 +10,7 @@
 //! (Huber 1967; blocks for dependent rows as in Liang & Zeger 1986; the second part is the prior's own, so that what the data
 //! do not see stays as wide as the prior). The tempering cancels: A⁻¹ grows with max(τ, λ) as s_b sinks.
 
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::gram::Gram;
 use crate::linear_algebra::Cholesky;
 use crate::plug_in::Fit;
@@ -114,7 +114,7 @@ pub(in crate::calibrate) fn findings<'a>(terms: impl Iterator<Item = Sds<'a>>) -
     };
     vec![Finding::new(
         Severity::Warning,
-        "sd_too_small",
+        Code::SdTooSmall,
         *name,
         format!(
             "the sd of `{name}`{others} may be too small: stretches of the logs disagree on it {ratio:.1} times more than the \

@@ -3,7 +3,7 @@
 use crate::calibrate::data::all_logs::{Data, grams_at};
 use crate::calibrate::data::other_cutoffs::pipelines;
 use crate::calibrate::settings::CalibrationSettings;
-use crate::error::{Finding, Result, Severity};
+use crate::error::{Code, Finding, Result, Severity};
 use crate::gram::Gram;
 use crate::infer::approximate;
 use crate::likelihood::{Columns, assemble};
@@ -97,7 +97,7 @@ pub(in crate::calibrate) fn findings(
             let moved = (point.mean[k] - posterior.mean[k]).abs() / posterior.sd[k];
             let finding = Finding::new(
                 Severity::Warning,
-                "depends_on_cutoff",
+                Code::DependsOnCutoff,
                 name.clone(),
                 format!(
                     "`{name}` moves by {moved:.1} sd when the cut-off becomes {} Hz (mean over all models, in or out: from {} to {}): \

@@ -1,7 +1,7 @@
 //! Does the noise of a joint change with its speed or load? Said where it does and the fit assumes that it does not.
 
 use crate::calibrate::fit::weigh::{MovingRow, moving};
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::likelihood::{NoiseSettings, Profile};
 use crate::observations::Part;
 use crate::plug_in::{Fit, residual_correlation_time};
@@ -12,7 +12,7 @@ const WORTH: f64 = 2.0;
 
 /// What noise may change with.
 struct Cause {
-    code: &'static str,
+    code: Code,
     /// "at some speeds than at others".
     words: &'static str,
     key: &'static str,
@@ -20,16 +20,16 @@ struct Cause {
     allowed: fn(&NoiseSettings) -> bool,
 }
 
-const CAUSES: [Cause; 2] = [
+static CAUSES: [Cause; 2] = [
     Cause {
-        code: "noise_varies_with_speed",
+        code: Code::NoiseVariesWithSpeed,
         words: "at some speeds than at others",
         key: "noise.varies_with_speed",
         value: |row| row.speed,
         allowed: |noise| noise.varies_with_speed,
     },
     Cause {
-        code: "noise_varies_with_load",
+        code: Code::NoiseVariesWithLoad,
         words: "under some loads than under others",
         key: "noise.varies_with_load",
         value: |row| row.load,
@@ -77,7 +77,7 @@ fn finding(mut found: Vec<(&str, f64)>, cause: &Cause) -> Option<Finding> {
     } = cause;
     Some(Finding::new(
         Severity::Note,
-        code,
+        *code,
         *name,
         format!(
             "joint `{name}`{others}: what is left is {ratio:.1} times larger {words}; intervals are too wide at \

@@ -2,7 +2,7 @@
 
 use crate::calibrate::fit::fitted::Fitted;
 use crate::calibrate::settings::CalibrationSettings;
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::infer::R_HAT_LIMIT;
 use crate::likelihood::NoiseModel;
 use crate::plug_in::correlation_time;
@@ -23,7 +23,7 @@ pub(in crate::calibrate) fn findings(
     {
         findings.push(Finding::new(
             Severity::Warning,
-            "chains_disagree",
+            Code::ChainsDisagree,
             "",
             format!(
                 "the {chains} chains disagree (R-hat {r_hat:.3}, limit {R_HAT_LIMIT}) and were accepted as allowed: \
@@ -35,7 +35,7 @@ pub(in crate::calibrate) fn findings(
     if !fitted.fit.converged {
         findings.push(Finding::new(
             Severity::Warning,
-            "plug_ins_not_settled",
+            Code::PlugInsNotSettled,
             "",
             format!(
                 "noise weights or slab scale still moved after {} rounds; probabilities near 0.5 may change in the second digit",
@@ -51,7 +51,7 @@ pub(in crate::calibrate) fn findings(
             if time > 2.0 {
                 findings.push(Finding::new(
                     Severity::Warning,
-                    "residual_correlated",
+                    Code::ResidualCorrelated,
                     name,
                     format!(
                         "joint `{name}`: the residual stays alike for {time:.1} rows, which noise.model = \"iid\" ignores: \

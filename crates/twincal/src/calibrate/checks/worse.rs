@@ -1,6 +1,6 @@
 //! A twin that predicts held-out torque worse than the model it started from.
 
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::robot::Robot;
 use crate::validate::{Loss, Scores, WORSE};
 use crate::words::significant;
@@ -49,12 +49,12 @@ pub(in crate::calibrate) fn of_compact(losses: Option<[Loss; 2]>) -> Option<Find
             significant(own.rmse, 3),
             significant(average.rmse, 3)
         );
-        Finding::new(Severity::Warning, "compact_worse", "", message, 0)
+        Finding::new(Severity::Warning, Code::CompactWorse, "", message, 0)
     })
 }
 
 fn finding(subject: String, message: String) -> Finding {
-    Finding::new(Severity::Warning, "worse_than_model", subject, message, 0)
+    Finding::new(Severity::Warning, Code::WorseThanModel, subject, message, 0)
 }
 
 #[cfg(test)]

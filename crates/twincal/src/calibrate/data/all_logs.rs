@@ -3,7 +3,7 @@
 use super::log::Log;
 use super::log_summary::LogSummary;
 use super::reader::{Reader, Role};
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity};
 use crate::gram::Gram;
 use crate::likelihood::Columns;
 use crate::observations::{GramSum, Observations, Part};
@@ -218,7 +218,7 @@ pub(in crate::calibrate) fn zero_findings(library: &Library, zero: &[usize]) -> 
         let name = &term.name;
         Finding::new(
             Severity::Warning,
-            "zero_column",
+            Code::ZeroColumn,
             name.clone(),
             format!("term `{name}` has no torque on any row of these logs and was left out: its joints do not move"),
             0,

@@ -1,7 +1,7 @@
 //! What is followed of the joints' history: thresholds of stop operators and what warmth is, from what the training logs hold.
 
 use crate::calibrate::settings::CalibrationSettings;
-use crate::error::{Finding, Result, Severity};
+use crate::error::{Code, Finding, Result, Severity};
 use crate::robot::{JointKind, Robot};
 use crate::signal::{
     JointHistory, Log, Pipeline, ReadyLog, STOPS, Warmth, known_temperatures, stretches,
@@ -87,7 +87,7 @@ pub(in crate::calibrate) fn follow(
         let message = format!("`{}` of friction is no candidate: {why}", family.word());
         findings.push(Finding::new(
             Severity::Note,
-            "history_not_followed",
+            Code::HistoryNotFollowed,
             "",
             message,
             0,

@@ -2,7 +2,7 @@
 
 use super::log::Log;
 use super::log_summary::LogSummary;
-use crate::error::{Finding, Result, Severity};
+use crate::error::{Code, Finding, Result, Severity};
 use crate::incidents::{Evidence, Incident, incident_findings, leave_out, left_out};
 use crate::observations::{GramSum, JointObservations, Observations, Room, observe};
 use crate::robot::Robot;
@@ -105,7 +105,7 @@ impl Reader<'_> {
         if warm.iter().zip(&observations.joints).any(cold) {
             findings.push(Finding::new(
                 Severity::Warning,
-                "temperature_left_out",
+                Code::TemperatureLeftOut,
                 &long.log.name,
                 "a temperature is missing in some chapters and was left out of all: drift is not compared with it",
                 0,

@@ -14,7 +14,7 @@
 //! a UR10 that were fitted in twice the band, 95 % intervals held none to all of the next seconds' torque. Such a log is refused.
 
 use crate::calibrate::settings::CalibrationSettings;
-use crate::error::{Error, Finding, Severity};
+use crate::error::{Code, Error, Finding, Severity};
 use crate::robot::Robot;
 use crate::signal::Auto;
 use crate::words::significant;
@@ -122,7 +122,7 @@ pub(in crate::calibrate) fn masked(
 
 /// Whether an encoder is so coarse that it was told.
 fn is_coarse(findings: &[Finding]) -> bool {
-    findings.iter().any(|f| f.code == "quantised_encoder")
+    findings.iter().any(|f| f.code == Code::QuantisedEncoder)
 }
 
 /// Cut-offs that are open to a fit by `settings` that ended with `few` and `findings`, Hz.
@@ -150,7 +150,7 @@ pub(in crate::calibrate) fn lowered(few: &TooFew, cutoff_hz: f64) -> Finding {
          less of the motion; [signal] cutoff_hz states another one",
         few.cutoff_hz
     );
-    Finding::new(Severity::Warning, "lower_band", "", message, 0)
+    Finding::new(Severity::Warning, Code::LowerBand, "", message, 0)
 }
 
 /// Half, a quarter and so on of a cut-off in two digits, not below [`LEAST`].
@@ -176,7 +176,7 @@ mod tests {
     }
 
     fn coarse() -> [Finding; 1] {
-        let code = "quantised_encoder";
+        let code = Code::QuantisedEncoder;
         let message = String::new();
         [Finding::new(Severity::Warning, code, "j", message, 0)]
     }

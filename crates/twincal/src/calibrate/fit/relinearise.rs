@@ -3,7 +3,7 @@
 use crate::calibrate::data::all_logs::Data;
 use crate::calibrate::data::log::Log;
 use crate::calibrate::settings::CalibrationSettings;
-use crate::error::{Finding, Result, Severity};
+use crate::error::{Code, Finding, Result, Severity};
 use crate::observations::Part;
 use crate::plug_in::Fit;
 use crate::robot::{Motion, Robot, nominal_torque};
@@ -119,7 +119,7 @@ pub(in crate::calibrate) fn finding(names: &[&str], open: Option<f64>) -> Option
     Some(match open {
         None => Finding::new(
             Severity::Note,
-            "relinearised",
+            Code::Relinearised,
             "",
             about,
             names.len() as u64,
@@ -131,7 +131,7 @@ pub(in crate::calibrate) fn finding(names: &[&str], open: Option<f64>) -> Option
             );
             Finding::new(
                 Severity::Warning,
-                "relinearised",
+                Code::Relinearised,
                 "",
                 message,
                 names.len() as u64,

@@ -4,6 +4,7 @@
 
 mod search;
 
+use crate::error::Code;
 use crate::error::{Finding, Severity};
 use crate::observations::Part;
 use crate::plug_in::{Fit, residual_correlation_time};
@@ -76,17 +77,17 @@ impl Seen {
     /// Where other families than the usual ones were asked for: the line that asks for this one.
     pub(in crate::calibrate) fn told(&self) -> Finding {
         let remedy = "makes it a candidate";
-        self.finding(Severity::Warning, "ripple_seen", "gear ripple; ", remedy)
+        self.finding(Severity::Warning, Code::RippleSeen, "gear ripple; ", remedy)
     }
 
     /// Where it became a candidate.
     pub(in crate::calibrate) fn added(&self) -> Finding {
         let what = "gear ripple, which is a candidate now; ";
         let remedy = "states it, another number or family chooses otherwise";
-        self.finding(Severity::Note, "ripple_added", what, remedy)
+        self.finding(Severity::Note, Code::RippleAdded, what, remedy)
     }
 
-    fn finding(&self, severity: Severity, code: &'static str, what: &str, remedy: &str) -> Finding {
+    fn finding(&self, severity: Severity, code: Code, what: &str, remedy: &str) -> Finding {
         let Self {
             joint,
             periods,
@@ -217,7 +218,10 @@ mod tests {
                 "{said}"
             );
         }
-        assert_eq!((&*told.code, &*added.code), ("ripple_seen", "ripple_added"));
+        assert_eq!(
+            (told.code, added.code),
+            (Code::RippleSeen, Code::RippleAdded)
+        );
         let slider = Ripple {
             order: 200.04 * TAU,
             ..ripple

@@ -2,7 +2,7 @@
 //! friction and base parameters.
 
 use crate::calibrate::settings::{CalibrationSettings, UnaskedRipple};
-use crate::error::{Error, Finding, Severity};
+use crate::error::{Code, Error, Finding, Severity};
 use crate::term::Family;
 
 /// Viscous and Coulomb friction, and the inertial parameters of links with the motors' inertia.
@@ -53,7 +53,7 @@ pub(in crate::calibrate) fn without_memory(
     let message = format!(
         "too few rows for all candidates ({problem}): fitted without hysteresis and warm-up of friction"
     );
-    let finding = Finding::new(Severity::Note, "history_not_followed", "", message, 0);
+    let finding = Finding::new(Severity::Note, Code::HistoryNotFollowed, "", message, 0);
     Some(Smaller { settings, finding })
 }
 
@@ -76,7 +76,7 @@ pub(in crate::calibrate) fn smaller(
         "no result with all candidates ({problem}): fitted with friction, motor inertia and link inertias only; log longer and faster motion \
          for the others"
     );
-    let finding = Finding::new(Severity::Warning, "smaller_library", "", message, 0);
+    let finding = Finding::new(Severity::Warning, Code::SmallerLibrary, "", message, 0);
     Some(Smaller { settings, finding })
 }
 

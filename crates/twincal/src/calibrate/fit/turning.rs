@@ -15,7 +15,7 @@
 use super::columns::columns_of;
 use crate::calibrate::data::all_logs::{tell_payload_apart, zero_columns};
 use crate::calibrate::settings::CalibrationSettings;
-use crate::error::{Finding, Result, Severity};
+use crate::error::{Code, Finding, Result, Severity};
 use crate::likelihood::{NoiseModel, NoiseSettings};
 use crate::observations::{Observations, Part, observe};
 use crate::plug_in::{Fit, FitSettings, Moving, fit, residual_correlation_time, start};
@@ -155,7 +155,7 @@ impl Way {
         } = self;
         Finding::new(
             Severity::Note,
-            "coulomb_velocity",
+            Code::CoulombVelocity,
             "",
             format!(
                 "friction turns round within {velocity} rad/s (m/s) instead of the usual {usual}: the residual is {:.0} % smaller, \

@@ -13,7 +13,7 @@
 use super::fitted::{estimate, sums};
 use crate::calibrate::data::all_logs::Data;
 use crate::calibrate::settings::CalibrationSettings;
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity};
 use crate::likelihood::{Columns, NoiseModel, NoiseSettings, Profile, Spread};
 use crate::observations::Part;
 use crate::robot::Robot;
@@ -81,7 +81,7 @@ pub(in crate::calibrate) fn weigh(
         if count > 0 {
             findings.push(Finding::new(
                 Severity::Note,
-                "outliers_weighed",
+                Code::OutliersWeighed,
                 name,
                 format!(
                     "joint `{name}`: {count} of {all} rows count less than a quarter (noise.robust)"

@@ -15,7 +15,7 @@
 
 use super::whiteness::{CUMULATED, Judged, Run, VARIANCES, judge};
 use crate::calibrate::settings::CalibrationSettings;
-use crate::error::{Error, Finding, Result, Severity};
+use crate::error::{Code, Error, Finding, Result, Severity};
 use crate::likelihood::NoiseModel;
 use crate::observations::{Observations, observe};
 use crate::plug_in::Fit;
@@ -138,7 +138,7 @@ fn runs(rows: &Observations, joint: usize, beta: &[f64]) -> Vec<Run> {
 pub(in crate::calibrate) fn not_wider(error: &Error) -> Finding {
     Finding::new(
         Severity::Note,
-        "not_wider",
+        Code::NotWider,
         "",
         format!(
             "what is left is an autoregression, but a fit in a wider band with \"ar1\" ends early ({error}): fitted in the usual one; \
@@ -159,7 +159,7 @@ fn finding(told: &[(&str, Judged)], pipeline: &Pipeline, cutoff_hz: f64) -> Opti
     let narrow = pipeline.cutoff_hz;
     Some(Finding::new(
         Severity::Note,
-        "wider_band",
+        Code::WiderBand,
         "",
         format!(
             "below {cutoff_hz} Hz what is left is noise of one memory on every joint, {:.3} s at most (joint `{}`): cumulated periodogram \

@@ -2,7 +2,7 @@
 
 use super::calibration::ComponentSummary;
 use super::status::Status;
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::term::Family;
 use crate::words::significant;
 
@@ -45,7 +45,7 @@ fn of_factor(factor: f64, sd: f64, from_currents: bool) -> Option<Finding> {
         significant(sd, 1),
         significant(1.0 / factor, 3)
     );
-    Some(Finding::new(severity, "common_factor", "", message, 0))
+    Some(Finding::new(severity, Code::CommonFactor, "", message, 0))
 }
 
 #[cfg(test)]

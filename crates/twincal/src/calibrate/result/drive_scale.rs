@@ -10,7 +10,7 @@
 //! units of the logged torque and stay as they are. Nor does the prediction of logged torque change. Where columns are worked out about effects
 //! (`relinearise`), x holds the torque of those as well, so that they count once less: d = β − β* + A_z⁻¹ X_zᵀ x.
 
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::linear_algebra::Cholesky;
 use crate::posterior::summary::ColumnSummary;
 use crate::posterior::{Posterior, Problem};
@@ -122,7 +122,7 @@ impl DriveScale {
         let share = 100.0 * self.sd;
         Some(Finding::new(
             Severity::Note,
-            "drive_gain_uncertain",
+            Code::DriveGainUncertain,
             "",
             format!(
                 "torque comes from the motors: an error of {share:.0} % (sd) that all drive constants may share is in the intervals of masses, \
@@ -144,7 +144,7 @@ pub(in crate::calibrate) fn ignored(
     (asked && scale.is_none()).then(|| {
         Finding::new(
             Severity::Warning,
-            "drive_gain_ignored",
+            Code::DriveGainIgnored,
             "prior.drive_gain",
             format!(
                 "an error of {:.0} % (sd) that all drive constants may share is not in the intervals of masses: that takes `gain` among the \
@@ -200,7 +200,7 @@ mod tests {
         };
         let (library, _) = Library::propose(&tree(), &settings).unwrap();
         let finding = ignored(0.07, None, &library).unwrap();
-        assert_eq!(finding.code, "drive_gain_ignored");
+        assert_eq!(finding.code, Code::DriveGainIgnored);
         assert_eq!(ignored(0.0, None, &library), None);
         let direction = vec![0.0];
         let scale = DriveScale {

@@ -1,7 +1,7 @@
 //! Friction that would drive its joint: quadratic friction that takes more than there is beyond the speeds that were logged.
 
 use super::calibration::ComponentSummary;
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::robot::JointKind;
 use crate::term::{Family, Library};
 use crate::twin::Twin;
@@ -100,7 +100,7 @@ fn told(
     } = friction;
     Some(Finding::new(
         Severity::Warning,
-        "friction_turns_negative",
+        Code::FrictionTurnsNegative,
         joint,
         format!(
             "friction of joint `{joint}` ({dry:.3} {viscous:+.3} v {quadratic:+.3} v²) is negative above {speed:.2} {unit}, {reach}: there \

@@ -13,7 +13,7 @@ use crate::calibrate::checks::sweep::SweepPoint;
 use crate::calibrate::data::facts::Facts;
 use crate::calibrate::fit::compact::Compact;
 use crate::calibrate::settings::CalibrationSettings;
-use crate::error::{Finding, Result, Severity};
+use crate::error::{Code, Finding, Result, Severity};
 use crate::infer::approximate;
 use crate::likelihood::{Columns, mean_squares};
 use crate::plug_in::Fit;
@@ -233,7 +233,7 @@ fn names(library: &Library, columns: &Columns) -> Vec<String> {
 fn forced(name: &String) -> Finding {
     Finding::new(
         Severity::Note,
-        "forced",
+        Code::Forced,
         name.clone(),
         format!(
             "`{name}` is in because prior.forced says so, or names what needs it: its probability of 1 is no evidence"
@@ -371,7 +371,7 @@ fn findings_of_posterior(groups: &[Group], problem: &Problem, sums: &Sums) -> Ve
     if problem.yy <= 1e-18 * measured {
         findings.push(Finding::new(
             Severity::Note,
-            "nothing_to_correct",
+            Code::NothingToCorrect,
             "",
             "the nominal model explains the torque to rounding: nothing to correct",
             0,
@@ -385,7 +385,7 @@ fn findings_of_posterior(groups: &[Group], problem: &Problem, sums: &Sums) -> Ve
         };
         findings.push(Finding::new(
             severity,
-            "alike_in_data",
+            Code::AlikeInData,
             group.members.join(", "),
             group.words.clone(),
             group.members.len() as u64,

@@ -2,7 +2,7 @@
 
 use super::calibration::Calibration;
 use super::status::{Status, StatusReason};
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::posterior::draws::Drawer;
 use crate::robot::{Robot, base_parameters, inertia_of, principal_axes};
 use crate::term::{Library, ModelColumn};
@@ -136,7 +136,7 @@ fn finding(link: &str, share: f64) -> Finding {
     };
     Finding::new(
         severity,
-        "unphysical_inertia_found",
+        Code::UnphysicalInertiaFound,
         link,
         format!(
             "link `{link}`: {:.1} % of the posterior draws of its inertia (with what it carries) are those of a rigid body; \

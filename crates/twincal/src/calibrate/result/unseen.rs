@@ -2,7 +2,7 @@
 
 use super::calibration::Calibration;
 use super::status::{Status as Said, StatusReason};
-use crate::error::{Finding, Severity};
+use crate::error::{Code, Finding, Severity};
 use crate::excitation::{Excitation, Seen, States, excitation as compare, sentence};
 use crate::gram::Gram;
 use crate::robot::Robot;
@@ -94,7 +94,7 @@ pub(in crate::calibrate) fn tell(calibration: &mut Calibration, excitation: &Exc
     for unseen in asked.take(TOLD) {
         findings.push(Finding::new(
             Severity::Note,
-            "unseen_motion",
+            Code::UnseenMotion,
             unseen.joint.clone().unwrap_or_default(),
             sentence(unseen),
             unseen.directions as u64,
@@ -119,7 +119,7 @@ pub(in crate::calibrate) fn tell(calibration: &mut Calibration, excitation: &Exc
 
 fn not_seen(message: String, names: &[String]) -> Finding {
     let (subject, count) = (names.join(", "), names.len() as u64);
-    Finding::new(Severity::Note, "not_seen", subject, message, count)
+    Finding::new(Severity::Note, Code::NotSeen, subject, message, count)
 }
 
 /// "a, b and 3 more".

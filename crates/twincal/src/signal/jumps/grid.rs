@@ -1,6 +1,7 @@
 //! Encoders × rates × rest × motion: none of them cuts a log; a real reset does.
 
 use super::*;
+use crate::error::Code;
 use crate::robot::JointKind;
 use crate::signal::Corrections;
 use crate::signal::prepare::prepare;
@@ -108,7 +109,7 @@ fn a_real_reset_cuts_in_rest_and_in_motion() {
                             let (pieces, findings) = prepared(&log);
                             let said = findings
                                 .iter()
-                                .find(|finding| finding.code == "position_step");
+                                .find(|finding| finding.code == Code::PositionStep);
                             let said = said.unwrap_or_else(|| {
                                 panic!("{world:?} {velocity:?} {size}: {findings:?}")
                             });

@@ -24,7 +24,9 @@ fn prepared(log: &Recording) -> (Prepared<'_>, Vec<Finding>) {
 }
 
 fn said<'a>(findings: &'a [Finding], code: &str) -> Option<&'a Finding> {
-    findings.iter().find(|finding| finding.code == code)
+    findings
+        .iter()
+        .find(|finding| finding.code.as_str() == code)
 }
 
 /// Rows that repeat the row before.

@@ -2,6 +2,7 @@
 
 use super::super::{Family, LibrarySettings, Status};
 use super::{all, bare, joints, only, planar, status_of};
+use crate::error::Code;
 use crate::error::{Error, Severity};
 
 fn alias(of: &str) -> Status {
@@ -171,14 +172,17 @@ fn terms_with_a_domain_are_compared_inside_it() {
     assert_eq!(status_of(&library, "log(q1^2)"), &alias("log(q1)"));
     assert_eq!(status_of(&library, "log(q1-9)*3"), &alias("log(q1-9)"));
     assert_eq!(status_of(&library, "q1*log(3)"), &Status::Candidate);
-    assert!(findings.iter().all(|f| f.code == "alias"), "{findings:?}");
+    assert!(
+        findings.iter().all(|f| f.code == Code::Alias),
+        "{findings:?}"
+    );
     // no state at all has both: kept, and said
     let (library, findings) = planar(2, &only(&["log(q1)", "log(-q1)", "cos(q1)"])).unwrap();
     assert_eq!(library.columns().len(), 3);
     assert_eq!(
         findings
             .iter()
-            .filter(|f| f.code == "alias_unchecked")
+            .filter(|f| f.code == Code::AliasUnchecked)
             .count(),
         1
     );
@@ -240,5 +244,5 @@ fn limits_and_empty_libraries_are_settings_errors() {
     };
     let (library, findings) = bare(&six, false, &unasked).unwrap();
     assert_eq!(library.columns().len(), 6);
-    assert_eq!(findings[0].code, "generic_family_off");
+    assert_eq!(findings[0].code, Code::GenericFamilyOff);
 }
