@@ -4,7 +4,7 @@
 //! seed give the same bytes. Numbers are the shortest that read back the same; what is not a number is `null`.
 
 #[cfg(feature = "report")]
-use crate::assessment::Assessment;
+use crate::assessment::Versioned;
 use crate::context::ReportContext;
 use crate::error::{Error, Result};
 use serde::Serialize;
@@ -47,7 +47,7 @@ struct ResultFile<'a> {
     model: &'a str,
     config: Option<ConfigRow<'a>>,
     #[cfg(feature = "report")]
-    assessment: Assessment<'a>,
+    assessment: Versioned,
     components: &'a [ComponentSummary],
     terms: Vec<TermRow<'a>>,
     groups: &'a [Group],
@@ -228,7 +228,7 @@ impl<'a> ResultFile<'a> {
                 sha256: &config.sha256,
             }),
             #[cfg(feature = "report")]
-            assessment: Assessment::of(calibration),
+            assessment: Versioned::of(calibration),
             components: &calibration.components,
             terms: calibration.terms.iter().map(TermRow::of).collect(),
             groups: &calibration.groups,

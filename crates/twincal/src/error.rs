@@ -132,4 +132,10 @@ impl Finding {
             count,
         }
     }
+
+    /// Whether its words name this joint: the finding of a log may be about one of its joints.
+    #[must_use]
+    pub fn names(&self, joint: &str) -> bool {
+        self.message.contains(&format!("`{joint}`"))
+    }
 }

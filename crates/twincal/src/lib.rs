@@ -35,6 +35,7 @@ pub mod twin;
 pub mod validate;
 pub mod cross_check;
 pub mod calibrate;
+pub mod assess;
 pub mod compare;
 pub mod evaluator;
 pub mod write_back;

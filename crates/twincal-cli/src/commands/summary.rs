@@ -3,6 +3,7 @@
 use super::not_kept::others;
 use super::table::{print_table, table};
 use crate::terminal::{Terminal, clean};
+use twincal::assess::{decisive, friction_only, has_standstill};
 use twincal::calibrate::{Calibration, ParameterSummary};
 use twincal::validate::{Scores, Split};
 use twincal::words::significant;
@@ -101,8 +102,8 @@ fn validation(calibration: &Calibration, terminal: &mut Terminal) {
             return;
         }
     };
-    let judged = report::decisive(validation);
-    let moving = if report::has_standstill(validation) {
+    let judged = decisive(validation);
+    let moving = if has_standstill(validation) {
         ", joints that move"
     } else {
         ""
@@ -147,7 +148,7 @@ fn reliability(calibration: &Calibration) -> Vec<String> {
         .map(|(level, seen)| format!("{:.0} % interval {}", 100.0 * level, percent(*seen)))
         .collect();
     if !levels.is_empty() {
-        let share = percent(report::decisive(validation).epistemic_share);
+        let share = percent(decisive(validation).epistemic_share);
         lines.push(format!("held-out values inside: {}", levels.join(", ")));
         lines.push(format!(
             "{share} of the predicted variance is what coefficients leave open, the rest noise"
@@ -159,7 +160,7 @@ fn reliability(calibration: &Calibration) -> Vec<String> {
             report::stretched(conformal.factor),
             significant(conformal.factor, 3),
             100.0 * conformal.rows,
-            if report::has_standstill(validation) {
+            if has_standstill(validation) {
                 ", those at standstill too,"
             } else {
                 ""
@@ -191,7 +192,7 @@ fn reliability(calibration: &Calibration) -> Vec<String> {
 
 /// Scores per joint, and over all of them; what friction alone would leave where that was asked for.
 pub(super) fn scores(scores: &Scores, terminal: &mut Terminal) {
-    let friction = report::friction_only(scores);
+    let friction = friction_only(scores);
     let mut heads = vec!["joint", "RMSE nominal"];
     heads.extend(friction.is_some().then_some("friction only"));
     heads.extend(["calibrated", "in 95 % interval", "its width"]);

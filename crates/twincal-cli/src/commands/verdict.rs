@@ -1,14 +1,15 @@
 //! The twin's own verdict, for commands that use it: nobody ought to meet it in the simulator first.
 
+use twincal::assess;
 use twincal::calibrate::Calibration;
 use twincal::{Code, Finding, Severity};
-use twincal_io::report::{Answer, Conclusion, answer};
+use twincal_io::report::{Answer, answer};
 
 /// The verdict where it is not a plain yes: the answer and its first reason. It is of the fit, not of what the command does, so that exit codes
 /// do not follow from it.
 pub(super) fn doubt(calibration: &Calibration) -> Option<Finding> {
     let answer = answer(calibration);
-    (answer.reason.conclusion() != Conclusion::Yes).then(|| {
+    (answer.answer != assess::Answer::Yes).then(|| {
         let words = words(&answer);
         Finding::new(Severity::Warning, Code::Verdict, "", words, 0)
     })
@@ -30,13 +31,13 @@ fn words(answer: &Answer) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use twincal_io::report::Reason;
 
     #[test]
     fn the_first_reason_stands_behind_the_answer() {
         let told = |headline: &str, limits: &[&str]| {
             words(&Answer {
-                reason: Reason::NothingEstablished,
+                answer: assess::Answer::NotYet,
+                reason: Code::NothingEstablished,
                 headline: headline.into(),
                 grounds: vec!["Torque error: 1 → 2 N·m.".into()],
                 limits: limits.iter().map(|&limit| limit.into()).collect(),

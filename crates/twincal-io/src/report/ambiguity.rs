@@ -3,6 +3,7 @@
 use super::text::{fixed, list, percent};
 use super::view::Joint;
 use twincal::Code;
+use twincal::assess::standstill;
 use twincal::calibrate::Calibration;
 
 /// Two coefficients whose draws correlate this much are known as a combination.
@@ -71,18 +72,6 @@ fn sentence(message: &str) -> String {
         Some(first) => format!("{}{}.", first.to_uppercase(), letters.as_str()),
         None => String::new(),
     }
-}
-
-/// Share of the fitted rows of joint `j` at standstill; NaN without rows.
-pub(super) fn standstill(calibration: &Calibration, j: usize) -> f64 {
-    let fitted = || calibration.logs.iter().filter(|log| log.role == "fit");
-    let moved: u64 = fitted()
-        .map(|log| log.rows.get(j).copied().unwrap_or(0))
-        .sum();
-    let stood: u64 = fitted()
-        .map(|log| log.standstill.get(j).copied().unwrap_or(0))
-        .sum();
-    stood as f64 / (moved + stood) as f64
 }
 
 /// Sets of effects of which one is there and the data cannot tell which; those that only the prior tells apart in one

@@ -1,155 +1,35 @@
-//! Rows on which the training data say less than on others, by cause: motion that training did not have, or torque that it leaves open.
+//! Rows on which the training data say less than on others, in words: motion that training did not have, or torque that it leaves open.
 
-use super::limits::too_narrow;
 use super::text::{list, number, percent, subject};
-use super::view::{Joint, memory};
+use super::view::{Joint, unit_of};
+use twincal::assess::{Beyond, Cause, tested_beyond};
 use twincal::calibrate::Calibration;
-use twincal::validate::{JointScore, Split, Validation};
 
-/// Share of its range by which a joint may leave the training motion.
-const MARGIN: f64 = 0.05;
-/// Share of a joint's rows from which the error there is told.
-const MANY: f64 = 0.1;
-/// Ratio of errors there and elsewhere from which they are told.
-const FURTHER_OFF: f64 = 1.25;
-/// Share of the rows beyond that are new motion, from which that is the cause.
-const MOSTLY: f64 = 0.5;
-
-/// Why [`Validation::beyond`] has a joint's rows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Cause {
-    /// Its position or velocity leaves the training range.
-    NewMotion,
-    /// What is not known of its torque is more than the noise.
-    OpenTorque,
+/// "34 of 80 moving rows".
+fn rows(own: &Beyond<'_>) -> String {
+    let [beyond, all] = own.rows();
+    format!("{beyond} of {all} moving rows")
 }
 
-impl Cause {
-    /// New motion is only where whole logs were held out: of other splits the range is that of all logs.
-    fn of(calibration: &Calibration, joint: &str, rows: f64) -> Self {
-        if calibration.validation.split != Split::HeldoutLogs {
-            return Self::OpenTorque;
-        }
-        let index = calibration
-            .noise
-            .iter()
-            .position(|noise| noise.joint == joint);
-        let hull = index.and_then(|index| calibration.twin.hull.get(index));
-        let Some(hull) = hull else {
-            return Self::NewMotion;
-        };
-        let leaves = |x: f64, low: f64, high: f64| {
-            let margin = MARGIN * (high - low);
-            x < low - margin || x > high + margin
-        };
-        let (mut new, mut all) = (0.0, 0.0);
-        let traces = calibration.validation.traces.iter();
-        for trace in traces.filter(|trace| trace.joint == joint) {
-            for ((q, qd), still) in trace.q.iter().zip(&trace.qd).zip(&trace.standstill) {
-                if !still {
-                    all += 1.0;
-                    let outside = leaves(*q, hull[0], hull[1]) || leaves(*qd, hull[2], hull[3]);
-                    new += f64::from(u8::from(outside));
-                }
-            }
-        }
-        match new > MOSTLY * rows * all {
-            true => Self::NewMotion,
-            false => Self::OpenTorque,
-        }
-    }
-}
-
-/// A joint's moving rows within and beyond.
-struct Pair<'a> {
-    within: &'a JointScore,
-    beyond: &'a JointScore,
-    cause: Cause,
-}
-
-impl<'a> Pair<'a> {
-    fn of(calibration: &Calibration, within: &'a JointScore, beyond: &'a JointScore) -> Self {
-        let share = beyond.rows as f64 / (within.rows + beyond.rows) as f64;
-        let cause = Cause::of(calibration, &beyond.joint, share);
-        Self {
-            within,
-            beyond,
-            cause,
-        }
-    }
-
-    /// "34 of 80 moving rows".
-    fn rows(&self) -> String {
-        let all = self.within.rows + self.beyond.rows;
-        format!("{} of {all} moving rows", self.beyond.rows)
-    }
-}
-
-/// Joints that have most of their rows there. Of torque that training leaves open only those that are predicted better elsewhere: otherwise
-/// that is no excuse.
-fn mostly_there(calibration: &Calibration) -> impl Iterator<Item = Pair<'_>> {
-    let Validation { within, beyond, .. } = &calibration.validation;
-    let pairs = within.joints.iter().zip(&beyond.joints);
-    pairs
-        .filter(|(within, beyond)| beyond.rows > within.rows)
-        .map(|(within, beyond)| Pair::of(calibration, within, beyond))
-        .filter(
-            |Pair {
-                 within,
-                 beyond,
-                 cause,
-             }| {
-                let better = within.rows == 0 || within.coverage95 > beyond.coverage95;
-                *cause == Cause::NewMotion || better
-            },
-        )
-}
-
-/// Joints of which training says less on a tenth of the held-out moving rows or more, mostly because their motion is new.
-pub(super) fn new_motion(calibration: &Calibration) -> Vec<String> {
-    let Validation { within, beyond, .. } = &calibration.validation;
-    let pairs = within.joints.iter().zip(&beyond.joints);
-    pairs
-        .filter(|(within, beyond)| beyond.rows as f64 >= MANY * (within.rows + beyond.rows) as f64)
-        .filter(|(_, beyond)| beyond.rows > 0)
-        .map(|(within, beyond)| Pair::of(calibration, within, beyond))
-        .filter(|pair| pair.cause == Cause::NewMotion)
-        .map(|pair| pair.beyond.joint.clone())
-        .collect()
-}
-
-/// Joints whose intervals are too narrow there, and less so elsewhere: by more than two standard errors of as many independent rows; and those
-/// whose error is larger there, on many of their rows.
-pub(super) fn narrow(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
-    let Validation { within, beyond, .. } = &calibration.validation;
-    let open = within.joints.iter().zip(&beyond.joints);
-    let open = open.filter(|(_, beyond)| beyond.rows > 0);
-    let told = open.filter_map(|(within, beyond)| {
-        let all = within.rows + beyond.rows;
-        let own = too_narrow(beyond, memory(joints, &beyond.joint));
-        let narrow = own && (within.rows == 0 || within.coverage95 > beyond.coverage95);
-        let further = within.rows > 0
-            && beyond.rows as f64 >= MANY * all as f64
-            && beyond.rmse_calibrated > FURTHER_OFF * within.rmse_calibrated;
-        if !(narrow || further) {
-            return None;
-        }
-        let pair = Pair::of(calibration, within, beyond);
-        let (place, elsewhere) = match pair.cause {
+/// Joints that are predicted worse there, or whose intervals hold less there.
+pub(super) fn worse(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
+    let own = twincal::assess::beyond(calibration).filter(|own| own.narrow || own.further_off);
+    let told = own.map(|own| {
+        let (within, beyond) = (own.within, own.beyond);
+        let (place, elsewhere) = match own.cause {
             Cause::NewMotion => ("beyond the training motion", "within it"),
             Cause::OpenTorque => ("where training leaves its torque open", "elsewhere"),
         };
-        let unit = joints.iter().find(|joint| joint.name == beyond.joint);
-        let unit = unit.map_or("", |joint| joint.units.torque);
         let mut said = Vec::new();
-        if further {
+        if own.further_off {
             said.push(format!(
-                "its error is {} {unit}, {elsewhere} {}",
+                "its error is {} {}, {elsewhere} {}",
                 number(beyond.rmse_calibrated, 3),
+                unit_of(joints, &beyond.joint),
                 number(within.rmse_calibrated, 3)
             ));
         }
-        if narrow {
+        if own.narrow {
             let seen = match within.rows {
                 0 => String::new(),
                 _ => format!(", {elsewhere} {}", percent(within.coverage95)),
@@ -159,23 +39,22 @@ pub(super) fn narrow(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Str
                 percent(beyond.coverage95)
             ));
         }
-        Some(format!(
+        format!(
             "{}: {place} ({}) {}.",
             subject(&[&beyond.joint]),
-            pair.rows(),
+            rows(&own),
             said.join("; ")
-        ))
+        )
     });
     told.collect()
 }
 
 /// Joints that were mostly tested there.
-pub(super) fn mostly(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
+pub(super) fn mostly(calibration: &Calibration) -> Vec<String> {
     let told = |wanted: Cause| -> Vec<String> {
-        mostly_there(calibration)
-            .filter(|pair| pair.cause == wanted)
-            .filter(|pair| joints.iter().any(|joint| joint.name == pair.beyond.joint))
-            .map(|pair| format!("{} ({})", pair.beyond.joint, pair.rows()))
+        tested_beyond(calibration)
+            .filter(|own| own.cause == wanted)
+            .map(|own| format!("{} ({})", own.beyond.joint, rows(&own)))
             .collect()
     };
     let each = [
@@ -194,7 +73,7 @@ pub(super) fn mostly(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Str
 #[cfg(test)]
 mod tests {
     use super::super::verdict::tests::judged;
-    use super::*;
+    use twincal::validate::Split;
 
     /// The elbow beyond on so many rows, within on as many; new motion where its held-out velocity is `speed` times what it is.
     fn limits(beyond: (u64, f64), within: (u64, f64), split: Split, speed: f64) -> Vec<String> {

@@ -3,7 +3,7 @@
 use super::text::count;
 use serde::Serialize;
 use twincal::calibrate::Calibration;
-use twincal::{Code, Finding, Severity};
+use twincal::{Code, Severity};
 
 /// Findings of one kind, as the page shows them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -68,11 +68,6 @@ pub(super) fn findings(calibration: &Calibration) -> Vec<Kind> {
         kind.told.extend(kind.more.drain(..told));
     }
     kinds
-}
-
-/// Whether the finding of a log is about this joint, which its words name.
-pub(super) fn is_about(finding: &Finding, joint: &str) -> bool {
-    finding.message.contains(&format!("`{joint}`"))
 }
 
 /// "There are 19 warnings of 6 kinds to read …"; `None` without any.

@@ -1,12 +1,16 @@
 //! What the verdict rests on, a sentence each: error of held-out torque, what friction alone would leave, intervals, effects.
 
 use super::figures::inclusion::family_name;
-use super::limits::{FEW, decisive, has_standstill, other_shares};
-use super::standstill::{at_standstill, held_at_rest, rest_got_worse};
+use super::limits::other_shares;
+use super::standstill::at_standstill;
 use super::status::with;
 use super::text::{count, first_of, list, number, percent};
-use super::view::{Joint, independent_rows, pooled_unit};
+use super::view::{Joint, pooled_unit, unit_of};
 use twincal::Code;
+use twincal::assess::{
+    FEW, all_at_rest, decisive, friction_only, has_standstill, independent_rows, rest_got_worse,
+    rows_of,
+};
 use twincal::calibrate::{Calibration, ComponentSummary, Status};
 use twincal::validate::{JointScore, Scores, Split};
 
@@ -30,14 +34,9 @@ pub(super) fn grounds(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<St
     // Where it got worse it is among what to mind.
     out.extend(at_standstill(calibration, joints).filter(|_| !rest_got_worse(calibration)));
     out.extend(friction_alone(calibration, joints));
-    out.push(held(calibration, joints));
+    out.push(held(calibration));
     out.extend(effects_found(calibration));
     out
-}
-
-/// Held-out values of all joints.
-pub(super) fn rows_of(scores: &Scores) -> u64 {
-    scores.joints.iter().map(|j| j.rows).sum()
 }
 
 /// "13.8 → 0.710 N·m, 94.9 % less".
@@ -173,8 +172,7 @@ fn with_friction(scores: &Scores, joints: &[Joint<'_>]) -> (Vec<String>, usize) 
     let growth = |(joint, left): &(&JointScore, f64)| left - joint.rmse_nominal;
     worse.sort_by(|a, b| growth(b).total_cmp(&growth(a)));
     let named = worse.iter().map(|(joint, left)| {
-        let unit = joints.iter().find(|other| other.name == joint.joint);
-        let unit = unit.map_or("", |joint| joint.units.torque);
+        let unit = unit_of(joints, &joint.joint);
         format!(
             "{} ({} → {} {unit})",
             joint.joint,
@@ -185,20 +183,8 @@ fn with_friction(scores: &Scores, joints: &[Joint<'_>]) -> (Vec<String>, usize) 
     (first_of(named.collect(), NAMED), better.len())
 }
 
-/// RMSE with friction alone over all rows of all joints; `None` where some joint has none.
-#[must_use]
-pub fn friction_only(scores: &Scores) -> Option<f64> {
-    let own = scores.joints.iter().filter(|joint| joint.rows > 0);
-    let squares: Option<Vec<f64>> = own
-        .map(|joint| Some(joint.rows as f64 * joint.rmse_friction?.powi(2)))
-        .collect();
-    let sum = squares?.iter().sum::<f64>();
-    let left = (sum / rows_of(scores) as f64).sqrt();
-    left.is_finite().then_some(left)
-}
-
 /// How much the 95 % intervals hold: of moving joints, and of all rows where some stand still.
-fn held(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
+fn held(calibration: &Calibration) -> String {
     let all = &calibration.validation.filtered;
     let judged = decisive(&calibration.validation);
     let (rows, share) = (count(rows_of(judged)), percent(judged.coverage95));
@@ -209,7 +195,7 @@ fn held(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
     };
     // Where all is inside, that is no praise.
     let factor = calibration.validation.conformal.as_ref().map(|c| c.factor);
-    let enough = independent_rows(calibration, joints) >= FEW;
+    let enough = independent_rows(calibration) >= FEW;
     let wide = match factor.filter(|f| *f < MUCH_TOO_WIDE && judged.coverage95 > SHARE_ALL) {
         Some(factor) if enough => format!(
             ": they are wider than they need to be, {} of their width would have done",
@@ -221,7 +207,7 @@ fn held(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
         ),
         None => String::new(),
     };
-    let single = match other_shares(judged, joints) {
+    let single = match other_shares(calibration) {
         Some(told) => format!(" On single joints, {told}."),
         None => String::new(),
     };
@@ -234,7 +220,7 @@ fn held(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
     let all = match differ {
         true => format!(
             ", and {} of the {} at standstill, where they are widened",
-            percent(held_at_rest(&calibration.validation)),
+            percent(all_at_rest(&calibration.validation).map_or(f64::NAN, |own| own.coverage95)),
             count(rows_of(all).saturating_sub(rows_of(judged)))
         ),
         false => String::new(),

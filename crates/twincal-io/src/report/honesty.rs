@@ -1,9 +1,9 @@
 //! Can the numbers be believed: intervals joint by joint, a guarantee, what the compact twin costs.
 
-use super::limits::has_standstill;
 use super::tables::{Table, with_unit};
 use super::text::{count, number, percent};
 use super::view::{Joint, pooled_unit};
+use twincal::assess::has_standstill;
 use twincal::calibrate::Calibration;
 use twincal::validate::{Conformal, TREND_ALARM, TREND_FEWEST, Trend, Validation};
 use twincal::words::significant;

@@ -1,41 +1,33 @@
-//! Where a twin does not hold: what errors and intervals of held-out torque say against it, and what was found that is not to be rested on.
+//! Where a twin does not hold, in sentences: the claims against it, what matters most first.
 
 use super::beyond;
 use super::findings;
 use super::shape;
-use super::standstill::{at_standstill, hardly_at_rest, rest_got_worse};
+use super::standstill::{at_standstill, hardly_at_rest};
 use super::text::{THIN, list, number, percent, subject};
-use super::view::{Joint, independent_rows, memory, pooled_unit, standard_deviation};
+use super::view::{Joint, pooled_unit, standard_deviation, unit_of};
+use twincal::assess::{
+    Assessment, CLEARLY_LOST, FEW, by_chance, decisive, has_standstill, memory, rest_got_worse,
+    too_narrow, too_wide,
+};
 use twincal::calibrate::Calibration;
-use twincal::posterior::Method;
-use twincal::validate::{JointScore, Scores, Validation, WORSE};
+use twincal::validate::JointScore;
 use twincal::{Code, Finding, Severity};
 
-/// A 95 % interval is honest if it holds this share of the held-out rows.
-pub(super) const COVERAGE: (f64, f64) = (0.90, 0.99);
-/// Share of honest intervals that are called too wide.
-const ALARM: f64 = 0.05;
-/// What an interval promises to hold.
-const LEVEL: f64 = 0.95;
 /// Shares of rows inside that nothing needs to be said of: 92 to 98 % in whole percent.
 const ABOUT: (f64, f64) = (0.915, 0.985);
 /// It in words.
 const LEVEL_WORDS: &str = "95 % intervals";
-/// Share of the torque's standard deviation from which the remaining error is called large.
-const LARGE: f64 = 0.5;
-/// Share of it from which a constant predicts torque better.
-const CLEARLY_LOST: f64 = 1.05;
-
-/// Held-out rows, in independent ones, below which nothing is promised.
-pub(super) const FEW: f64 = 20.0;
-/// Ratio of errors from which friction alone does not do as well.
-const AS_WELL: f64 = 1.05;
 
 /// Where the twin does not hold and what to mind, in the order of the report.
-pub(super) fn limits(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
+pub(super) fn limits(
+    assessment: &Assessment,
+    calibration: &Calibration,
+    joints: &[Joint<'_>],
+) -> Vec<String> {
     let mistakes = calibration.findings.iter().filter(|f| f.forbids_yes());
     let mut out: Vec<String> = mistakes.map(|f| said(f, calibration)).collect();
-    if !converged(calibration) {
+    if assessment.claims(Code::NotConverged).next().is_some() {
         out.push("The sampler has not converged: run it with more draws before relying on the probabilities.".into());
     }
     let degraded = calibration
@@ -43,7 +35,13 @@ pub(super) fn limits(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Str
         .iter()
         .filter(|f| f.severity == Severity::Degraded && !f.forbids_yes());
     out.extend(degraded.map(|f| said(f, calibration)));
-    out.extend(of_results(calibration, joints));
+    out.extend(too_few(assessment));
+    out.extend(limits_of_torque(assessment, calibration, joints));
+    out.extend(at_standstill(calibration, joints).filter(|_| rest_got_worse(calibration)));
+    out.extend(raw_is_worse(assessment, joints));
+    out.extend(friction_does_as_well(assessment, joints));
+    out.extend(beyond::mostly(calibration));
+    out.extend(hardly_at_rest(calibration, joints));
     out
 }
 
@@ -66,21 +64,6 @@ pub(super) fn pointers(calibration: &Calibration) -> Vec<String> {
     out
 }
 
-/// What held-out torque and the effects themselves say against the twin, what matters most first.
-fn of_results(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
-    let mut out: Vec<String> = too_few(calibration, joints).into_iter().collect();
-    out.extend(limits_of_torque(calibration, joints));
-    out.extend(at_standstill(calibration, joints).filter(|_| rest_got_worse(calibration)));
-    out.extend(raw_is_worse(calibration, joints));
-    out.extend(friction_does_as_well(
-        decisive(&calibration.validation),
-        joints,
-    ));
-    out.extend(beyond::mostly(calibration, joints));
-    out.extend(hardly_at_rest(calibration, joints));
-    out
-}
-
 /// What is shown at once where there is more to fold away.
 const SHOWN: usize = 3;
 
@@ -94,60 +77,78 @@ pub(super) fn fold(mut limits: Vec<String>) -> (Vec<String>, Vec<String>) {
     (limits, folded)
 }
 
+/// "Joints a and b: their torque got worse."; nothing of no joint.
+fn of_joints(joints: &[&str], one: &str, many: &str) -> Option<String> {
+    (!joints.is_empty()).then(|| {
+        let words = if joints.len() == 1 { one } else { many };
+        format!("{}: {words}.", subject(joints))
+    })
+}
+
+/// Joints of which something is claimed.
+fn named(assessment: &Assessment, code: Code) -> Vec<&str> {
+    let claims = assessment.claims(code);
+    claims.map(|claim| claim.subject.name()).collect()
+}
+
 /// What errors and intervals of held-out torque say against the twin.
-fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
-    let scores = decisive(&calibration.validation);
+fn limits_of_torque(
+    assessment: &Assessment,
+    calibration: &Calibration,
+    joints: &[Joint<'_>],
+) -> Vec<String> {
     let mut out = Vec::new();
-    let mut say = |joints: &[String], one: &str, many: &str| {
-        if !joints.is_empty() {
-            out.push(format!(
-                "{}: {}.",
-                subject(joints),
-                if joints.len() == 1 { one } else { many }
-            ));
-        }
-    };
-    say(
-        &worse(scores),
+    out.extend(of_joints(
+        &named(assessment, Code::JointTorqueWorse),
         "its torque got worse by calibration",
         "their torque got worse by calibration",
-    );
-    let moving = if has_standstill(&calibration.validation) {
-        " moving"
-    } else {
-        ""
+    ));
+    let moving = match has_standstill(&calibration.validation) {
+        true => " moving",
+        false => "",
     };
-    let mut off = |is_off: fn(&JointScore, f64) -> bool, words: &str| {
-        let own = scores.joints.iter();
-        let own: Vec<&JointScore> = own
-            .filter(|j| is_off(j, memory(joints, &j.joint)))
-            .collect();
-        let held: Vec<String> = own.iter().map(|j| percent(j.coverage95)).collect();
+    let widths = [
+        (Code::JointIntervalsNarrow, "too narrow"),
+        (Code::JointIntervalsWide, "wider than they need to be"),
+    ];
+    for (code, words) in widths {
+        let claims = assessment.claims(code);
+        let held: Vec<String> = claims.map(|c| percent(c.number("coverage95"))).collect();
         let held = list(&held);
         let held = format!("({LEVEL_WORDS} hold {held} of the{moving} rows)");
-        let names: Vec<String> = own.iter().map(|j| j.joint.clone()).collect();
-        say(
-            &names,
+        out.extend(of_joints(
+            &named(assessment, code),
             &format!("its intervals are {words} {held}"),
             &format!("their intervals are {words} {held}"),
-        );
-    };
-    off(too_narrow, "too narrow");
-    off(too_wide, "wider than they need to be");
-    let mut out_of_shape = shape::sentences(calibration, joints);
-    let lost = lost(scores, joints);
-    let shares: Vec<String> = lost
-        .iter()
-        .map(|(_, share)| whole_percent(*share))
+        ));
+    }
+    out.extend(above_torque(assessment, calibration, joints));
+    let words = "the error left is more than half of the torque's standard deviation";
+    let large = named(assessment, Code::JointErrorLarge);
+    out.extend(of_joints(&large, words, words));
+    out.extend(beyond::worse(calibration, joints));
+    out.extend(shape::sentences(calibration, joints));
+    out
+}
+
+/// Joints on which a constant would predict the torque as well.
+fn above_torque(
+    assessment: &Assessment,
+    calibration: &Calibration,
+    joints: &[Joint<'_>],
+) -> Option<String> {
+    let claims = || assessment.claims(Code::JointErrorAboveTorque);
+    let share = |(error, sd): (f64, f64)| error / sd;
+    let numbers = || claims().map(|c| (c.number("rms_calibrated"), c.number("torque_sd")));
+    let shares: Vec<String> = numbers().map(|n| whole_percent(share(n))).collect();
+    let deviations: Vec<String> = claims()
+        .map(|claim| {
+            let unit = unit_of(joints, claim.subject.name());
+            format!("{} {unit}", number(claim.number("torque_sd"), 3))
+        })
         .collect();
-    let deviation = |(name, _): &(String, f64)| {
-        let joint = joints.iter().find(|joint| joint.name == name)?;
-        let deviation = torque_deviation(joint, Rows::Moving);
-        Some(format!("{} {}", number(deviation, 3), joint.units.torque))
-    };
-    let deviations: Vec<String> = lost.iter().filter_map(deviation).collect();
-    let better = lost.iter().all(|(_, share)| *share > CLEARLY_LOST);
-    let names: Vec<String> = lost.into_iter().map(|(name, _)| name).collect();
+    let better = numbers().all(|n| share(n) > CLEARLY_LOST);
+    let names = named(assessment, Code::JointErrorAboveTorque);
     let words = format!(
         "the error left is {} of the torque's standard deviation ({}): a constant would do {}{}",
         list(&shares),
@@ -155,18 +156,11 @@ fn limits_of_torque(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<Stri
         if better { "better" } else { "as well" },
         hardly_driven(&names, calibration)
     );
-    say(&names, &words, &words);
-    let mut large = large(scores, joints);
-    large.retain(|name| !names.contains(name));
-    let words = "the error left is more than half of the torque's standard deviation";
-    say(&large, words, words);
-    out.extend(beyond::narrow(calibration, joints));
-    out.append(&mut out_of_shape);
-    out
+    of_joints(&names, &words, &words)
 }
 
 /// Whether such a joint is hardly driven in a held-out log: then nothing could be seen there.
-fn hardly_driven(names: &[String], calibration: &Calibration) -> &'static str {
+fn hardly_driven(names: &[&str], calibration: &Calibration) -> &'static str {
     let held_out = |log: &str| {
         let mut logs = calibration.logs.iter();
         logs.any(|own| own.name == log && own.role == "heldout")
@@ -175,7 +169,7 @@ fn hardly_driven(names: &[String], calibration: &Calibration) -> &'static str {
     let own = findings.any(|f| {
         f.code == Code::JointNotDriven
             && held_out(&f.subject)
-            && names.iter().any(|name| findings::is_about(f, name))
+            && names.iter().any(|name| f.names(name))
     });
     match own {
         true => "; it is hardly driven in the held-out log",
@@ -184,35 +178,29 @@ fn hardly_driven(names: &[String], calibration: &Calibration) -> &'static str {
 }
 
 /// How many rows count, how many are needed, and what to do.
-fn too_few(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
-    let independent = independent_rows(calibration, joints);
-    let tested = calibration.validation.filtered.joints.iter();
-    let tested = tested.map(|joint| joint.rows).sum::<u64>() > 0;
-    (tested && independent < FEW).then(|| {
-        // Not rounded up to what is needed.
-        let shown = (10.0 * independent).floor() / 10.0;
-        format!(
-            "The held-out rows count as {shown:.1} independent ones over all joints, {FEW} are needed: hold out {} times as much, by another log \
-             with --heldout or by longer logs.",
-            number(FEW / independent, 2)
-        )
-    })
+fn too_few(assessment: &Assessment) -> Option<String> {
+    let claim = assessment.claims(Code::FewHeldOutRows).next()?;
+    let independent = claim.number("independent_rows");
+    // Not rounded up to what is needed.
+    let shown = (10.0 * independent).floor() / 10.0;
+    Some(format!(
+        "The held-out rows count as {shown:.1} independent ones over all joints, {FEW} are needed: hold out {} times as much, by another log \
+         with --heldout or by longer logs.",
+        number(FEW / independent, 2)
+    ))
 }
 
 /// Joints on which what was found besides friction gains nothing, and by how much friction alone is better.
-fn friction_does_as_well(scores: &Scores, joints: &[Joint<'_>]) -> Option<String> {
-    let own = scores.joints.iter().filter(|score| score.rows > 0);
-    let named: Vec<String> = own
-        .filter_map(|score| Some((score, score.rmse_friction?)))
-        .filter(|(score, left)| *left <= AS_WELL * score.rmse_calibrated)
-        .map(|(score, left)| {
-            let joint = joints.iter().find(|joint| joint.name == score.joint);
+fn friction_does_as_well(assessment: &Assessment, joints: &[Joint<'_>]) -> Option<String> {
+    let claims = assessment.claims(Code::JointFrictionAlone);
+    let named: Vec<String> = claims
+        .map(|claim| {
+            let joint = claim.subject.name();
             format!(
-                "{} ({} instead of {} {})",
-                score.joint,
-                number(left, 3),
-                number(score.rmse_calibrated, 3),
-                joint.map_or("", |joint| joint.units.torque)
+                "{joint} ({} instead of {} {})",
+                number(claim.number("rms_friction"), 3),
+                number(claim.number("rms_calibrated"), 3),
+                unit_of(joints, joint)
             )
         })
         .collect();
@@ -225,46 +213,14 @@ fn friction_does_as_well(scores: &Scores, joints: &[Joint<'_>]) -> Option<String
 }
 
 /// Torque as it was logged, where the twin predicts it worse than the model did.
-fn raw_is_worse(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
-    let Validation { raw, .. } = &calibration.validation;
-    (raw.rmse_calibrated > WORSE * raw.rmse_nominal).then(|| {
-        format!(
-            "Unfiltered torque is predicted worse than by the model alone: RMSE {} → {} {}.",
-            number(raw.rmse_nominal, 3),
-            number(raw.rmse_calibrated, 3),
-            pooled_unit(joints)
-        )
-    })
-}
-
-/// Joints whose torque got worse.
-pub(super) fn worse(scores: &Scores) -> Vec<String> {
-    let joints = scores.joints.iter();
-    names(joints.filter(|j| j.rmse_calibrated > WORSE * j.rmse_nominal))
-}
-
-/// Joints on which the calibrated torque is off by more than [`LARGE`].
-pub(super) fn large(scores: &Scores, joints: &[Joint<'_>]) -> Vec<String> {
-    let large = shares(scores, joints).filter(|(_, share)| *share > LARGE);
-    large.map(|(name, _)| name).collect()
-}
-
-/// Joints on which it is off by as much as the torque varies, and by how much of that.
-pub(super) fn lost(scores: &Scores, joints: &[Joint<'_>]) -> Vec<(String, f64)> {
-    let lost = shares(scores, joints).filter(|(_, share)| *share >= 1.0);
-    lost.collect()
-}
-
-/// Error left of each joint, as a share of its torque's standard deviation.
-fn shares(scores: &Scores, joints: &[Joint<'_>]) -> impl Iterator<Item = (String, f64)> {
-    let share = |joint: &Joint<'_>| {
-        let score = scores.joints.iter().find(|s| s.joint == joint.name);
-        let deviation = torque_deviation(joint, Rows::Moving);
-        let error = score.map(|score| score.rmse_calibrated);
-        let error = error.filter(|_| deviation > 0.0)?;
-        Some((joint.name.to_owned(), error / deviation))
-    };
-    joints.iter().filter_map(share)
+fn raw_is_worse(assessment: &Assessment, joints: &[Joint<'_>]) -> Option<String> {
+    let claim = assessment.claims(Code::RawTorqueWorse).next()?;
+    Some(format!(
+        "Unfiltered torque is predicted worse than by the model alone: RMSE {} → {} {}.",
+        number(claim.number("rms_nominal"), 3),
+        number(claim.number("rms_calibrated"), 3),
+        pooled_unit(joints)
+    ))
 }
 
 /// "138 %".
@@ -272,40 +228,22 @@ fn whole_percent(share: f64) -> String {
     format!("{:.0}{THIN}%", 100.0 * share)
 }
 
-/// Fewer held-out rows in the 95 % interval than an honest one has, and than chance leaves it; `memory` rows count as one.
-pub(super) fn too_narrow(joint: &JointScore, memory: f64) -> bool {
-    joint.rows > 0 && joint.coverage95 < COVERAGE.0.min(LEVEL - chance(joint.rows, memory))
-}
-
-/// More of them: so many independent rows that some ought to lie outside.
-pub(super) fn too_wide(joint: &JointScore, memory: f64) -> bool {
-    joint.coverage95 > COVERAGE.1 && enough_to_leave_some(joint.rows, memory)
-}
-
-/// Whether an honest interval holds all of so many rows in fewer than one twin in twenty.
-fn enough_to_leave_some(rows: u64, memory: f64) -> bool {
-    LEVEL.powf(rows as f64 / memory) < ALARM
-}
-
 /// "a little outside 92 to 98 %: joint_2 91.1 %; within chance for so few rows: joint_3 88.3 %": joints of several whose intervals hold another
 /// share than promised, where neither [`too_narrow`] nor [`too_wide`] says so.
-pub(super) fn other_shares(scores: &Scores, joints: &[Joint<'_>]) -> Option<String> {
+pub(super) fn other_shares(calibration: &Calibration) -> Option<String> {
+    let scores = decisive(&calibration.validation);
     let several = scores.joints.iter().filter(|j| j.rows > 0).count() > 1;
-    let memory = |j: &JointScore| memory(joints, &j.joint);
+    let memory = |j: &JointScore| memory(&calibration.noise, &j.joint);
     let told = |j: &JointScore| too_narrow(j, memory(j)) || too_wide(j, memory(j));
     let outside = |j: &&JointScore| {
         let inside = (ABOUT.0..=ABOUT.1).contains(&j.coverage95);
         several && j.rows > 0 && !inside && !told(j)
     };
-    let by_chance = |j: &JointScore| {
-        let rows_within = (j.coverage95 - LEVEL).abs() <= chance(j.rows, memory(j));
-        rows_within || j.coverage95 > LEVEL && !enough_to_leave_some(j.rows, memory(j))
-    };
     let (few, many): (Vec<&JointScore>, Vec<&JointScore>) = scores
         .joints
         .iter()
         .filter(outside)
-        .partition(|j| by_chance(j));
+        .partition(|j| by_chance(j, memory(j)));
     let shares = |joints: &[&JointScore]| -> String {
         let each = joints.iter();
         let each: Vec<String> = each
@@ -321,45 +259,6 @@ pub(super) fn other_shares(scores: &Scores, joints: &[Joint<'_>]) -> Option<Stri
         out.push(format!("within chance for so few rows: {}", shares(&few)));
     }
     (!out.is_empty()).then(|| out.join("; "))
-}
-
-/// Two standard errors of the share of rows inside an honest interval.
-fn chance(rows: u64, memory: f64) -> f64 {
-    2.0 * (LEVEL * (1.0 - LEVEL) * memory / rows as f64).sqrt()
-}
-
-/// The scores that a twin is judged by: at standstill friction is whatever it takes, so those of moving joints where there are any.
-#[must_use]
-pub fn decisive(validation: &Validation) -> &Scores {
-    let moves = validation.moving.joints.iter().any(|joint| joint.rows > 0);
-    if moves && validation.moving.rmse_nominal > 0.0 {
-        &validation.moving
-    } else {
-        &validation.filtered
-    }
-}
-
-/// Whether [`decisive`] leaves out held-out rows in which a joint stands still.
-#[must_use]
-pub fn has_standstill(validation: &Validation) -> bool {
-    let rows = |scores: &Scores| scores.joints.iter().map(|joint| joint.rows).sum::<u64>();
-    rows(decisive(validation)) < rows(&validation.filtered)
-}
-
-fn names<'a>(scores: impl Iterator<Item = &'a JointScore>) -> Vec<String> {
-    scores
-        .filter(|s| s.rows > 0)
-        .map(|s| s.joint.clone())
-        .collect()
-}
-
-/// R̂ and effective sample size as Vehtari et al. (2021) ask for.
-pub(super) fn converged(calibration: &Calibration) -> bool {
-    match calibration.twin.posterior.method {
-        Method::Exact { .. } => true,
-        Method::Search { missing, .. } => missing < 1e-3,
-        Method::Gibbs { r_hat, ess, .. } => r_hat <= 1.01 && ess >= 400.0,
-    }
 }
 
 /// Which held-out rows of a joint.
@@ -474,8 +373,7 @@ mod tests {
             for ((score, rows), share) in scores.iter_mut().zip(rows).zip(shares) {
                 (score.rows, score.coverage95) = (rows, share);
             }
-            let joints = crate::report::view::joints(&calibration);
-            other_shares(&calibration.validation.moving, &joints)
+            other_shares(&calibration)
         };
         let thin = "\u{202f}";
         let said = format!(

@@ -18,7 +18,6 @@ mod limits;
 mod next_recording;
 mod page;
 mod plot;
-mod reason;
 mod remarks;
 mod scale;
 mod shape;
@@ -34,22 +33,22 @@ mod view;
 
 use crate::context::ReportContext;
 use crate::error::{Error, Result};
+use twincal::Code;
 use twincal::calibrate::Calibration;
 
 /// Probability from which an effect that was not kept is worth a line: below it, it is absent.
 pub const MENTIONED: f64 = 0.05;
 
-pub use grounds::friction_only;
 pub use honesty::{drawn_alike, stretched};
-pub use limits::{decisive, has_standstill};
-pub use reason::{Conclusion, Reason};
 pub use status::reason;
 
 /// Whether the calibrated torque can be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Answer {
-    /// What decides; [`Reason::conclusion`] is the answer.
-    pub reason: Reason,
+    /// May it be used?
+    pub answer: twincal::assess::Answer,
+    /// What decides.
+    pub reason: Code,
     /// One sentence.
     pub headline: String,
     /// What it rests on.
@@ -68,6 +67,7 @@ pub fn answer(calibration: &Calibration) -> Answer {
     let joints = view::joints(calibration);
     let verdict = verdict::judge(calibration, &joints);
     Answer {
+        answer: verdict.answer,
         reason: verdict.reason,
         headline: verdict.headline,
         grounds: verdict.grounds,

@@ -1,18 +1,14 @@
 //! The recording to make next: what it has to hold so that this data's open questions get an answer.
 
-use super::beyond;
-use super::findings::is_about;
 use super::grounds::NAMED;
-use super::limits::FEW;
-use super::standstill::hardly_at_rest;
 use super::text::{first_of, list};
-use super::view::{Joint, independent_rows};
 use twincal::Code;
+use twincal::assess::{FEW, driven_together, hardly_at_rest, independent_rows, new_motion};
 use twincal::calibrate::{Alike, Calibration};
 use twincal::validate::Split;
 
 /// In one phrase, without its beginning; `None` where nothing is known that it would show.
-pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
+pub(super) fn next(calibration: &Calibration) -> Option<String> {
     let mut holds = Vec::new();
     let findings = || calibration.findings.iter();
     let mut more: Vec<String> = findings()
@@ -35,7 +31,7 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
             }
         ));
     }
-    let new = beyond::new_motion(calibration);
+    let new: Vec<String> = new_motion(calibration).map(str::to_owned).collect();
     if !new.is_empty() {
         holds.push(format!(
             "with the motion of {} that only the held-out logs have",
@@ -56,10 +52,10 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
         holds.push("with the encoder’s full resolution".into());
     }
     let untried = calibration.validation.split == Split::LastThirty;
-    let few = independent_rows(calibration, joints) < FEW;
+    let few = independent_rows(calibration) < FEW;
     let fitted = (!holds.is_empty()).then(|| format!("to fit with these, {}", holds.join("; ")));
     // Standstill is no part of a fit.
-    let pauses = match hardly_at_rest(calibration, joints) {
+    let pauses = match hardly_at_rest(calibration) {
         Some(_) => " with pauses in several poses",
         None => "",
     };
@@ -83,35 +79,10 @@ pub(super) fn next(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<St
     }
 }
 
-/// In how many of the fitted logs, and of how many, no joint stands still or is hardly driven that another one drives; `None` where these
-/// are half of them or more, with a single log, and with a single joint.
-fn driven_together(calibration: &Calibration) -> Option<(usize, usize)> {
-    let logs = calibration.logs.iter().filter(|log| log.role == "fit");
-    let logs: Vec<&str> = logs.map(|log| log.name.as_str()).collect();
-    let passive = |log: &str, joint: &str| {
-        let mut findings = calibration.findings.iter();
-        findings.any(|f| {
-            matches!(f.code, Code::JointNotDriven | Code::JointStandsStill)
-                && f.subject == log
-                && is_about(f, joint)
-        })
-    };
-    let all = calibration.twin.robot.joint_names();
-    let driven: Vec<&str> = (all.iter().copied())
-        .filter(|joint| logs.iter().any(|log| !passive(log, joint)))
-        .collect();
-    let together = logs
-        .iter()
-        .filter(|log| !driven.iter().any(|joint| passive(log, joint)))
-        .count();
-    (driven.len() > 1 && logs.len() > 1 && 2 * together < logs.len())
-        .then_some((together, logs.len()))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::{fixture, view};
+    use crate::report::fixture;
     use twincal::calibrate::{Group, LogSummary};
     use twincal::{Code, Finding, Severity};
 
@@ -125,7 +96,7 @@ mod tests {
                 log.standstill.iter_mut().for_each(|rows| *rows = 0);
             }
             change(&mut calibration);
-            next(&calibration, &view::joints(&calibration))
+            next(&calibration)
         };
         assert_eq!(of(&|_| ()), None);
         let untried = of(&|c| c.validation.split = Split::LastThirty);

@@ -7,7 +7,7 @@ use super::figure::Figure;
 use super::figures;
 use super::findings;
 use super::honesty;
-use super::limits::{self, Rows};
+use super::limits::Rows;
 use super::standstill;
 use super::tables::{self, Table};
 use super::text;
@@ -17,6 +17,7 @@ use minijinja::syntax::SyntaxConfig;
 use minijinja::value::{Serde, Value};
 use minijinja::{Environment, UndefinedBehavior, escape_formatter};
 use serde::Serialize;
+use twincal::assess;
 use twincal::calibrate::Calibration;
 
 /// Traces drawn beyond the first of each joint, over all joints: the page stays below two megabytes.
@@ -114,7 +115,7 @@ fn gather<'a>(
 ) -> Page<'a> {
     let validation = &calibration.validation;
     let terms = &calibration.terms;
-    let independent = view::independent_rows(calibration, joints);
+    let independent = assess::independent_rows(calibration);
     let pit: Vec<f64> = joints
         .iter()
         .flat_map(|j| &j.traces)
@@ -149,13 +150,13 @@ fn gather<'a>(
         guarantee: honesty::guarantee(validation, &calibration.findings),
         compact: honesty::compact(calibration, joints),
         sensitivity: figures::sensitivity::figure(terms, components),
-        scores: tables::scores(limits::decisive(validation), joints, Rows::Moving),
+        scores: tables::scores(assess::decisive(validation), joints, Rows::Moving),
         all_rows: tables::scores(&validation.filtered, joints, Rows::All),
-        standstill: limits::has_standstill(validation),
+        standstill: assess::has_standstill(validation),
         at_rest: standstill::table(validation, joints),
         beyond: honesty::beyond(validation, joints),
         raw: tables::scores(&validation.raw, joints, Rows::All),
-        raw_moving: match limits::has_standstill(validation) {
+        raw_moving: match assess::has_standstill(validation) {
             true => tables::scores(&validation.raw_moving, joints, Rows::Moving),
             false => Table::default(),
         },

@@ -1,165 +1,40 @@
 //! Have the predicted distributions the right shape: what the PIT of held-out rows says, joint by joint, in words.
 
-use super::limits::{decisive, has_standstill, too_narrow, too_wide};
 use super::text::{number, percent, subject};
-use super::view::{Joint, memory};
+use super::view::Joint;
+use twincal::assess::{
+    Shape, decisive, has_standstill, is_far, looked_at, memory, too_narrow, too_wide,
+};
 use twincal::calibrate::Calibration;
-use twincal::validate::{JointScore, Pit, Reliability, Scores};
+use twincal::validate::{JointScore, Pit, Reliability};
 
-/// Distance of the PIT from uniform beyond which, if chance does not explain it, intervals are more than a little off: the
-/// 50 % interval then holds less than 40 % or more than 60 %.
-const OFF: f64 = 0.05;
-/// Share of right predictions that [`Pit::chance`] lets pass for wrong ones.
-const ALARM: f64 = 0.05;
 /// Share of the rows on one side of the prediction from which it is said to be off to that side.
 const ONE_SIDE: f64 = 0.6;
-/// Probability below which so many joints are not off by chance.
-const TOO_MANY: f64 = 0.01;
 
-/// How a predicted distribution is wrong.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Shape {
-    Wide,
-    Narrow,
-    /// The measured torque lies above the middle of the prediction too often.
-    Above,
-    Below,
-}
-
-impl Shape {
-    const ALL: [Self; 4] = [Self::Wide, Self::Narrow, Self::Above, Self::Below];
-
-    /// `None` where the distance from uniform is what chance allows one of `joints` that are looked at, in 95 of 100 right predictions.
-    fn of(pit: &Pit, joints: usize) -> Option<Self> {
-        let beyond = pit.distance > pit.chance * of_one_among(joints);
-        if pit.histogram.is_empty() || !beyond {
-            return None;
-        }
-        let bins = pit.histogram.len();
-        let mut share = 0.0;
-        let edges = (1..=bins).zip(&pit.histogram).map(|(edge, bin)| {
-            share += bin;
-            share - edge as f64 / bins as f64
-        });
-        // Share of the rows below each edge, less what it should be: of one sign where the prediction is off to one side.
-        let gaps: Vec<f64> = edges.collect();
-        let high = gaps.iter().copied().fold(0.0, f64::max);
-        let low = -gaps.iter().copied().fold(0.0, f64::min);
-        Some(if high < low / 3.0 {
-            Self::Above
-        } else if low < high / 3.0 {
-            Self::Below
-        } else if gaps[..bins / 2].iter().sum::<f64>() < 0.0 {
-            Self::Wide
-        } else {
-            Self::Narrow
-        })
-    }
-
-    pub(super) fn headline(self) -> &'static str {
-        match self {
-            Self::Wide => "The torque yes; its intervals are wider than they need to be.",
-            Self::Narrow => "The torque yes, its intervals not: they are too narrow.",
-            Self::Above | Self::Below => {
-                "The torque yes, its intervals not: they lie off to one side."
-            }
-        }
-    }
-
-    /// True where the 95 % interval of some joint says the opposite: in the middle of a distribution and at its ends errors may differ.
-    pub(super) fn contradicts(self, scores: &Scores, joints: &[Joint<'_>]) -> bool {
-        let any = |of: fn(&JointScore, f64) -> bool| {
-            let mut scores = scores.joints.iter();
-            scores.any(|score| of(score, memory(joints, &score.joint)))
-        };
-        match self {
-            Self::Wide => any(too_narrow),
-            Self::Narrow => any(too_wide),
-            Self::Above | Self::Below => false,
-        }
-    }
-
-    /// False where the central intervals hold too little for ones that are too wide, or too much for ones that are too narrow.
-    fn agrees(self, coverage: &[(f64, f64)]) -> bool {
-        let all = |of: fn(f64, f64) -> bool| coverage.iter().all(|(level, seen)| of(*level, *seen));
-        match self {
-            Self::Wide => all(|level, seen| seen >= level),
-            Self::Narrow => all(|level, seen| seen <= level),
-            Self::Above | Self::Below => true,
-        }
-    }
-
-    /// What a reader can see of it: how much the 50 % interval holds, or on which side of the middle torque lies.
-    fn shown(self, pit: &Pit, coverage: &[(f64, f64)], rows: &str) -> String {
-        let bins = pit.histogram.len();
-        let above =
-            pit.histogram[bins / 2..].iter().sum::<f64>() / pit.histogram.iter().sum::<f64>();
-        let half = coverage.iter().find(|(level, _)| *level == 0.5);
-        match (self, half) {
-            (Self::Above, _) => format!("{} of the {rows}", percent(above)),
-            (Self::Below, _) => format!("{} of the {rows}", percent(1.0 - above)),
-            (_, Some((_, seen))) => format!("{} of the {rows} in 50 % intervals", percent(*seen)),
-            (_, None) => format!("PIT off uniform by {}", number(pit.distance, 2)),
-        }
-    }
-
-    /// What is said of joints, and of one; `slightly` where intervals are still of use.
-    fn words(self, slightly: bool) -> &'static str {
-        match (self, slightly) {
-            (Self::Wide, false) => "intervals are wider than they need to be",
-            (Self::Wide, true) => "intervals are a little wider than they need to be",
-            (Self::Narrow, false) => "intervals are too narrow",
-            (Self::Narrow, true) => "intervals are a little too narrow",
-            (Self::Above, false) => "torque lies above the prediction too often",
-            (Self::Above, true) => "torque lies above the prediction a little too often",
-            (Self::Below, false) => "torque lies below the prediction too often",
-            (Self::Below, true) => "torque lies below the prediction a little too often",
-        }
+/// What a reader can see of it: how much the 50 % interval holds, or on which side of the middle torque lies.
+fn shown(shape: Shape, pit: &Pit, coverage: &[(f64, f64)], rows: &str) -> String {
+    let bins = pit.histogram.len();
+    let above = pit.histogram[bins / 2..].iter().sum::<f64>() / pit.histogram.iter().sum::<f64>();
+    let half = coverage.iter().find(|(level, _)| *level == 0.5);
+    match (shape, half) {
+        (Shape::Above, _) => format!("{} of the {rows}", percent(above)),
+        (Shape::Below, _) => format!("{} of the {rows}", percent(1.0 - above)),
+        (_, Some((_, seen))) => format!("{} of the {rows} in 50 % intervals", percent(*seen)),
+        (_, None) => format!("PIT off uniform by {}", number(pit.distance, 2)),
     }
 }
 
-/// Joints that count as looked at: one, where so many are beyond their own limit that chance would not do it in 99 of 100 right twins.
-fn looked_at(reliability: &[Reliability]) -> usize {
-    let joints = reliability.len();
-    let beyond = reliability
-        .iter()
-        .filter(|j| Shape::of(&j.pit, 1).is_some());
-    // P(X ≥ beyond) of a binomial distribution.
-    let tail = |least: usize| -> f64 {
-        let one = |k: usize| {
-            let ways = (0..k).map(|i| (joints - i) as f64 / (k - i) as f64);
-            ways.product::<f64>() * ALARM.powi(k as i32) * (1.0 - ALARM).powi((joints - k) as i32)
-        };
-        (least..=joints).map(one).sum()
-    };
-    match beyond.count() {
-        most if most > 1 && tail(most) < TOO_MANY => 1,
-        _ => joints,
-    }
-}
-
-/// How much further the worst of some joints goes than one alone: the Kolmogorov–Smirnov distance exceeds d by chance with a probability of
-/// about 2 exp(−2 n d²), which has to be 0.05 for one and 0.05/`joints` for each of several.
-fn of_one_among(joints: usize) -> f64 {
-    let log_tail = |alarm: f64| (2.0 / alarm).ln();
-    (log_tail(ALARM / joints.max(1) as f64) / log_tail(ALARM)).sqrt()
-}
-
-/// Where the shape of the predictions is off by more than [`OFF`] and by more than chance.
-pub(super) struct Off {
-    /// Over all joints.
-    pub(super) all: Option<Shape>,
-    /// On a single joint.
-    pub(super) single: bool,
-}
-
-pub(super) fn off(calibration: &Calibration) -> Off {
-    let validation = &calibration.validation;
-    let far = |pit: &Pit, joints| Shape::of(pit, joints).filter(|_| pit.distance > OFF);
-    let joints = looked_at(&validation.reliability);
-    Off {
-        all: far(&validation.pit, 1),
-        single: (validation.reliability.iter()).any(|j| far(&j.pit, joints).is_some()),
+/// What is said of joints, and of one; `slightly` where intervals are still of use.
+fn words(shape: Shape, slightly: bool) -> &'static str {
+    match (shape, slightly) {
+        (Shape::Wide, false) => "intervals are wider than they need to be",
+        (Shape::Wide, true) => "intervals are a little wider than they need to be",
+        (Shape::Narrow, false) => "intervals are too narrow",
+        (Shape::Narrow, true) => "intervals are a little too narrow",
+        (Shape::Above, false) => "torque lies above the prediction too often",
+        (Shape::Above, true) => "torque lies above the prediction a little too often",
+        (Shape::Below, false) => "torque lies below the prediction too often",
+        (Shape::Below, true) => "torque lies below the prediction a little too often",
     }
 }
 
@@ -178,7 +53,7 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
     let said = |joint: &str, shape: Shape| {
         let (mut own, memory) = (
             scores.iter().filter(|score| score.joint == joint),
-            memory(all, joint),
+            memory(&calibration.noise, joint),
         );
         own.any(|score| match shape {
             Shape::Wide | Shape::Narrow => too_narrow(score, memory) || too_wide(score, memory),
@@ -187,9 +62,7 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
     };
     for (shape, slightly) in Shape::ALL.into_iter().flat_map(|s| [(s, false), (s, true)]) {
         let own: Vec<&Reliability> = (validation.reliability.iter())
-            .filter(|j| {
-                Shape::of(&j.pit, joints) == Some(shape) && (j.pit.distance <= OFF) == slightly
-            })
+            .filter(|j| Shape::of(&j.pit, joints) == Some(shape) && is_far(&j.pit) != slightly)
             .filter(|j| !said(&j.joint, shape) && shape.agrees(&j.coverage_levels))
             .collect();
         let Some(worst) = (own.iter()).max_by(|a, b| a.pit.distance.total_cmp(&b.pit.distance))
@@ -198,10 +71,10 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
         };
         let names: Vec<&str> = own.iter().map(|j| j.joint.as_str()).collect();
         let one = |j: &Reliability| {
-            let shown = shape.shown(&j.pit, &j.coverage_levels, rows);
+            let seen = shown(shape, &j.pit, &j.coverage_levels, rows);
             match shape {
-                Shape::Above | Shape::Below => shown + &by_how_much(scores, all, &j.joint),
-                Shape::Wide | Shape::Narrow => shown,
+                Shape::Above | Shape::Below => seen + &by_how_much(scores, all, &j.joint),
+                Shape::Wide | Shape::Narrow => seen,
             }
         };
         if matches!(shape, Shape::Above | Shape::Below) {
@@ -209,7 +82,7 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
             to_one_side[usize::from(slightly)].extend(told);
             continue;
         }
-        let (names, words) = (subject(&names), shape.words(slightly));
+        let (names, words) = (subject(&names), words(shape, slightly));
         out.push(match own[..] {
             [_] => format!("{names}: its {words} ({}).", one(worst)),
             _ => format!(
@@ -236,9 +109,9 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
         };
         match side {
             Some(side) => {
-                let shown = side.shown(&joint.pit, &joint.coverage_levels, rows);
-                let shown = shown + &by_how_much(scores, all, &joint.joint);
-                to_one_side[0].push((side, &joint.joint, shown));
+                let seen = shown(side, &joint.pit, &joint.coverage_levels, rows);
+                let seen = seen + &by_how_much(scores, all, &joint.joint);
+                to_one_side[0].push((side, &joint.joint, seen));
             }
             None => out.push(format!(
                 "{}: predicted probabilities are not evenly spread (off by {}, by chance below {}).",
@@ -255,9 +128,9 @@ pub(super) fn sentences(calibration: &Calibration, all: &[Joint<'_>]) -> Vec<Str
     let pooled = pooled.filter(|shape| shape.agrees(&validation.coverage_levels));
     if let (true, Some(shape)) = (out.is_empty(), pooled) {
         let pit = &validation.pit;
-        let words = shape.words(pit.distance <= OFF);
-        let shown = shape.shown(pit, &validation.coverage_levels, rows);
-        out.push(format!("All joints together: {words} ({shown})."));
+        let words = words(shape, !is_far(pit));
+        let seen = shown(shape, pit, &validation.coverage_levels, rows);
+        out.push(format!("All joints together: {words} ({seen})."));
     }
     out
 }
@@ -272,7 +145,7 @@ fn off_to_sides(own: &[(Shape, &str, String)], slightly: bool) -> Option<String>
     if others.is_empty() {
         return Some(format!(
             "{subject}: its {} ({shown}).",
-            first.words(slightly)
+            words(*first, slightly)
         ));
     }
     let same = others.iter().all(|(shape, ..)| shape == first);
@@ -283,7 +156,7 @@ fn off_to_sides(own: &[(Shape, &str, String)], slightly: bool) -> Option<String>
     });
     let each: Vec<String> = each.collect();
     let words = match (same, slightly) {
-        (true, _) => first.words(slightly),
+        (true, _) => words(*first, slightly),
         (false, false) => "torque lies to one side of the prediction too often",
         (false, true) => "torque lies to one side of the prediction a little too often",
     };
@@ -414,7 +287,8 @@ pub(super) mod tests {
 
     #[test]
     fn what_is_wrong_is_shown_in_shares_of_rows() {
-        let shown = |shape: Shape, slope| shape.shown(&pit(0.5, slope), &[(0.5, 0.75)], "rows");
+        let shown =
+            |shape: Shape, slope| super::shown(shape, &pit(0.5, slope), &[(0.5, 0.75)], "rows");
         assert_eq!(
             shown(Shape::Wide, 0.0),
             "75.0\u{202f}% of the rows in 50 % intervals"

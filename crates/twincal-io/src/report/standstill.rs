@@ -1,63 +1,44 @@
 //! Joints that stand still: there friction is whatever it takes, so that errors are another matter than in motion.
 
-use super::ambiguity;
-use super::grounds::{NAMED, WORTH_TELLING, change, rows_of};
-use super::limits::decisive;
+use super::grounds::{NAMED, WORTH_TELLING, change};
 use super::tables::{self, Table, with_unit};
 use super::text::{count, first_of, list, number, percent};
-use super::view::{Joint, pooled_unit};
+use super::view::{Joint, pooled_unit, unit_of};
+use twincal::assess::{
+    self, AtRest, Pauses, all_at_rest, at_rest, decisive, few_pauses, tested_at_rest,
+};
 use twincal::calibrate::Calibration;
-use twincal::validate::{JointScore, Scores, Validation};
-
-/// Held-out rows at standstill below which that is not tested.
-const FEW_AT_REST: u64 = 20;
-/// Pauses in held-out data from which they say something of others.
-const FEW_PAUSES: usize = 3;
-/// Share of a joint's rows at standstill from which that is a part of what the robot does.
-const STANDS_STILL: f64 = 0.05;
+use twincal::validate::Validation;
 
 /// RMSE before and after of joints that stand still, where it is another matter, for there friction is whatever it takes: and which of them got worse.
 pub(super) fn at_standstill(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
     let validation = &calibration.validation;
     let (all, moving) = (&validation.filtered, decisive(validation));
-    if rows_of(all).saturating_sub(rows_of(moving)) < FEW_AT_REST {
-        return None;
-    }
-    let each = || all.joints.iter().zip(&moving.joints);
-    let rest: Vec<_> = each()
-        .filter(|(all, moving)| all.rows > moving.rows)
-        .collect();
-    let mut worse: Vec<(&str, [f64; 2])> = (rest.iter())
-        .filter_map(|pair| Some((pair.0.joint.as_str(), still(&[*pair])?)))
-        .filter(|(_, [before, after])| after / before - 1.0 > WORTH_TELLING)
-        .collect();
-    let gain = |errors: &[f64; 2]| errors[1] - errors[0];
-    worse.sort_by(|(_, a), (_, b)| gain(b).total_cmp(&gain(a)));
-    let together = still(&rest)?;
+    let together = tested_at_rest(validation)?;
+    let rest = at_rest(validation);
+    let mut worse: Vec<&AtRest<'_>> = rest.iter().filter(|own| own.got_worse()).collect();
+    let gain = |own: &AtRest<'_>| own.rmse[1] - own.rmse[0];
+    worse.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
     let differ = (all.rmse_calibrated / moving.rmse_calibrated - 1.0).abs() > WORTH_TELLING;
     if worse.is_empty() && !differ {
         return None;
     }
-    let told = change(together, pooled_unit(joints));
+    let told = change(together.rmse, pooled_unit(joints));
     let mut about = Vec::new();
     if let ([only], true) = (&rest[..], joints.len() > 1) {
-        about.push(only.0.joint.clone());
+        about.push(only.joint.to_owned());
         worse.clear();
     }
-    about.extend(few_pauses(calibration));
+    about.extend(few_pauses(calibration).map(pauses));
     let place = match about.is_empty() {
         true => "At standstill".to_owned(),
         false => format!("At standstill ({})", about.join("; ")),
     };
     let names = (worse.iter())
-        .map(|(name, [before, after])| {
-            let unit = joints.iter().find(|joint| joint.name == *name);
-            let unit = unit.map_or("", |joint| joint.units.torque);
-            format!(
-                "{name} ({} → {} {unit})",
-                number(*before, 3),
-                number(*after, 3)
-            )
+        .map(|own| {
+            let [before, after] = own.rmse.map(|rmse| number(rmse, 3));
+            let unit = unit_of(joints, own.joint);
+            format!("{} ({before} → {after} {unit})", own.joint)
         })
         .collect();
     let names = first_of(names, NAMED);
@@ -67,103 +48,31 @@ pub(super) fn at_standstill(calibration: &Calibration, joints: &[Joint<'_>]) -> 
     })
 }
 
-/// "one pause, 0.960 s", where held-out rows have so few that they say little of others.
-pub(super) fn few_pauses(calibration: &Calibration) -> Option<String> {
-    let (mut most, mut longest) = (0, 0.0f64);
-    for joint in &calibration.validation.filtered.joints {
-        let traces = calibration.validation.traces.iter();
-        let (mut pauses, mut seconds) = (0, 0.0);
-        for trace in traces.filter(|trace| trace.joint == joint.joint) {
-            let rows = trace.standstill.iter().zip(&trace.time);
-            let mut began = None;
-            for (still, &time) in rows {
-                match (still, began) {
-                    (true, None) => (pauses, began) = (pauses + 1, Some(time)),
-                    (true, Some(_)) => {}
-                    (false, Some(start)) => (seconds, began) = (seconds + time - start, None),
-                    (false, None) => {}
-                }
-            }
-            if let (Some(start), Some(end)) = (began, trace.time.last()) {
-                seconds += end - start;
-            }
-        }
-        most = most.max(pauses);
-        longest = longest.max(seconds);
+/// "one pause, 0.960 s".
+fn pauses(own: Pauses) -> String {
+    let seconds = number(own.seconds, 2);
+    match own.most {
+        1 => format!("one pause, {seconds} s"),
+        most => format!("at most {most} pauses of a joint, {seconds} s"),
     }
-    match most {
-        1 => Some(format!("one pause, {} s", number(longest, 2))),
-        2..FEW_PAUSES => Some(format!(
-            "at most {most} pauses of a joint, {} s",
-            number(longest, 2)
-        )),
-        _ => None,
-    }
-}
-
-/// Whether torque at standstill, of all joints together, got worse.
-pub(super) fn rest_got_worse(calibration: &Calibration) -> bool {
-    let validation = &calibration.validation;
-    let (all, moving) = (&validation.filtered, decisive(validation));
-    if rows_of(all).saturating_sub(rows_of(moving)) < FEW_AT_REST {
-        return false;
-    }
-    let each: Vec<_> = all.joints.iter().zip(&moving.joints).collect();
-    still(&each).is_some_and(|[before, after]| after / before - 1.0 > WORTH_TELLING)
-}
-
-/// RMSE before and after on the rows that are not among the moving ones; `None` without any.
-fn still(pairs: &[(&JointScore, &JointScore)]) -> Option<[f64; 2]> {
-    let rows: u64 = pairs
-        .iter()
-        .map(|(all, moving)| all.rows - moving.rows.min(all.rows))
-        .sum();
-    let square = |score: &JointScore, of: fn(&JointScore) -> f64| match score.rows {
-        0 => 0.0,
-        rows => rows as f64 * of(score).powi(2),
-    };
-    let each: [fn(&JointScore) -> f64; 2] = [|j| j.rmse_nominal, |j| j.rmse_calibrated];
-    (rows > 0).then(|| {
-        each.map(|of| {
-            let left = pairs
-                .iter()
-                .map(|(all, moving)| square(all, of) - square(moving, of));
-            (left.sum::<f64>().max(0.0) / rows as f64).sqrt()
-        })
-    })
 }
 
 /// What joints do at rest in the logs and hardly in held-out rows.
 pub(super) fn hardly_at_rest(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
-    let validation = &calibration.validation;
-    let rows = |scores: &Scores| scores.joints.iter().map(|joint| joint.rows).sum::<u64>();
-    let moving = rows(&validation.moving);
-    let at_rest = rows(&validation.filtered).saturating_sub(moving);
-    let shares = (0..joints.len()).map(|j| ambiguity::standstill(calibration, j));
-    let most = joints
-        .iter()
-        .zip(shares)
-        .filter(|(_, share)| *share >= STANDS_STILL);
-    let (joint, share) = most.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
-    (moving > 0 && at_rest < FEW_AT_REST).then(|| {
-        let (tested, held_out) = match at_rest {
-            0 => ("not", "but no held-out row is at rest".to_owned()),
-            1 => ("hardly", "but only one held-out row is at rest".to_owned()),
-            n => ("hardly", format!("but only {n} held-out rows are at rest")),
-        };
-        let pairs: Vec<_> = (validation.filtered.joints.iter())
-            .zip(&validation.moving.joints)
-            .collect();
-        let error = still(&pairs).filter(|_| at_rest > 0);
-        let error = error.map_or_else(String::new, |error| {
-            format!(" (error {})", change(error, pooled_unit(joints)))
-        });
-        format!(
-            "Standstill is {tested} tested: {} stands still in {} of the logs' rows, {held_out}{error}.",
-            joint.name,
-            percent(share)
-        )
-    })
+    let (joint, share, rows) = assess::hardly_at_rest(calibration)?;
+    let (tested, held_out) = match rows {
+        0 => ("not", "but no held-out row is at rest".to_owned()),
+        1 => ("hardly", "but only one held-out row is at rest".to_owned()),
+        n => ("hardly", format!("but only {n} held-out rows are at rest")),
+    };
+    let error = all_at_rest(&calibration.validation).filter(|_| rows > 0);
+    let error = error.map_or_else(String::new, |own| {
+        format!(" (error {})", change(own.rmse, pooled_unit(joints)))
+    });
+    Some(format!(
+        "Standstill is {tested} tested: {joint} stands still in {} of the logs' rows, {held_out}{error}.",
+        percent(share)
+    ))
 }
 
 /// Errors before and after on the rows in which a joint stands still; no rows without any.
@@ -177,58 +86,26 @@ pub(super) fn table(validation: &Validation, joints: &[Joint<'_>]) -> Table {
         "95 % coverage",
         "mean width",
     ]);
-    let (all, moving) = (&validation.filtered, decisive(validation));
-    let pairs: Vec<_> = (all.joints.iter().zip(&moving.joints))
-        .filter(|(all, moving)| all.rows > moving.rows)
-        .collect();
-    let mut add = |name: &str, pairs: &[(&JointScore, &JointScore)], unit: &str| {
-        if let Some([before, after]) = still(pairs) {
-            let rows = pairs.iter().map(|(all, moving)| all.rows - moving.rows);
-            table.rows.push(vec![
-                name.to_owned(),
-                count(rows.sum()),
-                with_unit(before, unit),
-                with_unit(after, unit),
-                tables::change(before, after),
-                percent(at_rest(pairs, |score| score.coverage95)),
-                with_unit(at_rest(pairs, |score| score.mean_width95), unit),
-            ]);
-        }
+    let mut add = |name: &str, own: &AtRest<'_>, unit: &str| {
+        let [before, after] = own.rmse;
+        table.rows.push(vec![
+            name.to_owned(),
+            count(own.rows),
+            with_unit(before, unit),
+            with_unit(after, unit),
+            tables::change(before, after),
+            percent(own.coverage95),
+            with_unit(own.mean_width95, unit),
+        ]);
     };
-    for pair in &pairs {
-        let unit = joints.iter().find(|joint| joint.name == pair.0.joint);
-        add(
-            &pair.0.joint,
-            &[*pair],
-            unit.map_or("", |joint| joint.units.torque),
-        );
+    let each = at_rest(validation);
+    for own in &each {
+        add(own.joint, own, unit_of(joints, own.joint));
     }
-    if pairs.len() > 1 {
-        add("all joints", &pairs, pooled_unit(joints));
+    if let (Some(all), 2..) = (all_at_rest(validation), each.len()) {
+        add("all joints", &all, pooled_unit(joints));
     }
     table
-}
-
-/// Share of the rows at standstill that 95 % intervals hold.
-pub(super) fn held_at_rest(validation: &Validation) -> f64 {
-    let (all, moving) = (&validation.filtered, decisive(validation));
-    let pairs: Vec<_> = all.joints.iter().zip(&moving.joints).collect();
-    at_rest(&pairs, |score| score.coverage95)
-}
-
-/// The mean over the rows at standstill of what is a mean over all rows and over the moving ones.
-fn at_rest(pairs: &[(&JointScore, &JointScore)], of: fn(&JointScore) -> f64) -> f64 {
-    let inside = |score: &JointScore| match score.rows {
-        0 => 0.0,
-        rows => rows as f64 * of(score),
-    };
-    let rows = pairs
-        .iter()
-        .map(|(all, moving)| all.rows - moving.rows.min(all.rows));
-    let held = pairs
-        .iter()
-        .map(|(all, moving)| inside(all) - inside(moving));
-    held.sum::<f64>() / rows.sum::<u64>() as f64
 }
 
 #[cfg(test)]
@@ -253,7 +130,7 @@ mod tests {
     #[test]
     fn few_pauses_are_counted_and_many_are_not_told() {
         let pauses = [3..13, 20..25, 30..32];
-        let of = |first: usize| few_pauses(&resting(&pauses[..first]));
+        let of = |first: usize| few_pauses(&resting(&pauses[..first])).map(super::pauses);
         assert_eq!(of(0), None);
         assert_eq!(of(1).as_deref(), Some("one pause, 1.0 s"));
         assert_eq!(of(2).as_deref(), Some("at most 2 pauses of a joint, 1.5 s"));

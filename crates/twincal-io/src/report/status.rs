@@ -54,11 +54,6 @@ fn left_out(error: &LeftOutError) -> String {
     }
 }
 
-/// Whether an effect, or a set that holds it, is claimed.
-pub(super) fn is_claimed(component: &ComponentSummary) -> bool {
-    matches!(component.status, Status::Established | Status::Equivalent)
-}
-
 /// Names of the effects with this status that are likelier in than not.
 pub(super) fn with(status: Status, calibration: &Calibration) -> Vec<&ComponentSummary> {
     let all = calibration.components.iter();

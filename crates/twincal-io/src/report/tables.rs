@@ -1,11 +1,11 @@
 //! The report's tables besides the effects: scores, noise, motion, logs, findings, convergence, pipeline.
 
 use super::ReportContext;
-use super::grounds::friction_only;
-use super::limits::{Rows, converged, torque_deviation};
+use super::limits::{Rows, torque_deviation};
 use super::text::{count, list, number, percent, probability};
 use super::view::Joint;
 use serde::Serialize;
+use twincal::assess::{converged, friction_only, standstill};
 use twincal::calibrate::{Calibration, LogSummary};
 use twincal::posterior::Method;
 use twincal::signal::Pipeline;
@@ -187,7 +187,7 @@ pub(super) fn motion(calibration: &Calibration, joints: &[Joint<'_>]) -> Table {
             range(hull[0], hull[1], joint.units.position),
             range(hull[2], hull[3], joint.units.velocity),
             range(hull[4], hull[5], joint.units.acceleration),
-            percent(super::ambiguity::standstill(calibration, j)),
+            percent(standstill(calibration, j)),
         ]);
     }
     table

@@ -1,24 +1,15 @@
-//! Can this twin be used, and where not: the first thing the report says, by held-out data and findings.
+//! Can this twin be used, and where not: the first thing the report says, the words of its [`Assessment`].
 
-use super::grounds::{self, rows_of};
-use super::limits::{
-    COVERAGE, FEW, converged, decisive, fold, has_standstill, large, limits, lost, pointers,
-    too_narrow, worse,
-};
+use super::grounds;
+use super::limits::{fold, limits, pointers};
 use super::next_recording;
-use super::reason::Reason;
-use super::shape;
-use super::standstill;
-use super::status;
 use super::text::with_sd;
-use super::view::{Joint, independent_rows, memory};
+use super::view::Joint;
 use serde::Serialize;
+use twincal::assess::{Answer, Assessment, assess, has_standstill};
 use twincal::calibrate::Calibration;
-use twincal::validate::WORSE;
-use twincal::{Code, Finding, Mistake, Severity};
+use twincal::{Code, Mistake, Severity};
 
-/// Ratio of errors from which calibration counts as an improvement.
-const BETTER: f64 = 0.95;
 /// How the answer is coloured; the words carry the meaning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -28,12 +19,31 @@ pub(super) enum Grade {
     Bad,
 }
 
+impl Grade {
+    fn of(assessment: &Assessment) -> Self {
+        let open = [
+            Code::FewHeldOutRows,
+            Code::NoBetterThanNominal,
+            Code::FrictionAloneIsBetter,
+            Code::NothingEstablished,
+        ];
+        match assessment.answer {
+            Answer::Yes => Self::Good,
+            Answer::YesWithinLimits => Self::Care,
+            Answer::NotYet if open.contains(&assessment.reason) => Self::Care,
+            Answer::No | Answer::NotYet => Self::Bad,
+        }
+    }
+}
+
 /// The verdict in words.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Verdict {
     pub(super) grade: Grade,
+    /// May it be used?
+    pub(super) answer: Answer,
     /// What decides.
-    pub(super) reason: Reason,
+    pub(super) reason: Code,
     /// One sentence.
     pub(super) headline: String,
     /// What the headline rests on.
@@ -49,196 +59,115 @@ pub(super) struct Verdict {
 
 /// Judges `calibration`.
 pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict {
-    let scores = &calibration.validation.filtered;
-    let all = || calibration.components.iter();
-    let found = all().filter(|own| own.is_in()).count();
-    let sure = all().filter(|own| status::is_claimed(own)).count();
-    let rows = rows_of(scores);
-    if rows == 0 || !(scores.rmse_nominal.is_finite() && scores.rmse_calibrated.is_finite()) {
+    let assessment = assess(calibration);
+    let (answer, reason) = (assessment.answer, assessment.reason);
+    let verdict = Verdict {
+        grade: Grade::of(&assessment),
+        answer,
+        reason,
+        headline: headline(reason, calibration),
+        grounds: Vec::new(),
+        limits: Vec::new(),
+        folded: Vec::new(),
+        pointers: Vec::new(),
+        next: None,
+    };
+    if reason == Code::NotTested {
         return Verdict {
-            grade: Grade::Bad,
-            reason: Reason::NotTested,
-            headline: "Not yet: there are no held-out rows to judge this twin by.".into(),
             grounds: grounds::effects_found(calibration),
-            limits: Vec::new(),
-            folded: Vec::new(),
-            pointers: Vec::new(),
             next: Some(
                 "another motion, given with --heldout; or at least three logs to fit.".into(),
             ),
+            ..verdict
         };
     }
-    let scores = decisive(&calibration.validation);
-    let ratio = scores.rmse_calibrated / scores.rmse_nominal;
-    let worse = worse(scores);
-    let honest = (COVERAGE.0..=COVERAGE.1).contains(&scores.coverage95);
-    let off = shape::off(calibration);
-    let mut each = scores.joints.iter();
-    let too_narrow = each.any(|j| too_narrow(j, memory(joints, &j.joint)));
-    let rest_worse =
-        standstill::rest_got_worse(calibration) && standstill::few_pauses(calibration).is_none();
-    let (large, lost) = (large(scores, joints).len(), lost(scores, joints).len());
-    let (limits, folded) = fold(limits(calibration, joints));
-    let serious = calibration
-        .findings
-        .iter()
-        .any(|f| f.severity == Severity::Degraded)
-        || !converged(calibration);
-    let mistake = calibration
-        .findings
-        .iter()
-        .filter_map(Finding::mistake)
-        .min();
-    let (grade, reason, headline) = if let Some(mistake) = mistake {
-        (Grade::Bad, Reason::from(mistake), mistake_words(mistake))
-    } else if independent_rows(calibration, joints) < FEW {
-        (
-            Grade::Care,
-            Reason::FewHeldOutRows,
-            "Hard to say: the held-out rows count as too few independent ones to judge this twin by.",
-        )
-    } else if ratio > WORSE {
-        (
-            Grade::Bad,
-            Reason::WorseThanNominal,
-            "No: on held-out data the calibrated torque is worse than the nominal one.",
-        )
-    } else if lost > 0 && lost == joints.len() {
-        (
-            Grade::Bad,
-            Reason::ErrorAboveTorque,
-            "No: the error left is larger than the torque itself.",
-        )
-    } else if 2 * lost > joints.len() {
-        (
-            Grade::Bad,
-            Reason::ErrorAboveTorqueOnMostJoints,
-            "No: on most joints the error left is larger than the torque itself.",
-        )
-    } else if found == 0 && ratio > BETTER {
-        (
-            Grade::Care,
-            Reason::NothingFound,
-            "Nothing to correct was found: none of the candidate effects is in this log.",
-        )
-    } else if ratio > BETTER {
-        (
-            Grade::Care,
-            Reason::NoBetterThanNominal,
-            "Hardly: on held-out data the calibrated torque is no better than the nominal one.",
-        )
-    } else if grounds::friction_only(scores)
-        .is_some_and(|left| left < BETTER * scores.rmse_calibrated)
-    {
-        (
-            Grade::Care,
-            Reason::FrictionAloneIsBetter,
-            "Hardly: friction and an offset alone predict held-out torque better.",
-        )
-    } else if found > 0 && sure == 0 {
-        (
-            Grade::Care,
-            Reason::NothingEstablished,
-            "Perhaps: low-passed torque is better with it, but none of its effects is established.",
-        )
-    } else if large > 0 && large == joints.len() {
-        (
-            Grade::Care,
-            Reason::LargeError,
-            "Better than the model alone, but the error that is left is large.",
-        )
-    } else if 2 * large > joints.len() {
-        (
-            Grade::Care,
-            Reason::LargeErrorOnMostJoints,
-            "Better than the model alone, but on most joints the error that is left is large.",
-        )
-    } else if no_bodies(calibration) > 1 {
-        (
-            Grade::Care,
-            Reason::UnphysicalLinks,
-            "With care: what was found of several links is no rigid body. Is this the robot's model?",
-        )
-    } else if !worse.is_empty() {
-        (
-            Grade::Care,
-            Reason::WorseOnSomeJoints,
-            "With care: better than the model alone, but on some joints torque got worse.",
-        )
-    } else if scores.coverage95 < COVERAGE.0 {
-        (
-            Grade::Care,
-            match rest_worse {
-                false => Reason::NarrowIntervals,
-                true => Reason::NarrowIntervalsInMotion,
-            },
-            match rest_worse {
-                false => "The torque yes, its intervals not: they are too narrow.",
-                true => "While joints move the torque yes, its intervals not: they are too narrow.",
-            },
-        )
-    } else if !honest {
-        (
-            Grade::Care,
-            Reason::WideIntervals,
-            "Yes; its intervals are wider than they need to be.",
-        )
-    } else if rest_worse {
-        (
-            Grade::Care,
-            Reason::WorseAtRest,
-            "While joints move, yes; at standstill it is worse than your model.",
-        )
-    } else if let Some(shape) = off.all.filter(|shape| !shape.contradicts(scores, joints)) {
-        (Grade::Care, Reason::ErrorDistribution, shape.headline())
-    } else if !serious && !off.single && !too_narrow {
-        (
-            Grade::Good,
-            Reason::Passed,
-            "Yes, to predict torque on motions like the ones it was tested on.",
-        )
-    } else {
-        (
-            Grade::Care,
-            Reason::Exceptions,
-            "Yes, to predict torque, with the exceptions below.",
-        )
-    };
+    let (limits, folded) = fold(limits(&assessment, calibration, joints));
+    // A log that is no measurement of this model has to be mended first.
+    let mended = Mistake::of(reason, Severity::Degraded).is_none();
     Verdict {
-        grade,
-        reason,
-        headline: in_band(calibration, headline),
         grounds: grounds::grounds(calibration, joints),
         limits,
         folded,
         pointers: pointers(calibration),
-        // A log that is no measurement of this model has to be mended first.
-        next: mistake
-            .is_none()
-            .then(|| next_recording::next(calibration, joints))
-            .flatten(),
+        next: mended.then(|| next_recording::next(calibration)).flatten(),
+        ..verdict
     }
 }
 
-/// Links of which what was found is no rigid body.
-fn no_bodies(calibration: &Calibration) -> usize {
-    let findings = calibration.findings.iter();
-    let sure = findings.filter(|f| f.severity == Severity::Warning);
-    sure.filter(|f| f.code == Code::UnphysicalInertiaFound)
-        .count()
+/// The answer in one sentence, by what decides; of joints that move, and of torque that the filter lets pass.
+fn headline(reason: Code, calibration: &Calibration) -> String {
+    if let Some(mistake) = Mistake::of(reason, Severity::Degraded) {
+        return mistake_words(mistake).into();
+    }
+    let torque = match has_standstill(&calibration.validation) {
+        true => "While joints move, the torque yes",
+        false => "The torque yes",
+    };
+    let predict = format!(
+        "Yes, to predict torque{}",
+        grounds::below_cutoff(calibration)
+    );
+    match reason {
+        Code::NarrowIntervals | Code::DistributionNarrow => {
+            format!("{torque}, its intervals not: they are too narrow.")
+        }
+        Code::DistributionWide => {
+            format!("{torque}; its intervals are wider than they need to be.")
+        }
+        Code::TorqueAbovePrediction | Code::TorqueBelowPrediction => {
+            format!("{torque}, its intervals not: they lie off to one side.")
+        }
+        Code::Passed => format!("{predict} on motions like the ones it was tested on."),
+        _ => fixed(reason).map_or_else(
+            || format!("{predict}, with the exceptions below."),
+            str::to_owned,
+        ),
+    }
 }
 
-/// The headline with what it is of: joints that move, and torque that the filter lets pass.
-fn in_band(calibration: &Calibration, headline: &str) -> String {
-    let headline = match has_standstill(&calibration.validation) {
-        true => headline.replace("The torque yes", "While joints move, the torque yes"),
-        false => headline.to_owned(),
-    };
-    let below = grounds::below_cutoff(calibration);
-    headline.replace(
-        "Yes, to predict torque",
-        &format!("Yes, to predict torque{below}"),
-    )
+/// Answers that are of the whole robot.
+fn fixed(reason: Code) -> Option<&'static str> {
+    Some(match reason {
+        Code::NotTested => "Not yet: there are no held-out rows to judge this twin by.",
+        Code::FewHeldOutRows => {
+            "Hard to say: the held-out rows count as too few independent ones to judge this twin by."
+        }
+        Code::WorseThanNominal => {
+            "No: on held-out data the calibrated torque is worse than the nominal one."
+        }
+        Code::ErrorAboveTorque => "No: the error left is larger than the torque itself.",
+        Code::ErrorAboveTorqueOnMostJoints => {
+            "No: on most joints the error left is larger than the torque itself."
+        }
+        Code::NothingFound => {
+            "Nothing to correct was found: none of the candidate effects is in this log."
+        }
+        Code::NoBetterThanNominal => {
+            "Hardly: on held-out data the calibrated torque is no better than the nominal one."
+        }
+        Code::FrictionAloneIsBetter => {
+            "Hardly: friction and an offset alone predict held-out torque better."
+        }
+        Code::NothingEstablished => {
+            "Perhaps: low-passed torque is better with it, but none of its effects is established."
+        }
+        Code::LargeError => "Better than the model alone, but the error that is left is large.",
+        Code::LargeErrorOnMostJoints => {
+            "Better than the model alone, but on most joints the error that is left is large."
+        }
+        Code::UnphysicalLinks => {
+            "With care: what was found of several links is no rigid body. Is this the robot's model?"
+        }
+        Code::JointTorqueWorse => {
+            "With care: better than the model alone, but on some joints torque got worse."
+        }
+        Code::NarrowIntervalsInMotion => {
+            "While joints move the torque yes, its intervals not: they are too narrow."
+        }
+        Code::WideIntervals => "Yes; its intervals are wider than they need to be.",
+        Code::WorseAtRest => "While joints move, yes; at standstill it is worse than your model.",
+        _ => return None,
+    })
 }
 
 /// The headline where a mistake stands: never "Yes".
@@ -269,9 +198,9 @@ pub(super) fn plus_minus(mean: f64, sd: f64) -> String {
 pub(super) mod tests {
     use super::*;
     use crate::report::fixture;
-    use crate::report::limits::{Rows, torque_deviation};
     use crate::report::shape::tests::pit;
     use crate::report::view;
+    use twincal::Finding;
     use twincal::calibrate::Status;
     use twincal::posterior::Method;
     use twincal::validate::Pit;
@@ -491,10 +420,7 @@ pub(super) mod tests {
         // The elbow is the fixture's second joint.
         let of = |shoulder: bool, factor: f64| {
             judged(move |c| {
-                let deviation = |index: usize| {
-                    let joints = view::joints(c);
-                    torque_deviation(&joints[index], Rows::Moving)
-                };
+                let deviation = |index: usize| c.validation.filtered.joints[index].torque_sd;
                 let deviations = [deviation(0), deviation(1)];
                 let joints = c.validation.filtered.joints.iter_mut();
                 for (joint, deviation) in joints.zip(deviations).skip(usize::from(!shoulder)) {
@@ -531,7 +457,7 @@ pub(super) mod tests {
                 .any(|l| l.starts_with("Joint elbow: the error left is 138"))
         );
         let single = judged(|c| {
-            let deviation = torque_deviation(&view::joints(c)[0], Rows::Moving);
+            let deviation = c.validation.filtered.joints[0].torque_sd;
             let joints = &mut c.validation.filtered.joints;
             (joints[0].rmse_calibrated, joints[0].rmse_nominal) =
                 (0.7 * deviation, 10.0 * deviation);

@@ -81,6 +81,12 @@ pub(super) fn pooled_unit(joints: &[Joint<'_>]) -> &'static str {
     }
 }
 
+/// Unit of a joint's torque; empty of a name that is none.
+pub(super) fn unit_of(joints: &[Joint<'_>], name: &str) -> &'static str {
+    let joint = joints.iter().find(|joint| joint.name == name);
+    joint.map_or("", |joint| joint.units.torque)
+}
+
 /// Rows that every array of the trace has.
 pub(super) fn rows(trace: &Trace) -> usize {
     trace
@@ -119,23 +125,6 @@ pub(super) fn standard_deviation(values: impl Iterator<Item = f64> + Clone) -> f
         .clone()
         .fold((0.0, 0.0), |(n, sum), x| (n + 1.0, sum + x));
     root_mean_square(finite.map(|x| x - sum / n))
-}
-
-/// Held-out rows divided by each joint's residual memory: how many independent ones they are worth.
-pub(super) fn independent_rows(calibration: &Calibration, joints: &[Joint<'_>]) -> f64 {
-    let scores = calibration.validation.filtered.joints.iter();
-    scores
-        .map(|score| score.rows as f64 / memory(joints, &score.joint))
-        .sum()
-}
-
-/// Rows that count as one independent row of a joint, at least 1.
-pub(super) fn memory(joints: &[Joint<'_>], name: &str) -> f64 {
-    let mut own = joints.iter().filter(|joint| joint.name == name);
-    let time = own
-        .next()
-        .map_or(1.0, |joint| joint.noise.autocorrelation_time);
-    if time.is_finite() { time.max(1.0) } else { 1.0 }
 }
 
 #[cfg(test)]

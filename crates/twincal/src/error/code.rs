@@ -44,10 +44,10 @@ macro_rules! codes {
 }
 
 codes! {
-    /// A part of an actuator of the model is not read.
-    ActuatorNotUsed = "actuator_not_used",
     /// The gear of an actuator turns its force into torque of the joint.
     ActuatorGear = "actuator_gear",
+    /// A part of an actuator of the model is not read.
+    ActuatorNotUsed = "actuator_not_used",
     /// A candidate has the torque of others on every motion and was left out.
     Alias = "alias",
     /// Whether a candidate has the torque of others could not be told.
@@ -114,6 +114,10 @@ codes! {
     DependsOnCutoff = "depends_on_cutoff",
     /// Acceleration was derived, and how much noise that leaves.
     DerivedAcceleration = "derived_acceleration",
+    /// Predicted distributions are too narrow, over all joints.
+    DistributionNarrow = "distribution_narrow",
+    /// Predicted distributions are wider than they need to be, over all joints.
+    DistributionWide = "distribution_wide",
     /// The residual changes over a run.
     Drift = "drift",
     /// The residual goes with the temperature.
@@ -126,24 +130,34 @@ codes! {
     DrivesOff = "drives_off",
     /// Rows that are there twice.
     DuplicateRows = "duplicate_rows",
+    /// Effects are established.
+    EffectsEstablished = "effects_established",
     /// The field `effort` is taken as joint torque.
     EffortIsJointTorque = "effort_is_joint_torque",
     /// Position holds one value while the joint moves.
     EncoderStuck = "encoder_stuck",
     /// An equality of the model is not read.
     EqualityNotUsed = "equality_not_used",
+    /// The error left is larger than the torque itself, on every joint.
+    ErrorAboveTorque = "error_above_torque",
+    /// The error left is larger than the torque itself, on most joints.
+    ErrorAboveTorqueOnMostJoints = "error_above_torque_on_most_joints",
     /// Factors of columns are those of the fit.
     FactorAsFitted = "factor_as_fitted",
     /// A factor of the fit's columns does not seem to belong to this log.
     FactorInDoubt = "factor_in_doubt",
     /// The rows of a joint count as few independent ones.
     FewEffectiveRows = "few_effective_rows",
+    /// The held-out rows count as too few independent ones.
+    FewHeldOutRows = "few_held_out_rows",
     /// A flag of the model is not read.
     FlagNotUsed = "flag_not_used",
     /// The drag of a medium is not read.
     FluidNotUsed = "fluid_not_used",
     /// An effect is in because the settings say so.
     Forced = "forced",
+    /// Friction and an offset alone predict held-out torque better than the twin.
+    FrictionAloneIsBetter = "friction_alone_is_better",
     /// Friction would drive the joint at higher speed than was logged.
     FrictionTurnsNegative = "friction_turns_negative",
     /// Friction that the model states is no part of its torque.
@@ -166,6 +180,20 @@ codes! {
     ImplausibleTimeStep = "implausible_time_step",
     /// The model's inertia is a placeholder: prior widths take a least one.
     InertiaFloor = "inertia_floor",
+    /// The 95 % intervals hold what they promise, over all joints.
+    IntervalsHold = "intervals_hold",
+    /// The predicted distribution of a joint is more than a little off.
+    JointDistributionOff = "joint_distribution_off",
+    /// The error left on a joint is as large as its torque: a constant would do as well.
+    JointErrorAboveTorque = "joint_error_above_torque",
+    /// The error left on a joint is more than half of the standard deviation of its torque.
+    JointErrorLarge = "joint_error_large",
+    /// On a joint friction and an offset alone do about as well.
+    JointFrictionAlone = "joint_friction_alone",
+    /// The 95 % intervals of a joint are too narrow.
+    JointIntervalsNarrow = "joint_intervals_narrow",
+    /// The 95 % intervals of a joint are wider than they need to be.
+    JointIntervalsWide = "joint_intervals_wide",
     /// A joint is hardly driven in a log.
     JointNotDriven = "joint_not_driven",
     /// A joint stands still in all training logs.
@@ -176,8 +204,16 @@ codes! {
     JointStandsStill = "joint_stands_still",
     /// The torque of one joint has another scale in one log.
     JointTorqueFactor = "joint_torque_factor",
+    /// The torque of a joint got worse by calibration.
+    JointTorqueWorse = "joint_torque_worse",
+    /// At standstill the torque of a joint got worse by calibration.
+    JointWorseAtRest = "joint_worse_at_rest",
     /// Joints of a log that the model does not have.
     JointsLeftOut = "joints_left_out",
+    /// The error that is left is large on every joint.
+    LargeError = "large_error",
+    /// The error that is left is large on most joints.
+    LargeErrorOnMostJoints = "large_error_on_most_joints",
     /// Messages come out of order.
     LateMessages = "late_messages",
     /// A link with a moving joint has no inertia.
@@ -216,6 +252,12 @@ codes! {
     MotionSpike = "motion_spike",
     /// A joint moves no mass.
     MovesNoMass = "moves_no_mass",
+    /// The 95 % intervals hold too little, over all joints.
+    NarrowIntervals = "narrow_intervals",
+    /// The 95 % intervals of joints that move hold too little; at standstill torque got worse.
+    NarrowIntervalsInMotion = "narrow_intervals_in_motion",
+    /// Held-out torque is no better than that of the model.
+    NoBetterThanNominal = "no_better_than_nominal",
     /// A bag has no metadata.
     NoMetadata = "no_metadata",
     /// Noise varies with load.
@@ -224,12 +266,20 @@ codes! {
     NoiseVariesWithSpeed = "noise_varies_with_speed",
     /// Logged velocity is noisier than the one derived from position.
     NoisyVelocity = "noisy_velocity",
+    /// The sampler has not converged.
+    NotConverged = "not_converged",
     /// Rows with values that are no numbers.
     NotFiniteRows = "not_finite_rows",
     /// Effects that these logs do not show.
     NotSeen = "not_seen",
+    /// No row was held out.
+    NotTested = "not_tested",
     /// A wider band was tried and not taken.
     NotWider = "not_wider",
+    /// Effects were found, and none of them is established.
+    NothingEstablished = "nothing_established",
+    /// None of the candidates is in these logs.
+    NothingFound = "nothing_found",
     /// The nominal model explains the torque to rounding.
     NothingToCorrect = "nothing_to_correct",
     /// A candidate has no torque at all: its Lagrangian is null.
@@ -238,6 +288,8 @@ codes! {
     OutliersWeighed = "outliers_weighed",
     /// Joints that come in messages of their own were brought to one clock.
     PartsMerged = "parts_merged",
+    /// All checks are passed.
+    Passed = "passed",
     /// The filters that were chosen.
     Pipeline = "pipeline",
     /// Estimates that the posterior takes as given had not settled.
@@ -256,6 +308,8 @@ codes! {
     RateCapped = "rate_capped",
     /// The rate of rows has no effect without a filter.
     RateIgnored = "rate_ignored",
+    /// Unfiltered torque is predicted worse than by the model.
+    RawTorqueWorse = "raw_torque_worse",
     /// Candidates were linearised about what was found.
     Relinearised = "relinearised",
     /// Samples are logged several times.
@@ -264,6 +318,8 @@ codes! {
     Resampled = "resampled",
     /// The residual is correlated, which the settings ignore.
     ResidualCorrelated = "residual_correlated",
+    /// A joint stands still in the logs and hardly in held-out rows.
+    RestNotTested = "rest_not_tested",
     /// Gear ripple was found in the residual and added to the candidates.
     RippleAdded = "ripple_added",
     /// The residual repeats with the joint's angle.
@@ -292,6 +348,10 @@ codes! {
     TemperatureMissing = "temperature_missing",
     /// A tendon of the model is not read.
     TendonNotUsed = "tendon_not_used",
+    /// Most held-out rows of a joint are motion that training did not have.
+    TestedOnNewMotion = "tested_on_new_motion",
+    /// On most held-out rows of a joint training leaves its torque open.
+    TestedOnOpenTorque = "tested_on_open_torque",
     /// Time starts elsewhere than at 0.
     TimeOrigin = "time_origin",
     /// Stamps are replaced by a given rate.
@@ -304,12 +364,18 @@ codes! {
     TimeUnit = "time_unit",
     /// A column is time by its type.
     TimestampType = "timestamp_type",
+    /// Measured torque lies above its prediction too often, over all joints.
+    TorqueAbovePrediction = "torque_above_prediction",
     /// Torque is read as that of the fit.
     TorqueAsFitted = "torque_as_fitted",
+    /// Measured torque lies below its prediction too often, over all joints.
+    TorqueBelowPrediction = "torque_below_prediction",
     /// Torque of a joint never changes.
     TorqueConstant = "torque_constant",
     /// Two joints have the same torque.
     TorqueCopied = "torque_copied",
+    /// The error of held-out torque.
+    TorqueError = "torque_error",
     /// Torque holds its value while the joint changes its speed.
     TorqueHeld = "torque_held",
     /// Torque is logged later or earlier than the motion.
@@ -330,6 +396,8 @@ codes! {
     UnphysicalInertia = "unphysical_inertia",
     /// What was found of a link is that of no rigid body.
     UnphysicalInertiaFound = "unphysical_inertia_found",
+    /// What was found of several links is no rigid body.
+    UnphysicalLinks = "unphysical_links",
     /// Cells of a table are no numbers.
     UnreadableRows = "unreadable_rows",
     /// Motion that the robot can make and the logs do not have.
@@ -342,10 +410,22 @@ codes! {
     VelocityOpposite = "velocity_opposite",
     /// The answer about a twin, where it is not a plain yes.
     Verdict = "verdict",
+    /// The 95 % intervals hold more than they promise, over all joints.
+    WideIntervals = "wide_intervals",
     /// The fit took a wider band.
     WiderBand = "wider_band",
+    /// At standstill torque got worse by calibration.
+    WorseAtRest = "worse_at_rest",
+    /// In the few pauses of the held-out logs torque got worse by calibration.
+    WorseInFewPauses = "worse_in_few_pauses",
+    /// On motion that training did not have a joint is predicted worse.
+    WorseOnNewMotion = "worse_on_new_motion",
+    /// Where training leaves the torque of a joint open it is predicted worse.
+    WorseOnOpenTorque = "worse_on_open_torque",
     /// The twin predicts torque worse than the model.
     WorseThanModel = "worse_than_model",
+    /// Held-out torque is worse than that of the model.
+    WorseThanNominal = "worse_than_nominal",
     /// Angles jump by a full turn.
     WrappedAngle = "wrapped_angle",
     /// A candidate has no torque in these logs.

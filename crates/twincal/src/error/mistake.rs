@@ -56,16 +56,22 @@ impl Mistake {
     pub fn codes() -> impl Iterator<Item = (Code, Severity)> {
         TABLE.iter().map(|(code, severity, _)| (*code, *severity))
     }
+
+    /// The mistake that a finding of this severity speaks of; `None` where a "Yes" may stand beside it.
+    #[must_use]
+    pub fn of(code: Code, severity: Severity) -> Option<Self> {
+        let named = TABLE
+            .iter()
+            .find(|(own, least, _)| *own == code && severity >= *least);
+        named.map(|(_, _, mistake)| *mistake)
+    }
 }
 
 impl Finding {
     /// The mistake that it speaks of; `None` where a "Yes" may stand beside it.
     #[must_use]
     pub fn mistake(&self) -> Option<Mistake> {
-        let named = |(code, severity, _): &&(Code, Severity, Mistake)| {
-            *code == self.code && self.severity >= *severity
-        };
-        TABLE.iter().find(named).map(|(_, _, mistake)| *mistake)
+        Mistake::of(self.code, self.severity)
     }
 
     /// True if it forbids a "Yes".

@@ -59,7 +59,8 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
     let columns = columns(examination, logs.len(), settings);
     let base = examination.checkup.base;
     let is_mended = |what: Mended| {
-        columns.mended.contains(&what) || (what == Mended::Finding(Code::BaseOrientation) && base.is_some())
+        columns.mended.contains(&what)
+            || (what == Mended::Finding(Code::BaseOrientation) && base.is_some())
     };
     let mends_refusal = |refusal: &Refusal| {
         (is_mended(Mended::Ticks) && refusal.time_unit.is_some())

@@ -4,10 +4,10 @@ use super::super::summary::paragraph;
 use super::super::table::{print_table, table};
 use super::{short, warn};
 use crate::terminal::{Terminal, clean};
+use twincal::assess::decisive;
 use twincal::calibrate::Calibration;
 use twincal::validate::{Split, WORSE};
 use twincal::write_back::{Holds, JointTorqueError, WriteBack};
-use twincal_io::report::decisive;
 
 /// Torque error of the file on held-out rows, before and after, beside that of the twin.
 pub(super) fn print(

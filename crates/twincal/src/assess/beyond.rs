@@ -1,0 +1,162 @@
+//! Rows on which the training data say less than on others, by cause: motion that training did not have, or torque that it leaves open.
+
+use super::claim::{Claim, Subject};
+use super::intervals::too_narrow;
+use super::scores::memory;
+use crate::calibrate::Calibration;
+use crate::error::Code;
+use crate::validate::{JointScore, Split, Validation};
+
+/// Share of its range by which a joint may leave the training motion.
+const MARGIN: f64 = 0.05;
+/// Share of a joint's rows from which the error there is told.
+const MANY: f64 = 0.1;
+/// Ratio of errors there and elsewhere from which they are told.
+const FURTHER_OFF: f64 = 1.25;
+/// Share of the rows beyond that are new motion, from which that is the cause.
+const MOSTLY: f64 = 0.5;
+
+/// Why [`Validation::beyond`] has a joint's rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cause {
+    /// Its position or velocity leaves the training range.
+    NewMotion,
+    /// What is not known of its torque is more than the noise.
+    OpenTorque,
+}
+
+impl Cause {
+    /// New motion is only where whole logs were held out: of other splits the range is that of all logs.
+    fn of(calibration: &Calibration, joint: &str, rows: f64) -> Self {
+        if calibration.validation.split != Split::HeldoutLogs {
+            return Self::OpenTorque;
+        }
+        let index = calibration
+            .noise
+            .iter()
+            .position(|noise| noise.joint == joint);
+        let hull = index.and_then(|index| calibration.twin.hull.get(index));
+        let Some(hull) = hull else {
+            return Self::NewMotion;
+        };
+        let leaves = |x: f64, low: f64, high: f64| {
+            let margin = MARGIN * (high - low);
+            x < low - margin || x > high + margin
+        };
+        let (mut new, mut all) = (0.0, 0.0);
+        let traces = calibration.validation.traces.iter();
+        for trace in traces.filter(|trace| trace.joint == joint) {
+            for ((q, qd), still) in trace.q.iter().zip(&trace.qd).zip(&trace.standstill) {
+                if !still {
+                    all += 1.0;
+                    let outside = leaves(*q, hull[0], hull[1]) || leaves(*qd, hull[2], hull[3]);
+                    new += f64::from(u8::from(outside));
+                }
+            }
+        }
+        match new > MOSTLY * rows * all {
+            true => Self::NewMotion,
+            false => Self::OpenTorque,
+        }
+    }
+}
+
+/// A joint's moving rows within and beyond.
+#[derive(Debug, Clone, Copy)]
+pub struct Beyond<'a> {
+    /// Scores of the rows that training speaks of.
+    pub within: &'a JointScore,
+    /// Scores of the others.
+    pub beyond: &'a JointScore,
+    /// Why there are others.
+    pub cause: Cause,
+    /// 95 % intervals are too narrow there, and less so elsewhere, by more than two standard errors of as many independent rows.
+    pub narrow: bool,
+    /// The error is larger there, on many of the joint's rows.
+    pub further_off: bool,
+}
+
+impl<'a> Beyond<'a> {
+    fn of(calibration: &Calibration, within: &'a JointScore, beyond: &'a JointScore) -> Self {
+        let all = within.rows + beyond.rows;
+        let share = beyond.rows as f64 / all as f64;
+        let narrow = too_narrow(beyond, memory(&calibration.noise, &beyond.joint));
+        Self {
+            within,
+            beyond,
+            cause: Cause::of(calibration, &beyond.joint, share),
+            narrow: narrow && (within.rows == 0 || within.coverage95 > beyond.coverage95),
+            further_off: within.rows > 0
+                && share >= MANY
+                && beyond.rmse_calibrated > FURTHER_OFF * within.rmse_calibrated,
+        }
+    }
+
+    /// Rows beyond and all rows.
+    #[must_use]
+    pub fn rows(&self) -> [u64; 2] {
+        [self.beyond.rows, self.within.rows + self.beyond.rows]
+    }
+
+    /// Whether the joint was mostly tested there. Of torque that training leaves open that is said only where it is predicted better elsewhere:
+    /// otherwise that is no excuse.
+    fn is_most(&self) -> bool {
+        let (within, beyond) = (self.within, self.beyond);
+        let better = within.rows == 0 || within.coverage95 > beyond.coverage95;
+        beyond.rows > within.rows && (self.cause == Cause::NewMotion || better)
+    }
+}
+
+/// Joints that have held-out rows there.
+pub fn beyond(calibration: &Calibration) -> impl Iterator<Item = Beyond<'_>> {
+    let Validation { within, beyond, .. } = &calibration.validation;
+    let pairs = within.joints.iter().zip(&beyond.joints);
+    pairs
+        .filter(|(_, beyond)| beyond.rows > 0)
+        .map(|(within, beyond)| Beyond::of(calibration, within, beyond))
+}
+
+/// Joints that were mostly tested there.
+pub fn tested_beyond(calibration: &Calibration) -> impl Iterator<Item = Beyond<'_>> {
+    beyond(calibration).filter(Beyond::is_most)
+}
+
+/// Joints of which training says less on a tenth of the held-out moving rows or more, mostly because their motion is new.
+pub fn new_motion(calibration: &Calibration) -> impl Iterator<Item = &str> {
+    beyond(calibration)
+        .filter(|own| {
+            let [rows, all] = own.rows();
+            own.cause == Cause::NewMotion && rows as f64 >= MANY * all as f64
+        })
+        .map(|own| own.beyond.joint.as_str())
+}
+
+/// Joints that are predicted worse there, or were mostly tested there.
+pub(super) fn claims(calibration: &Calibration) -> Vec<Claim> {
+    let told = beyond(calibration).flat_map(|own| {
+        let subject = || Subject::Joint(own.beyond.joint.clone());
+        let [rows, all] = own.rows();
+        let numbers = [
+            ("rows_beyond", rows as f64),
+            ("rows", all as f64),
+            ("coverage95_beyond", own.beyond.coverage95),
+            ("coverage95_within", own.within.coverage95),
+            ("rms_beyond", own.beyond.rmse_calibrated),
+            ("rms_within", own.within.rmse_calibrated),
+        ];
+        let (worse, tested) = match own.cause {
+            Cause::NewMotion => (Code::WorseOnNewMotion, Code::TestedOnNewMotion),
+            Cause::OpenTorque => (Code::WorseOnOpenTorque, Code::TestedOnOpenTorque),
+        };
+        let codes = [
+            (own.narrow || own.further_off, worse),
+            (own.is_most(), tested),
+        ];
+        codes
+            .into_iter()
+            .filter(|(holds, _)| *holds)
+            .map(move |(_, code)| Claim::limit(code, subject(), numbers))
+            .collect::<Vec<_>>()
+    });
+    told.collect()
+}

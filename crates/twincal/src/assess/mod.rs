@@ -1,0 +1,98 @@
+//! May a twin be used, why, and what to record next: a value of codes and numbers, without a word. Everything that tells people (terminal, page,
+//! `result.json`) renders it.
+//!
+//! # Example
+//! ```
+//! # #[path = "../../examples/two_link.rs"] mod two_link;
+//! # use two_link::{arm, log};
+//! use twincal::assess::{Answer, assess};
+//! use twincal::prelude::*;
+//!
+//! # let mut noise = twincal::random::Random::new(1, 0);
+//! # let (robot, real) = (arm(2.0)?, arm(2.6)?);
+//! # let mut run = |name: &str, phase: f64| log(name, phase, &real, &mut noise);
+//! # let (log, other) = (run("run1", 0.3), run("run2", 1.9));
+//! # let mut settings = Settings::default();
+//! # settings.library.families = vec![Family::Payload, Family::Viscous];
+//! let fit = Calibrate::new(&robot).logs([log]).heldout([other]).settings(settings).run()?;
+//! let assessment = assess(&fit);
+//! for claim in &assessment.claims {
+//!     println!("{} {:?} {:?}", claim.code, claim.subject, claim.evidence);
+//! }
+//! assert!(assessment.answer <= Answer::YesWithinLimits);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod answer;
+mod beyond;
+mod claim;
+mod intervals;
+mod next;
+mod of_torque;
+mod rest;
+mod scores;
+mod shape;
+
+pub use answer::{Answer, decide};
+pub use beyond::{Beyond, Cause, beyond, new_motion, tested_beyond};
+pub use claim::{Claim, Evidence, Role, Subject};
+pub use intervals::{by_chance, too_narrow, too_wide};
+pub use next::{Request, RequestCode, driven_together};
+pub use of_torque::{CLEARLY_LOST, error_share, is_large, is_lost, worse};
+pub use rest::{
+    AtRest, FEW_AT_REST, Pauses, all_at_rest, at_rest, few_pauses, hardly_at_rest, rest_got_worse,
+    standstill, tested_at_rest,
+};
+pub use scores::{
+    FEW, converged, decisive, friction_only, has_standstill, independent_rows, memory, rows_of,
+};
+pub use shape::{Off, Shape, is_far, looked_at, off};
+
+use crate::calibrate::Calibration;
+use crate::error::Code;
+use serde::Serialize;
+
+/// What may be concluded from a calibration.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct Assessment {
+    /// May the twin be used?
+    pub answer: Answer,
+    /// The code that decides; [`Code::Passed`] where nothing speaks against a "yes".
+    pub reason: Code,
+    /// What speaks for and against it: what decides first, then by weight.
+    pub claims: Vec<Claim>,
+    /// What to record next.
+    pub next: Vec<Request>,
+}
+
+impl Assessment {
+    /// The claims of this code.
+    pub fn claims(&self, code: Code) -> impl Iterator<Item = &Claim> {
+        self.claims.iter().filter(move |claim| claim.code == code)
+    }
+}
+
+/// Assesses a calibration. The answer follows from the claims alone ([`decide`]).
+#[must_use]
+pub fn assess(calibration: &Calibration) -> Assessment {
+    let mut claims = of_torque::claims(calibration);
+    if !claims.iter().any(|claim| claim.code == Code::NotTested) {
+        claims.extend(intervals::claims(calibration));
+        claims.extend(shape::claims(calibration));
+        claims.extend(rest::claims(calibration));
+        claims.extend(beyond::claims(calibration));
+    }
+    claims.extend(of_torque::of_effects(calibration));
+    let all = calibration.findings.iter();
+    claims.extend(all.map(|finding| Claim::of_finding(finding, calibration)));
+    let (answer, reason) = decide(&claims);
+    claims.sort_by_key(|claim| (claim.code != reason, claim.role));
+    let next = next::requests(calibration, &claims);
+    Assessment {
+        answer,
+        reason,
+        claims,
+        next,
+    }
+}
