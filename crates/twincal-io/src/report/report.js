@@ -104,7 +104,8 @@
       if (other !== plot && (other.scales.x.min !== min || other.scales.x.max !== max)) other.setScale("x", { min, max });
     }
     const rows = shown.time.length < shown.rows ? `, ${shown.time.length} of ${shown.rows} rows` : "";
-    at("range").textContent = `${seconds(min)} to ${seconds(max)} s${rows}`;
+    const rest = shown.rest.length > 0 ? ", grey: at rest" : "";
+    at("range").textContent = `${seconds(min)} to ${seconds(max)} s${rows}${rest}`;
   };
 
   const line = (label, name, width, dash) => ({
