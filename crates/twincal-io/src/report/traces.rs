@@ -8,7 +8,7 @@ use std::ops::Range;
 use twincal::validate::Trace;
 
 /// Rows over all traces: with the figures the page stays below two megabytes.
-const ROWS: usize = 12_000;
+const ROWS: usize = 8_000;
 /// Fewest and most rows of a trace.
 const FEWEST: usize = 200;
 const MOST: usize = 2_000;
@@ -237,6 +237,6 @@ mod tests {
         let traces = traces(&joints, &joints[1], 8).expect("there are held-out rows");
         assert_eq!((traces.traces.len(), traces.first), (16, 8));
         let text = crate::report::script::json(&traces).expect("numbers and names are JSON");
-        assert!(text.len() < 800_000, "{}", text.len());
+        assert!(text.len() < 500_000, "{}", text.len());
     }
 }
