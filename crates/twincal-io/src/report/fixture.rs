@@ -50,6 +50,12 @@ pub(super) fn seven_joints() -> Calibration {
     arm(&names, 2, 800)
 }
 
+/// Seven joints with more long held-out logs than the page draws: its largest size.
+pub(super) fn many_joints_and_logs() -> Calibration {
+    let names = ["j1", "j2", "j3", "j4", "j5", "j6", "j7"];
+    arm(&names, 4, 2000)
+}
+
 /// Sampled instead of enumerated, with chains that have not converged.
 pub(super) fn gibbs() -> Calibration {
     let mut calibration = two_joints();

@@ -1,8 +1,9 @@
 //! `report.html`: one self-contained page that says whether a twin can be used, what was found, and how sure it is.
 //!
-//! The page needs no network, no script and no file beside it. Every string that came from a model, a log or a command
-//! line is stripped of control characters and escaped on its way into the page, by the template's formatter and by the
-//! SVG builder; a content security policy forbids scripts as a second lock. The same calibration gives the same bytes.
+//! The page needs no network and no file beside it. Every string that came from a model, a log or a command line is
+//! stripped of control characters and escaped on its way into the page, by the template's formatter, by the SVG builder
+//! and by the data block. A content security policy is the second lock: it lets one script run, by its hash. Without a
+//! script the page shows the same figures, still. The same calibration gives the same bytes.
 
 mod ambiguity;
 mod beyond;
@@ -10,6 +11,7 @@ mod effects;
 mod figure;
 mod figures;
 mod findings;
+mod first_screen;
 mod grounds;
 mod honesty;
 #[cfg(test)]
@@ -20,6 +22,7 @@ mod page;
 mod plot;
 mod remarks;
 mod scale;
+mod script;
 mod shape;
 mod standstill;
 mod status;
@@ -28,6 +31,7 @@ mod tables;
 #[cfg(test)]
 mod tests;
 mod text;
+mod traces;
 mod verdict;
 mod view;
 

@@ -6,16 +6,19 @@ use super::effects::{self, Effects};
 use super::figure::Figure;
 use super::figures;
 use super::findings;
+use super::first_screen::{self, Number, Use};
 use super::honesty;
 use super::limits::Rows;
+use super::script;
 use super::standstill;
 use super::tables::{self, Table};
 use super::text;
+use super::traces;
 use super::verdict::{self, Verdict};
 use super::view::{self, Joint};
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::{Serde, Value};
-use minijinja::{Environment, UndefinedBehavior, escape_formatter};
+use minijinja::{Environment, ErrorKind, UndefinedBehavior, escape_formatter};
 use serde::Serialize;
 use twincal::assess;
 use twincal::calibrate::Calibration;
@@ -34,14 +37,25 @@ struct Page<'a> {
     mentioned: f64,
     /// Files and amount of data, in one line.
     about: String,
-    joints: Vec<&'a str>,
     verdict: Verdict,
+    numbers: [Number; 3],
+    #[serde(rename = "use")]
+    use_of: Use,
+    /// The joint that is shown first, for readers without script and for print.
+    hero: Option<Figure>,
+    /// The data block of the script as JSON; empty without held-out rows.
+    traces: String,
+    script: String,
+    /// What lets the script run.
+    script_source: String,
+    plot_style: &'static str,
     effects: Effects,
     inclusion: Option<Figure>,
     pairs: Option<Figure>,
     /// Which coefficients the figure of pairs shows, where it does not show all; may be empty.
     pairs_shown: String,
     curves: Option<Figure>,
+    /// The joints besides the first one.
     torque: Vec<Figure>,
     other_torque: Vec<Figure>,
     residual_time: Option<Figure>,
@@ -102,7 +116,8 @@ pub(super) fn fill(
     environment.add_template("report.html", include_str!("report.html"))?;
     environment.add_template("report.css", include_str!("report.css"))?;
     let joints = view::joints(calibration);
-    let page = gather(calibration, run, &joints);
+    let page = gather(calibration, run, &joints)
+        .map_err(|error| minijinja::Error::new(ErrorKind::BadSerialization, error.to_string()))?;
     environment
         .get_template("report.html")?
         .render(Serde(&page))
@@ -112,7 +127,7 @@ fn gather<'a>(
     calibration: &'a Calibration,
     run: &'a ReportContext,
     joints: &[Joint<'a>],
-) -> Page<'a> {
+) -> Result<Page<'a>, serde_json::Error> {
     let validation = &calibration.validation;
     let terms = &calibration.terms;
     let independent = assess::independent_rows(calibration);
@@ -124,18 +139,35 @@ fn gather<'a>(
         .collect();
     let others = OTHER_TRACES / joints.len().max(1);
     let components = &calibration.components;
-    Page {
+    let hero = first_screen::hero(calibration, joints);
+    let traces = hero.and_then(|hero| traces::traces(joints, hero, 1 + others));
+    let verdict = verdict::judge(calibration, joints);
+    let script = script::text();
+    Ok(Page {
         run,
         mentioned: super::MENTIONED,
         about: tables::about(calibration, run),
-        joints: joints.iter().map(|j| j.name).collect(),
-        verdict: verdict::judge(calibration, joints),
+        numbers: first_screen::numbers(calibration, joints),
+        use_of: first_screen::use_of(verdict.answer),
+        hero: hero.and_then(figures::torque::figure),
+        traces: match &traces {
+            Some(traces) => script::json(traces)?,
+            None => String::new(),
+        },
+        script_source: script::source(&script),
+        script,
+        plot_style: script::PLOT_STYLE,
+        verdict,
         effects: effects::sort(calibration),
         inclusion: figures::inclusion::figure(components, |c| calibration.sees(c)),
         pairs: figures::pairs::figure(&calibration.draws, terms),
         pairs_shown: figures::pairs::shown(&calibration.draws, terms),
         curves: figures::curves::figure(&calibration.curves, components, joints),
-        torque: joints.iter().filter_map(figures::torque::figure).collect(),
+        torque: joints
+            .iter()
+            .filter(|joint| hero.is_none_or(|hero| hero.name != joint.name))
+            .filter_map(figures::torque::figure)
+            .collect(),
         other_torque: joints
             .iter()
             .filter_map(|j| figures::torque::others(j, others))
@@ -167,5 +199,5 @@ fn gather<'a>(
         findings: findings::findings(calibration),
         convergence: tables::convergence(calibration),
         pipeline: tables::pipeline(calibration),
-    }
+    })
 }

@@ -21,7 +21,7 @@ pub(in crate::report) fn figure(calibration: &Calibration, joints: &[Joint<'_>])
         })
         .collect();
     (!images.is_empty()).then(|| Figure {
-        title: "Memory of the residual".into(),
+        title: "Autocorrelation of the residual: effective sample size".into(),
         read: "Rows whose residuals resemble their neighbours' carry little new information: a curve that drops into the \
                grey band at once is white noise, a slow one means fewer effective samples and wider intervals."
             .into(),

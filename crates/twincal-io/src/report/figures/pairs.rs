@@ -3,7 +3,7 @@
 use crate::report::figure::{Figure, Image, NARROW};
 use crate::report::scale::Scale;
 use crate::report::svg::{Anchor, Path, Svg};
-use crate::report::text::{count, fixed, list, percent, shorten, text_width};
+use crate::report::text::{count, first_of, fixed, list, percent, shorten, text_width};
 use std::collections::BTreeMap;
 use twincal::calibrate::{Draws, TermSummary};
 
@@ -18,6 +18,9 @@ const FAR: f64 = 4.0;
 const GAP: f64 = 10.0;
 /// Share of a coefficient's draws from which it is told that they are not drawn: more than the outermost 1 %.
 const MANY: f64 = 0.02;
+/// Correlation from which two coefficients are called confounded, and pairs that are named.
+const STRONG: f64 = 0.8;
+const PAIRS: usize = 6;
 /// Size of a label and distance of its lines, px.
 const LABEL: f64 = 11.0;
 const LINE: f64 = 13.0;
@@ -37,7 +40,7 @@ pub(in crate::report) fn figure(draws: &Draws, terms: &[TermSummary]) -> Option<
         names.join(", ")
     );
     Some(Figure {
-        title: "Posterior distributions".into(),
+        title: "Posterior distributions: which coefficients are confounded".into(),
         read: "On the diagonal each coefficient on its own, below it every pair (the stronger the colour, the more probable), above it their \
                correlation: a slanted cloud means that the data know a combination of the two better than each of them (a phone shows \
                each on its own). \
@@ -70,8 +73,9 @@ pub(in crate::report) fn shown(draws: &Draws, terms: &[TermSummary]) -> String {
             count(drawn as u64),
             count(kept as u64)
         );
-        out.push_str(". All of them stand under “Which numbers can I trust?” and in result.json. ");
+        out.push_str(". All of them stand under “Effects” and in result.json. ");
     }
+    out.push_str(&confounded(draws));
     if numbered {
         let each: Vec<String> = (1..)
             .zip(&names)
@@ -92,6 +96,29 @@ pub(in crate::report) fn shown(draws: &Draws, terms: &[TermSummary]) -> String {
         );
     }
     out.trim().to_owned()
+}
+
+/// The pairs with the largest correlations, by name; empty where none is strong.
+fn confounded(draws: &Draws) -> String {
+    let mut strong: Vec<_> = correlations(&draws.values)
+        .into_iter()
+        .filter(|(_, _, r)| r.abs() >= STRONG)
+        .collect();
+    strong.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
+    let pairs: Vec<String> = strong
+        .iter()
+        .filter_map(|&(i, j, r)| {
+            let (one, other) = (draws.terms.get(i)?, draws.terms.get(j)?);
+            Some(format!("{one} with {other} ({})", fixed(r, 2)))
+        })
+        .collect();
+    match pairs.is_empty() {
+        true => String::new(),
+        false => format!(
+            "Confounded (correlation): {}. ",
+            list(&first_of(pairs, PAIRS))
+        ),
+    }
 }
 
 /// Share of the draws of models that hold a term that are beyond what is drawn.
@@ -205,7 +232,7 @@ fn draw(variables: &[Variable<'_>], label: &str) -> String {
                 }
                 std::cmp::Ordering::Greater => {
                     let r = correlation(x.values, y.values);
-                    let class = if r.abs() >= 0.8 {
+                    let class = if r.abs() >= STRONG {
                         "number strong"
                     } else {
                         "number"

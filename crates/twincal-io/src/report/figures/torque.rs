@@ -98,7 +98,8 @@ pub(in crate::report) fn others(joint: &Joint<'_>, most: usize) -> Option<Figure
     })
 }
 
-fn scores(joint: &Joint<'_>, trace: &Trace) -> String {
+/// The log and its errors before and after, in one line.
+pub(in crate::report) fn scores(joint: &Joint<'_>, trace: &Trace) -> String {
     let thinned = match trace.step {
         0 | 1 => String::new(),
         step => format!(", from one row in {step}"),
@@ -243,13 +244,8 @@ fn torque_range(lines: &[&Vec<(f64, f64)>], band: &[(f64, f64, f64)]) -> (f64, f
 /// A point that is not a number after every pause longer than five usual steps, so that lines break there.
 pub(super) fn with_gaps(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     let points: Vec<_> = points.collect();
-    let mut steps: Vec<f64> = points
-        .windows(2)
-        .map(|p| p[1].0 - p[0].0)
-        .filter(|d| *d > 0.0)
-        .collect();
-    steps.sort_by(f64::total_cmp);
-    let limit = 5.0 * steps.get(steps.len() / 2).copied().unwrap_or(f64::INFINITY);
+    let times: Vec<f64> = points.iter().map(|point| point.0).collect();
+    let limit = longest_step(&times);
     let mut out = Vec::with_capacity(points.len());
     for (i, &point) in points.iter().enumerate() {
         if i > 0 && point.0 - points[i - 1].0 > limit {
@@ -260,8 +256,19 @@ pub(super) fn with_gaps(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f
     out
 }
 
+/// A step of time that is longer is a pause: five usual steps.
+pub(in crate::report) fn longest_step(times: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = times
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .filter(|step| *step > 0.0)
+        .collect();
+    steps.sort_by(f64::total_cmp);
+    5.0 * steps.get(steps.len() / 2).copied().unwrap_or(f64::INFINITY)
+}
+
 /// Maximal runs of `true` inside `range`.
-fn runs(flags: &[bool], range: &Range<usize>) -> Vec<Range<usize>> {
+pub(in crate::report) fn runs(flags: &[bool], range: &Range<usize>) -> Vec<Range<usize>> {
     let mut out: Vec<Range<usize>> = Vec::new();
     for i in range
         .clone()
