@@ -1,0 +1,219 @@
+//! What a person reads first after a fit: the answer, the torque error, a row per joint, what limits the twin, what to do next.
+//!
+//! At most 40 lines, 55 on a terminal of fewer than 80 columns: what does not fit is counted, and `-v` prints it.
+
+mod claims;
+mod effects;
+mod joints;
+mod text;
+
+use super::calibration::{quoted, report_of};
+use crate::terminal::Terminal;
+use std::path::Path;
+use text::{Page, Width, plain};
+use twincal::calibrate::Calibration;
+use twincal::validate::Split;
+use twincal::words::significant;
+use twincal_io::report::{self, Answer, Conclusion};
+
+/// Lines of the whole output, and of that on a narrow terminal.
+const LINES: usize = 40;
+const LINES_NARROW: usize = 55;
+/// Columns below which a terminal is narrow.
+const NARROW: usize = 80;
+
+/// How much of each part is printed.
+#[derive(Debug, Clone, Copy)]
+struct Detail {
+    /// Joints in the table, and effects beside them.
+    joints: usize,
+    effects: usize,
+    /// Claims.
+    claims: usize,
+    /// Lines of a joint's further effects, of an effect, of a claim and of a next step.
+    further: usize,
+    effect: usize,
+    claim: usize,
+    step: usize,
+}
+
+/// From generous to terse; the first that fits is printed.
+const DETAILS: [Detail; 7] = [
+    Detail::of([8, 8, 5], [3, 3, 5, 5]),
+    Detail::of([8, 8, 5], [2, 2, 4, 4]),
+    Detail::of([8, 8, 5], [1, 2, 3, 3]),
+    Detail::of([8, 8, 5], [1, 1, 2, 3]),
+    Detail::of([8, 6, 5], [1, 1, 2, 2]),
+    Detail::of([8, 5, 3], [1, 1, 2, 2]),
+    Detail::of([6, 4, 3], [1, 1, 1, 2]),
+];
+
+impl Detail {
+    const fn of([joints, effects, claims]: [usize; 3], lines: [usize; 4]) -> Self {
+        let [further, effect, claim, step] = lines;
+        Self {
+            joints,
+            effects,
+            claims,
+            further,
+            effect,
+            claim,
+            step,
+        }
+    }
+}
+
+/// Where the result lies, and what of the model can be exported.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::commands) struct Place<'a> {
+    pub(in crate::commands) output: &'a Path,
+    /// `urdf` or `mjcf`.
+    pub(in crate::commands) format: &'a str,
+}
+
+/// Prints all but the last line, which is the report's path; `more` lines are printed behind it.
+pub(super) fn print(
+    calibration: &Calibration,
+    place: Place<'_>,
+    more: usize,
+    terminal: &mut Terminal,
+) {
+    let answer = report::answer(calibration);
+    terminal.answer(&answer.headline);
+    let page = page(calibration, &answer, place, (terminal.width(), more));
+    page.print(terminal);
+}
+
+/// The lines between the answer and the report's path.
+fn page(
+    calibration: &Calibration,
+    answer: &Answer,
+    place: Place<'_>,
+    (columns, more): (usize, usize),
+) -> Page {
+    let limit = match columns < NARROW {
+        true => LINES_NARROW,
+        false => LINES,
+    };
+    let width = Width(columns);
+    let answer_lines = answer.headline.chars().count().div_ceil(columns) + 1;
+    let taken = answer_lines + more + report_of(place.output).chars().count().div_ceil(columns);
+    let mut pages = DETAILS.iter().map(|detail| {
+        let mut page = Page::default();
+        page.blank();
+        scores(calibration, width, &mut page);
+        page.blank();
+        joints::table(calibration, *detail, width, &mut page);
+        effects::beside_the_joints(calibration, *detail, width, &mut page);
+        claims::list(calibration, answer, *detail, width, &mut page);
+        next(calibration, answer, place, *detail, width, &mut page);
+        page
+    });
+    let fits = |page: &Page| page.len() + taken <= limit;
+    let mut last = Page::default();
+    pages
+        .find_map(|page| match fits(&page) {
+            true => Some(page),
+            false => {
+                last = page;
+                None
+            }
+        })
+        .unwrap_or(last)
+}
+
+/// Torque error before and after, and what the intervals hold.
+fn scores(calibration: &Calibration, width: Width, page: &mut Page) {
+    let validation = &calibration.validation;
+    let held_out = match &validation.split {
+        Split::HeldoutLogs => "held-out logs",
+        Split::LeaveOneLogOut => "each log predicted from the others",
+        Split::LeaveLogGroupsOut => "each fifth of the logs predicted from the others",
+        Split::LastThirty => "the last 30 % of each log",
+        Split::NotTested => {
+            let text = "Torque error: not tested. --heldout LOG predicts a log that was not fitted.";
+            page.paragraph(text, ["", "  "], width, 3);
+            return;
+        }
+    };
+    let scores = report::decisive(validation);
+    let [before, after] = [scores.rmse_nominal, scores.rmse_calibrated];
+    let change = match after / before - 1.0 {
+        change if !change.is_finite() => String::new(),
+        change if change.abs() < 5e-4 => ", unchanged".into(),
+        change => format!(
+            ", {:.1} % {}",
+            100.0 * change.abs(),
+            if change < 0.0 { "less" } else { "more" }
+        ),
+    };
+    let moving = match report::has_standstill(validation) {
+        true => ", joints that move",
+        false => "",
+    };
+    let text = format!(
+        "Torque error    {} → {} {}{change} (RMSE; {held_out}{moving})",
+        significant(before, 3),
+        significant(after, 3),
+        unit(calibration),
+    );
+    page.paragraph(&text, ["", "                "], width, 3);
+    if scores.coverage95.is_finite() {
+        let share = 100.0 * scores.coverage95;
+        page.push(plain(format!("95 % intervals  hold {share:.1} % of these rows")));
+    }
+}
+
+/// Unit of an error over all joints.
+fn unit(calibration: &Calibration) -> &'static str {
+    let joints = calibration.twin.robot.description().joints.iter();
+    let mut units: Vec<&str> = joints
+        .filter(|joint| joint.kind != twincal::robot::JointKind::Fixed)
+        .map(|joint| joint.kind.torque_unit())
+        .collect();
+    units.dedup();
+    match units[..] {
+        [] | ["N·m"] => "N·m",
+        ["N"] => "N",
+        _ => "N·m and N",
+    }
+}
+
+/// What to record, correct or run next.
+fn next(
+    calibration: &Calibration,
+    answer: &Answer,
+    place: Place<'_>,
+    detail: Detail,
+    width: Width,
+    page: &mut Page,
+) {
+    let begin = ["  ", "    "];
+    page.heading("Next");
+    if calibration.findings.iter().any(twincal::Finding::doubts_the_log) {
+        page.paragraph(super::summary::MENDS, begin, width, detail.step);
+    }
+    if let Some(recording) = &answer.next {
+        let text = format!("Record {recording}");
+        page.paragraph(&text, begin, width, detail.step);
+    }
+    let output = quoted(&place.output.to_string_lossy());
+    let format = place.format;
+    let command = match answer.reason.conclusion() {
+        Conclusion::Yes | Conclusion::YesWithinLimits => {
+            let file = match format {
+                "mjcf" => "calibrated.xml",
+                _ => "calibrated.urdf",
+            };
+            format!("twincal export --twin {output} --to {format} -o {file}")
+        }
+        Conclusion::NotYet | Conclusion::No => {
+            "twincal doctor LOG --model MODEL says what is wrong with a log or the model".into()
+        }
+    };
+    page.paragraph(&command, begin, width, 2);
+    page.blank();
+}
+
+#[cfg(test)]
+mod tests;
