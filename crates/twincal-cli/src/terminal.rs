@@ -162,7 +162,10 @@ mod tests {
     #[test]
     fn text_is_laid_out_for_60_to_120_columns() {
         let of = |given: &str| width(Some(given));
-        assert_eq!([of("20"), of("60"), of("101"), of("999")], [60, 60, 101, 120]);
+        assert_eq!(
+            [of("20"), of("60"), of("101"), of("999")],
+            [60, 60, 101, 120]
+        );
     }
 
     #[test]

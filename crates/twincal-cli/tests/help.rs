@@ -19,8 +19,18 @@ fn narrow(text: &str) -> &str {
 #[test]
 fn help_leads_with_examples() {
     for verb in [
-        "", "demo", "inspect", "doctor", "init", "fit", "check", "predict", "export", "report",
-        "completions", "schema",
+        "",
+        "demo",
+        "inspect",
+        "doctor",
+        "init",
+        "fit",
+        "check",
+        "predict",
+        "export",
+        "report",
+        "completions",
+        "schema",
     ] {
         let arguments = [verb, "-h"].into_iter().filter(|word| !word.is_empty());
         let done = run(folder().path(), arguments).expect(0);

@@ -22,7 +22,10 @@ fn brief(out: &str, columns: usize) {
     let most = if columns < 80 { 55 } else { 40 };
     let lines: Vec<&str> = out.lines().collect();
     assert!(lines.len() <= most, "{} lines: {out}", lines.len());
-    let wide = lines.iter().skip(1).find(|line| line.chars().count() > columns);
+    let wide = lines
+        .iter()
+        .skip(1)
+        .find(|line| line.chars().count() > columns);
     assert_eq!(wide, None, "{out}");
     let end = &lines[lines.len().saturating_sub(4)..];
     assert!(end.iter().any(|line| line.contains("report.html")), "{out}");
@@ -85,10 +88,18 @@ fn the_report_is_opened_and_that_it_cannot_be_is_a_note() {
     let done = open(&mut command(folder.path()));
     assert!(!done.err.contains("cannot open"), "{}", done.err);
     let opened = fs::read_to_string(folder.path().join("opened")).unwrap();
-    assert!(Path::new(&opened).is_absolute() && opened.ends_with("out/report.html"), "{opened}");
+    assert!(
+        Path::new(&opened).is_absolute() && opened.ends_with("out/report.html"),
+        "{opened}"
+    );
     fs::write(&opener, "#!/bin/sh\nexit 3\n").unwrap();
     open(&mut command(folder.path())).says(&["note: cannot open", "exit status: 3"]);
-    assert!(fit(folder.path(), &["-o", "other"]).expect(0).out.ends_with("other/report.html\n"));
+    assert!(
+        fit(folder.path(), &["-o", "other"])
+            .expect(0)
+            .out
+            .ends_with("other/report.html\n")
+    );
 }
 
 #[test]

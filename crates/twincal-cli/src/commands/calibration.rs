@@ -1,5 +1,6 @@
 //! What `fit` and `demo` share: calibrate, write the artefact, print what was found.
 
+use super::brief::Around;
 use super::inputs::{LogInput, RobotInput};
 use super::{brief, code_of, print_json, require_strict, summary};
 use crate::args::PrintFlags;
@@ -46,23 +47,28 @@ pub(super) struct Done {
 }
 
 impl Done {
-    /// Prints the result; a caller prints `behind` lines more.
+    /// What stands around the result in the terminal.
+    pub(super) fn around<'a>(&self, output: &'a Path) -> Around<'a> {
+        Around {
+            output,
+            format: self.format,
+            instead: &[],
+            behind: 0,
+        }
+    }
+
+    /// Prints the result.
     pub(super) fn print(
         &self,
         print: Print,
-        output: &Path,
-        behind: usize,
+        around: Around<'_>,
         terminal: &mut Terminal,
     ) -> Outcome<()> {
         let calibration = &self.stored.calibration;
-        let place = brief::Place {
-            output,
-            format: self.format,
-        };
         match print {
             Print::Json => terminal.data(&self.stored.result_json()?),
             Print::All => summary::print(calibration, terminal),
-            Print::Brief => brief::print(calibration, place, behind, terminal),
+            Print::Brief => brief::print(calibration, around, terminal),
             Print::Answer => {
                 terminal.answer(&twincal_io::report::answer(calibration).headline);
             }
@@ -232,7 +238,10 @@ impl Job<'_> {
 pub(super) fn show(stage: Stage, of: &str, progress: &Progress) {
     match stage {
         Stage::Rows => progress.step(&format!("{of}filtering the logs")),
-        Stage::Inference => progress.step(&format!("{of}computing probabilities of all candidates")),
+        Stage::Inference => {
+            progress.step(&format!("{of}computing probabilities of all candidates"))
+        }
+        Stage::Validation(_, 0 | 1) => progress.step(&format!("{of}predicting held-out data")),
         Stage::Validation(done, all) => {
             progress.counted(&format!("{of}predicting held-out data"), done, all);
         }

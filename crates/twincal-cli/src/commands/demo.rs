@@ -1,8 +1,11 @@
 //! `twincal demo`: the paper's study on logs that the program carries, written to ./twincal-demo.
 
-use super::calibration::{Job, Print, command, say_where};
+mod truth;
+
+use super::brief::Around;
+use super::calibration::{Job, Print, command, report_of, say_where};
 use super::inputs::{LogInput, RobotInput};
-use super::open::open;
+use super::open::{OPENER, open};
 use super::start_threads;
 use crate::args::Demo;
 use crate::clock::Stopwatch;
@@ -100,12 +103,34 @@ pub(super) fn run(flags: &Demo, terminal: &mut Terminal) -> Outcome<u8> {
         Failure::Error(error) => elsewhere(error).into(),
         other => other,
     })?;
-    done.print(print, output, 0, terminal)?;
+    let truth = truth::beside(&done.stored.calibration, terminal.width())?;
+    let end = end(output);
+    let around = Around {
+        instead: &truth,
+        behind: end.len(),
+        ..done.around(output)
+    };
+    done.print(print, around, terminal)?;
+    if print == Print::All {
+        truth.iter().for_each(|line| terminal.say(line));
+        terminal.say("");
+    }
     say_where(output, print, terminal);
+    if matches!(print, Print::Brief | Print::All) {
+        end.iter().for_each(|line| terminal.say(line));
+    }
     if flags.print.open {
         open(&output.join(REPORT), terminal);
     }
     Ok(done.code)
+}
+
+/// How to open the page, and the command to try next.
+fn end(output: &Path) -> [String; 2] {
+    [
+        format!("Open the page:  {OPENER} {}", report_of(output)),
+        "Your own log:   twincal doctor run.csv --model arm.urdf".into(),
+    ]
 }
 
 /// The error in words for a command without -o: its folder lies where it runs.

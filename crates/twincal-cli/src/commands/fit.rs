@@ -90,7 +90,7 @@ fn finish(
 ) -> Outcome<u8> {
     let (output, print) = (job.output, Print::of(flags, job.settings.json));
     let done = job.run(claim, Vec::new(), progress, terminal)?;
-    done.print(print, output, 0, terminal)?;
+    done.print(print, done.around(output), terminal)?;
     say_where(output, print, terminal);
     if flags.open {
         open(&output.join(REPORT), terminal);

@@ -4,7 +4,8 @@ use super::calibration::show;
 use super::inputs::{LogInput, Long, RobotInput, checksum_of_log};
 use super::settings::{Look, Usual};
 use super::{
-    code_of, count_of_logs, merge, print_json, reads, require_strict, settings, start_threads, summary,
+    code_of, count_of_logs, merge, print_json, reads, require_strict, settings, start_threads,
+    summary,
 };
 use crate::args::StatisticsFlags;
 use crate::failure::{Failure, Outcome};

@@ -315,7 +315,10 @@ fn lines(
     }
     let mut lines = Vec::new();
     let mut say = |text: &str| {
-        for (line, text) in wrapped(&format!("{word}: {text}"), width - 4).iter().enumerate() {
+        for (line, text) in wrapped(&format!("{word}: {text}"), width - 4)
+            .iter()
+            .enumerate()
+        {
             lines.push(format!("{}{text}", if line == 0 { "  " } else { "    " }));
         }
     };

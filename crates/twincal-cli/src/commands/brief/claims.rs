@@ -25,7 +25,12 @@ pub(super) fn list(
         page.warning(text, ["  ", "    "], width, detail.claim);
     }
     if all > shown {
-        page.paragraph(&format!("… {} more (-v)", all - shown), ["  ", "    "], width, 1);
+        page.paragraph(
+            &format!("… {} more (-v)", all - shown),
+            ["  ", "    "],
+            width,
+            1,
+        );
     }
     page.blank();
 }
@@ -38,10 +43,15 @@ fn claims(calibration: &Calibration, answer: &Answer) -> (Vec<String>, usize) {
     // Mistakes and degraded data are among the limits.
     let warnings: Vec<&Finding> = (calibration.findings.iter())
         .filter(|own| own.severity == Severity::Warning && !own.forbids_yes())
+        // They stand among the effects.
+        .filter(|own| own.code != "alike_in_data")
         .collect();
     for (number, finding) in warnings.iter().enumerate() {
         let before = &warnings[..number];
-        if before.iter().any(|own| (&own.code, &own.message) == (&finding.code, &finding.message)) {
+        if before
+            .iter()
+            .any(|own| (&own.code, &own.message) == (&finding.code, &finding.message))
+        {
             continue;
         }
         all += 1;

@@ -4,7 +4,7 @@ use super::Detail;
 use super::joints::joint_of;
 use super::text::{Page, Width};
 use crate::commands::not_kept::{with_ends, with_sd};
-use twincal::calibrate::{Calibration, ComponentSummary, Status, StatusReason};
+use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary, Status, StatusReason};
 
 /// The rows under the table of joints.
 pub(super) fn beside_the_joints(
@@ -20,12 +20,20 @@ pub(super) fn beside_the_joints(
         .map(|effect| in_words(effect.component()))
         .collect();
     texts.extend(sets(calibration));
-    let (shown, more) = (texts.len().min(detail.effects), texts.len().saturating_sub(detail.effects));
+    let (shown, more) = (
+        texts.len().min(detail.effects),
+        texts.len().saturating_sub(detail.effects),
+    );
     for text in &texts[..shown] {
         page.paragraph(text, ["  ", "    "], width, detail.effect);
     }
     if more > 0 {
-        page.paragraph(&format!("… {more} more effects (-v)"), ["  ", "    "], width, 1);
+        page.paragraph(
+            &format!("… {more} more effects (-v)"),
+            ["  ", "    "],
+            width,
+            1,
+        );
     }
     let tentative: Vec<&str> = (calibration.effects())
         .filter(|effect| effect.status() == Status::Tentative && effect.component().is_in())
@@ -36,7 +44,6 @@ pub(super) fn beside_the_joints(
         let text = format!("tentative: {}", tentative.join(", "));
         page.paragraph(&text, ["  ", "    "], width, detail.effect);
     }
-    page.blank();
 }
 
 /// An established effect with its numbers; without them where no rigid body has them.
@@ -61,32 +68,41 @@ fn sets(calibration: &Calibration) -> Vec<String> {
             sets.push(members);
         }
     }
-    let text = |members: &&[String]| {
-        format!(
-            "{}: not distinguishable, at least one is in",
-            members.join(" or ")
-        )
-    };
+    let text = |members: &&[String]| format!("{} (not distinguishable)", members.join(" or "));
     sets.iter().map(text).collect()
 }
 
-/// "+0.73 ± 0.04", or both ends of the 95 % interval where ± would mislead; "–" without a number.
-pub(super) fn value(component: &ComponentSummary) -> String {
-    let Some(parameter) = component.parameters.iter().find(|own| own.seen) else {
-        return "–".into();
+/// The clearest number of an effect: that with the largest value beside its spread.
+pub(super) fn clearest(component: &ComponentSummary) -> Option<&ParameterSummary> {
+    let clear = |own: &&ParameterSummary| {
+        let (value, spread) = own.told();
+        (value / spread).abs()
     };
-    match (parameter.told(), parameter.ends()) {
-        ((value, _), _) if !value.is_finite() => "–".into(),
-        ((value, _), Some(ends)) => with_ends(value, ends),
-        ((value, spread), None) => {
-            let (value, spread) = with_sd(value, spread);
+    let seen = component.parameters.iter().filter(|own| own.seen);
+    seen.max_by(|a, b| clear(a).total_cmp(&clear(b)))
+}
+
+/// "+0.73 ± 0.04", or both ends of the 95 % interval where ± would mislead; shares in percent.
+pub(in crate::commands) fn value(parameter: &ParameterSummary) -> String {
+    let (value, spread) = parameter.told();
+    let factor = if parameter.unit == SHARE { 100.0 } else { 1.0 };
+    match parameter.ends() {
+        _ if !value.is_finite() => "–".into(),
+        Some(ends) => with_ends(factor * value, ends.map(|end| factor * end)),
+        None => {
+            let (value, spread) = with_sd(factor * value, factor * spread);
             format!("{value} ± {spread}")
         }
     }
 }
 
 /// Unit of that number.
-pub(super) fn unit(component: &ComponentSummary) -> &str {
-    let shown = component.parameters.iter().find(|own| own.seen);
-    shown.map_or("", |own| own.unit.as_str())
+pub(in crate::commands) fn unit(parameter: &ParameterSummary) -> &str {
+    match parameter.unit.as_str() {
+        SHARE => "%",
+        unit => unit,
+    }
 }
+
+/// Unit of a share.
+const SHARE: &str = "1";

@@ -1,7 +1,7 @@
 //! The table of joints: viscous and Coulomb friction, and the other effects of each joint.
 
 use super::Detail;
-use super::effects::{unit, value};
+use super::effects::{clearest, unit, value};
 use super::text::{Page, Width, columns, lines, padded, plain, short_name};
 use twincal::calibrate::{Calibration, ComponentSummary, Status, StatusReason};
 use twincal::term::Family;
@@ -97,7 +97,7 @@ fn unit_of(calibration: &Calibration, family: Family) -> &str {
         component.family == family && component.status == Status::Established
     };
     let first = calibration.components.iter().find(own);
-    first.map_or("", unit)
+    first.and_then(clearest).map_or("", unit)
 }
 
 fn row(calibration: &Calibration, joint: &str, units: [&str; 2]) -> Row {
@@ -113,10 +113,17 @@ fn row(calibration: &Calibration, joint: &str, units: [&str; 2]) -> Row {
         let Some((_, kind)) = of_joint else {
             continue;
         };
-        let (status, kind) = (component.status, kind.replace('_', " "));
+        let status = component.status;
+        let kind = match component.family {
+            Family::Stribeck => "Stribeck".into(),
+            _ => kind.replace('_', " "),
+        };
+        let number = clearest(component);
+        let shown = number.map_or(NONE.to_owned(), value);
+        let shown_unit = number.map_or("", unit);
         let cell = |own: &str| match status {
-            Status::Established if unit(component) == own => value(component),
-            Status::Established => format!("{} {}", value(component), unit(component)),
+            Status::Established if shown_unit == own => shown.clone(),
+            Status::Established => format!("{shown} {shown_unit}"),
             Status::Tentative if component.is_in() => "tentative".into(),
             Status::Equivalent => "equivalent".into(),
             Status::Unidentifiable if component.reason == StatusReason::NoTorqueInLogs => {
@@ -129,9 +136,12 @@ fn row(calibration: &Calibration, joint: &str, units: [&str; 2]) -> Row {
             Family::Viscous => row.viscous = cell(units[0]),
             Family::Coulomb => row.coulomb = cell(units[1]),
             _ if status == Status::Established => {
-                let seen = component.parameters.iter().filter(|own| own.seen).count();
-                let rest = if seen > 1 { ", …" } else { "" };
-                let text = format!("{kind} {} {}", value(component), unit(component));
+                let several = component.parameters.iter().filter(|own| own.seen).count() > 1;
+                let (name, rest) = match number.filter(|_| several) {
+                    Some(number) => (format!(" {}", number.name), ", …"),
+                    None => (String::new(), ""),
+                };
+                let text = format!("{kind}{name} {shown} {shown_unit}");
                 further.push(format!("{}{rest}", text.trim_end()));
             }
             _ if status == Status::Tentative && component.is_in() => tentative.push(kind),

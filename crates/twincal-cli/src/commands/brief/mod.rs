@@ -7,6 +7,8 @@ mod effects;
 mod joints;
 mod text;
 
+pub(super) use effects::{unit, value};
+
 use super::calibration::{quoted, report_of};
 use crate::terminal::Terminal;
 use std::path::Path;
@@ -38,12 +40,14 @@ struct Detail {
 }
 
 /// From generous to terse; the first that fits is printed.
-const DETAILS: [Detail; 7] = [
+const DETAILS: [Detail; 9] = [
     Detail::of([8, 8, 5], [3, 3, 5, 5]),
     Detail::of([8, 8, 5], [2, 2, 4, 4]),
-    Detail::of([8, 8, 5], [1, 2, 3, 3]),
-    Detail::of([8, 8, 5], [1, 1, 2, 3]),
-    Detail::of([8, 6, 5], [1, 1, 2, 2]),
+    Detail::of([8, 8, 5], [2, 2, 3, 3]),
+    Detail::of([8, 8, 4], [2, 2, 3, 3]),
+    Detail::of([8, 8, 3], [2, 2, 3, 3]),
+    Detail::of([8, 6, 3], [1, 2, 3, 3]),
+    Detail::of([8, 6, 3], [1, 1, 3, 2]),
     Detail::of([8, 5, 3], [1, 1, 2, 2]),
     Detail::of([6, 4, 3], [1, 1, 1, 2]),
 ];
@@ -63,50 +67,55 @@ impl Detail {
     }
 }
 
-/// Where the result lies, and what of the model can be exported.
+/// What stands around the page.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::commands) struct Place<'a> {
+pub(in crate::commands) struct Around<'a> {
+    /// Folder of the result.
     pub(in crate::commands) output: &'a Path,
-    /// `urdf` or `mjcf`.
+    /// Format of the model, `urdf` or `mjcf`.
     pub(in crate::commands) format: &'a str,
+    /// What is printed in the place of the effects; they are printed where it is empty.
+    pub(in crate::commands) instead: &'a [String],
+    /// Lines that are printed behind the report's path.
+    pub(in crate::commands) behind: usize,
 }
 
-/// Prints all but the last line, which is the report's path; `more` lines are printed behind it.
-pub(super) fn print(
-    calibration: &Calibration,
-    place: Place<'_>,
-    more: usize,
-    terminal: &mut Terminal,
-) {
+/// Prints all but the last line, which is the report's path.
+pub(super) fn print(calibration: &Calibration, around: Around<'_>, terminal: &mut Terminal) {
     let answer = report::answer(calibration);
     terminal.answer(&answer.headline);
-    let page = page(calibration, &answer, place, (terminal.width(), more));
+    let page = page(calibration, &answer, around, terminal.width());
     page.print(terminal);
 }
 
 /// The lines between the answer and the report's path.
-fn page(
-    calibration: &Calibration,
-    answer: &Answer,
-    place: Place<'_>,
-    (columns, more): (usize, usize),
-) -> Page {
+fn page(calibration: &Calibration, answer: &Answer, around: Around<'_>, columns: usize) -> Page {
     let limit = match columns < NARROW {
         true => LINES_NARROW,
         false => LINES,
     };
     let width = Width(columns);
-    let answer_lines = answer.headline.chars().count().div_ceil(columns) + 1;
-    let taken = answer_lines + more + report_of(place.output).chars().count().div_ceil(columns);
+    let answer_lines = answer.headline.chars().count().div_ceil(columns);
+    let path_lines = report_of(around.output).chars().count().div_ceil(columns);
+    let taken = answer_lines + path_lines + around.behind;
     let mut pages = DETAILS.iter().map(|detail| {
         let mut page = Page::default();
         page.blank();
         scores(calibration, width, &mut page);
         page.blank();
-        joints::table(calibration, *detail, width, &mut page);
-        effects::beside_the_joints(calibration, *detail, width, &mut page);
+        match around.instead.is_empty() {
+            true => {
+                joints::table(calibration, *detail, width, &mut page);
+                effects::beside_the_joints(calibration, *detail, width, &mut page);
+            }
+            false => around
+                .instead
+                .iter()
+                .for_each(|line| page.push(plain(line))),
+        }
+        page.blank();
         claims::list(calibration, answer, *detail, width, &mut page);
-        next(calibration, answer, place, *detail, width, &mut page);
+        next(calibration, answer, around, *detail, width, &mut page);
         page
     });
     let fits = |page: &Page| page.len() + taken <= limit;
@@ -122,16 +131,21 @@ fn page(
         .unwrap_or(last)
 }
 
+/// What stands before the second line of a score.
+const OTHER_LINES: &str = "                ";
+
 /// Torque error before and after, and what the intervals hold.
 fn scores(calibration: &Calibration, width: Width, page: &mut Page) {
     let validation = &calibration.validation;
     let held_out = match &validation.split {
         Split::HeldoutLogs => "held-out logs",
-        Split::LeaveOneLogOut => "each log predicted from the others",
-        Split::LeaveLogGroupsOut => "each fifth of the logs predicted from the others",
+        Split::LeaveOneLogOut => "logs left out one at a time",
+        Split::LeaveLogGroupsOut => "logs left out in five groups",
+        Split::LastThirty if calibration.logs.len() == 1 => "the last 30 % of the log",
         Split::LastThirty => "the last 30 % of each log",
         Split::NotTested => {
-            let text = "Torque error: not tested. --heldout LOG predicts a log that was not fitted.";
+            let text =
+                "Torque error: not tested. --heldout LOG predicts a log that was not fitted.";
             page.paragraph(text, ["", "  "], width, 3);
             return;
         }
@@ -140,32 +154,33 @@ fn scores(calibration: &Calibration, width: Width, page: &mut Page) {
     let [before, after] = [scores.rmse_nominal, scores.rmse_calibrated];
     let change = match after / before - 1.0 {
         change if !change.is_finite() => String::new(),
-        change if change.abs() < 5e-4 => ", unchanged".into(),
+        change if change.abs() < 5e-4 => " (unchanged)".into(),
         change => format!(
-            ", {:.1} % {}",
+            " ({:.1} % {})",
             100.0 * change.abs(),
             if change < 0.0 { "less" } else { "more" }
         ),
     };
-    let moving = match report::has_standstill(validation) {
-        true => ", joints that move",
-        false => "",
-    };
     let text = format!(
-        "Torque error    {} → {} {}{change} (RMSE; {held_out}{moving})",
+        "{} → {} {} RMSE{change} on {held_out}",
         significant(before, 3),
         significant(after, 3),
-        unit(calibration),
+        error_unit(calibration),
     );
-    page.paragraph(&text, ["", "                "], width, 3);
+    page.paragraph(&text, ["Torque error    ", OTHER_LINES], width, 3);
     if scores.coverage95.is_finite() {
+        let moving = match report::has_standstill(validation) {
+            true => " in which the joint moves",
+            false => "",
+        };
         let share = 100.0 * scores.coverage95;
-        page.push(plain(format!("95 % intervals  hold {share:.1} % of these rows")));
+        let text = format!("hold {share:.1} % of its rows{moving}");
+        page.paragraph(&text, ["95 % intervals  ", OTHER_LINES], width, 2);
     }
 }
 
 /// Unit of an error over all joints.
-fn unit(calibration: &Calibration) -> &'static str {
+fn error_unit(calibration: &Calibration) -> &'static str {
     let joints = calibration.twin.robot.description().joints.iter();
     let mut units: Vec<&str> = joints
         .filter(|joint| joint.kind != twincal::robot::JointKind::Fixed)
@@ -183,22 +198,26 @@ fn unit(calibration: &Calibration) -> &'static str {
 fn next(
     calibration: &Calibration,
     answer: &Answer,
-    place: Place<'_>,
+    around: Around<'_>,
     detail: Detail,
     width: Width,
     page: &mut Page,
 ) {
     let begin = ["  ", "    "];
     page.heading("Next");
-    if calibration.findings.iter().any(twincal::Finding::doubts_the_log) {
+    if calibration
+        .findings
+        .iter()
+        .any(twincal::Finding::doubts_the_log)
+    {
         page.paragraph(super::summary::MENDS, begin, width, detail.step);
     }
     if let Some(recording) = &answer.next {
-        let text = format!("Record {recording}");
+        let text = format!("Recording: {recording}");
         page.paragraph(&text, begin, width, detail.step);
     }
-    let output = quoted(&place.output.to_string_lossy());
-    let format = place.format;
+    let output = quoted(&around.output.to_string_lossy());
+    let format = around.format;
     let command = match answer.reason.conclusion() {
         Conclusion::Yes | Conclusion::YesWithinLimits => {
             let file = match format {

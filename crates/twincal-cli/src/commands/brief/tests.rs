@@ -40,7 +40,11 @@ fn robot(joints: usize, name: fn(usize) -> String) -> Robot {
     }
     text.push_str("</robot>");
     let model = parse_model("chain.urdf", text.as_bytes(), &ModelSettings::default());
-    model.expect("a model").robot(&Default::default()).expect("a robot").0
+    model
+        .expect("a model")
+        .robot(&Default::default())
+        .expect("a robot")
+        .0
 }
 
 /// An effect with one number.
@@ -48,7 +52,8 @@ fn effect(like: &ComponentSummary, name: &str, family: Family, status: Status) -
     let mut own = like.clone();
     (own.name, own.family, own.status) = (name.into(), family, status);
     (own.pip, own.reason) = (Some(0.99), StatusReason::Probability);
-    own.words = format!("{name}, in words that name the link, its mass and its centre: +1.74 ± 0.02 kg");
+    own.words =
+        format!("{name}, in words that name the link, its mass and its centre: +1.74 ± 0.02 kg");
     let number = &mut own.parameters[0];
     (number.seen, number.median) = (true, 12.345);
     (number.interval68, number.interval95) = ([12.0, 12.7], [11.6, 13.1]);
@@ -62,22 +67,51 @@ fn much_to_say(joints: usize, name: fn(usize) -> String) -> Calibration {
     calibration.twin.robot = robot(joints, name);
     calibration.components.clear();
     let mut add = |name: String, family, status| {
-        calibration.components.push(effect(&like, &name, family, status));
+        calibration
+            .components
+            .push(effect(&like, &name, family, status));
     };
     for joint in 1..=joints {
         let joint = name(joint);
-        add(format!("{joint}.viscous"), Family::Viscous, Status::Established);
-        add(format!("{joint}.coulomb"), Family::Coulomb, Status::Established);
+        add(
+            format!("{joint}.viscous"),
+            Family::Viscous,
+            Status::Established,
+        );
+        add(
+            format!("{joint}.coulomb"),
+            Family::Coulomb,
+            Status::Established,
+        );
         add(format!("{joint}.offset"), Family::Offset, Status::Tentative);
-        add(format!("{joint}.motor_inertia"), Family::MotorInertia, Status::Established);
-        add(format!("{joint}.stribeck"), Family::Stribeck, Status::Established);
-        add(format!("l{joint}.density"), Family::Density, Status::Established);
-        add(format!("l{joint}.tensor"), Family::Tensor, Status::Tentative);
+        add(
+            format!("{joint}.motor_inertia"),
+            Family::MotorInertia,
+            Status::Established,
+        );
+        add(
+            format!("{joint}.stribeck"),
+            Family::Stribeck,
+            Status::Established,
+        );
+        add(
+            format!("l{joint}.density"),
+            Family::Density,
+            Status::Established,
+        );
+        add(
+            format!("l{joint}.tensor"),
+            Family::Tensor,
+            Status::Tentative,
+        );
     }
     add("payload".into(), Family::Payload, Status::Established);
     calibration.findings = (0..12)
         .map(|kind| {
-            let words = format!("warning {kind}: {}", "what, where, how much, what to do. ".repeat(8));
+            let words = format!(
+                "warning {kind}: {}",
+                "what, where, how much, what to do. ".repeat(8)
+            );
             Finding::new(Severity::Warning, format!("kind{kind}"), "", words, 1)
         })
         .collect();
@@ -85,7 +119,12 @@ fn much_to_say(joints: usize, name: fn(usize) -> String) -> Calibration {
 }
 
 fn answer() -> Answer {
-    let limit = |number: usize| format!("Limit {number}: {}", "prediction biased by +0.82 N·m. ".repeat(9));
+    let limit = |number: usize| {
+        format!(
+            "Limit {number}: {}",
+            "prediction biased by +0.82 N·m. ".repeat(9)
+        )
+    };
     Answer {
         reason: Reason::Exceptions,
         headline: "Yes, to predict torque below 5 Hz, with the exceptions below.".into(),
@@ -97,11 +136,13 @@ fn answer() -> Answer {
 }
 
 fn printed(calibration: &Calibration, columns: usize) -> Vec<String> {
-    let place = Place {
+    let around = Around {
         output: Path::new("twincal-out"),
         format: "urdf",
+        instead: &[],
+        behind: 0,
     };
-    let page = page(calibration, &answer(), place, (columns, 0));
+    let page = page(calibration, &answer(), around, columns);
     page.texts().into_iter().map(str::to_owned).collect()
 }
 
@@ -109,7 +150,9 @@ const ROBOTS: [(usize, fn(usize) -> String); 4] = [
     (2, |joint| format!("joint{joint}")),
     (6, |joint| format!("shoulder_{joint}_lift_joint")),
     (7, |joint| format!("panda_joint{joint}")),
-    (44, |joint| format!("left_hand_index_finger_proximal_joint_{joint}")),
+    (44, |joint| {
+        format!("left_hand_index_finger_proximal_joint_{joint}")
+    }),
 ];
 
 #[test]
@@ -120,7 +163,10 @@ fn no_robot_takes_more_lines_or_columns_than_promised() {
             let lines = printed(&calibration, columns);
             // The answer stands before, the report's path behind.
             let count = 2 + answer().headline.chars().count() / columns + lines.len();
-            assert!(count <= most, "{joints} joints, {columns} columns: {count}\n{lines:#?}");
+            assert!(
+                count <= most,
+                "{joints} joints, {columns} columns: {count}\n{lines:#?}"
+            );
             let wide = lines.iter().find(|line| text::columns(line) > columns);
             assert_eq!(wide, None, "{joints} joints, {columns} columns");
         }
@@ -131,7 +177,13 @@ fn no_robot_takes_more_lines_or_columns_than_promised() {
 fn what_is_left_out_is_counted() {
     let (joints, name) = ROBOTS[3];
     let lines = printed(&much_to_say(joints, name), 120).join("\n");
-    for said in ["more joints (-v)", "more effects (-v)", "Limit 0:", "more (-v)", "twincal export"] {
+    for said in [
+        "more joints (-v)",
+        "more effects (-v)",
+        "Limit 0:",
+        "more (-v)",
+        "twincal export",
+    ] {
         assert!(lines.contains(said), "{said}: {lines}");
     }
 }
@@ -144,7 +196,10 @@ fn tentative_effects_have_no_number() {
     }
     let lines = printed(&calibration, 120).join("\n");
     assert!(!lines.contains("12."), "{lines}");
-    assert!(lines.contains("tentative: offset, motor inertia, stribeck"), "{lines}");
+    assert!(
+        lines.contains("tentative: offset, motor inertia, Stribeck"),
+        "{lines}"
+    );
 }
 
 #[test]

@@ -110,7 +110,11 @@ pub(super) fn short_name(name: &str, most: usize) -> String {
     let head = (most - 1).div_ceil(2);
     let tail = most - 1 - head;
     let text = |letters: &[char]| letters.iter().collect::<String>();
-    format!("{}…{}", text(&letters[..head]), text(&letters[letters.len() - tail..]))
+    format!(
+        "{}…{}",
+        text(&letters[..head]),
+        text(&letters[letters.len() - tail..])
+    )
 }
 
 /// Columns that a text takes; combining marks take none.
