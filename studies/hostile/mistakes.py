@@ -70,12 +70,8 @@ def world_of(robot, motion, seed):
 
 
 def headline(text):
-    """The answer to "Can this twin be used?" on the terminal."""
-    lines = text.splitlines()
-    for k, line in enumerate(lines):
-        if line.strip() == "Can this twin be used?":
-            return " ".join(part.strip() for part in lines[k + 1 : k + 3])
-    return ""
+    """May the twin be used? The first line on the terminal."""
+    return text.partition("\n")[0].strip()
 
 
 def fit(program, folder):

@@ -61,6 +61,7 @@ Examples:
   twincal fit run1.csv --model arm.urdf
   twincal fit run*.csv --model arm.urdf --heldout other.csv -o calibrated
   twincal fit run*.csv --model arm.urdf --config twincal.toml --force --json
+  twincal fit run*.csv --model arm.urdf -v --open   all numbers; report in the browser
 ")]
     Fit(Fit),
     /// What a fit takes of each log, as a small file: such files add, and `fit`
@@ -116,11 +117,20 @@ Examples:
   twincal export --twin twincal-out --to urdf | diff arm.urdf -
   twincal export --twin twincal-out --to c -o arm.c
   twincal export --twin twincal-out --to c --beyond urdf -o rest.c
+  twincal export --twin twincal-out --to csv -o effects.csv
 ")]
     Export(Export),
     /// Write report.html anew from the stored result.
     #[command(before_help = "Example:\n  twincal report --twin twincal-out\n")]
     Report(Report),
+    /// Print a script that completes commands and flags in your shell.
+    #[command(before_help = "\
+Examples:
+  twincal completions bash > ~/.local/share/bash-completion/completions/twincal
+  twincal completions zsh > ~/.zfunc/_twincal
+  twincal completions fish > ~/.config/fish/completions/twincal.fish
+")]
+    Completions(Completions),
     /// Print the JSON Schema of twincal.toml.
     #[command(before_help = "Example:\n  twincal schema > twincal.schema.json\n")]
     Schema,
@@ -141,7 +151,7 @@ impl Command {
             Self::Diff(flags) => flags.json,
             Self::Export(flags) => flags.json,
             Self::Report(flags) => flags.json,
-            Self::Init(_) | Self::Schema => false,
+            Self::Init(_) | Self::Completions(_) | Self::Schema => false,
         }
     }
 }
@@ -170,6 +180,20 @@ pub(crate) struct LogFlags {
     pub(crate) json: bool,
 }
 
+/// How much of a result is printed for people.
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct PrintFlags {
+    /// Print everything, not only what matters most.
+    #[arg(short, long, conflicts_with = "quiet")]
+    pub(crate) verbose: bool,
+    /// Print the answer alone, in one line.
+    #[arg(short, long, conflicts_with = "json")]
+    pub(crate) quiet: bool,
+    /// Open the report in the browser.
+    #[arg(long)]
+    pub(crate) open: bool,
+}
+
 /// What may be accepted with a warning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Allow {
@@ -194,6 +218,8 @@ pub(crate) struct Demo {
     /// Threads; the result is the same for any number.
     #[arg(long, value_name = "N")]
     pub(crate) threads: Option<u64>,
+    #[command(flatten)]
+    pub(crate) print: PrintFlags,
     /// Print the result as JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,
@@ -311,6 +337,8 @@ pub(crate) struct Fit {
     #[arg(long, conflicts_with = "config")]
     pub(crate) no_config: bool,
     #[command(flatten)]
+    pub(crate) print: PrintFlags,
+    #[command(flatten)]
     pub(crate) log: LogFlags,
 }
 
@@ -406,6 +434,15 @@ pub(crate) enum ExportFormat {
     Python,
     /// The steps of the calculation, for other languages.
     Json,
+    /// The table of effects, for spreadsheets.
+    Csv,
+}
+
+/// What an export may be in spite of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum AllowExport {
+    /// A model file that predicts torque of some joint worse than yours does.
+    WorseThanModel,
 }
 
 /// A model file that was exported.
@@ -440,6 +477,9 @@ pub(crate) struct Export {
     /// Replace an existing file or an earlier folder.
     #[arg(long)]
     pub(crate) force: bool,
+    /// Accept with a warning what would be refused.
+    #[arg(long, value_name = "WHAT", value_enum)]
+    pub(crate) allow: Vec<AllowExport>,
     /// Print what was written and what was not as JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,
@@ -453,9 +493,26 @@ pub(crate) struct Report {
     /// Rewrite a report that was changed by hand.
     #[arg(long)]
     pub(crate) force: bool,
+    /// Open the report in the browser.
+    #[arg(long)]
+    pub(crate) open: bool,
     /// Print the path of the report as JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Completions {
+    /// Your shell.
+    #[arg(value_name = "SHELL", value_enum)]
+    pub(crate) shell: clap_complete::Shell,
+}
+
+/// The script for a shell.
+pub(crate) fn completions(shell: clap_complete::Shell) -> Vec<u8> {
+    let (mut command, mut script) = (Arguments::command(), Vec::new());
+    clap_complete::generate(shell, &mut command, "twincal", &mut script);
+    script
 }
 
 /// Adds the nearest command to an error about an unknown one, where clap has none (`fti`).

@@ -1,44 +1,110 @@
 //! How far a long step has come: a moving line for a person who watches, plain lines for a file.
 
+use crate::clock::Stopwatch;
 use crate::terminal::{Terminal, clean};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::cell::RefCell;
 use std::time::Duration;
+
+/// Seconds of a step from which on what is left of it is estimated.
+const WORTH_AN_ESTIMATE: f64 = 2.0;
 
 /// Progress of one command, on standard error.
 pub(crate) struct Progress {
-    bar: Option<ProgressBar>,
+    shown: Shown,
+    /// The step that is counted, and since when.
+    counted: RefCell<Option<(String, Stopwatch)>>,
+}
+
+/// How it is shown.
+enum Shown {
+    Moving(ProgressBar),
+    Lines,
+    Nothing,
 }
 
 impl Progress {
     pub(crate) fn new() -> Self {
         if !Terminal::is_watched() {
-            return Self { bar: None };
+            return Self::shown(Shown::Lines);
         }
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed:.dim}") {
             bar.set_style(style);
         }
         bar.enable_steady_tick(Duration::from_millis(120));
-        Self { bar: Some(bar) }
+        Self::shown(Shown::Moving(bar))
+    }
+
+    /// Shows nothing.
+    pub(crate) fn silent() -> Self {
+        Self::shown(Shown::Nothing)
+    }
+
+    fn shown(shown: Shown) -> Self {
+        Self {
+            shown,
+            counted: RefCell::default(),
+        }
     }
 
     /// Begins a step.
     pub(crate) fn step(&self, what: &str) {
-        match &self.bar {
-            Some(bar) => bar.set_message(clean(what)),
+        match &self.shown {
+            Shown::Moving(bar) => bar.set_message(clean(what)),
             // Nobody is left to be told when standard error is closed.
-            None => drop(std::io::Write::write_all(
+            Shown::Lines => drop(std::io::Write::write_all(
                 &mut std::io::stderr().lock(),
                 format!("{}\n", clean(what)).as_bytes(),
             )),
+            Shown::Nothing => {}
         }
+    }
+
+    /// How far a step has come that has `all` parts, with an estimate of what is left of it.
+    pub(crate) fn counted(&self, what: &str, done: usize, all: usize) {
+        let seconds = {
+            let mut counted = self.counted.borrow_mut();
+            let same = counted.as_ref().is_some_and(|(step, _)| step == what);
+            if done == 0 || !same {
+                *counted = Some((what.to_owned(), Stopwatch::start()));
+            }
+            counted.as_ref().map_or(0.0, |(_, since)| since.seconds())
+        };
+        let left = left(seconds, done, all);
+        self.step(&format!("{what}: {done} of {all} done{left}"));
+    }
+}
+
+/// ", about 12 s left", once a step has taken more than two seconds.
+fn left(seconds: f64, done: usize, all: usize) -> String {
+    if done == 0 || seconds < WORTH_AN_ESTIMATE {
+        return String::new();
+    }
+    let left = seconds / done as f64 * all.saturating_sub(done) as f64;
+    match left.ceil() as u64 {
+        few @ 0..120 => format!(", about {few} s left"),
+        many => format!(", about {} min left", many.div_ceil(60)),
     }
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if let Some(bar) = &self.bar {
+        if let Shown::Moving(bar) = &self.shown {
             bar.finish_and_clear();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::left;
+
+    #[test]
+    fn what_is_left_is_estimated_beyond_two_seconds() {
+        assert_eq!(left(1.9, 1, 10), "");
+        assert_eq!(left(9.0, 0, 10), "");
+        assert_eq!(left(4.0, 2, 8), ", about 12 s left");
+        assert_eq!(left(60.0, 1, 8), ", about 7 min left");
     }
 }

@@ -18,7 +18,12 @@ pub(crate) struct Terminal {
     broken: Option<io::Error>,
     /// Where a result lies that is complete whatever becomes of standard output.
     complete: Option<String>,
+    width: usize,
 }
+
+/// Columns that text is laid out for: no fewer and no more, and those of a file.
+const WIDTHS: (usize, usize) = (60, 120);
+const WIDTH_OF_FILES: usize = 80;
 
 impl Terminal {
     pub(crate) fn new() -> Self {
@@ -27,12 +32,28 @@ impl Terminal {
             err: anstream::stderr(),
             broken: None,
             complete: None,
+            width: width(std::env::var("COLUMNS").ok().as_deref()),
         }
     }
 
     /// True if a person watches standard error.
     pub(crate) fn is_watched() -> bool {
         io::stderr().is_terminal()
+    }
+
+    /// Columns of the terminal, 60 to 120.
+    pub(crate) fn width(&self) -> usize {
+        self.width
+    }
+
+    /// The answer, in one line for programs and in whole words for a person who watches.
+    pub(crate) fn answer(&mut self, line: &str) {
+        if !io::stdout().is_terminal() {
+            return self.heading(&line.replace('\n', " "));
+        }
+        for line in crate::commands::wrapped(line, self.width) {
+            self.heading(&line);
+        }
     }
 
     /// A line of the result.
@@ -112,6 +133,14 @@ impl Terminal {
     }
 }
 
+/// Columns by COLUMNS where it is a number, else of the terminal, else those of a file.
+fn width(given: Option<&str>) -> usize {
+    let given = given.and_then(|columns| columns.trim().parse().ok());
+    let of_terminal = || terminal_size::terminal_size().map(|(width, _)| width.0.into());
+    let columns: usize = given.or_else(of_terminal).unwrap_or(WIDTH_OF_FILES);
+    columns.clamp(WIDTHS.0, WIDTHS.1)
+}
+
 /// The text without what could steer a terminal or turn the reading direction.
 pub(crate) fn clean(text: &str) -> String {
     text.chars()
@@ -128,7 +157,16 @@ pub(crate) fn clean(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::clean;
+    use super::{clean, width};
+
+    #[test]
+    fn text_is_laid_out_for_60_to_120_columns() {
+        let of = |given: &str| width(Some(given));
+        assert_eq!(
+            [of("20"), of("60"), of("101"), of("999")],
+            [60, 60, 101, 120]
+        );
+    }
 
     #[test]
     fn case_109_names_cannot_steer_the_terminal() {

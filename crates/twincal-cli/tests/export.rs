@@ -224,7 +224,8 @@ fn friction_that_the_file_states_goes_to_what_was_found() {
         0.5 * v + 0.3 * v.signum()
     });
     let elbow = rms(&|t| 0.9 * (0.6 * (2.1 * t).sin()).cos());
-    let error = |joint: usize, key: &str| said["torque_error"][joint][key].as_f64().unwrap();
+    let error =
+        |joint: usize, key: &str| said["torque_error"]["joints"][joint][key].as_f64().unwrap();
     assert!((error(0, "rms_before") - shoulder).abs() < 0.01, "{said}");
     assert!(error(0, "rms") < 0.03, "{said}");
     assert!((error(1, "rms") - elbow).abs() < 0.01, "{said}");

@@ -110,7 +110,7 @@ fn a_fit_to_statistics_is_the_fit_to_the_logs() {
     );
     let done = run(at, line.split(' ')).expect(0);
     assert!(
-        done.out.contains("Held-out torque: not tested"),
+        done.out.contains("Torque error: not tested"),
         "{}",
         done.out
     );

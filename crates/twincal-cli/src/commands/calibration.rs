@@ -1,7 +1,9 @@
-//! The road that `fit` and `demo` share: calibrate, write the artefact, say what was found.
+//! What `fit` and `demo` share: calibrate, write the artefact, print what was found.
 
+use super::brief::Around;
 use super::inputs::{LogInput, RobotInput};
-use super::{code_of, print_json, require_strict, summary};
+use super::{brief, code_of, print_json, require_strict, summary};
+use crate::args::PrintFlags;
 use crate::clock::{Stopwatch, now};
 use crate::failure::Outcome;
 use crate::names::display_names;
@@ -12,7 +14,7 @@ use std::path::{Path, PathBuf};
 use twincal::calibrate::{
     Calibration, CalibrationSettings, Stage, Statistics, Stopped, calibrate, calibrate_statistics,
 };
-use twincal_io::artifact::{Claim, Maker, REPORT};
+use twincal_io::artifact::{Claim, MODEL_MJCF, Maker, REPORT};
 use twincal_io::config::{Config, ReadAs, Settings};
 use twincal_io::context::{FileHash, ReportContext};
 use twincal_io::memory;
@@ -35,15 +37,87 @@ pub(super) struct Job<'a> {
     pub(super) watch: Stopwatch,
 }
 
+/// What was calibrated and written.
+pub(super) struct Done {
+    /// Exit code.
+    pub(super) code: u8,
+    pub(super) stored: StoredTwin,
+    /// Format of the model file, as `twincal export --to` names it.
+    format: &'static str,
+}
+
+impl Done {
+    /// What stands around the result in the terminal.
+    pub(super) fn around<'a>(&self, output: &'a Path) -> Around<'a> {
+        Around {
+            output,
+            format: self.format,
+            instead: &[],
+            behind: 0,
+        }
+    }
+
+    /// Prints the result.
+    pub(super) fn print(
+        &self,
+        print: Print,
+        around: Around<'_>,
+        terminal: &mut Terminal,
+    ) -> Outcome<()> {
+        let calibration = &self.stored.calibration;
+        match print {
+            Print::Json => terminal.data(&self.stored.result_json()?),
+            Print::All => summary::print(calibration, terminal),
+            Print::Brief => brief::print(calibration, around, terminal),
+            Print::Answer => {
+                terminal.answer(&twincal_io::report::answer(calibration).headline);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// How much of a result is printed for people.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Print {
+    /// The answer and what matters most.
+    Brief,
+    /// Everything.
+    All,
+    /// The answer alone.
+    Answer,
+    /// The result as JSON, for programs.
+    Json,
+}
+
+impl Print {
+    /// As the flags say; `-q` is stronger than JSON that the config asks for.
+    pub(super) fn of(flags: PrintFlags, json: bool) -> Self {
+        match flags {
+            PrintFlags { quiet: true, .. } => Self::Answer,
+            _ if json => Self::Json,
+            PrintFlags { verbose: true, .. } => Self::All,
+            _ => Self::Brief,
+        }
+    }
+
+    pub(super) fn progress(self) -> Progress {
+        match self {
+            Self::Answer => Progress::silent(),
+            Self::Brief | Self::All | Self::Json => Progress::new(),
+        }
+    }
+}
+
 impl Job<'_> {
-    /// Calibrates, writes and prints; returns the exit code.
+    /// Calibrates and writes.
     pub(super) fn run(
         mut self,
         claim: Claim,
         mut inputs: Vec<(&str, Vec<u8>)>,
         progress: Progress,
         terminal: &mut Terminal,
-    ) -> Outcome<u8> {
+    ) -> Outcome<Done> {
         let calibration = match self.calibrate(&progress) {
             Ok(calibration) => calibration,
             Err(stopped) => {
@@ -63,22 +137,25 @@ impl Job<'_> {
         };
         progress.step("writing the result");
         let run_log = self.run_log(&stored);
+        let stored_as = self.robot.source.0;
         inputs.push(self.robot.source);
         stored.write(claim, self.maker, run_log, inputs)?;
         terminal.complete(self.output);
         drop(progress);
-        if self.settings.json {
-            terminal.data(&stored.result_json()?);
-        } else {
-            summary::print(&stored.calibration, terminal);
-        }
-        Ok(code)
+        Ok(Done {
+            code,
+            stored,
+            format: match stored_as {
+                MODEL_MJCF => "mjcf",
+                _ => "urdf",
+            },
+        })
     }
 
     /// With what reading the inputs found before everything else.
     fn calibrate(&mut self, progress: &Progress) -> Result<Calibration, Stopped> {
         let (logs, heldout) = (&mut self.logs, &mut self.heldout);
-        let step = |stage| progress.step(&stage_words(stage));
+        let step = |stage| show(stage, "", progress);
         let settings = CalibrationSettings {
             most_bytes: memory::spare(),
             ..self.settings.calibration.clone()
@@ -157,12 +234,18 @@ impl Job<'_> {
     }
 }
 
-pub(super) fn stage_words(stage: Stage) -> String {
+/// Shows how far a calibration has come, behind the name of what it is part of.
+pub(super) fn show(stage: Stage, of: &str, progress: &Progress) {
     match stage {
-        Stage::Rows => "filtering the logs".into(),
-        Stage::Inference => "weighing every candidate".into(),
-        Stage::Validation(done, all) => format!("predicting held-out data, {} of {all}", done + 1),
-        Stage::Sensitivity => "varying prior and cut-off".into(),
+        Stage::Rows => progress.step(&format!("{of}filtering the logs")),
+        Stage::Inference => {
+            progress.step(&format!("{of}computing probabilities of all candidates"))
+        }
+        Stage::Validation(_, 0 | 1) => progress.step(&format!("{of}predicting held-out data")),
+        Stage::Validation(done, all) => {
+            progress.counted(&format!("{of}predicting held-out data"), done, all);
+        }
+        Stage::Sensitivity => progress.step(&format!("{of}varying prior and cut-off")),
     }
 }
 
@@ -207,13 +290,17 @@ pub(super) fn quoted(word: &str) -> String {
 }
 
 /// Says where the report is; the last line of the output.
-pub(super) fn say_where(output: &Path, json: bool, terminal: &mut Terminal) {
-    let path = output.join(REPORT);
-    if json {
-        terminal.note(&format!("report: {}", path.to_string_lossy()));
-    } else {
-        terminal.say(&path.to_string_lossy());
+pub(super) fn say_where(output: &Path, print: Print, terminal: &mut Terminal) {
+    match print {
+        Print::Json => terminal.note(&format!("report: {}", report_of(output))),
+        Print::Brief | Print::All => terminal.say(&report_of(output)),
+        Print::Answer => {}
     }
+}
+
+/// Path of a result's report.
+pub(super) fn report_of(output: &Path) -> String {
+    output.join(REPORT).to_string_lossy().into_owned()
 }
 
 /// What `--json` prints of a command that wrote files.

@@ -1,18 +1,26 @@
 //! `twincal demo`: the paper's study on logs that the program carries, written to ./twincal-demo.
 
-use super::calibration::{Job, command, say_where};
+mod truth;
+
+use super::brief::Around;
+use super::calibration::{Job, Print, command, report_of, say_where};
 use super::inputs::{LogInput, RobotInput};
+use super::open::{OPENER, open};
 use super::start_threads;
 use crate::args::Demo;
 use crate::clock::Stopwatch;
 use crate::failure::{Failure, Outcome};
-use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::path::{Path, PathBuf};
 use twincal_io::Error;
-use twincal_io::artifact::{Claim, Inputs, Maker, Replace};
+use twincal_io::artifact::{Claim, Inputs, Maker, REPORT, Replace};
 use twincal_io::config::Config;
 use twincal_io::model::parse_model;
+
+/// What is simulated, and what is asked.
+const ABOUT: &str = "\
+A simulated two-joint arm (MuJoCo). Its model is missing a payload, friction and more.
+Which effects, how probable is each, and how well do they predict torque?";
 
 const FOLDER: &str = "twincal-demo";
 const MODEL: (&str, &[u8]) = (
@@ -56,10 +64,11 @@ pub(super) fn run(flags: &Demo, terminal: &mut Terminal) -> Outcome<u8> {
     let replace = Replace::MadeBy(Maker::Demo);
     let claim = Claim::new(output, replace, &Inputs::default()).map_err(elsewhere)?;
     start_threads(settings.threads)?;
-    terminal
-        .note("A simulated two-joint arm (MuJoCo) whose model lacks a payload, friction and more:");
-    terminal.note("which effects, how sure, and how well is torque predicted once they are known?");
-    let progress = Progress::new();
+    let print = Print::of(flags.print, settings.json);
+    if print != Print::Answer {
+        terminal.note(ABOUT);
+    }
+    let progress = print.progress();
     let robot = RobotInput::new(
         parse_model(MODEL.0, MODEL.1, &settings.model)?,
         MODEL.0.into(),
@@ -90,12 +99,38 @@ pub(super) fn run(flags: &Demo, terminal: &mut Terminal) -> Outcome<u8> {
     let inputs = carried
         .map(|(name, bytes)| (*name, bytes.to_vec()))
         .collect();
-    let code = (job.run(claim, inputs, progress, terminal)).map_err(|failure| match failure {
+    let done = (job.run(claim, inputs, progress, terminal)).map_err(|failure| match failure {
         Failure::Error(error) => elsewhere(error).into(),
         other => other,
     })?;
-    say_where(output, settings.json, terminal);
-    Ok(code)
+    let truth = truth::beside(&done.stored.calibration, terminal.width())?;
+    let end = end(output);
+    let around = Around {
+        instead: &truth,
+        behind: end.len(),
+        ..done.around(output)
+    };
+    done.print(print, around, terminal)?;
+    if print == Print::All {
+        truth.iter().for_each(|line| terminal.say(line));
+        terminal.say("");
+    }
+    say_where(output, print, terminal);
+    if matches!(print, Print::Brief | Print::All) {
+        end.iter().for_each(|line| terminal.say(line));
+    }
+    if flags.print.open {
+        open(&output.join(REPORT), terminal);
+    }
+    Ok(done.code)
+}
+
+/// How to open the page, and the command to try next.
+fn end(output: &Path) -> [String; 2] {
+    [
+        format!("Open the page:  {OPENER} {}", report_of(output)),
+        "Your own log:   twincal doctor run.csv --model arm.urdf".into(),
+    ]
 }
 
 /// The error in words for a command without -o: its folder lies where it runs.

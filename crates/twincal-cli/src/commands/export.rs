@@ -1,5 +1,6 @@
 //! `twincal export`: the calibrated model as a file of the user's own kind, or as code.
 
+mod effects_csv;
 mod torque_error;
 
 use super::summary::{self, paragraph, wrapped};
@@ -10,8 +11,10 @@ use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use crate::terminal::{Terminal, clean};
 use serde::Serialize;
+use serde_json::{Map, Value};
 use std::io::Write as _;
 use std::path::Path;
+use torque_error::TorqueErrors;
 use twincal::Finding;
 use twincal::evaluator::{Beyond, Evaluator, forgotten};
 use twincal::posterior::draws::draw;
@@ -45,7 +48,17 @@ struct Exported<'a> {
     /// Names of q1…qn; `joints` of the change are those that change.
     joint_names: Vec<&'a str>,
     #[serde(flatten)]
-    change: &'a WriteBack,
+    change: Map<String, Value>,
+    torque_error: TorqueErrors<'a>,
+    findings: Vec<Finding>,
+}
+
+/// What `--json` prints of the table of effects.
+#[derive(Serialize)]
+struct Tabled {
+    schema: u64,
+    output: String,
+    rows: usize,
     findings: Vec<Finding>,
 }
 
@@ -84,15 +97,16 @@ pub(super) fn run(flags: &Export, terminal: &mut Terminal) -> Outcome<u8> {
         ));
     }
     match (target(flags.to), flags.draws, &flags.output) {
-        (Target::Code(_), Some(_), _) => Err(Failure::usage(
-            "--draws writes model files, not code",
+        (Target::Code(_) | Target::Effects, Some(_), _) => Err(Failure::usage(
+            "--draws writes model files, nothing else",
             "give --to urdf, or leave out --draws",
         )),
         (Target::Code(language), None, _) => code(flags, language, terminal),
-        (Target::Model(_), ..) if flags.beyond.is_some() => Err(Failure::usage(
+        (Target::Model(_) | Target::Effects, ..) if flags.beyond.is_some() => Err(Failure::usage(
             "--beyond is for code: it says what a model file cannot",
             "give --to c, rust, python or json",
         )),
+        (Target::Effects, ..) => effects(flags, terminal),
         (Target::Model(kind), Some(count), Some(folder)) => {
             draws(flags, kind, count, folder, terminal)
         }
@@ -123,6 +137,8 @@ const MJCF: Kind = Kind {
 enum Target {
     Model(Kind),
     Code(Language),
+    /// The table of effects.
+    Effects,
 }
 
 fn target(format: ExportFormat) -> Target {
@@ -133,6 +149,7 @@ fn target(format: ExportFormat) -> Target {
         ExportFormat::Rust => Target::Code(Language::Rust),
         ExportFormat::Python => Target::Code(Language::Python),
         ExportFormat::Json => Target::Code(Language::Json),
+        ExportFormat::Csv => Target::Effects,
     }
 }
 
@@ -168,6 +185,29 @@ fn write(
 fn shown(flags: &Export) -> String {
     let path = flags.output.as_deref().unwrap_or(Path::new(""));
     path.to_string_lossy().into_owned()
+}
+
+/// The table of effects.
+fn effects(flags: &Export, terminal: &mut Terminal) -> Outcome<u8> {
+    let stored = StoredTwin::read(&Artifact::open(&flags.twin)?, true)?;
+    let output = open(flags, &stored)?;
+    let (bytes, rows) = effects_csv::table(&stored.calibration)?;
+    let findings = doubts(&stored, terminal);
+    if !write(flags, output, &bytes, terminal)? {
+        return Ok(0);
+    }
+    if flags.json {
+        let tabled = Tabled {
+            schema: 1,
+            output: shown(flags),
+            rows,
+            findings,
+        };
+        print_json(terminal, &tabled)?;
+    } else {
+        terminal.say(&shown(flags));
+    }
+    Ok(0)
 }
 
 /// Code that computes torque and interval.
@@ -255,6 +295,8 @@ fn one(flags: &Export, kind: Kind, terminal: &mut Terminal) -> Outcome<u8> {
     let (stored, model) = read(flags, kind)?;
     let output = open(flags, &stored)?;
     let change = Writer::new(&stored.calibration, kind.holds)?.mean()?;
+    let format = kind.holds.format;
+    torque_error::require_no_worse(&change, &stored.calibration, format, &flags.allow)?;
     let bytes = write_model(&model, &change)?;
     let findings = doubts(&stored, terminal);
     if !write(flags, output, &bytes, terminal)? {
@@ -265,7 +307,8 @@ fn one(flags: &Export, kind: Kind, terminal: &mut Terminal) -> Outcome<u8> {
             schema: 1,
             output: shown(flags),
             joint_names: stored.calibration.twin.robot.joint_names(),
-            change: &change,
+            change: as_map(&change)?,
+            torque_error: TorqueErrors::of(&change, &stored.calibration),
             findings,
         };
         print_json(terminal, &exported)?;
@@ -279,6 +322,20 @@ fn one(flags: &Export, kind: Kind, terminal: &mut Terminal) -> Outcome<u8> {
         terminal.say(&shown(flags));
     }
     Ok(0)
+}
+
+/// What is written as JSON, without the errors, which stand beside those of the twin.
+fn as_map(change: &WriteBack) -> Outcome<Map<String, Value>> {
+    let value = serde_json::to_value(change).map_err(|e| twincal_io::Error::Internal {
+        what: "JSON output".into(),
+        problem: e.to_string(),
+    })?;
+    let mut map = match value {
+        Value::Object(map) => map,
+        _ => Map::new(),
+    };
+    map.remove("torque_error");
+    Ok(map)
 }
 
 /// Many models from the posterior.
@@ -311,7 +368,7 @@ fn draws(
     let mut files = Vec::with_capacity(count);
     let mut projected = 0;
     for (number, beta) in drawn.beta.chunks_exact(drawn.columns).enumerate() {
-        progress.step(&format!("drawing model {} of {count}", number + 1));
+        progress.counted("drawing models", number, count);
         let change = writer.draw(beta)?;
         projected += usize::from(change.projection.is_some());
         let name = format!("draw{number:0width$}.{}", kind.extension);
@@ -477,9 +534,9 @@ fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
     terminal.say("");
 }
 
-/// A warning in its place among what is said, at most 80 columns wide.
+/// A warning in its place among what is said, as wide as the terminal.
 fn warn(text: &str, terminal: &mut Terminal) {
-    for (number, line) in wrapped(text, 76).iter().enumerate() {
+    for (number, line) in wrapped(text, terminal.width() - 4).iter().enumerate() {
         let begin = if number == 0 { "  " } else { "    " };
         terminal.warning(&format!("{begin}{line}"));
     }

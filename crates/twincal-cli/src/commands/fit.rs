@@ -1,9 +1,10 @@
 //! `twincal fit`: from logs and a model to a calibrated twin.
 
-use super::calibration::{Job, command, quoted, say_where, with_heldout};
+use super::calibration::{Job, Print, command, quoted, say_where, with_heldout};
 use super::inputs::{LogInput, Long, RobotInput};
+use super::open::open;
 use super::{merge, reads, settings, start_threads};
-use crate::args::Fit;
+use crate::args::{Fit, PrintFlags};
 use crate::clock::Stopwatch;
 use crate::failure::{Failure, Outcome};
 use crate::names::display_names;
@@ -11,7 +12,7 @@ use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
-use twincal_io::artifact::{Claim, Inputs, Maker, Replace};
+use twincal_io::artifact::{Claim, Inputs, Maker, REPORT, Replace};
 use twincal_io::config::{Config, Settings};
 
 pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
@@ -55,7 +56,7 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
         &inputs,
     )?;
     start_threads(settings.threads)?;
-    let progress = Progress::new();
+    let progress = Print::of(flags.print, settings.json).progress();
     progress.step(&format!("reading {}", model.to_string_lossy()));
     let robot = RobotInput::read(model, &settings)?;
     let long = Long::of_settings(&settings);
@@ -76,9 +77,25 @@ pub(super) fn run(flags: &Fit, terminal: &mut Terminal) -> Outcome<u8> {
         output: &settings.output,
         watch,
     };
-    let code = job.run(claim, Vec::new(), progress, terminal)?;
-    say_where(&settings.output, settings.json, terminal);
-    Ok(code)
+    let progress = (flags.print, progress);
+    finish(job, claim, progress, terminal)
+}
+
+/// Runs the calibration, prints it and opens its report.
+fn finish(
+    job: Job<'_>,
+    claim: Claim,
+    (flags, progress): (PrintFlags, Progress),
+    terminal: &mut Terminal,
+) -> Outcome<u8> {
+    let (output, print) = (job.output, Print::of(flags, job.settings.json));
+    let done = job.run(claim, Vec::new(), progress, terminal)?;
+    done.print(print, done.around(output), terminal)?;
+    say_where(output, print, terminal);
+    if flags.open {
+        open(&output.join(REPORT), terminal);
+    }
+    Ok(done.code)
 }
 
 /// From statistics of logs to a calibrated twin.
@@ -102,7 +119,7 @@ fn of_statistics(
     };
     let claim = Claim::new(&settings.output, replace, &inputs)?;
     start_threads(settings.threads)?;
-    let progress = Progress::new();
+    let progress = Print::of(flags.print, settings.json).progress();
     let (file, hashes) = merge::read(&flags.statistics, &progress)?;
     let robot = RobotInput::of_statistics(&file);
     let long = Long::of_pipeline(&file.statistics.plan.pipeline);
@@ -131,9 +148,8 @@ fn of_statistics(
         output: &settings.output,
         watch,
     };
-    let code = job.run(claim, Vec::new(), progress, terminal)?;
-    say_where(&settings.output, settings.json, terminal);
-    Ok(code)
+    let progress = (flags.print, progress);
+    finish(job, claim, progress, terminal)
 }
 
 fn fitted_and_held_out(name: &str) -> Failure {

@@ -1,6 +1,6 @@
 //! `twincal merge`: one file of statistics from several, and how a fit reads them.
 
-use super::print_json;
+use super::{count_of_logs, print_json};
 use crate::args::Merge;
 use crate::failure::{Failure, Outcome};
 use crate::names::display_names;
@@ -41,8 +41,8 @@ pub(super) fn run(flags: &Merge, terminal: &mut Terminal) -> Outcome<u8> {
         print_json(terminal, &merged)?;
     } else {
         terminal.say(&format!(
-            "statistics of {} logs of robot `{}`",
-            logs.len(),
+            "statistics of {} of robot `{}`",
+            count_of_logs(logs.len()),
             file.statistics.robot_name
         ));
         terminal.say(&place);

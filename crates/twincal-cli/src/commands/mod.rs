@@ -1,6 +1,7 @@
 //! The commands, one file each, and what they share.
 
 mod as_fitted;
+mod brief;
 mod calibration;
 mod check;
 mod checkup;
@@ -13,6 +14,7 @@ mod inputs;
 mod inspect;
 mod merge;
 mod not_kept;
+mod open;
 mod predict;
 mod reads;
 mod report;
@@ -27,6 +29,8 @@ use crate::failure::{DEGRADED, Failure, Outcome};
 use crate::terminal::Terminal;
 use serde::Serialize;
 use twincal::{Finding, Severity};
+
+pub(crate) use summary::wrapped;
 
 /// Runs one command; the number is the exit code.
 pub(crate) fn run(command: &Command, terminal: &mut Terminal) -> Outcome<u8> {
@@ -43,6 +47,11 @@ pub(crate) fn run(command: &Command, terminal: &mut Terminal) -> Outcome<u8> {
         Command::Diff(flags) => diff::run(flags, terminal),
         Command::Export(flags) => export::run(flags, terminal),
         Command::Report(flags) => report::run(flags, terminal),
+        Command::Completions(flags) => {
+            let script = crate::args::completions(flags.shell);
+            terminal.data(&String::from_utf8_lossy(&script));
+            Ok(0)
+        }
         Command::Schema => {
             terminal.data(&twincal_io::config::schema());
             Ok(0)
@@ -61,6 +70,14 @@ fn start_threads(threads: Option<usize>) -> Outcome<()> {
                 "give fewer with --threads, or raise the limits of memory (ulimit -v) and processes (ulimit -u)",
             )
         })
+}
+
+/// "1 log", "2 logs".
+fn count_of_logs(count: usize) -> String {
+    match count {
+        1 => "1 log".into(),
+        n => format!("{n} logs"),
+    }
 }
 
 /// Prints a value as JSON.

@@ -120,7 +120,7 @@ fn row(component: &ComponentSummary, terms: &[TermSummary]) -> [String; 5] {
 }
 
 /// A value and what stands behind ±, which gives two digits.
-fn with_sd(mean: f64, sd: f64) -> (String, String) {
+pub(super) fn with_sd(mean: f64, sd: f64) -> (String, String) {
     let size = sd.abs().max(mean.abs());
     if !(sd > 0.0 && (1e-4..1e6).contains(&size)) {
         return (format!("{mean:+.3e}"), format!("{sd:.1e}"));
@@ -130,7 +130,7 @@ fn with_sd(mean: f64, sd: f64) -> (String, String) {
 }
 
 /// A value and both ends of its interval, which give two digits.
-fn with_ends(value: f64, [low, high]: [f64; 2]) -> String {
+pub(super) fn with_ends(value: f64, [low, high]: [f64; 2]) -> String {
     let size = value.abs().max(high - low);
     if !(1e-4..1e6).contains(&size) {
         return format!("{value:+.3e} ({low:.1e} … {high:.1e})");

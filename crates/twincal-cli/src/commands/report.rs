@@ -1,6 +1,7 @@
 //! `twincal report`: report.html anew from the stored result.
 
-use super::calibration::{say_where, say_where_in_json};
+use super::calibration::{Print, say_where, say_where_in_json};
+use super::open::open;
 use crate::args::Report;
 use crate::failure::Outcome;
 use crate::terminal::Terminal;
@@ -19,7 +20,10 @@ pub(super) fn run(flags: &Report, terminal: &mut Terminal) -> Outcome<u8> {
     if flags.json {
         say_where_in_json(&flags.twin, terminal)?;
     } else {
-        say_where(&flags.twin, false, terminal);
+        say_where(&flags.twin, Print::Brief, terminal);
+    }
+    if flags.open {
+        open(&flags.twin.join(REPORT), terminal);
     }
     Ok(0)
 }

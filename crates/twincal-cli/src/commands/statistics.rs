@@ -1,9 +1,12 @@
 //! `twincal statistics`: what a fit takes of each log, as a file that stands for it.
 
-use super::calibration::stage_words;
+use super::calibration::show;
 use super::inputs::{LogInput, Long, RobotInput, checksum_of_log};
 use super::settings::{Look, Usual};
-use super::{code_of, merge, print_json, reads, require_strict, settings, start_threads, summary};
+use super::{
+    code_of, count_of_logs, merge, print_json, reads, require_strict, settings, start_threads,
+    summary,
+};
 use crate::args::StatisticsFlags;
 use crate::failure::{Failure, Outcome};
 use crate::names::display_names;
@@ -125,7 +128,8 @@ pub(super) fn run(flags: &StatisticsFlags, terminal: &mut Terminal) -> Outcome<u
             count => format!(", {count} there already"),
         };
         terminal.say(&format!(
-            "statistics of {made} logs of robot `{robot_name}` made{there}"
+            "statistics of {} of robot `{robot_name}` made{there}",
+            count_of_logs(made)
         ));
         terminal.say(&directory);
     }
@@ -180,7 +184,7 @@ impl Road<'_> {
             most_bytes: memory::spare(),
             ..self.settings.calibration.clone()
         };
-        let step = |stage| self.progress.step(&stage_words(stage));
+        let step = |stage| show(stage, "", &self.progress);
         let logs = std::mem::take(&mut read.logs);
         let made = plan(robot, logs, &settings, &step);
         let (plan, findings) =

@@ -1,4 +1,4 @@
-//! What a person reads after a fit: physical sentences, terms, held-out scores, findings.
+//! Everything that a person can read of a fit on the terminal: physical sentences, terms, held-out scores, findings.
 
 use super::not_kept::others;
 use super::table::{print_table, table};
@@ -11,12 +11,14 @@ use twincal::{Code, Finding, Severity};
 use twincal_io::report;
 
 /// What to do about a log that contradicts the model.
-const MENDS: &str = "`twincal init` with this log and model writes a twincal.toml that mends it, where it is a mistake of columns, signs or units";
+pub(super) const MENDS: &str = "`twincal init` with this log and model writes a twincal.toml that mends it, where it is a mistake of columns, signs or units";
 /// What stands where ± does not describe a number.
 pub(super) const ENDS: &str =
     "a (b … c): median and both ends of the 95 % interval, where ± would mislead";
-/// Prints the whole summary.
+/// Prints the whole summary, the answer first.
 pub(super) fn print(calibration: &Calibration, terminal: &mut Terminal) {
+    terminal.answer(&report::answer(calibration).headline);
+    terminal.say("");
     mistakes(calibration, terminal);
     effects(calibration, terminal);
     others(calibration, terminal);
@@ -31,7 +33,6 @@ fn mistakes(calibration: &Calibration, terminal: &mut Terminal) {
     if all().next().is_none() {
         return;
     }
-    terminal.heading(&report::answer(calibration).headline);
     all().for_each(|finding| paragraph(&finding.message, terminal));
     if all().any(Finding::doubts_the_log) {
         paragraph(MENDS, terminal);
@@ -116,11 +117,10 @@ fn validation(calibration: &Calibration, terminal: &mut Terminal) {
     terminal.say("");
 }
 
-/// What the report says first.
+/// What the answer rests on, and what limits it.
 fn verdict(calibration: &Calibration, terminal: &mut Terminal) {
     let answer = report::answer(calibration);
-    terminal.heading("Can this twin be used?");
-    paragraph(&answer.headline, terminal);
+    terminal.heading("What the answer rests on");
     // Findings follow in full.
     let limits = answer.limits.iter().filter(|limit| {
         let mut findings = calibration.findings.iter();
@@ -258,7 +258,7 @@ pub(super) fn findings(findings: &[Finding], notes: Notes, terminal: &mut Termin
             }
             continue;
         }
-        for line in lines(findings, severity, word, notes.place()) {
+        for line in lines(findings, (severity, word), notes.place(), terminal.width()) {
             if severity == Severity::Note {
                 terminal.say(&line);
             } else {
@@ -274,7 +274,7 @@ pub(super) fn findings(findings: &[Finding], notes: Notes, terminal: &mut Termin
 pub(super) fn before_the_error(findings: &[Finding], terminal: &mut Terminal) {
     for (severity, word) in ORDER {
         if severity > Severity::Note {
-            for line in lines(findings, severity, word, None) {
+            for line in lines(findings, (severity, word), None, terminal.width()) {
                 terminal.note(line.strip_prefix("  ").unwrap_or(&line));
             }
         }
@@ -286,9 +286,14 @@ const ALIKE: usize = 3;
 /// How many are told in full where there are more, and a place has the others.
 const TOLD: usize = 2;
 
-/// The findings of one severity as indented lines of at most 80 columns. Of many of one kind the first are told, the others
+/// The findings of one severity as indented lines of at most `width` columns. Of many of one kind the first are told, the others
 /// named where `place` has them.
-fn lines(findings: &[Finding], severity: Severity, word: &str, place: Option<&str>) -> Vec<String> {
+fn lines(
+    findings: &[Finding],
+    (severity, word): (Severity, &str),
+    place: Option<&str>,
+    width: usize,
+) -> Vec<String> {
     let of_severity: Vec<_> = findings
         .iter()
         .filter(|finding| finding.severity == severity)
@@ -311,7 +316,10 @@ fn lines(findings: &[Finding], severity: Severity, word: &str, place: Option<&st
     }
     let mut lines = Vec::new();
     let mut say = |text: &str| {
-        for (line, text) in wrapped(&format!("{word}: {text}"), 76).iter().enumerate() {
+        for (line, text) in wrapped(&format!("{word}: {text}"), width - 4)
+            .iter()
+            .enumerate()
+        {
             lines.push(format!("{}{text}", if line == 0 { "  " } else { "    " }));
         }
     };
@@ -343,7 +351,7 @@ fn lines(findings: &[Finding], severity: Severity, word: &str, place: Option<&st
 }
 
 /// What a message is about, unless it says so itself.
-fn about(subjects: &[&str], message: &str) -> String {
+pub(super) fn about(subjects: &[&str], message: &str) -> String {
     match subjects {
         [] => String::new(),
         [only] if only.is_empty() || message.contains(only) => String::new(),
@@ -361,20 +369,20 @@ fn about(subjects: &[&str], message: &str) -> String {
     }
 }
 
-/// An indented paragraph of at most 80 columns.
+/// An indented paragraph as wide as the terminal.
 pub(super) fn paragraph(text: &str, terminal: &mut Terminal) {
     indented(text, ["  ", "    "], terminal);
 }
 
-/// A paragraph of at most 80 columns whose first line and other lines begin like this.
+/// A paragraph as wide as the terminal whose first line and other lines begin like this.
 pub(super) fn indented(text: &str, begin: [&str; 2], terminal: &mut Terminal) {
-    let width = 80 - begin[0].chars().count().max(begin[1].chars().count());
+    let width = terminal.width() - begin[0].chars().count().max(begin[1].chars().count());
     for (number, line) in wrapped(text, width).iter().enumerate() {
         terminal.say(&format!("{}{line}", begin[usize::from(number > 0)]));
     }
 }
 
-pub(super) fn wrapped(text: &str, width: usize) -> Vec<String> {
+pub(crate) fn wrapped(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {
         match lines.last_mut() {
@@ -419,6 +427,8 @@ mod tests {
         );
     }
 
+    const WARNING: (Severity, &str) = (Severity::Warning, "warning");
+
     #[test]
     fn of_many_of_one_kind_the_first_are_told_and_the_others_named() {
         let of = |count: usize| -> Vec<Finding> {
@@ -434,7 +444,7 @@ mod tests {
             };
             (0..count).map(finding).collect()
         };
-        let told = |count, place| lines(&of(count), Severity::Warning, "warning", place);
+        let told = |count, place| lines(&of(count), WARNING, place, 80);
         assert_eq!(told(3, Some("the report")).len(), 3);
         assert_eq!(told(5, None).len(), 5);
         assert_eq!(
@@ -454,7 +464,7 @@ mod tests {
             finding("", "three"),
         ];
         shared.extend(["c", "d", "e"].map(|joint| finding(joint, "four")));
-        let told = |all: &[Finding]| lines(all, Severity::Warning, "warning", Some("the report"));
+        let told = |all: &[Finding]| lines(all, WARNING, Some("the report"), 80);
         assert_eq!(
             told(&shared)[2..],
             ["  warning: 4 more like these two in the report: c, d, e"]

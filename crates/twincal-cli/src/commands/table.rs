@@ -1,12 +1,10 @@
-//! Tables of at most 80 columns. A cell is broken between words, after `_` and after `.`, never inside a part of a name:
+//! Tables as wide as the terminal. A cell is broken between words, after `_` and after `.`, never inside a part of a name:
 //! a table that still does not fit is wider.
 
 use crate::terminal::Terminal;
 use comfy_table::presets::NOTHING;
 use comfy_table::{Cell, CellAlignment, ContentArrangement, Row, Table};
 
-/// Width of the terminal that everything fits.
-const WIDTH: usize = 80;
 /// Spaces around a cell.
 const PADDING: usize = 2;
 
@@ -24,19 +22,19 @@ pub(super) fn table(header: &[&str]) -> Table {
 }
 
 pub(super) fn print_table(table: &Table, terminal: &mut Terminal) {
-    for line in lines(table) {
+    for line in lines(table, terminal.width()) {
         terminal.say(&line);
     }
 }
 
-fn lines(all: &Table) -> Vec<String> {
+fn lines(all: &Table, room: usize) -> Vec<String> {
     let cells = |row: &Row| -> Vec<String> {
         let text = |cell: &Cell| cell.content().replace('\n', " ");
         row.cell_iter().map(text).collect()
     };
     let header = all.header().map(cells).unwrap_or_default();
     let body: Vec<Vec<String>> = all.row_iter().map(cells).collect();
-    let widths = widths(&header, &body);
+    let widths = widths(&header, &body, room);
     let fit = |row: &[String]| -> Vec<String> {
         let each = row.iter().zip(&widths);
         each.map(|(text, limit)| broken(text, *limit)).collect()
@@ -52,7 +50,7 @@ fn lines(all: &Table) -> Vec<String> {
 }
 
 /// Width of each column: headings give way first, then what is widest, none below its longest part.
-fn widths(header: &[String], body: &[Vec<String>]) -> Vec<usize> {
+fn widths(header: &[String], body: &[Vec<String>], room: usize) -> Vec<usize> {
     let part = |text: &String| parts(text).into_iter().map(width).max().unwrap_or(0);
     let whole = |text: &String| width(text);
     let cells = |column: usize| body.iter().filter_map(move |row| row.get(column));
@@ -69,7 +67,7 @@ fn widths(header: &[String], body: &[Vec<String>]) -> Vec<usize> {
         .map(|(column, head)| parts_of_names(column).max(part(head)))
         .collect();
     for bounds in [names_whole, least] {
-        while widths.iter().map(|width| width + PADDING).sum::<usize>() > WIDTH {
+        while widths.iter().map(|width| width + PADDING).sum::<usize>() > room {
             let wide = (0..widths.len()).filter(|&column| widths[column] > bounds[column]);
             // Of equally wide ones the last.
             let Some(widest) = wide.max_by_key(|&column| widths[column]) else {
@@ -130,6 +128,8 @@ fn width(text: &str) -> usize {
 mod tests {
     use super::*;
 
+    const WIDTH: usize = 80;
+
     fn fit(lines: &[String]) -> bool {
         lines.iter().all(|line| line.chars().count() <= WIDTH)
     }
@@ -148,7 +148,7 @@ mod tests {
                 column("current"),
             ]);
         }
-        let lines = lines(&rows);
+        let lines = lines(&rows, WIDTH);
         assert!(fit(&lines), "{lines:#?}");
         for word in lines.iter().flat_map(|line| line.split_whitespace()) {
             let ends = word.ends_with(['_', '.']) || word.ends_with("joint");
@@ -170,7 +170,7 @@ mod tests {
         ]);
         let name = "left_shoulder_pan_joint";
         rows.add_row([name, "100.0 %", "100.0 %", "0.967", ""]);
-        let lines = lines(&rows);
+        let lines = lines(&rows, WIDTH);
         assert!(fit(&lines), "{lines:#?}");
         assert!(
             lines[lines.len() - 1].starts_with(&format!("  {name}")),
@@ -183,7 +183,7 @@ mod tests {
         let name = "x".repeat(100);
         let mut rows = table(&["joint", "rate"]);
         rows.add_row([name.as_str(), "0.5"]);
-        assert!(lines(&rows)[1].contains(&name));
+        assert!(lines(&rows, WIDTH)[1].contains(&name));
         assert_eq!(
             parts("q_1.viscous 0.25 Hz"),
             ["q_", "1.", "viscous ", "0.25 ", "Hz"]

@@ -1,6 +1,6 @@
 //! Everything that can be said of logs and a model before a fit, also of logs that `fit` refuses.
 
-use super::super::calibration::stage_words;
+use super::super::calibration::show;
 use super::super::checkup::{Checkup, checkup};
 use super::super::inputs::{LogInput, Long, RobotInput};
 use super::units::{Degrees, converted};
@@ -364,7 +364,7 @@ impl Examination {
     fn try_fit(&mut self, logs: &LogInput, settings: &CalibrationSettings, progress: &Progress) {
         let robot = &self.robot.robot;
         let fit = |settings: &CalibrationSettings, trial: &str| {
-            let told = |stage| progress.step(&format!("{trial}: {}", stage_words(stage)));
+            let told = |stage| show(stage, &format!("{trial}: "), progress);
             let settings = CalibrationSettings {
                 most_bytes: memory::spare(),
                 ..settings.clone()

@@ -3,11 +3,105 @@
 use super::super::summary::paragraph;
 use super::super::table::{print_table, table};
 use super::{short, warn};
+use crate::args::AllowExport;
+use crate::failure::Outcome;
 use crate::terminal::{Terminal, clean};
+use serde::Serialize;
 use twincal::assess::decisive;
 use twincal::calibrate::Calibration;
-use twincal::validate::{Split, WORSE};
+use twincal::validate::{Scores, Split, WORSE};
+use twincal::words::listed;
 use twincal::write_back::{Holds, JointTorqueError, WriteBack};
+
+/// What `--json` has of it.
+#[derive(Serialize)]
+pub(super) struct TorqueErrors<'a> {
+    /// True where the file was fitted without these rows.
+    held_out: bool,
+    joints: Vec<TorqueError<'a>>,
+}
+
+#[derive(Serialize)]
+struct TorqueError<'a> {
+    joint: &'a str,
+    unit: &'a str,
+    /// RMSE of the user's file, of the exported one, and of the twin.
+    rms_before: Option<f64>,
+    rms: Option<f64>,
+    rms_twin: Option<f64>,
+}
+
+impl<'a> TorqueErrors<'a> {
+    pub(super) fn of(change: &'a WriteBack, calibration: &'a Calibration) -> Self {
+        let scores = decisive(&calibration.validation);
+        let robot = &calibration.twin.robot;
+        let joints = change.torque_error.iter().enumerate();
+        let joints = joints.map(|(number, own)| TorqueError {
+            joint: &own.joint,
+            unit: robot.joint_kind(number).torque_unit(),
+            rms_before: own.rms_before,
+            rms: own.rms,
+            rms_twin: twin(scores, number),
+        });
+        Self {
+            held_out: calibration.validation.split == Split::HeldoutLogs,
+            joints: joints.collect(),
+        }
+    }
+}
+
+/// RMSE of the twin on a joint.
+fn twin(scores: &Scores, joint: usize) -> Option<f64> {
+    let own = scores.joints.get(joint).map(|own| own.rmse_calibrated);
+    own.filter(|error| error.is_finite())
+}
+
+/// Refuses a file that is worse than the user's on some joint, unless that is allowed.
+pub(super) fn require_no_worse(
+    change: &WriteBack,
+    calibration: &Calibration,
+    format: &str,
+    allow: &[AllowExport],
+) -> Outcome<()> {
+    if allow.contains(&AllowExport::WorseThanModel) {
+        return Ok(());
+    }
+    let Some(joints) = worse_joints(&change.torque_error, calibration) else {
+        return Ok(());
+    };
+    let rows = match calibration.validation.split {
+        Split::HeldoutLogs => "held-out rows",
+        _ => "rows that were fitted",
+    };
+    Err(twincal::Error::Refused {
+        problem: format!("the exported {format} predicts torque worse than your model: {joints} (RMSE on {rows})"),
+        remedy: format!(
+            "use the whole twin (--to c, rust, python or json), add what the {format} cannot hold (--to c --beyond {}), or export it with --allow worse-than-model",
+            format.to_lowercase()
+        ),
+    }
+    .into())
+}
+
+/// "elbow 10.0 -> 12.0 N·m": joints on which the written file is worse than the user's.
+fn worse_joints(errors: &[JointTorqueError], calibration: &Calibration) -> Option<String> {
+    let robot = &calibration.twin.robot;
+    let worse: Vec<String> = (errors.iter().enumerate())
+        .filter_map(|(number, own)| {
+            let (before, after) = worse(own)?;
+            let unit = robot.joint_kind(number).torque_unit();
+            let (joint, before, after) = (clean(&own.joint), short(before), short(after));
+            Some(format!("{joint} {before} -> {after} {unit}"))
+        })
+        .collect();
+    (!worse.is_empty()).then(|| listed(worse.into_iter(), ", "))
+}
+
+/// Both errors where the written file is worse than the user's.
+fn worse(error: &JointTorqueError) -> Option<(f64, f64)> {
+    let both = error.rms_before.zip(error.rms);
+    both.filter(|(before, after)| *after > WORSE * *before)
+}
 
 /// Torque error of the file on held-out rows, before and after, beside that of the twin.
 pub(super) fn print(
@@ -26,7 +120,7 @@ pub(super) fn print(
             let value = value.filter(|value| value.is_finite());
             value.map_or("–".into(), short)
         };
-        let twin = scores.joints.get(joint).map(|own| own.rmse_calibrated);
+        let twin = twin(scores, joint);
         rows.add_row([
             &*clean(&own.joint),
             &*number(own.rms_before),
@@ -54,9 +148,8 @@ pub(super) fn print(
 /// Joints on which the written file is worse than the user's: what it cannot hold kept the rest in balance.
 fn worse_alone(errors: &[JointTorqueError], format: &str) -> Option<String> {
     let worse: Vec<String> = (errors.iter())
-        .filter_map(|own| Some((&own.joint, own.rms_before?, own.rms?)))
-        .filter(|(_, before, after)| *after > WORSE * *before)
-        .map(|(joint, before, after)| {
+        .filter_map(|own| Some((&own.joint, worse(own)?)))
+        .map(|(joint, (before, after))| {
             format!("{} ({} -> {})", clean(joint), short(before), short(after))
         })
         .collect();

@@ -1,0 +1,239 @@
+//! What a person reads first after a fit: the answer, the torque error, a row per joint, what limits the twin, what to do next.
+//!
+//! At most 40 lines, 55 on a terminal of fewer than 80 columns: what does not fit is counted, and `-v` prints it.
+
+mod claims;
+mod effects;
+mod joints;
+mod text;
+
+pub(super) use effects::{unit, value};
+
+use super::calibration::{quoted, report_of};
+use crate::terminal::Terminal;
+use std::path::Path;
+use text::{Page, Width, plain};
+use twincal::assess;
+use twincal::calibrate::Calibration;
+use twincal::validate::Split;
+use twincal::words::significant;
+use twincal_io::report::{self, Answer};
+
+/// Lines of the whole output, and of that on a narrow terminal.
+const LINES: usize = 40;
+const LINES_NARROW: usize = 55;
+/// Columns below which a terminal is narrow.
+const NARROW: usize = 80;
+
+/// How much of each part is printed.
+#[derive(Debug, Clone, Copy)]
+struct Detail {
+    /// Joints in the table, and effects beside them.
+    joints: usize,
+    effects: usize,
+    /// Claims.
+    claims: usize,
+    /// Lines of a joint's further effects, of an effect, of a claim and of a next step.
+    further: usize,
+    effect: usize,
+    claim: usize,
+    step: usize,
+}
+
+/// From generous to terse; the first that fits is printed.
+const DETAILS: [Detail; 9] = [
+    Detail::of([8, 8, 5], [3, 3, 5, 5]),
+    Detail::of([8, 8, 5], [2, 2, 4, 4]),
+    Detail::of([8, 8, 5], [2, 2, 3, 3]),
+    Detail::of([8, 8, 4], [2, 2, 3, 3]),
+    Detail::of([8, 8, 3], [2, 2, 3, 3]),
+    Detail::of([8, 6, 3], [1, 2, 3, 3]),
+    Detail::of([8, 6, 3], [1, 1, 3, 2]),
+    Detail::of([8, 5, 3], [1, 1, 2, 2]),
+    Detail::of([6, 4, 3], [1, 1, 1, 2]),
+];
+
+impl Detail {
+    const fn of([joints, effects, claims]: [usize; 3], lines: [usize; 4]) -> Self {
+        let [further, effect, claim, step] = lines;
+        Self {
+            joints,
+            effects,
+            claims,
+            further,
+            effect,
+            claim,
+            step,
+        }
+    }
+}
+
+/// What stands around the page.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::commands) struct Around<'a> {
+    /// Folder of the result.
+    pub(in crate::commands) output: &'a Path,
+    /// Format of the model, `urdf` or `mjcf`.
+    pub(in crate::commands) format: &'a str,
+    /// What is printed in the place of the effects; they are printed where it is empty.
+    pub(in crate::commands) instead: &'a [String],
+    /// Lines that are printed behind the report's path.
+    pub(in crate::commands) behind: usize,
+}
+
+/// Prints all but the last line, which is the report's path.
+pub(super) fn print(calibration: &Calibration, around: Around<'_>, terminal: &mut Terminal) {
+    let answer = report::answer(calibration);
+    terminal.answer(&answer.headline);
+    let page = page(calibration, &answer, around, terminal.width());
+    page.print(terminal);
+}
+
+/// The lines between the answer and the report's path.
+fn page(calibration: &Calibration, answer: &Answer, around: Around<'_>, columns: usize) -> Page {
+    let limit = match columns < NARROW {
+        true => LINES_NARROW,
+        false => LINES,
+    };
+    let width = Width(columns);
+    let answer_lines = answer.headline.chars().count().div_ceil(columns);
+    let path_lines = report_of(around.output).chars().count().div_ceil(columns);
+    let taken = answer_lines + path_lines + around.behind;
+    let mut pages = DETAILS.iter().map(|detail| {
+        let mut page = Page::default();
+        page.blank();
+        scores(calibration, width, &mut page);
+        page.blank();
+        match around.instead.is_empty() {
+            true => {
+                joints::table(calibration, *detail, width, &mut page);
+                effects::beside_the_joints(calibration, *detail, width, &mut page);
+            }
+            false => around
+                .instead
+                .iter()
+                .for_each(|line| page.push(plain(line))),
+        }
+        page.blank();
+        claims::list(calibration, answer, *detail, width, &mut page);
+        next(calibration, answer, around, *detail, width, &mut page);
+        page
+    });
+    let fits = |page: &Page| page.len() + taken <= limit;
+    let mut last = Page::default();
+    pages
+        .find_map(|page| match fits(&page) {
+            true => Some(page),
+            false => {
+                last = page;
+                None
+            }
+        })
+        .unwrap_or(last)
+}
+
+/// What stands before the second line of a score.
+const OTHER_LINES: &str = "                ";
+
+/// Torque error before and after, and what the intervals hold.
+fn scores(calibration: &Calibration, width: Width, page: &mut Page) {
+    let validation = &calibration.validation;
+    let held_out = match &validation.split {
+        Split::HeldoutLogs => "held-out logs",
+        Split::LeaveOneLogOut => "logs left out one at a time",
+        Split::LeaveLogGroupsOut => "logs left out in five groups",
+        Split::LastThirty if calibration.logs.len() == 1 => "the last 30 % of the log",
+        Split::LastThirty => "the last 30 % of each log",
+        Split::NotTested => {
+            let text =
+                "Torque error: not tested. --heldout LOG predicts a log that was not fitted.";
+            page.paragraph(text, ["", "  "], width, 3);
+            return;
+        }
+    };
+    let scores = assess::decisive(validation);
+    let [before, after] = [scores.rmse_nominal, scores.rmse_calibrated];
+    let change = match after / before - 1.0 {
+        change if !change.is_finite() => String::new(),
+        change if change.abs() < 5e-4 => " (unchanged)".into(),
+        change => format!(
+            " ({:.1} % {})",
+            100.0 * change.abs(),
+            if change < 0.0 { "less" } else { "more" }
+        ),
+    };
+    let text = format!(
+        "{} → {} {} RMSE{change} on {held_out}",
+        significant(before, 3),
+        significant(after, 3),
+        error_unit(calibration),
+    );
+    page.paragraph(&text, ["Torque error    ", OTHER_LINES], width, 3);
+    if scores.coverage95.is_finite() {
+        let moving = match assess::has_standstill(validation) {
+            true => " in which the joint moves",
+            false => "",
+        };
+        let share = 100.0 * scores.coverage95;
+        let text = format!("hold {share:.1} % of its rows{moving}");
+        page.paragraph(&text, ["95 % intervals  ", OTHER_LINES], width, 2);
+    }
+}
+
+/// Unit of an error over all joints.
+fn error_unit(calibration: &Calibration) -> &'static str {
+    let joints = calibration.twin.robot.description().joints.iter();
+    let mut units: Vec<&str> = joints
+        .filter(|joint| joint.kind != twincal::robot::JointKind::Fixed)
+        .map(|joint| joint.kind.torque_unit())
+        .collect();
+    units.dedup();
+    match units[..] {
+        [] | ["N·m"] => "N·m",
+        ["N"] => "N",
+        _ => "N·m and N",
+    }
+}
+
+/// What to record, correct or run next.
+fn next(
+    calibration: &Calibration,
+    answer: &Answer,
+    around: Around<'_>,
+    detail: Detail,
+    width: Width,
+    page: &mut Page,
+) {
+    let begin = ["  ", "    "];
+    page.heading("Next");
+    if calibration
+        .findings
+        .iter()
+        .any(twincal::Finding::doubts_the_log)
+    {
+        page.paragraph(super::summary::MENDS, begin, width, detail.step);
+    }
+    if let Some(recording) = &answer.next {
+        let text = format!("Recording: {recording}");
+        page.paragraph(&text, begin, width, detail.step);
+    }
+    let output = quoted(&around.output.to_string_lossy());
+    let format = around.format;
+    let command = match answer.answer {
+        assess::Answer::Yes | assess::Answer::YesWithinLimits => {
+            let file = match format {
+                "mjcf" => "calibrated.xml",
+                _ => "calibrated.urdf",
+            };
+            format!("twincal export --twin {output} --to {format} -o {file}")
+        }
+        assess::Answer::NotYet | assess::Answer::No => {
+            "twincal doctor LOG --model MODEL says what is wrong with a log or the model".into()
+        }
+    };
+    page.paragraph(&command, begin, width, 2);
+    page.blank();
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,222 @@
+//! What is true of the simulated arm, beside what was found: `truth.json` of the study, in the parameters of the effects.
+
+use super::super::brief::{unit, value};
+use super::super::summary::pip;
+use crate::failure::Outcome;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary, Status};
+use twincal::words::significant;
+use twincal_io::Error;
+
+const TRUTH: &str = include_str!("../../../../../studies/planar_arm/assets/truth.json");
+/// Distance of a number from the truth, in spreads, that is said.
+const FAR: f64 = 3.0;
+
+/// The file: coefficients of the Lagrangian and friction by name, and the arm that was simulated.
+#[derive(Deserialize)]
+struct File {
+    terms: BTreeMap<String, f64>,
+    settings: Settings,
+}
+
+#[derive(Deserialize)]
+struct Settings {
+    hidden: BTreeMap<String, f64>,
+    real: Real,
+}
+
+#[derive(Deserialize)]
+struct Real {
+    links: [Link; 2],
+    length: f64,
+    gravity: [f64; 3],
+    payload: f64,
+    payload_at: [f64; 3],
+}
+
+#[derive(Deserialize)]
+struct Link {
+    mass: f64,
+    com: [f64; 3],
+}
+
+/// Mass and centre of both links in the model, along the link: kg, m.
+const MODEL: [[f64; 2]; 2] = [[3.0, 0.2], [2.0, 0.15]];
+
+/// One true number.
+struct Truth {
+    /// In words.
+    words: &'static str,
+    component: &'static str,
+    parameter: &'static str,
+    value: f64,
+}
+
+/// The true numbers. Payload and heavier links act as one body on the forearm: what the upper arm has more acts as mass at the elbow.
+fn truths(file: &File) -> Vec<Truth> {
+    let term = |name: &str| file.terms.get(name).copied().unwrap_or(f64::NAN);
+    let hidden = |name: &str| file.settings.hidden.get(name).copied().unwrap_or(f64::NAN);
+    let real = &file.settings.real;
+    let moment = |link: usize| {
+        let ([mass, centre], own) = (MODEL[link], &real.links[link]);
+        own.mass * own.com[0] - mass * centre
+    };
+    let fore = real.links[1].mass + real.payload - MODEL[1][0];
+    let mass = fore + moment(0) / real.length;
+    let centre = (moment(1) + real.payload * real.payload_at[0]) / mass;
+    let truth = |words, component, parameter, value| Truth {
+        words,
+        component,
+        parameter,
+        value,
+    };
+    vec![
+        truth(
+            "viscous friction, shoulder",
+            "shoulder.viscous",
+            "value",
+            term("shoulder.viscous"),
+        ),
+        truth(
+            "viscous friction, elbow",
+            "elbow.viscous",
+            "value",
+            term("elbow.viscous"),
+        ),
+        truth(
+            "Coulomb friction, shoulder",
+            "shoulder.coulomb",
+            "value",
+            term("shoulder.coulomb"),
+        ),
+        truth(
+            "Coulomb friction, elbow",
+            "elbow.coulomb",
+            "value",
+            term("elbow.coulomb"),
+        ),
+        truth("payload and links, mass", "payload", "mass", mass),
+        truth("payload and links, centre", "payload", "com_x", centre),
+        truth(
+            "payload and links, inertia",
+            "payload",
+            "iyy",
+            term("qd1*qd2"),
+        ),
+        truth(
+            "tilt of the base, gravity x",
+            "base.tilt",
+            "x",
+            real.gravity[0],
+        ),
+        // The Lagrangian is kinetic less potential energy.
+        truth(
+            "hidden potential, cos q2",
+            "elbow.potential",
+            "cos",
+            -hidden("cos(q2)"),
+        ),
+        truth(
+            "hidden kinetic, qd2² cos q2",
+            "qd2^2*cos(q2)",
+            "value",
+            hidden("qd2^2*cos(q2)"),
+        ),
+    ]
+}
+
+/// The table, and what was found that is not simulated.
+pub(super) fn beside(calibration: &Calibration, width: usize) -> Outcome<Vec<String>> {
+    let file: File = serde_json::from_str(TRUTH).map_err(|e| Error::Internal {
+        what: "truth.json".into(),
+        problem: e.to_string(),
+    })?;
+    let truths = truths(&file);
+    let mut lines = vec![format!("{:<28}{:>9}   found", "Simulated effect", "truth")];
+    let mut missed = 0;
+    for truth in &truths {
+        let component = calibration
+            .components
+            .iter()
+            .find(|own| own.name == truth.component);
+        let (found, is_missed) = found(truth, component);
+        missed += usize::from(is_missed);
+        let true_value = significant(truth.value, 3);
+        lines.push(format!("  {:<26}{true_value:>9}   {found}", truth.words));
+    }
+    let others: Vec<&str> = (calibration.components.iter())
+        .filter(|own| own.status == Status::Established)
+        .map(|own| own.name.as_str())
+        .filter(|name| !truths.iter().any(|truth| truth.component == *name))
+        .collect();
+    let others = match others[..] {
+        [] => "nothing else is established".to_owned(),
+        ref names => format!("not simulated, but established: {}", names.join(", ")),
+    };
+    let text = format!(
+        "{} of {} found; {others}",
+        truths.len() - missed,
+        truths.len()
+    );
+    let wrapped = crate::commands::wrapped(&text, width - 2);
+    lines.extend(wrapped.iter().map(|line| format!("  {line}")));
+    Ok(lines)
+}
+
+/// The number that was found, and whether the effect was missed.
+fn found(truth: &Truth, component: Option<&ComponentSummary>) -> (String, bool) {
+    let claimed =
+        |own: &&ComponentSummary| matches!(own.status, Status::Established | Status::Equivalent);
+    let parameter = |own: &ComponentSummary| {
+        let mut all = own.parameters.iter();
+        all.find(|own| own.name == truth.parameter && own.seen)
+            .cloned()
+    };
+    match component.filter(claimed).and_then(parameter) {
+        Some(own) => (with_distance(&own, truth.value), false),
+        None => {
+            let probability = pip(component.and_then(|own| own.pip));
+            (format!("missed (PIP {probability})"), true)
+        }
+    }
+}
+
+/// "+0.3988 ± 0.0021 N·m·s/rad", with its distance from the truth where that is large.
+fn with_distance(number: &ParameterSummary, truth: f64) -> String {
+    let (median, spread) = number.told();
+    let distance = (median - truth).abs() / spread;
+    let far = match distance > FAR {
+        true => format!(", {distance:.1} sd off"),
+        false => String::new(),
+    };
+    format!("{} {}{far}", value(number), unit(number))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// First moments by the coefficients of the Lagrangian that the study's own script wrote, which are worked out otherwise.
+    #[test]
+    fn true_numbers_are_those_of_the_lagrangian() {
+        let file: File = serde_json::from_str(TRUTH).expect("truth.json");
+        let truths = truths(&file);
+        let of = |component: &str, parameter: &str| {
+            let mut all = truths.iter();
+            let own = all.find(|own| (own.component, own.parameter) == (component, parameter));
+            own.expect("a true number").value
+        };
+        let moment = |angle: &str, of_model: f64| {
+            let z = file.settings.real.gravity[2];
+            (file.terms[angle] - of_model * 9.81) / z - of_model
+        };
+        let mass = moment("sin(q1)", 3.0 * 0.2 + 2.0 * 0.4) / 0.4;
+        let centre = moment("sin(q1+q2)", 2.0 * 0.15) / mass;
+        assert!((of("payload", "mass") - mass).abs() < 1e-9);
+        assert!((of("payload", "com_x") - centre).abs() < 1e-9);
+        assert_eq!(of("elbow.potential", "cos"), -0.8);
+        assert_eq!(of("shoulder.coulomb", "value"), 0.6);
+        assert!(truths.iter().all(|own| own.value.is_finite()));
+    }
+}
