@@ -44,7 +44,6 @@ pub mod log;
 pub mod table;
 pub mod context;
 pub mod artifact;
-#[cfg(feature = "report")]
 mod assessment;
 #[cfg(feature = "report")]
 pub mod report;

@@ -3,7 +3,6 @@
 //! Nothing in it depends on the machine, the clock, the number of threads or the folder: the same input, settings and
 //! seed give the same bytes. Numbers are the shortest that read back the same; what is not a number is `null`.
 
-#[cfg(feature = "report")]
 use crate::assessment::Versioned;
 use crate::context::ReportContext;
 use crate::error::{Error, Result};
@@ -46,7 +45,6 @@ struct ResultFile<'a> {
     twincal: &'static str,
     model: &'a str,
     config: Option<ConfigRow<'a>>,
-    #[cfg(feature = "report")]
     assessment: Versioned,
     components: &'a [ComponentSummary],
     terms: Vec<TermRow<'a>>,
@@ -227,7 +225,6 @@ impl<'a> ResultFile<'a> {
                 path: &config.name,
                 sha256: &config.sha256,
             }),
-            #[cfg(feature = "report")]
             assessment: Versioned::of(calibration),
             components: &calibration.components,
             terms: calibration.terms.iter().map(TermRow::of).collect(),

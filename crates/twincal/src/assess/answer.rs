@@ -51,7 +51,23 @@ const TABLE: &[(Code, Answer)] = &[
     (Code::EffectsEstablished, Answer::Yes),
 ];
 
+/// The table: results that decide, in the order in which they are looked for.
+pub fn decision_table() -> impl Iterator<Item = (Code, Answer)> {
+    TABLE.iter().copied()
+}
+
 impl Answer {
+    /// Its name in files.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Yes => "yes",
+            Self::YesWithinLimits => "yes_within_limits",
+            Self::No => "no",
+            Self::NotYet => "not_yet",
+        }
+    }
+
     /// What a result of the fit means; `None` of a finding.
     pub(super) fn of_result(code: Code) -> Option<Self> {
         let row = TABLE.iter().find(|(own, _)| *own == code);

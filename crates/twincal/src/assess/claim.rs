@@ -35,9 +35,9 @@ pub enum Role {
     Informs,
 }
 
-/// Whom a claim is about.
+/// Whom a claim is about. In JSON `{"kind": "joint", "name": "elbow"}`; of the run `{"kind": "run"}`.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[serde(rename_all = "snake_case", tag = "kind", content = "name")]
 pub enum Subject {
     /// The whole run.
     Run,

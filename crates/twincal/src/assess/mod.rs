@@ -33,7 +33,7 @@ mod rest;
 mod scores;
 mod shape;
 
-pub use answer::{Answer, decide};
+pub use answer::{Answer, decide, decision_table};
 pub use beyond::{Beyond, Cause, beyond, new_motion, tested_beyond};
 pub use claim::{Claim, Evidence, Role, Subject};
 pub use intervals::{by_chance, too_narrow, too_wide};

@@ -150,7 +150,10 @@ fn printed(calibration: &Calibration, columns: usize) -> Vec<String> {
     page.texts().into_iter().map(str::to_owned).collect()
 }
 
-const ROBOTS: [(usize, fn(usize) -> String); 4] = [
+/// Joints, and the name of each.
+type NamedJoints = (usize, fn(usize) -> String);
+
+const ROBOTS: [NamedJoints; 4] = [
     (2, |joint| format!("joint{joint}")),
     (6, |joint| format!("shoulder_{joint}_lift_joint")),
     (7, |joint| format!("panda_joint{joint}")),

@@ -94,7 +94,7 @@ fn worse_joints(errors: &[JointTorqueError], calibration: &Calibration) -> Optio
             Some(format!("{joint} {before} -> {after} {unit}"))
         })
         .collect();
-    (!worse.is_empty()).then(|| listed(worse.into_iter(), ", "))
+    (!worse.is_empty()).then(|| listed(worse, ", "))
 }
 
 /// Both errors where the written file is worse than the user's.
