@@ -61,7 +61,7 @@ Examples:
   twincal fit run1.csv --model arm.urdf
   twincal fit run*.csv --model arm.urdf --heldout other.csv -o calibrated
   twincal fit run*.csv --model arm.urdf --config twincal.toml --force --json
-  twincal fit run*.csv --model arm.urdf -v --open   all numbers; report in the browser
+  twincal fit run*.csv --model arm.urdf -v --open    everything, and the page
 ")]
     Fit(Fit),
     /// What a fit takes of each log, as a small file: such files add, and `fit`

@@ -6,6 +6,9 @@ mod common;
 use common::{ARM, QUICK, Row, Run, csv, files, fit, fitted, fitted_copy, folder, run};
 use std::fs;
 
+/// The flag that accepts a file that is worse than the model.
+const WORSE: [&str; 2] = ["--allow", "worse-than-model"];
+
 fn export<'a>(more: &[&'a str]) -> Vec<&'a str> {
     ["export", "--twin", "twin"]
         .iter()
@@ -260,9 +263,10 @@ fn a_twin_that_is_no_good_says_so_wherever_it_is_used() {
         line.into_iter().chain(more.iter().copied()).collect()
     };
     for (number, arguments) in [
-        export(&["--to", "urdf"]),
+        export(&["--to", "urdf", WORSE[0], WORSE[1]]),
         export(&["--to", "c"]),
-        export(&["--to", "urdf", "-o", "a.urdf"]),
+        export(&["--to", "csv"]),
+        export(&["--to", "urdf", "-o", "a.urdf", WORSE[0], WORSE[1]]),
         export(&["--to", "urdf", "--draws", "2", "-o", "draws"]),
         predict(&[]),
         predict(&["-o", "a.csv"]),
@@ -275,14 +279,73 @@ fn a_twin_that_is_no_good_says_so_wherever_it_is_used() {
         assert!(!done.out.contains("can this twin"), "{number}");
     }
     for arguments in [
-        export(&["--to", "urdf", "-o", "b.urdf", "--json"]),
+        export(&["--to", "urdf", "-o", "b.urdf", "--json", WORSE[0], WORSE[1]]),
         export(&["--to", "c", "-o", "b.c", "--json"]),
+        export(&["--to", "csv", "-o", "b.csv", "--json"]),
         export(&["--to", "urdf", "--draws", "2", "-o", "more", "--json"]),
-        predict(&["-o", "b.csv", "--json"]),
+        predict(&["-o", "p.csv", "--json"]),
     ] {
         let told = json(&run(folder.path(), arguments).expect(0));
         assert_eq!(told["findings"][0]["code"], "verdict", "{told}");
         assert_eq!(told["findings"][0]["severity"], "warning");
+    }
+}
+
+/// Its model file is worse than the user's: nothing is written unless that is allowed.
+#[test]
+fn a_file_that_is_worse_than_the_model_is_refused() {
+    let folder = folder();
+    let own = |x: f64| 0.1 * (1e7 * x).sin();
+    let bare = log(&|q2, [v1, v2]| [own(v1) - 0.4 * v1, own(v2) + 0.9 * q2.cos() - 0.2 * v2]);
+    fs::write(folder.path().join("bare.csv"), bare).unwrap();
+    fit(folder.path(), &["--heldout", "bare.csv", "-o", "twin"]).expect(0);
+    let refused = run(folder.path(), export(&["--to", "urdf", "-o", "a.urdf"])).expect(4);
+    let refused = refused.says(&[
+        "shoulder 0.07",
+        " N·m",
+        "held-out rows",
+        "--allow worse-than-model",
+    ]);
+    assert!(!folder.path().join("a.urdf").exists() && refused.out.is_empty());
+    let told = json(
+        &run(
+            folder.path(),
+            export(&["--to", "urdf", "-o", "a.urdf", "--json"]),
+        )
+        .expect(4),
+    );
+    assert_eq!(told["error"]["exit_code"], 4);
+    let allowed = export(&["--to", "urdf", "-o", "a.urdf", WORSE[0], WORSE[1]]);
+    let done = run(folder.path(), allowed).expect(0);
+    assert!(done.out.contains("WORSE"), "{}", done.out);
+}
+
+/// Every parameter of every candidate has a row, and the numbers are those of result.json.
+#[test]
+fn the_table_of_effects_is_that_of_the_result() {
+    let folder = common::fitted_copy();
+    let table = run(folder.path(), export(&["--to", "csv"])).expect(0).out;
+    let text = fs::read_to_string(folder.path().join("twin/result.json")).unwrap();
+    let result: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let mut rows = table.lines();
+    let head = "component,parameter,unit,mean,sd,low95,high95,pip,status";
+    assert_eq!(rows.next(), Some(head));
+    for component in result["components"].as_array().unwrap() {
+        let parameters = component["parameters"].as_array().unwrap();
+        for parameter in parameters.iter().filter(|own| own["seen"] == true) {
+            let row = rows.by_ref().find(|row| {
+                let [name, own] =
+                    [&component["name"], &parameter["name"]].map(|w| w.as_str().unwrap());
+                row.starts_with(&format!("{name},{own},"))
+            });
+            let cells: Vec<&str> = row.unwrap().split(',').collect();
+            assert_eq!(number(cells[3]), parameter["mean"].as_f64().unwrap());
+            assert_eq!(
+                number(cells[6]),
+                parameter["interval95"][1].as_f64().unwrap()
+            );
+            assert_eq!(cells[8], component["status"]);
+        }
     }
 }
 

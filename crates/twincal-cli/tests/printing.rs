@@ -107,8 +107,6 @@ fn completions_are_scripts_that_know_the_commands() {
     let folder = tempfile::tempdir().unwrap();
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
         let done = run(folder.path(), ["completions", shell]).expect(0);
-        for word in ["statistics", "worse-than-model"] {
-            assert!(done.out.contains(word), "{shell}: {word}");
-        }
+        assert!(done.out.contains("statistics"), "{shell}");
     }
 }

@@ -40,13 +40,18 @@ pub fn worse(joint: &JointScore) -> bool {
     joint.rows > 0 && joint.rmse_calibrated > WORSE * joint.rmse_nominal
 }
 
-/// What held-out torque says; `not_tested` alone where there is none.
+/// What held-out torque says; `not_tested` alone where there is none, `nothing_found` alone where the model is exact.
 pub(super) fn claims(calibration: &Calibration) -> Vec<Claim> {
     let all = &calibration.validation.filtered;
     if rows_of(all) == 0 || !(all.rmse_nominal.is_finite() && all.rmse_calibrated.is_finite()) {
         return vec![Claim::new(Code::NotTested, Subject::Run, [])];
     }
     let scores = decisive(&calibration.validation);
+    let mut findings = calibration.findings.iter();
+    if findings.any(|finding| finding.code == Code::NothingToCorrect) {
+        // Errors of rounding have no order.
+        return vec![Claim::new(Code::NothingFound, Subject::Run, [])];
+    }
     let independent = independent_rows(calibration);
     let mut out = match independent < FEW {
         true => {

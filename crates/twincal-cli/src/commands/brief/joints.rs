@@ -67,7 +67,12 @@ pub(super) fn table(calibration: &Calibration, detail: Detail, width: Width, pag
         .map(|joint| row(calibration, joint, units))
         .collect();
     if rows.iter().all(Row::is_empty) {
-        page.push(plain("Found: no effect of a joint"));
+        page.heading(
+            match calibration.effects().any(|own| own.component().is_in()) {
+                true => "Found",
+                false => "Found: nothing. No candidate has a probability of 0.5 or more.",
+            },
+        );
         return;
     }
     if rows.len() > detail.joints {

@@ -45,6 +45,7 @@ struct Link {
 const MODEL: [[f64; 2]; 2] = [[3.0, 0.2], [2.0, 0.15]];
 
 /// One true number.
+#[derive(Clone)]
 struct Truth {
     /// In words.
     words: &'static str,
@@ -65,65 +66,49 @@ fn truths(file: &File) -> Vec<Truth> {
     let fore = real.links[1].mass + real.payload - MODEL[1][0];
     let mass = fore + moment(0) / real.length;
     let centre = (moment(1) + real.payload * real.payload_at[0]) / mass;
-    let truth = |words, component, parameter, value| Truth {
+    let mut truths = FRICTION
+        .map(|(words, name)| truth(words, [name, "value"], term(name)))
+        .to_vec();
+    let hidden_kinetic = "qd2^2*cos(q2)";
+    truths.extend([
+        truth("payload+links, mass", ["payload", "mass"], mass),
+        truth("payload+links, centre", ["payload", "com_x"], centre),
+        truth(
+            "payload+links, inertia",
+            ["payload", "iyy"],
+            term("qd1*qd2"),
+        ),
+        truth("base tilt, gravity x", ["base.tilt", "x"], real.gravity[0]),
+        // The Lagrangian is kinetic less potential energy.
+        truth(
+            "potential, cos q2",
+            ["elbow.potential", "cos"],
+            -hidden("cos(q2)"),
+        ),
+        truth(
+            "kinetic, qd2² cos q2",
+            [hidden_kinetic, "value"],
+            hidden(hidden_kinetic),
+        ),
+    ]);
+    truths
+}
+
+/// Friction in words, and its name as effect and in the file.
+const FRICTION: [(&str, &str); 4] = [
+    ("viscous, shoulder", "shoulder.viscous"),
+    ("viscous, elbow", "elbow.viscous"),
+    ("Coulomb, shoulder", "shoulder.coulomb"),
+    ("Coulomb, elbow", "elbow.coulomb"),
+];
+
+fn truth(words: &'static str, [component, parameter]: [&'static str; 2], value: f64) -> Truth {
+    Truth {
         words,
         component,
         parameter,
         value,
-    };
-    vec![
-        truth(
-            "viscous friction, shoulder",
-            "shoulder.viscous",
-            "value",
-            term("shoulder.viscous"),
-        ),
-        truth(
-            "viscous friction, elbow",
-            "elbow.viscous",
-            "value",
-            term("elbow.viscous"),
-        ),
-        truth(
-            "Coulomb friction, shoulder",
-            "shoulder.coulomb",
-            "value",
-            term("shoulder.coulomb"),
-        ),
-        truth(
-            "Coulomb friction, elbow",
-            "elbow.coulomb",
-            "value",
-            term("elbow.coulomb"),
-        ),
-        truth("payload and links, mass", "payload", "mass", mass),
-        truth("payload and links, centre", "payload", "com_x", centre),
-        truth(
-            "payload and links, inertia",
-            "payload",
-            "iyy",
-            term("qd1*qd2"),
-        ),
-        truth(
-            "tilt of the base, gravity x",
-            "base.tilt",
-            "x",
-            real.gravity[0],
-        ),
-        // The Lagrangian is kinetic less potential energy.
-        truth(
-            "hidden potential, cos q2",
-            "elbow.potential",
-            "cos",
-            -hidden("cos(q2)"),
-        ),
-        truth(
-            "hidden kinetic, qd2² cos q2",
-            "qd2^2*cos(q2)",
-            "value",
-            hidden("qd2^2*cos(q2)"),
-        ),
-    ]
+    }
 }
 
 /// The table, and what was found that is not simulated.
@@ -133,7 +118,7 @@ pub(super) fn beside(calibration: &Calibration, width: usize) -> Outcome<Vec<Str
         problem: e.to_string(),
     })?;
     let truths = truths(&file);
-    let mut lines = vec![format!("{:<28}{:>9}   found", "Simulated effect", "truth")];
+    let mut lines = vec![format!("{:<24}{:>8}  found", "Simulated effect", "truth")];
     let mut missed = 0;
     for truth in &truths {
         let component = calibration
@@ -143,7 +128,7 @@ pub(super) fn beside(calibration: &Calibration, width: usize) -> Outcome<Vec<Str
         let (found, is_missed) = found(truth, component);
         missed += usize::from(is_missed);
         let true_value = significant(truth.value, 3);
-        lines.push(format!("  {:<26}{true_value:>9}   {found}", truth.words));
+        lines.push(format!("  {:<22}{true_value:>8}  {found}", truth.words));
     }
     let others: Vec<&str> = (calibration.components.iter())
         .filter(|own| own.status == Status::Established)
