@@ -61,7 +61,7 @@ def study(name, model, train, log, first, config, every, with_residual):
         folder = Path(folder)
         (folder / "twincal.toml").write_text(config)
         twincal("fit", *train(folder), "--model", model, "--config", folder / "twincal.toml", "-o", folder / "out")
-        twincal("export", "--twin", folder / "out", "--to", "mjcf", "-o", folder / "exported.xml")
+        twincal("export", "--twin", folder / "out", "--to", "mjcf", "-o", folder / "exported.xml", "--allow", "worse-than-model")
         twincal("export", "--twin", folder / "out", "--to", "python", "--beyond", "mjcf", "-o", folder / "rest.py")
         spec = importlib.util.spec_from_file_location("rest", folder / "rest.py")
         rest = importlib.util.module_from_spec(spec)

@@ -27,6 +27,8 @@ import simulate_arms as industrial  # noqa: E402
 PENDULUM = SHARED / "double_pendulum"
 UR10 = SHARED / "ur10"
 
+ALLOW = ["--allow", "worse-than-model"]
+
 
 # ---- what is not changed
 
@@ -59,7 +61,9 @@ def ur5(tmp_path_factory):
     config = "[signal]\ncutoff_hz = 0\n[library]\ncoulomb_velocity = 0.02\n"
     logs = [folder / f"train{k}.csv" for k in (1, 2, 3)]
     fit(folder, logs, config, "--heldout", folder / "heldout.csv", model=truth["model"])
-    twincal("export", "--twin", folder / "out", "--to", "urdf", "-o", folder / "ur5.urdf")
+    # The file alone is worse than the model on one joint: what it cannot hold is exported beside it.
+    twincal("export", "--twin", folder / "out", "--to", "urdf", "-o", folder / "ur5.urdf", expect=4)
+    twincal("export", "--twin", folder / "out", "--to", "urdf", "-o", folder / "ur5.urdf", *ALLOW)
     twincal("predict", folder / "heldout.csv", "--twin", folder / "out", "-o", folder / "predicted.csv")
     return folder, truth
 
@@ -139,7 +143,7 @@ def test_exported_model_and_residual_are_the_twin(ur5):
     others = [0, 2, 3, 4, 5]
     assert (rmse(written)[others] < 0.3 * rmse(nominal)[others] + 0.1).all()
     # and what it says of what it left out
-    told = json.loads(twincal("export", "--twin", folder / "out", "--to", "urdf", "-o", folder / "again.urdf", "--json").stdout)
+    told = json.loads(twincal("export", "--twin", folder / "out", "--to", "urdf", "-o", folder / "again.urdf", "--json", *ALLOW).stdout)
     assert truth["spring"] in [r["component"] for r in told["residual"] if r["pip"] > 0.5]
     assert "payload" in [w["component"] for w in told["written"]]
     assert (folder / "again.urdf").read_bytes() == (folder / "ur5.urdf").read_bytes()

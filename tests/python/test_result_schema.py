@@ -2,10 +2,11 @@
 
 import copy
 import json
+import subprocess
 
 import jsonschema
 import pytest
-from conftest import ROOT, SHARED, twincal
+from conftest import ROOT, SHARED, program, twincal
 
 SCHEMA = json.loads((ROOT / "schema" / "result.schema.json").read_text())
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
@@ -17,10 +18,9 @@ def problems(result):
 
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("schema") / "demo"
-    twincal("demo", "-o", folder)
-    found = next(folder.rglob("result.json"))
-    return json.loads(found.read_text())
+    folder = tmp_path_factory.mktemp("schema")
+    subprocess.run([program("twincal"), "demo"], cwd=folder, check=True, capture_output=True)
+    return json.loads((folder / "twincal-demo" / "result.json").read_text())
 
 
 def test_the_schema_is_one():

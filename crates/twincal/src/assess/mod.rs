@@ -78,7 +78,7 @@ impl Assessment {
 pub fn assess(calibration: &Calibration) -> Assessment {
     let mut claims = of_torque::claims(calibration);
     // Without a test, and of an exact model, nothing else is said.
-    if claims.len() > 1 {
+    if claims.iter().any(|claim| claim.code == Code::TorqueError) {
         claims.extend(intervals::claims(calibration));
         claims.extend(shape::claims(calibration));
         claims.extend(rest::claims(calibration));
