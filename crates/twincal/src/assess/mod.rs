@@ -38,10 +38,10 @@ pub use beyond::{Beyond, Cause, beyond, new_motion, tested_beyond};
 pub use claim::{Claim, Evidence, Role, Subject};
 pub use intervals::{by_chance, too_narrow, too_wide};
 pub use next::{Request, RequestCode, driven_together};
-pub use of_torque::{CLEARLY_LOST, error_share, is_large, is_lost, worse};
+pub use of_torque::CLEARLY_LOST;
 pub use rest::{
-    AtRest, FEW_AT_REST, Pauses, all_at_rest, at_rest, few_pauses, hardly_at_rest, rest_got_worse,
-    standstill, tested_at_rest,
+    AtRest, Pauses, all_at_rest, at_rest, few_pauses, hardly_at_rest, rest_got_worse, standstill,
+    tested_at_rest,
 };
 pub use scores::{
     FEW, converged, decisive, friction_only, has_standstill, independent_rows, memory, rows_of,

@@ -16,27 +16,23 @@ pub const CLEARLY_LOST: f64 = 1.05;
 const AS_WELL: f64 = 1.05;
 
 /// Error left of a joint, as a share of its torque's standard deviation; `None` where the torque does not vary.
-#[must_use]
-pub fn error_share(joint: &JointScore) -> Option<f64> {
+fn error_share(joint: &JointScore) -> Option<f64> {
     let share = joint.rmse_calibrated / joint.torque_sd;
     (joint.rows > 0 && joint.torque_sd > 0.0 && share.is_finite()).then_some(share)
 }
 
 /// Whether it is more than half of it.
-#[must_use]
-pub fn is_large(joint: &JointScore) -> bool {
+fn is_large(joint: &JointScore) -> bool {
     error_share(joint).is_some_and(|share| share > LARGE)
 }
 
 /// Whether a constant would predict the torque as well.
-#[must_use]
-pub fn is_lost(joint: &JointScore) -> bool {
+fn is_lost(joint: &JointScore) -> bool {
     error_share(joint).is_some_and(|share| share >= 1.0)
 }
 
 /// Whether a joint's torque got worse by calibration.
-#[must_use]
-pub fn worse(joint: &JointScore) -> bool {
+fn worse(joint: &JointScore) -> bool {
     joint.rows > 0 && joint.rmse_calibrated > WORSE * joint.rmse_nominal
 }
 

@@ -7,7 +7,7 @@ use crate::error::Code;
 use crate::validate::{JointScore, Validation};
 
 /// Held-out rows at standstill below which that is not tested.
-pub const FEW_AT_REST: u64 = 20;
+const FEW_AT_REST: u64 = 20;
 /// Pauses in held-out data from which they say something of others.
 const FEW_PAUSES: usize = 3;
 /// Share of a joint's rows at standstill from which that is a part of what the robot does.

@@ -13,13 +13,13 @@ pub(super) struct Columns {
     pub(super) table: ColumnsTable,
     /// Why numbers need factors.
     pub(super) why: String,
-    /// What the table mends.
-    pub(super) mended: Vec<Mended>,
+    /// What the table fixes.
+    pub(super) fixed: Vec<Fixed>,
 }
 
-/// What a proposed config mends.
+/// What a proposed config fixes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Mended {
+pub(super) enum Fixed {
     Finding(Code),
     /// The refusal of positions in degrees.
     Degrees,
@@ -32,11 +32,11 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
     let mut all = Columns {
         table: settings.log.columns.clone(),
         why: String::new(),
-        mended: Vec::new(),
+        fixed: Vec::new(),
     };
     if let Some(unit) = examination.time_unit(logs, settings) {
         all.table.time_unit = Some(unit);
-        all.mended.push(Mended::Ticks);
+        all.fixed.push(Fixed::Ticks);
     }
     let is_logged = |column: fn(&JointColumns) -> bool| {
         let mut joints = examination.mappings.iter().flat_map(|(_, m)| &m.joints);
@@ -63,7 +63,7 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
             }
         }
         whys.push("Positions or velocities are logged in degrees.".to_owned());
-        all.mended.push(Mended::Degrees);
+        all.fixed.push(Fixed::Degrees);
     }
     let joints = &examination.checkup.joints;
     for check in joints.iter().filter(|check| is_turned(check)) {
@@ -81,7 +81,7 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
             }
         }
         whys.push(format!("{} is turned round.", check.joint));
-        all.mended.push(Mended::Finding(Code::SignFlip));
+        all.fixed.push(Fixed::Finding(Code::SignFlip));
     }
     let scaled: Vec<&JointCheck> = joints
         .iter()
@@ -103,11 +103,11 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
     let has_factor =
         |f: &Finding| f.subject.is_empty() || scaled.iter().any(|c| c.joint == f.subject);
     if !scaled.is_empty() && scales.all(has_factor) {
-        all.mended.push(Mended::Finding(Code::TorqueScale));
+        all.fixed.push(Fixed::Finding(Code::TorqueScale));
     }
     all.why = whys.join(" ");
     if joints.iter().any(is_moved) && reorder(examination, &mut all.table) {
-        all.mended.push(Mended::Finding(Code::JointOrder));
+        all.fixed.push(Fixed::Finding(Code::JointOrder));
     }
     all
 }

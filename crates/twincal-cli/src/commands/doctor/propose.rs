@@ -1,7 +1,7 @@
 //! The config that logs and model ask for.
 
 use super::Asked;
-use super::columns::{Mended, columns};
+use super::columns::{Fixed, columns};
 use super::examine::{Examination, Refusal};
 use super::mends::lag;
 use std::path::{Path, PathBuf};
@@ -58,13 +58,13 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
     });
     let columns = columns(examination, logs.len(), settings);
     let base = examination.checkup.base;
-    let is_mended = |what: Mended| {
-        columns.mended.contains(&what)
-            || (what == Mended::Finding(Code::BaseOrientation) && base.is_some())
+    let is_fixed = |what: Fixed| {
+        columns.fixed.contains(&what)
+            || (what == Fixed::Finding(Code::BaseOrientation) && base.is_some())
     };
-    let mends_refusal = |refusal: &Refusal| {
-        (is_mended(Mended::Ticks) && refusal.time_unit.is_some())
-            || (is_mended(Mended::Degrees) && refusal.degrees.is_some())
+    let fixes_refusal = |refusal: &Refusal| {
+        (is_fixed(Fixed::Ticks) && refusal.time_unit.is_some())
+            || (is_fixed(Fixed::Degrees) && refusal.degrees.is_some())
     };
     let mut locked = settings.locked.clone();
     locked.extend(examination.locked.clone());
@@ -75,14 +75,14 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
     let remarks = examination
         .refusals
         .iter()
-        .filter(|refusal| examination.locked.is_empty() && !mends_refusal(refusal))
+        .filter(|refusal| examination.locked.is_empty() && !fixes_refusal(refusal))
         .map(|refusal| format!("{REFUSES}: {}; {}", refusal.problem, refusal.remedy))
         .chain(
             examination
                 .findings
                 .iter()
                 .filter(|finding| finding.doubts_the_log())
-                .filter(|f| !is_mended(Mended::Finding(f.code)))
+                .filter(|f| !is_fixed(Fixed::Finding(f.code)))
                 .map(|finding| finding.message.clone()),
         )
         .chain(beside)
