@@ -36,7 +36,7 @@ Examples:
   twincal inspect run1.csv --model arm.urdf --json
 ")]
     Inspect(Inspect),
-    /// What is wrong with these logs or this model, and what to mend first.
+    /// What is wrong with these logs or this model, and how to fix it.
     #[command(
         before_help = "\
 Examples:
@@ -197,7 +197,7 @@ pub(crate) struct PrintFlags {
 /// What may be accepted with a warning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Allow {
-    /// Inertia tensors that no rigid body can have.
+    /// Physically inconsistent inertia tensors.
     UnphysicalInertia,
     /// Gibbs chains that disagree (R-hat > 1.01).
     DisagreeingChains,
@@ -206,7 +206,7 @@ pub(crate) enum Allow {
 /// The same where nothing is fitted: a model only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum AllowModel {
-    /// Inertia tensors that no rigid body can have.
+    /// Physically inconsistent inertia tensors.
     UnphysicalInertia,
 }
 

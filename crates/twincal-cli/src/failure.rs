@@ -140,11 +140,11 @@ mod tests {
 
     #[test]
     fn message_is_cut_into_problem_and_remedy() {
-        let error = Error::content(Place::line("a; b.csv", 3), "bad; number", "mend; it");
+        let error = Error::content(Place::line("a; b.csv", 3), "bad; number", "fix; it");
         let (problem, remedy) = Failure::from(error).words();
         assert_eq!(
             (problem.as_str(), remedy.as_deref()),
-            ("a; b.csv:3: bad; number", Some("mend; it"))
+            ("a; b.csv:3: bad; number", Some("fix; it"))
         );
     }
 

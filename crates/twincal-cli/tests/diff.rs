@@ -137,7 +137,7 @@ fn friction_of_another_shape_stands_apart() {
     twin(folder.path(), "sharp", &config(0.02), &dry);
     twin(folder.path(), "soft", &config(0.4), &dry);
     let (words, json) = diff(folder.path(), "sharp", "soft");
-    let heading = "Not the same quantity: friction turns round within 0.02 → 0.4 rad/s (m/s)\n";
+    let heading = "Not the same quantity: friction reverses within 0.02 → 0.4 rad/s (m/s)\n";
     let (first, last) = words.out.split_once(heading).unwrap();
     assert!(
         last.contains("changed: Coulomb friction on shoulder"),
@@ -146,7 +146,7 @@ fn friction_of_another_shape_stands_apart() {
     );
     assert!(!first.contains("Coulomb"), "{}", words.out);
     assert!(
-        last.contains("warning: friction turns round within 0.02"),
+        last.contains("warning: friction reverses within 0.02"),
         "{}",
         words.out
     );

@@ -81,7 +81,7 @@ fn print(changes: &[Change], velocities: [f64; 2], terminal: &mut Terminal) {
     }
     let [before, after] = velocities;
     terminal.heading(&format!(
-        "Not the same quantity: friction turns round within {before} → {after} rad/s (m/s)"
+        "Not the same quantity: friction reverses within {before} → {after} rad/s (m/s)"
     ));
     let same = print_changed(&other, terminal);
     if same > 0 {

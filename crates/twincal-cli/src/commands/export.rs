@@ -498,7 +498,7 @@ fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
         .iter()
         .partition(|residual| residual.pip >= 0.5);
     if !told.is_empty() {
-        terminal.heading("Stays beside it: the residual");
+        terminal.heading("Not representable in the file: the residual");
     }
     for residual in told.iter().take(TOLD) {
         let text = format!(

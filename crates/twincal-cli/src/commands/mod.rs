@@ -122,7 +122,7 @@ fn require_strict(strict: bool, findings: &[Finding]) -> Outcome<()> {
     {
         Some(finding) => Err(Failure::usage(
             finding.message.clone(),
-            "mend the log, or leave out --strict to go on",
+            "fix the log, or leave out --strict to go on",
         )),
         None => Ok(()),
     }

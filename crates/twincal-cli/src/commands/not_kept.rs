@@ -41,7 +41,7 @@ pub(super) fn others(calibration: &Calibration, terminal: &mut Terminal) {
     if table.is_empty() && rare == 0 && dropped.is_empty() {
         return;
     }
-    terminal.heading("Weighed and not kept");
+    terminal.heading("Not selected");
     print_table(&table, terminal);
     if !table.is_empty() {
         paragraph(VALUE, terminal);

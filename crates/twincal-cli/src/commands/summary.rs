@@ -11,7 +11,7 @@ use twincal::{Code, Finding, Severity};
 use twincal_io::report;
 
 /// What to do about a log that contradicts the model.
-pub(super) const MENDS: &str = "`twincal init` with this log and model writes a twincal.toml that mends it, where it is a mistake of columns, signs or units";
+pub(super) const MENDS: &str = "`twincal init` with this log and model writes a twincal.toml that fixes it, where it is a mistake of columns, signs or units";
 /// What stands where ± does not describe a number.
 pub(super) const ENDS: &str =
     "a (b … c): median and both ends of the 95 % interval, where ± would mislead";
@@ -476,7 +476,7 @@ mod tests {
         );
         let same = ["", "a", "b"].map(|joint| finding(joint, "same"));
         assert_eq!(told(&same), ["  warning: a, b: same"]);
-        let group = "a, b and 4 more say the same";
+        let group = "a, b and 4 more are equivalent";
         assert_eq!(about(&["a, b, c, d, e, f"], group), "");
         assert_eq!(about(&["run1.csv"], group), "run1.csv: ");
     }

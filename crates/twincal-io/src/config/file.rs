@@ -72,7 +72,7 @@ pub struct BaseTable {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Allow {
-    /// Inertia tensors that no rigid body can have.
+    /// Physically inconsistent inertia tensors.
     UnphysicalInertia,
     /// Gibbs chains that disagree (R̂ > 1.01): their numbers are reported and labelled.
     DisagreeingChains,

@@ -61,7 +61,7 @@ impl Proposal {
                 .collect();
             comment(
                 &mut text,
-                "The log has no column for these; they are taken to stand still here (rad or m).",
+                "The log has no column for these; they are taken to be at rest here (rad or m).",
             );
             let _ = writeln!(text, "locked = {{ {} }}", joints.join(", "));
         }

@@ -13,7 +13,7 @@ use twincal::robot::Inertia;
 use twincal::write_back::WriteBack;
 
 /// What a file says at a link whose inertia is no body's.
-const NO_BODY: &str = "<!-- twincal: no rigid body can have the inertia that was found here. These numbers are a body with the \
+const NO_BODY: &str = "<!-- twincal: the inertia that was found here is physically inconsistent. These numbers are a body with the \
                        nearest torque: do not read them as mass or inertia of this link. -->";
 
 /// The user's file with the change, byte by byte the same elsewhere.

@@ -38,7 +38,7 @@ pub(super) fn sentences(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<
         .collect();
     if !still.is_empty() {
         out.push(format!(
-            "Stood still for most of the logs: {}. What is found on them rests on the other rows.",
+            "At rest in most of the logs: {}. What is found on them rests on the other rows.",
             list(&still)
         ));
     }

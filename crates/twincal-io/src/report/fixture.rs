@@ -294,7 +294,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
                 Code::JointNotDriven,
                 names[names.len() - 1],
                 format!(
-                    "joint `{}`: 9.3 % of the rows stand still (|q̇| < 0.02 rad/s); its friction is known less well than the \
+                    "joint `{}`: at rest in 9.3 % of the rows (|q̇| < 0.02 rad/s); its friction is known less well than the \
                      numbers say, move it more.",
                     names[names.len() - 1]
                 ),

@@ -17,7 +17,7 @@ pub(super) fn reliability(validation: &Validation) -> Table {
         "in 80 %",
         "in 90 %",
         "in 95 %",
-        "off uniform (PIT)",
+        "PIT deviation",
         "by chance",
     ]);
     let mut add = |name: &str, levels: &[(f64, f64)], distance: f64, chance: f64| {

@@ -404,11 +404,11 @@ mod tests {
         let said = |text: Option<String>| text.unwrap_or_default();
         assert_eq!(
             said(of(120, 4)),
-            "Standstill is hardly tested: elbow stands still in 12.0\u{202f}% of the logs' rows, but only 4 held-out rows are at rest (error 0.431 → 0.0546 N·m, 87.3\u{202f}% less)."
+            "Standstill is hardly tested: elbow is at rest in 12.0\u{202f}% of the logs' rows, but only 4 held-out rows are at rest (error 0.431 → 0.0546 N·m, 87.3\u{202f}% less)."
         );
         assert_eq!(
             said(of(120, 0)),
-            "Standstill is not tested: elbow stands still in 12.0\u{202f}% of the logs' rows, but no held-out row is at rest."
+            "Standstill is not tested: elbow is at rest in 12.0\u{202f}% of the logs' rows, but no held-out row is at rest."
         );
         assert_eq!(of(120, 40), None);
         assert_eq!(of(10, 4), None);

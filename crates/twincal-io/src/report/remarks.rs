@@ -110,7 +110,7 @@ fn size_of_gravity(component: &ComponentSummary, calibration: &Calibration) -> O
     let (before, after) = (size(nominal), size([0, 1, 2].map(changed)));
     ((after / before - 1.0).abs() > SIZE_OF_GRAVITY).then(|| {
         format!(
-            "gravity would be {} m/s²: it stands in for masses, springs or the scale of torque",
+            "gravity would be {} m/s²: it makes up for wrong masses, springs or a wrong scale of torque",
             number(after, 3)
         )
     })

@@ -20,7 +20,7 @@ fn shown(shape: Shape, pit: &Pit, coverage: &[(f64, f64)], rows: &str) -> String
         (Shape::Above, _) => format!("{} of the {rows}", percent(above)),
         (Shape::Below, _) => format!("{} of the {rows}", percent(1.0 - above)),
         (_, Some((_, seen))) => format!("{} of the {rows} in 50 % intervals", percent(*seen)),
-        (_, None) => format!("PIT off uniform by {}", number(pit.distance, 2)),
+        (_, None) => format!("PIT deviation {}", number(pit.distance, 2)),
     }
 }
 
@@ -157,8 +157,8 @@ fn off_to_sides(own: &[(Shape, &str, String)], slightly: bool) -> Option<String>
     let each: Vec<String> = each.collect();
     let words = match (same, slightly) {
         (true, _) => words(*first, slightly),
-        (false, false) => "torque lies to one side of the prediction too often",
-        (false, true) => "torque lies to one side of the prediction a little too often",
+        (false, false) => "predictions are biased",
+        (false, true) => "predictions are slightly biased",
     };
     Some(format!("{subject}: their {words} ({}).", each.join("; ")))
 }
@@ -232,7 +232,7 @@ pub(super) mod tests {
         );
         assert_eq!(
             of(&[(below, "a"), (above, "b")], false),
-            "Joints a and b: their torque lies to one side of the prediction too often (a below: 70 %; b above: 70 %)."
+            "Joints a and b: their predictions are biased (a below: 70 %; b above: 70 %)."
         );
     }
 

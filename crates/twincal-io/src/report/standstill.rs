@@ -70,7 +70,7 @@ pub(super) fn hardly_at_rest(calibration: &Calibration, joints: &[Joint<'_>]) ->
         format!(" (error {})", change(own.rmse, pooled_unit(joints)))
     });
     Some(format!(
-        "Standstill is {tested} tested: {joint} stands still in {} of the logs' rows, {held_out}{error}.",
+        "Standstill is {tested} tested: {joint} is at rest in {} of the logs' rows, {held_out}{error}.",
         percent(share)
     ))
 }

@@ -29,7 +29,10 @@ pub fn reason(component: &ComponentSummary) -> String {
             format!("same torque as {others}, {kind}; P(at least one) {pip}")
         }
         StatusReason::NoRigidBody { share } => {
-            format!("no rigid body in {} of the draws", percent(1.0 - share))
+            format!(
+                "physically inconsistent in {} of the draws",
+                percent(1.0 - share)
+            )
         }
         StatusReason::WideAsPrior => "as wide as the prior".into(),
         StatusReason::NoTorqueInLogs => "no torque in these logs".into(),
@@ -106,7 +109,7 @@ mod tests {
         assert!(of(same(Alike::TheseLogs)).contains(", in these logs only;"));
         assert_eq!(
             of(StatusReason::NoRigidBody { share: 0.028 }),
-            "no rigid body in 97.2\u{202f}% of the draws"
+            "physically inconsistent in 97.2\u{202f}% of the draws"
         );
         assert_eq!(of(StatusReason::Probability), "");
     }

@@ -156,7 +156,7 @@ fn fixed(reason: Code) -> Option<&'static str> {
             "Better than the model alone, but on most joints the error that is left is large."
         }
         Code::UnphysicalLinks => {
-            "With care: what was found of several links is no rigid body. Is this the robot's model?"
+            "With care: the inertia found of several links is physically inconsistent. Is this the robot's model?"
         }
         Code::JointTorqueWorse => {
             "With care: better than the model alone, but on some joints torque got worse."

@@ -242,7 +242,7 @@ pub fn hindrances(before: &Twin, after: &Twin) -> Result<Vec<Finding>> {
         return Ok(Vec::new());
     }
     let message = format!(
-        "friction turns round within {old} rad/s (m/s) before and {new} after: its numbers differ for that alone; fit both with \
+        "friction reverses within {old} rad/s (m/s) before and {new} after: its numbers differ for that alone; fit both with \
          [library] coulomb_velocity = {old}"
     );
     Ok(vec![Finding::new(
@@ -322,7 +322,7 @@ impl Side {
     }
 }
 
-/// What became of a component; `apart` where friction turns round within another velocity.
+/// What became of a component; `apart` where friction reverses within another velocity.
 fn change(
     name: &str,
     status: [Option<Status>; 2],

@@ -196,7 +196,7 @@ codes! {
     JointIntervalsWide = "joint_intervals_wide",
     /// A joint is hardly driven in a log.
     JointNotDriven = "joint_not_driven",
-    /// A joint stands still in all training logs.
+    /// A joint is at rest in all training logs.
     JointNotExcited = "joint_not_excited",
     /// The joints of a log seem exchanged.
     JointOrder = "joint_order",
@@ -318,7 +318,7 @@ codes! {
     Resampled = "resampled",
     /// The residual is correlated, which the settings ignore.
     ResidualCorrelated = "residual_correlated",
-    /// A joint stands still in the logs and hardly in held-out rows.
+    /// A joint is at rest in the logs and hardly in held-out rows.
     RestNotTested = "rest_not_tested",
     /// Gear ripple was found in the residual and added to the candidates.
     RippleAdded = "ripple_added",
@@ -340,7 +340,7 @@ codes! {
     SmallerLibrary = "smaller_library",
     /// Torque repeats its last value for some rows.
     StaleTorque = "stale_torque",
-    /// A joint stands still in some rows; its torque there is not fitted.
+    /// A joint is at rest in some rows; its torque there is not fitted.
     Standstill = "standstill",
     /// A temperature that is missing in some chapters was left out.
     TemperatureLeftOut = "temperature_left_out",
@@ -392,11 +392,11 @@ codes! {
     UnknownElements = "unknown_elements",
     /// A joint has no name.
     UnnamedJoint = "unnamed_joint",
-    /// The inertia of a link in the model is that of no rigid body.
+    /// The inertia of a link in the model is physically inconsistent.
     UnphysicalInertia = "unphysical_inertia",
-    /// What was found of a link is that of no rigid body.
+    /// The inertia that was found of a link is physically inconsistent.
     UnphysicalInertiaFound = "unphysical_inertia_found",
-    /// What was found of several links is no rigid body.
+    /// The inertia that was found of several links is physically inconsistent.
     UnphysicalLinks = "unphysical_links",
     /// Cells of a table are no numbers.
     UnreadableRows = "unreadable_rows",

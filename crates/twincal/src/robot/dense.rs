@@ -55,7 +55,7 @@ pub(super) fn report(
         };
         let message = format!(
             "link `{link}`: {} kg with a radius of gyration of {} mm, where a ball of tungsten has {} mm: a point mass. What its real tensor adds \
-             will be told as motor inertia of joint `{joint}`{or_of}; give the link its own tensor in the model where you know it",
+             will be reported as motor inertia of joint `{joint}`{or_of}; give the link its own tensor in the model where you know it",
             significant(mass, 3),
             significant(1e3 * radius, 2),
             significant(1e3 * (0.4_f64).sqrt() * ball, 2)

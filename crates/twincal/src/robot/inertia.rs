@@ -154,7 +154,7 @@ pub(crate) fn check(
             super::dense::CODE,
             link,
             format!(
-                "link `{link}`: {mass} kg with inertia tensor 0: taken as a point mass. What its real tensor adds will be told as motor inertia \
+                "link `{link}`: {mass} kg with inertia tensor 0: taken as a point mass. What its real tensor adds will be reported as motor inertia \
                  of its joint or as the tensor of another link; give the link its own in the model where you know it"
             ),
             1,

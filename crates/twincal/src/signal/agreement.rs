@@ -66,8 +66,8 @@ pub(crate) fn findings(names: &[&str], log: &str, agreement: &[Option<Agreement>
             let Agreement { r2, slope } = agreement;
             if agreement.is_opposite() {
                 let message = format!(
-                    "joint `{name}` of {log}: the logged velocity is the change of position with the opposite sign (slope {slope:.3}): one \
-                     of the two is turned round; give that one the factor -1 in [columns.factor]: q or qd = {{ {name:?} = -1.0 }}"
+                    "joint `{name}` of {log}: the logged velocity is the change of position with the opposite sign (slope {slope:.3}): the sign \
+                     of one of the two is reversed; give that one the factor -1 in [columns.factor]: q or qd = {{ {name:?} = -1.0 }}"
                 );
                 return Finding::new(Severity::Warning, OPPOSITE, *name, message, 0);
             }

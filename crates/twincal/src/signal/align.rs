@@ -286,7 +286,7 @@ fn align(
                 "no stretch between cuts is longer than the motion filter ({:.3} s)",
                 2.0 * motion_half_seconds(cutoff)
             ),
-            remedy: "mend the gaps and NaN rows, or raise [signal] cutoff_hz".into(),
+            remedy: "fix the gaps and NaN rows, or raise [signal] cutoff_hz".into(),
         });
     }
     findings.push(Finding::new(
@@ -541,7 +541,7 @@ fn report_standstill(
         let (severity, code, rest) = if still as f64 >= HARDLY_MOVES * all as f64 {
             (Severity::Warning, Code::JointStandsStill, "does not move")
         } else {
-            (Severity::Note, Code::Standstill, "stands still")
+            (Severity::Note, Code::Standstill, "is at rest")
         };
         let limit = pipeline.standstill_velocity[joint];
         // A coarse encoder tells slow motion from standing still only where the filter leaves little of its steps.

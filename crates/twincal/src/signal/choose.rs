@@ -164,11 +164,11 @@ fn unexcited(joints: &[JointFacts], still: &[bool], limits: &[f64]) -> Result<Ve
     if names(false).is_empty() {
         return Err(Error::Refused {
             problem: format!(
-                "no excitation: every joint stands still in all training logs ({})",
+                "no excitation: every joint is at rest in all training logs ({})",
                 listed(names(true), ", ")
             ),
             remedy: if limits.iter().any(|limit| *limit > COULOMB_VELOCITY) {
-                "a coarse encoder cannot tell slower motion from standing still: record faster motion, log the velocity, or \
+                "a coarse encoder cannot distinguish slower motion from rest: record faster motion, log the velocity, or \
                  lower [signal] cutoff_hz"
                     .into()
             } else {
@@ -186,7 +186,7 @@ fn unexcited(joints: &[JointFacts], still: &[bool], limits: &[f64]) -> Result<Ve
                 Code::JointNotExcited,
                 &joint.name,
                 format!(
-                    "joint `{}` stands still in all training logs: its own effects cannot be seen",
+                    "joint `{}` is at rest in all training logs: its own effects cannot be seen",
                     joint.name
                 ),
                 0,
@@ -495,7 +495,7 @@ fn limits(
             problem: format!(
                 "the longest stretch without a cut is {longest:.3} s; filters at {cutoff} Hz need {needed:.3} s for {FEWEST_ROWS} rows"
             ),
-            remedy: "record longer, mend the gaps, raise [signal] cutoff_hz, or set it to 0".into(),
+            remedy: "record longer, fix the gaps, raise [signal] cutoff_hz, or set it to 0".into(),
         });
     }
     Ok((rate, findings))

@@ -38,7 +38,7 @@ pub struct JointScore {
     /// RMSE of the calibrated torque (model average), N·m.
     #[serde(deserialize_with = "nan_if_null")]
     pub rmse_calibrated: f64,
-    /// Mean of measured less calibrated torque, N·m: beside the RMSE it says how much of the error lies to one side.
+    /// Mean of measured less calibrated torque, N·m: beside the RMSE it says how much of the error is bias.
     #[serde(default = "nan", deserialize_with = "nan_if_null")]
     pub bias: f64,
     /// Share of rows inside the 95 % interval.

@@ -80,7 +80,7 @@ pub(super) fn columns(examination: &Examination, logs: usize, settings: &Setting
                 multiply(factor, examination, &check.joint, -1.0);
             }
         }
-        whys.push(format!("{} is turned round.", check.joint));
+        whys.push(format!("The sign of {} is reversed.", check.joint));
         all.fixed.push(Fixed::Finding(Code::SignFlip));
     }
     let scaled: Vec<&JointCheck> = joints

@@ -197,7 +197,7 @@ impl Examination {
                 quoted(&missing)
             ),
             remedy: format!(
-                "where they stand still, say so: [model] locked = {{ {} }}; here they are taken to",
+                "where they are at rest, say so: [model] locked = {{ {} }}; here they are taken to be",
                 listed(&entries, ", ")
             ),
             exit_code: crate::failure::INPUT,

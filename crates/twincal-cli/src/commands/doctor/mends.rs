@@ -163,7 +163,7 @@ const ORDER: &[(Code, &str)] = &[
         "log each sample of the controller once, with the controller's stamp",
     ),
     (Code::SlowerChannels, "log all channels at one rate"),
-    (Code::ShortSegments, "record longer, or mend the gaps"),
+    (Code::ShortSegments, "record longer, or fix the gaps"),
     (
         Code::Contact,
         "nothing: left out; cut the log there to be sure",
@@ -312,7 +312,7 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
         let joint = unseen.joint.as_deref().unwrap_or("several joints at once");
         all.push(Mend {
             problem: format!(
-                "the logs show {logs} of {robot} independent directions; {} more would come from moving {joint}",
+                "the logs show {logs} of {robot} identifiable combinations; {} more would come from moving {joint}",
                 unseen.directions
             ),
             how: format!(

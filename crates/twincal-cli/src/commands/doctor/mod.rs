@@ -1,4 +1,4 @@
-//! `twincal doctor`: what is wrong with logs or model, what to mend first, and a config to begin with; `twincal init`
+//! `twincal doctor`: what is wrong with logs or model, what to fix first, and a config to begin with; `twincal init`
 //! writes that config.
 
 mod columns;
@@ -217,9 +217,9 @@ fn diagnosis(examination: Examination, asked: &Asked) -> Diagnosis {
     // Refusals are mends of now.
     let to_mend = match (count(When::Now), count(When::NextLog)) {
         (0, 0) => String::new(),
-        (now, 0) => format!("; {now} to mend"),
+        (now, 0) => format!("; {now} to fix"),
         (0, next) => format!("; {next} to do better in the next log"),
-        (now, next) => format!("; {now} to mend, {next} to do better in the next log"),
+        (now, next) => format!("; {now} to fix, {next} to do better in the next log"),
     };
     let verdict = match (refused.count(), degraded) {
         (0, 0) => format!("fit would go ahead{to_mend}"),

@@ -155,7 +155,7 @@ fn worse_alone(errors: &[JointTorqueError], format: &str) -> Option<String> {
         .collect();
     (!worse.is_empty()).then(|| {
         format!(
-            "this {format} alone is WORSE than your model on {}: add what stays beside it (--to c, rust, python or json)",
+            "this {format} alone is WORSE than your model on {}: add what it cannot represent (--to c, rust, python or json)",
             worse.join(", ")
         )
     })
@@ -177,7 +177,7 @@ mod tests {
             worse_alone(&errors, "URDF")
         };
         assert_eq!(of([1.0, 20.1]), None);
-        let said = "this URDF alone is WORSE than your model on b (20.0 -> 30.0): add what stays beside it (--to c, rust, python or json)";
+        let said = "this URDF alone is WORSE than your model on b (20.0 -> 30.0): add what it cannot represent (--to c, rust, python or json)";
         assert_eq!(of([1.0, 30.0]).as_deref(), Some(said));
     }
 }

@@ -170,7 +170,7 @@ pub(in super::super) fn directions<'a>(
         return;
     };
     terminal.heading(&format!(
-        "What these logs show: {logs} of {robot} independent directions"
+        "What these logs show: {logs} of {robot} identifiable combinations"
     ));
     let all = unseen.len();
     for words in unseen.take(SHOWN) {

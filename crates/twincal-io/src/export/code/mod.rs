@@ -44,7 +44,7 @@ fn notes(evaluator: &Evaluator, about: &[String]) -> Vec<String> {
         "In: position, velocity, acceleration per joint; rad or m, SI units.",
         "Out: calibrated torque, and the ends of its 95 % interval for torque as",
         "measured. 1 (true) outside the data that the twin was fitted to, else 0.",
-        "While a joint stands still, stiction may add up to its Coulomb friction.",
+        "While a joint is at rest, stiction may add up to its Coulomb friction.",
         "Joints:",
     ];
     let lines = about.iter().cloned().chain(told.map(str::to_owned));

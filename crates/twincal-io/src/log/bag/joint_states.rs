@@ -353,7 +353,7 @@ impl<'a> JointStates<'a> {
     fn unfit(&mut self, problem: String) -> Result<()> {
         self.unfit_with(
             problem,
-            "mend the publisher, or drop and count such messages with --lenient",
+            "fix the publisher, or drop and count such messages with --lenient",
         )
     }
 

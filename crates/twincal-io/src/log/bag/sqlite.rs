@@ -31,7 +31,7 @@ pub(super) fn read(
         Error::content(
             Place::file(file),
             format!("is not a whole SQLite bag: {e}"),
-            "copy it again, or mend it with `ros2 bag convert`",
+            "copy it again, or repair it with `ros2 bag convert`",
         )
     };
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY
@@ -93,7 +93,7 @@ pub(super) fn read(
             return Err(Error::content(
                 Place::file(file),
                 format!("a message is of topic {topic}, which is not in the table `topics`"),
-                "copy it again, or mend it with `ros2 bag convert`",
+                "copy it again, or repair it with `ros2 bag convert`",
             ));
         };
         let data = row.get_ref(2).map_err(broken)?;
@@ -162,7 +162,7 @@ fn refuse_unfinished(path: &Path, file: &str) -> Result<()> {
                 format!(
                     "is still being written, or its recorder was killed: `{file}{ending}` holds {bytes} bytes that belong to it"
                 ),
-                "end the recording; after a crash `sqlite3 FILE .recover` or `ros2 bag reindex` mends it",
+                "end the recording; after a crash `sqlite3 FILE .recover` or `ros2 bag reindex` repairs it",
             ));
         }
     }

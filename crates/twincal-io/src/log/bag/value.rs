@@ -225,7 +225,7 @@ pub(super) fn find(root: &Value, steps: &[Step], joint: Joint<'_>) -> Result<Fou
         };
         if index >= length {
             return Err(format!(
-                "`{before}` has {length} entries, the names beside it have more; mend the publisher"
+                "`{before}` has {length} entries, the names beside it have more; fix the publisher"
             ));
         }
         found.at.push(index);

@@ -234,7 +234,7 @@ impl<R: Read> Table<R> {
             {
                 "decimal commas? Export with a decimal point or another delimiter; --lenient drops such rows"
             } else {
-                "mend the line, or drop and count such rows with --lenient"
+                "fix the line, or drop and count such rows with --lenient"
             };
             return Err(Error::content(
                 Place::line(&self.name, line.number),
@@ -263,7 +263,7 @@ impl<R: Read> Table<R> {
                     "`{shown}` in column `{}` is not a number",
                     self.header[column]
                 ),
-                "mend the cell (leave it empty if there is no value), or drop and count such rows with --lenient",
+                "fix the cell (leave it empty if there is no value), or drop and count such rows with --lenient",
             ));
         }
         Ok(())

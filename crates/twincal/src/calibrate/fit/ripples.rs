@@ -105,7 +105,7 @@ impl Seen {
             joint.clone(),
             format!(
                 "joint `{joint}`: what the model leaves over repeats {periods} times per {per}, {:.3} {unit} at its height, {:.0} % of the \
-                 variance of its rows away from where it turns round, over {} periods forwards and {} backwards, {:.0} nats: {what}\
+                 variance of its rows away from its velocity reversals, over {} periods forwards and {} backwards, {:.0} nats: {what}\
                  [library] ripple = {{ {joint:?} = {periods} }} {remedy}",
                 ripple.amplitude,
                 100.0 * ripple.share,
@@ -127,7 +127,7 @@ fn per(kind: JointKind) -> f64 {
     }
 }
 
-/// Every `step`-th row of a joint away from where it turns round, at most [`ROWS`]; and that step.
+/// Every `step`-th row of a joint away from its velocity reversals, at most [`ROWS`]; and that step.
 fn rows(training: &[Part<'_>], joint: usize, beta: &[f64], reach: f64) -> (Vec<Row>, usize) {
     let mut rows = Vec::new();
     for part in training {
@@ -210,7 +210,7 @@ mod tests {
                 "{said}"
             );
             assert!(
-                said.contains("N·m at its height, 70 % of the variance of its rows away from where it turns round, over 28 periods forwards and 27 backwards, 110 nats"),
+                said.contains("N·m at its height, 70 % of the variance of its rows away from its velocity reversals, over 28 periods forwards and 27 backwards, 110 nats"),
                 "{said}"
             );
             assert!(

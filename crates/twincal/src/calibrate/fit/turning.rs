@@ -158,7 +158,7 @@ impl Way {
             Code::CoulombVelocity,
             "",
             format!(
-                "friction turns round within {velocity} rad/s (m/s) instead of the usual {usual}: the residual is {:.0} % smaller, \
+                "friction reverses within {velocity} rad/s (m/s) instead of the usual {usual}: the residual is {:.0} % smaller, \
                  {gain:.0} nats; [library] coulomb_velocity sets another",
                 100.0 * share
             ),

@@ -76,7 +76,7 @@ pub struct ComponentSummary {
     /// is. `None` for what is not likelier in than not, and in results of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub told_as: Option<Vec<String>>,
-    /// True where no rigid body has what was found of its link, whatever else is in: torque is right, the numbers are no mass or inertia.
+    /// True where the inertia that was found of its link is physically inconsistent, whatever else is in: torque is right, the numbers are no mass or inertia.
     #[serde(default)]
     pub no_rigid_body: bool,
     /// Share of the posterior draws in which its link, with all that was found of it, is a rigid body; only where that is less than one half.

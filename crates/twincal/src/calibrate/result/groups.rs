@@ -384,7 +384,7 @@ struct Instead {
 
 impl Calibration {
     /// Groups of which the prior alone prefers a member, in a sentence for those alike in every motion and one for those alike in these logs:
-    /// "told as either in every motion, which the prior alone decides (the first is preferred): payload or tool.tensor; …".
+    /// "not distinguishable in every motion, the prior alone prefers the first: payload or tool.tensor; …".
     #[must_use]
     pub fn told_apart_by_the_prior(&self) -> Vec<String> {
         let kinds = [
@@ -411,7 +411,7 @@ impl Calibration {
             );
             (!told.is_empty()).then(|| {
                 format!(
-                    "told as either {place}, which the prior alone decides (the first is preferred): {}",
+                    "not distinguishable {place}, the prior alone prefers the first: {}",
                     told.join("; ")
                 )
             })
@@ -446,12 +446,10 @@ fn words(names: &[&str], pip: f64, (alike, whole): (Alike, bool), settled: bool)
     let same = match (alike, whole) {
         (Alike::EveryMotion, true) => "can explain the same torque in every motion of this robot",
         (Alike::EveryMotion, false) => {
-            "can stand in for one another in every motion of this robot, directly or by way of others"
+            "are equivalent in every motion of this robot, directly or by way of others"
         }
-        (Alike::TheseLogs, true) => "say the same in these logs",
-        (Alike::TheseLogs, false) => {
-            "can stand in for one another in these logs, directly or by way of others"
-        }
+        (Alike::TheseLogs, true) => "are equivalent in these logs",
+        (Alike::TheseLogs, false) => "are equivalent in these logs, directly or by way of others",
     };
     let pip = if pip > 0.999 {
         "> 0.999".to_owned()

@@ -16,7 +16,7 @@ const CONTRADICTS: f64 = 0.05;
 /// Share below which it is worth telling.
 const WORTH_TELLING: f64 = 0.5;
 /// Behind the words of a component that contradicts every rigid body.
-const NO_BODY: &str = "; no rigid body has such an inertia";
+const NO_BODY: &str = "; physically inconsistent inertia";
 /// Rounding in the triangle inequality, as a share of the largest moment.
 const ROUNDING: f64 = 1e-9;
 /// The same share for draws: a point mass or a thin rod lies on the bound, and half of what is found of it beyond.
