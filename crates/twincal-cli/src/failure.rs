@@ -30,7 +30,7 @@ pub(crate) enum Failure {
     Usage {
         /// What is wrong.
         problem: String,
-        /// How to mend it.
+        /// How to fix it.
         remedy: String,
     },
 }
@@ -64,7 +64,7 @@ impl Failure {
         })
     }
 
-    /// What is wrong, and how to mend it.
+    /// What is wrong, and how to fix it.
     pub(crate) fn words(&self) -> (String, Option<String>) {
         match self {
             Self::Usage { problem, remedy } | Self::Unprinted { problem, remedy } => {
@@ -83,7 +83,7 @@ impl Failure {
     }
 }
 
-/// The part of an error that says how to mend it; it stands at the end of its message.
+/// The part of an error that says how to fix it; it stands at the end of its message.
 fn remedy_of(error: &Error) -> Option<&str> {
     use twincal::Error as Core;
     match error {

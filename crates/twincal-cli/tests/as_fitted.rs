@@ -204,7 +204,7 @@ fn a_factor_that_cannot_be_this_logs_is_doubted() {
     ] {
         assert!(doubts[1].contains(words), "{words}: {doubts:?}");
     }
-    // The remedy mends it.
+    // The remedy fixes it.
     let own = "[columns.factor]\nq = 1.0\nqd = 1.0\nqdd = 1.0\n";
     fs::write(place().join("radians.toml"), own).unwrap();
     let (_, findings) = check("radians.csv", &["--config", "radians.toml"], 0);

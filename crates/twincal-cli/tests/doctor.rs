@@ -1,4 +1,4 @@
-//! `doctor` and `init`: what is wrong with a log is named with its number and its mend, also where `fit` refuses.
+//! `doctor` and `init`: what is wrong with a log is named with its number and its remedy, also where `fit` refuses.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
 mod common;
@@ -15,11 +15,11 @@ fn doctor(folder: &TempDir, code: i32) -> Value {
     let done = with_config(folder.path(), "doctor", "look.toml", &["--json"]).expect(code);
     let diagnosis: Value = serde_json::from_str(&done.out).unwrap();
     // whatever is wrong, there is something to do
-    for mend in diagnosis["mends"].as_array().unwrap() {
-        let how = mend["how"].as_str().unwrap();
+    for remedy in diagnosis["remedies"].as_array().unwrap() {
+        let how = remedy["how"].as_str().unwrap();
         assert!(
             !how.is_empty() && !how.contains("read the message"),
-            "{mend}"
+            "{remedy}"
         );
     }
     diagnosis
@@ -46,16 +46,16 @@ fn add(folder: &TempDir, name: &str, lines: &str) {
     fs::write(folder.path().join(name), format!("{LOOK}{lines}")).unwrap();
 }
 
-fn first_mend(diagnosis: &Value) -> (&str, &str) {
-    let mend = &diagnosis["mends"][0];
+fn first_remedy(diagnosis: &Value) -> (&str, &str) {
+    let remedy = &diagnosis["remedies"][0];
     (
-        mend["problem"].as_str().unwrap(),
-        mend["how"].as_str().unwrap(),
+        remedy["problem"].as_str().unwrap(),
+        remedy["how"].as_str().unwrap(),
     )
 }
 
 #[test]
-fn a_good_log_needs_no_mend_and_everything_is_told() {
+fn a_good_log_needs_no_remedy_and_everything_is_told() {
     let folder = folder(GOOD);
     let diagnosis = doctor(&folder, 0);
     assert_eq!(codes(&diagnosis), [] as [&str; 0]);
@@ -149,7 +149,7 @@ fn case_24_a_velocity_that_is_not_the_change_of_position_is_named_and_can_be_lef
         message.contains("`elbow`") && message.contains("R² 0.75"),
         "{message}"
     );
-    let (_, how) = first_mend(&diagnosis);
+    let (_, how) = first_remedy(&diagnosis);
     assert!(how.contains("velocity = \"position\""), "{how}");
     let config = diagnosis["config"].as_str().unwrap();
     assert!(config.contains("velocity = \"position\""), "{config}");
@@ -247,7 +247,7 @@ fn what_fit_refuses_is_told_and_looked_through_all_the_same() {
         ..GOOD
     });
     let diagnosis = doctor(&degrees, 2);
-    assert!(first_mend(&diagnosis).0.contains("degrees"));
+    assert!(first_remedy(&diagnosis).0.contains("degrees"));
     assert!(
         diagnosis["converted"][0]
             .as_str()
@@ -260,7 +260,7 @@ fn what_fit_refuses_is_told_and_looked_through_all_the_same() {
         ..GOOD
     });
     let diagnosis = doctor(&milliseconds, 2);
-    assert!(first_mend(&diagnosis).1.contains("time_unit = \"ms\""));
+    assert!(first_remedy(&diagnosis).1.contains("time_unit = \"ms\""));
     let config = diagnosis["config"].as_str().unwrap();
     assert!(config.contains("\n[columns]\ntime_unit = \"ms\"\n") && !config.contains("refuses"));
     let toml = milliseconds.path().join("ms.toml");
@@ -286,7 +286,7 @@ fn what_fit_refuses_is_told_and_looked_through_all_the_same() {
     )
     .unwrap();
     let diagnosis = doctor(&milliseconds, 2);
-    assert!(first_mend(&diagnosis).0.contains("run.csv:2"));
+    assert!(first_remedy(&diagnosis).0.contains("run.csv:2"));
 }
 
 #[test]
@@ -301,7 +301,7 @@ fn a_joint_that_is_not_logged_is_locked_for_the_look_and_in_the_config() {
     fs::write(folder.path().join("run.csv"), text).unwrap();
     let diagnosis = doctor(&folder, 2);
     assert!(
-        first_mend(&diagnosis)
+        first_remedy(&diagnosis)
             .1
             .contains("locked = { elbow = 0.0 }")
     );
@@ -323,7 +323,7 @@ fn what_only_a_fit_can_tell_is_told_by_a_trial() {
     let trial = ["--json", "--trial"];
     let done = with_config(folder.path(), "doctor", "slow.toml", &trial).expect(4);
     let diagnosis: Value = serde_json::from_str(&done.out).unwrap();
-    let (problem, how) = first_mend(&diagnosis);
+    let (problem, how) = first_remedy(&diagnosis);
     assert!(diagnosis["verdict"].as_str().unwrap().contains("refuse"));
     assert!(
         fit.err.contains(problem) && fit.err.contains(how),

@@ -98,7 +98,7 @@ fn proposed(folder: &TempDir) -> String {
 
 /// With the config that `init` writes, a log in other units, signs or order gives what the good log gives.
 #[test]
-fn init_mends_units_signs_and_order_and_the_twin_reads_new_logs_likewise() {
+fn init_fixes_units_signs_and_order_and_the_twin_reads_new_logs_likewise() {
     let good = fitted(&folder(GOOD), "look.toml", 0);
     let rmse = |result: &Value, joint: usize| {
         result["validation"]["joints"][joint]["rmse_calibrated"]

@@ -80,7 +80,7 @@ pub enum Error {
         place: Place,
         /// What is wrong, with the number.
         problem: String,
-        /// How to mend it.
+        /// How to fix it.
         remedy: String,
     },
     /// The operating system refused (exit code 2).
@@ -92,7 +92,7 @@ pub enum Error {
         action: &'static str,
         /// The system's own words.
         problem: String,
-        /// How to mend it.
+        /// How to fix it.
         remedy: String,
     },
     /// A mistake in this program, not in its input.

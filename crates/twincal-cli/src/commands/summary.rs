@@ -11,7 +11,7 @@ use twincal::{Code, Finding, Severity};
 use twincal_io::report;
 
 /// What to do about a log that contradicts the model.
-pub(super) const MENDS: &str = "`twincal init` with this log and model writes a twincal.toml that fixes it, where it is a mistake of columns, signs or units";
+pub(super) const HOW_TO_FIX: &str = "`twincal init` with this log and model writes a twincal.toml that fixes it, where it is a mistake of columns, signs or units";
 /// What stands where ± does not describe a number.
 pub(super) const ENDS: &str =
     "a (b … c): median and both ends of the 95 % interval, where ± would mislead";
@@ -35,7 +35,7 @@ fn mistakes(calibration: &Calibration, terminal: &mut Terminal) {
     }
     all().for_each(|finding| paragraph(&finding.message, terminal));
     if all().any(Finding::doubts_the_log) {
-        paragraph(MENDS, terminal);
+        paragraph(HOW_TO_FIX, terminal);
     }
     terminal.say("");
 }

@@ -205,7 +205,7 @@ pub(super) fn exchange(beside: &Beside) -> io::Result<()> {
     }
 }
 
-/// For file systems without an atomic exchange; [`recover`] mends a kill between the two renames.
+/// For file systems without an atomic exchange; [`recover`] repairs after a kill between the two renames.
 pub(super) fn exchange_in_two_steps(beside: &Beside) -> io::Result<()> {
     fs::rename(&beside.target, &beside.old)?;
     if let Err(e) = fs::rename(&beside.staging, &beside.target) {

@@ -36,7 +36,7 @@ pub struct Proposal {
     pub lag: Option<(f64, String)>,
     /// Velocity from position, and a comment on it.
     pub velocity_from_position: Option<String>,
-    /// What no key can mend, at the top.
+    /// What no key can fix, at the top.
     pub remarks: Vec<String>,
 }
 

@@ -82,14 +82,14 @@ pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict 
         };
     }
     let (limits, folded) = fold(limits(&assessment, calibration, joints));
-    // A log that is no measurement of this model has to be mended first.
-    let mended = Mistake::of(reason, Severity::Degraded).is_none();
+    // A log that is no measurement of this model has to be fixed first.
+    let usable = Mistake::of(reason, Severity::Degraded).is_none();
     Verdict {
         grounds: grounds::grounds(calibration, joints),
         limits,
         folded,
         pointers: pointers(calibration),
-        next: mended.then(|| next_recording::next(calibration)).flatten(),
+        next: usable.then(|| next_recording::next(calibration)).flatten(),
         ..verdict
     }
 }

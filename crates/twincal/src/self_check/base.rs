@@ -5,8 +5,8 @@
 //! compared with the log as it is, as every other reading is.
 
 use super::columns::is_constant;
+use super::correct::explains_more;
 use super::explain::{Explained, Reading, explain};
-use super::mend::explains_more;
 use super::parts::Parts;
 use super::sample::Sample;
 use super::shared;
@@ -21,8 +21,8 @@ use serde::{Deserialize, Serialize};
 const TURNED: f64 = 20.0;
 /// Angle within which a base is taken to stand along an axis, degrees: twice what model errors turn it by.
 const ALONG_AN_AXIS: f64 = 15.0;
-/// Size of the gravity found, as a share of the model's, within which its direction is believed: torque whose scale is further off has that to
-/// mend first, and compensated torque shows none.
+/// Size of the gravity found, as a share of the model's, within which its direction is believed: torque whose scale is further off has to be
+/// corrected first, and compensated torque shows none.
 const BELIEVED: std::ops::RangeInclusive<f64> = 0.5..=2.5;
 /// Standard error of a component from which on no joint feels it, m/s².
 const UNSEEN: f64 = 1.5;

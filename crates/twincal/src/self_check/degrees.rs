@@ -1,7 +1,7 @@
 //! Angles in degrees that motion alone does not show: torque makes sense only where they are taken so.
 
+use super::correct::{gain_of, overwhelming};
 use super::explain::{Explained, Reading, explain};
-use super::mend::{gain_of, overwhelming};
 use super::sample::Sample;
 use crate::error::{Error, Result};
 use crate::robot::{JointKind, Robot};

@@ -1,15 +1,15 @@
 //! Do log and model speak of the same robot? Degrees for radians, torque of the motor's side, turned signs, exchanged joints.
 //!
 //! Every joint's torque is compared with what the nominal model, passive friction and motor inertia can explain; a mistake
-//! is named only where another reading of the log explains by far more. Nothing is ever mended in silence: degrees are
-//! refused, all else counts as degraded data, with the mend to try.
+//! is named only where another reading of the log explains by far more. Nothing is ever corrected in silence: degrees are
+//! refused, all else counts as degraded data, with the remedy to try.
 
 mod base;
 mod columns;
 mod degrees;
 mod explain;
 mod gravity_part;
-mod mend;
+mod correct;
 mod parts;
 mod sample;
 mod shared;
@@ -179,7 +179,7 @@ impl Read {
     /// gravity, too.
     fn of(robot: &Robot, sample: &Sample, as_logged: &[Option<Explained>]) -> Self {
         let upright = Self::on(None, robot.clone(), (sample, as_logged), as_logged.to_vec());
-        let turned = match mend::is_doubtful(as_logged) {
+        let turned = match correct::is_doubtful(as_logged) {
             true => base::turned(robot, sample, as_logged),
             false => None,
         };
@@ -193,7 +193,7 @@ impl Read {
             turned.explained,
         );
         let [signs, base] =
-            [&upright, &turned].map(|read| mend::gain_of(as_logged, &read.explained));
+            [&upright, &turned].map(|read| correct::gain_of(as_logged, &read.explained));
         let more = match turned.is_as_logged() {
             true => RATHER_SIGNS,
             false => -RATHER_SIGNS,
@@ -211,9 +211,9 @@ impl Read {
         (sample, as_logged): (&Sample, &[Option<Explained>]),
         standing: Vec<Option<Explained>>,
     ) -> Self {
-        let mended = mend::mend(&robot, sample, &standing);
-        let (reading, explained) = Some(mended)
-            .filter(|(_, explained)| mend::none_less(as_logged, explained))
+        let corrected = correct::correct(&robot, sample, &standing);
+        let (reading, explained) = Some(corrected)
+            .filter(|(_, explained)| correct::none_less(as_logged, explained))
             .unwrap_or_else(|| (Reading::as_logged(robot.dof()), standing.clone()));
         Self {
             base,
@@ -452,7 +452,7 @@ fn used([largest, limit]: [f64; 2]) -> f64 {
     largest / limit
 }
 
-/// What [`mend::mend`] changed, in words.
+/// What [`correct::correct`] changed, in words.
 fn signs_and_order(
     robot: &Robot,
     reading: &Reading,

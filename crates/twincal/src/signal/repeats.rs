@@ -85,7 +85,7 @@ pub(crate) fn sampled(
     if held.iter().all(Vec::is_empty) {
         return Sampled::default();
     }
-    let (mended, dropped) = mended(&rows, &held);
+    let (repaired, dropped) = repaired(&rows, &held);
     findings.push(held_positions(
         &rows,
         names,
@@ -95,7 +95,7 @@ pub(crate) fn sampled(
     if cut.every_row {
         Sampled::default()
     } else {
-        mended
+        repaired
     }
 }
 
@@ -146,7 +146,7 @@ fn held(rows: &Rows<'_>, joint: &Travel) -> Vec<Range<usize>> {
 }
 
 /// Rows whose channels all repeat are dropped; elsewhere the motion that repeats is interpolated. Also how many were dropped.
-fn mended(rows: &Rows<'_>, held: &[Vec<Range<usize>>]) -> (Sampled, usize) {
+fn repaired(rows: &Rows<'_>, held: &[Vec<Range<usize>>]) -> (Sampled, usize) {
     let mut dropped = vec![false; rows.log.time.len()];
     let mut count = 0;
     let mut filled = Vec::with_capacity(held.len());
@@ -166,13 +166,13 @@ fn mended(rows: &Rows<'_>, held: &[Vec<Range<usize>>]) -> (Sampled, usize) {
         }
         filled.push(own);
     }
-    let mended = Sampled {
+    let repaired = Sampled {
         time: None,
         interval: None,
         dropped,
         filled,
     };
-    (mended, count)
+    (repaired, count)
 }
 
 impl Filled {

@@ -211,7 +211,7 @@ fn next(
         .iter()
         .any(twincal::Finding::doubts_the_log)
     {
-        page.paragraph(super::summary::MENDS, begin, width, detail.step);
+        page.paragraph(super::summary::HOW_TO_FIX, begin, width, detail.step);
     }
     if let Some(recording) = &answer.next {
         let text = format!("Recording: {recording}");

@@ -25,7 +25,7 @@ use twincal_io::log::{
 };
 use twincal_io::memory;
 
-/// Mistakes in units that are mended one after the other: of time, of position, of velocity.
+/// Mistakes in units that are repaired one after the other: of time, of position, of velocity.
 const MISTAKES: usize = 3;
 
 /// Why `fit` would stop.
@@ -292,14 +292,14 @@ impl Examination {
                         break;
                     }
                     let mut refusal = Refusal::from(Failure::from(error.clone()));
-                    let Some(mended) = converted(robot, log, &error, settings) else {
+                    let Some(repaired) = converted(robot, log, &error, settings) else {
                         self.refusals.push(refusal);
                         break;
                     };
-                    self.converted.push(mended.words);
-                    refusal.time_unit = mended.time;
-                    refusal.degrees = mended.degrees;
-                    *log = mended.log;
+                    self.converted.push(repaired.words);
+                    refusal.time_unit = repaired.time;
+                    refusal.degrees = repaired.degrees;
+                    *log = repaired.log;
                     self.refusals.push(refusal);
                 }
             }

@@ -3,7 +3,7 @@
 
 mod columns;
 mod examine;
-mod mends;
+mod remedies;
 mod print;
 mod propose;
 mod units;
@@ -16,8 +16,8 @@ use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use examine::{Examination, Mapping, Refusal, Trial, examine};
-use mends::{Mend, When, mends};
 use propose::propose;
+use remedies::{Remedy, When, remedies};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use twincal::Finding;
@@ -54,7 +54,7 @@ struct Diagnosis {
     directions: Option<[usize; 2]>,
     unseen: Vec<String>,
     /// Most important first.
-    mends: Vec<Mend>,
+    remedies: Vec<Remedy>,
     findings: Vec<Finding>,
     /// The proposed twincal.toml.
     config: String,
@@ -204,27 +204,27 @@ pub(super) fn init(flags: &args::Init, terminal: &mut Terminal) -> Outcome<u8> {
 }
 
 fn diagnosis(examination: Examination, asked: &Asked) -> Diagnosis {
-    let mends = mends(&examination);
+    let remedies = remedies(&examination);
     let folder = Path::new("");
     let proposal = propose(&examination, asked, folder);
     let refused = examination.refusals.iter().map(|refusal| refusal.exit_code);
     let degraded = code_of(&examination.findings);
     let exit_code = refused.clone().min().unwrap_or(degraded);
     let count = |when: When| {
-        let of = |mend: &&Mend| mend.wrong && mend.when == when;
-        mends.iter().filter(of).count()
+        let of = |remedy: &&Remedy| remedy.wrong && remedy.when == when;
+        remedies.iter().filter(of).count()
     };
-    // Refusals are mends of now.
-    let to_mend = match (count(When::Now), count(When::NextLog)) {
+    // Refusals are remedies of now.
+    let to_fix = match (count(When::Now), count(When::NextLog)) {
         (0, 0) => String::new(),
         (now, 0) => format!("; {now} to fix"),
         (0, next) => format!("; {next} to do better in the next log"),
         (now, next) => format!("; {now} to fix, {next} to do better in the next log"),
     };
     let verdict = match (refused.count(), degraded) {
-        (0, 0) => format!("fit would go ahead{to_mend}"),
-        (0, _) => format!("fit would go ahead, but call the data degraded{to_mend}"),
-        _ => format!("fit would refuse{to_mend}"),
+        (0, 0) => format!("fit would go ahead{to_fix}"),
+        (0, _) => format!("fit would go ahead, but call the data degraded{to_fix}"),
+        _ => format!("fit would refuse{to_fix}"),
     };
     let excitation = examination
         .outlook
@@ -277,7 +277,7 @@ fn diagnosis(examination: Examination, asked: &Asked) -> Diagnosis {
         components,
         directions,
         unseen,
-        mends,
+        remedies,
         findings,
         config: proposal.text(),
     }

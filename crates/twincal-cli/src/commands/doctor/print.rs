@@ -12,11 +12,11 @@ use twincal::Severity;
 use twincal::lag::{Lags, LogLag};
 use twincal::words::significant;
 
-/// Mends that come first.
+/// Remedies that come first.
 const FIRST: usize = 3;
 /// Columns that are named where they are not used.
 const NAMED: usize = 8;
-/// How lines begin that say what mends.
+/// How lines begin that hold a remedy.
 const HOW: [&str; 2] = ["     → ", "       "];
 /// Notes on a log that are shown with it.
 const OF_LOG: [Code; 6] = [
@@ -36,10 +36,10 @@ const NOTHING: &str = "–";
 
 pub(super) fn print(diagnosis: &Diagnosis, terminal: &mut Terminal) {
     terminal.heading(&format!("{}: {}", diagnosis.model, diagnosis.verdict));
-    for (number, mend) in diagnosis.mends.iter().take(FIRST).enumerate() {
+    for (number, remedy) in diagnosis.remedies.iter().take(FIRST).enumerate() {
         let number = format!("  {}. ", number + 1);
-        indented(&mend.problem, [&number, "     "], terminal);
-        indented(&mend.how, HOW, terminal);
+        indented(&remedy.problem, [&number, "     "], terminal);
+        indented(&remedy.how, HOW, terminal);
     }
     let of_model = diagnosis.findings.iter();
     for finding in of_model.filter(|finding| finding.code == Code::PointMass) {
@@ -68,11 +68,11 @@ pub(super) fn print(diagnosis: &Diagnosis, terminal: &mut Terminal) {
         let words = diagnosis.unseen.iter().map(String::as_str);
         directions(diagnosis.directions, words, terminal);
     }
-    if diagnosis.mends.len() > FIRST {
+    if diagnosis.remedies.len() > FIRST {
         terminal.heading("Also");
-        for mend in &diagnosis.mends[FIRST..] {
-            indented(&mend.problem, ["  - ", "    "], terminal);
-            indented(&mend.how, HOW, terminal);
+        for remedy in &diagnosis.remedies[FIRST..] {
+            indented(&remedy.problem, ["  - ", "    "], terminal);
+            indented(&remedy.how, HOW, terminal);
         }
         terminal.say("");
     }

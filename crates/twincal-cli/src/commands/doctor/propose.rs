@@ -3,7 +3,7 @@
 use super::Asked;
 use super::columns::{Fixed, columns};
 use super::examine::{Examination, Refusal};
-use super::mends::lag;
+use super::remedies::lag;
 use std::path::{Path, PathBuf};
 use twincal::Code;
 use twincal_io::config::{Config, LogEntry, Proposal};

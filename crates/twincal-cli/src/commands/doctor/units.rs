@@ -121,7 +121,7 @@ pub(super) fn converted(
                 };
                 let changed = units.of(robot, log)?;
                 let words = format!("{}: time was taken as {unit}", log.name());
-                // Other units may have to be mended as well.
+                // Other units may have to be repaired as well.
                 match describe(robot, &changed) {
                     Err(twincal::Error::Log { problem, .. }) if problem.contains("degrees") => {}
                     seen => drop(seen.ok()?),

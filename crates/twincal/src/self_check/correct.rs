@@ -163,14 +163,14 @@ pub(super) fn overwhelming(before: &[Option<Explained>], after: &[Option<Explain
     let any = |better: fn([f64; 2]) -> bool| {
         honest().any(|left| both().any(|(b, a)| a.driven && better([left(&b), left(&a)])))
     };
-    let mended = any(|[b, a]| b > BAD && a < GOOD);
+    let corrected = any(|[b, a]| b > BAD && a < GOOD);
     let improved = any(|[b, a]| b > DOUBTFUL && a < 0.1 * b);
-    mended && gain >= LEAST_GAIN || improved && gain >= GREAT_GAIN
+    corrected && gain >= LEAST_GAIN || improved && gain >= GREAT_GAIN
 }
 
 /// Turns signs and exchanges joints, the best step first, while that helps; unless the result is [`overwhelming`], the log as it
 /// stands but for joints whose velocity is minus the change of their position ([`consistent`]).
-pub(super) fn mend(
+pub(super) fn correct(
     robot: &Robot,
     sample: &Sample,
     as_logged: &[Option<Explained>],

@@ -1,4 +1,4 @@
-//! What to mend, the most important first, each with a number and a line to type or to write.
+//! What to fix, the most important first, each with a number and a line to type or to write.
 
 use super::columns::{is_axis, sign_line};
 use super::examine::Examination;
@@ -8,9 +8,9 @@ use twincal::self_check::JointCheck;
 use twincal::{Code, Finding, Severity};
 use twincal_io::config::key;
 
-/// One thing to mend.
+/// One thing to fix.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Mend {
+pub(super) struct Remedy {
     /// What is wrong, with its number.
     pub(super) problem: String,
     /// A command, a line of twincal.toml, or what to do where the log is made.
@@ -18,14 +18,14 @@ pub(super) struct Mend {
     /// Something is wrong, not only missing.
     #[serde(skip)]
     pub(super) wrong: bool,
-    /// When it can be mended.
+    /// When it can be fixed.
     #[serde(skip)]
     pub(super) when: When,
     #[serde(skip)]
     rank: usize,
 }
 
-/// When something can be mended.
+/// When something can be fixed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum When {
     /// With these logs.
@@ -49,15 +49,15 @@ impl When {
     }
 }
 
-/// How mends begin that ask for another recording.
+/// How remedies begin that ask for another recording.
 const NEXT: [&str; 2] = ["log ", "record "];
-/// What stands before a mend that is for the next log: of a published one there is no other.
+/// What stands before a remedy that is for the next log: of a published one there is no other.
 const FOR_THE_NEXT: &str = "nothing has to be done for this log; for the next one:";
 
 /// What to do about effects of a model that are left aside.
 const NOT_USED: &str = "nothing, if it does not act in these logs; else write its effect into the model in a form that is read";
 
-/// Findings in the order in which they matter, with what mends them.
+/// Findings in the order in which they matter, with their remedies.
 const ORDER: &[(Code, &str)] = &[
     (Code::BaseOrientation, "twincal.toml: [model] base"),
     (
@@ -257,11 +257,11 @@ const ORDER: &[(Code, &str)] = &[
 ];
 
 /// All of them, ranked.
-pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
-    let mut all: Vec<Mend> = examination
+pub(super) fn remedies(examination: &Examination) -> Vec<Remedy> {
+    let mut all: Vec<Remedy> = examination
         .refusals
         .iter()
-        .map(|refusal| Mend {
+        .map(|refusal| Remedy {
             problem: refusal.problem.clone(),
             how: match refusal.time_unit.is_some() || refusal.degrees.is_some() {
                 true => format!("{} (twincal init writes it)", refusal.remedy),
@@ -297,9 +297,9 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
         }
     }
     let first = examination.refusals.len();
-    for ((_, more), mend) in said.iter().zip(&mut all[first..]) {
+    for ((_, more), remedy) in said.iter().zip(&mut all[first..]) {
         if *more > 0 {
-            let _ = write!(mend.problem, " ({more} more like this, --json)");
+            let _ = write!(remedy.problem, " ({more} more like this, --json)");
         }
     }
     if let Some(excitation) = examination
@@ -310,7 +310,7 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
     {
         let [robot, logs] = excitation.directions;
         let joint = unseen.joint.as_deref().unwrap_or("several joints at once");
-        all.push(Mend {
+        all.push(Remedy {
             problem: format!(
                 "the logs show {logs} of {robot} identifiable combinations; {} more would come from moving {joint}",
                 unseen.directions
@@ -324,11 +324,11 @@ pub(super) fn mends(examination: &Examination) -> Vec<Mend> {
             rank: ORDER.len() + 3,
         });
     }
-    all.sort_by_key(|mend| mend.rank);
+    all.sort_by_key(|remedy| remedy.rank);
     all
 }
 
-fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
+fn of_finding(finding: &Finding, examination: &Examination) -> Remedy {
     let place = ORDER.iter().position(|(code, _)| *code == finding.code);
     let how = match (finding.code, place) {
         (Code::TorqueLag, _) if finding.subject.is_empty() => {
@@ -402,7 +402,7 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Mend {
     } else {
         2
     };
-    Mend {
+    Remedy {
         problem: if finding.subject.is_empty() || finding.message.contains(&finding.subject) {
             finding.message.clone()
         } else {
