@@ -16,7 +16,7 @@ pub(crate) const BUG: u8 = 70;
 
 /// Why a command could not do what it was asked.
 #[derive(Debug)]
-pub(crate) enum Failure {
+pub enum Failure {
     /// A file, a setting or the mathematics refused.
     Error(Error),
     /// The result is complete in its place, what was to be printed of it is lost.
@@ -36,17 +36,19 @@ pub(crate) enum Failure {
 }
 
 /// What a command ends with: an exit code, or why it could not do its work.
-pub(crate) type Outcome<T> = Result<T, Failure>;
+pub type Outcome<T> = Result<T, Failure>;
 
 impl Failure {
-    pub(crate) fn usage(problem: impl Into<String>, remedy: impl Into<String>) -> Self {
+    /// Arguments that do not fit together.
+    pub fn usage(problem: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self::Usage {
             problem: problem.into(),
             remedy: remedy.into(),
         }
     }
 
-    pub(crate) fn exit_code(&self) -> u8 {
+    /// Exit code of the program.
+    pub fn exit_code(&self) -> u8 {
         match self {
             Self::Error(Error::Core(twincal::Error::Refused { .. })) => REFUSED,
             Self::Error(Error::Internal { .. }) => BUG,
@@ -65,7 +67,8 @@ impl Failure {
     }
 
     /// What is wrong, and how to fix it.
-    pub(crate) fn words(&self) -> (String, Option<String>) {
+    #[must_use]
+    pub fn words(&self) -> (String, Option<String>) {
         match self {
             Self::Usage { problem, remedy } | Self::Unprinted { problem, remedy } => {
                 (problem.clone(), Some(remedy.clone()))

@@ -1,56 +1,7 @@
-//! The program `twincal`: words for people, JSON for programs, exit codes for both.
-//!
-//! Exit codes: 0 done · 1 a gate of `check` said no · 2 wrong usage or input · 3 done, but data was lost or degraded
-//! beyond the stated limit, or the summary could not be printed · 4 the data cannot answer the question · 70 our bug · 130 interrupted.
+//! The program `twincal`; everything it does is in the library beside it, so that the Python package runs the same.
 
-mod address_space;
-mod args;
-mod clock;
-mod commands;
-mod failure;
-mod names;
-mod progress;
-mod terminal;
-
-use clap::Parser as _;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-use terminal::Terminal;
 
 fn main() -> ExitCode {
-    address_space::prepare();
-    std::panic::set_hook(Box::new(failure::report_panic));
-    listen_to_signals();
-    let outcome = catch_unwind(AssertUnwindSafe(|| {
-        let arguments = args::Arguments::try_parse()
-            .unwrap_or_else(|error| args::with_suggestion(error).exit());
-        let mut terminal = Terminal::new();
-        let outcome = commands::run(&arguments.command, &mut terminal)
-            .and_then(|code| terminal.finish().map(|()| code));
-        match outcome {
-            Ok(code) => code,
-            Err(failure) => {
-                terminal.failure(&failure);
-                if arguments.command.wants_json() {
-                    terminal.data(&format!("{:#}\n", failure.json()));
-                    // Without standard output there is the exit code.
-                    let _ = terminal.finish();
-                }
-                failure.exit_code()
-            }
-        }
-    }));
-    ExitCode::from(outcome.unwrap_or(failure::BUG))
-}
-
-/// Ctrl-C ends the program at once with 130: what is on disk is complete at any moment. A write beyond the file-size
-/// limit must fail with an error instead of killing the program.
-fn listen_to_signals() {
-    use signal_hook::{consts, flag};
-    // Where a handler cannot be installed the system's own reaction stays.
-    let _ =
-        flag::register_conditional_shutdown(consts::SIGINT, 130, Arc::new(AtomicBool::new(true)));
-    let _ = flag::register(consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
+    ExitCode::from(twincal_cli::run(std::env::args_os()))
 }

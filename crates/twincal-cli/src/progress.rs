@@ -3,11 +3,24 @@
 use crate::clock::Stopwatch;
 use crate::terminal::{Terminal, clean};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::time::Duration;
 
 /// Seconds of a step from which on what is left of it is estimated.
 const WORTH_AN_ESTIMATE: f64 = 2.0;
+
+thread_local! {
+    /// Commands of this thread run for a program that shows nothing.
+    static SILENT: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Runs a command on this thread without any progress on standard error.
+pub(crate) fn silently<T>(command: impl FnOnce() -> T) -> T {
+    let before = SILENT.replace(true);
+    let result = command();
+    SILENT.set(before);
+    result
+}
 
 /// Progress of one command, on standard error.
 pub(crate) struct Progress {
@@ -25,6 +38,9 @@ enum Shown {
 
 impl Progress {
     pub(crate) fn new() -> Self {
+        if SILENT.get() {
+            return Self::silent();
+        }
         if !Terminal::is_watched() {
             return Self::shown(Shown::Lines);
         }

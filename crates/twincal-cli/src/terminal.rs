@@ -13,12 +13,19 @@ const PLAIN: &str = "\x1b[0m";
 
 /// Where a command speaks to.
 pub(crate) struct Terminal {
-    out: AutoStream<io::Stdout>,
-    err: AutoStream<io::Stderr>,
+    out: Out,
+    err: Option<AutoStream<io::Stderr>>,
     broken: Option<io::Error>,
     /// Where a result lies that is complete whatever becomes of standard output.
     complete: Option<String>,
     width: usize,
+}
+
+/// Where results go.
+enum Out {
+    Stream(AutoStream<io::Stdout>),
+    /// Kept for a program that called the command.
+    Kept(Vec<u8>),
 }
 
 /// Columns that text is laid out for: no fewer and no more, and those of a file.
@@ -28,11 +35,30 @@ const WIDTH_OF_FILES: usize = 80;
 impl Terminal {
     pub(crate) fn new() -> Self {
         Self {
-            out: anstream::stdout(),
-            err: anstream::stderr(),
+            out: Out::Stream(anstream::stdout()),
+            err: Some(anstream::stderr()),
             broken: None,
             complete: None,
             width: width(std::env::var("COLUMNS").ok().as_deref()),
+        }
+    }
+
+    /// Keeps results and says nothing.
+    pub(crate) fn kept() -> Self {
+        Self {
+            out: Out::Kept(Vec::new()),
+            err: None,
+            broken: None,
+            complete: None,
+            width: WIDTH_OF_FILES,
+        }
+    }
+
+    /// The results that were kept.
+    pub(crate) fn into_kept(self) -> String {
+        match self.out {
+            Out::Stream(_) => String::new(),
+            Out::Kept(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
         }
     }
 
@@ -93,22 +119,27 @@ impl Terminal {
 
     /// A line that is not part of the result.
     pub(crate) fn note(&mut self, line: &str) {
+        let Some(err) = &mut self.err else { return };
         // Nobody is left to be told when standard error is closed.
-        let _ = writeln!(self.err, "{}", clean(line));
+        let _ = writeln!(err, "{}", clean(line));
     }
 
     /// Why the command failed.
     pub(crate) fn failure(&mut self, failure: &Failure) {
+        let Some(err) = &mut self.err else { return };
         let (problem, remedy) = failure.words();
-        let _ = writeln!(self.err, "{RED}error{PLAIN}: {}", clean(&problem));
+        let _ = writeln!(err, "{RED}error{PLAIN}: {}", clean(&problem));
         if let Some(remedy) = remedy {
-            let _ = writeln!(self.err, "  {BOLD}help{PLAIN}: {}", clean(&remedy));
+            let _ = writeln!(err, "  {BOLD}help{PLAIN}: {}", clean(&remedy));
         }
     }
 
     /// Says whether everything could be written; a reader that went away (`| head`) wanted no more.
     pub(crate) fn finish(&mut self) -> Outcome<()> {
-        let flushed = self.out.flush();
+        let flushed = match &mut self.out {
+            Out::Stream(out) => out.flush(),
+            Out::Kept(_) => Ok(()),
+        };
         match self.broken.take().map_or(flushed, Err) {
             Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(match self.complete.take() {
                 Some(place) => Failure::Unprinted {
@@ -127,8 +158,12 @@ impl Terminal {
     }
 
     fn write(&mut self, text: &str) {
-        if self.broken.is_none() {
-            self.broken = self.out.write_all(text.as_bytes()).err();
+        match &mut self.out {
+            Out::Stream(out) if self.broken.is_none() => {
+                self.broken = out.write_all(text.as_bytes()).err();
+            }
+            Out::Stream(_) => {}
+            Out::Kept(kept) => kept.extend_from_slice(text.as_bytes()),
         }
     }
 }

@@ -31,6 +31,7 @@ pub mod posterior;
 pub mod likelihood;
 pub mod infer;
 pub mod plug_in;
+pub mod regression;
 pub mod twin;
 pub mod validate;
 pub mod cross_check;

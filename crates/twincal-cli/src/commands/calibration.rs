@@ -5,15 +5,17 @@ use super::inputs::{LogInput, RobotInput};
 use super::{brief, code_of, print_json, require_strict, summary};
 use crate::args::PrintFlags;
 use crate::clock::{Stopwatch, now};
-use crate::failure::Outcome;
+use crate::failure::{Failure, Outcome};
 use crate::names::display_names;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use twincal::calibrate::{
-    Calibration, CalibrationSettings, Stage, Statistics, Stopped, calibrate, calibrate_statistics,
+    Calibration, CalibrationSettings, Stage, Statistics, Stopped, calibrate_statistics,
+    calibrate_watched,
 };
+use twincal::Finding;
 use twincal_io::artifact::{Claim, MODEL_MJCF, Maker, REPORT};
 use twincal_io::config::{Config, ReadAs, Settings};
 use twincal_io::context::{FileHash, ReportContext};
@@ -118,23 +120,19 @@ impl Job<'_> {
         progress: Progress,
         terminal: &mut Terminal,
     ) -> Outcome<Done> {
-        let calibration = match self.calibrate(&progress) {
-            Ok(calibration) => calibration,
-            Err(stopped) => {
+        let watch = |stage| {
+            show(stage, "", &progress);
+            Ok(())
+        };
+        let stored = match self.result(&watch) {
+            Ok(stored) => stored,
+            Err((failure, findings)) => {
                 drop(progress);
-                summary::before_the_error(&stopped.findings, terminal);
-                let as_given = self.logs.as_given(stopped.error);
-                return Err(self.config.locate(self.heldout.as_given(as_given)).into());
+                summary::before_the_error(&findings, terminal);
+                return Err(failure);
             }
         };
-        require_strict(self.settings.log.strict, &calibration.findings)?;
-        let code = code_of(&calibration.findings);
-        let stored = StoredTwin {
-            gates: self.settings.gates,
-            read_as: Some(ReadAs::of(&self.settings.log, self.logs.given())),
-            context: self.context(),
-            calibration,
-        };
+        let code = code_of(&stored.calibration.findings);
         progress.step("writing the result");
         let run_log = self.run_log(&stored);
         let stored_as = self.robot.source.0;
@@ -152,10 +150,34 @@ impl Job<'_> {
         })
     }
 
+    /// Calibrates: the result as it will lie in its folder. An error comes with what was found before it.
+    pub(super) fn result(
+        &mut self,
+        watch: &dyn Fn(Stage) -> twincal::Result<()>,
+    ) -> Result<StoredTwin, (Failure, Vec<Finding>)> {
+        let calibration = self.calibrate(watch).map_err(|stopped| {
+            let as_given = self.logs.as_given(stopped.error);
+            let error = self.config.locate(self.heldout.as_given(as_given));
+            (error.into(), stopped.findings)
+        })?;
+        require_strict(self.settings.log.strict, &calibration.findings)
+            .map_err(|failure| (failure, Vec::new()))?;
+        Ok(StoredTwin {
+            gates: self.settings.gates,
+            read_as: Some(ReadAs::of(&self.settings.log, self.logs.given())),
+            context: self.context(),
+            calibration,
+        })
+    }
+
     /// With what reading the inputs found before everything else.
-    fn calibrate(&mut self, progress: &Progress) -> Result<Calibration, Stopped> {
+    fn calibrate(
+        &mut self,
+        watch: &dyn Fn(Stage) -> twincal::Result<()>,
+    ) -> Result<Calibration, Stopped> {
         let (logs, heldout) = (&mut self.logs, &mut self.heldout);
-        let step = |stage| show(stage, "", progress);
+        // Without logs there is nothing long to end.
+        let step = |stage| drop(watch(stage));
         let settings = CalibrationSettings {
             most_bytes: memory::spare(),
             ..self.settings.calibration.clone()
@@ -165,7 +187,8 @@ impl Job<'_> {
             Some(statistics) => calibrate_statistics(statistics, held_out, &settings, &step),
             None => {
                 let logs = std::mem::take(&mut logs.logs);
-                calibrate(&self.robot.robot, logs, held_out, &settings, &step)
+                let recordings = (logs.into(), held_out.into());
+                calibrate_watched(&self.robot.robot, recordings, &settings, watch)
             }
         };
         let read = [&self.robot.findings, &logs.findings, &heldout.findings];
@@ -198,7 +221,7 @@ impl Job<'_> {
     }
 
     /// When, where and how long: what may differ between two runs with the same result.
-    fn run_log(&self, stored: &StoredTwin) -> String {
+    pub(super) fn run_log(&self, stored: &StoredTwin) -> String {
         let words: Vec<_> = std::env::args_os()
             .map(|word| quoted(&word.to_string_lossy()))
             .collect();

@@ -152,7 +152,7 @@ fn of_statistics(
     finish(job, claim, progress, terminal)
 }
 
-fn fitted_and_held_out(name: &str) -> Failure {
+pub(super) fn fitted_and_held_out(name: &str) -> Failure {
     Failure::usage(
         format!("`{name}` is fitted and held out"),
         "hold out a log that the fit does not see, or leave --heldout away",
@@ -160,7 +160,7 @@ fn fitted_and_held_out(name: &str) -> Failure {
 }
 
 /// A log that is fitted says nothing of what was not, and counts for one experiment only.
-fn every_log_once(logs: &LogInput, heldout: &LogInput) -> Outcome<()> {
+pub(super) fn every_log_once(logs: &LogInput, heldout: &LogInput) -> Outcome<()> {
     let fitted: BTreeSet<&str> = logs.files.iter().map(|file| file.sha256.as_str()).collect();
     for files in [&heldout.files, &logs.files] {
         let mut seen = BTreeSet::new();

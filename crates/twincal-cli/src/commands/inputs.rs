@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use twincal::Finding;
 use twincal::robot::Robot;
-use twincal::signal::{Auto, Log, Pipeline};
+use twincal::signal::{Auto, Log, Pipeline, Recording};
 use twincal_io::artifact::{MODEL_MJCF, MODEL_URDF, sha256, sha256_unless};
 use twincal_io::config::{LogSettings, Settings};
 use twincal_io::context::FileHash;
@@ -25,6 +25,7 @@ const DOUBLES_PER_SAMPLE: u64 = 12;
 const MOST_SAID: usize = 20;
 
 /// The robot and what its file says.
+#[derive(Debug, Clone)]
 pub(super) struct RobotInput {
     pub(super) robot: Robot,
     /// What its file calls it; may be empty.
@@ -181,6 +182,29 @@ impl LogInput {
             files,
             ..Self::new(given.to_vec())
         }
+    }
+
+    /// A log that is in memory, with what was found when it was matched to the robot.
+    pub(super) fn of_recording(
+        (recording, findings): (Recording, Vec<Finding>),
+        sha256: &str,
+    ) -> Self {
+        let name = recording.name.clone();
+        let given = vec![PathBuf::from(&name)];
+        let sha256 = sha256.to_owned();
+        Self {
+            logs: vec![recording.into()],
+            findings,
+            ..Self::of_files(&given, vec![FileHash { name, sha256 }])
+        }
+    }
+
+    /// Takes the logs of another one behind its own.
+    pub(super) fn append(&mut self, other: Self) {
+        self.logs.extend(other.logs);
+        self.files.extend(other.files);
+        self.findings.extend(other.findings);
+        self.given.extend(other.given);
     }
 
     /// Reads logs, each as `read_one` does.

@@ -78,7 +78,8 @@ pub(super) fn read(
     Ok((sum, files))
 }
 
-fn add(sum: &mut StatisticsFile, file: &StatisticsFile, path: &Path) -> Outcome<()> {
+/// Adds statistics of more logs.
+pub(super) fn add(sum: &mut StatisticsFile, file: &StatisticsFile, path: &Path) -> Outcome<()> {
     let merged = sum.statistics.try_merge(&file.statistics);
     merged.map_err(|error| {
         let (problem, remedy) = match error {

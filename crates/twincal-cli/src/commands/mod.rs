@@ -18,6 +18,7 @@ mod open;
 mod predict;
 mod reads;
 mod report;
+pub mod session;
 mod settings;
 mod statistics;
 mod summary;
@@ -59,8 +60,11 @@ pub(crate) fn run(command: &Command, terminal: &mut Terminal) -> Outcome<u8> {
     }
 }
 
-/// Starts this many threads, or one per core.
+/// Starts this many threads, or one per core; a program that called the command has its own.
 fn start_threads(threads: Option<usize>) -> Outcome<()> {
+    if rayon::current_thread_index().is_some() {
+        return Ok(()); // those of the program that calls
+    }
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads.unwrap_or(0))
         .build_global()

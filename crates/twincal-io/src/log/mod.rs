@@ -286,6 +286,44 @@ pub fn parse_log(
     in_memory(read)
 }
 
+/// A log of columns in memory, which are matched to the joints as those of a table are; `name` is what messages call it.
+///
+/// # Errors
+/// Like [`read_log`]; columns of different lengths.
+pub fn read_columns(
+    name: &str,
+    header: &[String],
+    columns: &[Vec<f64>],
+    robot: &Robot,
+    options: &LogOptions,
+) -> Result<(Recording, Vec<Finding>)> {
+    let request = Request {
+        name,
+        robot,
+        options,
+        chapters: false,
+    };
+    let rows = columns.first().map_or(0, Vec::len);
+    let other = columns.iter().position(|column| column.len() != rows);
+    if let Some(other) = other {
+        let problem = format!(
+            "column `{}` has {} samples, `{}` has {rows}",
+            header[other],
+            columns[other].len(),
+            header[0]
+        );
+        let remedy = "give one value for each time stamp, NaN where it is not known";
+        return Err(Error::content(Place::file(name), problem, remedy));
+    }
+    let selection = request.select(header)?;
+    let wanted = selection.file_columns();
+    let mut cells = Cells::default();
+    cells.columns = wanted.iter().map(|&own| columns[own].clone()).collect();
+    let mut findings = Vec::new();
+    let log = assemble(request, cells, selection, &mut findings)?;
+    in_memory((log, findings))
+}
+
 /// What a file is by its first bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {

@@ -114,12 +114,15 @@ pub fn plan<'a>(
     }
 }
 
-/// [`calibrate`] under eyes that may end it with an error.
-pub(crate) fn calibrate_watched(
+/// [`calibrate`] under eyes that may end it with an error; `recordings` are those to fit and those held out.
+///
+/// # Errors
+/// Those of [`calibrate`], and that of `progress`.
+pub fn calibrate_watched(
     robot: &Robot,
     recordings: (Logs<'_>, Logs<'_>),
     settings: &CalibrationSettings,
-    progress: &Watch<'_>,
+    progress: &dyn Fn(Stage) -> Result<()>,
 ) -> std::result::Result<Calibration, Stopped> {
     let mut findings = Vec::new();
     let every_log = recordings.0.0.iter().chain(&recordings.1.0);

@@ -16,14 +16,14 @@ pub(crate) use tempering::fit_tempered;
 
 use crate::diagnostics::integrated_autocorrelation_time;
 use crate::error::Result;
-use crate::gram::Gram;
+use crate::gram::{Gram, JointGram};
 use crate::infer::approximate;
 use crate::likelihood::{Columns, NoiseModel, NoiseSettings, PlugIn, assemble};
 use crate::observations::Part;
 use crate::posterior::{Posterior, Problem};
 use crate::prior::PriorSettings;
 use crate::signal::Auto;
-use crate::statistics::{Sums, Unit, of_joint, residual_form};
+use crate::statistics::{JointUnit, Sums, Unit, of_joint, residual_form};
 use autoregression::Residual;
 use passband::Passband;
 
@@ -189,13 +189,40 @@ fn fit_sums(
     }
 }
 
+/// [`fit`] to one Gram alone, of rows behind no filter.
+pub(crate) fn fit_gram(
+    gram: &Gram,
+    columns: &Columns,
+    settings: FitSettings<'_>,
+    start: &PlugIn,
+    moving: Moving,
+) -> Result<Fit> {
+    let squares = |joint: &JointGram| {
+        let last = joint.s0.size - 1;
+        JointUnit {
+            torque: joint.s0.at(last, last),
+            ..JointUnit::default()
+        }
+    };
+    let total = Unit {
+        joints: gram.joints.iter().map(squares).collect(),
+        gram: gram.clone(),
+    };
+    fit_sums((&total, 0.0), columns, settings, start, moving, None)
+}
+
 /// Where an iteration starts: white noise of equal size on every joint.
 pub(crate) fn start(sums: &Sums, columns: &Columns, prior: &PriorSettings) -> PlugIn {
+    first(sums.joints(), columns, prior)
+}
+
+/// [`start`] for so many joints.
+pub(crate) fn first(joints: usize, columns: &Columns, prior: &PriorSettings) -> PlugIn {
     let v = match prior.scaled_variance {
         Auto::Value(v) => v,
         Auto::Auto => FIRST_SLAB,
     };
-    PlugIn::start(sums.joints(), columns.families.len(), v)
+    PlugIn::start(joints, columns.families.len(), v)
 }
 
 /// The filter that an autoregression of rows has to be told of.

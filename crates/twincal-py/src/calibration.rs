@@ -1,0 +1,144 @@
+//! A calibration: tables, torque, draws, files.
+
+use crate::errors::Problem;
+use crate::pool;
+use crate::robot::numbers;
+use crate::tables::{self, Table};
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use twincal::posterior::draws::draw;
+use twincal_cli::session::Fitted;
+use twincal_io::report::answer;
+
+/// Random stream of draws that Python asks for.
+const STREAM: u64 = (1 << 32) + 3;
+
+/// A result as it lies in a folder.
+#[pyclass(frozen, module = "twincal._twincal")]
+#[derive(Debug)]
+pub(crate) struct Calibration {
+    fitted: Fitted,
+}
+
+impl Calibration {
+    pub(crate) fn new(fitted: Fitted) -> Self {
+        Self { fitted }
+    }
+
+    fn result(&self) -> &twincal::calibrate::Calibration {
+        &self.fitted.stored.calibration
+    }
+}
+
+/// A one-dimensional array.
+type Array<'py, T> = Bound<'py, PyArray1<T>>;
+/// Mean, low, high and outside of states.
+type Torque<'py> = (Array<'py, f64>, Array<'py, f64>, Array<'py, f64>, Array<'py, bool>);
+/// Coefficients, noise and model of draws.
+type Draws<'py> = (Array<'py, f64>, Array<'py, f64>, Array<'py, u32>);
+
+#[pymethods]
+impl Calibration {
+    /// Reads the folder of a result.
+    #[staticmethod]
+    fn load(py: Python<'_>, folder: PathBuf) -> PyResult<Self> {
+        let fitted = pool::detached(py, None, || Fitted::load(&folder))?;
+        Ok(Self { fitted })
+    }
+
+    /// Writes the folder.
+    fn save(&self, py: Python<'_>, folder: PathBuf, force: bool) -> PyResult<()> {
+        pool::detached(py, None, || self.fitted.save(&folder, force))
+    }
+
+    /// The text of result.json.
+    fn result_json(&self, py: Python<'_>) -> PyResult<String> {
+        pool::detached(py, None, || self.fitted.stored.result_json())
+    }
+
+    /// The page.
+    fn html(&self, py: Python<'_>) -> PyResult<String> {
+        let stored = &self.fitted.stored;
+        pool::detached(py, None, || {
+            twincal_io::report::render(&stored.calibration, &stored.context)
+        })
+    }
+
+    /// Names of the moving joints.
+    #[getter]
+    fn joint_names(&self) -> Vec<&str> {
+        self.result().twin.robot.joint_names()
+    }
+
+    /// Units of their torque.
+    #[getter]
+    fn torque_units(&self) -> Vec<&'static str> {
+        let robot = &self.result().twin.robot;
+        (0..robot.dof()).map(|j| robot.joint_kind(j).torque_unit()).collect()
+    }
+
+    /// What the model file calls the robot.
+    #[getter]
+    fn robot_name(&self) -> &str {
+        &self.fitted.stored.context.robot
+    }
+
+    /// Table of the claims, answer, code and headline.
+    fn assessment(&self) -> (Table, &'static str, String, String) {
+        let (table, word, code) = tables::assessment(self.result());
+        (table, word, code, answer(self.result()).headline)
+    }
+
+    /// Table of the components.
+    fn effects(&self) -> Table {
+        tables::effects(self.result())
+    }
+
+    /// Table of the terms.
+    fn terms(&self) -> Table {
+        tables::terms(self.result())
+    }
+
+    /// Table of the held-out scores.
+    fn validation(&self) -> Table {
+        tables::validation(&self.result().validation)
+    }
+
+    /// Code, severity, subject and words of the findings.
+    fn findings(&self) -> Table {
+        tables::findings(&self.result().findings)
+    }
+
+    /// Torque of states, state * joints + joint.
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        q: PyReadonlyArray1<'py, f64>,
+        qd: PyReadonlyArray1<'py, f64>,
+        qdd: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Torque<'py>> {
+        let (q, qd, qdd) = (numbers(py, &q)?, numbers(py, &qd)?, numbers(py, &qdd)?);
+        let twin = &self.result().twin;
+        let torque = pool::detached(py, None, || twin.torque(q, qd, qdd))?;
+        Ok((
+            PyArray1::from_vec(py, torque.mean),
+            PyArray1::from_vec(py, torque.low),
+            PyArray1::from_vec(py, torque.high),
+            PyArray1::from_vec(py, torque.outside),
+        ))
+    }
+
+    /// Draws from the posterior: coefficients (draw * columns + column), variance φ and index of the model.
+    fn draws<'py>(&self, py: Python<'py>, count: usize, seed: u64) -> PyResult<Draws<'py>> {
+        let posterior = &self.result().twin.posterior;
+        let draws = pool::detached(py, None, || {
+            Ok::<_, Problem>(draw(posterior, count, seed, STREAM))
+        })?;
+        Ok((
+            PyArray1::from_vec(py, draws.beta),
+            PyArray1::from_vec(py, draws.noise),
+            PyArray1::from_vec(py, draws.models),
+        ))
+    }
+}

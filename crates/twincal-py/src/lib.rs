@@ -1,0 +1,52 @@
+//! The extension module `twincal._twincal`: conversions between Python and the other crates, nothing else. Shapes and types of arrays are checked in
+//! the Python layer above it; statistics are those of the crate `twincal`.
+
+mod calibration;
+mod errors;
+mod fit;
+mod log;
+mod pool;
+mod regression;
+mod robot;
+mod settings;
+mod statistics;
+mod tables;
+
+use pyo3::prelude::*;
+
+/// The extension module.
+#[pymodule]
+mod _twincal {
+    #[pymodule_export]
+    use super::calibration::Calibration;
+    #[pymodule_export]
+    use super::log::Log;
+    #[pymodule_export]
+    use super::regression::{Regression, regress};
+    #[pymodule_export]
+    use super::robot::Robot;
+    #[pymodule_export]
+    use super::statistics::{Plan, Statistics, plan};
+    #[pymodule_export]
+    use super::tables::Table;
+    #[pymodule_export]
+    use super::{call, command, fit::fit, fit::fit_statistics, version};
+}
+
+/// Version of the package, which is that of the program.
+#[pyfunction]
+fn version() -> &'static str {
+    env!("CARGO_PKG_VERSION")
+}
+
+/// The program `twincal` with its arguments, its own name first; returns the exit code.
+#[pyfunction]
+fn command(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
+    py.detach(|| twincal_cli::run(arguments))
+}
+
+/// A command of the program without its name: exit code and what it prints on standard output.
+#[pyfunction]
+fn call(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> PyResult<(u8, String)> {
+    pool::detached(py, None, || twincal_cli::session::call(arguments))
+}

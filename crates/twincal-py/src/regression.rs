@@ -1,0 +1,183 @@
+//! Spike-and-slab regression of any columns.
+
+use crate::errors::Problem;
+use crate::pool;
+use crate::robot::numbers;
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use twincal::infer::{Choice, InferenceSettings};
+use twincal::likelihood::NoiseModel;
+use twincal::posterior::draws::draw;
+use twincal::posterior::summary::{ColumnSummary, summarise};
+use twincal::prior::{Inclusion, PriorSettings};
+use twincal::regression::{self, Design, Regressed};
+use twincal::signal::Auto;
+use twincal_cli::Failure;
+
+/// Random stream of its draws.
+const STREAM: u64 = (1 << 32) + 4;
+
+/// A posterior of coefficients.
+#[pyclass(frozen, module = "twincal._twincal")]
+#[derive(Debug)]
+pub(crate) struct Regression {
+    regressed: Regressed,
+    summaries: Vec<ColumnSummary>,
+}
+
+/// What a regression is asked for.
+#[derive(FromPyObject)]
+pub(crate) struct Asked {
+    groups: Vec<usize>,
+    noise: String,
+    method: String,
+    scaled_variance: Option<f64>,
+    expected_terms: Option<f64>,
+    probability: Option<f64>,
+    chains: usize,
+    draws: usize,
+    seed: u64,
+    intercept: bool,
+}
+
+impl Asked {
+    fn settings(&self) -> Result<regression::Settings, Problem> {
+        let unknown = |key: &str, given: &str, known: &str| {
+            let problem = format!("{key} is `{given}`");
+            Problem::from(Failure::usage(problem, format!("give one of {known}").as_str()))
+        };
+        let noise = match self.noise.as_str() {
+            "iid" => NoiseModel::Iid,
+            "ar1" => NoiseModel::Ar1,
+            "tempered" => NoiseModel::Tempered,
+            other => return Err(unknown("noise", other, "`iid`, `ar1`, `tempered`")),
+        };
+        let method = match self.method.as_str() {
+            "auto" => Choice::Auto,
+            "exact" => Choice::Exact,
+            "gibbs" => Choice::Gibbs,
+            other => return Err(unknown("method", other, "`auto`, `exact`, `gibbs`")),
+        };
+        let inclusion = match (self.probability, self.expected_terms) {
+            (Some(probability), _) => Some(Inclusion::Probability(probability)),
+            (None, Some(terms)) => Some(Inclusion::ExpectedTerms(terms)),
+            (None, None) => None,
+        };
+        Ok(regression::Settings {
+            groups: self.groups.clone(),
+            noise,
+            intercept: self.intercept,
+            prior: PriorSettings {
+                scaled_variance: self.scaled_variance.map_or(Auto::Auto, Auto::Value),
+                inclusion,
+                ..PriorSettings::default()
+            },
+            inference: InferenceSettings {
+                method,
+                chains: self.chains,
+                draws: self.draws,
+                seed: self.seed,
+                allow_disagreement: true,
+            },
+        })
+    }
+}
+
+/// Regresses `y` on columns, `x[column * rows + row]`; `breaks` are rows that start a new run.
+#[pyfunction]
+pub(crate) fn regress(
+    py: Python<'_>,
+    x: PyReadonlyArray1<'_, f64>,
+    y: PyReadonlyArray1<'_, f64>,
+    breaks: Vec<usize>,
+    asked: Asked,
+) -> PyResult<Regression> {
+    let (x, y) = (numbers(py, &x)?, numbers(py, &y)?);
+    let settings = asked.settings().map_err(|problem| problem.raise(py))?;
+    let design = Design { x, y, breaks: &breaks };
+    pool::detached(py, None, || {
+        let regressed = regression::regress(design, &settings)?;
+        let summaries = summarise(&regressed.posterior);
+        Ok::<_, Problem>(Regression {
+            regressed,
+            summaries,
+        })
+    })
+}
+
+#[pymethods]
+impl Regression {
+    /// Posterior inclusion probability of each column.
+    #[getter]
+    fn inclusion<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.regressed.posterior.inclusion)
+    }
+
+    /// Posterior mean of each coefficient.
+    #[getter]
+    fn mean<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.regressed.posterior.mean)
+    }
+
+    /// Posterior sd of each coefficient.
+    #[getter]
+    fn sd<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.regressed.posterior.sd)
+    }
+
+    /// Ends of the central 95 % interval of each coefficient, column * 2 + end.
+    #[getter]
+    fn interval95<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let ends = self.summaries.iter().flat_map(|own| own.interval95).collect();
+        PyArray1::from_vec(py, ends)
+    }
+
+    /// Constant of the model.
+    #[getter]
+    fn intercept(&self) -> f64 {
+        self.regressed.intercept
+    }
+
+    /// sd of one row around the model.
+    #[getter]
+    fn sigma(&self) -> f64 {
+        self.regressed.sigma
+    }
+
+    /// First-order autocorrelation of the noise; 0 unless `ar1`.
+    #[getter]
+    fn rho(&self) -> f64 {
+        self.regressed.rho
+    }
+
+    /// Rows that count as one.
+    #[getter]
+    fn autocorrelation_time(&self) -> f64 {
+        self.regressed.autocorrelation_time
+    }
+
+    /// ln of the evidence; none with Gibbs.
+    #[getter]
+    fn log_evidence(&self) -> Option<f64> {
+        self.regressed.posterior.log_evidence
+    }
+
+    /// Mean and sd of a new row of `y`, for rows x[row * columns + column].
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        rows: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+        let rows = numbers(py, &rows)?;
+        let (mean, sd) = pool::detached(py, None, || {
+            Ok::<_, Problem>(self.regressed.predict(rows))
+        })?;
+        Ok((PyArray1::from_vec(py, mean), PyArray1::from_vec(py, sd)))
+    }
+
+    /// Draws of the coefficients, draw * columns + column.
+    fn draws<'py>(&self, py: Python<'py>, count: usize, seed: u64) -> Bound<'py, PyArray1<f64>> {
+        let draws = py.detach(|| draw(&self.regressed.posterior, count, seed, STREAM));
+        PyArray1::from_vec(py, draws.beta)
+    }
+}

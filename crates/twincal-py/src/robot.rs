@@ -1,0 +1,219 @@
+//! Robots: model files in, torque and regressors of arrays out.
+
+use crate::errors::Problem;
+use crate::{pool, settings};
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use rayon::prelude::*;
+use std::path::PathBuf;
+use twincal::robot::{
+    BLOCK, Motion, PARAMETERS, Regressor, inverse_dynamics, nominal_torque,
+};
+use twincal_cli::session::ModelInput;
+use twincal_io::config::Config;
+
+/// States that one thread takes at a time: three channels of seven joints stay in the cache of a core.
+const CHUNK: usize = 512;
+/// States below which one thread is faster than waking the others.
+const FEW: usize = 4096;
+
+/// A robot and the settings of [model] that it was read with.
+#[pyclass(frozen, module = "twincal._twincal")]
+#[derive(Debug, Clone)]
+pub(crate) struct Robot {
+    pub(crate) input: ModelInput,
+    pub(crate) config: Config,
+}
+
+/// Arrays of positions, velocities and accelerations, state * joints + joint.
+type States<'py> = [PyReadonlyArray1<'py, f64>; 3];
+
+/// The numbers of contiguous arrays; the Python layer makes them so.
+pub(crate) fn numbers<'a>(
+    py: Python<'_>,
+    array: &'a PyReadonlyArray1<'_, f64>,
+) -> PyResult<&'a [f64]> {
+    array
+        .as_slice()
+        .map_err(|_| Problem::Panicked("an array that is not contiguous".into()).raise(py))
+}
+
+#[pymethods]
+impl Robot {
+    /// Of a file, with settings of [model] as an object of JSON.
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf, keywords: &str) -> PyResult<Self> {
+        pool::detached(py, None, || {
+            let config = settings::config(keywords)?;
+            let input = ModelInput::read(&path, &config)?;
+            Ok::<_, Problem>(Self { input, config })
+        })
+    }
+
+    /// Of the text of a model.
+    #[staticmethod]
+    fn parse(py: Python<'_>, name: &str, text: &str, keywords: &str) -> PyResult<Self> {
+        pool::detached(py, None, || {
+            let config = settings::config(keywords)?;
+            let input = ModelInput::parse(name, text, &config)?;
+            Ok::<_, Problem>(Self { input, config })
+        })
+    }
+
+    /// What the file calls it.
+    #[getter]
+    fn name(&self) -> &str {
+        self.input.name()
+    }
+
+    /// Names of the moving joints.
+    #[getter]
+    fn joint_names(&self) -> Vec<&str> {
+        self.input.robot().joint_names()
+    }
+
+    /// Units of their torque.
+    #[getter]
+    fn torque_units(&self) -> Vec<&'static str> {
+        let robot = self.input.robot();
+        (0..robot.dof()).map(|j| robot.joint_kind(j).torque_unit()).collect()
+    }
+
+    /// Names of the moving bodies.
+    #[getter]
+    fn bodies(&self) -> Vec<&str> {
+        self.input.robot().bodies()
+    }
+
+    /// Names of the parameters of a body.
+    #[getter]
+    fn parameter_names(&self) -> Vec<&'static str> {
+        PARAMETERS.to_vec()
+    }
+
+    /// Inertial parameters of the bodies, body * 10 + parameter.
+    fn parameters<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let robot = self.input.robot();
+        let bodies = 0..robot.bodies().len();
+        let all: Vec<f64> = bodies.flat_map(|body| robot.parameters_of_body(body)).collect();
+        PyArray1::from_vec(py, all)
+    }
+
+    /// Code and words of what had to be assumed of the model.
+    fn findings(&self) -> Vec<(String, String)> {
+        let findings = self.input.findings().iter();
+        findings.map(|own| (own.code.to_string(), own.message.clone())).collect()
+    }
+
+    /// Torque of states.
+    fn inverse_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        states: States<'py>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let [q, qd, qdd] = [&states[0], &states[1], &states[2]].map(|own| numbers(py, own));
+        let motion = [q?, qd?, qdd?];
+        let tau = pool::detached(py, None, || Ok::<_, Problem>(self.torque(motion)))?;
+        Ok(PyArray1::from_vec(py, tau))
+    }
+
+    /// Regressor of states: state * joints * parameters + joint * parameters + body * 10 + parameter.
+    fn regressor<'py>(
+        &self,
+        py: Python<'py>,
+        states: States<'py>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let [q, qd, qdd] = [&states[0], &states[1], &states[2]].map(|own| numbers(py, own));
+        let motion = [q?, qd?, qdd?];
+        let values = pool::detached(py, None, || Ok::<_, Problem>(self.columns(motion)))?;
+        Ok(PyArray1::from_vec(py, values))
+    }
+}
+
+/// From state * joints + joint to joint * len + state.
+fn by_joint(values: &[f64], dof: usize, out: &mut [f64]) {
+    let len = values.len() / dof;
+    for (state, row) in values.chunks_exact(dof).enumerate() {
+        for (joint, value) in row.iter().enumerate() {
+            out[joint * len + state] = *value;
+        }
+    }
+}
+
+impl Robot {
+    fn torque(&self, [q, qd, qdd]: [&[f64]; 3]) -> Vec<f64> {
+        let robot = self.input.robot();
+        let dof = robot.dof();
+        let mut tau = vec![0.0; q.len()];
+        if q.len() == dof {
+            let mut workspace = twincal::robot::Workspace::new(robot);
+            inverse_dynamics(robot, &mut workspace, q, qd, qdd, &mut tau);
+            return tau;
+        }
+        let size = CHUNK * dof;
+        let chunk = |memory: &mut [Vec<f64>; 4], (number, out): (usize, &mut [f64])| {
+            let (at, len) = (number * size..number * size + out.len(), out.len() / dof);
+            let [own_q, own_qd, own_qdd, own_tau] = memory;
+            for (own, all) in [(&mut *own_q, q), (own_qd, qd), (own_qdd, qdd)] {
+                by_joint(&all[at.clone()], dof, own);
+            }
+            let motion = Motion {
+                len,
+                q: own_q,
+                qd: own_qd,
+                qdd: own_qdd,
+            };
+            nominal_torque(robot, motion, own_tau);
+            for (state, row) in out.chunks_exact_mut(dof).enumerate() {
+                for (joint, value) in row.iter_mut().enumerate() {
+                    *value = own_tau[joint * len + state];
+                }
+            }
+        };
+        let memory = || [(); 4].map(|()| vec![0.0; size]);
+        if q.len() <= FEW * dof {
+            let mut own = memory();
+            tau.chunks_mut(size).enumerate().for_each(|out| chunk(&mut own, out));
+        } else {
+            (tau.par_chunks_mut(size).enumerate()).for_each_init(memory, chunk);
+        }
+        tau
+    }
+
+    fn columns(&self, [q, qd, qdd]: [&[f64]; 3]) -> Vec<f64> {
+        let robot = self.input.robot();
+        let dof = robot.dof();
+        let parameters = 10 * robot.bodies().len();
+        let regressor = Regressor::new(robot);
+        let mut values = vec![0.0; q.len() * parameters];
+        let memory = || {
+            let motion = [(); 3].map(|()| vec![0.0; BLOCK * dof]);
+            (motion, regressor.block(robot))
+        };
+        let chunks = values.par_chunks_mut(BLOCK * dof * parameters).enumerate();
+        chunks.for_each_init(memory, |(motion, block), (number, out)| {
+            let len = out.len() / (dof * parameters);
+            let at = number * BLOCK * dof..(number * BLOCK + len) * dof;
+            for (own, all) in motion.iter_mut().zip([q, qd, qdd]) {
+                by_joint(&all[at.clone()], dof, own);
+            }
+            let motion = Motion {
+                len,
+                q: &motion[0],
+                qd: &motion[1],
+                qdd: &motion[2],
+            };
+            regressor.evaluate(robot, motion, 0..len, block);
+            for (index, pair) in regressor.pairs().iter().enumerate() {
+                for parameter in (0..10).filter(|&k| pair.present[k]) {
+                    let column = &block.column(index, parameter)[..len];
+                    let place = pair.coordinate * parameters + 10 * pair.body + parameter;
+                    for (state, value) in column.iter().enumerate() {
+                        out[state * dof * parameters + place] += value;
+                    }
+                }
+            }
+        });
+        values
+    }
+}

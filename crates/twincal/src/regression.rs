@@ -1,0 +1,228 @@
+//! Spike-and-slab regression of any columns: the likelihood, prior and inference of a calibration without a robot.
+
+use crate::diagnostics::integrated_autocorrelation_time;
+use crate::error::{Error, Result};
+use crate::gram::{Gram, JointAccumulator, JointGram, Workspace};
+use crate::infer::{InferenceSettings, infer};
+use crate::likelihood::{Columns, NoiseModel, NoiseSettings, PlugIn};
+use crate::plug_in::{FitSettings, Moving, fit_gram, first};
+use crate::posterior::Posterior;
+use crate::prior::PriorSettings;
+use crate::term::Family;
+
+/// Data of a regression.
+#[derive(Debug, Clone, Copy)]
+pub struct Design<'a> {
+    /// Columns, `x[column * rows + row]`.
+    pub x: &'a [f64],
+    /// What is explained, one number per row.
+    pub y: &'a [f64],
+    /// Rows, ascending, at which a new run begins: noise is not correlated across it. Row 0 begins one anyway.
+    pub breaks: &'a [usize],
+}
+
+/// Everything that can be chosen.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Component of each column, 0..C without a gap: its columns are in or out together.
+    pub groups: Vec<usize>,
+    /// Likelihood; `Tempered` divides statistics by the autocorrelation time of the residual.
+    pub noise: NoiseModel,
+    /// A constant is in the model: columns and `y` are centred, which is a flat prior on it.
+    pub intercept: bool,
+    /// Prior.
+    pub prior: PriorSettings,
+    /// Inference.
+    pub inference: InferenceSettings,
+}
+
+/// The posterior, and what a prediction needs beside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Regressed {
+    /// Posterior of models and coefficients.
+    pub posterior: Posterior,
+    /// Mean of each column, subtracted from it; 0 without intercept.
+    pub offsets: Vec<f64>,
+    /// E[constant | y]; 0 without intercept.
+    pub intercept: f64,
+    /// sd of one row around the model.
+    pub sigma: f64,
+    /// AR(1) coefficient; 0 unless `Ar1`.
+    pub rho: f64,
+    /// Rows that count as one; 1 unless `Tempered`.
+    pub autocorrelation_time: f64,
+    /// Rows.
+    pub rows: usize,
+    covariance: Vec<f64>,
+}
+
+/// The posterior of `y = Xβ + ε` under a spike-and-slab prior: `β_k = 0` or `β_k ~ N(0, v φ / rms_k²)`, slab scale v and noise by the same fixed
+/// point as in a calibration.
+///
+/// | value | shape |
+/// |---|---|
+/// | `design.x` | columns × rows |
+/// | `design.y` | rows |
+///
+/// # Errors
+/// [`Error::Setting`] for lengths that do not fit together, groups with a gap and numbers that are not finite; those of [`infer`].
+/// # Source
+/// paper eq. (5); method sections 5–7.
+pub fn regress(design: Design<'_>, settings: &Settings) -> Result<Regressed> {
+    check(&design, settings)?;
+    let (rows, count) = (design.y.len(), settings.groups.len());
+    let mean = |values: &[f64]| match settings.intercept {
+        true => values.iter().sum::<f64>() / rows as f64,
+        false => 0.0,
+    };
+    let centre = mean(design.y);
+    let offsets: Vec<f64> = design.x.chunks_exact(rows).map(mean).collect();
+    let x: Vec<f64> = (design.x.chunks_exact(rows).zip(&offsets))
+        .flat_map(|(column, offset)| column.iter().map(move |value| value - offset))
+        .collect();
+    let y: Vec<f64> = design.y.iter().map(|value| value - centre).collect();
+    let gram = Gram {
+        joints: vec![statistics(&x, &y, design.breaks, count)],
+    };
+    let columns = columns(&settings.groups);
+    let fit_settings = FitSettings {
+        noise: NoiseSettings {
+            model: settings.noise,
+            per_joint: true,
+            robust: false,
+            varies_with_speed: false,
+            varies_with_load: false,
+        },
+        prior: &settings.prior,
+    };
+    let start = first(1, &columns, &settings.prior);
+    let mut fit = fit_gram(&gram, &columns, fit_settings, &start, Moving::All)?;
+    if settings.noise == NoiseModel::Tempered {
+        let runs = residual(&x, &y, design.breaks, &fit.posterior.mean);
+        let runs: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
+        let plug_in = PlugIn {
+            autocorrelation_time: vec![integrated_autocorrelation_time(&runs).max(1.0)],
+            ..fit.plug_in
+        };
+        fit = fit_gram(&gram, &columns, fit_settings, &plug_in, Moving::SlabScale)?;
+    }
+    let posterior = infer(&fit.problem, &settings.inference)?;
+    let rho = fit.plug_in.rho[0];
+    let products = posterior.mean.iter().zip(&offsets).map(|(beta, x)| beta * x);
+    Ok(Regressed {
+        intercept: centre - products.sum::<f64>(),
+        sigma: (posterior.noise / (1.0 - rho * rho)).sqrt(),
+        rho,
+        autocorrelation_time: fit.plug_in.autocorrelation_time[0],
+        rows,
+        covariance: posterior.covariance(),
+        offsets,
+        posterior,
+    })
+}
+
+impl Regressed {
+    /// Mean and sd of a new row of `y` given its columns, `x[row * columns + column]`: the sd holds noise, coefficients and constant.
+    ///
+    /// # Panics
+    /// If `x` is no multiple of the columns.
+    #[must_use]
+    pub fn predict(&self, x: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let count = self.offsets.len();
+        assert!(count > 0 && x.len().is_multiple_of(count), "whole rows");
+        // the constant is as uncertain as the mean of so many rows
+        let constant = self.sigma * self.sigma * self.autocorrelation_time / self.rows as f64;
+        let of_row = |row: &[f64]| {
+            let products = row.iter().zip(&self.posterior.mean).map(|(x, beta)| x * beta);
+            let mean = self.intercept + products.sum::<f64>();
+            let own: Vec<f64> = row.iter().zip(&self.offsets).map(|(x, o)| x - o).collect();
+            let epistemic: f64 = (self.covariance.chunks_exact(count).zip(&own))
+                .map(|(line, x)| x * line.iter().zip(&own).map(|(c, x)| c * x).sum::<f64>())
+                .sum();
+            let variance = epistemic.max(0.0) + constant + self.sigma * self.sigma;
+            (mean, variance.sqrt())
+        };
+        x.chunks_exact(count).map(of_row).unzip()
+    }
+}
+
+fn check(design: &Design<'_>, settings: &Settings) -> Result<()> {
+    let refuse = |key: &str, problem: String, remedy: &str| {
+        Err(Error::Setting {
+            key: key.into(),
+            problem,
+            remedy: remedy.into(),
+        })
+    };
+    let (rows, count) = (design.y.len(), settings.groups.len());
+    if rows < 2 || count == 0 || design.x.len() != rows * count {
+        let problem = format!(
+            "{} numbers for {count} columns of {rows} rows",
+            design.x.len()
+        );
+        return refuse("x", problem, "give one column of two rows or more");
+    }
+    for (key, values) in [("x", design.x), ("y", design.y)] {
+        if let Some(place) = values.iter().position(|value| !value.is_finite()) {
+            let problem = format!("{} in row {}", values[place], place % rows);
+            return refuse(key, problem, "leave out rows that are not known");
+        }
+    }
+    let components = 1 + settings.groups.iter().max().copied().unwrap_or(0);
+    if let Some(gap) = (0..components).find(|own| !settings.groups.contains(own)) {
+        let problem = format!("no column of group {gap}");
+        return refuse("groups", problem, "number the groups 0, 1, 2 … without a gap");
+    }
+    Ok(())
+}
+
+/// Sums over the rows.
+fn statistics(x: &[f64], y: &[f64], breaks: &[usize], count: usize) -> JointGram {
+    let rows = y.len();
+    let mut sums = JointAccumulator::new((0..count as u32).collect());
+    let mut workspace = Workspace::default();
+    for run in runs(rows, breaks) {
+        let (own, keep) = (&x[run.start..], vec![true; run.len()]);
+        sums.push_block(own, rows, &y[run], &keep, true, &mut workspace);
+    }
+    sums.finish()
+}
+
+/// Ranges of rows between breaks.
+fn runs(rows: usize, breaks: &[usize]) -> Vec<std::ops::Range<usize>> {
+    let inner = breaks.iter().copied().filter(|row| (1..rows).contains(row));
+    let mut ends: Vec<usize> = std::iter::once(0).chain(inner).chain([rows]).collect();
+    ends.sort_unstable();
+    ends.dedup();
+    ends.windows(2).map(|pair| pair[0]..pair[1]).collect()
+}
+
+/// `y − Xβ`, run by run.
+fn residual(x: &[f64], y: &[f64], breaks: &[usize], beta: &[f64]) -> Vec<Vec<f64>> {
+    let rows = y.len();
+    let mut left = y.to_vec();
+    for (column, beta) in x.chunks_exact(rows).zip(beta) {
+        left.iter_mut().zip(column).for_each(|(y, x)| *y -= beta * x);
+    }
+    let own = runs(rows, breaks).into_iter();
+    own.map(|run| left[run].to_vec()).collect()
+}
+
+/// Columns without bounds, parents or physical priors.
+fn columns(groups: &[usize]) -> Columns {
+    let count = groups.len();
+    let components = 1 + groups.iter().max().copied().unwrap_or(0);
+    Columns {
+        names: (0..count).map(|column| format!("x{column}")).collect(),
+        component: groups.to_vec(),
+        family: vec![0; components],
+        families: vec![Family::User],
+        prior_sd: vec![None; count],
+        lower: vec![f64::NEG_INFINITY; count],
+        forced: Vec::new(),
+        parent: Vec::new(),
+        second_choice: Vec::new(),
+        one_motion: false,
+        halves: Vec::new(),
+    }
+}
