@@ -7,6 +7,7 @@ use crate::tables::{self, Table};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use std::path::PathBuf;
+use twincal::calibrate::Along;
 use twincal::posterior::draws::draw;
 use twincal_cli::session::Fitted;
 use twincal_io::report::answer;
@@ -34,9 +35,25 @@ impl Calibration {
 /// A one-dimensional array.
 type Array<'py, T> = Bound<'py, PyArray1<T>>;
 /// Mean, low, high and outside of states.
-type Torque<'py> = (Array<'py, f64>, Array<'py, f64>, Array<'py, f64>, Array<'py, bool>);
+type Torque<'py> = (
+    Array<'py, f64>,
+    Array<'py, f64>,
+    Array<'py, f64>,
+    Array<'py, bool>,
+);
 /// Coefficients, noise and model of draws.
 type Draws<'py> = (Array<'py, f64>, Array<'py, f64>, Array<'py, u32>);
+
+/// Name, coordinate, components, x, mean, low and high of a law of one coordinate.
+type Law<'py> = (
+    String,
+    &'static str,
+    Vec<String>,
+    Array<'py, f64>,
+    Array<'py, f64>,
+    Array<'py, f64>,
+    Array<'py, f64>,
+);
 
 #[pymethods]
 impl Calibration {
@@ -75,7 +92,9 @@ impl Calibration {
     #[getter]
     fn torque_units(&self) -> Vec<&'static str> {
         let robot = &self.result().twin.robot;
-        (0..robot.dof()).map(|j| robot.joint_kind(j).torque_unit()).collect()
+        (0..robot.dof())
+            .map(|j| robot.joint_kind(j).torque_unit())
+            .collect()
     }
 
     /// What the model file calls the robot.
@@ -140,5 +159,83 @@ impl Calibration {
             PyArray1::from_vec(py, draws.noise),
             PyArray1::from_vec(py, draws.models),
         ))
+    }
+
+    /// Names of the columns of the regression: terms that were not dropped.
+    #[getter]
+    fn column_names(&self) -> Vec<String> {
+        let terms = self.result().terms.iter();
+        let live = terms.filter(|own| own.pip.is_some());
+        live.map(|own| own.term.name.clone()).collect()
+    }
+
+    /// Names of the components that have columns, and of each column the index of its component.
+    #[getter]
+    fn components(&self) -> (Vec<String>, Vec<usize>) {
+        let result = self.result();
+        let own = &result.twin.posterior.component;
+        let mut known: Vec<usize> = own.clone();
+        known.sort_unstable();
+        known.dedup();
+        let name = |column: usize| {
+            let live = result.terms.iter().filter(|own| own.pip.is_some()).nth(column);
+            let component = live.and_then(|own| result.components.get(own.term.component));
+            component.map_or(String::new(), |own| own.name.clone())
+        };
+        let first = |component: &usize| own.iter().position(|other| other == component);
+        let names = known.iter().filter_map(first).map(name).collect();
+        let index = |component: &usize| known.partition_point(|other| other < component);
+        (names, own.iter().map(index).collect())
+    }
+
+    /// Families of these components.
+    #[getter]
+    fn families(&self) -> Vec<&'static str> {
+        let (names, _) = self.components();
+        let family = |name: &String| {
+            let mut all = self.result().components.iter();
+            all.find(|own| own.name == *name).map_or("", |own| own.family.word())
+        };
+        names.iter().map(family).collect()
+    }
+
+    /// Laws of one coordinate that were found.
+    fn curves<'py>(&self, py: Python<'py>) -> Vec<Law<'py>> {
+        let curves = self.result().curves.iter();
+        let law = |own: &twincal::calibrate::Curve| {
+            let along = match own.along {
+                Along::Position => "position",
+                Along::Velocity => "velocity",
+            };
+            let array = |values: &[f64]| PyArray1::from_slice(py, values);
+            (
+                own.joint.clone(),
+                along,
+                own.components.clone(),
+                array(&own.x),
+                array(&own.mean),
+                array(&own.low95),
+                array(&own.high95),
+            )
+        };
+        curves.map(law).collect()
+    }
+
+    /// Draws of measured torque at states, (draw * states + state) * joints + joint.
+    fn predictive<'py>(
+        &self,
+        py: Python<'py>,
+        states: [PyReadonlyArray1<'py, f64>; 3],
+        count: usize,
+        seed: u64,
+    ) -> PyResult<Array<'py, f64>> {
+        let [q, qd, qdd] = [&states[0], &states[1], &states[2]].map(|own| numbers(py, own));
+        let motion = [q?, qd?, qdd?];
+        let twin = &self.result().twin;
+        let torque = pool::detached(py, None, || {
+            let draws = draw(&twin.posterior, count, seed, STREAM);
+            twin.torque_model()?.draws(motion, &draws, seed)
+        })?;
+        Ok(PyArray1::from_vec(py, torque))
     }
 }

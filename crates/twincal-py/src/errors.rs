@@ -70,7 +70,11 @@ impl Problem {
                 format!("a mistake in twincal: {message}"),
                 "please report it, with the input if you may".into(),
             ),
-            Self::Interrupted => ("cancelled", "the fit was asked to stop".into(), String::new()),
+            Self::Interrupted => (
+                "cancelled",
+                "the fit was asked to stop".into(),
+                String::new(),
+            ),
         }
     }
 

@@ -28,11 +28,7 @@ enum Message {
 }
 
 /// Settings, with those of the model and of the logs.
-pub(crate) fn config_of(
-    robot: &Robot,
-    logs: &[&Log],
-    keywords: &str,
-) -> Result<Config, Problem> {
+pub(crate) fn config_of(robot: &Robot, logs: &[&Log], keywords: &str) -> Result<Config, Problem> {
     let mut config = settings::config(keywords)?;
     let model = &mut config.file.model;
     let allow = model.allow.take();
@@ -82,7 +78,10 @@ fn add_log(config: &mut Config, log: &Log) -> Result<(), Problem> {
         let all = &mut config.file.columns;
         if *all != Default::default() && *all != own.columns {
             return Err(Failure::usage(
-                format!("`{}` names other columns than a log before it", log.source.given().display()),
+                format!(
+                    "`{}` names other columns than a log before it",
+                    log.source.given().display()
+                ),
                 "give all logs of a fit the same columns=",
             )
             .into());
@@ -142,13 +141,16 @@ fn start(request: Request, stop: &Arc<AtomicBool>) -> Result<Mutex<Receiver<Mess
             }
             let send = stages.lock().unwrap_or_else(PoisonError::into_inner);
             // Nobody listens to a fit that was given up.
-            send.send(Message::Stage(stage)).map_err(|_| twincal::Error::Cancelled)
+            send.send(Message::Stage(stage))
+                .map_err(|_| twincal::Error::Cancelled)
         };
         let done = pool::work(threads, || request.fit(&watch));
         // Nobody listens to a fit that was given up.
         let _ = send.send(Message::Done(Box::new(done)));
     };
-    let thread = std::thread::Builder::new().name("twincal fit".into()).spawn(run);
+    let thread = std::thread::Builder::new()
+        .name("twincal fit".into())
+        .spawn(run);
     thread.map_err(|e| {
         let failure = Failure::usage(
             format!("cannot start a thread: {e}"),

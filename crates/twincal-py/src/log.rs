@@ -4,7 +4,7 @@ use crate::errors::Problem;
 use crate::pool;
 use crate::robot::numbers;
 use arrow_array::cast::AsArray as _;
-use arrow_array::ffi_stream::{ArrowArrayStreamReader, FFI_ArrowArrayStream};
+use arrow_array::ffi_stream::{RecordBatchStreamReader, FFI_ArrowArrayStream};
 use arrow_array::types::{Float32Type, Float64Type, Int32Type, Int64Type};
 use arrow_array::{Array, RecordBatch, RecordBatchReader as _};
 use arrow_schema::DataType;
@@ -98,15 +98,14 @@ impl Log {
     }
 
     /// Columns in memory by name; none for a file.
-    fn in_memory<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> Vec<(String, Bound<'py, numpy::PyArray1<f64>>)> {
+    fn in_memory<'py>(&self, py: Python<'py>) -> Vec<(String, Bound<'py, numpy::PyArray1<f64>>)> {
         match &self.source {
             LogSource::File(_) => Vec::new(),
             LogSource::Columns(own) => {
                 let columns = own.header.iter().cloned().zip(&own.columns);
-                columns.map(|(name, x)| (name, numpy::PyArray1::from_slice(py, x))).collect()
+                columns
+                    .map(|(name, x)| (name, numpy::PyArray1::from_slice(py, x)))
+                    .collect()
             }
         }
     }
@@ -120,7 +119,7 @@ const STREAM: &std::ffi::CStr = c"arrow_array_stream";
     unsafe_code,
     reason = "the Arrow C stream interface hands over a struct by its address"
 )]
-fn reader_of(py: Python<'_>, capsule: &Bound<'_, PyCapsule>) -> PyResult<ArrowArrayStreamReader> {
+fn reader_of(py: Python<'_>, capsule: &Bound<'_, PyCapsule>) -> PyResult<RecordBatchStreamReader> {
     let refuse = |e: String| {
         let failure = Failure::usage(
             format!("a table whose Arrow stream cannot be read: {e}"),
@@ -128,17 +127,19 @@ fn reader_of(py: Python<'_>, capsule: &Bound<'_, PyCapsule>) -> PyResult<ArrowAr
         );
         Problem::from(failure).raise(py)
     };
-    let address = capsule.pointer_checked(Some(STREAM)).map_err(|e| refuse(e.to_string()))?;
+    let address = capsule
+        .pointer_checked(Some(STREAM))
+        .map_err(|e| refuse(e.to_string()))?;
     let stream = address.cast::<FFI_ArrowArrayStream>();
     // SAFETY: a capsule of this name holds a valid `ArrowArrayStream` (Arrow PyCapsule interface), which lives as long as the capsule, and the
     // capsule outlives this call. `from_raw` moves the stream out and leaves a released one behind, which the capsule's destructor accepts. The
     // GIL is held, so that nobody else reads the struct meanwhile.
-    let reader = unsafe { ArrowArrayStreamReader::from_raw(stream.as_ptr()) };
+    let reader = unsafe { RecordBatchStreamReader::from_raw(stream.as_ptr()) };
     reader.map_err(|e| refuse(e.to_string()))
 }
 
 /// All columns of numbers of a table.
-fn columns_of(name: String, reader: ArrowArrayStreamReader) -> Result<Columns, Problem> {
+fn columns_of(name: String, reader: RecordBatchStreamReader) -> Result<Columns, Problem> {
     let refuse = |problem: String| {
         let remedy = "give a table with one column of numbers per channel";
         Problem::from(Failure::usage(format!("`{name}` {problem}"), remedy))
@@ -147,7 +148,9 @@ fn columns_of(name: String, reader: ArrowArrayStreamReader) -> Result<Columns, P
     let wanted: Vec<usize> = (0..schema.fields().len())
         .filter(|&index| is_number(schema.field(index).data_type()))
         .collect();
-    let header = wanted.iter().map(|&index| schema.field(index).name().clone());
+    let header = wanted
+        .iter()
+        .map(|&index| schema.field(index).name().clone());
     let header: Vec<String> = header.collect();
     let mut columns = vec![Vec::new(); wanted.len()];
     for batch in reader {

@@ -44,7 +44,10 @@ impl Asked {
     fn settings(&self) -> Result<regression::Settings, Problem> {
         let unknown = |key: &str, given: &str, known: &str| {
             let problem = format!("{key} is `{given}`");
-            Problem::from(Failure::usage(problem, format!("give one of {known}").as_str()))
+            Problem::from(Failure::usage(
+                problem,
+                format!("give one of {known}").as_str(),
+            ))
         };
         let noise = match self.noise.as_str() {
             "iid" => NoiseModel::Iid,
@@ -70,7 +73,10 @@ impl Asked {
             prior: PriorSettings {
                 scaled_variance: self.scaled_variance.map_or(Auto::Auto, Auto::Value),
                 inclusion,
-                ..PriorSettings::default()
+                noise: None,
+                families: Vec::new(),
+                forced: Vec::new(),
+                heredity: None,
             },
             inference: InferenceSettings {
                 method,
@@ -94,7 +100,11 @@ pub(crate) fn regress(
 ) -> PyResult<Regression> {
     let (x, y) = (numbers(py, &x)?, numbers(py, &y)?);
     let settings = asked.settings().map_err(|problem| problem.raise(py))?;
-    let design = Design { x, y, breaks: &breaks };
+    let design = Design {
+        x,
+        y,
+        breaks: &breaks,
+    };
     pool::detached(py, None, || {
         let regressed = regression::regress(design, &settings)?;
         let summaries = summarise(&regressed.posterior);
@@ -128,7 +138,11 @@ impl Regression {
     /// Ends of the central 95 % interval of each coefficient, column * 2 + end.
     #[getter]
     fn interval95<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let ends = self.summaries.iter().flat_map(|own| own.interval95).collect();
+        let ends = self
+            .summaries
+            .iter()
+            .flat_map(|own| own.interval95)
+            .collect();
         PyArray1::from_vec(py, ends)
     }
 
@@ -169,10 +183,29 @@ impl Regression {
         rows: PyReadonlyArray1<'py, f64>,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
         let rows = numbers(py, &rows)?;
-        let (mean, sd) = pool::detached(py, None, || {
-            Ok::<_, Problem>(self.regressed.predict(rows))
-        })?;
+        let (mean, sd) =
+            pool::detached(py, None, || Ok::<_, Problem>(self.regressed.predict(rows)))?;
         Ok((PyArray1::from_vec(py, mean), PyArray1::from_vec(py, sd)))
+    }
+
+    /// The whole posterior as JSON, for pickle.
+    fn to_json(&self, py: Python<'_>) -> PyResult<String> {
+        let text = serde_json::to_string(&self.regressed);
+        text.map_err(|e| Problem::Panicked(e.to_string()).raise(py))
+    }
+
+    /// The posterior that [`Self::to_json`] wrote.
+    #[staticmethod]
+    fn from_json(py: Python<'_>, text: &str) -> PyResult<Self> {
+        let regressed: Regressed = serde_json::from_str(text).map_err(|e| {
+            let failure = Failure::usage(format!("not a pickled regression: {e}"), "fit again");
+            Problem::from(failure).raise(py)
+        })?;
+        let summaries = summarise(&regressed.posterior);
+        Ok(Self {
+            regressed,
+            summaries,
+        })
     }
 
     /// Draws of the coefficients, draw * columns + column.

@@ -6,9 +6,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::path::PathBuf;
-use twincal::robot::{
-    BLOCK, Motion, PARAMETERS, Regressor, inverse_dynamics, nominal_torque,
-};
+use twincal::robot::{BLOCK, Motion, PARAMETERS, Regressor, inverse_dynamics, nominal_torque};
 use twincal_cli::session::ModelInput;
 use twincal_io::config::Config;
 
@@ -76,7 +74,9 @@ impl Robot {
     #[getter]
     fn torque_units(&self) -> Vec<&'static str> {
         let robot = self.input.robot();
-        (0..robot.dof()).map(|j| robot.joint_kind(j).torque_unit()).collect()
+        (0..robot.dof())
+            .map(|j| robot.joint_kind(j).torque_unit())
+            .collect()
     }
 
     /// Names of the moving bodies.
@@ -95,14 +95,18 @@ impl Robot {
     fn parameters<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let robot = self.input.robot();
         let bodies = 0..robot.bodies().len();
-        let all: Vec<f64> = bodies.flat_map(|body| robot.parameters_of_body(body)).collect();
+        let all: Vec<f64> = bodies
+            .flat_map(|body| robot.parameters_of_body(body))
+            .collect();
         PyArray1::from_vec(py, all)
     }
 
     /// Code and words of what had to be assumed of the model.
     fn findings(&self) -> Vec<(String, String)> {
         let findings = self.input.findings().iter();
-        findings.map(|own| (own.code.to_string(), own.message.clone())).collect()
+        findings
+            .map(|own| (own.code.to_string(), own.message.clone()))
+            .collect()
     }
 
     /// Torque of states.
@@ -173,7 +177,9 @@ impl Robot {
         let memory = || [(); 4].map(|()| vec![0.0; size]);
         if q.len() <= FEW * dof {
             let mut own = memory();
-            tau.chunks_mut(size).enumerate().for_each(|out| chunk(&mut own, out));
+            tau.chunks_mut(size)
+                .enumerate()
+                .for_each(|out| chunk(&mut own, out));
         } else {
             (tau.par_chunks_mut(size).enumerate()).for_each_init(memory, chunk);
         }

@@ -34,14 +34,17 @@ pub(crate) fn config(keywords: &str) -> Result<Config, Problem> {
         }
         place(&schema, &mut tables, key, value)?;
     }
-    let table = toml::Table::try_from(Value::Object(tables)).map_err(|e| internal(e.to_string()))?;
+    let table =
+        toml::Table::try_from(Value::Object(tables)).map_err(|e| internal(e.to_string()))?;
     Ok(Config::parse(NAME, &table.to_string())?)
 }
 
 /// Keys of a table of the schema.
 fn keys<'a>(schema: &'a Value, table: &str) -> Vec<&'a str> {
     let own = &schema["properties"][table];
-    let name = own["$ref"].as_str().and_then(|path| path.rsplit('/').next());
+    let name = own["$ref"]
+        .as_str()
+        .and_then(|path| path.rsplit('/').next());
     let own = name.map_or(own, |name| &schema["$defs"][name]);
     let own = own["properties"].as_object();
     own.map_or(Vec::new(), |own| own.keys().map(String::as_str).collect())
@@ -65,11 +68,15 @@ fn place(
         }
         return Ok(());
     }
-    let owner = ORDER.iter().find(|table| keys(schema, table).contains(&key.as_str()));
+    let owner = ORDER
+        .iter()
+        .find(|table| keys(schema, table).contains(&key.as_str()));
     let Some(owner) = owner else {
         return Err(unknown(schema, &key));
     };
-    let table = tables.entry(*owner).or_insert_with(|| Value::Object(Map::new()));
+    let table = tables
+        .entry(*owner)
+        .or_insert_with(|| Value::Object(Map::new()));
     if let Value::Object(table) = table {
         table.insert(key, value);
     }

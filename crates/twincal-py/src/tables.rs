@@ -3,7 +3,8 @@
 use crate::errors::Problem;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::{
-    ArrayRef, BooleanArray, Float64Array, RecordBatch, RecordBatchIterator, StringArray, UInt64Array,
+    ArrayRef, BooleanArray, Float64Array, RecordBatch, RecordBatchIterator, StringArray,
+    UInt64Array,
 };
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -124,13 +125,19 @@ pub(crate) fn effects(calibration: &Calibration) -> Table {
     for component in &calibration.components {
         match component.parameters.is_empty() {
             true => rows.push((component, None)),
-            false => rows.extend(component.parameters.iter().map(|own| (component, Some(own)))),
+            false => rows.extend(
+                component
+                    .parameters
+                    .iter()
+                    .map(|own| (component, Some(own))),
+            ),
         }
     }
     let of = |value: fn(&ParameterSummary) -> f64| -> Vec<f64> {
         let own = rows.iter();
         let own = own.map(|(_, parameter)| parameter.filter(|own| own.seen));
-        own.map(|parameter| parameter.map_or(f64::NAN, value)).collect()
+        own.map(|parameter| parameter.map_or(f64::NAN, value))
+            .collect()
     };
     let text = |value: fn(&ParameterSummary) -> &str| -> Vec<String> {
         let own = rows.iter();
@@ -139,9 +146,18 @@ pub(crate) fn effects(calibration: &Calibration) -> Table {
     };
     Table::default()
         .text("component", rows.iter().map(|(own, _)| own.name.clone()))
-        .text("family", rows.iter().map(|(own, _)| own.family.word().to_owned()))
-        .text("status", rows.iter().map(|(own, _)| own.status.word().to_owned()))
-        .number("pip", rows.iter().map(|(own, _)| own.pip.unwrap_or(f64::NAN)))
+        .text(
+            "family",
+            rows.iter().map(|(own, _)| own.family.word().to_owned()),
+        )
+        .text(
+            "status",
+            rows.iter().map(|(own, _)| own.status.word().to_owned()),
+        )
+        .number(
+            "pip",
+            rows.iter().map(|(own, _)| own.pip.unwrap_or(f64::NAN)),
+        )
         .text("parameter", text(|own| &own.name))
         .text("unit", text(|own| &own.unit))
         .number("mean", of(|own| own.mean))
@@ -156,11 +172,17 @@ pub(crate) fn effects(calibration: &Calibration) -> Table {
 pub(crate) fn terms(calibration: &Calibration) -> Table {
     let terms = &calibration.terms;
     let number = |value: fn(&twincal::calibrate::TermSummary) -> Option<f64>| -> Vec<f64> {
-        terms.iter().map(|own| value(own).unwrap_or(f64::NAN)).collect()
+        terms
+            .iter()
+            .map(|own| value(own).unwrap_or(f64::NAN))
+            .collect()
     };
     Table::default()
         .text("term", terms.iter().map(|own| own.term.name.clone()))
-        .text("family", terms.iter().map(|own| own.term.family.word().to_owned()))
+        .text(
+            "family",
+            terms.iter().map(|own| own.term.family.word().to_owned()),
+        )
         .text("unit", terms.iter().map(|own| own.term.unit.clone()))
         .number("pip", number(|own| own.pip))
         .number("pip_mcse", number(|own| own.pip_mcse))
@@ -223,12 +245,14 @@ pub(crate) fn assessment(calibration: &Calibration) -> (Table, &'static str, Str
         };
         match claim.evidence.iter().next() {
             None => push("", f64::NAN),
-            Some(_) => claim.evidence.iter().for_each(|(name, number)| push(name, number)),
+            Some(_) => claim
+                .evidence
+                .iter()
+                .for_each(|(name, number)| push(name, number)),
         }
     }
-    let column = |index: usize| -> Vec<String> {
-        rows.iter().map(|row| row[index].clone()).collect()
-    };
+    let column =
+        |index: usize| -> Vec<String> { rows.iter().map(|row| row[index].clone()).collect() };
     let table = Table::default()
         .text("code", column(0))
         .text("role", column(1))
@@ -236,7 +260,11 @@ pub(crate) fn assessment(calibration: &Calibration) -> (Table, &'static str, Str
         .text("subject", column(3))
         .text("evidence", column(4))
         .number("value", numbers);
-    (table, assessment.answer.as_str(), assessment.reason.to_string())
+    (
+        table,
+        assessment.answer.as_str(),
+        assessment.reason.to_string(),
+    )
 }
 
 /// An enum of the core as the word that its JSON has.

@@ -5,10 +5,11 @@ use crate::error::{Error, Result};
 use crate::gram::{Gram, JointAccumulator, JointGram, Workspace};
 use crate::infer::{InferenceSettings, infer};
 use crate::likelihood::{Columns, NoiseModel, NoiseSettings, PlugIn};
-use crate::plug_in::{FitSettings, Moving, fit_gram, first};
+use crate::plug_in::{FitSettings, Moving, first, fit_gram};
 use crate::posterior::Posterior;
 use crate::prior::PriorSettings;
 use crate::term::Family;
+use serde::{Deserialize, Serialize};
 
 /// Data of a regression.
 #[derive(Debug, Clone, Copy)]
@@ -37,7 +38,7 @@ pub struct Settings {
 }
 
 /// The posterior, and what a prediction needs beside it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Regressed {
     /// Posterior of models and coefficients.
     pub posterior: Posterior,
@@ -108,7 +109,11 @@ pub fn regress(design: Design<'_>, settings: &Settings) -> Result<Regressed> {
     }
     let posterior = infer(&fit.problem, &settings.inference)?;
     let rho = fit.plug_in.rho[0];
-    let products = posterior.mean.iter().zip(&offsets).map(|(beta, x)| beta * x);
+    let products = posterior
+        .mean
+        .iter()
+        .zip(&offsets)
+        .map(|(beta, x)| beta * x);
     Ok(Regressed {
         intercept: centre - products.sum::<f64>(),
         sigma: (posterior.noise / (1.0 - rho * rho)).sqrt(),
@@ -133,7 +138,10 @@ impl Regressed {
         // the constant is as uncertain as the mean of so many rows
         let constant = self.sigma * self.sigma * self.autocorrelation_time / self.rows as f64;
         let of_row = |row: &[f64]| {
-            let products = row.iter().zip(&self.posterior.mean).map(|(x, beta)| x * beta);
+            let products = row
+                .iter()
+                .zip(&self.posterior.mean)
+                .map(|(x, beta)| x * beta);
             let mean = self.intercept + products.sum::<f64>();
             let own: Vec<f64> = row.iter().zip(&self.offsets).map(|(x, o)| x - o).collect();
             let epistemic: f64 = (self.covariance.chunks_exact(count).zip(&own))
@@ -171,7 +179,11 @@ fn check(design: &Design<'_>, settings: &Settings) -> Result<()> {
     let components = 1 + settings.groups.iter().max().copied().unwrap_or(0);
     if let Some(gap) = (0..components).find(|own| !settings.groups.contains(own)) {
         let problem = format!("no column of group {gap}");
-        return refuse("groups", problem, "number the groups 0, 1, 2 … without a gap");
+        return refuse(
+            "groups",
+            problem,
+            "number the groups 0, 1, 2 … without a gap",
+        );
     }
     Ok(())
 }
@@ -202,7 +214,9 @@ fn residual(x: &[f64], y: &[f64], breaks: &[usize], beta: &[f64]) -> Vec<Vec<f64
     let rows = y.len();
     let mut left = y.to_vec();
     for (column, beta) in x.chunks_exact(rows).zip(beta) {
-        left.iter_mut().zip(column).for_each(|(y, x)| *y -= beta * x);
+        left.iter_mut()
+            .zip(column)
+            .for_each(|(y, x)| *y -= beta * x);
     }
     let own = runs(rows, breaks).into_iter();
     own.map(|run| left[run].to_vec()).collect()
@@ -224,5 +238,113 @@ fn columns(groups: &[usize]) -> Columns {
         second_choice: Vec::new(),
         one_motion: false,
         halves: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::infer::Choice;
+    use crate::prior::Inclusion;
+    use crate::random::Random;
+    use crate::signal::Auto;
+
+    fn settings(noise: NoiseModel, intercept: bool) -> Settings {
+        Settings {
+            groups: vec![0, 1],
+            noise,
+            intercept,
+            prior: PriorSettings {
+                scaled_variance: Auto::Value(100.0),
+                inclusion: Some(Inclusion::Probability(0.5)),
+                noise: Some((2.0, 0.5)),
+                families: Vec::new(),
+                forced: Vec::new(),
+                heredity: None,
+            },
+            inference: InferenceSettings {
+                method: Choice::Exact,
+                chains: 2,
+                draws: 100,
+                seed: 1,
+                allow_disagreement: false,
+            },
+        }
+    }
+
+    /// Two orthogonal columns: the marginal likelihood of each of the four models in closed form.
+    #[test]
+    fn probabilities_are_those_of_the_closed_form() {
+        let rows = 40;
+        let mut random = Random::new(3, 0);
+        let a: Vec<f64> = (0..rows)
+            .map(|i| if i % 2 == 0 { 1.0 } else { -1.0 })
+            .collect();
+        let b: Vec<f64> = (0..rows)
+            .map(|i| if i % 4 < 2 { 1.0 } else { -1.0 })
+            .collect();
+        let y: Vec<f64> = (a.iter())
+            .map(|a| 0.2 * a + 0.5 * random.normal())
+            .collect();
+        let x = [a.clone(), b.clone()].concat();
+        let design = Design {
+            x: &x,
+            y: &y,
+            breaks: &[],
+        };
+        let found = regress(design, &settings(NoiseModel::Iid, false)).unwrap();
+        // β ~ N(0, v φ) with rms 1, φ ~ InvGamma(a0, b0), each column in with probability ½
+        let (n, v, a0, b0) = (rows as f64, 100.0, 2.0, 0.5);
+        let dot = |p: &[f64], q: &[f64]| -> f64 { p.iter().zip(q).map(|(p, q)| p * q).sum() };
+        let log = |inside: [bool; 2]| {
+            let gain: f64 = [&a, &b]
+                .iter()
+                .zip(inside)
+                .filter(|(_, inside)| *inside)
+                .map(|(column, _)| dot(column, &y).powi(2) / (n + 1.0 / v))
+                .sum();
+            let size = inside.iter().filter(|inside| **inside).count() as f64;
+            -0.5 * size * (1.0 + v * n).ln()
+                - (a0 + 0.5 * n) * (b0 + 0.5 * (dot(&y, &y) - gain)).ln()
+        };
+        let models = [[false, false], [true, false], [false, true], [true, true]];
+        let weights = models.map(|inside| log(inside).exp());
+        let all: f64 = weights.iter().sum();
+        let pip = [
+            (weights[1] + weights[3]) / all,
+            (weights[2] + weights[3]) / all,
+        ];
+        for k in 0..2 {
+            let error = (found.posterior.inclusion[k] - pip[k]).abs();
+            assert!(
+                error < 1e-9,
+                "{k}: {} and {}",
+                found.posterior.inclusion[k],
+                pip[k]
+            );
+        }
+    }
+
+    #[test]
+    fn a_constant_moves_nothing_but_the_intercept() {
+        let mut random = Random::new(4, 0);
+        let x: Vec<f64> = (0..400).map(|_| 3.0 + random.normal()).collect();
+        let y: Vec<f64> = (0..200)
+            .map(|i| 2.0 * x[i] + 0.1 * random.normal())
+            .collect();
+        let moved: Vec<f64> = y.iter().map(|y| y + 7.0).collect();
+        let of = |y: &[f64]| {
+            let design = Design {
+                x: &x,
+                y,
+                breaks: &[],
+            };
+            regress(design, &settings(NoiseModel::Iid, true)).unwrap()
+        };
+        let (one, other) = (of(&y), of(&moved));
+        assert!((other.intercept - one.intercept - 7.0).abs() < 1e-9);
+        assert!((other.posterior.mean[0] - one.posterior.mean[0]).abs() < 1e-9);
+        let error = |found: &Regressed| (found.predict(&x[..2]).0[0] - found.intercept).abs();
+        assert!((error(&one) - error(&other)).abs() < 1e-9);
     }
 }

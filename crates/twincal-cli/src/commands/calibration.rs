@@ -11,11 +11,11 @@ use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use twincal::Finding;
 use twincal::calibrate::{
     Calibration, CalibrationSettings, Stage, Statistics, Stopped, calibrate_statistics,
     calibrate_watched,
 };
-use twincal::Finding;
 use twincal_io::artifact::{Claim, MODEL_MJCF, Maker, REPORT};
 use twincal_io::config::{Config, ReadAs, Settings};
 use twincal_io::context::{FileHash, ReportContext};

@@ -21,8 +21,8 @@ use twincal::robot::Robot;
 use twincal_io::artifact::{
     Artifact, Claim, Inputs, MODEL_MJCF, MODEL_URDF, Maker, RUN_LOG, Replace, sha256,
 };
-use twincal_io::log::read_columns;
 use twincal_io::config::{Config, Settings};
+use twincal_io::log::read_columns;
 use twincal_io::memory;
 use twincal_io::model::parse_model;
 use twincal_io::statistics::StatisticsFile;
@@ -215,7 +215,13 @@ fn read(
         match source {
             LogSource::File(path) => {
                 let path = (path.as_path(), name.as_str());
-                all.append(LogInput::read_one(path, robot, &settings.log, long, &progress)?);
+                all.append(LogInput::read_one(
+                    path,
+                    robot,
+                    &settings.log,
+                    long,
+                    &progress,
+                )?);
             }
             LogSource::Columns(own) => {
                 let options = settings.log.options(Path::new(&own.name));

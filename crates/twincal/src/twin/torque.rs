@@ -2,6 +2,8 @@
 
 use super::{Predictor, TorqueSignal, Twin};
 use crate::error::{Error, Result};
+use crate::posterior::draws::CoefficientDraws;
+use crate::random::Random;
 use crate::rows::{RowBlock, RowSignal, visit_rows};
 use crate::signal::{Payload, Pipeline, Segment, Trajectory};
 use crate::term::Library;
@@ -9,6 +11,8 @@ use rayon::prelude::*;
 
 /// States that one thread takes at a time.
 const BATCH: usize = 4096;
+/// Random stream of noise in draws of torque.
+const NOISE_STREAM: u64 = (1 << 32) + 5;
 
 /// Torque of some states, `state * joints + joint`, N·m or N.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -74,6 +78,74 @@ impl TorqueModel<'_> {
     /// [`Error::Setting`] with the key `q`, `qd` or `qdd`.
     pub fn torque(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Result<Torque> {
         let dof = self.twin.robot.dof();
+        self.check(q, qd, qdd)?;
+        let batches: Vec<usize> = (0..q.len()).step_by(BATCH * dof).collect();
+        let parts: Vec<Torque> = (batches.into_par_iter())
+            .map(|from| {
+                let own = from..q.len().min(from + BATCH * dof);
+                self.batch([&q[own.clone()], &qd[own.clone()], &qdd[own]])
+            })
+            .collect::<Result<_>>()?;
+        let mut torque = Torque::default();
+        for part in parts {
+            torque.mean.extend(part.mean);
+            torque.low.extend(part.low);
+            torque.high.extend(part.high);
+            torque.outside.extend(part.outside);
+        }
+        Ok(torque)
+    }
+
+    /// Draws of measured torque, `(draw * states + state) * joints + joint`: nominal torque, the effects with each draw's coefficients, and noise.
+    ///
+    /// Noise is independent from state to state, with the sd that the interval has; of one `seed` the result is the same on any number of threads.
+    ///
+    /// # Errors
+    /// Those of [`Twin::torque`].
+    pub fn draws(
+        &self,
+        [q, qd, qdd]: [&[f64]; 3],
+        draws: &CoefficientDraws,
+        seed: u64,
+    ) -> Result<Vec<f64>> {
+        self.check(q, qd, qdd)?;
+        let dof = self.twin.robot.dof();
+        let all = q.len();
+        let mut torque = vec![0.0; draws.models.len() * all];
+        let mut sd = vec![0.0; all];
+        let mut put = |block: &RowBlock<'_>| {
+            let joints = self.predictor.block(block, TorqueSignal::Raw);
+            for (joint, (own, rows)) in joints.iter().zip(&block.joints).enumerate() {
+                for (i, &row) in block.input_rows.iter().enumerate() {
+                    let at = row * dof + joint;
+                    sd[at] = own.noise[i];
+                    let fixed = rows.nominal[i] + rows.products.get(i).copied().unwrap_or(0.0);
+                    for (draw, beta) in draws.beta.chunks_exact(draws.columns).enumerate() {
+                        let columns = rows.columns.iter().enumerate();
+                        let found =
+                            columns.map(|(k, &column)| beta[column] * rows.x[k * rows.stride + i]);
+                        torque[draw * all + at] = fixed + found.sum::<f64>();
+                    }
+                }
+            }
+            Ok(())
+        };
+        let trajectory = self.trajectory([q, qd, qdd]);
+        let (robot, library) = (&self.twin.robot, &self.library);
+        let raw = RowSignal::Raw;
+        visit_rows(robot, library, &self.pipeline, &trajectory, raw, &mut put)?;
+        let mut random = Random::new(seed, NOISE_STREAM);
+        for own in torque.chunks_exact_mut(all.max(1)) {
+            own.iter_mut()
+                .zip(&sd)
+                .for_each(|(tau, sd)| *tau += sd * random.normal());
+        }
+        Ok(torque)
+    }
+
+    /// Refuses arrays that are no states of the robot.
+    fn check(&self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Result<()> {
+        let dof = self.twin.robot.dof();
         for (key, values) in [("q", q), ("qd", qd), ("qdd", qdd)] {
             if !values.len().is_multiple_of(dof) || values.len() != q.len() {
                 let problem = format!(
@@ -100,51 +172,13 @@ impl TorqueModel<'_> {
                 });
             }
         }
-        let batches: Vec<usize> = (0..q.len()).step_by(BATCH * dof).collect();
-        let parts: Vec<Torque> = (batches.into_par_iter())
-            .map(|from| {
-                let own = from..q.len().min(from + BATCH * dof);
-                self.batch([&q[own.clone()], &qd[own.clone()], &qdd[own]])
-            })
-            .collect::<Result<_>>()?;
-        let mut torque = Torque::default();
-        for part in parts {
-            torque.mean.extend(part.mean);
-            torque.low.extend(part.low);
-            torque.high.extend(part.high);
-            torque.outside.extend(part.outside);
-        }
-        Ok(torque)
+        Ok(())
     }
 
     fn batch(&self, motion: [&[f64]; 3]) -> Result<Torque> {
         let dof = self.twin.robot.dof();
         let count = motion[0].len() / dof;
-        let by_joint = |values: &[f64]| -> Vec<f64> {
-            (0..dof)
-                .flat_map(|joint| values.iter().skip(joint).step_by(dof).copied())
-                .collect()
-        };
-        let [q, qd, qdd] = motion.map(by_joint);
-        let trajectory = Trajectory {
-            name: String::new(),
-            dof,
-            segments: vec![Segment {
-                time: (0..count).map(|i| i as f64).collect(),
-                input_rows: (0..count).collect(),
-                logged: None,
-                q,
-                qd,
-                qdd,
-                tau: Vec::new(),
-                standstill: vec![false; dof * count],
-                history: vec![0.0; self.pipeline.channels() * dof * count],
-                interval: 1.0,
-                logged_interval: 1.0,
-            }],
-            payload: Payload::None,
-            payload_acts: true,
-        };
+        let trajectory = self.trajectory(motion);
         let mut torque = Torque {
             mean: vec![0.0; dof * count],
             low: vec![0.0; dof * count],
@@ -173,5 +207,36 @@ impl TorqueModel<'_> {
             &mut put,
         )?;
         Ok(torque)
+    }
+
+    /// States as a trajectory without history.
+    fn trajectory(&self, motion: [&[f64]; 3]) -> Trajectory {
+        let dof = self.twin.robot.dof();
+        let count = motion[0].len() / dof;
+        let by_joint = |values: &[f64]| -> Vec<f64> {
+            (0..dof)
+                .flat_map(|joint| values.iter().skip(joint).step_by(dof).copied())
+                .collect()
+        };
+        let [q, qd, qdd] = motion.map(by_joint);
+        Trajectory {
+            name: String::new(),
+            dof,
+            segments: vec![Segment {
+                time: (0..count).map(|i| i as f64).collect(),
+                input_rows: (0..count).collect(),
+                logged: None,
+                q,
+                qd,
+                qdd,
+                tau: Vec::new(),
+                standstill: vec![false; dof * count],
+                history: vec![0.0; self.pipeline.channels() * dof * count],
+                interval: 1.0,
+                logged_interval: 1.0,
+            }],
+            payload: Payload::None,
+            payload_acts: true,
+        }
     }
 }

@@ -1,0 +1,70 @@
+"""Finds the physics that is missing from a robot's digital twin.
+
+>>> import twincal
+>>> robot = twincal.Robot.from_urdf("arm.urdf")
+>>> result = twincal.fit(robot, [twincal.Log.read("run1.csv")])
+>>> result.effects.to_pandas()
+
+======================  ==================================================================
+`Robot`                 a model: torque of a motion, regressor
+`Log`                   a recording: a file, arrays or a data frame
+`fit`                   robot and logs to a `Calibration`
+`Calibration`           assessment, effects, torque with intervals, files
+`Statistics`            what a fit takes of each log, which adds
+`SpikeSlabRegressor`    the same regression for any columns, as scikit-learn has it
+`plot`                  figures of matplotlib
+======================  ==================================================================
+
+Units are SI and radians. Errors are those of `twincal.errors`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from twincal import errors
+from twincal._calibration import Calibration, Draws, Torque, fit
+from twincal._log import Log
+from twincal._robot import Robot
+from twincal._statistics import Plan, Statistics
+from twincal._table import Assessment, Table
+from twincal._twincal import version as _version
+from twincal.errors import Error
+
+if TYPE_CHECKING:
+    from twincal import plot
+    from twincal._regressor import SpikeSlabRegressor
+
+__version__ = _version()
+
+__all__ = [
+    "Assessment",
+    "Calibration",
+    "Draws",
+    "Error",
+    "Log",
+    "Plan",
+    "Robot",
+    "SpikeSlabRegressor",
+    "Statistics",
+    "Table",
+    "Torque",
+    "errors",
+    "fit",
+    "plot",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Imports what needs scikit-learn or matplotlib when it is first used."""
+    import importlib
+
+    if name == "SpikeSlabRegressor":
+        return importlib.import_module("twincal._regressor").SpikeSlabRegressor
+    if name == "plot":
+        return importlib.import_module("twincal.plot")
+    raise AttributeError(f"module 'twincal' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), "SpikeSlabRegressor", "plot"])

@@ -1,0 +1,160 @@
+"""Threads, forks, interrupts, imports and memory."""
+
+from __future__ import annotations
+
+import os
+import sys
+import textwrap
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+import twincal
+from conftest import SETTINGS, python
+
+FIT = """
+import sys, twincal
+robot = twincal.Robot.from_urdf(sys.argv[1])
+log = twincal.Log.read(sys.argv[2])
+def work(_=None):
+    return float(twincal.fit(robot, log, families=["viscous"], generic=False).terms["mean"][0])
+"""
+
+
+def test_eight_threads(arm, robot, result):
+    states = np.random.default_rng(2).uniform(-1.0, 1.0, (3, 3000, 2))
+    expected, fitted = result.predict(*states), result.terms["mean"]
+
+    def work(number: int) -> bool:
+        own = result.predict(*states)
+        same = np.array_equal(own.low, expected.low)
+        if number % 4 == 0:
+            logs = [arm.log(name) for name in ("run1", "run2")]
+            again = twincal.fit(robot, logs, heldout=arm.log("run3"), **SETTINGS)
+            same &= np.array_equal(again.terms["mean"], fitted, equal_nan=True)
+        return bool(same)
+
+    with ThreadPoolExecutor(8) as pool:
+        assert all(pool.map(work, range(8)))
+
+
+@pytest.mark.parametrize("method", ["fork", "spawn", "loky"])
+def test_processes(arm, method, tmp_path):
+    if method == "loky":
+        pytest.importorskip("joblib")
+    script = tmp_path / "work.py"
+    run = {
+        "loky": "import joblib; own = joblib.Parallel(2)(joblib.delayed(work)() for _ in range(2))",
+    }.get(
+        method,
+        f"""import multiprocessing
+    with multiprocessing.get_context("{method}").Pool(2) as pool:
+        own = pool.map(work, range(2))""",
+    )
+    text = FIT + f'\nif __name__ == "__main__":\n    first = work()\n    {run}\n    print(own == [first] * 2)\n'
+    script.write_text(text)
+    import subprocess
+
+    done = subprocess.run(
+        [sys.executable, script, arm.model, arm.folder / "run1.csv"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.stdout.strip() == "True", done.stderr
+
+
+def test_ctrl_c_ends_a_fit_within_a_second(arm):
+    code = FIT + textwrap.dedent(
+        """
+        import os, signal, threading, time
+        threading.Timer(0.1, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+        logs = [twincal.Log.read(path) for path in sys.argv[2:5]]
+        began = time.monotonic()
+        try:
+            twincal.fit(robot, logs, method="gibbs", draws=400000, chains=4)
+        except KeyboardInterrupt:
+            print(time.monotonic() - began)
+        os._exit(0)
+        """
+    )
+    files = [arm.folder / f"run{k}.csv" for k in (1, 2, 3)]
+    done = python(code, arm.model, *files)
+    assert float(done.stdout) < 1.1, done.stderr
+
+
+def test_progress_is_called_and_may_stop(arm, robot):
+    heard = []
+    twincal.fit(robot, arm.log("run1"), progress=lambda *own: heard.append(own), **SETTINGS)
+    assert len({stage for stage, _, _ in heard}) >= 3
+    twincal.fit(robot, arm.log("run1"), progress=True, **SETTINGS)
+
+    class Enough(Exception):
+        pass
+
+    def stop(*_):
+        raise Enough
+
+    with pytest.raises(Enough):
+        twincal.fit(robot, arm.log("run1"), progress=stop, **SETTINGS)
+    with pytest.raises(TypeError):
+        twincal.fit(robot, arm.log("run1"), progress=3)
+
+
+def test_other_threads_run_during_a_fit(arm, robot):
+    from threading import Event, Thread
+
+    ended, counted = Event(), []
+
+    def count():
+        while not ended.is_set():
+            counted.append(None)
+            time.sleep(0.001)
+
+    thread = Thread(target=count)
+    thread.start()
+    began = time.monotonic()
+    twincal.fit(robot, [arm.log("run1"), arm.log("run2")], **SETTINGS)
+    seconds = time.monotonic() - began
+    ended.set()
+    thread.join()
+    assert len(counted) > 50 * seconds
+
+
+def test_import_is_quick_and_light():
+    code = """
+import sys, time
+import numpy
+began = time.perf_counter()
+import twincal
+print(time.perf_counter() - began)
+heavy = {"sklearn", "arviz", "matplotlib", "pandas", "polars", "xarray", "scipy", "tqdm"}
+print(sorted(heavy & set(sys.modules)))
+"""
+    best = []
+    for _ in range(5):
+        seconds, heavy = python(code).stdout.splitlines()
+        assert heavy == "[]"
+        best.append(float(seconds))
+    assert min(best) < 0.2, best
+
+
+def test_memory_does_not_grow(arm):
+    code = FIT + textwrap.dedent(
+        """
+        def rss():
+            with open("/proc/self/statm") as file:
+                return int(file.read().split()[1]) * 4096 / 1e6
+        sizes = []
+        for count in range(1, 121):
+            work()
+            if count in (20, 120):
+                sizes.append(rss())
+        print(sizes[1] - sizes[0])
+        """
+    )
+    if not os.path.exists("/proc/self/statm"):
+        pytest.skip("memory is read from /proc")
+    done = python(code, arm.model, arm.folder / "run1.csv")
+    assert float(done.stdout) < 10.0, done.stderr

@@ -1,0 +1,68 @@
+"""Types: mypy --strict of the package, stubtest of the extension, docstrings of everything public."""
+
+from __future__ import annotations
+
+import inspect
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import twincal
+
+FOLDER = Path(twincal.__file__).parent
+
+
+def test_mypy_is_strict(tmp_path):
+    pytest.importorskip("mypy")
+    config = tmp_path / "mypy.ini"
+    config.write_text(
+        "[mypy]\nstrict = True\n"
+        + "".join(
+            f"[mypy-{name}.*]\nignore_missing_imports = True\nfollow_imports = skip\n"
+            for name in ("sklearn", "pandas", "polars", "xarray", "matplotlib", "tqdm", "arviz")
+        )
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--config-file", config, "-p", "twincal"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stdout
+
+
+def test_stubs_are_those_of_the_extension(tmp_path):
+    pytest.importorskip("mypy")
+    allow = tmp_path / "allow"
+    allow.write_text("twincal\\._twincal\\.__all__\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy.stubtest", "twincal._twincal", "--allowlist", allow]
+        + ["--ignore-unused-allowlist", "--ignore-disjoint-bases"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        timeout=300,
+        env={**os.environ},
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_py_typed_is_there():
+    assert (FOLDER / "py.typed").exists()
+
+
+def test_everything_public_has_a_docstring():
+    missing = []
+    for name in twincal.__all__:
+        own = getattr(twincal, name)
+        if not inspect.getdoc(own):
+            missing.append(name)
+        if inspect.isclass(own):
+            for key, member in vars(own).items():
+                public = not key.startswith("_") and (callable(member) or isinstance(member, property))
+                if public and not inspect.getdoc(getattr(own, key)):
+                    missing.append(f"{name}.{key}")
+    assert not missing
