@@ -153,6 +153,12 @@ class Log:
             return cls._of(_twincal.Log.arrays(name, named, own, said))
         raise TypeError(f"{type(frame).__name__} is no table; give a data frame with Arrow support")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        log = self._log
+        path = self.path
+        columns = log.in_memory() if path is None else None
+        return (_restored, (path or log.name, columns, log.entry, log.columns))
+
     @property
     def name(self) -> str:
         """Name as it was given."""
@@ -166,6 +172,15 @@ class Log:
 
     def __repr__(self) -> str:
         return f"<twincal.Log {self.name!r}>"
+
+
+def _restored(
+    name: str, columns: list[tuple[str, Any]] | None, entry: str, said: str
+) -> Log:
+    """A log that was pickled."""
+    if columns is None:
+        return Log._of(_twincal.Log.file(name, entry, said))
+    return Log._of(_twincal.Log.arrays(name, columns, entry, said))
 
 
 def _has(module: str) -> bool:

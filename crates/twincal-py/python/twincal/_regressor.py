@@ -126,18 +126,19 @@ class SpikeSlabRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         ValueError
             For arrays and parameters that do not fit together.
         """
-        X, y = validate_data(
+        checked: tuple[Floats, Floats] = validate_data(
             self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2
         )
-        asked = self._asked(X.shape[1])
+        rows, target = checked
+        asked = self._asked(rows.shape[1])
         breaks: list[int] = []
         if runs is not None:
             own = np.asarray(runs)
-            if own.shape != y.shape:
+            if own.shape != target.shape:
                 raise ValueError(f"runs has shape {own.shape}; give one number per sample")
             breaks = (1 + np.flatnonzero(own[1:] != own[:-1])).tolist()
-        columns = np.ascontiguousarray(X.T).reshape(-1)
-        target = np.ascontiguousarray(y, dtype=np.float64)
+        columns = np.ascontiguousarray(rows.T).reshape(-1)
+        target = np.ascontiguousarray(target, dtype=np.float64)
         self.regression_ = _twincal.regress(columns, target, breaks, asked)
         found = self.regression_
         self.coef_ = found.mean
@@ -168,8 +169,8 @@ class SpikeSlabRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             Only with `return_std`.
         """
         check_is_fitted(self)
-        X = validate_data(self, X, dtype=np.float64, reset=False)
-        mean, std = self.regression_.predict(np.ascontiguousarray(X).reshape(-1))
+        rows: Floats = validate_data(self, X, dtype=np.float64, reset=False)
+        mean, std = self.regression_.predict(np.ascontiguousarray(rows).reshape(-1))
         return (mean, std) if return_std else mean
 
     def sample(self, n: int = 1000, *, seed: int = 1) -> Floats:

@@ -29,10 +29,23 @@ class Robot:
         The B moving bodies, in the order of the regressor.
     """
 
-    def __init__(self, robot: _twincal.Robot) -> None:
+    def __init__(self, robot: _twincal.Robot, made_of: tuple[str, str | None, str]) -> None:
         if not isinstance(robot, _twincal.Robot):
             raise TypeError("a Robot is made by Robot.from_urdf, from_mjcf or from_mjspec")
         self._robot = robot
+        self._made_of = made_of
+
+    @classmethod
+    def _make(cls, name: str, text: str | None, settings: str) -> Robot:
+        """A robot of a file, or of the text of a model."""
+        if text is None:
+            robot = _twincal.Robot.read(name, settings)
+        else:
+            robot = _twincal.Robot.parse(name, text, settings)
+        return cls(robot, (name, text, settings))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (Robot._make, self._made_of)
 
     @classmethod
     def from_urdf(cls, path: str | os.PathLike[str], **settings: Any) -> Robot:
@@ -57,12 +70,12 @@ class Robot:
         twincal.errors.SettingError
             For an unknown or impossible setting.
         """
-        return cls(_twincal.Robot.read(os.fspath(path), as_json(settings)))
+        return cls._make(os.fspath(path), None, as_json(settings))
 
     @classmethod
     def from_mjcf(cls, path: str | os.PathLike[str], **settings: Any) -> Robot:
         """Reads an MJCF file; parameters, result and errors are those of `from_urdf`."""
-        return cls(_twincal.Robot.read(os.fspath(path), as_json(settings)))
+        return cls._make(os.fspath(path), None, as_json(settings))
 
     @classmethod
     def from_mjspec(cls, spec: Any, **settings: Any) -> Robot:
@@ -93,7 +106,7 @@ class Robot:
         compile_ = getattr(spec, "compile", None)
         if callable(compile_):
             compile_()
-        return cls(_twincal.Robot.parse("model.xml", to_xml(), as_json(settings)))
+        return cls._make("model.xml", to_xml(), as_json(settings))
 
     @property
     def name(self) -> str:

@@ -23,7 +23,8 @@ def _axes(ax: Axes | None) -> Axes:
         return ax
     from matplotlib import pyplot
 
-    return pyplot.subplots()[1]
+    made: Axes = pyplot.subplots()[1]
+    return made
 
 
 def _joint(calibration: Calibration, joint: int | str) -> int:
