@@ -152,6 +152,7 @@ impl Calibration {
     fn draws<'py>(&self, py: Python<'py>, count: usize, seed: u64) -> PyResult<Draws<'py>> {
         let posterior = &self.result().twin.posterior;
         let draws = pool::detached(py, None, || {
+            pool::require_memory("draws", &[count, posterior.mean.len().max(1)])?;
             Ok::<_, Problem>(draw(posterior, count, seed, STREAM))
         })?;
         Ok((
@@ -178,7 +179,11 @@ impl Calibration {
         known.sort_unstable();
         known.dedup();
         let name = |column: usize| {
-            let live = result.terms.iter().filter(|own| own.pip.is_some()).nth(column);
+            let live = result
+                .terms
+                .iter()
+                .filter(|own| own.pip.is_some())
+                .nth(column);
             let component = live.and_then(|own| result.components.get(own.term.component));
             component.map_or(String::new(), |own| own.name.clone())
         };
@@ -194,7 +199,8 @@ impl Calibration {
         let (names, _) = self.components();
         let family = |name: &String| {
             let mut all = self.result().components.iter();
-            all.find(|own| own.name == *name).map_or("", |own| own.family.word())
+            all.find(|own| own.name == *name)
+                .map_or("", |own| own.family.word())
         };
         names.iter().map(family).collect()
     }
@@ -233,8 +239,13 @@ impl Calibration {
         let motion = [q?, qd?, qdd?];
         let twin = &self.result().twin;
         let torque = pool::detached(py, None, || {
+            let columns = twin.posterior.mean.len();
+            pool::require_memory(
+                "draws of torque",
+                &[count, motion[0].len().max(columns).max(1)],
+            )?;
             let draws = draw(&twin.posterior, count, seed, STREAM);
-            twin.torque_model()?.draws(motion, &draws, seed)
+            Ok::<_, Problem>(twin.torque_model()?.draws(motion, &draws, seed)?)
         })?;
         Ok(PyArray1::from_vec(py, torque))
     }

@@ -13,8 +13,6 @@ pub(crate) enum Problem {
     Failed(Failure),
     /// It panicked: a mistake in twincal.
     Panicked(String),
-    /// Python asked for an end.
-    Interrupted,
 }
 
 impl From<Failure> for Problem {
@@ -69,11 +67,6 @@ impl Problem {
                 "internal",
                 format!("a mistake in twincal: {message}"),
                 "please report it, with the input if you may".into(),
-            ),
-            Self::Interrupted => (
-                "cancelled",
-                "the fit was asked to stop".into(),
-                String::new(),
             ),
         }
     }

@@ -7,7 +7,6 @@ use crate::pool;
 use crate::robot::Robot;
 use crate::settings;
 use crate::statistics::Statistics;
-use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -122,7 +121,6 @@ pub(crate) fn fit(
     }
     match outcome? {
         Ok(fitted) => Ok(Calibration::new(fitted)),
-        Err(Problem::Interrupted) => Err(PyKeyboardInterrupt::new_err("the fit was interrupted")),
         Err(problem) => Err(problem.raise(py)),
     }
 }

@@ -72,3 +72,17 @@ pub(crate) fn detached<T: Send, E: Send + Into<Problem>>(
     py.detach(|| work(wanted, own))
         .map_err(|problem| problem.raise(py))
 }
+
+/// Refuses numbers that the memory does not hold, before they are allocated: a failed allocation ends the process.
+pub(crate) fn require_memory(what: &str, sizes: &[usize]) -> Result<(), Problem> {
+    let numbers = sizes
+        .iter()
+        .fold(1_u64, |all, &own| all.saturating_mul(own as u64));
+    // a result and a copy of it
+    let bytes = numbers.saturating_mul(16);
+    Ok(twincal_io::memory::require(
+        what,
+        bytes,
+        "ask for fewer at a time",
+    )?)
+}

@@ -209,8 +209,17 @@ impl Regression {
     }
 
     /// Draws of the coefficients, draw * columns + column.
-    fn draws<'py>(&self, py: Python<'py>, count: usize, seed: u64) -> Bound<'py, PyArray1<f64>> {
-        let draws = py.detach(|| draw(&self.regressed.posterior, count, seed, STREAM));
-        PyArray1::from_vec(py, draws.beta)
+    fn draws<'py>(
+        &self,
+        py: Python<'py>,
+        count: usize,
+        seed: u64,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let posterior = &self.regressed.posterior;
+        let draws = pool::detached(py, None, || {
+            pool::require_memory("draws", &[count, posterior.mean.len().max(1)])?;
+            Ok::<_, Problem>(draw(posterior, count, seed, STREAM))
+        })?;
+        Ok(PyArray1::from_vec(py, draws.beta))
     }
 }

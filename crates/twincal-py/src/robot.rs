@@ -6,7 +6,11 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::path::PathBuf;
-use twincal::robot::{BLOCK, Motion, PARAMETERS, Regressor, inverse_dynamics, nominal_torque};
+use twincal::robot::spatial::{apply, scale, transpose};
+use twincal::robot::{
+    BLOCK, Motion, PARAMETERS, Placement, Regressor, inverse_dynamics, nominal_torque,
+    to_body_frame,
+};
 use twincal_cli::session::ModelInput;
 use twincal_io::config::Config;
 
@@ -91,14 +95,19 @@ impl Robot {
         PARAMETERS.to_vec()
     }
 
-    /// Inertial parameters of the bodies, body * 10 + parameter.
+    /// Inertial parameters of the bodies in the frames of their links, body * 10 + parameter.
     fn parameters<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let robot = self.input.robot();
-        let bodies = 0..robot.bodies().len();
-        let all: Vec<f64> = bodies
-            .flat_map(|body| robot.parameters_of_body(body))
-            .collect();
-        PyArray1::from_vec(py, all)
+        let of_body = |(body, name): (usize, &str)| {
+            let placement = robot
+                .body_of_link(name)
+                .map_or(Placement::IDENTITY, |own| own.1);
+            let map = to_body_frame(&inverse(&placement));
+            let own = robot.parameters_of_body(body);
+            map.map(|row| row.iter().zip(&own).map(|(a, x)| a * x).sum::<f64>())
+        };
+        let all = robot.bodies().into_iter().enumerate().flat_map(of_body);
+        PyArray1::from_vec(py, all.collect())
     }
 
     /// Code and words of what had to be assumed of the model.
@@ -129,8 +138,21 @@ impl Robot {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let [q, qd, qdd] = [&states[0], &states[1], &states[2]].map(|own| numbers(py, own));
         let motion = [q?, qd?, qdd?];
-        let values = pool::detached(py, None, || Ok::<_, Problem>(self.columns(motion)))?;
+        let values = pool::detached(py, None, || {
+            let parameters = 10 * self.input.robot().bodies().len();
+            pool::require_memory("regressor", &[motion[0].len(), parameters])?;
+            Ok::<_, Problem>(self.columns(motion))
+        })?;
         Ok(PyArray1::from_vec(py, values))
+    }
+}
+
+/// The outer frame, seen from a frame in it.
+fn inverse(placement: &Placement) -> Placement {
+    let rotation = transpose(&placement.rotation);
+    Placement {
+        rotation,
+        translation: scale(-1.0, apply(&rotation, placement.translation)),
     }
 }
 
@@ -191,6 +213,13 @@ impl Robot {
         let dof = robot.dof();
         let parameters = 10 * robot.bodies().len();
         let regressor = Regressor::new(robot);
+        let of_link = |name: &str| {
+            let placement = robot
+                .body_of_link(name)
+                .map_or(Placement::IDENTITY, |own| own.1);
+            to_body_frame(&placement)
+        };
+        let maps: Vec<_> = robot.bodies().into_iter().map(of_link).collect();
         let mut values = vec![0.0; q.len() * parameters];
         let memory = || {
             let motion = [(); 3].map(|()| vec![0.0; BLOCK * dof]);
@@ -211,11 +240,15 @@ impl Robot {
             };
             regressor.evaluate(robot, motion, 0..len, block);
             for (index, pair) in regressor.pairs().iter().enumerate() {
-                for parameter in (0..10).filter(|&k| pair.present[k]) {
-                    let column = &block.column(index, parameter)[..len];
-                    let place = pair.coordinate * parameters + 10 * pair.body + parameter;
+                let place = pair.coordinate * parameters + 10 * pair.body;
+                for inner in (0..10).filter(|&k| pair.present[k]) {
+                    let column = &block.column(index, inner)[..len];
+                    // a column of the link's parameters is Σ_i Y_body[i] A[i][k]
+                    let row = &maps[pair.body][inner];
                     for (state, value) in column.iter().enumerate() {
-                        out[state * dof * parameters + place] += value;
+                        let at = state * dof * parameters + place;
+                        let own = out[at..at + 10].iter_mut().zip(row);
+                        own.for_each(|(sum, a)| *sum += value * a);
                     }
                 }
             }

@@ -32,11 +32,25 @@ pub(crate) fn config(keywords: &str) -> Result<Config, Problem> {
         if value.is_null() {
             continue;
         }
+        require_toml(&key, &value)?;
         place(&schema, &mut tables, key, value)?;
     }
     let table =
         toml::Table::try_from(Value::Object(tables)).map_err(|e| internal(e.to_string()))?;
     Ok(Config::parse(NAME, &table.to_string())?)
+}
+
+/// Refuses a value that no twincal.toml can hold: None in a list, a whole number beyond 64 bits.
+fn require_toml(key: &str, value: &Value) -> Result<(), Problem> {
+    match toml::Value::try_from(value) {
+        Ok(_) => Ok(()),
+        Err(e) => Err(Failure::from(twincal::Error::Setting {
+            key: key.to_owned(),
+            problem: format!("is no value of a setting: {e}"),
+            remedy: "give numbers, text, lists and dicts without None".into(),
+        })
+        .into()),
+    }
 }
 
 /// Keys of a table of the schema.

@@ -18,7 +18,7 @@ import sys, twincal
 robot = twincal.Robot.from_urdf(sys.argv[1])
 log = twincal.Log.read(sys.argv[2])
 def work(_=None):
-    return float(twincal.fit(robot, log, families=["viscous"], generic=False).terms["mean"][0])
+    return float(twincal.fit(robot, log, families=["payload", "viscous"], generic=False).terms["mean"][0])
 """
 
 

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 import twincal
+from conftest import SETTINGS
 
 
 def test_tables_are_those_of_result_json(result):
@@ -41,7 +42,7 @@ def test_a_table_in_the_memory_of_others_is_a_log(arm, robot):
     polars, pyarrow = pytest.importorskip("polars"), pytest.importorskip("pyarrow")
     frame = polars.read_csv(arm.folder / "run1.csv")
     fits = [
-        twincal.fit(robot, twincal.Log.from_dataframe(own), families=["viscous"], generic=False)
+        twincal.fit(robot, twincal.Log.from_dataframe(own), **SETTINGS)
         for own in (frame, frame.to_arrow(), pyarrow.table(frame).slice(0, len(frame)))
     ]
     for other in fits[1:]:
@@ -70,7 +71,7 @@ def test_exports_and_gates(arm, result):
     file = result.check(twincal.Log.read(arm.folder / "run3.csv"))
     assert [gate["value"] for gate in file["gates"]] == [gate["value"] for gate in passed["gates"]]
     same = result.diff(result)
-    assert same["schema"] == 1 and all(own["became"] == "same" for own in same["components"])
+    assert same["schema"] == 1 and all(own["became"] == "as_before" for own in same["components"])
     page = result.report(arm.folder / "page.html")
     assert page.startswith("<!") and (arm.folder / "page.html").read_text() == page
 

@@ -129,3 +129,32 @@ def as_json(settings: dict[str, Any]) -> str:
         raise TypeError(f"a setting has a value of the wrong type: {error}") from None
     except RecursionError:
         raise ValueError("a setting holds itself") from None
+
+
+def whole(name: str, value: object) -> int:
+    """A whole number from 0 on.
+
+    Parameters
+    ----------
+    name : str
+        What messages call the argument.
+    value : int
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    TypeError, ValueError
+        For anything else.
+    """
+    import operator
+
+    try:
+        number = operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise TypeError(f"{name} is of {type(value).__name__}; give a whole number") from None
+    if not 0 <= number < 1 << 63:
+        raise ValueError(f"{name} is {number}; give a whole number from 0 on")
+    return number

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from twincal import _twincal
-from twincal._arrays import Floats, as_json, states
+from twincal._arrays import Floats, as_json, states, whole
 from twincal._log import Log
 from twincal._robot import Robot
 from twincal._table import Assessment, Table
@@ -310,7 +310,7 @@ class Calibration:
         ValueError
             For a negative number.
         """
-        count, start = _whole("n", n), _whole("seed", seed)
+        count, start = whole("n", n), whole("seed", seed)
         names = self._calibration.column_names
         beta, noise, _ = self._calibration.draws(count, start)
         beta = beta.reshape(count, len(names))
@@ -345,7 +345,7 @@ class Calibration:
             Why it could not be written.
         """
         with self._folder() as twin:
-            more = ["--draws", str(_whole("draws", draws))] if draws is not None else []
+            more = ["--draws", str(whole("draws", draws))] if draws is not None else []
             arguments = ["export", "--twin", twin, "--to", to, "-o", os.fspath(path), "--json"]
             return _run([*arguments, *more, *(["--force"] if force else [])])[1]
 
@@ -439,18 +439,6 @@ class Calibration:
 
     def _repr_html_(self) -> str:
         return self.assessment._repr_html_() + self.effects._repr_html_()
-
-
-def _whole(name: str, value: object) -> int:
-    import operator
-
-    try:
-        number = operator.index(value)  # type: ignore[arg-type]
-    except TypeError:
-        raise TypeError(f"{name} is of {type(value).__name__}; give a whole number") from None
-    if not 0 <= number < 1 << 63:
-        raise ValueError(f"{name} is {number}; give a whole number from 0 on")
-    return number
 
 
 def _run(arguments: list[str]) -> tuple[int, dict[str, Any]]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from twincal._arrays import floats, states
+from twincal._arrays import floats, states, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -20,7 +20,8 @@ def datatree(
     """See `Calibration.to_datatree`."""
     import xarray
 
-    chains, draws = size
+    chains, draws = (whole(name, own) for name, own in zip(("chains", "draws"), size, strict=True))
+    size = (chains, draws)
     drawn = calibration.draws(chains * draws, seed=seed)
     components, belongs = calibration._calibration.components
     of = np.asarray(belongs, dtype=np.intp)

@@ -11,6 +11,7 @@ from sklearn.utils import check_random_state
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from twincal import _twincal
+from twincal._arrays import whole
 
 Floats = npt.NDArray[np.float64]
 
@@ -176,7 +177,9 @@ class SpikeSlabRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     def sample(self, n: int = 1000, *, seed: int = 1) -> Floats:
         """Independent draws of β from the posterior, shape (n, n_features)."""
         check_is_fitted(self)
-        return self.regression_.draws(n, seed).reshape(n, -1)
+        count = whole("n", n)
+        drawn = self.regression_.draws(count, whole("seed", seed))
+        return drawn.reshape(count, len(self.coef_))
 
     def _asked(self, features: int) -> _Asked:
         asked = _Asked()

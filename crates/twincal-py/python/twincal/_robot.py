@@ -142,7 +142,8 @@ class Robot:
     def parameters(self) -> Floats:
         """Inertial parameters π of the model, shape (B, 10).
 
-        Mass in kg, first moments in kg·m, tensor about the origin of the body's frame in kg·m².
+        Of each body in the frame of its link: mass in kg, first moments in kg·m, tensor about the
+        origin of that frame in kg·m²; links that are fixed to it are part of it.
         """
         return self._robot.parameters().reshape(-1, 10)
 

@@ -1,11 +1,12 @@
 import os
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 import numpy.typing as npt
 
 _Floats = npt.NDArray[np.float64]
 
+@final
 class Table:
     @property
     def column_names(self) -> list[str]: ...
@@ -14,6 +15,7 @@ class Table:
     def to_dict(self) -> dict[str, Any]: ...
     def arrow_c_stream(self) -> object: ...
 
+@final
 class Robot:
     @staticmethod
     def read(path: str | os.PathLike[str], keywords: str) -> Robot: ...
@@ -34,6 +36,7 @@ class Robot:
     def inverse_dynamics(self, states: list[_Floats]) -> _Floats: ...
     def regressor(self, states: list[_Floats]) -> _Floats: ...
 
+@final
 class Log:
     @staticmethod
     def file(path: str | os.PathLike[str], entry: str, columns: str) -> Log: ...
@@ -51,8 +54,10 @@ class Log:
     def columns(self) -> str: ...
     def in_memory(self) -> list[tuple[str, _Floats]]: ...
 
+@final
 class Plan: ...
 
+@final
 class Statistics:
     @staticmethod
     def map(robot: Robot, log: Log, plan: Plan) -> Statistics: ...
@@ -63,6 +68,7 @@ class Statistics:
     def read(path: str | os.PathLike[str]) -> Statistics: ...
     def write(self, path: str | os.PathLike[str], force: bool) -> None: ...
 
+@final
 class Calibration:
     @staticmethod
     def load(folder: str | os.PathLike[str]) -> Calibration: ...
@@ -95,6 +101,7 @@ class Calibration:
     def predictive(self, states: list[_Floats], count: int, seed: int) -> _Floats: ...
     def draws(self, count: int, seed: int) -> tuple[_Floats, _Floats, npt.NDArray[np.uint32]]: ...
 
+@final
 class Regression:
     @property
     def inclusion(self) -> _Floats: ...
