@@ -2,15 +2,17 @@
 
 use super::brief::Around;
 use super::inputs::{LogInput, RobotInput};
-use super::{brief, code_of, print_json, require_strict, summary};
+use super::{brief, print_json, require_strict, summary};
 use crate::args::PrintFlags;
 use crate::clock::{Stopwatch, now};
+use crate::exit;
 use crate::failure::Outcome;
 use crate::names::display_names;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use twincal::assess::assess;
 use twincal::calibrate::{
     Calibration, CalibrationSettings, Stage, Statistics, Stopped, calibrate, calibrate_statistics,
 };
@@ -70,7 +72,7 @@ impl Done {
             Print::All => summary::print(calibration, terminal),
             Print::Brief => brief::print(calibration, around, terminal),
             Print::Answer => {
-                terminal.answer(&twincal_io::report::answer(calibration).headline);
+                terminal.answer(&twincal_io::words::answer(calibration).headline);
             }
         }
         Ok(())
@@ -128,7 +130,7 @@ impl Job<'_> {
             }
         };
         require_strict(self.settings.log.strict, &calibration.findings)?;
-        let code = code_of(&calibration.findings);
+        let code = exit::of_fit(assess(&calibration).answer, &calibration.findings);
         let stored = StoredTwin {
             gates: self.settings.gates,
             read_as: Some(ReadAs::of(&self.settings.log, self.logs.given())),

@@ -3,8 +3,9 @@
 use super::inputs::LogInput;
 use super::summary::{Notes, paragraph};
 use super::verdict::doubt;
-use super::{code_of, print_json, reads, require_strict, settings, start_threads};
+use super::{print_json, reads, require_strict, settings, start_threads};
 use crate::args::Predict;
+use crate::exit;
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
@@ -90,7 +91,7 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
         }
     }
     drop(progress);
-    let code = code_of(&prediction.findings);
+    let code = exit::of_findings(&prediction.findings);
     let Prediction {
         rows,
         extrapolating,

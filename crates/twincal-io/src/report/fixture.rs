@@ -27,17 +27,17 @@ use twincal::{Code, Finding, Severity};
 const RATE: f64 = 25.0;
 
 /// A planar arm with two joints, 20 candidates, three logs of a minute.
-pub(super) fn two_joints() -> Calibration {
+pub(crate) fn two_joints() -> Calibration {
     arm(&["shoulder", "elbow"], 3, 1500)
 }
 
 /// Eight held-out traces per joint, each of two minutes: what the limit on the page's size is about.
-pub(super) fn many_logs() -> Calibration {
+pub(crate) fn many_logs() -> Calibration {
     arm(&["shoulder", "elbow"], 8, 3000)
 }
 
 /// An arm with seven joints and a slider under it.
-pub(super) fn seven_joints() -> Calibration {
+pub(crate) fn seven_joints() -> Calibration {
     let names = [
         "rail",
         "shoulder_pan",
@@ -51,13 +51,13 @@ pub(super) fn seven_joints() -> Calibration {
 }
 
 /// Seven joints with more long held-out logs than the page draws: its largest size.
-pub(super) fn many_joints_and_logs() -> Calibration {
+pub(crate) fn many_joints_and_logs() -> Calibration {
     let names = ["j1", "j2", "j3", "j4", "j5", "j6", "j7"];
     arm(&names, 4, 2000)
 }
 
 /// Sampled instead of enumerated, with chains that have not converged.
-pub(super) fn gibbs() -> Calibration {
+pub(crate) fn gibbs() -> Calibration {
     let mut calibration = two_joints();
     calibration.twin.posterior.method = Method::Gibbs {
         chains: 4,
@@ -75,7 +75,7 @@ pub(super) fn gibbs() -> Calibration {
 }
 
 /// A log that the nominal model explains.
-pub(super) fn nothing_found() -> Calibration {
+pub(crate) fn nothing_found() -> Calibration {
     let mut calibration = two_joints();
     for term in calibration.terms.iter_mut().filter(|t| t.pip.is_some()) {
         term.pip = Some(0.01);
@@ -91,7 +91,7 @@ pub(super) fn nothing_found() -> Calibration {
 }
 
 /// One row of one joint.
-pub(super) fn single_row() -> Calibration {
+pub(crate) fn single_row() -> Calibration {
     let mut calibration = arm(&["only"], 1, 1);
     calibration.autocorrelation = vec![vec![1.0], vec![1.0]];
     calibration
@@ -103,7 +103,7 @@ pub(super) fn single_row() -> Calibration {
 }
 
 /// No held-out data at all.
-pub(super) fn no_validation() -> Calibration {
+pub(crate) fn no_validation() -> Calibration {
     let mut calibration = arm(&["shoulder", "elbow"], 2, 0);
     calibration.validation.coverage_levels.clear();
     calibration.autocorrelation.clear();
@@ -111,7 +111,7 @@ pub(super) fn no_validation() -> Calibration {
 }
 
 /// Joints with long names, and names that are attacks.
-pub(super) fn hostile() -> Calibration {
+pub(crate) fn hostile() -> Calibration {
     let long = "left_manipulator_shoulder_pan_joint_of_the_second_station_upper_deck";
     let mut calibration = arm(
         &[

@@ -554,15 +554,11 @@ fn report_standstill(
         } else {
             format!("{rest} in {share:.1} % of this log's filtered samples")
         };
-        findings.push(Finding::new(
-            severity,
-            code,
-            &log.name,
-            format!(
-                "joint `{}` {text}; its torque there is not used",
-                facts.name
-            ),
-            still as u64,
-        ));
+        let message = format!(
+            "joint `{}` {text}; its torque there is not used",
+            facts.name
+        );
+        let own = Finding::new(severity, code, &log.name, message, still as u64);
+        findings.push(own.of_joint(&facts.name));
     }
 }

@@ -17,7 +17,7 @@ use twincal::assess;
 use twincal::calibrate::Calibration;
 use twincal::validate::Split;
 use twincal::words::significant;
-use twincal_io::report::{self, Answer};
+use twincal_io::words::{self, Answer};
 
 /// Lines of the whole output, and of that on a narrow terminal.
 const LINES: usize = 40;
@@ -83,7 +83,7 @@ pub(in crate::commands) struct Around<'a> {
 
 /// Prints all but the last line, which is the report's path.
 pub(super) fn print(calibration: &Calibration, around: Around<'_>, terminal: &mut Terminal) {
-    let answer = report::answer(calibration);
+    let answer = words::answer(calibration);
     terminal.answer(&answer.headline);
     let page = page(calibration, &answer, around, terminal.width());
     page.print(terminal);
