@@ -205,3 +205,29 @@ fn gates_decide_before_what_new_logs_are_said_to_be() {
     let short = vec![Claim::of_run(Code::TooShortToCheck)];
     assert_eq!(of(short, &[]), (Answer::NotYet, Code::TooShortToCheck));
 }
+
+/// Samples of the held-out log are 10 ms apart: what stands beside a row is the sample of that time.
+#[test]
+fn traces_have_the_torque_as_it_was_logged() {
+    let own = twin();
+    let mut noise = Random::new(1, 0);
+    let real = two_link::arm(2.6).expect("an arm");
+    let mut run = |name: &str, phase: f64| two_link::log(name, phase, &real, &mut noise);
+    let (_, log) = (run("run1", 0.3), run("run2", 1.9));
+    assert!(own.twin.pipeline.cutoff_hz > 0.0);
+    for (joint, trace) in own.validation.traces.iter().enumerate() {
+        let torque = log.joints[joint].tau.as_ref().expect("torque");
+        assert_eq!(trace.logged.len(), trace.time.len());
+        for (time, logged) in trace.time.iter().zip(&trace.logged) {
+            let own = logged.expect("a whole log");
+            // The nearest sample, or of a row in the middle one of two.
+            let at = (time / 0.01).round() as usize;
+            let near = [at.saturating_sub(1), at, (at + 1).min(torque.len() - 1)];
+            assert!(near.iter().any(|k| torque[*k] == own), "{time} {own}");
+            let nearest = near.map(|k| (time - 0.01 * k as f64).abs());
+            let least = nearest.into_iter().fold(f64::INFINITY, f64::min);
+            let of = near.iter().zip(nearest).find(|(k, _)| torque[**k] == own);
+            assert!(of.is_some_and(|(_, away)| away <= least + 1e-9), "{time}");
+        }
+    }
+}
