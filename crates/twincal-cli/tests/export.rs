@@ -256,7 +256,7 @@ fn a_twin_that_is_no_good_says_so_wherever_it_is_used() {
     let own = |x: f64| 0.1 * (1e7 * x).sin();
     let bare = log(&|q2, [v1, v2]| [own(v1) - 0.4 * v1, own(v2) + 0.9 * q2.cos() - 0.2 * v2]);
     fs::write(folder.path().join("bare.csv"), bare).unwrap();
-    fit(folder.path(), &["--heldout", "bare.csv", "-o", "twin"]).expect(0);
+    fit(folder.path(), &["--heldout", "bare.csv", "-o", "twin"]).expect(3);
     let words = "warning: can this twin be used? Not yet: a held-out log is of another robot, or of another state of it";
     let predict = |more: &[&'static str]| {
         let line = ["predict", "run.csv", "--twin", "twin"];
@@ -298,7 +298,7 @@ fn a_file_that_is_worse_than_the_model_is_refused() {
     let own = |x: f64| 0.1 * (1e7 * x).sin();
     let bare = log(&|q2, [v1, v2]| [own(v1) - 0.4 * v1, own(v2) + 0.9 * q2.cos() - 0.2 * v2]);
     fs::write(folder.path().join("bare.csv"), bare).unwrap();
-    fit(folder.path(), &["--heldout", "bare.csv", "-o", "twin"]).expect(0);
+    fit(folder.path(), &["--heldout", "bare.csv", "-o", "twin"]).expect(3);
     let refused = run(folder.path(), export(&["--to", "urdf", "-o", "a.urdf"])).expect(4);
     let refused = refused.says(&[
         "shoulder 0.07",

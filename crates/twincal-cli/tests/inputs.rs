@@ -328,7 +328,7 @@ fn entries_of_the_config_are_the_logs_where_none_is_given() {
     );
     fs::write(folder.path().join("quick.toml"), config).unwrap();
     let base = ["fit", "--model", "arm.urdf", "--config", "quick.toml"];
-    run(folder.path(), base.iter().chain(&["-o", "out"])).expect(0);
+    run(folder.path(), base.iter().chain(&["-o", "out"])).expect(3);
     let logs = |path: &str| -> Vec<(String, String)> {
         let result = json(&folder, path);
         let text = |value: &Value| value.as_str().unwrap().to_owned();

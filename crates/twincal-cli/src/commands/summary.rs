@@ -156,8 +156,7 @@ fn reliability(calibration: &Calibration) -> Vec<String> {
     }
     if let Some(conformal) = &validation.conformal {
         lines.push(format!(
-            "{} by {}, they hold {:.0} % of all rows{} of the next such log with {} {} ({})",
-            words::stretched(conformal.factor),
+            "scaled by {}, they hold {:.0} % of all rows{} of the next such log with {} {} ({})",
             significant(conformal.factor, 3),
             100.0 * conformal.rows,
             if has_standstill(validation) {

@@ -25,9 +25,8 @@ pub(crate) fn guarantee(validation: &Validation, findings: &[Finding]) -> String
         .map(|joint| format!("{} {}", joint.joint, number(joint.factor, 3)))
         .collect();
     format!(
-        "Without believing the model: {} by {}, the 95 % intervals of all joints hold {} of all rows of the next log \
+        "Without believing the model: scaled by {}, the 95 % intervals of all joints hold {} of all rows of the next log \
          like these{}, with probability {}/{} = {} {}.{} {} Joint by joint: {}.",
-        stretched(conformal.factor),
         number(conformal.factor, 3),
         percent(conformal.rows),
         if has_standstill(validation) {
@@ -71,16 +70,6 @@ pub fn drawn_alike(conformal: &Conformal) -> String {
             "{holds}; the factors show no trend over the recording order (Kendall's τ {tau:+.2}, p = {}, {level}).",
             significant(p, 2)
         ),
-    }
-}
-
-/// What a factor does to intervals.
-#[must_use]
-pub fn stretched(factor: f64) -> &'static str {
-    if factor < 1.0 {
-        "narrowed"
-    } else {
-        "stretched"
     }
 }
 

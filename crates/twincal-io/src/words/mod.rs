@@ -19,8 +19,8 @@ pub(crate) mod units;
 
 pub(crate) use compact::compact;
 pub(crate) use family::family_name;
+pub use intervals::drawn_alike;
 pub(crate) use intervals::guarantee;
-pub use intervals::{drawn_alike, stretched};
 pub use remedy::{Remedy, When, remedy};
 pub use status::reason;
 pub(crate) use status::with;
