@@ -181,6 +181,12 @@ def test_the_service_changed_what_diff_says(folder_of):
     done = subprocess.run([program("twincal"), "diff", folder / "before", folder / "after", "--json"], capture_output=True,
                           text=True, check=True)  # fmt: skip
     components = {one["name"]: one for one in json.loads(done.stdout)["components"]}
+    before, after = (TRUTH["logs"][name] for name in ("run", "after"))
+    elbow = TRUTH["joints"].index("elbow")
+    for name, parameter, value in (("payload", "mass", after["payload"] - before["payload"]),
+                                   ("elbow.coulomb", "value", after["coulomb"][elbow] - before["coulomb"][elbow])):  # fmt: skip
+        found = next(one for one in components[name]["parameters"] if one["name"] == parameter)
+        assert within((found["difference"], found["sd"]), value), found
     became = {name: one["became"] for name, one in components.items() if one["became"] in ("new", "gone", "changed")}
     assert became == {"payload": "new", "elbow.coulomb": "changed"}, became
 
