@@ -4,7 +4,7 @@ mod changes;
 mod gates;
 
 use super::inputs::LogInput;
-use super::summary::{Notes, findings, paragraph, percent};
+use super::summary::{Notes, findings, paragraph};
 use super::table::{print_table, table};
 use super::{print_json, require_strict, settings, start_threads};
 use crate::args::Check;
@@ -26,6 +26,7 @@ use twincal_io::artifact::Artifact;
 use twincal_io::assessment::Versioned;
 use twincal_io::context::FileHash;
 use twincal_io::twin_json::StoredTwin;
+use twincal_io::words::percent;
 
 /// What `--json` prints.
 #[derive(Serialize)]

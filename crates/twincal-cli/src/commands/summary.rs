@@ -8,7 +8,7 @@ use twincal::calibrate::{Calibration, ParameterSummary};
 use twincal::validate::{Scores, Split};
 use twincal::words::significant;
 use twincal::{Code, Finding, Severity};
-use twincal_io::words;
+use twincal_io::words::{self, percent};
 
 /// What to do about a log that contradicts the model.
 pub(super) const HOW_TO_FIX: &str = "`twincal init` with this log and model writes a twincal.toml that fixes it, where it is a mistake of columns, signs or units";
@@ -383,7 +383,8 @@ pub(super) fn indented(text: &str, begin: [&str; 2], terminal: &mut Terminal) {
 
 pub(crate) fn wrapped(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
-    for word in text.split_whitespace() {
+    // A number and its unit stay together: between them is no ASCII blank.
+    for word in text.split_ascii_whitespace() {
         match lines.last_mut() {
             Some(line) if line.is_empty() => line.push_str(word),
             Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
@@ -403,14 +404,6 @@ pub(super) fn pip(pip: Option<f64>) -> String {
         Some(p) if p > 0.999 => ">0.999".into(),
         Some(p) if p < 0.001 => "<0.001".into(),
         Some(p) => format!("{p:.3}"),
-    }
-}
-
-pub(super) fn percent(share: f64) -> String {
-    if share.is_finite() {
-        format!("{:.1} %", 100.0 * share)
-    } else {
-        "–".into()
     }
 }
 

@@ -21,6 +21,7 @@ pub(crate) use compact::compact;
 pub(crate) use family::family_name;
 pub use intervals::drawn_alike;
 pub(crate) use intervals::guarantee;
+pub use number::percent;
 pub use remedy::{Remedy, When, remedy};
 pub use status::reason;
 pub(crate) use status::with;

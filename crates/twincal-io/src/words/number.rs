@@ -71,7 +71,8 @@ pub(crate) fn probability(p: f64) -> String {
 }
 
 /// A share as per cent with one decimal.
-pub(crate) fn percent(share: f64) -> String {
+#[must_use]
+pub fn percent(share: f64) -> String {
     if share.is_finite() {
         signed(&format!("{:.1}{THIN}%", 100.0 * share))
     } else {

@@ -1,6 +1,5 @@
 //! The gates of `check` on each joint's error and intervals.
 
-use super::super::summary::percent;
 use serde::Serialize;
 use twincal::Code;
 use twincal::assess::{Claim, Subject};
@@ -9,6 +8,7 @@ use twincal::validate::{Split, Validation};
 use twincal::words::significant;
 use twincal_io::config::Gates;
 use twincal_io::twin_json::StoredTwin;
+use twincal_io::words::percent;
 
 /// Rows that count as independent, below which a joint's error says nothing.
 pub(super) const ENOUGH: f64 = 10.0;
