@@ -1,5 +1,6 @@
 """Sphinx settings of the documentation: the pages of docs, and a reference that is made from the program (reference.py)."""
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -20,4 +21,8 @@ html_show_sourcelink = False
 
 def setup(app):
     """The README is no page of the site: its place is the first page."""
-    app.connect("source-read", lambda _, __, source: source.__setitem__(0, source[0].replace("](../README.md)", "](index.md)")))
+
+    def first_page(_, __, source):
+        source[0] = re.sub(r"\]\((?:\.\./)+README\.md(#[^)]*)?\)", "](/index.md)", source[0])
+
+    app.connect("source-read", first_page)
