@@ -234,7 +234,7 @@ pub(super) mod tests {
         assert!(judged.iter().all(|gate| gate.rows == ALL));
         let values: Vec<f64> = judged.iter().map(|gate| gate.value).collect();
         assert_eq!(values, [9.0, 0.1]);
-        assert!(judged[1].words.contains("10.0 % of the rows"));
+        assert!(judged[1].words.contains("10.0\u{202f}% of the rows"));
     }
 
     #[test]
