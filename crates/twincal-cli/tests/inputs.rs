@@ -347,7 +347,7 @@ fn entries_of_the_config_are_the_logs_where_none_is_given() {
         folder.path(),
         base.iter().chain(&["run.csv", "-o", "other"]),
     )
-    .expect(0);
+    .expect(3);
     assert_eq!(logs("other/result.json")[0], pair("run.csv", "fit"));
     // Neither: usage.
     run(folder.path(), ["fit", "--model", "arm.urdf"])
