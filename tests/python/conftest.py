@@ -31,7 +31,7 @@ def twincal(*arguments, expect=0):
     return done
 
 
-def fit(folder, logs, config, *arguments, model=ASSETS / "arm.urdf", expect=0):
+def fit(folder, logs, config, *arguments, model=ASSETS / "arm.urdf", expect=None):
     """`twincal fit` with a twincal.toml of this text; returns result.json."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "twincal.toml").write_text(config)
