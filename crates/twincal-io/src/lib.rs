@@ -51,6 +51,10 @@ pub mod result_json;
 #[cfg(feature = "tables")]
 pub mod statistics;
 pub mod twin_json;
+#[cfg_attr(
+    not(feature = "report"),
+    allow(dead_code, reason = "some sentences stand in the report alone")
+)]
 pub mod words;
 pub mod export;
 

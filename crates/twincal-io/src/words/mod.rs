@@ -2,6 +2,7 @@
 //! these sentences; none of them decides anything.
 
 mod beyond;
+#[cfg(feature = "report")]
 mod compact;
 mod family;
 mod grounds;
@@ -17,9 +18,11 @@ mod shape;
 mod status;
 pub(crate) mod units;
 
+#[cfg(feature = "report")]
 pub(crate) use compact::compact;
 pub(crate) use family::family_name;
 pub use intervals::drawn_alike;
+#[cfg(feature = "report")]
 pub(crate) use intervals::guarantee;
 pub use number::percent;
 pub use remedy::{Remedy, When, remedy};
