@@ -37,9 +37,13 @@ def fit(folder, logs, config, *arguments, model=ASSETS / "arm.urdf", expect=None
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "twincal.toml").write_text(config)
     out = folder / "out"
-    twincal("fit", *logs, "--model", model, "--config", folder / "twincal.toml", "-o", out, "--force", *arguments,
-            expect=expect)  # fmt: skip
-    return json.loads((out / "result.json").read_text())
+    done = twincal("fit", *logs, "--model", model, "--config", folder / "twincal.toml", "-o", out, "--force", *arguments,
+                   expect=expect)  # fmt: skip
+    result = json.loads((out / "result.json").read_text())
+    lost = any(finding["severity"] == "degraded" for finding in result["findings"])
+    usable = result["assessment"]["answer"] in ("yes", "yes_within_limits")
+    assert done.returncode == (0 if usable and not lost else 3), (result["assessment"]["reason"], done.returncode)
+    return result
 
 
 @pytest.fixture(scope="session")

@@ -109,7 +109,7 @@ pub struct Finding {
     pub severity: Severity,
     /// What it is about: log, joint, term or link, by name. Empty when it is about the whole run.
     pub subject: String,
-    /// The joint, where the subject is a log and one of its joints is meant.
+    /// The joint of the log that is its subject: of `joint_not_driven`, `joint_stands_still` and `standstill`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint: Option<String>,
     /// One sentence: culprit, number, remedy.

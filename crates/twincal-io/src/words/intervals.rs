@@ -84,7 +84,11 @@ mod tests {
         let mut validation = fixture::two_joints().validation;
         let guarantee = |validation: &Validation| guarantee(validation, &[]);
         assert!(guarantee(&validation).contains("not guaranteed"));
-        validation.conformal.as_mut().unwrap().guaranteed = true;
+        validation
+            .conformal
+            .as_mut()
+            .expect("the fixture has one")
+            .guaranteed = true;
         let text = guarantee(&validation);
         assert!(
             text.contains("3/4") && text.contains("trajectory, guaranteed)"),
@@ -94,7 +98,7 @@ mod tests {
             text.contains("guaranteed). 3 logs allow no more. It holds if"),
             "{text}"
         );
-        let conformal = validation.conformal.as_mut().unwrap();
+        let conformal = validation.conformal.as_mut().expect("the fixture has one");
         (conformal.trajectories, conformal.level) = (19, 0.95);
         assert!(!guarantee(&validation).contains("no more"));
         validation.conformal = None;
@@ -111,7 +115,7 @@ mod tests {
     fn a_trend_of_the_factors_is_said_with_its_level() {
         let mut validation = fixture::two_joints().validation;
         let mut of = |trend| {
-            let conformal = validation.conformal.as_mut().unwrap();
+            let conformal = validation.conformal.as_mut().expect("the fixture has one");
             conformal.trend = trend;
             drawn_alike(conformal)
         };

@@ -28,6 +28,7 @@ pub use number::percent;
 pub use remedy::{Remedy, When, remedy};
 pub use status::reason;
 pub(crate) use status::with;
+pub use units::pooled_unit;
 
 use twincal::Code;
 use twincal::assess::{Assessment, assess};
@@ -56,6 +57,13 @@ pub struct Answer {
 }
 
 /// What may be concluded from a calibration, in words.
+///
+/// # Example
+/// ```no_run
+/// let twin = twincal_io::load("twincal-out")?;
+/// println!("{}", twincal_io::words::answer(&twin).headline);
+/// # Ok::<(), twincal_io::error::Error>(())
+/// ```
 #[must_use]
 pub fn answer(calibration: &Calibration) -> Answer {
     of_assessment(&assess(calibration), calibration)

@@ -33,7 +33,8 @@ impl Units {
 }
 
 /// The unit of torque, if all joints share one; the pooled numbers mix N·m and N otherwise.
-pub(crate) fn pooled_unit(calibration: &Calibration) -> &'static str {
+#[must_use]
+pub fn pooled_unit(calibration: &Calibration) -> &'static str {
     let robot = &calibration.twin.robot;
     let mut joints = (0..calibration.noise.len()).map(|joint| Units::of(robot.joint_kind(joint)));
     match joints.next() {

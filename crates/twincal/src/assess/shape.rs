@@ -19,7 +19,7 @@ const TOO_MANY: f64 = 0.01;
 
 /// How a predicted distribution is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Shape {
+enum Shape {
     /// Intervals are wider than they need to be.
     Wide,
     /// They are too narrow.
@@ -103,7 +103,7 @@ impl Shape {
 }
 
 /// Joints that count as looked at: one, where so many are beyond their own limit that chance would not do it in 99 of 100 right twins.
-pub(super) fn looked_at(reliability: &[Reliability]) -> usize {
+fn looked_at(reliability: &[Reliability]) -> usize {
     let joints = reliability.len();
     let beyond = reliability
         .iter()
@@ -130,26 +130,15 @@ fn of_one_among(joints: usize) -> f64 {
 }
 
 /// Whether a distribution is more than a little off.
-pub(super) fn is_far(pit: &Pit) -> bool {
+fn is_far(pit: &Pit) -> bool {
     pit.distance > OFF
 }
 
-/// Where the shape of the predictions is off by more than a little and by more than chance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Off {
-    /// Over all joints, unless the 95 % interval of some joint says the opposite.
-    pub all: Option<Shape>,
-    /// On a single joint.
-    pub single: bool,
-}
-
-/// Where it is.
-pub(super) fn off(calibration: &Calibration) -> Off {
+/// How the distribution of all joints together is off by more than a little and by more than chance, unless the 95 % interval of some joint says
+/// the opposite.
+fn together(calibration: &Calibration) -> Option<Shape> {
     let all = far(&calibration.validation.pit, 1);
-    Off {
-        all: all.filter(|shape| !shape.contradicts(calibration)),
-        single: single(calibration).next().is_some(),
-    }
+    all.filter(|shape| !shape.contradicts(calibration))
 }
 
 fn far(pit: &Pit, joints: usize) -> Option<Shape> {
@@ -168,7 +157,7 @@ fn single(calibration: &Calibration) -> impl Iterator<Item = &Reliability> {
 pub(super) fn claims(calibration: &Calibration) -> Vec<Claim> {
     let numbers = |pit: &Pit| [("distance", pit.distance), ("chance", pit.chance)];
     let mut out = Vec::new();
-    if let Some(shape) = off(calibration).all {
+    if let Some(shape) = together(calibration) {
         let numbers = numbers(&calibration.validation.pit);
         out.push(Claim::new(shape.of_run(), Subject::Run, numbers));
     }
@@ -182,14 +171,12 @@ pub(super) fn claims(calibration: &Calibration) -> Vec<Claim> {
 
 /// What can be seen of a distribution: how far it is from uniform, what the 50 % interval holds, the share of rows above the middle.
 fn numbers_of(pit: &Pit, levels: &[(f64, f64)]) -> Vec<(&'static str, f64)> {
-    let bins = pit.histogram.len();
-    let above = pit.histogram[bins / 2..].iter().sum::<f64>() / pit.histogram.iter().sum::<f64>();
     let half = levels.iter().find(|(level, _)| *level == 0.5);
     let mut out = vec![
         ("distance", pit.distance),
         ("chance", pit.chance),
         ("slight", f64::from(u8::from(!is_far(pit)))),
-        ("share_above", above),
+        ("share_above", share_above(pit)),
     ];
     out.extend(half.map(|(_, seen)| ("coverage50", *seen)));
     out
@@ -233,13 +220,17 @@ fn seen(calibration: &Calibration) -> Vec<Claim> {
     out
 }
 
+/// Share of the rows above the middle of the prediction.
+fn share_above(pit: &Pit) -> f64 {
+    let bins = &pit.histogram;
+    bins[bins.len() / 2..].iter().sum::<f64>() / bins.iter().sum::<f64>()
+}
+
 /// Off, but neither too wide nor too narrow as a whole: to one side, if most of it lies there.
 fn to_one_side(pit: &Pit) -> Option<Shape> {
-    let bins = &pit.histogram;
-    let above = bins[bins.len() / 2..].iter().sum::<f64>() / bins.iter().sum::<f64>();
-    match above {
-        _ if above > ONE_SIDE => Some(Shape::Above),
-        _ if above < 1.0 - ONE_SIDE => Some(Shape::Below),
+    match share_above(pit) {
+        above if above > ONE_SIDE => Some(Shape::Above),
+        above if above < 1.0 - ONE_SIDE => Some(Shape::Below),
         _ => None,
     }
 }

@@ -162,16 +162,12 @@ pub fn look<'a>(
     })
 }
 
-/// The robot with the payload that all logs state; `None` where they state none, or not the same one.
+/// The robot with the payload that all logs state, at the last link; `None` where they state none, or not the same one.
 fn with_known_payload(robot: &Robot, trajectories: &[&Trajectory]) -> Result<Option<Robot>> {
     let mut stated = trajectories.iter().map(|own| own.payload);
-    let (Some(first), Some(last)) = (stated.next(), robot.dof().checked_sub(1)) else {
-        return Ok(None);
-    };
-    match first {
-        Payload::Known { mass, com } if stated.all(|own| own == first) => {
-            let link = &robot.joint(last).child;
-            robot.carrying(link, mass, com).map(Some)
+    match stated.next() {
+        Some(first @ Payload::Known { mass, com }) if stated.all(|own| own == first) => {
+            robot.carrying(robot.last_link(), mass, com).map(Some)
         }
         _ => Ok(None),
     }

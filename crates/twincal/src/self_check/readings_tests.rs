@@ -111,7 +111,9 @@ fn a_robot_on_a_wall_or_a_ceiling_gets_its_base_proposed() {
 fn a_payload_that_the_log_states_is_part_of_the_model() {
     let robot = arm(1.0);
     let (mass, com) = (30.0, [0.05, 0.0, 0.25]);
-    let loaded = robot.carrying(&robot.joint(3).child, mass, com).unwrap();
+    let loaded = robot
+        .carrying(&robot.joint(3).child, mass, com)
+        .expect("a positive mass at a link of the arm");
     let mut log = log_of(&loaded, 0.0);
     let scale = |log: &Trajectory| {
         let said = said(&robot, log);

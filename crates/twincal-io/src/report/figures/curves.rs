@@ -138,7 +138,7 @@ mod tests {
                 "{}; counted in by their probability: {} (PIP {})",
                 found.name,
                 open.name,
-                probability(open.pip.unwrap())
+                probability(open.pip.expect("a candidate with a probability"))
             )
         );
     }
