@@ -285,11 +285,7 @@ fn limits(
     clocks: &Clocks,
     settings: &SignalSettings,
 ) -> Result<(f64, Vec<Finding>)> {
-    let Clocks {
-        longest,
-        lowest_rate,
-        ..
-    } = *clocks;
+    let (longest, lowest_rate) = (clocks.longest, clocks.lowest_rate);
     let mut findings = Vec::new();
     if cutoff > COLUMN_LIMIT * lowest_rate {
         return Err(setting(
