@@ -427,9 +427,11 @@ pub(crate) struct Predict {
 /// What a twin is written as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ExportFormat {
-    /// The URDF that was fitted, with inertias and friction.
+    /// The URDF that was fitted, with inertias and friction; from an MJCF a
+    /// generated one without meshes.
     Urdf,
-    /// The MJCF that was fitted; also motor inertia, springs and gravity.
+    /// The MJCF that was fitted; also motor inertia, springs and gravity. From
+    /// a URDF a generated one without meshes.
     Mjcf,
     /// C99: torque, interval and "outside the data" in one function.
     C,
