@@ -150,6 +150,32 @@ def test_exported_model_and_residual_are_the_twin(ur5):
     assert max(told["lost"]) < 0.1
 
 
+def test_mujoco_on_the_generated_mjcf_and_the_residual_are_the_twin(ur5):
+    """The fitted file is a URDF: the MJCF is written anew; with what no MJCF holds it is the mean that `predict` gives."""
+    folder, truth = ur5
+    told = json.loads(twincal("export", "--twin", folder / "out", "--to", "mjcf", "-o", folder / "ur5.xml", "--json").stdout)
+    assert truth["spring"] in [w["component"] for w in told["written"]] and told["generated"]
+    twincal("export", "--twin", folder / "out", "--to", "python", "--beyond", "mjcf", "-o", folder / "beyond.py")
+    model = mujoco.MjModel.from_xml_path(str(folder / "ur5.xml"))
+    joints = [model.joint(k).name for k in range(model.njnt)]
+    assert joints == truth["joints"] and model.jnt_stiffness[1] == pytest.approx(35, rel=0.05)
+    friction = model.dof_frictionloss.copy()
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT  # dry friction and limits are constraints there
+    q, qd, qdd = heldout(folder)
+    written = arm.inverse_dynamics(model, q.T, qd.T, qdd.T) + friction * np.tanh(qd.T / industrial.COULOMB_VELOCITY)
+    rest = residual_module(folder / "beyond.py").evaluate(q, qd, qdd)[0]
+    twin = predicted(folder, truth["joints"], "tau")
+    error = np.abs(written.T + rest - twin).max(1) / np.abs(twin).max(1)
+    print("relative to the joint's largest torque:", error)
+    assert error.max() < 1e-9
+    # the file alone: the spring is in it, so that no joint is worse than the model
+    measured = predicted(folder, truth["joints"], "tau_meas")
+    rmse = lambda tau: np.sqrt(((tau - measured) ** 2).mean(1))
+    assert (rmse(written.T) < 0.3 * rmse(predicted(folder, truth["joints"], "tau_nom")) + 0.1).all()
+    for own, rms in zip(told["torque_error"]["joints"], rmse(written.T)):
+        assert own["rms"] == pytest.approx(rms, rel=0.05), own["joint"]
+
+
 # ---- code
 
 
@@ -325,6 +351,27 @@ def test_mujoco_has_the_torque_that_the_format_can_hold(planar):
     moved = np.abs(arm.inverse_dynamics(model, q, qd, qdd) - arm.inverse_dynamics(nominal, q, qd, qdd)).max()
     assert moved > 0.5  # N m: it is not the nominal model
     assert math.isclose(nominal.body_mass.sum(), 5.0, rel_tol=1e-6) and model.body_mass.sum() > 5.2
+
+
+def test_pinocchio_on_the_generated_urdf_and_the_residual_are_the_twin(planar):
+    """The fitted file is an MJCF: the URDF is written anew and is without motor inertia and springs."""
+    twincal("export", "--twin", planar / "out", "--to", "urdf", "-o", planar / "arm.urdf", *ALLOW)
+    twincal("export", "--twin", planar / "out", "--to", "python", "-o", planar / "all.py", "--force")
+    twincal("export", "--twin", planar / "out", "--to", "python", "--beyond", "urdf", "-o", planar / "beyond.py")
+    whole, rest = residual_module(planar / "all.py"), residual_module(planar / "beyond.py")
+    model = pin.buildModelFromUrdf(str(planar / "arm.urdf"))
+    model.gravity.linear = mujoco.MjModel.from_xml_path(str(ASSETS / "arm.xml")).opt.gravity
+    data = model.createData()
+    rng = np.random.default_rng(3)
+    q, qd, qdd = rng.uniform(-1, 1, (200, 2)), rng.uniform(1, 2, (200, 2)), rng.uniform(-5, 5, (200, 2))
+    stated = [joint.find("dynamics") for joint in tree.parse(planar / "arm.urdf").getroot().findall("joint") if joint.get("type") != "fixed"]
+    damping, friction = ([0.0 if own is None else float(own.get(key, 0)) for own in stated] for key in ("damping", "friction"))
+    ours = np.array([pin.rnea(model, data, configuration(model, a), b, c) for a, b, c in zip(q, qd, qdd)])
+    ours += damping * qd + friction * np.sign(qd) + rest.evaluate(q.T, qd.T, qdd.T)[0].T
+    twin = whole.evaluate(q.T, qd.T, qdd.T)[0].T
+    error = np.abs(ours - twin).max(0) / np.abs(twin).max(0)
+    print("relative to the joint's largest torque:", error)
+    assert error.max() < 1e-9
 
 
 def rolled_out(model, log, seconds=1.0, every=50):

@@ -56,13 +56,18 @@ Examples:
 ")]
     Init(Init),
     /// Discover what the model misses, estimate it, validate on held-out data.
-    #[command(before_help = "\
+    #[command(
+        before_help = "\
 Examples:
   twincal fit run1.csv --model arm.urdf
   twincal fit run*.csv --model arm.urdf --heldout other.csv -o calibrated
   twincal fit run*.csv --model arm.urdf --config twincal.toml --force --json
   twincal fit run*.csv --model arm.urdf -v --open    everything, and the page
-")]
+",
+        after_help = "\
+Exit code 0: the twin may be used; 3: it may not, or data were degraded (the result is
+written); 2: wrong usage or input; 4: the data cannot answer the question."
+    )]
     Fit(Fit),
     /// What a fit takes of each log, as a small file: such files add, and `fit`
     /// takes them in the place of the logs.
@@ -422,9 +427,11 @@ pub(crate) struct Predict {
 /// What a twin is written as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ExportFormat {
-    /// The URDF that was fitted, with inertias and friction.
+    /// The URDF that was fitted, with inertias and friction; from an MJCF a
+    /// generated one without meshes.
     Urdf,
-    /// The MJCF that was fitted; also motor inertia, springs and gravity.
+    /// The MJCF that was fitted; also motor inertia, springs and gravity. From
+    /// a URDF a generated one without meshes.
     Mjcf,
     /// C99: torque, interval and "outside the data" in one function.
     C,

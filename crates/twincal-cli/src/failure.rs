@@ -7,7 +7,7 @@ use twincal_io::Error;
 pub(crate) const GATE: u8 = 1;
 /// Wrong usage, config or input.
 pub(crate) const INPUT: u8 = 2;
-/// Done, but data was lost or degraded beyond the stated limit, or could not be printed.
+/// Done, but data was lost or degraded beyond the stated limit, the answer is not yes, or the result could not be printed.
 pub(crate) const DEGRADED: u8 = 3;
 /// The data cannot answer the question.
 pub(crate) const REFUSED: u8 = 4;

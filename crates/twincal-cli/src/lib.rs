@@ -10,6 +10,7 @@ mod address_space;
 mod args;
 mod clock;
 mod commands;
+mod exit;
 mod failure;
 mod names;
 mod progress;

@@ -328,7 +328,7 @@ fn entries_of_the_config_are_the_logs_where_none_is_given() {
     );
     fs::write(folder.path().join("quick.toml"), config).unwrap();
     let base = ["fit", "--model", "arm.urdf", "--config", "quick.toml"];
-    run(folder.path(), base.iter().chain(&["-o", "out"])).expect(0);
+    run(folder.path(), base.iter().chain(&["-o", "out"])).expect(3);
     let logs = |path: &str| -> Vec<(String, String)> {
         let result = json(&folder, path);
         let text = |value: &Value| value.as_str().unwrap().to_owned();
@@ -347,7 +347,7 @@ fn entries_of_the_config_are_the_logs_where_none_is_given() {
         folder.path(),
         base.iter().chain(&["run.csv", "-o", "other"]),
     )
-    .expect(0);
+    .expect(3);
     assert_eq!(logs("other/result.json")[0], pair("run.csv", "fit"));
     // Neither: usage.
     run(folder.path(), ["fit", "--model", "arm.urdf"])

@@ -108,7 +108,7 @@ fn a_fit_to_statistics_is_the_fit_to_the_logs() {
         "fit --statistics {} --config quick.toml -o alone",
         all.join(" ")
     );
-    let done = run(at, line.split(' ')).expect(0);
+    let done = run(at, line.split(' ')).expect(3);
     assert!(
         done.out.contains("Torque error: not tested"),
         "{}",
@@ -269,5 +269,5 @@ fn damaged_files_and_wrong_words_are_refused() {
             "sig-twin",
         ],
     )
-    .expect(0);
+    .expect(3);
 }

@@ -22,7 +22,7 @@
 //! |---|---|
 //! | `tables` (default) | logs in Parquet, Arrow, NPZ; predictions as Parquet |
 //! | `bags` (default) | logs in MCAP, SQLite bags, rosbag2 folders; predictions as MCAP |
-//! | `report` (default) | `report.html`, and what stands in it in words (`report::answer`) |
+//! | `report` (default) | `report.html`, and its figures |
 //!
 //! CSV is always read and written. Without `tables` and `bags` nothing in C is compiled.
 
@@ -44,13 +44,18 @@ pub mod log;
 pub mod table;
 pub mod context;
 pub mod artifact;
-mod assessment;
+pub mod assessment;
 #[cfg(feature = "report")]
 pub mod report;
 pub mod result_json;
 #[cfg(feature = "tables")]
 pub mod statistics;
 pub mod twin_json;
+#[cfg_attr(
+    not(feature = "report"),
+    allow(dead_code, reason = "some sentences stand in the report alone")
+)]
+pub mod words;
 pub mod export;
 
 pub use error::{Error, Place, Result};

@@ -109,6 +109,9 @@ pub struct Finding {
     pub severity: Severity,
     /// What it is about: log, joint, term or link, by name. Empty when it is about the whole run.
     pub subject: String,
+    /// The joint of the log that is its subject: of `joint_not_driven`, `joint_stands_still` and `standstill`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<String>,
     /// One sentence: culprit, number, remedy.
     pub message: String,
     /// How many samples, rows or elements it concerns; 0 when it does not count anything.
@@ -128,14 +131,24 @@ impl Finding {
             code,
             severity,
             subject: subject.into(),
+            joint: None,
             message: message.into(),
             count,
         }
     }
 
-    /// Whether its words name this joint: the finding of a log may be about one of its joints.
+    /// The same about one joint of the log that is its subject.
     #[must_use]
-    pub fn names(&self, joint: &str) -> bool {
-        self.message.contains(&format!("`{joint}`"))
+    pub fn of_joint(self, joint: impl Into<String>) -> Self {
+        Self {
+            joint: Some(joint.into()),
+            ..self
+        }
+    }
+
+    /// Whether it is about this joint, of whichever log.
+    #[must_use]
+    pub fn is_about(&self, joint: &str) -> bool {
+        self.joint.as_deref() == Some(joint) || self.joint.is_none() && self.subject == joint
     }
 }

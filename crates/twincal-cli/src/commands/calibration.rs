@@ -2,9 +2,10 @@
 
 use super::brief::Around;
 use super::inputs::{LogInput, RobotInput};
-use super::{brief, code_of, print_json, require_strict, summary};
+use super::{brief, print_json, require_strict, summary};
 use crate::args::PrintFlags;
 use crate::clock::{Stopwatch, now};
+use crate::exit;
 use crate::failure::{Failure, Outcome};
 use crate::names::display_names;
 use crate::progress::Progress;
@@ -12,6 +13,7 @@ use crate::terminal::Terminal;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use twincal::Finding;
+use twincal::assess::assess;
 use twincal::calibrate::{
     Calibration, CalibrationSettings, Stage, Statistics, Stopped, calibrate_statistics,
     calibrate_watched,
@@ -72,7 +74,7 @@ impl Done {
             Print::All => summary::print(calibration, terminal),
             Print::Brief => brief::print(calibration, around, terminal),
             Print::Answer => {
-                terminal.answer(&twincal_io::report::answer(calibration).headline);
+                terminal.answer(&twincal_io::words::answer(calibration).headline);
             }
         }
         Ok(())
@@ -132,7 +134,10 @@ impl Job<'_> {
                 return Err(failure);
             }
         };
-        let code = code_of(&stored.calibration.findings);
+        let code = exit::of_fit(
+            assess(&stored.calibration).answer,
+            &stored.calibration.findings,
+        );
         progress.step("writing the result");
         let run_log = self.run_log(&stored);
         let stored_as = self.robot.source.0;

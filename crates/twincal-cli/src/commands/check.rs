@@ -4,16 +4,18 @@ mod changes;
 mod gates;
 
 use super::inputs::LogInput;
-use super::summary::{Notes, findings, paragraph, percent};
+use super::summary::{Notes, findings, paragraph};
 use super::table::{print_table, table};
-use super::{code_of, print_json, require_strict, settings, start_threads};
+use super::{print_json, require_strict, settings, start_threads};
 use crate::args::Check;
-use crate::failure::{DEGRADED, Failure, GATE, Outcome};
+use crate::exit;
+use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use crate::terminal::{Terminal, clean};
 use gates::{ALL, ENOUGH, Gate, Own, judge};
 use serde::Serialize;
 use twincal::Code;
+use twincal::assess::{Assessment, Claim, of_gates};
 use twincal::twin::Twin;
 use twincal::validate::{
     Change, Changes, FALSE_ALARM, HeldOut, Scores, Split, Validation, least_share,
@@ -21,13 +23,16 @@ use twincal::validate::{
 use twincal::words::{listed, significant};
 use twincal::{Finding, Result, Severity};
 use twincal_io::artifact::Artifact;
+use twincal_io::assessment::Versioned;
 use twincal_io::context::FileHash;
 use twincal_io::twin_json::StoredTwin;
+use twincal_io::words::percent;
 
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Checked {
     schema: u64,
+    assessment: Versioned,
     verdict: Verdict,
     /// The verdict is `passed`.
     passed: bool,
@@ -76,7 +81,8 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     gates.extend(changes::gates(&changes, least));
     found.splice(0..0, known.iter().cloned());
     let verdict = Verdict::of(&gates);
-    let code = verdict.code(&found);
+    let assessment = assessment(&gates, &found);
+    let code = exit::of_check(assessment.answer, &found);
     if settings.json {
         let Validation {
             filtered,
@@ -88,6 +94,7 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
         } = validation;
         let checked = Checked {
             schema: 1,
+            assessment: Versioned::from(assessment),
             verdict,
             passed: verdict == Verdict::Passed,
             gates,
@@ -154,14 +161,6 @@ impl Verdict {
         }
     }
 
-    fn code(self, findings: &[Finding]) -> u8 {
-        match self {
-            Self::Passed => code_of(findings),
-            Self::Failed => GATE,
-            Self::Inconclusive => DEGRADED,
-        }
-    }
-
     fn word(self) -> &'static str {
         match self {
             Self::Passed => "passed",
@@ -169,6 +168,15 @@ impl Verdict {
             Self::Inconclusive => "inconclusive",
         }
     }
+}
+
+/// What the gates say of the twin.
+fn assessment(gates: &[Gate], found: &[Finding]) -> Assessment {
+    let mut claims: Vec<Claim> = gates.iter().filter_map(Gate::claim).collect();
+    if claims.is_empty() && Verdict::of(gates) == Verdict::Inconclusive {
+        claims.push(Claim::of_run(Code::TooShortToCheck));
+    }
+    of_gates(claims, found)
 }
 
 /// Where rows are too few: how many there are, and what to record.

@@ -1,15 +1,18 @@
-//! `twincal export`: the calibrated model as a file of the user's own kind, or as code.
+//! `twincal export`: the calibrated model as a file of the user's own kind, as a generated one of the other kind, or as code.
 
 mod effects_csv;
+mod file;
+mod said;
 mod torque_error;
 
-use super::summary::{self, paragraph, wrapped};
+use super::summary::paragraph;
 use super::verdict::doubt;
 use super::{print_json, reads};
 use crate::args::{Beyond as BeyondFormat, Export, ExportFormat};
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
-use crate::terminal::{Terminal, clean};
+use crate::terminal::Terminal;
+use file::FileMaker;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::io::Write as _;
@@ -18,24 +21,16 @@ use torque_error::TorqueErrors;
 use twincal::Finding;
 use twincal::evaluator::{Beyond, Evaluator, forgotten};
 use twincal::posterior::draws::draw;
-use twincal::robot::Inertia;
-use twincal::write_back::{Holds, LinkChange, Residual, WriteBack, Writer, Written};
-use twincal_io::artifact::{Artifact, Claim, MODEL_MJCF, MODEL_URDF, Maker, OutputFile, Replace};
+use twincal::write_back::{Holds, WriteBack, Writer};
+use twincal_io::artifact::{Artifact, Claim, Maker, OutputFile, Replace};
 use twincal_io::export::code::{Language, source};
-use twincal_io::export::write_model;
-use twincal_io::model::{Model, ModelSettings, parse_model};
+use twincal_io::model::ModelFormat;
 use twincal_io::twin_json::StoredTwin;
 
 /// Random stream of the draws that are written.
 const STREAM: u64 = (1 << 32) + 2;
 /// Most models of one call.
 const MOST: usize = 100_000;
-/// Probability above which the model average is the component's own number, as words round it.
-const CERTAIN: f64 = 0.98;
-/// Share of its like below which a number is rounding.
-const ROUNDING: f64 = 1e-9;
-/// Residual components that are told one by one; the rest is summed up.
-const TOLD: usize = 8;
 
 /// Said of twins whose payload acts in some logs only.
 const CARRIED: &str = "With the payload of the logs that carried something unknown.";
@@ -49,6 +44,8 @@ struct Exported<'a> {
     joint_names: Vec<&'a str>,
     #[serde(flatten)]
     change: Map<String, Value>,
+    /// Of a generated file: what its format cannot hold or asks for. `None`: the user's own file.
+    generated: Option<Vec<String>>,
     torque_error: TorqueErrors<'a>,
     findings: Vec<Finding>,
 }
@@ -119,19 +116,19 @@ pub(super) fn run(flags: &Export, terminal: &mut Terminal) -> Outcome<u8> {
 struct Kind {
     holds: Holds,
     extension: &'static str,
-    stored: &'static str,
+    format: ModelFormat,
 }
 
 const URDF: Kind = Kind {
     holds: Holds::URDF,
     extension: "urdf",
-    stored: MODEL_URDF,
+    format: ModelFormat::Urdf,
 };
 
 const MJCF: Kind = Kind {
     holds: Holds::MJCF,
     extension: "xml",
-    stored: MODEL_MJCF,
+    format: ModelFormat::Mjcf,
 };
 
 enum Target {
@@ -292,14 +289,14 @@ fn code(flags: &Export, language: Language, terminal: &mut Terminal) -> Outcome<
 
 /// The model average.
 fn one(flags: &Export, kind: Kind, terminal: &mut Terminal) -> Outcome<u8> {
-    let (stored, model) = read(flags, kind)?;
+    let (stored, maker) = FileMaker::read(flags, kind)?;
     let output = open(flags, &stored)?;
     let change = Writer::new(&stored.calibration, kind.holds)?.mean()?;
     let format = kind.holds.format;
     torque_error::require_no_worse(&change, &stored.calibration, format, &flags.allow)?;
-    let bytes = write_model(&model, &change)?;
+    let file = maker.file(&change)?;
     let findings = doubts(&stored, terminal);
-    if !write(flags, output, &bytes, terminal)? {
+    if !write(flags, output, &file.bytes, terminal)? {
         return Ok(0);
     }
     if flags.json {
@@ -308,12 +305,14 @@ fn one(flags: &Export, kind: Kind, terminal: &mut Terminal) -> Outcome<u8> {
             output: shown(flags),
             joint_names: stored.calibration.twin.robot.joint_names(),
             change: as_map(&change)?,
+            generated: file.notes,
             torque_error: TorqueErrors::of(&change, &stored.calibration),
             findings,
         };
         print_json(terminal, &exported)?;
     } else {
-        say(&change, kind.holds, terminal);
+        said::generated(&file, kind.holds, terminal);
+        said::change(&change, kind.holds, terminal);
         torque_error::print(&change, &stored.calibration, kind.holds, terminal);
         if stored.calibration.twin.payload_where_unknown {
             paragraph(CARRIED, terminal);
@@ -357,7 +356,7 @@ fn draws(
     } else {
         Replace::Never
     };
-    let (stored, model) = read(flags, kind)?;
+    let (stored, maker) = FileMaker::read(flags, kind)?;
     let claim = Claim::new(folder, replace, &reads::of_twin(&flags.twin, &stored))?;
     let findings = doubts(&stored, terminal);
     let writer = Writer::new(&stored.calibration, kind.holds)?;
@@ -372,7 +371,7 @@ fn draws(
         let change = writer.draw(beta)?;
         projected += usize::from(change.projection.is_some());
         let name = format!("draw{number:0width$}.{}", kind.extension);
-        files.push((name, write_model(&model, &change)?));
+        files.push((name, maker.file(&change)?.bytes));
     }
     let files = files
         .iter()
@@ -408,171 +407,6 @@ fn doubts(stored: &StoredTwin, terminal: &mut Terminal) -> Vec<Finding> {
         terminal.note(&format!("warning: {}", finding.message));
     }
     doubts
-}
-
-/// The twin, and the user's model as it was fitted.
-fn read(flags: &Export, kind: Kind) -> Outcome<(StoredTwin, Model)> {
-    let artifact = Artifact::open(&flags.twin)?;
-    let stored = StoredTwin::read(&artifact, true)?;
-    let other = [MODEL_URDF, MODEL_MJCF]
-        .into_iter()
-        .find(|name| *name != kind.stored);
-    if artifact.names().any(|name| Some(name) == other) {
-        return Err(Failure::usage(
-            format!(
-                "the twin was fitted with {}, which is not of that kind",
-                stored.context.model
-            ),
-            format!(
-                "use --to {}: only the fitted file's own numbers are changed",
-                if kind.stored == MODEL_URDF {
-                    "mjcf"
-                } else {
-                    "urdf"
-                }
-            ),
-        ));
-    }
-    let bytes = artifact.read(kind.stored)?;
-    let settings = ModelSettings {
-        allow_unphysical: true,
-        ..ModelSettings::default()
-    };
-    let mut model = parse_model(&stored.context.model, &bytes, &settings)?;
-    // What counts as nominal was decided when it was fitted.
-    model.description = stored.calibration.twin.robot.description().clone();
-    Ok((stored, model))
-}
-
-/// What went in, what stays out and why.
-fn say(change: &WriteBack, holds: Holds, terminal: &mut Terminal) {
-    let format = holds.format;
-    terminal.heading(&format!("In the {format} now"));
-    if let Some(projection) = &change.projection {
-        let text = format!(
-            "warning: no body can have the inertia found for {}: the one with the nearest torque was taken; do not read it as mass or \
-             inertia (a comment in the file says so, too)",
-            projection.links.join(", ")
-        );
-        warn(&text, terminal);
-    }
-    if change.written.is_empty() {
-        terminal.say("  nothing: no found effect has a place there; the file is as it was");
-    }
-    for written in &change.written {
-        let Written {
-            words, place, pip, ..
-        } = written;
-        // The file holds the model average.
-        let text = match written.in_file {
-            Some(value) if written.nearest => format!(
-                "{words} ({place}; in the file {}, nearest to that and the joint's quadratic friction)",
-                short(value)
-            ),
-            Some(value) if *pip > CERTAIN => format!(
-                "{words} ({place}; in the file {}, the average over models, some of which hold other effects beside it)",
-                short(value)
-            ),
-            Some(value) => format!(
-                "{words} ({place}; in the file {}, the average over models with and without it, PIP {})",
-                short(value),
-                summary::pip(Some(*pip))
-            ),
-            None if *pip > CERTAIN => format!("{words} ({place})"),
-            None => format!(
-                "{words} ({place}; {:.0} % of that, its probability)",
-                100.0 * pip
-            ),
-        };
-        paragraph(&text, terminal);
-    }
-    let changed: Vec<String> = change.links.iter().filter_map(change_of).collect();
-    if !changed.is_empty() {
-        terminal
-            .say("  links before -> after, where several effects share one or bodies limit them:");
-        changed.iter().for_each(|text| paragraph(text, terminal));
-    }
-    terminal.say("");
-    let (told, rest): (Vec<&Residual>, Vec<&Residual>) = change
-        .residual
-        .iter()
-        .partition(|residual| residual.pip >= 0.5);
-    if !told.is_empty() {
-        terminal.heading("Not representable in the file: the residual");
-    }
-    for residual in told.iter().take(TOLD) {
-        let text = format!(
-            "{}: {}; up to {} N·m rms",
-            residual.words,
-            residual.reason,
-            short(largest(&residual.torque))
-        );
-        paragraph(&text, terminal);
-    }
-    let smaller: Vec<&Residual> = told.into_iter().skip(TOLD).collect();
-    for (which, residuals) in [("smaller", smaller), ("less sure", rest)] {
-        let most = residuals.iter().map(|r| largest(&r.torque));
-        if let Some(most) = most.reduce(f64::max) {
-            let text = match residuals.len() {
-                1 => format!("one {which} component: up to {} N·m rms", short(most)),
-                n => format!(
-                    "{n} {which} components: each at most {} N·m rms",
-                    short(most)
-                ),
-            };
-            paragraph(&text, terminal);
-        }
-    }
-    let (lost, all) = (largest(&change.lost), largest(&change.correction));
-    let lost = if lost > ROUNDING * all {
-        format!("{} N·m rms", short(lost))
-    } else {
-        "nothing".into()
-    };
-    let text = format!("of what went in, {lost} is lost in one physical model");
-    paragraph(&text, terminal);
-    terminal.say("");
-}
-
-/// A warning in its place among what is said, as wide as the terminal.
-fn warn(text: &str, terminal: &mut Terminal) {
-    for (number, line) in wrapped(text, terminal.width() - 4).iter().enumerate() {
-        let begin = if number == 0 { "  " } else { "    " };
-        terminal.warning(&format!("{begin}{line}"));
-    }
-}
-
-/// "upper_arm_link: 12.9 -> 6.28 kg, centre (-0.28, 0, 0.136) -> (-0.31, 0, 0.14) m"; `None` for a link of its own.
-fn change_of(change: &LinkChange) -> Option<String> {
-    let before = change.before?;
-    let coordinates = before.com.iter().chain(&change.after.com);
-    let far = coordinates.fold(0.0_f64, |far, x| far.max(x.abs()));
-    let shown = |x: f64| short(if x.abs() > ROUNDING * far { x } else { 0.0 });
-    let centre = |inertia: &Inertia| inertia.com.map(shown).join(", ");
-    let (was, is) = (centre(&before), centre(&change.after));
-    let mut text = format!("{}: ", clean(&change.link));
-    let masses = (short(before.mass), short(change.after.mass));
-    text += &if masses.0 == masses.1 {
-        format!("{} kg as before", masses.0)
-    } else {
-        format!("{} -> {} kg", masses.0, masses.1)
-    };
-    text += &if was == is {
-        ", centre as before".to_owned()
-    } else {
-        format!(", centre ({was}) -> ({is}) m")
-    };
-    if before.tensor != change.after.tensor {
-        text += ", new inertia tensor";
-    }
-    if change.no_body {
-        text += "; no body can have what was found";
-    }
-    Some(text)
-}
-
-fn largest(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |most, value| most.max(*value))
 }
 
 /// Three digits.

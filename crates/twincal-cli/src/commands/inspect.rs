@@ -6,8 +6,9 @@ use super::inputs::{LogInput, Long, RobotInput};
 use super::settings::{Look, Usual};
 use super::summary::{Notes, findings, paragraph};
 use super::table::{print_table, table};
-use super::{code_of, print_json, require_strict, settings, start_threads};
+use super::{print_json, require_strict, settings, start_threads};
 use crate::args::Inspect;
+use crate::exit;
 use crate::failure::Outcome;
 use crate::progress::Progress;
 use crate::terminal::{Terminal, clean};
@@ -133,7 +134,7 @@ pub(super) fn run(flags: &Inspect, terminal: &mut Terminal) -> Outcome<u8> {
     drop(progress);
     found.extend(outlook.findings.iter().cloned());
     require_strict(settings.log.strict, &found)?;
-    let code = code_of(&found);
+    let code = exit::of_findings(&found);
     let inspection = inspection(&robot.robot, robot.file.name, &outlook, overviews, found);
     if settings.json {
         print_json(terminal, &inspection)?;

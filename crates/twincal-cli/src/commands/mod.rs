@@ -26,7 +26,7 @@ mod table;
 mod verdict;
 
 use crate::args::Command;
-use crate::failure::{DEGRADED, Failure, Outcome};
+use crate::failure::{Failure, Outcome};
 use crate::terminal::Terminal;
 use serde::Serialize;
 use twincal::{Finding, Severity};
@@ -104,18 +104,6 @@ fn no_model() -> Failure {
         "no robot model",
         "give --model arm.urdf, or `file` in [model] of the config",
     )
-}
-
-/// 3 if data was lost or degraded beyond the stated limit, else 0.
-fn code_of(findings: &[Finding]) -> u8 {
-    if findings
-        .iter()
-        .any(|finding| finding.severity == Severity::Degraded)
-    {
-        DEGRADED
-    } else {
-        0
-    }
 }
 
 /// With `--strict`, degraded data is an error.

@@ -3,8 +3,9 @@
 use super::inputs::LogInput;
 use super::summary::{Notes, paragraph};
 use super::verdict::doubt;
-use super::{code_of, print_json, reads, require_strict, settings, start_threads};
+use super::{print_json, reads, require_strict, settings, start_threads};
 use crate::args::Predict;
+use crate::exit;
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
@@ -65,15 +66,7 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
     let twin = &stored.calibration.twin;
     let mut logs = LogInput::for_twin(&flags.logs, &stored, settings.log.clone(), &progress)?;
     progress.step("predicting the logs");
-    let mut prediction = Prediction {
-        findings: std::mem::take(&mut logs.findings),
-        ..Prediction::default()
-    };
-    for log in &logs.logs {
-        let missing = missing_torque(&twin.robot, log)?;
-        prediction.findings.extend(missing);
-    }
-    let input_rows = logs.logs.iter().map(Log::samples).sum();
+    let mut prediction = Prediction::of(twin, &mut logs)?;
     match output {
         Some((format, place, mut output)) => {
             let written = match output.file() {
@@ -90,50 +83,16 @@ pub(super) fn run(flags: &Predict, terminal: &mut Terminal) -> Outcome<u8> {
         }
     }
     drop(progress);
-    let code = code_of(&prediction.findings);
-    let Prediction {
-        rows,
-        extrapolating,
-        mut findings,
-    } = prediction;
+    let code = exit::of_findings(&prediction.findings);
     let doubt = doubt(&stored.calibration);
     if let Some(doubt) = &doubt {
         terminal.note(&format!("warning: {}", doubt.message));
     }
-    let output = flags
-        .output
-        .as_ref()
-        .map(|path| path.to_string_lossy().into_owned());
     if settings.json {
-        findings.splice(0..0, doubt);
-        print_json(
-            terminal,
-            &Predicted {
-                schema: 1,
-                output,
-                rows,
-                input_rows,
-                extrapolating,
-                signal: "raw",
-                findings,
-            },
-        )?;
-    } else if let Some(output) = output {
-        paragraph(
-            &format!(
-                "{rows} of {input_rows} rows predicted{}, {extrapolating} of them extrapolating on some joint; torque is unfiltered",
-                if rows < input_rows {
-                    " (the motion filter takes some at either end of each stretch)"
-                } else {
-                    ""
-                }
-            ),
-            terminal,
-        );
-        super::summary::findings(&findings, Notes::In("the output of --json"), terminal);
-        terminal.say(&output);
+        prediction.findings.splice(0..0, doubt);
+        print_json(terminal, &prediction.summary(flags))?;
     } else {
-        notes(&findings, terminal);
+        prediction.say(flags, terminal);
     }
     Ok(code)
 }
@@ -152,6 +111,8 @@ fn notes(findings: &[Finding], terminal: &mut Terminal) {
 #[derive(Default)]
 struct Prediction {
     rows: u64,
+    /// Rows of the logs.
+    input_rows: u64,
     extrapolating: u64,
     findings: Vec<Finding>,
 }
@@ -176,6 +137,60 @@ struct Stretch<'a> {
 }
 
 impl Prediction {
+    /// Nothing written yet; what was found in reading the logs, and where torque is missing.
+    fn of(twin: &Twin, logs: &mut LogInput) -> Result<Self> {
+        let mut prediction = Self {
+            findings: std::mem::take(&mut logs.findings),
+            ..Self::default()
+        };
+        for log in &logs.logs {
+            let missing = missing_torque(&twin.robot, log)?;
+            prediction.findings.extend(missing);
+        }
+        prediction.input_rows = logs.logs.iter().map(Log::samples).sum();
+        Ok(prediction)
+    }
+
+    /// What `--json` prints.
+    fn summary(self, flags: &Predict) -> Predicted {
+        let path = flags.output.as_ref();
+        Predicted {
+            schema: 1,
+            output: path.map(|path| path.to_string_lossy().into_owned()),
+            rows: self.rows,
+            input_rows: self.input_rows,
+            extrapolating: self.extrapolating,
+            signal: "raw",
+            findings: self.findings,
+        }
+    }
+
+    /// Says what was written to a file, or what is to be known beside rows on standard output.
+    fn say(&self, flags: &Predict, terminal: &mut Terminal) {
+        let Some(output) = &flags.output else {
+            return notes(&self.findings, terminal);
+        };
+        let Self {
+            rows,
+            input_rows,
+            extrapolating,
+            ..
+        } = self;
+        paragraph(
+            &format!(
+                "{rows} of {input_rows} rows predicted{}, {extrapolating} of them extrapolating on some joint; torque is unfiltered",
+                if rows < input_rows {
+                    " (the motion filter takes some at either end of each stretch)"
+                } else {
+                    ""
+                }
+            ),
+            terminal,
+        );
+        super::summary::findings(&self.findings, Notes::In("the output of --json"), terminal);
+        terminal.say(&output.to_string_lossy());
+    }
+
     /// Writes the rows of all logs; the inner result is what became of the writing.
     fn write(
         &mut self,

@@ -4,10 +4,10 @@ use super::calibration::show;
 use super::inputs::{LogInput, Long, RobotInput, checksum_of_log};
 use super::settings::{Look, Usual};
 use super::{
-    code_of, count_of_logs, merge, print_json, reads, require_strict, settings, start_threads,
-    summary,
+    count_of_logs, merge, print_json, reads, require_strict, settings, start_threads, summary,
 };
 use crate::args::StatisticsFlags;
+use crate::exit;
 use crate::failure::{Failure, Outcome};
 use crate::names::display_names;
 use crate::progress::Progress;
@@ -109,7 +109,7 @@ pub(super) fn run(flags: &StatisticsFlags, terminal: &mut Terminal) -> Outcome<u
         ..
     } = road;
     drop(progress);
-    let code = code_of(&findings);
+    let code = exit::of_findings(&findings);
     let directory = flags.output.to_string_lossy().into_owned();
     if settings.json {
         let made = Made {

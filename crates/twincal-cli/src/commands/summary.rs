@@ -8,7 +8,7 @@ use twincal::calibrate::{Calibration, ParameterSummary};
 use twincal::validate::{Scores, Split};
 use twincal::words::significant;
 use twincal::{Code, Finding, Severity};
-use twincal_io::report;
+use twincal_io::words::{self, percent};
 
 /// What to do about a log that contradicts the model.
 pub(super) const HOW_TO_FIX: &str = "`twincal init` with this log and model writes a twincal.toml that fixes it, where it is a mistake of columns, signs or units";
@@ -17,7 +17,7 @@ pub(super) const ENDS: &str =
     "a (b … c): median and both ends of the 95 % interval, where ± would mislead";
 /// Prints the whole summary, the answer first.
 pub(super) fn print(calibration: &Calibration, terminal: &mut Terminal) {
-    terminal.answer(&report::answer(calibration).headline);
+    terminal.answer(&words::answer(calibration).headline);
     terminal.say("");
     mistakes(calibration, terminal);
     effects(calibration, terminal);
@@ -49,7 +49,7 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
     for component in all.iter().filter(|component| component.is_in()) {
         let status = component.status.word();
         let mut said = vec![format!("{status}, PIP {}", pip(component.pip))];
-        said.extend(Some(report::reason(component)).filter(|why| !why.is_empty()));
+        said.extend(Some(words::reason(component)).filter(|why| !why.is_empty()));
         let text = format!("{} ({})", component.words, said.join(": "));
         paragraph(&text, terminal);
     }
@@ -119,7 +119,7 @@ fn validation(calibration: &Calibration, terminal: &mut Terminal) {
 
 /// What the answer rests on, and what limits it.
 fn verdict(calibration: &Calibration, terminal: &mut Terminal) {
-    let answer = report::answer(calibration);
+    let answer = words::answer(calibration);
     terminal.heading("What the answer rests on");
     // Findings follow in full.
     let limits = answer.limits.iter().filter(|limit| {
@@ -156,8 +156,7 @@ fn reliability(calibration: &Calibration) -> Vec<String> {
     }
     if let Some(conformal) = &validation.conformal {
         lines.push(format!(
-            "{} by {}, they hold {:.0} % of all rows{} of the next such log with {} {} ({})",
-            report::stretched(conformal.factor),
+            "scaled by {}, they hold {:.0} % of all rows{} of the next such log with {} {} ({})",
             significant(conformal.factor, 3),
             100.0 * conformal.rows,
             if has_standstill(validation) {
@@ -176,7 +175,7 @@ fn reliability(calibration: &Calibration) -> Vec<String> {
                 n => format!("{n} logs"),
             }
         ));
-        lines.push(report::drawn_alike(conformal));
+        lines.push(words::drawn_alike(conformal));
     }
     if let (Some(compact), Some([average, own])) = (&calibration.compact, validation.compact) {
         lines.push(format!(
@@ -384,7 +383,8 @@ pub(super) fn indented(text: &str, begin: [&str; 2], terminal: &mut Terminal) {
 
 pub(crate) fn wrapped(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
-    for word in text.split_whitespace() {
+    // A number and its unit stay together: between them is no ASCII blank.
+    for word in text.split_ascii_whitespace() {
         match lines.last_mut() {
             Some(line) if line.is_empty() => line.push_str(word),
             Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
@@ -404,14 +404,6 @@ pub(super) fn pip(pip: Option<f64>) -> String {
         Some(p) if p > 0.999 => ">0.999".into(),
         Some(p) if p < 0.001 => "<0.001".into(),
         Some(p) => format!("{p:.3}"),
-    }
-}
-
-pub(super) fn percent(share: f64) -> String {
-    if share.is_finite() {
-        format!("{:.1} %", 100.0 * share)
-    } else {
-        "–".into()
     }
 }
 

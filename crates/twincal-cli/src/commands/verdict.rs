@@ -3,7 +3,7 @@
 use twincal::assess;
 use twincal::calibrate::Calibration;
 use twincal::{Code, Finding, Severity};
-use twincal_io::report::{Answer, answer};
+use twincal_io::words::{Answer, answer};
 
 /// The verdict where it is not a plain yes: the answer and its first reason. It is of the fit, not of what the command does, so that exit codes
 /// do not follow from it.

@@ -166,12 +166,12 @@ fn gravity(document: &Document, edits: &mut Edits<'_>, new: [f64; 3]) -> Result<
 }
 
 /// xx, yy, zz, xy, xz, yz.
-fn six(tensor: &Matrix) -> [f64; 6] {
+pub(super) fn six(tensor: &Matrix) -> [f64; 6] {
     [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].map(|(i, j)| tensor[i][j])
 }
 
 /// w, x, y, z of a rotation whose columns are known up to their sign.
-fn quaternion(axes: &Matrix) -> [f64; 4] {
+pub(super) fn quaternion(axes: &Matrix) -> [f64; 4] {
     let mut r = *axes;
     if dot(r[0], cross(r[1], r[2])) < 0.0 {
         r.iter_mut().for_each(|row| row[2] = -row[2]);

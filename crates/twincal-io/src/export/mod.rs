@@ -1,7 +1,8 @@
-//! The calibrated model as files: the user's own model with only the changed numbers changed.
+//! The calibrated model as files: the user's own model with only the changed numbers changed, or a whole file of the other format.
 
 pub mod code;
 mod edit;
+pub mod generate;
 mod mjcf;
 mod urdf;
 #[cfg(test)]

@@ -99,7 +99,7 @@ fn inertial(
 }
 
 /// A whole `<inertial>`.
-fn block(inertia: &Inertia) -> Vec<(usize, String)> {
+pub(super) fn block(inertia: &Inertia) -> Vec<(usize, String)> {
     vec![
         (0, "<inertial>".into()),
         (

@@ -96,95 +96,38 @@ fn open(
     budget: &mut Budget,
 ) -> Result<usize> {
     let element = document.elements[include].clone();
-    let fail = |document: &Document, problem: String, remedy: &str| {
-        Err(document.error(&element, problem, remedy))
-    };
     let Some(file) = element.text("file") else {
-        return fail(
-            document,
-            "<include> has no attribute `file`".into(),
+        return Err(document.error(
+            &element,
+            "<include> has no attribute `file`",
             "name the file",
-        );
+        ));
     };
     let shown = shorten(file);
     let Some(folder) = folder else {
-        return fail(
-            document,
+        return Err(document.error(
+            &element,
             format!("includes `{shown}`, but this model does not come from a file"),
             "write the parts into one file",
-        );
+        ));
     };
-    if chain.len() > MAX_CHAIN {
-        return fail(
-            document,
-            format!("includes are nested deeper than {MAX_CHAIN} files"),
-            "flatten the model",
-        );
-    }
-    let path = match folder.root.join(file).canonicalize() {
-        Ok(path) => path,
-        Err(error) => {
-            return fail(
-                document,
-                format!("cannot include `{shown}`: {error}"),
-                "check the path",
-            );
-        }
+    let directive = Include {
+        document,
+        element: &element,
+        shown: &shown,
     };
-    if !path.starts_with(&folder.root) {
-        return fail(
-            document,
-            format!("includes `{shown}`, which is outside the model's folder"),
-            "copy it beside the model: nothing outside that folder is opened",
-        );
-    }
-    if chain.contains(&path) {
-        return fail(
-            document,
-            format!("includes `{shown}`, which includes this file: a cycle"),
-            "remove one of them",
-        );
-    }
-    budget.files += 1;
-    let cannot = |refusal: Refusal| {
-        let problem = format!("cannot include `{shown}`: it {refusal}");
-        document.error(&element, problem, "check the path")
-    };
-    let limit = MAX_BYTES as u64;
-    let included = InputFile::new(&path, limit).inside(&folder.root);
-    let mut bytes = Vec::new();
-    let size = match included.read() {
-        Ok(read) => {
-            bytes = read;
-            bytes.len() as u64
-        }
-        // Told below, with what the others have.
-        Err(Refusal::TooLarge { bytes, .. }) => bytes,
-        Err(refusal) => return Err(cannot(refusal)),
-    };
-    budget.bytes = budget
-        .bytes
-        .saturating_add(usize::try_from(size).unwrap_or(usize::MAX));
-    if budget.bytes > MAX_BYTES || budget.files > MAX_FILES {
-        return fail(
-            document,
-            format!(
-                "included files exceed the limit of {} MiB or {MAX_FILES} files in all (at `{shown}`)",
-                MAX_BYTES >> 20
-            ),
-            "no robot needs this: is it the right model?",
-        );
-    }
+    let path = directive.resolve(folder, file, chain)?;
+    let bytes = directive.read(folder, &path, budget)?;
     let start = document.elements.len();
     let root = document.parse(file, &bytes)?;
     let name = &document.elements[root].name;
     if name != "mujoco" && name != "mujocoinclude" {
         let name = shorten(name);
-        return fail(
-            document,
+        return Err(document.error(
+            &element,
             format!("included file `{shown}` has the root <{name}>"),
             "it must be <mujoco> or <mujocoinclude>",
-        );
+        ));
     }
     let mut longer = chain.to_vec();
     longer.push(path);
@@ -196,6 +139,86 @@ fn open(
         budget,
     )?;
     Ok(root)
+}
+
+/// One `<include>`.
+struct Include<'a> {
+    document: &'a Document,
+    element: &'a Element,
+    /// The file as it is shown.
+    shown: &'a str,
+}
+
+impl Include<'_> {
+    fn fail<T>(&self, problem: String, remedy: &str) -> Result<T> {
+        Err(self.document.error(self.element, problem, remedy))
+    }
+
+    /// Path of the file: inside the folder and not in the chain of files that include it.
+    fn resolve(&self, folder: &Folder, file: &str, chain: &[PathBuf]) -> Result<PathBuf> {
+        let shown = self.shown;
+        if chain.len() > MAX_CHAIN {
+            return self.fail(
+                format!("includes are nested deeper than {MAX_CHAIN} files"),
+                "flatten the model",
+            );
+        }
+        let path = match folder.root.join(file).canonicalize() {
+            Ok(path) => path,
+            Err(error) => {
+                return self.fail(
+                    format!("cannot include `{shown}`: {error}"),
+                    "check the path",
+                );
+            }
+        };
+        if !path.starts_with(&folder.root) {
+            return self.fail(
+                format!("includes `{shown}`, which is outside the model's folder"),
+                "copy it beside the model: nothing outside that folder is opened",
+            );
+        }
+        if chain.contains(&path) {
+            return self.fail(
+                format!("includes `{shown}`, which includes this file: a cycle"),
+                "remove one of them",
+            );
+        }
+        Ok(path)
+    }
+
+    /// Bytes of the file, as far as the budget goes.
+    fn read(&self, folder: &Folder, path: &Path, budget: &mut Budget) -> Result<Vec<u8>> {
+        let shown = self.shown;
+        budget.files += 1;
+        let included = InputFile::new(path, MAX_BYTES as u64).inside(&folder.root);
+        let mut bytes = Vec::new();
+        let size = match included.read() {
+            Ok(read) => {
+                bytes = read;
+                bytes.len() as u64
+            }
+            // Told below, with what the others have.
+            Err(Refusal::TooLarge { bytes, .. }) => bytes,
+            Err(refusal) => {
+                let problem = format!("cannot include `{shown}`: it {refusal}");
+                return self.fail(problem, "check the path");
+            }
+        };
+        budget.bytes = budget
+            .bytes
+            .saturating_add(usize::try_from(size).unwrap_or(usize::MAX));
+        if budget.bytes > MAX_BYTES || budget.files > MAX_FILES {
+            return self.fail(
+                format!(
+                    "included files exceed the limit of {} MiB or {MAX_FILES} files in all (at `{shown}`)",
+                    MAX_BYTES >> 20
+                ),
+                "no robot needs this: is it the right model?",
+            );
+        }
+        Ok(bytes)
+    }
 }
 
 /// Includes may have stacked more levels than one file may have.

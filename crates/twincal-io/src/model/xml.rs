@@ -59,6 +59,53 @@ pub(crate) struct Document {
     items: usize,
 }
 
+/// A file that is being parsed.
+struct OpenFile<'a> {
+    name: &'a str,
+    text: &'a str,
+    /// Elements whose end tag has not come yet, from the root on.
+    open: Vec<usize>,
+    root: Option<usize>,
+}
+
+impl OpenFile<'_> {
+    /// An error at a byte of the file.
+    fn fail<T>(&self, offset: usize, problem: String, remedy: &str) -> Result<T> {
+        Err(Error::content(
+            Place::of_offset(self.name, self.text.as_bytes(), offset),
+            problem,
+            remedy,
+        ))
+    }
+
+    /// Refuses document types and entities that they declare; other events pass.
+    fn refuse_declarations(&self, event: &Event<'_>, offset: usize) -> Result<()> {
+        match event {
+            Event::DocType(_) => self.fail(
+                offset,
+                "it has a document type definition (<!DOCTYPE …>)".into(),
+                "remove it: twincal reads neither DTDs nor external entities",
+            ),
+            Event::GeneralRef(entity) => {
+                let known = entity.is_char_ref()
+                    || quick_xml::escape::resolve_predefined_entity(entity).is_some();
+                if known {
+                    return Ok(());
+                }
+                self.fail(
+                    offset,
+                    format!(
+                        "entity &{}; is not one of the five predefined ones",
+                        shorten(entity)
+                    ),
+                    "write the text itself",
+                )
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 impl Document {
     /// Parses `bytes` and appends its elements; returns the index of its root element.
     ///
@@ -67,7 +114,6 @@ impl Document {
     /// for entities other than the five predefined ones.
     pub(crate) fn parse(&mut self, name: &str, bytes: &[u8]) -> Result<usize> {
         let text = decode(name, bytes)?;
-        let file = self.files.len();
         // The reader drops a byte-order mark without counting it.
         let skip = if text.starts_with('\u{feff}') {
             '\u{feff}'.len_utf8()
@@ -75,127 +121,117 @@ impl Document {
             0
         };
         let mut reader = Reader::from_str(&text[skip..]);
-        let mut open: Vec<usize> = Vec::new();
-        let mut root = None;
+        let mut file = OpenFile {
+            name,
+            text: &text,
+            open: Vec::new(),
+            root: None,
+        };
         loop {
             let offset = skip + reader.buffer_position() as usize;
-            let fail = |offset: usize, problem: String, remedy: &str| {
-                Err(Error::content(
-                    Place::of_offset(name, text.as_bytes(), offset),
-                    problem,
-                    remedy,
-                ))
-            };
             let event = match reader.read_event() {
                 Ok(event) => event,
                 Err(error) => {
-                    let offset = skip + reader.error_position() as usize;
-                    return fail(
-                        offset,
+                    return file.fail(
+                        skip + reader.error_position() as usize,
                         format!("not well-formed XML: {error}"),
                         "correct the file",
                     );
                 }
             };
+            let behind = skip + reader.buffer_position() as usize;
             match event {
-                Event::Start(ref tag) | Event::Empty(ref tag) => {
-                    if open.len() >= MAX_DEPTH {
-                        return fail(
-                            offset,
-                            format!("elements are nested deeper than {MAX_DEPTH} levels"),
-                            "no robot needs this: is it the right file?",
-                        );
-                    }
-                    let element = Element {
-                        name: tag.name().as_ref().into(),
-                        attributes: attributes(name, &text, offset, tag)?,
-                        children: Vec::new(),
-                        file,
-                        offset,
-                        inside: skip + reader.buffer_position() as usize,
-                        close: skip + reader.buffer_position() as usize,
-                        end: skip + reader.buffer_position() as usize,
-                    };
-                    self.items += 1 + element.attributes.len();
-                    if self.items > MAX_ITEMS {
-                        return fail(
-                            offset,
-                            format!("more than {MAX_ITEMS} elements and attributes"),
-                            "no robot needs this: is it the right file?",
-                        );
-                    }
-                    let index = self.elements.len();
-                    match open.last() {
-                        Some(&parent) => self.elements[parent].children.push(index),
-                        None if root.is_none() => root = Some(index),
-                        None => {
-                            return fail(
-                                offset,
-                                format!("a second root element <{}>", element.name),
-                                "an XML file has one root element",
-                            );
-                        }
-                    }
-                    self.elements.push(element);
-                    if matches!(event, Event::Start(_)) {
-                        open.push(index);
-                    }
+                Event::Start(ref tag) => {
+                    let index = self.start(&mut file, tag, offset..behind)?;
+                    file.open.push(index);
+                }
+                Event::Empty(ref tag) => {
+                    self.start(&mut file, tag, offset..behind)?;
                 }
                 Event::End(_) => {
-                    if let Some(closed) = open.pop() {
+                    if let Some(closed) = file.open.pop() {
                         self.elements[closed].close = offset;
-                        self.elements[closed].end = skip + reader.buffer_position() as usize;
-                    }
-                }
-                Event::DocType(_) => {
-                    return fail(
-                        offset,
-                        "it has a document type definition (<!DOCTYPE …>)".into(),
-                        "remove it: twincal reads neither DTDs nor external entities",
-                    );
-                }
-                Event::GeneralRef(ref entity) => {
-                    let known = entity.is_char_ref()
-                        || quick_xml::escape::resolve_predefined_entity(entity).is_some();
-                    if !known {
-                        return fail(
-                            offset,
-                            format!(
-                                "entity &{}; is not one of the five predefined ones",
-                                shorten(entity)
-                            ),
-                            "write the text itself",
-                        );
+                        self.elements[closed].end = behind;
                     }
                 }
                 Event::Eof => break,
-                Event::Text(_)
-                | Event::CData(_)
-                | Event::Comment(_)
-                | Event::Decl(_)
-                | Event::PI(_) => {}
+                ref other => file.refuse_declarations(other, offset)?,
             }
         }
-        if let Some(&unclosed) = open.last() {
-            let element = &self.elements[unclosed];
-            return Err(Error::content(
-                Place::of_offset(name, text.as_bytes(), element.offset),
-                format!("element <{}> is never closed", shorten(&element.name)),
-                "the file ends too early: was it cut off?",
-            ));
-        }
-        let Some(root) = root else {
-            return Err(Error::content(
-                Place::file(name),
-                "there is no XML element in it",
-                "give a URDF or MJCF file",
-            ));
-        };
+        let root = self.root_of(&file)?;
         self.files.push(Source {
             name: name.into(),
             text,
         });
         Ok(root)
+    }
+
+    /// Appends the element of a start tag, `span` in its file; returns its index.
+    fn start(
+        &mut self,
+        file: &mut OpenFile<'_>,
+        tag: &BytesStart<'_>,
+        span: Range<usize>,
+    ) -> Result<usize> {
+        let offset = span.start;
+        if file.open.len() >= MAX_DEPTH {
+            return file.fail(
+                offset,
+                format!("elements are nested deeper than {MAX_DEPTH} levels"),
+                "no robot needs this: is it the right file?",
+            );
+        }
+        let element = Element {
+            name: tag.name().as_ref().into(),
+            attributes: attributes(file.name, file.text, offset, tag)?,
+            children: Vec::new(),
+            file: self.files.len(),
+            offset,
+            inside: span.end,
+            close: span.end,
+            end: span.end,
+        };
+        self.items += 1 + element.attributes.len();
+        if self.items > MAX_ITEMS {
+            return file.fail(
+                offset,
+                format!("more than {MAX_ITEMS} elements and attributes"),
+                "no robot needs this: is it the right file?",
+            );
+        }
+        let index = self.elements.len();
+        match file.open.last() {
+            Some(&parent) => self.elements[parent].children.push(index),
+            None if file.root.is_none() => file.root = Some(index),
+            None => {
+                return file.fail(
+                    offset,
+                    format!("a second root element <{}>", element.name),
+                    "an XML file has one root element",
+                );
+            }
+        }
+        self.elements.push(element);
+        Ok(index)
+    }
+
+    /// Root element of a file that has been read to its end.
+    fn root_of(&self, file: &OpenFile<'_>) -> Result<usize> {
+        if let Some(&unclosed) = file.open.last() {
+            let element = &self.elements[unclosed];
+            return file.fail(
+                element.offset,
+                format!("element <{}> is never closed", shorten(&element.name)),
+                "the file ends too early: was it cut off?",
+            );
+        }
+        file.root.ok_or_else(|| {
+            Error::content(
+                Place::file(file.name),
+                "there is no XML element in it",
+                "give a URDF or MJCF file",
+            )
+        })
     }
 
     /// Where an element begins.

@@ -1,7 +1,8 @@
 //! "A or B, the data cannot tell": pairs of effects that stand in for each other, joints that hardly moved.
 
-use super::text::{fixed, list, percent};
 use super::view::Joint;
+use crate::words::list::list;
+use crate::words::number::{fixed, percent};
 use twincal::Code;
 use twincal::assess::standstill;
 use twincal::calibrate::Calibration;

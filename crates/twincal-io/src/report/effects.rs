@@ -2,11 +2,10 @@
 //! effect is a component: one physical story with all its columns.
 
 use super::MENTIONED;
-use super::figures::inclusion::family_name;
 use super::remarks::remarks;
-use super::status::reason as status_reason;
-use super::text::{interval, probability, with_ends};
-use super::verdict::plus_minus;
+use crate::words::number::plus_minus;
+use crate::words::number::{interval, probability, with_ends};
+use crate::words::{family_name, reason as status_reason};
 use serde::Serialize;
 use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary, TermSummary};
 use twincal::term::{Estimate, Family, Status, is_place, told};

@@ -1,6 +1,6 @@
 //! Everything that was dropped, changed, assumed or doubted, by kind: of many of one kind the first are told, the others folded away.
 
-use super::text::count;
+use crate::words::number::count;
 use serde::Serialize;
 use twincal::calibrate::Calibration;
 use twincal::{Code, Severity};

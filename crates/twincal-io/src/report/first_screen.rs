@@ -1,8 +1,9 @@
 //! What stands beside the answer on the first screen: three numbers, the joint that matters most, what the twin is for.
 
-use super::status;
-use super::text::{number, percent};
-use super::view::{Joint, pooled_unit};
+use super::view::Joint;
+use crate::words;
+use crate::words::number::{number, percent};
+use crate::words::units::pooled_unit;
 use serde::Serialize;
 use twincal::assess::{Answer, decisive};
 use twincal::calibrate::{Calibration, Status};
@@ -15,7 +16,7 @@ pub(super) struct Number {
 }
 
 /// Torque error before and after, coverage of the 95 % intervals, established effects.
-pub(super) fn numbers(calibration: &Calibration, joints: &[Joint<'_>]) -> [Number; 3] {
+pub(super) fn numbers(calibration: &Calibration) -> [Number; 3] {
     let scores = decisive(&calibration.validation);
     let tested = scores.joints.iter().any(|joint| joint.rows > 0);
     let error = match tested {
@@ -26,11 +27,11 @@ pub(super) fn numbers(calibration: &Calibration, joints: &[Joint<'_>]) -> [Numbe
         ),
         false => number(f64::NAN, 3),
     };
-    let established = status::with(Status::Established, calibration).len();
+    let established = words::with(Status::Established, calibration).len();
     [
         Number {
             value: error,
-            label: format!("torque error (RMSE), {}", pooled_unit(joints)),
+            label: format!("torque error (RMSE), {}", pooled_unit(calibration)),
         },
         Number {
             value: percent(if tested { scores.coverage95 } else { f64::NAN }),
@@ -134,8 +135,7 @@ mod tests {
     #[test]
     fn numbers_without_a_test_are_dashes() {
         let calibration = fixture::no_validation();
-        let joints = view::joints(&calibration);
-        let [error, coverage, _] = numbers(&calibration, &joints);
+        let [error, coverage, _] = numbers(&calibration);
         assert_eq!((error.value.as_str(), coverage.value.as_str()), ("–", "–"));
     }
 }

@@ -27,17 +27,17 @@ use twincal::{Code, Finding, Severity};
 const RATE: f64 = 25.0;
 
 /// A planar arm with two joints, 20 candidates, three logs of a minute.
-pub(super) fn two_joints() -> Calibration {
+pub(crate) fn two_joints() -> Calibration {
     arm(&["shoulder", "elbow"], 3, 1500)
 }
 
 /// Eight held-out traces per joint, each of two minutes: what the limit on the page's size is about.
-pub(super) fn many_logs() -> Calibration {
+pub(crate) fn many_logs() -> Calibration {
     arm(&["shoulder", "elbow"], 8, 3000)
 }
 
 /// An arm with seven joints and a slider under it.
-pub(super) fn seven_joints() -> Calibration {
+pub(crate) fn seven_joints() -> Calibration {
     let names = [
         "rail",
         "shoulder_pan",
@@ -51,13 +51,13 @@ pub(super) fn seven_joints() -> Calibration {
 }
 
 /// Seven joints with more long held-out logs than the page draws: its largest size.
-pub(super) fn many_joints_and_logs() -> Calibration {
+pub(crate) fn many_joints_and_logs() -> Calibration {
     let names = ["j1", "j2", "j3", "j4", "j5", "j6", "j7"];
     arm(&names, 4, 2000)
 }
 
 /// Sampled instead of enumerated, with chains that have not converged.
-pub(super) fn gibbs() -> Calibration {
+pub(crate) fn gibbs() -> Calibration {
     let mut calibration = two_joints();
     calibration.twin.posterior.method = Method::Gibbs {
         chains: 4,
@@ -75,7 +75,7 @@ pub(super) fn gibbs() -> Calibration {
 }
 
 /// A log that the nominal model explains.
-pub(super) fn nothing_found() -> Calibration {
+pub(crate) fn nothing_found() -> Calibration {
     let mut calibration = two_joints();
     for term in calibration.terms.iter_mut().filter(|t| t.pip.is_some()) {
         term.pip = Some(0.01);
@@ -91,7 +91,7 @@ pub(super) fn nothing_found() -> Calibration {
 }
 
 /// One row of one joint.
-pub(super) fn single_row() -> Calibration {
+pub(crate) fn single_row() -> Calibration {
     let mut calibration = arm(&["only"], 1, 1);
     calibration.autocorrelation = vec![vec![1.0], vec![1.0]];
     calibration
@@ -103,7 +103,7 @@ pub(super) fn single_row() -> Calibration {
 }
 
 /// No held-out data at all.
-pub(super) fn no_validation() -> Calibration {
+pub(crate) fn no_validation() -> Calibration {
     let mut calibration = arm(&["shoulder", "elbow"], 2, 0);
     calibration.validation.coverage_levels.clear();
     calibration.autocorrelation.clear();
@@ -111,7 +111,7 @@ pub(super) fn no_validation() -> Calibration {
 }
 
 /// Joints with long names, and names that are attacks.
-pub(super) fn hostile() -> Calibration {
+pub(crate) fn hostile() -> Calibration {
     let long = "left_manipulator_shoulder_pan_joint_of_the_second_station_upper_deck";
     let mut calibration = arm(
         &[
@@ -159,6 +159,7 @@ impl Noise {
     }
 }
 
+/// An arm with these joints, `logs` logs and as many held-out traces of `rows` rows per joint.
 fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
     let mut noise = Noise(7);
     let terms = terms(names);
@@ -166,6 +167,41 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
         .flat_map(|log| (0..names.len()).map(move |joint| (log, joint)))
         .map(|(log, joint)| trace(log, names[joint], joint, rows, &mut noise))
         .collect();
+    let posterior = posterior(&terms);
+    let joint_noise = joint_noise(names, (logs * rows) as f64);
+    let decay = |memory: f64| {
+        (0..=20)
+            .map(|lag| (-f64::from(lag) / memory).exp() * (0.5 * f64::from(lag) / memory).cos())
+            .collect()
+    };
+    Calibration {
+        draws: draws(&terms, &mut noise),
+        curves: curves(names),
+        lags: None,
+        twin: twin(names, posterior, joint_noise.clone()),
+        components: components(&terms),
+        compact: Some(compact(&terms)),
+        terms,
+        noise: joint_noise,
+        prior: prior(),
+        likelihood: LikelihoodUsed {
+            model: NoiseModel::Tempered,
+            rounds: 6,
+        },
+        groups: Vec::new(),
+        sweep: Vec::new(),
+        validation: validation(traces, names),
+        autocorrelation: names
+            .iter()
+            .flat_map(|_| [decay(6.0), decay(1.2)])
+            .collect(),
+        logs: log_summaries(logs, names.len()),
+        findings: findings(names),
+    }
+}
+
+/// Exact posterior of the candidates, of one model.
+fn posterior(terms: &[TermSummary]) -> Posterior {
     let live: Vec<&TermSummary> = terms.iter().filter(|t| t.pip.is_some()).collect();
     let column = |value: &dyn Fn(&TermSummary) -> Option<f64>| {
         live.iter()
@@ -176,7 +212,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
         .filter(|k| live[*k].pip >= Some(0.5))
         .map(|k| k as u32)
         .collect();
-    let posterior = Posterior {
+    Posterior {
         component: (0..live.len()).collect(),
         inclusion: column(&|t| t.pip),
         inclusion_mcse: vec![0.0; live.len()],
@@ -197,8 +233,12 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
         method: Method::Exact {
             models: 1 << live.len().min(28),
         },
-    };
-    let joint_noise: Vec<JointNoise> = names
+    }
+}
+
+/// Noise of every joint on so many rows.
+fn joint_noise(names: &[&str], rows: f64) -> Vec<JointNoise> {
+    names
         .iter()
         .enumerate()
         .map(|(j, name)| JointNoise {
@@ -206,109 +246,100 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
             sigma: 0.09 / (1.0 + j as f64),
             rho: 0.0,
             weight: 1.0 + 0.2 * j as f64,
-            n: (logs * rows) as f64,
-            n_eff: (logs * rows) as f64 / 7.3,
+            n: rows,
+            n_eff: rows / 7.3,
             autocorrelation_time: 2.4,
             misfit: 1.0,
             interval_factor: 1.08,
             out_of_band: 0.021,
             spread: Default::default(),
         })
-        .collect();
-    let decay = |memory: f64| {
-        (0..=20)
-            .map(|lag| (-f64::from(lag) / memory).exp() * (0.5 * f64::from(lag) / memory).cos())
-            .collect()
-    };
-    Calibration {
-        draws: draws(&terms, &mut noise),
-        curves: curves(names),
-        lags: None,
-        twin: Twin {
-            robot: robot(names),
-            library: LibrarySettings::default(),
-            zero_columns: Vec::new(),
-            pipeline: Pipeline {
-                cutoff_hz: 10.0,
-                motion_cutoff_hz: 40.0,
-                rate_hz: RATE,
-                motion_interval: 0.0,
-                coulomb_velocity: 0.02,
-                standstill_velocity: vec![0.02; names.len()],
-                derived_from: vec![twincal::signal::DerivedFrom::Position; names.len()],
-                velocity_from: Vec::new(),
-                corrections: twincal::signal::Corrections::default(),
-                history: Vec::new(),
-            },
-            posterior,
-            noise: joint_noise.clone(),
-            hull: names
-                .iter()
-                .enumerate()
-                .map(|(j, _)| [-1.2, 1.4 + 0.1 * j as f64, -3.1, 3.0, -14.2, 13.9])
-                .collect(),
-            payload_where_unknown: false,
+        .collect()
+}
+
+/// The twin of an arm.
+fn twin(names: &[&str], posterior: Posterior, noise: Vec<JointNoise>) -> Twin {
+    Twin {
+        robot: robot(names),
+        library: LibrarySettings::default(),
+        zero_columns: Vec::new(),
+        pipeline: Pipeline {
+            cutoff_hz: 10.0,
+            motion_cutoff_hz: 40.0,
+            rate_hz: RATE,
+            motion_interval: 0.0,
+            coulomb_velocity: 0.02,
+            standstill_velocity: vec![0.02; names.len()],
+            derived_from: vec![twincal::signal::DerivedFrom::Position; names.len()],
+            velocity_from: Vec::new(),
+            corrections: twincal::signal::Corrections::default(),
+            history: Vec::new(),
         },
-        components: components(&terms),
-        compact: Some(compact(&terms)),
-        terms,
-        noise: joint_noise,
-        prior: PriorUsed {
-            scaled_variance: vec![(Family::Generic, 240.0)],
-            learned: true,
-            inclusion: Inclusion::ExpectedTerms(5.0),
-            families: Vec::new(),
-            forced: Vec::new(),
-            heredity: Vec::new(),
-            shape: 1e-3,
-            scale: 1e-4,
-        },
-        likelihood: LikelihoodUsed {
-            model: NoiseModel::Tempered,
-            rounds: 6,
-        },
-        groups: Vec::new(),
-        sweep: Vec::new(),
-        validation: validation(traces, names),
-        autocorrelation: names
+        posterior,
+        noise,
+        hull: names
             .iter()
-            .flat_map(|_| [decay(6.0), decay(1.2)])
+            .enumerate()
+            .map(|(j, _)| [-1.2, 1.4 + 0.1 * j as f64, -3.1, 3.0, -14.2, 13.9])
             .collect(),
-        logs: (0..logs)
-            .map(|log| LogSummary {
-                name: format!("run{log}.csv"),
-                role: "fit".into(),
-                samples: 60_000,
-                duration: 60.0,
-                rate_hz: 1000.0,
-                kept_rate_hz: RATE,
-                segments: 1 + log as u64,
-                rows: (0..names.len()).map(|j| 1500 - 140 * j as u64).collect(),
-                standstill: (0..names.len()).map(|j| 140 * j as u64).collect(),
-                incidents: Vec::new(),
-            })
-            .collect(),
-        findings: vec![
-            Finding::new(
-                Severity::Warning,
-                Code::JointNotDriven,
-                names[names.len() - 1],
-                format!(
-                    "joint `{}`: at rest in 9.3 % of the rows (|q̇| < 0.02 rad/s); its friction is known less well than the \
-                     numbers say, move it more.",
-                    names[names.len() - 1]
-                ),
-                140,
-            ),
-            Finding::new(
-                Severity::Note,
-                Code::TimeOrigin,
-                "run0.csv",
-                "log `run0.csv`: 3 stamps repeated; the later ones were dropped.",
-                3,
-            ),
-        ],
+        payload_where_unknown: false,
     }
+}
+
+/// The prior that was used.
+fn prior() -> PriorUsed {
+    PriorUsed {
+        scaled_variance: vec![(Family::Generic, 240.0)],
+        learned: true,
+        inclusion: Inclusion::ExpectedTerms(5.0),
+        families: Vec::new(),
+        forced: Vec::new(),
+        heredity: Vec::new(),
+        shape: 1e-3,
+        scale: 1e-4,
+    }
+}
+
+/// Logs of a minute each.
+fn log_summaries(logs: usize, joints: usize) -> Vec<LogSummary> {
+    (0..logs)
+        .map(|log| LogSummary {
+            name: format!("run{log}.csv"),
+            role: "fit".into(),
+            samples: 60_000,
+            duration: 60.0,
+            rate_hz: 1000.0,
+            kept_rate_hz: RATE,
+            segments: 1 + log as u64,
+            rows: (0..joints).map(|j| 1500 - 140 * j as u64).collect(),
+            standstill: (0..joints).map(|j| 140 * j as u64).collect(),
+            incidents: Vec::new(),
+        })
+        .collect()
+}
+
+/// A warning and a note.
+fn findings(names: &[&str]) -> Vec<Finding> {
+    vec![
+        Finding::new(
+            Severity::Warning,
+            Code::JointNotDriven,
+            names[names.len() - 1],
+            format!(
+                "joint `{}`: at rest in 9.3 % of the rows (|q̇| < 0.02 rad/s); its friction is known less well than the \
+                 numbers say, move it more.",
+                names[names.len() - 1]
+            ),
+            140,
+        ),
+        Finding::new(
+            Severity::Note,
+            Code::TimeOrigin,
+            "run0.csv",
+            "log `run0.csv`: 3 stamps repeated; the later ones were dropped.",
+            3,
+        ),
+    ]
 }
 
 /// A counterbalance over the second joint's position, where there is one.

@@ -8,7 +8,6 @@ use super::figures;
 use super::findings;
 use super::first_screen::{self, Number, Use};
 use super::honesty;
-use super::limits::Rows;
 use super::script;
 use super::standstill;
 use super::tables::{self, Table};
@@ -16,6 +15,7 @@ use super::text;
 use super::traces;
 use super::verdict::{self, Verdict};
 use super::view::{self, Joint};
+use crate::words;
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::{Serde, Value};
 use minijinja::{Environment, ErrorKind, UndefinedBehavior, escape_formatter};
@@ -141,13 +141,13 @@ fn gather<'a>(
     let components = &calibration.components;
     let hero = first_screen::hero(calibration, joints);
     let traces = hero.and_then(|hero| traces::traces(joints, hero, 1 + others));
-    let verdict = verdict::judge(calibration, joints);
+    let verdict = verdict::judge(calibration);
     let script = script::text();
     Ok(Page {
         run,
         mentioned: super::MENTIONED,
         about: tables::about(calibration, run),
-        numbers: first_screen::numbers(calibration, joints),
+        numbers: first_screen::numbers(calibration),
         use_of: first_screen::use_of(verdict.answer),
         hero: hero.and_then(figures::torque::figure),
         traces: match &traces {
@@ -179,17 +179,17 @@ fn gather<'a>(
         // Traces may be thinned: then there are fewer values than rows.
         pit: figures::pit::figure(&pit, independent.min(pit.len() as f64)),
         reliability: honesty::reliability(validation),
-        guarantee: honesty::guarantee(validation, &calibration.findings),
-        compact: honesty::compact(calibration, joints),
+        guarantee: words::guarantee(validation, &calibration.findings),
+        compact: words::compact(calibration),
         sensitivity: figures::sensitivity::figure(terms, components),
-        scores: tables::scores(assess::decisive(validation), joints, Rows::Moving),
-        all_rows: tables::scores(&validation.filtered, joints, Rows::All),
+        scores: tables::scores(assess::decisive(validation), calibration),
+        all_rows: tables::scores(&validation.filtered, calibration),
         standstill: assess::has_standstill(validation),
-        at_rest: standstill::table(validation, joints),
+        at_rest: standstill::table(calibration),
         beyond: honesty::beyond(validation, joints),
-        raw: tables::scores(&validation.raw, joints, Rows::All),
+        raw: tables::scores(&validation.raw, calibration),
         raw_moving: match assess::has_standstill(validation) {
-            true => tables::scores(&validation.raw_moving, joints, Rows::Moving),
+            true => tables::scores(&validation.raw_moving, calibration),
             false => Table::default(),
         },
         noise: tables::noise(joints),

@@ -1,6 +1,6 @@
 //! What explains an effect's numbers: it stands at the effect's own line.
 
-use super::text::{number, percent};
+use crate::words::number::{number, percent};
 use twincal::Code;
 use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary};
 use twincal::term::Family;

@@ -23,6 +23,7 @@
   /** Columns of the shown trace, in the order of the CSV file. */
   const columns = (trace) => ({
     time_s: trace.time,
+    ...(trace.logged.length > 0 ? { as_logged: trace.logged } : {}),
     measured: trace.measured,
     nominal: trace.nominal,
     calibrated: trace.calibrated,
@@ -156,13 +157,15 @@
   const draw = () => {
     for (const old of plots) old.destroy();
     plots = [];
-    const { time, measured, nominal, calibrated, low, high } = shown;
+    const { time, logged, measured, nominal, calibrated, low, high } = shown;
     const band = [end("95 % low"), end("95 % high")];
+    // Behind the others, and only where a filter makes it another line.
+    const [behind, raw] = logged.length > 0 ? [[line("as logged", "logged", 0.8)], [logged]] : [[], []];
     const torque = plot(
       0,
       "torque",
-      [...band, line("measured", "measured", 2.4), line("before (nominal)", "nominal", 1.4, [4, 4]), line("after (calibrated)", "calibrated", 1.6)],
-      [time, low, high, measured, nominal, calibrated],
+      [...band, ...behind, line("measured", "measured", 2.4), line("before (nominal)", "nominal", 1.4, [4, 4]), line("after (calibrated)", "calibrated", 1.6)],
+      [time, low, high, ...raw, measured, nominal, calibrated],
     );
     const residual = plot(
       1,

@@ -1,6 +1,6 @@
 //! From data to pixels: linear scales with round tick values.
 
-use super::text::number;
+use crate::words::number::number;
 
 /// Maps `domain` linearly onto `range` (pixels).
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,9 +1,10 @@
 //! The report's tables besides the effects: scores, noise, motion, logs, findings, convergence, pipeline.
 
 use super::ReportContext;
-use super::limits::{Rows, torque_deviation};
-use super::text::{count, list, number, percent, probability};
 use super::view::Joint;
+use crate::words::list::list;
+use crate::words::number::{count, number, percent, probability};
+use crate::words::units::{pooled_unit, unit_of};
 use serde::Serialize;
 use twincal::assess::{converged, friction_only, standstill};
 use twincal::calibrate::{Calibration, LogSummary};
@@ -64,7 +65,7 @@ pub(super) fn about(calibration: &Calibration, run: &ReportContext) -> String {
 }
 
 /// Held-out scores per joint and pooled.
-pub(super) fn scores(scores: &Scores, joints: &[Joint<'_>], rows: Rows) -> Table {
+pub(super) fn scores(scores: &Scores, calibration: &Calibration) -> Table {
     let mut table = Table::new([
         "joint",
         "rows",
@@ -80,14 +81,8 @@ pub(super) fn scores(scores: &Scores, joints: &[Joint<'_>], rows: Rows) -> Table
         "from coefficients",
     ]);
     for score in scores.joints.iter() {
-        let joint = joints.iter().find(|j| j.name == score.joint);
-        let unit = joint.map_or("", |j| j.units.torque);
-        // Results of earlier versions do not have it.
-        let deviation = match score.torque_sd > 0.0 {
-            true => score.torque_sd,
-            false => joint.map_or(f64::NAN, |j| torque_deviation(j, rows)),
-        };
-        let share = score.rmse_calibrated / deviation;
+        let unit = unit_of(calibration, &score.joint);
+        let share = score.rmse_calibrated / score.torque_sd;
         table.rows.push(vec![
             score.joint.clone(),
             count(score.rows),
@@ -104,7 +99,7 @@ pub(super) fn scores(scores: &Scores, joints: &[Joint<'_>], rows: Rows) -> Table
         ]);
     }
     if scores.joints.len() > 1 {
-        let unit = super::view::pooled_unit(joints);
+        let unit = pooled_unit(calibration);
         table.rows.push(vec![
             "all joints".into(),
             count(scores.joints.iter().map(|j| j.rows).sum()),

@@ -37,6 +37,8 @@ pub(super) struct Plotted {
     rows: usize,
     /// s.
     time: Vec<f64>,
+    /// As it was logged; empty where nothing is filtered.
+    logged: Vec<Option<f64>>,
     measured: Vec<Option<f64>>,
     nominal: Vec<Option<f64>>,
     calibrated: Vec<Option<f64>>,
@@ -73,17 +75,18 @@ pub(super) fn traces(joints: &[Joint<'_>], hero: &Joint<'_>, most: usize) -> Opt
 fn plotted(joint: &Joint<'_>, trace: &Trace, budget: usize) -> Plotted {
     let kept = kept(trace, budget);
     let breaks = breaks(trace, &kept);
-    let column = |values: &[f64]| -> Vec<Option<f64>> {
+    let values = |of: &dyn Fn(usize) -> Option<f64>| -> Vec<Option<f64>> {
         let mut out = Vec::with_capacity(kept.len());
         for &row in &kept {
             if breaks.contains(&row) {
                 out.push(None);
             }
-            let value = values.get(row).copied().filter(|value| value.is_finite());
+            let value = of(row).filter(|value| value.is_finite());
             out.push(value.map(|value| rounded(value, DIGITS)));
         }
         out
     };
+    let column = |all: &[f64]| values(&|row| all.get(row).copied());
     let mut time = Vec::with_capacity(kept.len());
     for &row in &kept {
         // The break stands just before the row behind the pause.
@@ -99,6 +102,10 @@ fn plotted(joint: &Joint<'_>, trace: &Trace, budget: usize) -> Plotted {
         error: clean(&scores(joint, trace)),
         rows: rows(trace),
         time,
+        logged: match trace.logged.is_empty() {
+            true => Vec::new(),
+            false => values(&|row| trace.logged.get(row).copied().flatten()),
+        },
         measured: column(&trace.measured),
         nominal: column(&trace.nominal),
         calibrated: column(&trace.calibrated),

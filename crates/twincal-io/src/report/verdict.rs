@@ -1,14 +1,11 @@
-//! Can this twin be used, and where not: the first thing the report says, the words of its [`Assessment`].
+//! Can this twin be used, and where not: the first thing the page says, the words of its [`Assessment`].
 
-use super::grounds;
-use super::limits::{fold, limits, pointers};
-use super::next_recording;
-use super::text::with_sd;
-use super::view::Joint;
+use super::findings;
+use crate::words;
 use serde::Serialize;
-use twincal::assess::{Answer, Assessment, assess, has_standstill};
+use twincal::Code;
+use twincal::assess::{Answer, Assessment, assess};
 use twincal::calibrate::Calibration;
-use twincal::{Code, Mistake, Severity};
 
 /// How the answer is coloured; the words carry the meaning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -57,163 +54,44 @@ pub(super) struct Verdict {
     pub(super) next: Option<String>,
 }
 
-/// Judges `calibration`.
-pub(super) fn judge(calibration: &Calibration, joints: &[Joint<'_>]) -> Verdict {
+/// The assessment of `calibration`, as the page shows it.
+pub(super) fn judge(calibration: &Calibration) -> Verdict {
     let assessment = assess(calibration);
-    let (answer, reason) = (assessment.answer, assessment.reason);
-    let verdict = Verdict {
-        grade: Grade::of(&assessment),
-        answer,
-        reason,
-        headline: headline(reason, calibration),
-        grounds: Vec::new(),
-        limits: Vec::new(),
-        folded: Vec::new(),
-        pointers: Vec::new(),
-        next: None,
-    };
-    if reason == Code::NotTested {
-        return Verdict {
-            grounds: grounds::effects_found(calibration),
-            next: Some(
-                "another motion, given with --heldout; or at least three logs to fit.".into(),
-            ),
-            ..verdict
-        };
-    }
-    let (limits, folded) = fold(limits(&assessment, calibration, joints));
-    // A log that is no measurement of this model has to be fixed first.
-    let usable = Mistake::of(reason, Severity::Degraded).is_none();
+    let words = words::of_assessment(&assessment, calibration);
     Verdict {
-        grounds: grounds::grounds(calibration, joints),
-        limits,
-        folded,
-        pointers: pointers(calibration),
-        next: usable.then(|| next_recording::next(calibration)).flatten(),
-        ..verdict
+        grade: Grade::of(&assessment),
+        answer: words.answer,
+        reason: words.reason,
+        headline: words.headline,
+        grounds: words.grounds,
+        limits: words.limits,
+        folded: words.folded,
+        pointers: match words.reason {
+            Code::NotTested => Vec::new(),
+            _ => pointers(calibration),
+        },
+        next: words.next,
     }
 }
 
-/// The answer in one sentence, by what decides; of joints that move, and of torque that the filter lets pass.
-fn headline(reason: Code, calibration: &Calibration) -> String {
-    if let Some(mistake) = Mistake::of(reason, Severity::Degraded) {
-        return mistake_words(mistake).into();
-    }
-    let torque = match has_standstill(&calibration.validation) {
-        true => "While joints move, the torque yes",
-        false => "The torque yes",
-    };
-    let predict = format!(
-        "Yes, to predict torque{}",
-        grounds::below_cutoff(calibration)
-    );
-    match reason {
-        Code::NarrowIntervals | Code::DistributionNarrow => {
-            format!("{torque}, its intervals not: they are too narrow.")
-        }
-        Code::DistributionWide => {
-            format!("{torque}; its intervals are wider than they need to be.")
-        }
-        Code::TorqueAbovePrediction | Code::TorqueBelowPrediction => {
-            format!("{torque}, its intervals not: they lie off to one side.")
-        }
-        Code::Passed => format!("{predict} on motions like the ones it was tested on."),
-        _ => fixed(reason).map_or_else(
-            || format!("{predict}, with the exceptions below."),
-            str::to_owned,
-        ),
-    }
-}
-
-/// Answers that are of the whole robot.
-fn fixed(reason: Code) -> Option<&'static str> {
-    Some(match reason {
-        Code::NotTested => "Not yet: there are no held-out rows to judge this twin by.",
-        Code::FewHeldOutRows => {
-            "Hard to say: the held-out rows count as too few independent ones to judge this twin by."
-        }
-        Code::WorseThanNominal => {
-            "No: on held-out data the calibrated torque is worse than the nominal one."
-        }
-        Code::ErrorAboveTorque => "No: the error left is larger than the torque itself.",
-        Code::ErrorAboveTorqueOnMostJoints => {
-            "No: on most joints the error left is larger than the torque itself."
-        }
-        Code::NothingFound => {
-            "Nothing to correct was found: none of the candidate effects is in this log."
-        }
-        Code::NoBetterThanNominal => {
-            "Hardly: on held-out data the calibrated torque is no better than the nominal one."
-        }
-        Code::FrictionAloneIsBetter => {
-            "Hardly: friction and an offset alone predict held-out torque better."
-        }
-        Code::NothingEstablished => {
-            "Perhaps: low-passed torque is better with it, but none of its effects is established."
-        }
-        Code::LargeError => "Better than the model alone, but the error that is left is large.",
-        Code::LargeErrorOnMostJoints => {
-            "Better than the model alone, but on most joints the error that is left is large."
-        }
-        Code::UnphysicalLinks => {
-            "With care: the inertia found of several links is physically inconsistent. Is this the robot's model?"
-        }
-        Code::JointTorqueWorse => {
-            "With care: better than the model alone, but on some joints torque got worse."
-        }
-        Code::NarrowIntervalsInMotion => {
-            "While joints move the torque yes, its intervals not: they are too narrow."
-        }
-        Code::WideIntervals => "Yes; its intervals are wider than they need to be.",
-        Code::WorseAtRest => "While joints move, yes; at standstill it is worse than your model.",
-        _ => return None,
-    })
-}
-
-/// The headline where a mistake stands: never "Yes".
-fn mistake_words(mistake: Mistake) -> &'static str {
-    match mistake {
-        Mistake::Contradiction => {
-            "Not yet: log and model contradict each other in orientation, sign, scale or order of joints."
-        }
-        Mistake::NoMeasurement => {
-            "Not yet: torque that never changes while joints move is no measurement."
-        }
-        Mistake::Copy => "Not yet: one log is a copy of another.",
-        Mistake::OddTorque => "Not yet: the torque of one log or joint contradicts the others.",
-        Mistake::OddMotion => "Not yet: positions or their clock are wrong in a log.",
-        Mistake::AnotherState => {
-            "Not yet: a held-out log is of another robot, or of another state of it."
-        }
-    }
-}
-
-/// "mean ± sd" with matching digits.
-pub(super) fn plus_minus(mean: f64, sd: f64) -> String {
-    let (mean, sd) = with_sd(mean, sd);
-    format!("{mean} ± {sd}")
+/// Where on the page more of it stands.
+fn pointers(calibration: &Calibration) -> Vec<String> {
+    let mut out: Vec<String> = findings::warnings(calibration).into_iter().collect();
+    out.push("Outside the motion listed under “What the data cannot tell” it extrapolates.".into());
+    out
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
-    use crate::report::fixture;
-    use crate::report::shape::tests::pit;
-    use crate::report::view;
-    use twincal::Finding;
+    use crate::words::tests::{changed, pit};
     use twincal::calibrate::Status;
     use twincal::posterior::Method;
     use twincal::validate::Pit;
+    use twincal::{Finding, Mistake, Severity};
 
-    pub(in crate::report) fn judged(change: impl Fn(&mut Calibration)) -> Verdict {
-        let mut calibration = fixture::two_joints();
-        calibration.findings.clear();
-        let moving = calibration.validation.moving.clone();
-        change(&mut calibration);
-        if calibration.validation.moving == moving {
-            calibration.validation.moving = calibration.validation.filtered.clone();
-        }
-        let mut verdict = judge(&calibration, &view::joints(&calibration));
+    fn judged(change: impl Fn(&mut Calibration)) -> Verdict {
+        let mut verdict = judge(&changed(change));
         verdict.limits.append(&mut verdict.folded);
         verdict
     }

@@ -1,38 +1,9 @@
 //! A calibration seen joint by joint: names, units and held-out traces, as every section needs them.
 
-use serde::Serialize;
+use crate::words::units::Units;
 use twincal::calibrate::Calibration;
 use twincal::likelihood::JointNoise;
-use twincal::robot::JointKind;
 use twincal::validate::Trace;
-
-/// Units of one joint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub(super) struct Units {
-    pub(super) position: &'static str,
-    pub(super) velocity: &'static str,
-    pub(super) acceleration: &'static str,
-    pub(super) torque: &'static str,
-}
-
-impl Units {
-    fn of(kind: JointKind) -> Self {
-        match kind {
-            JointKind::Prismatic => Self {
-                position: "m",
-                velocity: "m/s",
-                acceleration: "m/s²",
-                torque: "N",
-            },
-            _ => Self {
-                position: "rad",
-                velocity: "rad/s",
-                acceleration: "rad/s²",
-                torque: "N·m",
-            },
-        }
-    }
-}
 
 /// One moving joint with everything that the report says about it.
 #[derive(Debug)]
@@ -73,20 +44,6 @@ pub(super) fn joints(calibration: &Calibration) -> Vec<Joint<'_>> {
         .collect()
 }
 
-/// The unit of torque, if all joints share one; the pooled numbers mix N·m and N otherwise.
-pub(super) fn pooled_unit(joints: &[Joint<'_>]) -> &'static str {
-    match joints.split_first() {
-        Some((first, rest)) if rest.iter().all(|j| j.units == first.units) => first.units.torque,
-        _ => "N·m and N",
-    }
-}
-
-/// Unit of a joint's torque; empty of a name that is none.
-pub(super) fn unit_of(joints: &[Joint<'_>], name: &str) -> &'static str {
-    let joint = joints.iter().find(|joint| joint.name == name);
-    joint.map_or("", |joint| joint.units.torque)
-}
-
 /// Rows that every array of the trace has.
 pub(super) fn rows(trace: &Trace) -> usize {
     trace
@@ -116,15 +73,6 @@ pub(super) fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
         .filter(|x| x.is_finite())
         .fold((0.0, 0.0), |(n, sum), x| (n + 1.0, sum + x * x));
     f64::sqrt(sum / n)
-}
-
-/// Standard deviation of the finite values; NaN without any.
-pub(super) fn standard_deviation(values: impl Iterator<Item = f64> + Clone) -> f64 {
-    let finite = values.filter(|x| x.is_finite());
-    let (n, sum) = finite
-        .clone()
-        .fold((0.0, 0.0), |(n, sum), x| (n + 1.0, sum + x));
-    root_mean_square(finite.map(|x| x - sum / n))
 }
 
 #[cfg(test)]
@@ -164,13 +112,6 @@ mod tests {
     #[test]
     fn moments_ignore_what_is_not_finite() {
         assert_eq!(root_mean_square([3.0, f64::NAN, -3.0].into_iter()), 3.0);
-        assert_eq!(
-            standard_deviation([1.0, 3.0, f64::INFINITY].into_iter()),
-            1.0
-        );
-        assert!(
-            root_mean_square(std::iter::empty()).is_nan()
-                && standard_deviation([].into_iter()).is_nan()
-        );
+        assert!(root_mean_square(std::iter::empty()).is_nan());
     }
 }

@@ -23,6 +23,12 @@ pub enum Answer {
 const TABLE: &[(Code, Answer)] = &[
     (Code::NotTested, Answer::NotYet),
     (Code::FewHeldOutRows, Answer::NotYet),
+    (Code::ErrorAboveGate, Answer::No),
+    (Code::CoverageOutsideGate, Answer::No),
+    (Code::FrictionChanged, Answer::No),
+    (Code::PayloadChanged, Answer::No),
+    (Code::JointZeroChanged, Answer::No),
+    (Code::TooShortToCheck, Answer::NotYet),
     (Code::WorseThanNominal, Answer::No),
     (Code::ErrorAboveTorque, Answer::No),
     (Code::ErrorAboveTorqueOnMostJoints, Answer::No),

@@ -18,7 +18,7 @@ const MOSTLY: f64 = 0.5;
 
 /// Why [`Validation::beyond`] has a joint's rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cause {
+pub(super) enum Cause {
     /// Its position or velocity leaves the training range.
     NewMotion,
     /// What is not known of its torque is more than the noise.
@@ -63,7 +63,7 @@ impl Cause {
 
 /// A joint's moving rows within and beyond.
 #[derive(Debug, Clone, Copy)]
-pub struct Beyond<'a> {
+pub(super) struct Beyond<'a> {
     /// Scores of the rows that training speaks of.
     pub within: &'a JointScore,
     /// Scores of the others.
@@ -93,8 +93,7 @@ impl<'a> Beyond<'a> {
     }
 
     /// Rows beyond and all rows.
-    #[must_use]
-    pub fn rows(&self) -> [u64; 2] {
+    fn rows(&self) -> [u64; 2] {
         [self.beyond.rows, self.within.rows + self.beyond.rows]
     }
 
@@ -108,7 +107,7 @@ impl<'a> Beyond<'a> {
 }
 
 /// Joints that have held-out rows there.
-pub fn beyond(calibration: &Calibration) -> impl Iterator<Item = Beyond<'_>> {
+pub(super) fn beyond(calibration: &Calibration) -> impl Iterator<Item = Beyond<'_>> {
     let Validation { within, beyond, .. } = &calibration.validation;
     let pairs = within.joints.iter().zip(&beyond.joints);
     pairs
@@ -116,13 +115,8 @@ pub fn beyond(calibration: &Calibration) -> impl Iterator<Item = Beyond<'_>> {
         .map(|(within, beyond)| Beyond::of(calibration, within, beyond))
 }
 
-/// Joints that were mostly tested there.
-pub fn tested_beyond(calibration: &Calibration) -> impl Iterator<Item = Beyond<'_>> {
-    beyond(calibration).filter(Beyond::is_most)
-}
-
 /// Joints of which training says less on a tenth of the held-out moving rows or more, mostly because their motion is new.
-pub fn new_motion(calibration: &Calibration) -> impl Iterator<Item = &str> {
+pub(super) fn new_motion(calibration: &Calibration) -> impl Iterator<Item = &str> {
     beyond(calibration)
         .filter(|own| {
             let [rows, all] = own.rows();
@@ -136,26 +130,29 @@ pub(super) fn claims(calibration: &Calibration) -> Vec<Claim> {
     let told = beyond(calibration).flat_map(|own| {
         let subject = || Subject::Joint(own.beyond.joint.clone());
         let [rows, all] = own.rows();
-        let numbers = [
-            ("rows_beyond", rows as f64),
-            ("rows", all as f64),
+        let rows = [("rows_beyond", rows as f64), ("rows", all as f64)];
+        let coverage = [
             ("coverage95_beyond", own.beyond.coverage95),
             ("coverage95_within", own.within.coverage95),
+        ];
+        let errors = [
             ("rms_beyond", own.beyond.rmse_calibrated),
             ("rms_within", own.within.rmse_calibrated),
         ];
+        let narrow = own.narrow.then_some(coverage).into_iter().flatten();
+        let further_off = own.further_off.then_some(errors).into_iter().flatten();
+        let predicted: Vec<_> = narrow.chain(further_off).collect();
         let (worse, tested) = match own.cause {
             Cause::NewMotion => (Code::WorseOnNewMotion, Code::TestedOnNewMotion),
             Cause::OpenTorque => (Code::WorseOnOpenTorque, Code::TestedOnOpenTorque),
         };
         let codes = [
-            (own.narrow || own.further_off, worse),
-            (own.is_most(), tested),
+            (!predicted.is_empty(), worse, predicted),
+            (own.is_most(), tested, Vec::new()),
         ];
-        codes
-            .into_iter()
-            .filter(|(holds, _)| *holds)
-            .map(move |(_, code)| Claim::limit(code, subject(), numbers))
+        let claimed = codes.into_iter().filter(|(holds, ..)| *holds);
+        claimed
+            .map(|(_, code, more)| Claim::limit(code, subject(), rows).with(more))
             .collect::<Vec<_>>()
     });
     told.collect()

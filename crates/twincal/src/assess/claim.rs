@@ -122,6 +122,18 @@ impl Claim {
         self.evidence.get(name).unwrap_or(f64::NAN)
     }
 
+    /// Whether a number of this name speaks for it.
+    #[must_use]
+    pub fn has(&self, name: &str) -> bool {
+        self.evidence.get(name).is_some()
+    }
+
+    /// With these numbers too.
+    pub(super) fn with(mut self, numbers: impl IntoIterator<Item = (&'static str, f64)>) -> Self {
+        self.evidence.0.extend(numbers);
+        self
+    }
+
     /// Role and severity are those that the answer to the code means.
     pub(super) fn new<const N: usize>(
         code: Code,
@@ -156,8 +168,26 @@ impl Claim {
         }
     }
 
+    /// A claim about the run that needs no number.
+    #[must_use]
+    pub fn of_run(code: Code) -> Self {
+        Self::new(code, Subject::Run, [])
+    }
+
+    /// A gate of new logs that does not hold: a value outside its limits.
+    #[must_use]
+    pub fn of_gate(code: Code, subject: Subject, value: f64, [low, high]: [f64; 2]) -> Self {
+        let numbers = [("value", value), ("low", low), ("high", high)];
+        Self::new(code, subject, numbers)
+    }
+
     /// What was found before the fit was judged.
     pub(super) fn of_finding(finding: &Finding, calibration: &Calibration) -> Self {
+        Self::found(finding, Subject::of(&finding.subject, calibration))
+    }
+
+    /// What was found, and of whom.
+    pub(super) fn found(finding: &Finding, subject: Subject) -> Self {
         let role = match (finding.mistake(), finding.severity) {
             (Some(_), _) => Role::ForbidsYes,
             (None, Severity::Note) => Role::Informs,
@@ -168,7 +198,7 @@ impl Claim {
             code: finding.code,
             role,
             severity: finding.severity,
-            subject: Subject::of(&finding.subject, calibration),
+            subject,
             evidence: Evidence(count.into_iter().collect()),
         }
     }

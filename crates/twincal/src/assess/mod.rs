@@ -34,22 +34,15 @@ mod scores;
 mod shape;
 
 pub use answer::{Answer, decide, decision_table};
-pub use beyond::{Beyond, Cause, beyond, new_motion, tested_beyond};
 pub use claim::{Claim, Evidence, Role, Subject};
-pub use intervals::{by_chance, too_narrow, too_wide};
-pub use next::{Request, RequestCode, driven_together};
-pub use of_torque::CLEARLY_LOST;
-pub use rest::{
-    AtRest, Pauses, all_at_rest, at_rest, few_pauses, hardly_at_rest, rest_got_worse, standstill,
-    tested_at_rest,
-};
+pub use next::{Request, RequestCode};
+pub use rest::{AtRest, Pauses, all_at_rest, at_rest, few_pauses, standstill};
 pub use scores::{
-    FEW, converged, decisive, friction_only, has_standstill, independent_rows, memory, rows_of,
+    converged, decisive, friction_only, has_standstill, independent_rows, memory, rows_of,
 };
-pub use shape::{Off, Shape, is_far, looked_at, off};
 
 use crate::calibrate::Calibration;
-use crate::error::Code;
+use crate::error::{Code, Finding};
 use serde::Serialize;
 
 /// What may be concluded from a calibration.
@@ -70,6 +63,33 @@ impl Assessment {
     /// The claims of this code.
     pub fn claims(&self, code: Code) -> impl Iterator<Item = &Claim> {
         self.claims.iter().filter(move |claim| claim.code == code)
+    }
+}
+
+/// What gates on new logs mean for a twin: they decide, and where they hold a mistake in those logs does.
+#[must_use]
+pub fn of_gates(gates: Vec<Claim>, findings: &[Finding]) -> Assessment {
+    let (answer, reason) = decide(&gates);
+    let found = findings.iter().map(|finding| {
+        let subject = match finding.subject.as_str() {
+            "" => Subject::Run,
+            name => Subject::Other(name.to_owned()),
+        };
+        Claim::found(finding, subject)
+    });
+    let mut claims = gates;
+    let decided = answer > Answer::YesWithinLimits;
+    claims.extend(found);
+    let (answer, reason) = match decided {
+        true => (answer, reason),
+        false => decide(&claims),
+    };
+    claims.sort_by_key(|claim| (claim.code != reason, claim.role));
+    Assessment {
+        answer,
+        reason,
+        claims,
+        next: Vec::new(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The recording to make next: what it has to hold so that this data's open questions get an answer.
 
 use super::beyond;
-use super::claim::{Claim, Role, Subject};
+use super::claim::{Claim, Evidence, Role, Subject};
 use super::rest::hardly_at_rest;
 use super::scores::{FEW, independent_rows};
 use crate::calibrate::{Alike, Calibration};
@@ -10,12 +10,14 @@ use crate::validate::Split;
 use serde::Serialize;
 
 /// Something to record.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Request {
     /// What.
     pub code: RequestCode,
     /// Of whom.
     pub subject: Subject,
+    /// By which numbers.
+    pub evidence: Evidence,
 }
 
 /// What to record.
@@ -61,14 +63,23 @@ pub(super) fn requests(calibration: &Calibration, claims: &[Claim]) -> Vec<Reque
 }
 
 fn to_fit(calibration: &Calibration) -> Vec<Request> {
-    let of = |code, subject| Request { code, subject };
+    let of = |code, subject| Request {
+        code,
+        subject,
+        evidence: Evidence::default(),
+    };
     let findings = || calibration.findings.iter();
     let joint = |name: &str| Subject::Joint(name.to_owned());
     let mut out: Vec<Request> = findings()
         .filter(|f| f.code == Code::UnseenMotion && !f.subject.is_empty())
         .map(|f| of(RequestCode::MoreMotion, joint(&f.subject)))
         .collect();
-    out.extend(driven_together(calibration).map(|_| of(RequestCode::JointsTogether, Subject::Run)));
+    out.extend(
+        driven_together(calibration).map(|(together, logs)| Request {
+            evidence: Evidence::of([("together", together as f64), ("logs", logs as f64)]),
+            ..of(RequestCode::JointsTogether, Subject::Run)
+        }),
+    );
     let new = beyond::new_motion(calibration);
     out.extend(new.map(|name| of(RequestCode::MotionOfHeldOutLogs, joint(name))));
     let groups = calibration.groups.iter();
@@ -84,6 +95,7 @@ fn to_test(calibration: &Calibration) -> Vec<Request> {
     let of = |code| Request {
         code,
         subject: Subject::Run,
+        evidence: Evidence::default(),
     };
     let untried = matches!(
         calibration.validation.split,
@@ -102,8 +114,7 @@ fn to_test(calibration: &Calibration) -> Vec<Request> {
 
 /// In how many of the fitted logs, and of how many, no joint stands still or is hardly driven that another one drives; `None` where these
 /// are half of them or more, with a single log, and with a single joint.
-#[must_use]
-pub fn driven_together(calibration: &Calibration) -> Option<(usize, usize)> {
+fn driven_together(calibration: &Calibration) -> Option<(usize, usize)> {
     let logs = calibration.logs.iter().filter(|log| log.role == "fit");
     let logs: Vec<&str> = logs.map(|log| log.name.as_str()).collect();
     let passive = |log: &str, joint: &str| {
@@ -111,7 +122,7 @@ pub fn driven_together(calibration: &Calibration) -> Option<(usize, usize)> {
         findings.any(|f| {
             matches!(f.code, Code::JointNotDriven | Code::JointStandsStill)
                 && f.subject == log
-                && f.names(joint)
+                && f.is_about(joint)
         })
     };
     let all = calibration.twin.robot.joint_names();

@@ -1,7 +1,9 @@
 //! Held-out torque: is its error smaller than that of the model, of friction alone, and than the torque itself; and are there effects behind it.
 
 use super::claim::{Claim, Subject};
-use super::scores::{FEW, converged, decisive, friction_only, independent_rows, rows_of};
+use super::scores::{
+    FEW, converged, decisive, friction_only, has_standstill, independent_rows, rows_of,
+};
 use crate::calibrate::{Calibration, Status};
 use crate::error::{Code, Severity};
 use crate::validate::{JointScore, Scores, WORSE};
@@ -10,8 +12,8 @@ use crate::validate::{JointScore, Scores, WORSE};
 const BETTER: f64 = 0.95;
 /// Share of the torque's standard deviation from which the remaining error is called large.
 const LARGE: f64 = 0.5;
-/// Share of it from which a constant predicts torque better.
-pub const CLEARLY_LOST: f64 = 1.05;
+/// Change of the error of unfiltered torque, which has noise that no twin explains, from which it is told apart.
+const UNFILTERED_APART: f64 = 0.25;
 /// Ratio of errors from which friction alone does not do as well.
 const AS_WELL: f64 = 1.05;
 
@@ -62,8 +64,11 @@ pub(super) fn claims(calibration: &Calibration) -> Vec<Claim> {
         ("rms_friction", friction_only(scores).unwrap_or(f64::NAN)),
     ];
     out.push(Claim::new(Code::TorqueError, Subject::Run, numbers));
-    out.extend(scores.joints.iter().flat_map(of_joint));
+    let joints = scores.joints.iter();
+    out.extend(joints.flat_map(|joint| of_joint(joint, calibration)));
     out.extend(raw_is_worse(&calibration.validation.raw));
+    out.extend(as_logged(calibration));
+    out.extend(friction_alone(scores));
     out
 }
 
@@ -111,7 +116,7 @@ fn decisive_claims(calibration: &Calibration, scores: &Scores) -> Vec<Claim> {
 }
 
 /// What one joint's error is compared with.
-fn of_joint(joint: &JointScore) -> Vec<Claim> {
+fn of_joint(joint: &JointScore, calibration: &Calibration) -> Vec<Claim> {
     if joint.rows == 0 {
         return Vec::new();
     }
@@ -127,7 +132,10 @@ fn of_joint(joint: &JointScore) -> Vec<Claim> {
         out.push(Claim::new(Code::JointTorqueWorse, subject(), numbers));
     }
     if is_lost(joint) {
-        out.push(Claim::new(Code::JointErrorAboveTorque, subject(), numbers));
+        let unseen = hardly_driven(&joint.joint, calibration);
+        let unseen = unseen.then_some(("hardly_driven_held_out", 1.0));
+        let claim = Claim::new(Code::JointErrorAboveTorque, subject(), numbers);
+        out.push(claim.with(unseen));
     } else if is_large(joint) {
         out.push(Claim::limit(Code::JointErrorLarge, subject(), numbers));
     }
@@ -135,6 +143,74 @@ fn of_joint(joint: &JointScore) -> Vec<Claim> {
     if joint.rmse_friction.is_some_and(as_well) {
         out.push(Claim::limit(Code::JointFrictionAlone, subject(), numbers));
     }
+    out
+}
+
+/// Whether such a joint is hardly driven in a held-out log: then nothing could be seen there.
+fn hardly_driven(joint: &str, calibration: &Calibration) -> bool {
+    let held_out = |log: &str| {
+        let mut logs = calibration.logs.iter();
+        logs.any(|own| own.name == log && own.role == "heldout")
+    };
+    let mut findings = calibration.findings.iter();
+    findings.any(|f| f.code == Code::JointNotDriven && held_out(&f.subject) && f.is_about(joint))
+}
+
+/// Error of torque as it was logged, of moving joints, where that is another matter than below the cut-off; and joints that are lost in it.
+fn as_logged(calibration: &Calibration) -> Vec<Claim> {
+    let validation = &calibration.validation;
+    let judged = decisive(validation);
+    let known = rows_of(&validation.raw_moving) > 0;
+    let raw = match known && has_standstill(validation) {
+        true => &validation.raw_moving,
+        false => &validation.raw,
+    };
+    let lost = raw.joints.iter();
+    let lost = lost.filter(|j| j.rows > 0 && j.rmse_calibrated > j.torque_sd);
+    let apart = (raw.rmse_calibrated / judged.rmse_calibrated - 1.0).abs();
+    let filtered = calibration.twin.pipeline.cutoff_hz > 0.0;
+    if !filtered || rows_of(raw) == 0 || apart <= UNFILTERED_APART && lost.clone().count() == 0 {
+        return Vec::new();
+    }
+    let numbers = [
+        ("rms_nominal", raw.rmse_nominal),
+        ("rms_calibrated", raw.rmse_calibrated),
+    ];
+    let mut out = vec![Claim::new(Code::RawTorqueError, Subject::Run, numbers)];
+    out.extend(lost.map(|joint| {
+        let subject = Subject::Joint(joint.joint.clone());
+        let numbers = [
+            ("rms_calibrated", joint.rmse_calibrated),
+            ("torque_sd", joint.torque_sd),
+        ];
+        Claim::new(Code::JointRawErrorAboveTorque, subject, numbers)
+    }));
+    out
+}
+
+/// What the first thing that anybody adds to a model would leave: errors of a model without friction are large by that alone. Joints on which it would
+/// be worse than the model, the worst first.
+fn friction_alone(scores: &Scores) -> Vec<Claim> {
+    let Some(left) = friction_only(scores) else {
+        return Vec::new();
+    };
+    let own = scores.joints.iter().filter(|joint| joint.rows > 0);
+    let own = own.filter_map(|joint| Some((joint, joint.rmse_friction?)));
+    let (mut worse, better): (Vec<_>, Vec<_>) =
+        own.partition(|(joint, left)| *left > joint.rmse_nominal);
+    let growth = |(joint, left): &(&JointScore, f64)| left - joint.rmse_nominal;
+    worse.sort_by(|a, b| growth(b).total_cmp(&growth(a)));
+    let numbers = [
+        ("rms_nominal", scores.rmse_nominal),
+        ("rms_friction", left),
+        ("joints_better", better.len() as f64),
+    ];
+    let mut out = vec![Claim::new(Code::FrictionAlone, Subject::Run, numbers)];
+    out.extend(worse.iter().map(|(joint, left)| {
+        let subject = Subject::Joint(joint.joint.clone());
+        let numbers = [("rms_nominal", joint.rmse_nominal), ("rms_friction", *left)];
+        Claim::new(Code::JointFrictionAloneWorse, subject, numbers)
+    }));
     out
 }
 

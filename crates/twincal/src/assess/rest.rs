@@ -4,7 +4,7 @@ use super::claim::{Claim, Subject};
 use super::scores::{decisive, rows_of};
 use crate::calibrate::Calibration;
 use crate::error::Code;
-use crate::validate::{JointScore, Validation};
+use crate::validate::{JointScore, Scores, Validation};
 
 /// Held-out rows at standstill below which that is not tested.
 const FEW_AT_REST: u64 = 20;
@@ -12,7 +12,7 @@ const FEW_AT_REST: u64 = 20;
 const FEW_PAUSES: usize = 3;
 /// Share of a joint's rows at standstill from which that is a part of what the robot does.
 const STANDS_STILL: f64 = 0.05;
-/// Growth of an error from which it is told.
+/// Change of an error from which it is told.
 const WORTH_TELLING: f64 = 0.05;
 
 /// Scores of the held-out rows in which a joint stands still, or all joints together.
@@ -89,14 +89,12 @@ pub fn all_at_rest(validation: &Validation) -> Option<AtRest<'_>> {
 }
 
 /// All joints at rest together, where these rows are enough to say something.
-#[must_use]
-pub fn tested_at_rest(validation: &Validation) -> Option<AtRest<'_>> {
+pub(super) fn tested_at_rest(validation: &Validation) -> Option<AtRest<'_>> {
     all_at_rest(validation).filter(|own| own.rows >= FEW_AT_REST)
 }
 
 /// Whether torque at standstill, of all joints together, got worse.
-#[must_use]
-pub fn rest_got_worse(calibration: &Calibration) -> bool {
+pub(super) fn rest_got_worse(calibration: &Calibration) -> bool {
     tested_at_rest(&calibration.validation).is_some_and(|own| own.got_worse())
 }
 
@@ -154,8 +152,7 @@ pub fn standstill(calibration: &Calibration, j: usize) -> f64 {
 }
 
 /// The joint that stands still most in the logs, its share, and the held-out rows at rest, where these are too few to test it.
-#[must_use]
-pub fn hardly_at_rest(calibration: &Calibration) -> Option<(&str, f64, u64)> {
+pub(super) fn hardly_at_rest(calibration: &Calibration) -> Option<(&str, f64, u64)> {
     let validation = &calibration.validation;
     let moving = rows_of(&validation.moving);
     let at_rest = rows_of(&validation.filtered).saturating_sub(moving);
@@ -170,25 +167,54 @@ pub fn hardly_at_rest(calibration: &Calibration) -> Option<(&str, f64, u64)> {
 pub(super) fn claims(calibration: &Calibration) -> Vec<Claim> {
     let mut out = Vec::new();
     let validation = &calibration.validation;
-    let rms = |[before, after]: [f64; 2]| [("rms_nominal", before), ("rms_calibrated", after)];
     if let Some(together) = tested_at_rest(validation) {
-        if together.got_worse() {
-            let numbers = rms(together.rmse);
-            out.push(match few_pauses(calibration) {
-                Some(_) => Claim::limit(Code::WorseInFewPauses, Subject::Run, numbers),
-                None => Claim::new(Code::WorseAtRest, Subject::Run, numbers),
-            });
-        }
-        let joints = at_rest(validation).into_iter();
-        out.extend(joints.filter(AtRest::got_worse).map(|own| {
-            let subject = Subject::Joint(own.joint.to_owned());
-            Claim::limit(Code::JointWorseAtRest, subject, rms(own.rmse))
-        }));
+        out.extend(tested(calibration, &together));
     }
     out.extend(hardly_at_rest(calibration).map(|(joint, share, rows)| {
         let subject = Subject::Joint(joint.to_owned());
         let numbers = [("share_at_rest", share), ("rows_at_rest", rows as f64)];
-        Claim::limit(Code::RestNotTested, subject, numbers)
+        let all = all_at_rest(validation).filter(|_| rows > 0);
+        let error = all.into_iter().flat_map(|own| rms(own.rmse));
+        Claim::limit(Code::RestNotTested, subject, numbers).with(error)
+    }));
+    out
+}
+
+fn rms([before, after]: [f64; 2]) -> [(&'static str, f64); 2] {
+    [("rms_nominal", before), ("rms_calibrated", after)]
+}
+
+/// The error of joints at rest, of one of several that rest or of all together, where it got worse or is another than that of moving joints; and
+/// the joints on which it got worse, most first.
+fn tested(calibration: &Calibration, together: &AtRest<'_>) -> Vec<Claim> {
+    let validation = &calibration.validation;
+    let rest = at_rest(validation);
+    let mut worse: Vec<&AtRest<'_>> = rest.iter().filter(|own| own.got_worse()).collect();
+    let gain = |own: &AtRest<'_>| own.rmse[1] - own.rmse[0];
+    worse.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+    let after = |scores: &Scores| scores.rmse_calibrated;
+    let differ = after(&validation.filtered) / after(decisive(validation)) - 1.0;
+    let differs = differ.abs() > WORTH_TELLING;
+    let numbers = rms(together.rmse);
+    let pauses = few_pauses(calibration);
+    let subject = match &rest[..] {
+        [only] if calibration.noise.len() > 1 => Subject::Joint(only.joint.to_owned()),
+        _ => Subject::Run,
+    };
+    let claim = match (together.got_worse(), pauses) {
+        (true, Some(_)) => Claim::limit(Code::WorseInFewPauses, subject, numbers),
+        (true, None) => Claim::new(Code::WorseAtRest, subject, numbers),
+        (false, _) => Claim::new(Code::TorqueErrorAtRest, subject, numbers),
+    };
+    let few = pauses.into_iter();
+    let few = few.flat_map(|own| [("pauses", own.most as f64), ("seconds", own.seconds)]);
+    let mut out = Vec::new();
+    if !worse.is_empty() || differs {
+        out.push(claim.with(few));
+    }
+    out.extend(worse.into_iter().map(|own| {
+        let subject = Subject::Joint(own.joint.to_owned());
+        Claim::limit(Code::JointWorseAtRest, subject, rms(own.rmse))
     }));
     out
 }

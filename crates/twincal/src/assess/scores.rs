@@ -6,7 +6,7 @@ use crate::posterior::Method;
 use crate::validate::{Scores, Validation};
 
 /// Held-out rows, in independent ones, below which nothing is promised.
-pub const FEW: f64 = 20.0;
+pub(super) const FEW: f64 = 20.0;
 
 /// The scores that a twin is judged by: at standstill friction is whatever it takes, so those of moving joints where there are any.
 #[must_use]

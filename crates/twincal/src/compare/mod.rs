@@ -8,7 +8,7 @@ mod rivals;
 use crate::calibrate::{Calibration, Status};
 use crate::error::{Code, Error, Finding, Result, Severity};
 use crate::posterior::draws::{CoefficientDraws, draw};
-use crate::term::{Before, Estimate, Family, Library};
+use crate::term::{Before, Estimate, Family, Library, Parameter};
 use crate::twin::Twin;
 use serde::Serialize;
 
@@ -350,6 +350,7 @@ fn change(
             None => rows.map(|_| vec![0.0; parameters.len()]).collect(),
         }
     });
+    let table = without_rounding(table, &parameters);
     // A payload's first moments are its mass and centre once more.
     let twice = |name: &str| {
         let family = library.components()[component].family;
@@ -386,6 +387,29 @@ fn change(
         words: words(&component.story, component.family, &parameters),
         parameters,
     })
+}
+
+/// Share of the largest number of the same unit below which a number is what rounding leaves of zero.
+const ROUNDING: f64 = 1e-12;
+
+/// Draws of a component's parameters before and after, what is rounding alone set to zero.
+fn without_rounding(mut table: [Vec<Vec<f64>>; 2], parameters: &[Parameter]) -> [Vec<Vec<f64>>; 2] {
+    let size = |p: usize| -> f64 {
+        let alike = |k: &usize| parameters[*k].unit == parameters[p].unit;
+        let alike: Vec<usize> = (0..parameters.len()).filter(alike).collect();
+        let rows = table.iter().flatten();
+        let sizes = rows.flat_map(|row| alike.iter().map(|k| row[*k].abs()));
+        sizes.fold(0.0, f64::max)
+    };
+    let sizes: Vec<f64> = (0..parameters.len()).map(size).collect();
+    for row in table.iter_mut().flatten() {
+        for (value, size) in row.iter_mut().zip(&sizes) {
+            if value.abs() < ROUNDING * size {
+                *value = 0.0;
+            }
+        }
+    }
+    table
 }
 
 fn parameter_change(
@@ -450,6 +474,23 @@ fn words(story: &str, family: Family, parameters: &[ParameterChange]) -> String 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_rounding_leaves_of_zero_is_no_difference() {
+        let parameter = |name: &str, unit: &str| Parameter {
+            name: name.into(),
+            unit: unit.into(),
+        };
+        let all = [
+            parameter("mass", "kg"),
+            parameter("ixx", "kg·m²"),
+            parameter("ixy", "kg·m²"),
+        ];
+        let after = vec![vec![1.0, 6e-4, 7e-36], vec![1.1, 5e-4, 6e-36]];
+        let before = vec![vec![0.0; 3]; 2];
+        let [_, after] = without_rounding([before, after], &all);
+        assert_eq!(after, [[1.0, 6e-4, 0.0], [1.1, 5e-4, 0.0]]);
+    }
 
     /// A thousand draws between 1 and 2 and one far off: the sd is that one's doing, the words are not.
     #[test]

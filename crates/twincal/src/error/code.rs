@@ -98,6 +98,8 @@ codes! {
     CoulombVelocity = "coulomb_velocity",
     /// Two twins have different reversal velocities of friction.
     CoulombVelocityDiffers = "coulomb_velocity_differs",
+    /// On new logs the 95 % intervals of a joint hold a share of the rows outside the gate.
+    CoverageOutsideGate = "coverage_outside_gate",
     /// Stamps lie in bunches.
     CrowdedStamps = "crowded_stamps",
     /// The last row of a table is cut off.
@@ -138,6 +140,8 @@ codes! {
     EncoderStuck = "encoder_stuck",
     /// An equality of the model is not read.
     EqualityNotUsed = "equality_not_used",
+    /// On new logs the error of a joint is above the gate.
+    ErrorAboveGate = "error_above_gate",
     /// The error left is larger than the torque itself, on every joint.
     ErrorAboveTorque = "error_above_torque",
     /// The error left is larger than the torque itself, on most joints.
@@ -156,8 +160,12 @@ codes! {
     FluidNotUsed = "fluid_not_used",
     /// An effect is in because the settings say so.
     Forced = "forced",
+    /// What viscous and Coulomb friction and an offset alone would leave of the error.
+    FrictionAlone = "friction_alone",
     /// Friction and an offset alone predict held-out torque better than the twin.
     FrictionAloneIsBetter = "friction_alone_is_better",
+    /// On new logs the friction of a joint is another than that of the twin.
+    FrictionChanged = "friction_changed",
     /// Friction would drive the joint at higher speed than was logged.
     FrictionTurnsNegative = "friction_turns_negative",
     /// Friction that the model states is no part of its torque.
@@ -182,6 +190,10 @@ codes! {
     InertiaFloor = "inertia_floor",
     /// The 95 % intervals hold what they promise, over all joints.
     IntervalsHold = "intervals_hold",
+    /// The 95 % intervals of a joint hold another share than promised, which chance explains for so few rows.
+    JointCoverageByChance = "joint_coverage_by_chance",
+    /// The 95 % intervals of a joint hold a little less than 92 % or more than 98 % of its rows.
+    JointCoverageOff = "joint_coverage_off",
     /// The predicted distribution of a joint is more than a little off.
     JointDistributionOff = "joint_distribution_off",
     /// The error left on a joint is as large as its torque: a constant would do as well.
@@ -190,6 +202,8 @@ codes! {
     JointErrorLarge = "joint_error_large",
     /// On a joint friction and an offset alone do about as well.
     JointFrictionAlone = "joint_friction_alone",
+    /// On a joint friction and an offset alone would be worse than the model.
+    JointFrictionAloneWorse = "joint_friction_alone_worse",
     /// The 95 % intervals of a joint are too narrow.
     JointIntervalsNarrow = "joint_intervals_narrow",
     /// The 95 % intervals of a joint are wider than they need to be.
@@ -200,6 +214,8 @@ codes! {
     JointNotExcited = "joint_not_excited",
     /// The joints of a log seem exchanged.
     JointOrder = "joint_order",
+    /// The error left in a joint's torque as it was logged is as large as that torque.
+    JointRawErrorAboveTorque = "joint_raw_error_above_torque",
     /// A joint does not move in a log.
     JointStandsStill = "joint_stands_still",
     /// The torque of one joint has another scale in one log.
@@ -208,6 +224,8 @@ codes! {
     JointTorqueWorse = "joint_torque_worse",
     /// At standstill the torque of a joint got worse by calibration.
     JointWorseAtRest = "joint_worse_at_rest",
+    /// On new logs the zero of a joint is another than that of the twin.
+    JointZeroChanged = "joint_zero_changed",
     /// Joints of a log that the model does not have.
     JointsLeftOut = "joints_left_out",
     /// The error that is left is large on every joint.
@@ -290,6 +308,8 @@ codes! {
     PartsMerged = "parts_merged",
     /// All checks are passed.
     Passed = "passed",
+    /// On new logs the payload is another than that of the twin.
+    PayloadChanged = "payload_changed",
     /// The filters that were chosen.
     Pipeline = "pipeline",
     /// Estimates that the posterior takes as given had not settled.
@@ -308,6 +328,8 @@ codes! {
     RateCapped = "rate_capped",
     /// The rate of rows has no effect without a filter.
     RateIgnored = "rate_ignored",
+    /// The error of torque as it was logged, which is another than that of filtered torque.
+    RawTorqueError = "raw_torque_error",
     /// Unfiltered torque is predicted worse than by the model.
     RawTorqueWorse = "raw_torque_worse",
     /// Candidates were linearised about what was found.
@@ -330,6 +352,16 @@ codes! {
     SaturatedTorque = "saturated_torque",
     /// Stretches of the logs disagree more than the stated sd says.
     SdTooSmall = "sd_too_small",
+    /// The torque of a joint, or of all joints together, lies above the middle of the prediction too often.
+    ShapeAbove = "shape_above",
+    /// The torque of a joint, or of all joints together, lies below the middle of the prediction too often.
+    ShapeBelow = "shape_below",
+    /// The predicted distribution of a joint, or of all joints together, is too narrow.
+    ShapeNarrow = "shape_narrow",
+    /// The predicted probabilities of a joint are not evenly spread.
+    ShapeUneven = "shape_uneven",
+    /// The predicted distribution of a joint, or of all joints together, is wider than it needs to be.
+    ShapeWide = "shape_wide",
     /// Segments are shorter than the filters.
     ShortSegments = "short_segments",
     /// The sign of a joint's columns is turned.
@@ -364,6 +396,8 @@ codes! {
     TimeUnit = "time_unit",
     /// A column is time by its type.
     TimestampType = "timestamp_type",
+    /// New logs are too short to tell whether the twin still holds.
+    TooShortToCheck = "too_short_to_check",
     /// Measured torque lies above its prediction too often, over all joints.
     TorqueAbovePrediction = "torque_above_prediction",
     /// Torque is read as that of the fit.
@@ -376,6 +410,8 @@ codes! {
     TorqueCopied = "torque_copied",
     /// The error of held-out torque.
     TorqueError = "torque_error",
+    /// The error at standstill, which is another than that of moving joints.
+    TorqueErrorAtRest = "torque_error_at_rest",
     /// Torque holds its value while the joint changes its speed.
     TorqueHeld = "torque_held",
     /// Torque is logged later or earlier than the motion.

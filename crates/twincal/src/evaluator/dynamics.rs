@@ -1,8 +1,8 @@
 //! The recursive Newton–Euler equations as steps: the lines of `robot/recursion.rs`, written down instead of computed.
 
 use super::trace::{Id, Step, Trace};
-use crate::robot::Robot;
 use crate::robot::spatial::{Matrix, clean};
+use crate::robot::{Body, Robot};
 use crate::term::Function;
 
 type Vector = [Id; 3];
@@ -82,104 +82,122 @@ pub(super) fn motion(t: &mut Trace, robot: &Robot, gravity: [f64; 3], moves: boo
     let zero = t.number(0.0);
     let mut all: Vec<Moving> = Vec::new();
     for (index, body) in robot.layout().iter().enumerate() {
-        let input = |t: &mut Trace, step: Step| {
-            let input = t.step(step);
-            t.scale(body.multiplier, input)
-        };
-        let k = body.coordinate;
-        let position = input(t, Step::Position(k));
-        let offset = t.number(body.offset);
-        let position = t.add(position, offset);
-        let [velocity, acceleration] = if moves {
-            [input(t, Step::Velocity(k)), input(t, Step::Acceleration(k))]
-        } else {
-            [zero, zero]
-        };
-        let one = t.number(1.0);
-        let [sin, cos] = if body.prismatic {
-            [zero, one]
-        } else {
-            [Function::Sin, Function::Cos].map(|f| t.apply(f, position))
-        };
-        let mut own = Moving {
-            cos,
-            sin,
-            position,
-            velocity,
-            acceleration,
-            w: [zero; 3],
-            wd: [zero; 3],
-            a: [zero; 3],
-            b: [[zero; 3]; 3],
-            products: [zero; 3],
-            differences: [zero; 3],
-        };
-        let (mut w, mut wd, mut a) = match body.parent {
+        let mut own = joint_state(t, body, zero, moves);
+        match body.parent {
             Some(parent) => {
-                let parent = all[parent];
                 let p = origin(t, robot, index, &own);
-                // a = a_parent + B p
-                let shift = parent.b.map(|row| t.dot(&row, &p));
-                let at = plus(t, parent.a, shift);
-                let rotation = &body.rotation;
-                (
-                    apply_transposed(t, rotation, parent.w),
-                    apply_transposed(t, rotation, parent.wd),
-                    apply_transposed(t, rotation, at),
-                )
+                carry(t, &body.rotation, &all[parent], p, &mut own);
             }
             None => {
                 let up = gravity.map(|g| t.number(-g));
-                (
-                    [zero; 3],
-                    [zero; 3],
-                    apply_transposed(t, &body.rotation, up),
-                )
+                own.a = apply_transposed(t, &body.rotation, up);
             }
-        };
-        if body.prismatic {
-            // a = a' + z q̈ + 2 ω × z q̇
-            let twice = t.scale(2.0, velocity);
-            let x = t.multiply(w[1], twice);
-            let y = t.multiply(w[0], twice);
-            a = [
-                t.add(a[0], x),
-                t.subtract(a[1], y),
-                t.add(a[2], acceleration),
-            ];
-        } else {
-            w = turn_back(t, &own, w);
-            wd = turn_back(t, &own, wd);
-            a = turn_back(t, &own, a);
-            let x = t.multiply(w[1], velocity);
-            let y = t.multiply(w[0], velocity);
-            wd = [
-                t.add(wd[0], x),
-                t.subtract(wd[1], y),
-                t.add(wd[2], acceleration),
-            ];
-            w[2] = t.add(w[2], velocity);
         }
-        // B = [ω̇]× + ω ωᵀ − |ω|² E
-        let mut product = |i: usize, j: usize| t.multiply(w[i], w[j]);
-        let (xx, yy, zz) = (product(0, 0), product(1, 1), product(2, 2));
-        let (xy, xz, yz) = (product(0, 1), product(0, 2), product(1, 2));
-        let mut minus = |a: Id, b: Id| {
-            let sum = t.add(a, b);
-            t.negate(sum)
-        };
-        let diagonal = [minus(yy, zz), minus(xx, zz), minus(xx, yy)];
-        own.b = [
-            [diagonal[0], t.subtract(xy, wd[2]), t.add(xz, wd[1])],
-            [t.add(xy, wd[2]), diagonal[1], t.subtract(yz, wd[0])],
-            [t.subtract(xz, wd[1]), t.add(yz, wd[0]), diagonal[2]],
-        ];
-        own.products = [xy, xz, yz];
-        own.differences = [t.subtract(yy, zz), t.subtract(zz, xx), t.subtract(xx, yy)];
-        (own.w, own.wd, own.a) = (w, wd, a);
+        if body.prismatic {
+            slide(t, &mut own);
+        } else {
+            rotate(t, &mut own);
+        }
+        acceleration_gradient(t, &mut own);
         all.push(own);
     }
     all
+}
+
+/// Position, velocity and acceleration of a body's joint; all else `zero`.
+fn joint_state(t: &mut Trace, body: &Body, zero: Id, moves: bool) -> Moving {
+    let input = |t: &mut Trace, step: Step| {
+        let input = t.step(step);
+        t.scale(body.multiplier, input)
+    };
+    let k = body.coordinate;
+    let position = input(t, Step::Position(k));
+    let offset = t.number(body.offset);
+    let position = t.add(position, offset);
+    let [velocity, acceleration] = if moves {
+        [input(t, Step::Velocity(k)), input(t, Step::Acceleration(k))]
+    } else {
+        [zero, zero]
+    };
+    let one = t.number(1.0);
+    let [sin, cos] = if body.prismatic {
+        [zero, one]
+    } else {
+        [Function::Sin, Function::Cos].map(|f| t.apply(f, position))
+    };
+    Moving {
+        cos,
+        sin,
+        position,
+        velocity,
+        acceleration,
+        w: [zero; 3],
+        wd: [zero; 3],
+        a: [zero; 3],
+        b: [[zero; 3]; 3],
+        products: [zero; 3],
+        differences: [zero; 3],
+    }
+}
+
+/// The parent's motion at a body's origin `p`, in the axes of the body's joint at q = 0.
+fn carry(t: &mut Trace, rotation: &Matrix, parent: &Moving, p: Vector, own: &mut Moving) {
+    // a = a_parent + B p
+    let shift = parent.b.map(|row| t.dot(&row, &p));
+    let at = plus(t, parent.a, shift);
+    own.w = apply_transposed(t, rotation, parent.w);
+    own.wd = apply_transposed(t, rotation, parent.wd);
+    own.a = apply_transposed(t, rotation, at);
+}
+
+/// Adds the motion of a slider.
+fn slide(t: &mut Trace, own: &mut Moving) {
+    let (w, a) = (own.w, own.a);
+    // a = a' + z q̈ + 2 ω × z q̇
+    let twice = t.scale(2.0, own.velocity);
+    let x = t.multiply(w[1], twice);
+    let y = t.multiply(w[0], twice);
+    own.a = [
+        t.add(a[0], x),
+        t.subtract(a[1], y),
+        t.add(a[2], own.acceleration),
+    ];
+}
+
+/// Adds the motion of a hinge, in the axes that turn with it.
+fn rotate(t: &mut Trace, own: &mut Moving) {
+    let mut w = turn_back(t, own, own.w);
+    let wd = turn_back(t, own, own.wd);
+    own.a = turn_back(t, own, own.a);
+    let x = t.multiply(w[1], own.velocity);
+    let y = t.multiply(w[0], own.velocity);
+    own.wd = [
+        t.add(wd[0], x),
+        t.subtract(wd[1], y),
+        t.add(wd[2], own.acceleration),
+    ];
+    w[2] = t.add(w[2], own.velocity);
+    own.w = w;
+}
+
+/// B = [ω̇]× + ω ωᵀ − |ω|² E, and the products of ω in it.
+fn acceleration_gradient(t: &mut Trace, own: &mut Moving) {
+    let (w, wd) = (own.w, own.wd);
+    let mut product = |i: usize, j: usize| t.multiply(w[i], w[j]);
+    let (xx, yy, zz) = (product(0, 0), product(1, 1), product(2, 2));
+    let (xy, xz, yz) = (product(0, 1), product(0, 2), product(1, 2));
+    let mut minus = |a: Id, b: Id| {
+        let sum = t.add(a, b);
+        t.negate(sum)
+    };
+    let diagonal = [minus(yy, zz), minus(xx, zz), minus(xx, yy)];
+    own.b = [
+        [diagonal[0], t.subtract(xy, wd[2]), t.add(xz, wd[1])],
+        [t.add(xy, wd[2]), diagonal[1], t.subtract(yz, wd[0])],
+        [t.subtract(xz, wd[1]), t.add(yz, wd[0]), diagonal[2]],
+    ];
+    own.products = [xy, xz, yz];
+    own.differences = [t.subtract(yy, zz), t.subtract(zz, xx), t.subtract(xx, yy)];
 }
 
 /// Force and moment about its origin.

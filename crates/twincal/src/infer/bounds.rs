@@ -70,19 +70,7 @@ pub(super) fn apply(
     }
     let before: Vec<Model> = listed.models.clone();
     let mut listed = listed;
-    let rows = listed.models.par_iter_mut().zip(&listed.positions);
-    let log_ratios: Vec<Result<f64>> = rows
-        .map(|(model, positions)| truncate(standard, model, positions, weights))
-        .collect();
-    let mut acts = false;
-    let models = listed.models.iter().zip(log_ratios);
-    for ((model, log_ratio), log_weight) in models.zip(&mut log_weights) {
-        // Of several errors the first model's, on any number of threads.
-        let log_ratio = log_ratio?;
-        acts |= log_ratio.abs() > 1e-12 || !model.sites.is_empty();
-        *log_weight += log_ratio;
-    }
-    if !acts {
+    if !truncate_all(standard, &mut listed, &mut log_weights, weights)? {
         let models = before;
         return Ok((Listed { models, ..listed }, 0.0));
     }
@@ -94,19 +82,112 @@ pub(super) fn apply(
     for (model, log_weight) in listed.models.iter_mut().zip(&log_weights) {
         model.weight = (log_weight - unit).exp();
     }
-    // Models that are not listed are scaled like those that a method without bounds listed.
+    let scale = unlisted_factor(&before, &listed.models);
+    let all: f64 = before.iter().map(|m| m.weight).sum();
+    let masses = Masses {
+        scale,
+        before: all,
+        total: listed.mass() + scale * (1.0 - all).max(0.0),
+    };
+    correct(standard, averages, &before, &listed, &masses);
+    let total = masses.total;
+    Ok((heaviest_first(&listed, total), unit + total.ln()))
+}
+
+/// Truncates every listed model and multiplies its weight accordingly; whether a bound acts.
+fn truncate_all(
+    standard: &Standard,
+    listed: &mut Listed,
+    log_weights: &mut [f64],
+    weights: Weights,
+) -> Result<bool> {
+    let rows = listed.models.par_iter_mut().zip(&listed.positions);
+    let log_ratios: Vec<Result<f64>> = rows
+        .map(|(model, positions)| truncate(standard, model, positions, weights))
+        .collect();
+    let mut acts = false;
+    let models = listed.models.iter().zip(log_ratios);
+    for ((model, log_ratio), log_weight) in models.zip(log_weights) {
+        // Of several errors the first model's, on any number of threads.
+        let log_ratio = log_ratio?;
+        acts |= log_ratio.abs() > 1e-12 || !model.sites.is_empty();
+        *log_weight += log_ratio;
+    }
+    Ok(acts)
+}
+
+/// What bounds multiply the weight of models that are not listed with: the factor of those that a method without bounds listed.
+fn unlisted_factor(before: &[Model], listed: &[Model]) -> f64 {
     let was_listed = |model: &&Model| model.weight > JOINED_SHARE;
     let old: f64 = before.iter().filter(was_listed).map(|m| m.weight).sum();
-    let new: f64 = (before.iter().zip(&listed.models))
+    let new: f64 = (before.iter().zip(listed))
         .filter(|(before, _)| was_listed(before))
         .map(|(_, model)| model.weight)
         .sum();
-    let all: f64 = before.iter().map(|m| m.weight).sum();
-    let scale = new / old;
-    let total = listed.mass() + scale * (1.0 - all).max(0.0);
+    new / old
+}
+
+/// Sums of weights without bounds and with them.
+struct Masses {
+    /// Factor on the weights of models that are not listed.
+    scale: f64,
+    /// Listed models without bounds, as a share of all.
+    before: f64,
+    /// All models with bounds, in units of the heaviest.
+    total: f64,
+}
+
+/// Makes averages without bounds those with bounds; `before`: the listed models without bounds.
+fn correct(
+    standard: &Standard,
+    averages: &mut Averages,
+    before: &[Model],
+    listed: &Listed,
+    masses: &Masses,
+) {
     let size = standard.size();
     // About the mean without bounds: what a sampler's average and its list differ by must not be measured by how far that is from 0.
     let about = averages.shift.clone();
+    let mut sums = about_the_mean(averages, masses.scale);
+    let mut own = Averages {
+        inclusion: vec![0.0; size],
+        mcse: Vec::new(),
+        shift: vec![0.0; size],
+        moment: vec![0.0; size],
+        misfit: 0.0,
+    };
+    for ((model, old), positions) in listed.models.iter().zip(before).zip(&listed.positions) {
+        count(standard, &about, &mut sums, (old, -masses.scale), positions);
+        count(standard, &about, &mut own, (model, 1.0), positions);
+    }
+    // What is left is that of models that are not listed. Where they are few it is but what a sampler's averages and its list differ by: rare
+    // models of wide moments, which bounds rule out, would stand in it.
+    let few = 1.0 - masses.before < FEW;
+    for d in 0..size {
+        sums.inclusion[d] += own.inclusion[d];
+        let left = if few { 0.0 } else { 1.0 };
+        sums.shift[d] = own.shift[d] + left * sums.shift[d];
+        sums.moment[d] = own.moment[d] + left * sums.moment[d];
+    }
+    sums.misfit += own.misfit;
+    let total = masses.total;
+    let mass = if few { listed.mass() } else { total };
+    for d in 0..size {
+        let (moved, spread) = (sums.shift[d] / mass, sums.moment[d] / mass);
+        // No less than the spread of the listed models about this mean.
+        let least = own.moment[d] - 2.0 * moved * own.shift[d] + moved * moved * listed.mass();
+        let spread = spread.max(least / mass + moved * moved);
+        averages.inclusion[d] = (sums.inclusion[d] / total).clamp(0.0, 1.0);
+        averages.shift[d] = about[d] + moved;
+        averages.moment[d] = spread + about[d] * (2.0 * moved + about[d]);
+    }
+    averages.misfit = sums.misfit / total;
+}
+
+/// Averages times `scale`, with moments about their own mean.
+fn about_the_mean(averages: &Averages, scale: f64) -> Averages {
+    let about = &averages.shift;
+    let size = about.len();
     let mut sums = Averages {
         inclusion: averages.inclusion.clone(),
         mcse: averages.mcse.clone(),
@@ -119,38 +200,11 @@ pub(super) fn apply(
         sums.moment[d] = scale * (sums.moment[d] - about[d] * about[d]);
     }
     sums.misfit *= scale;
-    let mut own = Averages {
-        inclusion: vec![0.0; size],
-        mcse: Vec::new(),
-        shift: vec![0.0; size],
-        moment: vec![0.0; size],
-        misfit: 0.0,
-    };
-    for ((model, old), positions) in listed.models.iter().zip(&before).zip(&listed.positions) {
-        count(standard, &about, &mut sums, (old, -scale), positions);
-        count(standard, &about, &mut own, (model, 1.0), positions);
-    }
-    // What is left is that of models that are not listed. Where they are few it is but what a sampler's averages and its list differ by: rare
-    // models of wide moments, which bounds rule out, would stand in it.
-    let few = 1.0 - all < FEW;
-    for d in 0..size {
-        sums.inclusion[d] += own.inclusion[d];
-        let left = if few { 0.0 } else { 1.0 };
-        sums.shift[d] = own.shift[d] + left * sums.shift[d];
-        sums.moment[d] = own.moment[d] + left * sums.moment[d];
-    }
-    sums.misfit += own.misfit;
-    let mass = if few { listed.mass() } else { total };
-    for d in 0..size {
-        let (moved, spread) = (sums.shift[d] / mass, sums.moment[d] / mass);
-        // No less than the spread of the listed models about this mean.
-        let least = own.moment[d] - 2.0 * moved * own.shift[d] + moved * moved * listed.mass();
-        let spread = spread.max(least / mass + moved * moved);
-        averages.inclusion[d] = (sums.inclusion[d] / total).clamp(0.0, 1.0);
-        averages.shift[d] = about[d] + moved;
-        averages.moment[d] = spread + about[d] * (2.0 * moved + about[d]);
-    }
-    averages.misfit = sums.misfit / total;
+    sums
+}
+
+/// Listed models with the heaviest first, weights as shares of `total`.
+fn heaviest_first(listed: &Listed, total: f64) -> Listed {
     let mut order: Vec<usize> = (0..listed.models.len()).collect();
     order.sort_by(|&a, &b| {
         let (a, b) = (&listed.models[a], &listed.models[b]);
@@ -158,7 +212,7 @@ pub(super) fn apply(
             .total_cmp(&a.weight)
             .then_with(|| a.members.cmp(&b.members))
     });
-    let listed = Listed {
+    Listed {
         models: order
             .iter()
             .map(|&i| Model {
@@ -167,8 +221,7 @@ pub(super) fn apply(
             })
             .collect(),
         positions: order.iter().map(|&i| listed.positions[i].clone()).collect(),
-    };
-    Ok((listed, unit + total.ln()))
+    }
 }
 
 /// [`apply`] for a method that does not know the bounds: where they act, its list is joined by what a search finds.

@@ -17,7 +17,7 @@ use super::check::check;
 use crate::error::{Error, Result};
 use crate::linear_algebra::{Cholesky, NotPositiveDefinite};
 use crate::posterior::{Model, Problem};
-use crate::prior::HalfSpace;
+use crate::prior::{HalfSpace, Prior};
 use statrs::function::erf::erfc;
 use statrs::function::gamma::ln_gamma;
 use std::ops::Range;
@@ -108,37 +108,12 @@ impl Standard {
             .iter()
             .flat_map(|&c| columns[c].iter().copied())
             .collect();
-        // A column that is zero everywhere has no unit of its own: any will do.
-        let slab = |k: usize| {
-            if problem.gram[k * size + k] == 0.0 {
-                1.0
-            } else {
-                prior.slab[k]
-            }
-        };
-        let scale: Vec<f64> = order
-            .iter()
-            .map(|&k| (problem.gram[k * size + k] + 1.0 / slab(k)).sqrt())
-            .collect();
-        let mut matrix = vec![0.0; size * size];
-        for (i, &ki) in order.iter().enumerate() {
-            matrix[i * size + i] = 1.0;
-            for (j, &kj) in order.iter().enumerate().take(i) {
-                let value = problem.gram[ki * size + kj] / (scale[i] * scale[j]);
-                matrix[i * size + j] = value;
-                matrix[j * size + i] = value;
-            }
-        }
-        let precision: Vec<f64> = order
-            .iter()
-            .zip(&scale)
-            .map(|(&k, scale)| 1.0 / slab(k) / (scale * scale))
-            .collect();
-        let xy: Vec<f64> = order
-            .iter()
-            .zip(&scale)
-            .map(|(&k, scale)| problem.xy[k] / scale)
-            .collect();
+        let Scaled {
+            scale,
+            matrix,
+            precision,
+            xy,
+        } = Scaled::new(problem, &order);
         let names: Vec<String> = order.iter().map(|&k| problem.names[k].clone()).collect();
         let center = full_model(&matrix, &xy, &names)?;
         let product = multiply(&matrix, &center);
@@ -152,55 +127,20 @@ impl Standard {
             + (0..size)
                 .map(|k| (offset[k] - xy[k]) * center[k])
                 .sum::<f64>();
-        // A perfect model without prior scale has no unit; the smallest one keeps every formula finite.
-        let b0 = if problem.yy > 0.0 {
-            prior.scale
-        } else {
-            prior.scale.max(f64::MIN_POSITIVE)
-        };
-        let full_scale = b0 + 0.5 * misfit.max(0.0);
-        let unit = (2.0 * full_scale).sqrt();
-        let shape = prior.shape + 0.5 * problem.n;
-        let log_constant = problem.log_constant
-            - prior.log_admissible()
-            - 0.5 * problem.n * (2.0 * std::f64::consts::PI).ln()
-            + prior.shape * b0.ln()
-            - ln_gamma(prior.shape)
-            + ln_gamma(shape)
-            - shape * full_scale.ln();
+        let noise = Noise::new(problem, misfit);
+        let unit = (2.0 * noise.full_scale).sqrt();
         let lower: Vec<f64> = order
             .iter()
             .zip(&scale)
             .map(|(&k, scale)| prior.lower[k] * scale / unit)
             .collect();
         let halves = halves_in(&prior.halves, &order, |d| unit / scale[d]);
-        let mut start = 0;
-        let blocks = components
-            .iter()
-            .map(|&c| {
-                let block = Block {
-                    component: c,
-                    family: prior.family[c],
-                    start,
-                    len: columns[c].len(),
-                    factor: 1.0,
-                };
-                start += block.len;
-                let mass: f64 = block
-                    .range()
-                    .map(|d| slab_mass(lower[d], precision[d], 2.0 * shape))
-                    .product();
-                Block {
-                    factor: 1.0 / mass,
-                    ..block
-                }
-            })
-            .collect();
+        let mass = |d: usize| slab_mass(lower[d], precision[d], 2.0 * noise.shape);
         Ok(Self {
             order,
             names,
             component: prior.component.clone(),
-            blocks,
+            blocks: blocks_of(prior, components, mass),
             held: vec![0; prior.families()],
             log_held: 0.0,
             bounded: lower.iter().any(|&l| l > f64::NEG_INFINITY) || !halves.is_empty(),
@@ -212,9 +152,9 @@ impl Standard {
             center: center.iter().map(|x| x / unit).collect(),
             offset: offset.iter().map(|x| x / unit).collect(),
             precision,
-            shape,
-            full_scale,
-            log_constant,
+            shape: noise.shape,
+            full_scale: noise.full_scale,
+            log_constant: noise.log_constant,
         })
     }
 
@@ -354,6 +294,119 @@ impl Standard {
             sites: Vec::new(),
         })
     }
+}
+
+/// Columns in a given order, scaled to a unit diagonal of `G + V⁻¹`.
+struct Scaled {
+    /// `√(G_kk + 1/v_k)`.
+    scale: Vec<f64>,
+    /// `A`.
+    matrix: Vec<f64>,
+    /// `1/v_k` in these units.
+    precision: Vec<f64>,
+    /// `r` in these units.
+    xy: Vec<f64>,
+}
+
+impl Scaled {
+    fn new(problem: &Problem, order: &[usize]) -> Self {
+        let size = order.len();
+        // A column that is zero everywhere has no unit of its own: any will do.
+        let slab = |k: usize| {
+            if problem.gram[k * size + k] == 0.0 {
+                1.0
+            } else {
+                problem.prior.slab[k]
+            }
+        };
+        let scale: Vec<f64> = order
+            .iter()
+            .map(|&k| (problem.gram[k * size + k] + 1.0 / slab(k)).sqrt())
+            .collect();
+        let mut matrix = vec![0.0; size * size];
+        for (i, &ki) in order.iter().enumerate() {
+            matrix[i * size + i] = 1.0;
+            for (j, &kj) in order.iter().enumerate().take(i) {
+                let value = problem.gram[ki * size + kj] / (scale[i] * scale[j]);
+                matrix[i * size + j] = value;
+                matrix[j * size + i] = value;
+            }
+        }
+        let precision = order
+            .iter()
+            .zip(&scale)
+            .map(|(&k, scale)| 1.0 / slab(k) / (scale * scale))
+            .collect();
+        let xy = order
+            .iter()
+            .zip(&scale)
+            .map(|(&k, scale)| problem.xy[k] / scale)
+            .collect();
+        Self {
+            scale,
+            matrix,
+            precision,
+            xy,
+        }
+    }
+}
+
+/// What models share of the noise's posterior, see [`Standard`].
+struct Noise {
+    shape: f64,
+    full_scale: f64,
+    log_constant: f64,
+}
+
+impl Noise {
+    /// `misfit`: that of the full model, (N·m)².
+    fn new(problem: &Problem, misfit: f64) -> Self {
+        let prior = &problem.prior;
+        // A perfect model without prior scale has no unit; the smallest one keeps every formula finite.
+        let b0 = if problem.yy > 0.0 {
+            prior.scale
+        } else {
+            prior.scale.max(f64::MIN_POSITIVE)
+        };
+        let full_scale = b0 + 0.5 * misfit.max(0.0);
+        let shape = prior.shape + 0.5 * problem.n;
+        let log_constant = problem.log_constant
+            - prior.log_admissible()
+            - 0.5 * problem.n * (2.0 * std::f64::consts::PI).ln()
+            + prior.shape * b0.ln()
+            - ln_gamma(prior.shape)
+            + ln_gamma(shape)
+            - shape * full_scale.ln();
+        Self {
+            shape,
+            full_scale,
+            log_constant,
+        }
+    }
+}
+
+/// Blocks of the components in a given order; `mass`: that of a position's slab within its bound.
+fn blocks_of(prior: &Prior, components: &[usize], mass: impl Fn(usize) -> f64) -> Vec<Block> {
+    let columns = prior.columns();
+    let mut start = 0;
+    components
+        .iter()
+        .map(|&c| {
+            let block = Block {
+                component: c,
+                family: prior.family[c],
+                start,
+                len: columns[c].len(),
+                factor: 1.0,
+            };
+            start += block.len;
+            let mass: f64 = block.range().map(&mass).product();
+            Block {
+                factor: 1.0 / mass,
+                ..block
+            }
+        })
+        .collect()
 }
 
 /// Bounds on sums with columns by position in `order`, and factors times `unit` there; those with a column that has no position are

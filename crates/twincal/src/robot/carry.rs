@@ -4,6 +4,23 @@ use super::{Inertia, JointDescription, JointKind, LinkDescription, Robot};
 use crate::error::{Error, Result};
 
 impl Robot {
+    /// Where a tool is mounted: the last of the links that move with the last body of the longest chain. Frames without
+    /// inertia (`tool0`, `flange`) come behind the link that carries them; what hangs from a locked joint is a finger, and holds no tool.
+    pub(crate) fn last_link(&self) -> &str {
+        let last = self.bodies().len().saturating_sub(1);
+        let links = self.links_of_body(last);
+        let mount = links.iter().rfind(|link| !self.hangs_from_locked(link));
+        mount.or(links.last()).copied().unwrap_or("")
+    }
+
+    /// True if one of the joints between a link and the base is locked.
+    fn hangs_from_locked(&self, link: &str) -> bool {
+        let mut joints = self.description().joints.iter();
+        joints.find(|joint| joint.child == link).is_some_and(|own| {
+            self.locked().contains_key(&own.name) || self.hangs_from_locked(&own.parent)
+        })
+    }
+
     /// The same robot with a point mass fixed to `link`: `mass` in kg at `com` in the link's frame, m.
     ///
     /// # Errors

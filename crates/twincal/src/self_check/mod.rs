@@ -17,7 +17,7 @@ mod velocity;
 
 use crate::error::{Code, Finding, Result, Severity};
 use crate::robot::Robot;
-use crate::signal::{Pipeline, Trajectory};
+use crate::signal::{Payload, Pipeline, Trajectory};
 use crate::words::significant;
 use degrees::refuse_degrees;
 use explain::{Explained, Reading, explain};
@@ -117,6 +117,8 @@ pub fn look<'a>(
     trajectories: impl IntoIterator<Item = &'a Trajectory>,
 ) -> Result<Look> {
     let trajectories: Vec<&Trajectory> = trajectories.into_iter().collect();
+    let loaded = with_known_payload(robot, &trajectories)?;
+    let robot = loaded.as_ref().unwrap_or(robot);
     let mut samples = Vec::new();
     let mut logs = Vec::new();
     for &trajectory in &trajectories {
@@ -158,6 +160,17 @@ pub fn look<'a>(
         base: read.base,
         findings,
     })
+}
+
+/// The robot with the payload that all logs state, at the last link; `None` where they state none, or not the same one.
+fn with_known_payload(robot: &Robot, trajectories: &[&Trajectory]) -> Result<Option<Robot>> {
+    let mut stated = trajectories.iter().map(|own| own.payload);
+    match stated.next() {
+        Some(first @ Payload::Known { mass, com }) if stated.all(|own| own == first) => {
+            robot.carrying(robot.last_link(), mass, com).map(Some)
+        }
+        _ => Ok(None),
+    }
 }
 
 /// The reading of the logs that explains most: how the base stands, then signs and order of joints.

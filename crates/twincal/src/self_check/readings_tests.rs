@@ -106,6 +106,24 @@ fn a_robot_on_a_wall_or_a_ceiling_gets_its_base_proposed() {
     assert_eq!(base.line(), "gravity = [0.0, 0.0, -9.81]");
 }
 
+/// A hand with seven times its weight: without a word on it that is another scale of the last joint's torque.
+#[test]
+fn a_payload_that_the_log_states_is_part_of_the_model() {
+    let robot = arm(1.0);
+    let (mass, com) = (30.0, [0.05, 0.0, 0.25]);
+    let loaded = robot
+        .carrying(&robot.joint(3).child, mass, com)
+        .expect("a positive mass at a link of the arm");
+    let mut log = log_of(&loaded, 0.0);
+    let scale = |log: &Trajectory| {
+        let said = said(&robot, log);
+        said.iter().any(|(code, _)| code == "torque_scale")
+    };
+    assert!(scale(&log), "{:?}", said(&robot, &log));
+    log.payload = crate::signal::Payload::Known { mass, com };
+    assert_eq!(said(&robot, &log), []);
+}
+
 /// Robots, bases and mistakes at random: whatever is proposed explains at least as much of every joint's torque.
 #[test]
 fn no_reading_is_proposed_that_explains_less_on_any_joint() {

@@ -1,17 +1,17 @@
 //! One recording through the motion filter: segments of smooth motion, raw torque and standstill flags.
 
+mod segment;
+
 use super::agreement::{self, velocity_agreement};
 use super::choose::{COLUMN_LIMIT, MOTION_LIMIT, require_derivatives};
-use super::convolve::{correlate, correlate_two};
-use super::fir::{MotionKernels, column_half_seconds, motion_half_samples, motion_half_seconds};
+use super::fir::{column_half_seconds, motion_half_seconds};
 use super::mask::Saturated;
-use super::prepare::{JointFacts, Piece, Prepared, Values, pick, prepare, report_short};
-use super::standstill::{at_rest, slower_than};
+use super::prepare::{JointFacts, Piece, Prepared, prepare, report_short};
 use super::thin::thin;
-use super::{Channels, DerivedFrom, LoggedSamples, Pipeline, Recording, Segment, Trajectory};
+use super::{Channels, Pipeline, Recording, Segment, Trajectory};
 use crate::error::{Code, Error, Finding, Result, Severity};
 use crate::words::significant;
-use rayon::prelude::*;
+use segment::{Kept, as_logged, smoothed};
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -22,10 +22,6 @@ pub(super) const STANDSTILL_PERIODS: f64 = 3.0;
 const HARDLY_MOVES: f64 = 0.95;
 /// In v_s, from which speed on "standing still" would be no word for what is slower.
 const SLOW: f64 = 10.0;
-
-/// Samples as logged that are kept of a long log whose clock is thinned, about, and how many in a row.
-const SPREAD: usize = 1 << 16;
-const STRETCH: usize = 1 << 8;
 
 /// What a segment keeps of samples as logged where its motion has a coarser clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -231,11 +227,29 @@ fn align(
     if pipeline.is_off() {
         let logged = prepared.pieces.iter();
         trajectory.segments = logged.map(|piece| as_logged(piece, with_tau)).collect();
-        pipeline.remember(log, ready.start, &mut trajectory, findings);
-        saturated.mask(log, pipeline, &mut trajectory, findings);
-        return Ok(trajectory);
+    } else {
+        let cutoff = motion_cutoff(ready, pipeline, findings)?;
+        let kept = Kept { with_tau, raw };
+        trajectory.segments = smooth_segments(ready, pipeline, (cutoff, kept), findings)?;
+        report_agreement(ready, (&trajectory, pipeline), findings);
+        report_standstill(joints, log, (&trajectory, pipeline), findings);
     }
-    let rate = 1.0 / prepared.interval;
+    pipeline.remember(log, ready.start, &mut trajectory, findings);
+    saturated.mask(log, pipeline, &mut trajectory, findings);
+    Ok(trajectory)
+}
+
+/// Cut-off of the motion filter for this log, Hz.
+///
+/// # Errors
+/// [`Error::Log`] where the log's rate is too low for the column filter.
+fn motion_cutoff(
+    ready: &PreparedLog<'_>,
+    pipeline: &Pipeline,
+    findings: &mut Vec<Finding>,
+) -> Result<f64> {
+    let log = &ready.log;
+    let rate = 1.0 / ready.pieces.interval;
     if pipeline.cutoff_hz > COLUMN_LIMIT * rate {
         return Err(Error::Log {
             log: log.name.clone(),
@@ -262,15 +276,29 @@ fn align(
             0,
         ));
     }
+    Ok(cutoff)
+}
+
+/// The pieces that are long enough for the filters; says what of the log the filters use up.
+///
+/// # Errors
+/// [`Error::Log`] where no piece is.
+fn smooth_segments(
+    ready: &PreparedLog<'_>,
+    pipeline: &Pipeline,
+    filter: (f64, Kept),
+    findings: &mut Vec<Finding>,
+) -> Result<Vec<Segment>> {
+    let (log, (cutoff, kept)) = (&ready.log, filter);
+    let mut segments = Vec::with_capacity(ready.pieces.pieces.len());
     let (mut short, mut short_rows, mut used) = (0, 0, 0.0);
-    for piece in &prepared.pieces {
-        let kept = Kept { with_tau, raw };
+    for piece in &ready.pieces.pieces {
         match smoothed(ready, piece, pipeline, cutoff, kept) {
             Some(segment) => {
                 let border = 2.0 * column_half_seconds(pipeline.cutoff_hz);
                 let length = segment.time.len().saturating_sub(1) as f64 * piece.interval;
                 used += (length - border).max(0.0);
-                trajectory.segments.push(segment);
+                segments.push(segment);
             }
             None => {
                 short += 1;
@@ -279,7 +307,7 @@ fn align(
         }
     }
     report_short(log, short, short_rows, findings);
-    if trajectory.segments.is_empty() {
+    if segments.is_empty() {
         return Err(Error::Log {
             log: log.name.clone(),
             problem: format!(
@@ -300,16 +328,24 @@ fn align(
         ),
         0,
     ));
-    let names: Vec<&str> = joints.iter().map(|facts| facts.name.as_str()).collect();
-    let mut agreement = velocity_agreement(&trajectory, &pipeline.standstill_velocity);
+    Ok(segments)
+}
+
+/// Says where a logged velocity and the change of position disagree.
+fn report_agreement(
+    ready: &PreparedLog<'_>,
+    aligned: (&Trajectory, &Pipeline),
+    findings: &mut Vec<Finding>,
+) {
+    let (log, (trajectory, pipeline)) = (&ready.log, aligned);
+    let names: Vec<&str> = (ready.joints.iter())
+        .map(|facts| facts.name.as_str())
+        .collect();
+    let mut agreement = velocity_agreement(trajectory, &pipeline.standstill_velocity);
     for (agreement, channels) in agreement.iter_mut().zip(&log.joints) {
         *agreement = agreement.filter(|_| channels.qd.is_some());
     }
     findings.extend(agreement::findings(&names, &log.name, &agreement));
-    report_standstill(joints, log, (&trajectory, pipeline), findings);
-    pipeline.remember(log, ready.start, &mut trajectory, findings);
-    saturated.mask(log, pipeline, &mut trajectory, findings);
-    Ok(trajectory)
 }
 
 /// First stamp of a log, s.
@@ -317,209 +353,7 @@ pub(super) fn first_stamp(log: &Recording) -> Option<f64> {
     log.time.iter().copied().find(|time| time.is_finite())
 }
 
-/// Channels one after the other: `joint * len + sample`.
-fn stacked<'a>(
-    joints: &'a [Values<'a>],
-    channel: impl Fn(&'a Values<'a>) -> Option<&'a Cow<'a, [f64]>>,
-) -> Vec<f64> {
-    let channels = joints.iter().filter_map(channel);
-    channels.flat_map(|values| values.iter().copied()).collect()
-}
-
-/// Evenly spread stretches of some samples of a log of `all`.
-fn spread(range: Range<usize>, all: usize) -> Vec<Range<usize>> {
-    let every = all.div_ceil(SPREAD).max(1);
-    let starts = (range.start..range.end).step_by(every * STRETCH);
-    if every == 1 {
-        return std::iter::once(range).collect();
-    }
-    starts
-        .map(|start| start..range.end.min(start + STRETCH))
-        .collect()
-}
-
-/// What of a piece goes into its segment beside motion.
-#[derive(Debug, Clone, Copy)]
-struct Kept {
-    with_tau: bool,
-    raw: Raw,
-}
-
-/// Pipeline off: the rows as they are.
-fn as_logged(piece: &Piece<'_>, with_tau: bool) -> Segment {
-    Segment {
-        time: piece.time.clone(),
-        input_rows: piece.rows.clone(),
-        logged_interval: piece.interval,
-        logged: None,
-        q: stacked(&piece.joints, |c| Some(&c.q)),
-        qd: stacked(&piece.joints, |c| c.qd.as_ref()),
-        qdd: stacked(&piece.joints, |c| c.qdd.as_ref()),
-        tau: if with_tau {
-            stacked(&piece.joints, |c| c.tau.as_ref())
-        } else {
-            Vec::new()
-        },
-        standstill: vec![false; piece.joints.len() * piece.time.len()],
-        history: Vec::new(),
-        interval: piece.interval,
-    }
-}
-
-/// Step 2 of method section 1; `None` if the piece does not hold the kernel and a few samples more.
-fn smoothed(
-    ready: &PreparedLog<'_>,
-    piece: &Piece<'_>,
-    pipeline: &Pipeline,
-    cutoff: f64,
-    kept: Kept,
-) -> Option<Segment> {
-    let half = motion_half_samples(cutoff, piece.interval);
-    let len = piece
-        .time
-        .len()
-        .checked_sub(2 * half)
-        .filter(|len| *len >= 2)?;
-    let kernels = MotionKernels::new(cutoff, piece.interval);
-    let dof = piece.joints.len();
-    let inner = half..half + len;
-    let [mut q, mut qd, mut qdd] = [(); 3].map(|()| vec![0.0; dof * len]);
-    let mut still = vec![false; dof * len];
-    let of_joints = piece.joints.par_iter().enumerate();
-    of_joints
-        .zip(q.par_chunks_exact_mut(len))
-        .zip(qd.par_chunks_exact_mut(len))
-        .zip(qdd.par_chunks_exact_mut(len))
-        .zip(still.par_chunks_exact_mut(len))
-        .for_each(|(((((joint, channels), q), qd), qdd), still)| {
-            let travel = derivatives(&kernels, channels, pipeline.sources(joint), [q, qd, qdd]);
-            // As logged: a filtered position rings where a move ends.
-            let rest = at_rest(&channels.q, ready.at_rest[joint], piece.interval);
-            still.copy_from_slice(&rest[half..half + len]);
-            let limit = pipeline.standstill_velocity[joint];
-            let travel = travel.as_deref().unwrap_or(qd);
-            let seconds = pipeline.shortest_standstill();
-            let slow = slower_than(travel, limit, seconds, piece.interval);
-            (still.iter_mut().zip(slow)).for_each(|(still, slow)| *still |= slow);
-        });
-    let torque = piece.joints.iter().filter_map(|c| c.tau.as_ref());
-    let tau = torque
-        .filter(|_| kept.with_tau)
-        .flat_map(|tau| tau[inner.clone()].iter().copied())
-        .collect();
-    let time = piece.time[inner.clone()].to_vec();
-    let input_rows = if piece.resampled() {
-        Vec::new()
-    } else {
-        piece.grid_rows[inner].to_vec()
-    };
-    let logged = (kept.raw != Raw::None && (piece.resampled() || piece.every > 1))
-        .then(|| logged_samples(ready, &time, piece, pipeline, kept));
-    Some(Segment {
-        time,
-        input_rows,
-        logged,
-        q,
-        qd,
-        qdd,
-        tau,
-        standstill: still,
-        history: Vec::new(),
-        interval: piece.interval,
-        logged_interval: piece.interval / piece.every as f64,
-    })
-}
-
-/// Smooth position, velocity and acceleration of one joint; the derivative of its position, where that is not the velocity.
-fn derivatives(
-    kernels: &MotionKernels,
-    channels: &Values<'_>,
-    [velocity_from, derived]: [DerivedFrom; 2],
-    [q, qd, qdd]: [&mut [f64]; 3],
-) -> Option<Vec<f64>> {
-    let logged = channels.qd.as_ref();
-    let Some(velocity) = logged.filter(|_| velocity_from == DerivedFrom::Velocity) else {
-        correlate_two([&kernels.smooth, &kernels.first], &channels.q, [q, qd]);
-        match &channels.qdd {
-            Some(logged) => correlate(&kernels.smooth, logged, qdd),
-            None => correlate(&kernels.second, &channels.q, qdd),
-        }
-        return None;
-    };
-    let mut travel = vec![0.0; q.len()];
-    correlate_two(
-        [&kernels.smooth, &kernels.first],
-        &channels.q,
-        [q, &mut travel],
-    );
-    match (&channels.qdd, derived) {
-        (None, DerivedFrom::Velocity) => {
-            correlate_two([&kernels.smooth, &kernels.first], velocity, [qd, qdd]);
-        }
-        (logged, _) => {
-            correlate(&kernels.smooth, velocity, qd);
-            match logged {
-                Some(logged) => correlate(&kernels.smooth, logged, qdd),
-                None => correlate(&kernels.second, &channels.q, qdd),
-            }
-        }
-    }
-    Some(travel)
-}
-
-/// The rows as logged that lie within the borders of a segment; torque moved back by its lag.
-fn logged_samples(
-    ready: &PreparedLog<'_>,
-    time: &[f64],
-    piece: &Piece<'_>,
-    pipeline: &Pipeline,
-    kept: Kept,
-) -> LoggedSamples {
-    let PreparedLog { log, joints, .. } = ready;
-    let time_of_rows = ready.pieces.time.as_ref().unwrap_or(&log.time);
-    let stamps = pick(time_of_rows, &piece.rows);
-    let logged: Vec<Values<'_>> = log
-        .joints
-        .iter()
-        .map(|channels| Values {
-            q: Cow::Borrowed(&[]),
-            qd: None,
-            qdd: None,
-            tau: (channels.tau.as_deref().filter(|_| kept.with_tau))
-                .map(|tau| pick(tau, &piece.rows)),
-        })
-        .collect();
-    let mut moved = logged.clone();
-    let corrections = &pipeline.corrections;
-    if corrections.moves(joints) {
-        corrections.move_torque(joints, &stamps, &logged, &stamps, &mut moved);
-    }
-    let (first, last) = (time[0], time[time.len() - 1]);
-    let from = stamps.partition_point(|t| *t < first);
-    let to = stamps.partition_point(|t| *t <= last);
-    let stretches = match kept.raw {
-        Raw::Spread if piece.every > 1 => spread(from..to, log.time.len()),
-        _ => std::iter::once(from..to).collect(),
-    };
-    let kept = |values: &[f64]| -> Vec<f64> {
-        stretches
-            .iter()
-            .flat_map(|stretch| &values[stretch.clone()])
-            .copied()
-            .collect()
-    };
-    let rows = stretches
-        .iter()
-        .flat_map(|stretch| &piece.rows[stretch.clone()]);
-    LoggedSamples {
-        time: kept(&stamps),
-        tau: (moved.iter().filter_map(|channels| channels.tau.as_deref()))
-            .flat_map(&kept)
-            .collect(),
-        input_rows: rows.copied().collect(),
-    }
-}
-
+/// Says how much of the log each joint is at rest.
 fn report_standstill(
     joints: &[JointFacts],
     log: &Recording,
@@ -554,15 +388,11 @@ fn report_standstill(
         } else {
             format!("{rest} in {share:.1} % of this log's filtered samples")
         };
-        findings.push(Finding::new(
-            severity,
-            code,
-            &log.name,
-            format!(
-                "joint `{}` {text}; its torque there is not used",
-                facts.name
-            ),
-            still as u64,
-        ));
+        let message = format!(
+            "joint `{}` {text}; its torque there is not used",
+            facts.name
+        );
+        let own = Finding::new(severity, code, &log.name, message, still as u64);
+        findings.push(own.of_joint(&facts.name));
     }
 }

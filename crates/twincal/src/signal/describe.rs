@@ -252,17 +252,13 @@ pub fn hardly_driven<'a>(robot: &Robot, logs: impl Into<Logs<'a>>) -> Result<Vec
             let Some(torque) = torque[joint].filter(|t| *t < HARDLY_DRIVEN * largest) else {
                 continue;
             };
-            findings.push(Finding::new(
-                Severity::Note,
-                Code::JointNotDriven,
-                log.name(),
-                format!(
-                    "joint `{name}` is hardly driven: rms torque {}, {:.1} % of its largest in any log",
-                    significant(torque, 3),
-                    100.0 * torque / largest
-                ),
-                0,
-            ));
+            let message = format!(
+                "joint `{name}` is hardly driven: rms torque {}, {:.1} % of its largest in any log",
+                significant(torque, 3),
+                100.0 * torque / largest
+            );
+            let (severity, code) = (Severity::Note, Code::JointNotDriven);
+            findings.push(Finding::new(severity, code, log.name(), message, 0).of_joint(name));
         }
     }
     Ok(findings)

@@ -312,6 +312,33 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
+    /// Torque of a joint as it was logged, of the sample nearest to a time in s, N·m or N. `None` between segments and of a log without torque.
+    #[must_use]
+    pub fn logged_torque(&self, joint: usize, time: f64) -> Option<f64> {
+        let behind = self
+            .segments
+            .partition_point(|segment| segment.time.first().is_some_and(|first| *first <= time));
+        let segment = &self.segments[behind.checked_sub(1)?];
+        if segment.time.last().is_none_or(|last| *last < time) {
+            return None;
+        }
+        let (times, torque) = match &segment.logged {
+            Some(logged) => (&logged.time, &logged.tau),
+            None => (&segment.time, &segment.tau),
+        };
+        let after = times.partition_point(|own| *own < time);
+        let near = [
+            after.saturating_sub(1),
+            after.min(times.len().checked_sub(1)?),
+        ];
+        let nearest = match time - times[near[0]] <= times[near[1]] - time {
+            true => near[0],
+            false => near[1],
+        };
+        let value = torque.get(joint * times.len() + nearest).copied();
+        value.filter(|torque| torque.is_finite())
+    }
+
     /// The same between two times, s.
     pub(crate) fn between(&self, from: f64, to: f64) -> Self {
         let cut = |segment: &Segment| {

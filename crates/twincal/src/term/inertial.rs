@@ -75,7 +75,7 @@ pub(super) fn inertial(
 fn payload_mount(robot: &Robot, settings: &LibrarySettings, bodies: &[Body]) -> Result<Mount> {
     let name = match &settings.payload_frame {
         Some(name) => name.as_str(),
-        None => last_link(robot),
+        None => robot.last_link(),
     };
     let Some((body, placement)) = robot.body_of_link(name) else {
         let links = robot.description().links.iter();
@@ -97,23 +97,6 @@ fn payload_mount(robot: &Robot, settings: &LibrarySettings, bodies: &[Body]) -> 
         frame: name.to_owned(),
         placement,
         body: bodies[body].carried(mass, PAYLOAD_SIZE),
-    })
-}
-
-/// Where a tool is mounted: the last of the links that move with the last body of the longest chain. Frames without
-/// inertia (`tool0`, `flange`) come behind the link that carries them; what hangs from a locked joint is a finger, and holds no tool.
-pub(super) fn last_link(robot: &Robot) -> &str {
-    let last = robot.bodies().len().saturating_sub(1);
-    let links = robot.links_of_body(last);
-    let mount = links.iter().rfind(|link| !hangs_from_locked(robot, link));
-    mount.or(links.last()).copied().unwrap_or("")
-}
-
-/// True if one of the joints between a link and the base is locked.
-fn hangs_from_locked(robot: &Robot, link: &str) -> bool {
-    let mut joints = robot.description().joints.iter();
-    joints.find(|joint| joint.child == link).is_some_and(|own| {
-        robot.locked().contains_key(&own.name) || hangs_from_locked(robot, &own.parent)
     })
 }
 

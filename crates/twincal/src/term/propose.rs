@@ -51,6 +51,37 @@ pub(super) fn proposals(
     settings: &LibrarySettings,
     findings: &mut Vec<Finding>,
 ) -> Result<Vec<Proposal>> {
+    check_limits(about, settings)?;
+    let generic = wants_generic(about, settings, findings)?;
+    let mut collector = Collector {
+        graph,
+        about,
+        settings,
+        all: Vec::new(),
+    };
+    collector.written(generic)?;
+    collector.simple_joint_terms();
+    if let Some(robot) = about.robot {
+        collector.all.extend(inertial(robot, settings, findings)?);
+        if settings.has(Family::Tilt) {
+            let gravity = robot.description().gravity;
+            collector.all.push(base_tilt::proposal(gravity));
+        }
+    }
+    collector.conservative();
+    collector.further_friction();
+    collector.coupled();
+    if about.robot.is_some() {
+        collector.scaled_and_shifted();
+    }
+    let ripples = ripples(collector.graph, about.joints, settings)?;
+    collector.all.extend(ripples);
+    collector.with_memory();
+    Ok(collector.all)
+}
+
+/// The velocity of Coulomb friction is one, and the robot has no more joints than a fit can have.
+fn check_limits(about: &About<'_>, settings: &LibrarySettings) -> Result<()> {
     let velocity = settings.coulomb_velocity;
     if !(velocity.is_finite()
         && velocity >= 0.0
@@ -74,109 +105,136 @@ pub(super) fn proposals(
                 .to_owned(),
         });
     }
-    let generic = wants_generic(about, settings, findings)?;
-    let mut all: Vec<Proposal> = Vec::new();
-    for text in &settings.terms {
-        all.push(user::candidate(graph, text, Family::User, joints)?.into());
-    }
-    if generic {
-        for name in generic::names(joints, about.parallel) {
-            all.push(user::candidate(graph, &name, Family::Generic, joints)?.into());
+    Ok(())
+}
+
+/// Proposals of the families that are switched on, so far.
+struct Collector<'a> {
+    graph: &'a mut Graph,
+    about: &'a About<'a>,
+    settings: &'a LibrarySettings,
+    all: Vec<Proposal>,
+}
+
+impl Collector<'_> {
+    /// What `make` gives for each joint, if the family is on.
+    fn per_joint<P: Into<Proposal>>(
+        &mut self,
+        family: Family,
+        make: impl Fn(&mut Graph, &Joint) -> P,
+    ) {
+        if self.settings.has(family) {
+            for joint in self.about.joints {
+                self.all.push(make(self.graph, joint).into());
+            }
         }
     }
-    let mut per_joint = |family: Family, make: &mut dyn FnMut(&Joint) -> Option<Proposal>| {
-        if settings.has(family) {
-            all.extend(joints.iter().filter_map(make));
-        }
-    };
-    per_joint(Family::Viscous, &mut |joint| {
-        Some(viscous::candidate(graph, joint).into())
-    });
-    per_joint(Family::Coulomb, &mut |joint| {
-        Some(coulomb::candidate(graph, joint, velocity).into())
-    });
-    per_joint(Family::Offset, &mut |joint| {
-        Some(offset::candidate(graph, joint).into())
-    });
-    per_joint(Family::MotorInertia, &mut |joint| {
-        Some(motor_inertia::candidate(graph, joint).into())
-    });
-    if let Some(robot) = about.robot {
-        all.extend(inertial(robot, settings, findings)?);
-        if settings.has(Family::Tilt) {
-            all.push(base_tilt::proposal(robot.description().gravity));
-        }
-    }
-    let mut per_joint = |family: Family, make: &mut dyn FnMut(&Joint) -> Option<Proposal>| {
-        if settings.has(family) {
-            all.extend(joints.iter().filter_map(make));
-        }
-    };
-    let held: Vec<Option<f64>> = held_torque(about);
-    per_joint(Family::Spring, &mut |joint| {
-        Some(spring::proposal(graph, joint, held[joint.index]))
-    });
-    per_joint(Family::Potential, &mut |joint| {
-        (!joint.slides).then(|| potential::proposal(graph, joint, held[joint.index]))
-    });
-    per_joint(Family::Asymmetry, &mut |joint| {
-        Some(asymmetry::proposal(graph, joint, velocity))
-    });
-    per_joint(Family::Stribeck, &mut |joint| {
-        Some(stribeck::candidate(graph, joint, velocity).into())
-    });
-    per_joint(Family::QuadraticFriction, &mut |joint| {
-        Some(quadratic_friction::candidate(graph, joint).into())
-    });
-    if about.robot.is_some() {
-        per_joint(Family::LoadFriction, &mut |joint| {
-            Some(load_friction::candidate(joint, velocity).into())
-        });
-    }
-    let mut per_pair = |family: Family, make: &mut dyn FnMut(&Joint, &Joint, f64) -> Proposal| {
-        if settings.has(family) {
+
+    /// What `make` gives for the sum and the difference of each pair of joints of a wrist, if the family is on.
+    fn per_pair<P: Into<Proposal>>(
+        &mut self,
+        family: Family,
+        make: impl Fn(&mut Graph, [&Joint; 2], f64) -> P,
+    ) {
+        let joints = self.about.joints;
+        if self.settings.has(family) {
             for (a, b) in coupled_friction::pairs(joints) {
-                all.extend([1.0, -1.0].map(|sign| make(&joints[a], &joints[b], sign)));
+                for sign in [1.0, -1.0] {
+                    let pair = [&joints[a], &joints[b]];
+                    self.all.push(make(self.graph, pair, sign).into());
+                }
             }
         }
-    };
-    per_pair(Family::CoupledFriction, &mut |a, b, sign| {
-        coupled_friction::proposal(graph, a, b, sign, velocity)
-    });
-    per_pair(Family::CoupledInertia, &mut |a, b, sign| {
-        coupled_inertia::candidate(graph, a, b, sign).into()
-    });
-    if about.robot.is_some() {
-        if settings.has(Family::Gain) && joints.len() > 1 {
-            all.push(gain::common().into());
+    }
+
+    /// Terms given as text: the user's, and the generic family.
+    fn written(&mut self, generic: bool) -> Result<()> {
+        let joints = self.about.joints;
+        for text in &self.settings.terms {
+            let term = user::candidate(self.graph, text, Family::User, joints)?;
+            self.all.push(term.into());
         }
-        let mut per_joint = |family: Family, make: &mut dyn FnMut(&Joint) -> Option<Proposal>| {
-            if settings.has(family) {
-                all.extend(joints.iter().filter_map(make));
+        if generic {
+            for name in generic::names(joints, self.about.parallel) {
+                let term = user::candidate(self.graph, &name, Family::Generic, joints)?;
+                self.all.push(term.into());
             }
-        };
-        per_joint(Family::Gain, &mut |joint| {
-            Some(gain::candidate(joint).into())
+        }
+        Ok(())
+    }
+
+    /// Viscous and Coulomb friction, offsets and motor inertias.
+    fn simple_joint_terms(&mut self) {
+        let velocity = self.settings.coulomb_velocity;
+        self.per_joint(Family::Viscous, viscous::candidate);
+        self.per_joint(Family::Coulomb, |graph, joint| {
+            coulomb::candidate(graph, joint, velocity)
         });
-        per_joint(Family::EncoderZero, &mut |joint| {
-            Some(encoder_zero::candidate(joint).into())
+        self.per_joint(Family::Offset, offset::candidate);
+        self.per_joint(Family::MotorInertia, motor_inertia::candidate);
+    }
+
+    /// Springs, and torques of one joint that depend on its position.
+    fn conservative(&mut self) {
+        let held: Vec<Option<f64>> = held_torque(self.about);
+        self.per_joint(Family::Spring, |graph, joint| {
+            spring::proposal(graph, joint, held[joint.index])
+        });
+        if self.settings.has(Family::Potential) {
+            for joint in self.about.joints.iter().filter(|joint| !joint.slides) {
+                let potential = potential::proposal(self.graph, joint, held[joint.index]);
+                self.all.push(potential);
+            }
+        }
+    }
+
+    /// Friction of single joints beyond viscous and Coulomb.
+    fn further_friction(&mut self) {
+        let velocity = self.settings.coulomb_velocity;
+        self.per_joint(Family::Asymmetry, |graph, joint| {
+            asymmetry::proposal(graph, joint, velocity)
+        });
+        self.per_joint(Family::Stribeck, |graph, joint| {
+            stribeck::candidate(graph, joint, velocity)
+        });
+        self.per_joint(Family::QuadraticFriction, quadratic_friction::candidate);
+        if self.about.robot.is_some() {
+            self.per_joint(Family::LoadFriction, |_, joint| {
+                load_friction::candidate(joint, velocity)
+            });
+        }
+    }
+
+    /// Friction and inertia of two joints together.
+    fn coupled(&mut self) {
+        let velocity = self.settings.coulomb_velocity;
+        self.per_pair(Family::CoupledFriction, |graph, [a, b], sign| {
+            coupled_friction::proposal(graph, a, b, sign, velocity)
+        });
+        self.per_pair(Family::CoupledInertia, |graph, [a, b], sign| {
+            coupled_inertia::candidate(graph, a, b, sign)
         });
     }
-    all.extend(ripples(graph, joints, settings)?);
-    if settings.has(Family::Hysteresis) {
-        all.extend(
-            joints
-                .iter()
-                .map(|joint| hysteresis::proposal(graph, joint)),
-        );
+
+    /// Gains of torque and zeros of encoders.
+    fn scaled_and_shifted(&mut self) {
+        if self.settings.has(Family::Gain) && self.about.joints.len() > 1 {
+            self.all.push(gain::common().into());
+        }
+        self.per_joint(Family::Gain, |_, joint| gain::candidate(joint));
+        self.per_joint(Family::EncoderZero, |_, joint| {
+            encoder_zero::candidate(joint)
+        });
     }
-    if settings.has(Family::WarmUp) {
-        let warm_up = joints
-            .iter()
-            .map(|joint| warm_up::proposal(graph, joint, velocity));
-        all.extend(warm_up);
+
+    /// What depends on earlier motion: hysteresis and warm-up.
+    fn with_memory(&mut self) {
+        let velocity = self.settings.coulomb_velocity;
+        self.per_joint(Family::Hysteresis, hysteresis::proposal);
+        self.per_joint(Family::WarmUp, |graph, joint| {
+            warm_up::proposal(graph, joint, velocity)
+        });
     }
-    Ok(all)
 }
 
 /// Torque that each joint holds against gravity: amplitude (√2 rms) over random positions, N·m or N, at least a twentieth of the robot's

@@ -198,19 +198,33 @@ fn payload(parameters: &[Estimate]) -> String {
     if told(Family::Payload, parameters).len() < 2 {
         return mass_text;
     }
-    let millimetre = |c: &Estimate| match c.value {
-        value if value.is_finite() => format!("{:.0}", 1e3 * value),
+    format!("{mass_text}, centre of mass {} mm", place(com))
+}
+
+/// A place in mm: "(0, 2, 61) ± 4"; where some coordinate is known by far better than another "(20 ± 1, 1 ± 11, 59 ± 1)".
+fn place(coordinates: &[Estimate]) -> String {
+    let shown = |spread: f64| format!("{spread:.*}", usize::from(spread < 1.0));
+    let spreads = || coordinates.iter().map(|c| 1e3 * c.spread);
+    let spreads = || spreads().filter(|spread| spread.is_finite());
+    let worst = spreads().fold(0.0, f64::max);
+    let apart = worst > UNEVEN * spreads().fold(f64::INFINITY, f64::min);
+    let one = |c: &Estimate| match (1e3 * c.value).round() {
+        // Minus zero is zero.
+        value if value.is_finite() && apart => {
+            format!("{} ± {}", value + 0.0, shown(1e3 * c.spread))
+        }
+        value if value.is_finite() => format!("{}", value + 0.0),
         _ => "–".into(), // no joint shows it
     };
-    let millimetres: Vec<String> = com.iter().map(millimetre).collect();
-    let worst = com.iter().map(|c| 1e3 * c.spread).fold(0.0, f64::max);
-    format!(
-        "{mass_text}, centre of mass ({}) ± {:.*} mm",
-        millimetres.join(", "),
-        usize::from(worst < 1.0),
-        worst
-    )
+    let all: Vec<String> = coordinates.iter().map(one).collect();
+    match apart {
+        true => format!("({})", all.join(", ")),
+        false => format!("({}) ± {}", all.join(", "), shown(worst)),
+    }
 }
+
+/// Ratio of the largest to the smallest spread of coordinates from which each has its own.
+const UNEVEN: f64 = 3.0;
 
 fn angle(p: &Estimate) -> String {
     if p.unit == "m" {
@@ -267,6 +281,21 @@ mod tests {
         assert_eq!(
             sentence(&component(Family::Payload, "payload at tool0"), &parameters),
             "payload at tool0: +1.200 ± 0.030 kg, centre of mass (0, 2, 61) ± 4 mm"
+        );
+    }
+
+    #[test]
+    fn a_coordinate_that_is_known_worse_has_its_own_spread() {
+        let parameters = estimates(&[
+            ("mass", "kg", 1.2, 0.03),
+            ("com_x", "m", 0.02, 0.0006),
+            ("com_y", "m", -0.0001, 0.011),
+            ("com_z", "m", 0.059, 0.0012),
+        ]);
+        let payload = component(Family::Payload, "payload at tool0");
+        assert_eq!(
+            sentence(&payload, &parameters),
+            "payload at tool0: +1.200 ± 0.030 kg, centre of mass (20 ± 0.6, 0 ± 11, 59 ± 1) mm"
         );
     }
 

@@ -188,7 +188,7 @@ impl HeldOut {
         }
     }
 
-    /// The raw rows of [`HeldOut::score`] alone.
+    /// The raw rows of [`HeldOut::score`] alone, of the log whose filtered rows were scored last.
     ///
     /// # Errors
     /// Those of [`visit_slices`].
@@ -201,6 +201,9 @@ impl HeldOut {
         trajectory: &Trajectory,
         from: f64,
     ) -> Result<()> {
+        if pipeline.cutoff_hz > 0.0 {
+            self.add_logged(trajectory);
+        }
         let keepers: Vec<[ScoreKeeper; 2]> = spread_raw(pipeline, trajectory, from)
             .into_par_iter()
             .map(|slice| {
@@ -247,6 +250,17 @@ impl HeldOut {
     fn add(&mut self, collected: Collected) {
         self.conformal.push(collected.stretches);
         self.traces.extend(collected.traces);
+    }
+
+    /// Torque as it was logged, beside the rows of the traces that were added last.
+    fn add_logged(&mut self, trajectory: &Trajectory) {
+        let first = self.traces.len().saturating_sub(self.names.len());
+        for (joint, trace) in self.traces[first..].iter_mut().enumerate() {
+            let times = trace.time.iter();
+            trace.logged = times
+                .map(|time| trajectory.logged_torque(joint, *time))
+                .collect();
+        }
     }
 
     fn push_filtered(

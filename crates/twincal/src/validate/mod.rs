@@ -135,6 +135,10 @@ pub struct Trace {
     pub qd: Vec<f64>,
     /// Measured torque, filtered like the rows.
     pub measured: Vec<f64>,
+    /// Torque as it was logged, of the sample nearest to each row, N·m or N; `None` of a row between kept parts of a long log. Empty where nothing
+    /// is filtered.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub logged: Vec<Option<f64>>,
     /// Nominal torque.
     pub nominal: Vec<f64>,
     /// Calibrated torque.

@@ -55,12 +55,16 @@ pub(super) fn beyond(
         }
     }
     let mut difference = states.torque(&beta);
-    let nominal = states
-        .nominal(before)
-        .into_iter()
-        .zip(states.nominal(after));
-    for (d, (before, after)) in difference.iter_mut().zip(nominal) {
-        *d += before - after;
+    let nominal = nominal_difference(states, [before, after]);
+    for (d, nominal) in difference.iter_mut().zip(nominal) {
+        *d += nominal;
     }
     difference
+}
+
+/// Nominal torque per joint and state, N·m, that `before` has and `after` has not.
+pub(super) fn nominal_difference(states: &States, [before, after]: [&Robot; 2]) -> Vec<f64> {
+    let nominal = states.nominal(before).into_iter();
+    let nominal = nominal.zip(states.nominal(after));
+    nominal.map(|(before, after)| before - after).collect()
 }

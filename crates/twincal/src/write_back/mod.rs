@@ -10,10 +10,12 @@ mod metric;
 mod pseudo_inertia;
 mod projection;
 mod lost;
+mod dropped;
 mod torque_error;
 #[cfg(test)]
 mod tests;
 
+pub use dropped::{Dropped, dropped};
 pub use joints::JointChange;
 pub use links::LinkChange;
 pub use projection::Projection;
@@ -26,6 +28,7 @@ use crate::robot::{Robot, RobotDescription};
 use crate::term::{Family, Library, ModelColumn};
 use linear_part::Share;
 use serde::Serialize;
+use torque_error::InFile;
 
 /// What a model format can hold beside inertias, viscous and dry friction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,6 +99,8 @@ pub struct WriteBack {
     pub written: Vec<Written>,
     /// Components that are not, largest torque first.
     pub residual: Vec<Residual>,
+    /// What the nominal model itself has and the format cannot hold; the written robot is without it.
+    pub dropped: Vec<Dropped>,
     /// How inertias were made physical; `None` where they were already.
     pub projection: Option<Projection>,
     /// RMS of the torque by which the file differs from the written components, per joint, N·m (N): what it costs that
@@ -208,18 +213,28 @@ impl<'a> Writer<'a> {
             gravity,
             written: Vec::new(),
             residual: Vec::new(),
+            dropped: Vec::new(),
             projection,
             lost: Vec::new(),
             correction: Vec::new(),
             lacks: Vec::new(),
             torque_error: Vec::new(),
         };
-        let (states, robots) = (&self.states, [robot, &change.robot(robot)?]);
-        let joints = &change.joints;
+        let (states, whole_robot) = (&self.states, change.robot(robot)?);
+        let (robots, joints) = ([robot, &whole_robot], &change.joints);
         change.lost = rms(&lost::difference(states, robots, joints, &held, &file));
         let alone = lost::held_alone(&held, &file);
         let linear = lost::beyond(states, robots, joints, &held, &alone);
-        change.torque_error = self.torque_error(&change, &held, &file, &linear);
+        change.dropped = dropped(robot, self.holds);
+        let robots = [robot, &change.robot(robot)?];
+        let without = lost::nominal_difference(states, [&whole_robot, robots[1]]);
+        let in_file = InFile {
+            held: &held,
+            coefficients: &file,
+            lost: &linear,
+            dropped: &self.dropped_coefficients(&change.dropped, &without),
+        };
+        change.torque_error = self.torque_error(&change, &in_file);
         let mut correction = states.torque(beta);
         states.add_products(&mut correction);
         change.correction = rms(&correction);
@@ -251,6 +266,11 @@ impl<'a> Writer<'a> {
 
     /// Where a column's coefficient goes in a file of this format.
     fn place(&self, column: usize) -> Option<Place> {
+        self.place_in(column, self.holds)
+    }
+
+    /// Where a column's coefficient goes in a file that holds this.
+    fn place_in(&self, column: usize, holds: Holds) -> Option<Place> {
         let term = &self.library.terms()[self.library.columns()[column]];
         let joint = || {
             let names = self.calibration.twin.robot.joint_names();
@@ -260,7 +280,7 @@ impl<'a> Writer<'a> {
                 .strip_suffix('.')?;
             names.iter().position(|joint| *joint == own)
         };
-        let more = self.holds.more;
+        let more = holds.more;
         match (term.family, self.library.model_column(column)) {
             (_, Some(&ModelColumn::Inertia { body, weights })) => {
                 Some(Place::Inertia { body, weights })
@@ -397,7 +417,7 @@ impl WriteBack {
         Robot::new(description, nominal.locked()).map(|(robot, _)| robot)
     }
 
-    /// The nominal description with the change; dry friction has no place in it.
+    /// The nominal description with the change, without what the format cannot hold; dry friction has no place in it.
     #[must_use]
     pub fn description(&self, nominal: &RobotDescription) -> RobotDescription {
         let mut description = nominal.clone();
@@ -409,6 +429,9 @@ impl WriteBack {
         for joint in &mut description.joints {
             if let Some(change) = self.joints.iter().find(|change| change.joint == joint.name) {
                 change.apply(joint);
+            }
+            if self.dropped.iter().any(|own| own.joint == joint.name) {
+                Dropped::apply(joint);
             }
         }
         description.gravity = self.gravity.unwrap_or(description.gravity);

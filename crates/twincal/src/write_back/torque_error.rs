@@ -1,5 +1,6 @@
 //! Torque error of a model file, as it was and as it is written: its RMSE on the held-out rows, with the friction that it states.
 
+use super::dropped::DroppedTorque;
 use super::{Place, WriteBack, Writer};
 use crate::evaluator::STATES;
 use crate::linear_algebra::Cholesky;
@@ -17,28 +18,40 @@ pub struct JointTorqueError {
     /// RMSE of the user's file: nominal torque with the damping and the friction that the file states. `None` without rows, or where it states
     /// friction of a kind that was no candidate.
     pub rms_before: Option<f64>,
-    /// RMSE of the written file, likewise.
+    /// RMSE of the written file, likewise; `None` also where no candidate has the torque that the format cannot hold.
     pub rms: Option<f64>,
 }
 
+/// What the file holds, in coefficients.
+pub(super) struct InFile<'a> {
+    /// Places of the columns that it holds.
+    pub(super) held: &'a [Option<Place>],
+    /// Coefficients of these columns.
+    pub(super) coefficients: &'a [f64],
+    /// Torque by which the file differs from the sum of these columns, as [`super::lost::beyond`] has it.
+    pub(super) lost: &'a [f64],
+    /// What the file is without of the nominal model.
+    pub(super) dropped: &'a DroppedTorque,
+}
+
 impl Writer<'_> {
-    /// Errors of all joints; `file`: the coefficients that `held` columns have in the file, `lost`: torque by which the file differs from
-    /// the sum of these columns, as [`super::lost::beyond`] has it.
+    /// Errors of all joints.
     pub(super) fn torque_error(
         &self,
         change: &WriteBack,
-        held: &[Option<Place>],
-        file: &[f64],
-        lost: &[f64],
+        file: &InFile<'_>,
     ) -> Vec<JointTorqueError> {
         let robot = &self.calibration.twin.robot;
         let moments = &self.calibration.validation.moments;
-        let mut after = self.projected(lost);
-        for ((after, file), place) in after.iter_mut().zip(file).zip(held) {
-            let written = if place.is_some() { *file } else { 0.0 };
-            *after = written - *after;
+        let mut after = self.projected(file.lost);
+        let held = file.held.iter().zip(&file.dropped.coefficients);
+        for ((after, written), (place, dropped)) in
+            after.iter_mut().zip(file.coefficients).zip(held)
+        {
+            let written = if place.is_some() { *written } else { 0.0 };
+            *after = written - *after - dropped;
         }
-        let mut before = vec![0.0; file.len()];
+        let mut before = vec![0.0; after.len()];
         let named = robot.joint_names().into_iter().enumerate();
         let errors = named.map(|(joint, name)| {
             let changed = change.joints.iter().find(|own| own.joint == name);
@@ -72,7 +85,7 @@ impl Writer<'_> {
             JointTorqueError {
                 joint: name.to_owned(),
                 rms_before: error(known[0], &before),
-                rms: error(known[1], &after),
+                rms: error(known[1] && file.dropped.is_known[joint], &after),
             }
         });
         errors.collect()
@@ -85,7 +98,7 @@ impl Writer<'_> {
 
     /// Coefficients of the columns of inertias and gravity whose torque is nearest to `torque`, `joint * STATES + state`, over states within the training
     /// range; 0 of all others.
-    fn projected(&self, torque: &[f64]) -> Vec<f64> {
+    pub(super) fn projected(&self, torque: &[f64]) -> Vec<f64> {
         let columns = self.library.columns().len();
         let is_inertial = |column| {
             matches!(

@@ -5,7 +5,7 @@ use super::text::{Page, Width};
 use crate::commands::summary::about;
 use twincal::calibrate::Calibration;
 use twincal::{Code, Finding, Severity};
-use twincal_io::report::Answer;
+use twincal_io::words::Answer;
 
 /// The list, and how many more there are.
 pub(super) fn list(

@@ -17,7 +17,7 @@ use twincal::assess;
 use twincal::calibrate::Calibration;
 use twincal::validate::Split;
 use twincal::words::significant;
-use twincal_io::report::{self, Answer};
+use twincal_io::words::{self, Answer};
 
 /// Lines of the whole output, and of that on a narrow terminal.
 const LINES: usize = 40;
@@ -83,7 +83,7 @@ pub(in crate::commands) struct Around<'a> {
 
 /// Prints all but the last line, which is the report's path.
 pub(super) fn print(calibration: &Calibration, around: Around<'_>, terminal: &mut Terminal) {
-    let answer = report::answer(calibration);
+    let answer = words::answer(calibration);
     terminal.answer(&answer.headline);
     let page = page(calibration, &answer, around, terminal.width());
     page.print(terminal);
@@ -144,14 +144,14 @@ fn scores(calibration: &Calibration, width: Width, page: &mut Page) {
         Split::LeaveLogGroupsOut => "logs left out in five groups",
         Split::LastThirty if calibration.logs.len() == 1 => "the last 30 % of the log",
         Split::LastThirty => "the last 30 % of each log",
-        Split::NotTested => {
-            let text =
-                "Torque error: not tested. --heldout LOG predicts a log that was not fitted.";
-            page.paragraph(text, ["", "  "], width, 3);
-            return;
-        }
+        Split::NotTested => "",
     };
     let scores = assess::decisive(validation);
+    if held_out.is_empty() || assess::rows_of(scores) == 0 {
+        let text = "Torque error: not tested. --heldout LOG predicts a log that was not fitted.";
+        page.paragraph(text, ["", "  "], width, 3);
+        return;
+    }
     let [before, after] = [scores.rmse_nominal, scores.rmse_calibrated];
     let change = match after / before - 1.0 {
         change if !change.is_finite() => String::new(),
@@ -166,7 +166,7 @@ fn scores(calibration: &Calibration, width: Width, page: &mut Page) {
         "{} → {} {} RMSE{change} on {held_out}",
         significant(before, 3),
         significant(after, 3),
-        error_unit(calibration),
+        words::pooled_unit(calibration),
     );
     page.paragraph(&text, ["Torque error    ", OTHER_LINES], width, 3);
     if scores.coverage95.is_finite() {
@@ -177,21 +177,6 @@ fn scores(calibration: &Calibration, width: Width, page: &mut Page) {
         let share = 100.0 * scores.coverage95;
         let text = format!("hold {share:.1} % of its rows{moving}");
         page.paragraph(&text, ["95 % intervals  ", OTHER_LINES], width, 2);
-    }
-}
-
-/// Unit of an error over all joints.
-fn error_unit(calibration: &Calibration) -> &'static str {
-    let joints = calibration.twin.robot.description().joints.iter();
-    let mut units: Vec<&str> = joints
-        .filter(|joint| joint.kind != twincal::robot::JointKind::Fixed)
-        .map(|joint| joint.kind.torque_unit())
-        .collect();
-    units.dedup();
-    match units[..] {
-        [] | ["N·m"] => "N·m",
-        ["N"] => "N",
-        _ => "N·m and N",
     }
 }
 

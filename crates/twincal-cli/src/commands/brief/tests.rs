@@ -215,3 +215,21 @@ fn names_are_short_and_cannot_steer_the_terminal() {
     assert_eq!(text::short_name("shoulder_pan_joint", 9), "shou…oint");
     assert_eq!(text::short_name("a\u{1b}[31m\nb", 24), "a\u{fffd}[31m b");
 }
+
+/// All held-out rows may be left out of a split: there is no error then.
+#[test]
+fn without_a_held_out_row_no_error_is_printed() {
+    let mut calibration = fitted();
+    let validation = &mut calibration.validation;
+    for scores in [&mut validation.filtered, &mut validation.moving] {
+        scores.joints.iter_mut().for_each(|joint| joint.rows = 0);
+        (scores.rmse_nominal, scores.rmse_calibrated) = (f64::NAN, f64::NAN);
+    }
+    let mut page = Page::default();
+    scores(&calibration, Width(80), &mut page);
+    let text = page.texts().join(" ");
+    assert!(
+        text.starts_with("Torque error: not tested.") && !text.contains('–'),
+        "{text}"
+    );
+}

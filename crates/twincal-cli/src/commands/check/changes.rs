@@ -2,6 +2,7 @@
 
 use super::gates::{Gate, MOVING};
 use crate::terminal::clean;
+use twincal::Code;
 use twincal::term::Family;
 use twincal::validate::{Change, ChangeKind, FALSE_ALARM};
 use twincal::words::significant;
@@ -15,6 +16,7 @@ pub(super) fn gates(changes: &[Change], least: f64) -> Vec<Gate> {
         rows: MOVING,
         joint: change.subject.clone(),
         gate: name(change.kind),
+        code: code(change.kind),
         passed: !change.changed,
         value: change.chance,
         limit: [Some(limit), None],
@@ -29,6 +31,14 @@ fn name(kind: ChangeKind) -> &'static str {
         ChangeKind::Friction => "friction",
         ChangeKind::Payload => "payload",
         ChangeKind::JointZero => "joint_zero",
+    }
+}
+
+fn code(kind: ChangeKind) -> Code {
+    match kind {
+        ChangeKind::Friction => Code::FrictionChanged,
+        ChangeKind::Payload => Code::PayloadChanged,
+        ChangeKind::JointZero => Code::JointZeroChanged,
     }
 }
 

@@ -1,12 +1,14 @@
 //! The gates of `check` on each joint's error and intervals.
 
-use super::super::summary::percent;
 use serde::Serialize;
+use twincal::Code;
+use twincal::assess::{Claim, Subject};
 use twincal::likelihood::JointNoise;
 use twincal::validate::{Split, Validation};
 use twincal::words::significant;
 use twincal_io::config::Gates;
 use twincal_io::twin_json::StoredTwin;
+use twincal_io::words::percent;
 
 /// Rows that count as independent, below which a joint's error says nothing.
 pub(super) const ENOUGH: f64 = 10.0;
@@ -18,6 +20,9 @@ pub(super) struct Gate {
     pub(super) rows: &'static str,
     pub(super) joint: String,
     pub(super) gate: &'static str,
+    /// What it means where it does not hold.
+    #[serde(skip)]
+    pub(super) code: Code,
     pub(super) passed: bool,
     pub(super) value: f64,
     pub(super) limit: [Option<f64>; 2],
@@ -25,6 +30,19 @@ pub(super) struct Gate {
     /// False where so few rows count as independent that a failure says nothing.
     #[serde(skip)]
     pub(super) enough: bool,
+}
+
+impl Gate {
+    /// What is claimed where it does not hold; nothing of too few rows.
+    pub(super) fn claim(&self) -> Option<Claim> {
+        let subject = match self.code {
+            Code::PayloadChanged => Subject::Run,
+            _ => Subject::Joint(self.joint.clone()),
+        };
+        let limit = self.limit.map(|limit| limit.unwrap_or(f64::NAN));
+        let fails = !self.passed && self.enough;
+        fails.then(|| Claim::of_gate(self.code, subject, self.value, limit))
+    }
 }
 
 /// Rows of joints that move.
@@ -88,6 +106,7 @@ pub(super) fn judge(scores: &Validation, own: &Own<'_>) -> Vec<Gate> {
             rows: which,
             joint: name.clone(),
             gate: "rmse",
+            code: Code::ErrorAboveGate,
             // Without rows, or without a stored score, nothing was shown: not a pass.
             passed: rmse <= limit,
             value: rmse,
@@ -114,6 +133,7 @@ pub(super) fn judge(scores: &Validation, own: &Own<'_>) -> Vec<Gate> {
             rows: which,
             joint: name.clone(),
             gate: "coverage",
+            code: Code::CoverageOutsideGate,
             passed: low <= joint.coverage95 && joint.coverage95 <= high,
             value: joint.coverage95,
             limit: [Some(low), Some(high)],
@@ -214,7 +234,7 @@ pub(super) mod tests {
         assert!(judged.iter().all(|gate| gate.rows == ALL));
         let values: Vec<f64> = judged.iter().map(|gate| gate.value).collect();
         assert_eq!(values, [9.0, 0.1]);
-        assert!(judged[1].words.contains("10.0 % of the rows"));
+        assert!(judged[1].words.contains("10.0\u{202f}% of the rows"));
     }
 
     #[test]

@@ -10,14 +10,15 @@ mod units;
 
 use super::inspect::library::{ComponentRow, component_rows};
 use super::settings::{Look, Usual};
-use super::{code_of, print_json, reads, require_strict, settings, start_threads};
+use super::{print_json, reads, require_strict, settings, start_threads};
 use crate::args;
+use crate::exit;
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use examine::{Examination, Mapping, Refusal, Trial, examine};
 use propose::propose;
-use remedies::{Remedy, When, remedies};
+use remedies::{Advice, remedies};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use twincal::Finding;
@@ -27,6 +28,7 @@ use twincal::self_check::JointCheck;
 use twincal::signal::{Agreement, LogOverview, Pipeline, Steps};
 use twincal_io::artifact::{Inputs, OutputFile};
 use twincal_io::config::{Config, Settings};
+use twincal_io::words::When;
 
 /// Where `init` writes.
 const USUAL: &str = "twincal.toml";
@@ -54,7 +56,7 @@ struct Diagnosis {
     directions: Option<[usize; 2]>,
     unseen: Vec<String>,
     /// Most important first.
-    remedies: Vec<Remedy>,
+    remedies: Vec<Advice>,
     findings: Vec<Finding>,
     /// The proposed twincal.toml.
     config: String,
@@ -200,7 +202,7 @@ pub(super) fn init(flags: &args::Init, terminal: &mut Terminal) -> Outcome<u8> {
         };
         terminal.note(&format!("{shown} is written; {next}"));
     }
-    Ok(code_of(&examination.findings))
+    Ok(exit::of_findings(&examination.findings))
 }
 
 fn diagnosis(examination: Examination, asked: &Asked) -> Diagnosis {
@@ -208,10 +210,10 @@ fn diagnosis(examination: Examination, asked: &Asked) -> Diagnosis {
     let folder = Path::new("");
     let proposal = propose(&examination, asked, folder);
     let refused = examination.refusals.iter().map(|refusal| refusal.exit_code);
-    let degraded = code_of(&examination.findings);
+    let degraded = exit::of_findings(&examination.findings);
     let exit_code = refused.clone().min().unwrap_or(degraded);
     let count = |when: When| {
-        let of = |remedy: &&Remedy| remedy.wrong && remedy.when == when;
+        let of = |remedy: &&Advice| remedy.wrong && remedy.when == when;
         remedies.iter().filter(of).count()
     };
     // Refusals are remedies of now.

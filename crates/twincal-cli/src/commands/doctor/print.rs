@@ -2,7 +2,7 @@
 
 use super::super::inspect::library::{directions, families};
 use super::super::inspect::log_heading;
-use super::super::summary::{indented, paragraph, percent};
+use super::super::summary::{indented, paragraph};
 use super::super::table::{print_table, table};
 use super::examine::Mapping;
 use super::{Diagnosis, LogRow};
@@ -11,6 +11,7 @@ use twincal::Code;
 use twincal::Severity;
 use twincal::lag::{Lags, LogLag};
 use twincal::words::significant;
+use twincal_io::words::percent;
 
 /// Remedies that come first.
 const FIRST: usize = 3;

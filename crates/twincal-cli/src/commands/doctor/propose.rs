@@ -6,6 +6,7 @@ use super::examine::{Examination, Refusal};
 use super::remedies::lag;
 use std::path::{Path, PathBuf};
 use twincal::Code;
+use twincal::signal::Auto;
 use twincal_io::config::{Config, LogEntry, Proposal};
 
 /// How a remark begins that says why a fit with the proposed config is refused.
@@ -14,16 +15,47 @@ pub(super) const REFUSES: &str = "fit refuses these logs";
 /// What `doctor` prints and `init` writes; paths are seen from `folder`.
 pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -> Proposal {
     let (settings, model, logs) = (&asked.settings, &asked.model, &asked.logs);
-    let seen_from = |path: &Path| -> PathBuf {
-        if folder.as_os_str().is_empty() || path.is_absolute() {
-            path.to_owned()
-        } else {
-            std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
-        }
-    };
-    let said = settings.calibration.signal.cutoff_hz;
-    let (cutoff_hz, cutoff_comment) = match (&examination.pipeline, said) {
-        (_, twincal::signal::Auto::Value(hz)) => (Some(hz), "As given.".to_owned()),
+    let (cutoff_hz, cutoff_comment) = cutoff(examination, settings.calibration.signal.cutoff_hz);
+    let velocity = examination
+        .findings
+        .iter()
+        .filter(|finding| finding.code == Code::VelocityMismatch);
+    let velocity: Vec<&str> = velocity.map(|finding| finding.message.as_str()).collect();
+    let columns = columns(examination, logs.len(), settings);
+    let mut locked = settings.locked.clone();
+    locked.extend(examination.locked.clone());
+    let shown = |path: &Path| path.to_string_lossy().into_owned();
+    let names: Vec<String> = logs.iter().map(|log| shown(log)).collect();
+    Proposal {
+        command: format!("twincal init {} --model {}", names.join(" "), shown(model)),
+        model: seen_from(folder, model),
+        locked,
+        base: base_line(examination),
+        allow_unphysical: settings.model.allow_unphysical,
+        logs: log_entries(asked, folder),
+        remarks: remarks(examination, asked, &columns.fixed),
+        columns: columns.table,
+        factor_comment: columns.why,
+        cutoff_hz,
+        cutoff_comment,
+        lag: lag_of_torque(examination),
+        velocity_from_position: (!velocity.is_empty()).then(|| velocity.join(" ")),
+    }
+}
+
+/// A path as it is written in a config that lies in `folder`.
+fn seen_from(folder: &Path, path: &Path) -> PathBuf {
+    if folder.as_os_str().is_empty() || path.is_absolute() {
+        path.to_owned()
+    } else {
+        std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+    }
+}
+
+/// Cut-off in Hz where it is given, and a comment on it.
+fn cutoff(examination: &Examination, said: Auto) -> (Option<f64>, String) {
+    match (&examination.pipeline, said) {
+        (_, Auto::Value(hz)) => (Some(hz), "As given.".to_owned()),
         (Some(pipeline), _) => (
             None,
             format!(
@@ -37,13 +69,12 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
             None,
             "\"auto\" could not be found on these logs as they are.".to_owned(),
         ),
-    };
-    let velocity = examination
-        .findings
-        .iter()
-        .filter(|finding| finding.code == Code::VelocityMismatch);
-    let velocity: Vec<&str> = velocity.map(|finding| finding.message.as_str()).collect();
-    let lag = lag(examination).map(|lag| {
+    }
+}
+
+/// Lag of torque, s, and a comment on it.
+fn lag_of_torque(examination: &Examination) -> Option<(f64, String)> {
+    lag(examination).map(|lag| {
         let logs = (examination.checkup.lags.iter()).flat_map(|lags| &lags.logs);
         let samples: Vec<String> = logs
             .map(|log| format!("{:.1} in {}", lag / log.interval, log.log))
@@ -55,24 +86,36 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
             samples.join(", ")
         );
         (lag, words)
-    });
-    let columns = columns(examination, logs.len(), settings);
-    let base = examination.checkup.base;
+    })
+}
+
+/// The line of `[model]` that says how the base stands, and why.
+fn base_line(examination: &Examination) -> Option<(String, String)> {
+    examination.checkup.base.map(|base| {
+        let said = examination
+            .findings
+            .iter()
+            .find(|f| f.code == Code::BaseOrientation);
+        let why = said.map_or_else(String::new, |finding| finding.message.clone());
+        (base.line(), why)
+    })
+}
+
+/// What no key of the proposed config fixes, and what of a given config it does not repeat; `fixed`: what its columns fix.
+fn remarks(examination: &Examination, asked: &Asked, fixed: &[Fixed]) -> Vec<String> {
     let is_fixed = |what: Fixed| {
-        columns.fixed.contains(&what)
-            || (what == Fixed::Finding(Code::BaseOrientation) && base.is_some())
+        fixed.contains(&what)
+            || (what == Fixed::Finding(Code::BaseOrientation) && examination.checkup.base.is_some())
     };
     let fixes_refusal = |refusal: &Refusal| {
         (is_fixed(Fixed::Ticks) && refusal.time_unit.is_some())
             || (is_fixed(Fixed::Degrees) && refusal.degrees.is_some())
     };
-    let mut locked = settings.locked.clone();
-    locked.extend(examination.locked.clone());
     let beside = asked.given.iter().map(|file| {
         let file = file.to_string_lossy();
         format!("Other keys of {file}, such as gravity and candidates, are not repeated here.")
     });
-    let remarks = examination
+    examination
         .refusals
         .iter()
         .filter(|refusal| examination.locked.is_empty() && !fixes_refusal(refusal))
@@ -86,44 +129,25 @@ pub(super) fn propose(examination: &Examination, asked: &Asked, folder: &Path) -
                 .map(|finding| finding.message.clone()),
         )
         .chain(beside)
-        .collect();
-    let heldout = settings.log.heldout.iter();
+        .collect()
+}
+
+/// The logs and the held-out ones beside them, with what the config says of each.
+fn log_entries(asked: &Asked, folder: &Path) -> Vec<LogEntry> {
+    let logs = &asked.logs;
+    let heldout = asked.settings.log.heldout.iter();
     let heldout = heldout.filter(|file| !logs.iter().any(|log| same_file(log, file)));
-    let shown = |path: &Path| path.to_string_lossy().into_owned();
-    let names: Vec<String> = logs.iter().map(|log| shown(log)).collect();
-    Proposal {
-        command: format!("twincal init {} --model {}", names.join(" "), shown(model)),
-        model: seen_from(model),
-        locked,
-        base: base.map(|base| {
-            let said = examination
-                .findings
-                .iter()
-                .find(|f| f.code == Code::BaseOrientation);
-            let why = said.map_or_else(String::new, |finding| finding.message.clone());
-            (base.line(), why)
-        }),
-        allow_unphysical: settings.model.allow_unphysical,
-        logs: logs
-            .iter()
-            .map(|log| LogEntry {
-                file: seen_from(log),
-                ..entry(&asked.config, log)
-            })
-            .chain(heldout.map(|file| LogEntry {
-                file: seen_from(file),
-                heldout: Some(true),
-                ..entry(&asked.config, file)
-            }))
-            .collect(),
-        columns: columns.table,
-        factor_comment: columns.why,
-        cutoff_hz,
-        cutoff_comment,
-        lag,
-        velocity_from_position: (!velocity.is_empty()).then(|| velocity.join(" ")),
-        remarks,
-    }
+    logs.iter()
+        .map(|log| LogEntry {
+            file: seen_from(folder, log),
+            ..entry(&asked.config, log)
+        })
+        .chain(heldout.map(|file| LogEntry {
+            file: seen_from(folder, file),
+            heldout: Some(true),
+            ..entry(&asked.config, file)
+        }))
+        .collect()
 }
 
 /// Whether two paths lead to one file.

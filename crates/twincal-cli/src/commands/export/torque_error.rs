@@ -2,7 +2,8 @@
 
 use super::super::summary::paragraph;
 use super::super::table::{print_table, table};
-use super::{short, warn};
+use super::said::warn;
+use super::short;
 use crate::args::AllowExport;
 use crate::failure::Outcome;
 use crate::terminal::{Terminal, clean};

@@ -8,6 +8,7 @@ mod rust;
 mod text;
 
 use crate::error::Result;
+pub(super) use text::comment_text;
 use twincal::evaluator::{Evaluator, Step};
 
 /// A language that an [`Evaluator`] is printed in.

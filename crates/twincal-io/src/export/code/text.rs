@@ -14,7 +14,7 @@ use std::io;
 /// White space becomes a space. What is not printable by Unicode (control characters, bidirectional marks, U+2028, a byte-order mark)
 /// becomes its number, `<U+202E>`. A backslash would continue a C comment or begin an escape in Python: `|`. Double quotes end Python's
 /// text: `'`. Signs whose pairs mean something to a C compiler (`*/`, `/*`, `??`) stand apart.
-pub(super) fn comment_text(text: &str) -> String {
+pub(in crate::export) fn comment_text(text: &str) -> String {
     let mut line = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

@@ -3,17 +3,18 @@
 //!
 //! Format: <https://mcap.dev/spec>. A record is an opcode, a length of 8 bytes and the content.
 
+mod chunk;
+
 use super::definition::MAX_TEXT;
 use super::joint_states::{JointStates, TopicId};
 use super::mapping::Schema;
 use super::unpack::PackedMessages;
 use crate::error::{Error, Place, Result};
+use chunk::{Chunk, Damage};
 use mcap::records::{Record, op};
 use rayon::prelude::*;
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, SeekFrom};
-use std::ops::Range;
 use std::rc::Rc;
 use twincal::{Code, Finding, Severity};
 
@@ -27,113 +28,17 @@ const MAX_DECLARATION: usize = 16 << 20;
 const MAX_CHANNELS: usize = 10_000;
 /// Most chunks that are unpacked side by side, and the unpacked bytes from which on no further one joins them.
 const SIDE_BY_SIDE: (usize, u64) = (4, 32 << 20);
-/// Where a chunk says how large it is when unpacked.
-const CLAIM: usize = 16;
-/// Where the records of a chunk begin that is not packed: behind two times, size, checksum, an empty text and a length.
-const PLAIN: usize = 40;
 /// Bytes of a record before its content.
 const RECORD_HEAD: usize = 9;
 /// Bytes of a message before its data: channel, sequence, two times.
 const MESSAGE_HEAD: usize = 22;
 
-/// What goes wrong inside a chunk: the chunk alone is lost, or the file is refused.
-enum Damage {
-    Chunk(String),
-    File(Error),
-}
-
-impl From<Error> for Damage {
-    fn from(error: Error) -> Self {
-        Self::File(error)
-    }
-}
-
-/// A chunk as it lies in the file, and unpacked.
-#[derive(Default)]
-struct Chunk {
-    /// Of its record, bytes from the start of the file.
-    position: u64,
-    body: Vec<u8>,
-    unpacked: Vec<u8>,
-    /// Where its records are in `body`; `None`: in `unpacked`.
-    plain: Option<Range<usize>>,
-    /// Whether it has a checksum of its own.
-    is_checked: bool,
-}
-
-impl Chunk {
-    /// Bytes that it claims to unpack to; they are compared with the limit before anything is unpacked.
-    fn claim(&self) -> u64 {
-        let claim = self.body.get(CLAIM..).and_then(<[u8]>::first_chunk);
-        claim.map_or(0, |bytes| u64::from_le_bytes(*bytes))
-    }
-
-    /// Its records, once it is unpacked.
-    fn records(&self) -> &[u8] {
-        match &self.plain {
-            Some(range) => &self.body[range.clone()],
-            None => &self.unpacked,
-        }
-    }
-
-    /// Unpacks what is packed and compares size and checksum.
-    fn unpack(&mut self, file: &str) -> std::result::Result<(), Damage> {
-        self.unpacked.clear();
-        let Ok(Record::Chunk {
-            header,
-            data: Cow::Borrowed(data),
-        }) = parse(op::CHUNK, &self.body)
-        else {
-            return Err(Damage::Chunk("its header is broken".into()));
-        };
-        let size = header.uncompressed_size;
-        let refuse = |problem, remedy| Damage::File(refusal(file, problem, remedy));
-        if size > MAX_RECORD {
-            return Err(refuse(
-                format!("a chunk claims {size} bytes when unpacked, the limit is {MAX_RECORD}"),
-                "record it again with smaller chunks",
-            ));
-        }
-        let damaged = |e: std::io::Error| Damage::Chunk(format!("cannot be unpacked: {e}"));
-        let plain = PLAIN..PLAIN + data.len();
-        self.plain = header.compression.is_empty().then_some(plain);
-        match header.compression.as_str() {
-            "" => {}
-            "zstd" => {
-                self.unpacked.reserve_exact(size as usize);
-                zstd::bulk::Decompressor::new()
-                    .and_then(|mut zstd| zstd.decompress_to_buffer(data, &mut self.unpacked))
-                    .map_err(damaged)?;
-            }
-            "lz4" => {
-                self.unpacked.reserve_exact(size as usize);
-                lz4_flex::frame::FrameDecoder::new(data)
-                    .take(size + 1)
-                    .read_to_end(&mut self.unpacked)
-                    .map_err(damaged)?;
-            }
-            other => {
-                return Err(refuse(
-                    format!("a chunk is compressed with `{other}`, known are zstd and lz4"),
-                    "`mcap compress` writes it anew",
-                ));
-            }
-        }
-        let records = self.records();
-        if records.len() as u64 != size {
-            return Err(Damage::Chunk(format!(
-                "it unpacks to {} bytes and claims {size}",
-                records.len()
-            )));
-        }
-        let claimed = header.uncompressed_crc;
-        let is_right = claimed == 0 || crc32fast::hash(records) == claimed;
-        self.is_checked = claimed != 0;
-        if !is_right {
-            return Err(Damage::Chunk("its checksum is wrong".into()));
-        }
-        Ok(())
-    }
+/// Whether a record's content is looked at.
+fn is_wanted(opcode: u8) -> bool {
+    matches!(
+        opcode,
+        op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK | op::HEADER | op::DATA_END
+    )
 }
 
 fn refusal(file: &str, problem: String, remedy: &str) -> Error {
@@ -251,28 +156,9 @@ impl Reader<'_, '_> {
         refusal(self.file, problem, remedy)
     }
 
+    /// All records of the file, one by one; how it ends.
     fn records(&mut self, source: &mut (impl Read + Seek)) -> Result<End> {
-        let system = |e: &std::io::Error| {
-            Error::system(
-                self.file,
-                "read",
-                e,
-                "check the disk or copy the file again",
-            )
-        };
-        let mut magic = Vec::new();
-        (&mut *source)
-            .take(mcap::MAGIC.len() as u64)
-            .read_to_end(&mut magic)
-            .map_err(|e| system(&e))?;
-        if magic != mcap::MAGIC {
-            return Err(self.refuse(
-                "does not begin as an MCAP file does".into(),
-                "give an MCAP file, a rosbag2 folder, CSV, Parquet, Arrow or NPZ",
-            ));
-        }
-        self.checksum.update(&magic);
-        let mut position = magic.len() as u64;
+        let mut position = self.magic(source)?;
         let (mut body, mut head) = (Vec::new(), Vec::with_capacity(RECORD_HEAD));
         let mut behind_data = false;
         loop {
@@ -293,15 +179,11 @@ impl Reader<'_, '_> {
                 self.chunks(source, position)?;
                 return Ok(ended);
             };
-            let wanted = matches!(
-                opcode,
-                op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK | op::HEADER | op::DATA_END
-            );
             // What stands between chunks otherwise, their indexes, changes nothing.
-            if opcode != op::CHUNK && (wanted || opcode == op::FOOTER) {
+            if opcode != op::CHUNK && (is_wanted(opcode) || opcode == op::FOOTER) {
                 self.chunks(source, position)?;
             }
-            if wanted && length > MAX_RECORD {
+            if is_wanted(opcode) && length > MAX_RECORD {
                 return Err(self.refuse(
                     format!("the record at byte {position} (opcode {opcode:#04x}) claims {length} bytes, the limit is {MAX_RECORD}"),
                     "copy the file again, or write smaller chunks",
@@ -310,52 +192,91 @@ impl Reader<'_, '_> {
             if opcode != op::DATA_END {
                 self.checksum.update(&head);
             }
-            body.clear();
-            let read = if wanted {
-                (&mut *source)
-                    .take(length)
-                    .read_to_end(&mut body)
-                    .map(|n| n as u64)
-            } else {
-                let mut passed = Passed(&mut self.checksum);
-                std::io::copy(&mut (&mut *source).take(length), &mut passed)
-            };
-            let read = read.map_err(|e| Error::system(self.file, "read", &e, "check the disk"))?;
-            if read < length {
+            if self.body(source, (opcode, length), &mut body)? < length {
                 self.chunks(source, position)?;
                 return Ok(ended);
             }
-            if opcode != op::DATA_END {
-                // Of what is not wanted there is nothing left.
-                self.checksum.update(&body);
+            if opcode == op::FOOTER {
+                return Ok(End::Whole);
             }
-            match opcode {
-                op::CHUNK => {
-                    let mut chunk = self.spare.pop().unwrap_or_default();
-                    chunk.position = position;
-                    std::mem::swap(&mut chunk.body, &mut body);
-                    self.waiting.push(chunk);
-                }
-                op::DATA_END => {
-                    behind_data = true;
-                    let claimed = body.first_chunk().map_or(0, |crc| u32::from_le_bytes(*crc));
-                    self.is_changed = ![0, self.checksum.clone().finalize()].contains(&claimed);
-                }
-                op::FOOTER => return Ok(End::Whole),
-                _ if wanted => match self.record_outside(opcode, &body) {
-                    Ok(()) => {}
-                    Err(Damage::File(error)) => return Err(error),
-                    Err(Damage::Chunk(problem)) => {
-                        return Err(self.refuse(
-                            format!("the record at byte {position}: {problem}"),
-                            "copy the file again",
-                        ));
-                    }
-                },
-                _ => {}
-            }
+            behind_data |= opcode == op::DATA_END;
+            self.whole_record(opcode, &mut body, position)?;
             position += RECORD_HEAD as u64 + length;
         }
+    }
+
+    /// The bytes that every MCAP file begins with; how many they are.
+    fn magic(&mut self, source: &mut impl Read) -> Result<u64> {
+        let mut magic = Vec::new();
+        (&mut *source)
+            .take(mcap::MAGIC.len() as u64)
+            .read_to_end(&mut magic)
+            .map_err(|e| {
+                let remedy = "check the disk or copy the file again";
+                Error::system(self.file, "read", &e, remedy)
+            })?;
+        if magic != mcap::MAGIC {
+            return Err(self.refuse(
+                "does not begin as an MCAP file does".into(),
+                "give an MCAP file, a rosbag2 folder, CSV, Parquet, Arrow or NPZ",
+            ));
+        }
+        self.checksum.update(&magic);
+        Ok(magic.len() as u64)
+    }
+
+    /// Reads the content of a record of (opcode, length) into `body`, or passes over it; how many bytes were there.
+    fn body(
+        &mut self,
+        source: &mut impl Read,
+        record: (u8, u64),
+        body: &mut Vec<u8>,
+    ) -> Result<u64> {
+        let (opcode, length) = record;
+        body.clear();
+        let read = if is_wanted(opcode) {
+            (&mut *source)
+                .take(length)
+                .read_to_end(body)
+                .map(|n| n as u64)
+        } else {
+            let mut passed = Passed(&mut self.checksum);
+            std::io::copy(&mut (&mut *source).take(length), &mut passed)
+        };
+        let read = read.map_err(|e| Error::system(self.file, "read", &e, "check the disk"))?;
+        if read == length && opcode != op::DATA_END {
+            // Of what is not wanted there is nothing left.
+            self.checksum.update(body);
+        }
+        Ok(read)
+    }
+
+    /// A record that begins at byte `position`; chunks are put aside.
+    fn whole_record(&mut self, opcode: u8, body: &mut Vec<u8>, position: u64) -> Result<()> {
+        match opcode {
+            op::CHUNK => {
+                let mut chunk = self.spare.pop().unwrap_or_default();
+                chunk.position = position;
+                std::mem::swap(&mut chunk.body, body);
+                self.waiting.push(chunk);
+            }
+            op::DATA_END => {
+                let claimed = body.first_chunk().map_or(0, |crc| u32::from_le_bytes(*crc));
+                self.is_changed = ![0, self.checksum.clone().finalize()].contains(&claimed);
+            }
+            _ if is_wanted(opcode) => match self.record_outside(opcode, body) {
+                Ok(()) => {}
+                Err(Damage::File(error)) => return Err(error),
+                Err(Damage::Chunk(problem)) => {
+                    return Err(self.refuse(
+                        format!("the record at byte {position}: {problem}"),
+                        "copy the file again",
+                    ));
+                }
+            },
+            _ => {}
+        }
+        Ok(())
     }
 
     /// Schemas and channels outside chunks from byte `from` to the end; the position stays.

@@ -6,7 +6,7 @@
 //! | `[elbow]` | the one called so: its own field `name` says it, or the list of texts beside it, or beside what it lies in |
 //! | `[*]` | each joint's: by its name where such names are there, else in the model's order |
 
-use super::definition::{Definition, Fields, Kind, Length, Record, Scalar};
+use super::definition::{Definition, Field, Fields, Kind, Length, Record, Scalar};
 use std::fmt;
 use twincal::robot::did_you_mean;
 
@@ -196,82 +196,112 @@ fn is_stamp(record: &Record) -> bool {
 /// # Errors
 /// The field that is not there with those that are, the list without a number, what is no number, in words with a remedy behind a `;`.
 pub(super) fn check(definition: &Definition, steps: &[Step], wanted: Wanted) -> Result<(), String> {
-    let mut enclosing: Vec<&Record> = Vec::new();
-    let mut kind = &Kind::Record(0);
+    let message = Kind::Record(0);
+    let mut walk = Walk {
+        definition,
+        enclosing: Vec::new(),
+        kind: &message,
+    };
     for (at, step) in steps.iter().enumerate() {
-        let before = match at {
-            0 => "the message".to_owned(),
-            _ => format!("`{}`", Written(&steps[..at])),
+        walk.step(&steps[..at], step)?;
+    }
+    check_end(definition, steps, wanted, walk.kind)
+}
+
+/// How far a path has been followed into a definition.
+struct Walk<'a> {
+    definition: &'a Definition,
+    /// The records on the way.
+    enclosing: Vec<&'a Record>,
+    /// What the steps so far lead to.
+    kind: &'a Kind,
+}
+
+impl Walk<'_> {
+    /// One step further; `before`: the steps so far.
+    fn step(&mut self, before: &[Step], step: &Step) -> Result<(), String> {
+        let path = Written(before);
+        let place = match before {
+            [] => "the message".to_owned(),
+            _ => format!("`{path}`"),
         };
-        match (step, kind) {
-            (Step::Field(name), Kind::Record(number)) => {
-                let record = &definition.records[*number];
-                let names = record.fields.iter().map(|field| field.name.as_str());
-                let Some(field) = record.fields.iter().find(|field| field.name == *name) else {
-                    return Err(format!(
-                        "{} has no field `{name}`, it has {}; {}",
-                        record.name,
-                        Fields(record),
-                        did_you_mean(name, names)
-                    ));
-                };
-                enclosing.push(record);
-                kind = &field.kind;
-            }
-            (Step::Field(name), Kind::List(..)) => {
-                return Err(format!(
-                    "{before} is {}, a list; say whose `{name}`: {}[0].{name}, or a name or * in the brackets",
-                    as_written(definition, kind),
-                    Written(&steps[..at])
-                ));
-            }
-            (Step::Field(name), _) => {
-                return Err(format!(
-                    "{before} is {} and has no field `{name}`; end the path before it",
-                    as_written(definition, kind)
-                ));
-            }
+        let kind = || as_written(self.definition, self.kind);
+        match (step, self.kind) {
+            (Step::Field(name), Kind::Record(number)) => self.field(name, *number),
+            (Step::Field(name), Kind::List(..)) => Err(format!(
+                "{place} is {}, a list; say whose `{name}`: {path}[0].{name}, or a name or * in the brackets",
+                kind()
+            )),
+            (Step::Field(name), _) => Err(format!(
+                "{place} is {} and has no field `{name}`; end the path before it",
+                kind()
+            )),
             (Step::Index(index), Kind::List(entry, length)) => {
                 if let Length::Fixed(count) = length
                     && index >= count
                 {
                     return Err(format!(
-                        "{before} is {} and has no number {index}; numbers go from 0 to {}",
-                        as_written(definition, kind),
+                        "{place} is {} and has no number {index}; numbers go from 0 to {}",
+                        kind(),
                         count.saturating_sub(1)
                     ));
                 }
-                kind = entry;
+                self.kind = entry;
+                Ok(())
             }
             (Step::Name(name), Kind::List(entry, _)) => {
-                let says = |record: &Record| {
-                    let names = |f: &&super::definition::Field| matches!(&f.kind, Kind::List(text, _) if **text == Kind::Text);
-                    record.fields.iter().find(names).is_some()
-                };
-                let own = |record: &Record| {
-                    let named = |f: &super::definition::Field| {
-                        f.kind == Kind::Text && NAMES.contains(&f.name.as_str())
-                    };
-                    record.fields.iter().any(named)
-                };
-                let own =
-                    matches!(**entry, Kind::Record(number) if own(&definition.records[number]));
-                if !own && !enclosing.iter().any(|record| says(record)) {
+                if !self.has_names(entry) {
                     return Err(format!(
-                        "nothing says which entry of {before} is called `{name}`: no list of texts stands beside it; give its number, from 0"
+                        "nothing says which entry of {place} is called `{name}`: no list of texts stands beside it; give its number, from 0"
                     ));
                 }
-                kind = entry;
+                self.kind = entry;
+                Ok(())
             }
-            (Step::All, Kind::List(entry, _)) => kind = entry,
-            (_, _) => {
-                return Err(format!(
-                    "{before} is {}, not a list; leave the brackets out",
-                    as_written(definition, kind)
-                ));
+            (Step::All, Kind::List(entry, _)) => {
+                self.kind = entry;
+                Ok(())
             }
+            (_, _) => Err(format!(
+                "{place} is {}, not a list; leave the brackets out",
+                kind()
+            )),
         }
     }
+
+    /// Into a field of a record.
+    fn field(&mut self, name: &str, record: usize) -> Result<(), String> {
+        let record = &self.definition.records[record];
+        let Some(field) = record.fields.iter().find(|field| field.name == name) else {
+            let names = record.fields.iter().map(|field| field.name.as_str());
+            return Err(format!(
+                "{} has no field `{name}`, it has {}; {}",
+                record.name,
+                Fields(record),
+                did_you_mean(name, names)
+            ));
+        };
+        self.enclosing.push(record);
+        self.kind = &field.kind;
+        Ok(())
+    }
+
+    /// Whether entries of a list have names: in a field of their own, or in a list of texts beside it or what it lies in.
+    fn has_names(&self, entry: &Kind) -> bool {
+        let names = |f: &Field| matches!(&f.kind, Kind::List(text, _) if **text == Kind::Text);
+        let named = |f: &Field| f.kind == Kind::Text && NAMES.contains(&f.name.as_str());
+        let own = matches!(*entry, Kind::Record(number) if self.definition.records[number].fields.iter().any(named));
+        own || (self.enclosing.iter()).any(|record| record.fields.iter().any(names))
+    }
+}
+
+/// Whether a path that leads to `kind` leads to what is wanted.
+fn check_end(
+    definition: &Definition,
+    steps: &[Step],
+    wanted: Wanted,
+    kind: &Kind,
+) -> Result<(), String> {
     let path = Written(steps);
     match (wanted, kind) {
         (

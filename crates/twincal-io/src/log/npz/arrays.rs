@@ -34,8 +34,6 @@ pub(super) fn name_columns<'a>(
     robot: &Robot,
     options: &'a LogOptions,
 ) -> Result<Cow<'a, LogOptions>> {
-    let refuse =
-        |problem: String, remedy: String| Error::content(Place::file(file), problem, remedy);
     let said = &options.columns;
     if [&said.q, &said.qd, &said.qdd, &said.tau, &said.temperature]
         .iter()
@@ -43,25 +41,12 @@ pub(super) fn name_columns<'a>(
     {
         return Ok(Cow::Borrowed(options));
     }
-    let joints = robot.joint_names();
-    let table = |key: &str, text: &str| {
-        let Some(array) = arrays.iter().find(|array| array.key == key) else {
-            let keys = arrays.iter().map(|array| array.key.as_str());
-            return Err(refuse(
-                format!("has no array `{key}`, which [columns] names in `{text}`"),
-                did_you_mean(key, keys),
-            ));
-        };
-        match array.header.shape[..] {
-            [_, _] if array.width > 0 => Ok(array),
-            _ => Err(refuse(
-                format!(
-                    "array `{key}` has shape {:?}, `{text}` asks for samples × joints",
-                    array.header.shape
-                ),
-                "save a table of one row per time stamp, or name another array".into(),
-            )),
-        }
+    let mut tables = Tables {
+        file,
+        arrays,
+        names,
+        joints: robot.joint_names(),
+        columns,
     };
     let mut options = options.clone();
     let said = &mut options.columns;
@@ -73,79 +58,140 @@ pub(super) fn name_columns<'a>(
         ("temperature", &mut said.temperature),
     ];
     for (channel, names_of) in channels {
-        let mut by_joint = Vec::new();
-        match &*names_of {
-            ChannelNames::ByJoint(by_name) => {
-                for (joint, text) in by_name {
-                    let plain = columns.contains(text);
-                    let Some((key, column)) = indexed(text).filter(|_| !plain) else {
-                        by_joint.push((joint.clone(), text.clone()));
-                        continue;
-                    };
-                    let array = table(key, text)?;
-                    let Some(column) = column else {
-                        return Err(refuse(
-                            format!("[columns] {channel} gives joint `{joint}` all of `{text}`"),
-                            format!(
-                                "write its column, `{key}[:,0]`, or {channel} = \"{key}\" for all joints"
-                            ),
-                        ));
-                    };
-                    if column >= array.width {
-                        return Err(refuse(
-                            format!(
-                                "array `{key}` has {} columns, none of number {column} (from 0)",
-                                array.width
-                            ),
-                            format!("correct `{text}` in [columns] {channel}"),
-                        ));
-                    }
-                    let canonical = format!("{key}[:,{column}]");
-                    columns[array.first + column].clone_from(&canonical);
-                    by_joint.push((joint.clone(), canonical));
-                }
-            }
-            ChannelNames::All(text) => {
-                let key = match indexed(text) {
-                    Some((key, None)) => key,
-                    _ => text.as_str(),
-                };
-                // A pattern for arrays of one dimension, or the only column of the only joint.
-                if columns.contains(text) || text.contains('*') && indexed(text).is_none() {
-                    continue;
-                }
-                let array = table(key, text)?;
-                let by_name = names.len() == array.width;
-                if !by_name && array.width != joints.len() {
-                    return Err(refuse(
-                        format!(
-                            "array `{key}` has {} columns, the model has {} moving joints",
-                            array.width,
-                            joints.len()
-                        ),
-                        format!(
-                            "name them joint by joint: {channel} = {{ {} = \"{key}[:,0]\" }}",
-                            joints[0]
-                        ),
-                    ));
-                }
-                for (number, joint) in joints.iter().enumerate() {
-                    let column = match by_name {
-                        false => number,
-                        true => names.iter().position(|name| name == joint).ok_or_else(|| {
-                            refuse(
-                                format!("the array of names, which says whose the columns of `{key}` are, lacks joint `{joint}`"),
-                                did_you_mean(joint, names.iter().map(String::as_str)),
-                            )
-                        })?,
-                    };
-                    let canonical = format!("{key}[:,{column}]");
-                    columns[array.first + column].clone_from(&canonical);
-                    by_joint.push(((*joint).to_owned(), canonical));
-                }
-            }
-        }
+        let by_joint = match &*names_of {
+            ChannelNames::ByJoint(by_name) => by_name
+                .iter()
+                .map(|(joint, text)| Ok((joint.clone(), tables.one(channel, joint, text)?)))
+                .collect::<Result<Vec<_>>>()?,
+            ChannelNames::All(text) => match tables.all(channel, text)? {
+                Some(by_joint) => by_joint,
+                None => continue,
+            },
+        };
         *names_of = by_joint.into_iter().collect();
     }
     Ok(Cow::Owned(options))
+}
+
+/// The arrays of a file, and the columns that they make.
+struct Tables<'a> {
+    file: &'a str,
+    arrays: &'a [Array],
+    /// What the file calls the columns of its arrays; empty where it does not say.
+    names: &'a [String],
+    /// Moving joints of the model.
+    joints: Vec<&'a str>,
+    columns: &'a mut [String],
+}
+
+impl<'a> Tables<'a> {
+    fn refuse(&self, problem: String, remedy: String) -> Error {
+        Error::content(Place::file(self.file), problem, remedy)
+    }
+
+    /// Whether a text is the plain name of a column.
+    fn is_column(&self, text: &str) -> bool {
+        self.columns.iter().any(|column| column == text)
+    }
+
+    /// The array `key` of samples × joints that `text` names.
+    fn table(&self, key: &str, text: &str) -> Result<&'a Array> {
+        let Some(array) = self.arrays.iter().find(|array| array.key == key) else {
+            let keys = self.arrays.iter().map(|array| array.key.as_str());
+            return Err(self.refuse(
+                format!("has no array `{key}`, which [columns] names in `{text}`"),
+                did_you_mean(key, keys),
+            ));
+        };
+        match array.header.shape[..] {
+            [_, _] if array.width > 0 => Ok(array),
+            _ => Err(self.refuse(
+                format!(
+                    "array `{key}` has shape {:?}, `{text}` asks for samples × joints",
+                    array.header.shape
+                ),
+                "save a table of one row per time stamp, or name another array".into(),
+            )),
+        }
+    }
+
+    /// Gives a column of an array the name `key[:,column]`, which is returned.
+    fn name(&mut self, array: &Array, key: &str, column: usize) -> String {
+        let canonical = format!("{key}[:,{column}]");
+        self.columns[array.first + column].clone_from(&canonical);
+        canonical
+    }
+
+    /// Name of the column that `text` says of one joint.
+    fn one(&mut self, channel: &str, joint: &str, text: &str) -> Result<String> {
+        let plain = self.is_column(text);
+        let Some((key, column)) = indexed(text).filter(|_| !plain) else {
+            return Ok(text.to_owned());
+        };
+        let array = self.table(key, text)?;
+        let Some(column) = column else {
+            return Err(self.refuse(
+                format!("[columns] {channel} gives joint `{joint}` all of `{text}`"),
+                format!("write its column, `{key}[:,0]`, or {channel} = \"{key}\" for all joints"),
+            ));
+        };
+        if column >= array.width {
+            return Err(self.refuse(
+                format!(
+                    "array `{key}` has {} columns, none of number {column} (from 0)",
+                    array.width
+                ),
+                format!("correct `{text}` in [columns] {channel}"),
+            ));
+        }
+        Ok(self.name(array, key, column))
+    }
+
+    /// Joints with their columns of the array that `text` says of all; `None` where it names no array of two dimensions.
+    fn all(&mut self, channel: &str, text: &str) -> Result<Option<Vec<(String, String)>>> {
+        let key = match indexed(text) {
+            Some((key, None)) => key,
+            _ => text,
+        };
+        // A pattern for arrays of one dimension, or the only column of the only joint.
+        if self.is_column(text) || text.contains('*') && indexed(text).is_none() {
+            return Ok(None);
+        }
+        let array = self.table(key, text)?;
+        if self.names.len() != array.width && array.width != self.joints.len() {
+            return Err(self.refuse(
+                format!(
+                    "array `{key}` has {} columns, the model has {} moving joints",
+                    array.width,
+                    self.joints.len()
+                ),
+                format!(
+                    "name them joint by joint: {channel} = {{ {} = \"{key}[:,0]\" }}",
+                    self.joints[0]
+                ),
+            ));
+        }
+        let mut by_joint = Vec::with_capacity(self.joints.len());
+        for number in 0..self.joints.len() {
+            let column = self.column_of(array, key, number)?;
+            let canonical = self.name(array, key, column);
+            by_joint.push((self.joints[number].to_owned(), canonical));
+        }
+        Ok(Some(by_joint))
+    }
+
+    /// Column of a joint of the model: by its name where the columns have names, else in the model's order.
+    fn column_of(&self, array: &Array, key: &str, number: usize) -> Result<usize> {
+        if self.names.len() != array.width {
+            return Ok(number);
+        }
+        let joint = self.joints[number];
+        let column = self.names.iter().position(|name| name == joint);
+        column.ok_or_else(|| {
+            self.refuse(
+                format!("the array of names, which says whose the columns of `{key}` are, lacks joint `{joint}`"),
+                did_you_mean(joint, self.names.iter().map(String::as_str)),
+            )
+        })
+    }
 }

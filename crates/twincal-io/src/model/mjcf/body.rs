@@ -267,62 +267,10 @@ impl<'a> Tree<'a> {
             Some(name) if !name.is_empty() => name.to_string(),
             _ => format!("{body}.joint{}", number + 1),
         };
-        let fail = |problem: String, remedy: &str| -> Result<(JointDescription, [f64; 3], f64)> {
-            let error: Error =
-                self.document
-                    .error(part.element, format!("joint `{name}`: {problem}"), remedy);
-            Err(error)
-        };
-        let kind = if part.element.name == "freejoint" {
-            "free"
-        } else {
-            view.text("type").unwrap_or("hinge")
-        };
-        let (kind, angle) = match kind {
-            "hinge" => (JointKind::Revolute, self.compiler.angle),
-            "slide" => (JointKind::Prismatic, 1.0),
-            "free" => {
-                return fail(
-                    format!("body `{body}` floats freely"),
-                    "twincal needs a fixed base: remove the free joint of the robot's root body",
-                );
-            }
-            other => {
-                return fail(
-                    format!("its type is `{}`", shorten(other)),
-                    "twincal supports hinge and slide (a ball joint is three hinges)",
-                );
-            }
-        };
-        if view
-            .numbers::<2>("springdamper")?
-            .is_some_and(|s| s != [0.0; 2])
-        {
-            return fail(
-                "its spring and damper follow from springdamper".into(),
-                "give stiffness and damping: MuJoCo prints them as m.jnt_stiffness and m.dof_damping",
-            );
-        }
-        if view.number("springyield")?.is_some_and(|y| y != 0.0) {
-            return fail(
-                "its spring yields (springyield)".into(),
-                "twincal's nominal torque has linear springs only",
-            );
-        }
+        let (kind, angle) = self.joint_kind(&view, &name, body)?;
+        refuse_nonlinear_springs(&view, &name)?;
         let mut joint = JointDescription::new(&name, kind, "", "");
-        let axis = apply(
-            &part.placement.rotation,
-            view.numbers("axis")?.unwrap_or([0.0, 0.0, 1.0]),
-        );
-        let length = norm(axis);
-        if !(length.is_finite() && length > 1e-14) {
-            return fail(
-                format!("axis {axis:?} has length {length}"),
-                "give a direction other than zero",
-            );
-        }
-        // MuJoCo itself normalises every axis: nothing to report.
-        joint.axis = scale(1.0 / length, axis);
+        joint.axis = joint_axis(&view, &name, &part.placement)?;
         joint.armature = view.number("armature")?.unwrap_or(0.0);
         joint.damping = view.linear("damping")?;
         joint.stiffness = view.linear("stiffness")?;
@@ -338,53 +286,135 @@ impl<'a> Tree<'a> {
             stiffness: joint.stiffness,
             spring_reference: joint.spring_reference,
         });
-        let range = view.numbers::<2>("range")?;
-        let limited = view
-            .flag("limited")
-            .unwrap_or(self.compiler.autolimits && range.is_some());
-        if let (true, Some([lower, upper])) = (limited, range) {
-            joint.limits = Limits {
-                lower: Some(angle * lower),
-                upper: Some(angle * upper),
-                ..joint.limits
-            };
-        } else if kind == JointKind::Revolute {
-            joint.kind = JointKind::Continuous;
-        }
-        joint.limits.effort = view
-            .numbers::<2>("actuatorfrcrange")?
-            .map(|[low, high]| low.abs().max(high.abs()));
+        limit(&mut joint, &view, angle, self.compiler.autolimits)?;
         let anchor = part
             .placement
             .point(view.numbers("pos")?.unwrap_or([0.0; 3]));
         let reference = angle * view.number("ref")?.unwrap_or(0.0);
-        let friction = joint.unused_friction;
         if part.element.text("name").is_none_or(str::is_empty) {
-            let message = format!(
-                "joint {} of body `{body}` has no name: called `{name}`",
-                number + 1
-            );
-            self.findings.push(Finding::new(
-                Severity::Note,
-                Code::UnnamedJoint,
-                &name,
-                message,
-                1,
-            ));
+            self.findings.push(unnamed_joint(&name, body, number));
         }
-        if friction != 0.0 {
-            let message = format!(
-                "joint `{name}`: frictionloss {friction} is dry friction and not part of the nominal torque; Coulomb \
-                 friction is a candidate"
-            );
-            self.findings.push(Finding::new(
-                Severity::Note,
-                Code::FrictionlossNotUsed,
-                &name,
-                message,
-                1,
-            ));
+        if joint.unused_friction != 0.0 {
+            self.findings
+                .push(unused_friction(&name, joint.unused_friction));
         }
         Ok((joint, anchor, reference))
     }
+
+    /// Hinge or slider, and the radians or metres per unit of its angles.
+    fn joint_kind(&self, view: &View<'_, '_>, name: &str, body: &str) -> Result<(JointKind, f64)> {
+        let kind = if view.element.name == "freejoint" {
+            "free"
+        } else {
+            view.text("type").unwrap_or("hinge")
+        };
+        match kind {
+            "hinge" => Ok((JointKind::Revolute, self.compiler.angle)),
+            "slide" => Ok((JointKind::Prismatic, 1.0)),
+            "free" => Err(joint_error(
+                view,
+                name,
+                format!("body `{body}` floats freely"),
+                "twincal needs a fixed base: remove the free joint of the robot's root body",
+            )),
+            other => Err(joint_error(
+                view,
+                name,
+                format!("its type is `{}`", shorten(other)),
+                "twincal supports hinge and slide (a ball joint is three hinges)",
+            )),
+        }
+    }
+}
+
+/// An error at a joint.
+fn joint_error(view: &View<'_, '_>, name: &str, problem: String, remedy: &str) -> Error {
+    let problem = format!("joint `{name}`: {problem}");
+    view.document.error(view.element, problem, remedy)
+}
+
+/// Refuses springs that are not given by a stiffness or are not linear.
+fn refuse_nonlinear_springs(view: &View<'_, '_>, name: &str) -> Result<()> {
+    if view
+        .numbers::<2>("springdamper")?
+        .is_some_and(|s| s != [0.0; 2])
+    {
+        return Err(joint_error(
+            view,
+            name,
+            "its spring and damper follow from springdamper".into(),
+            "give stiffness and damping: MuJoCo prints them as m.jnt_stiffness and m.dof_damping",
+        ));
+    }
+    if view.number("springyield")?.is_some_and(|y| y != 0.0) {
+        return Err(joint_error(
+            view,
+            name,
+            "its spring yields (springyield)".into(),
+            "twincal's nominal torque has linear springs only",
+        ));
+    }
+    Ok(())
+}
+
+/// Axis of a joint in the body's frame, of length 1. MuJoCo itself normalises every axis: nothing to report.
+fn joint_axis(view: &View<'_, '_>, name: &str, placement: &Placement) -> Result<[f64; 3]> {
+    let axis = apply(
+        &placement.rotation,
+        view.numbers("axis")?.unwrap_or([0.0, 0.0, 1.0]),
+    );
+    let length = norm(axis);
+    if !(length.is_finite() && length > 1e-14) {
+        return Err(joint_error(
+            view,
+            name,
+            format!("axis {axis:?} has length {length}"),
+            "give a direction other than zero",
+        ));
+    }
+    Ok(scale(1.0 / length, axis))
+}
+
+/// Limits of position and effort; a hinge without limits of position is continuous.
+fn limit(
+    joint: &mut JointDescription,
+    view: &View<'_, '_>,
+    angle: f64,
+    autolimits: bool,
+) -> Result<()> {
+    let range = view.numbers::<2>("range")?;
+    let limited = view
+        .flag("limited")
+        .unwrap_or(autolimits && range.is_some());
+    if let (true, Some([lower, upper])) = (limited, range) {
+        joint.limits = Limits {
+            lower: Some(angle * lower),
+            upper: Some(angle * upper),
+            ..joint.limits
+        };
+    } else if joint.kind == JointKind::Revolute {
+        joint.kind = JointKind::Continuous;
+    }
+    joint.limits.effort = view
+        .numbers::<2>("actuatorfrcrange")?
+        .map(|[low, high]| low.abs().max(high.abs()));
+    Ok(())
+}
+
+/// Says what a joint without a name is called.
+fn unnamed_joint(name: &str, body: &str, number: usize) -> Finding {
+    let message = format!(
+        "joint {} of body `{body}` has no name: called `{name}`",
+        number + 1
+    );
+    Finding::new(Severity::Note, Code::UnnamedJoint, name, message, 1)
+}
+
+/// Says that a joint's dry friction is left out.
+fn unused_friction(name: &str, friction: f64) -> Finding {
+    let message = format!(
+        "joint `{name}`: frictionloss {friction} is dry friction and not part of the nominal torque; Coulomb \
+         friction is a candidate"
+    );
+    Finding::new(Severity::Note, Code::FrictionlossNotUsed, name, message, 1)
 }

@@ -4,8 +4,8 @@ use crate::report::figure::{Figure, HALF, Image, Legend, legend};
 use crate::report::plot::{Frame, Panel};
 use crate::report::scale::extent;
 use crate::report::svg::Svg;
-use crate::report::text::{count, number};
 use crate::report::view::Joint;
+use crate::words::number::{count, number};
 use twincal::calibrate::Calibration;
 
 /// The figure; `None` where the calibration carries no autocorrelation.

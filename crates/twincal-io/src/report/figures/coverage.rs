@@ -3,7 +3,7 @@
 use crate::report::figure::{Figure, HALF, Image, Legend};
 use crate::report::plot::{Frame, Panel};
 use crate::report::svg::Svg;
-use crate::report::text::percent;
+use crate::words::number::percent;
 
 /// The figure from `(level, observed)` pairs and the number of rows that count as independent.
 pub(in crate::report) fn figure(levels: &[(f64, f64)], independent_rows: f64) -> Option<Figure> {

@@ -4,8 +4,9 @@ use crate::report::figure::{Figure, HALF, Image, Legend, legend};
 use crate::report::plot::{Frame, Panel};
 use crate::report::scale::extent;
 use crate::report::svg::Svg;
-use crate::report::text;
 use crate::report::view::Joint;
+use crate::words::list::list;
+use crate::words::number::probability;
 use twincal::calibrate::{Along, ComponentSummary, Curve};
 
 const MEAN: Legend = Legend {
@@ -89,18 +90,18 @@ fn laws(curve: &Curve, components: &[ComponentSummary]) -> String {
     for name in &curve.components {
         match components.iter().find(|own| own.name == *name) {
             Some(own) if !own.is_in() && own.pip.is_some() => {
-                let pip = text::probability(own.pip.unwrap_or(0.0));
+                let pip = probability(own.pip.unwrap_or(0.0));
                 open.push(format!("{name} (PIP {pip})"));
             }
             _ => found.push(name.as_str()),
         }
     }
     match open.is_empty() {
-        true => text::list(&found),
+        true => list(&found),
         false => format!(
             "{}; counted in by their probability: {}",
-            text::list(&found),
-            text::list(&open)
+            list(&found),
+            list(&open)
         ),
     }
 }
@@ -137,7 +138,7 @@ mod tests {
                 "{}; counted in by their probability: {} (PIP {})",
                 found.name,
                 open.name,
-                text::probability(open.pip.unwrap())
+                probability(open.pip.expect("a candidate with a probability"))
             )
         );
     }

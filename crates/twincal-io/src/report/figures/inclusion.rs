@@ -4,7 +4,8 @@ use crate::report::MENTIONED;
 use crate::report::figure::{Figure, Image, Legend};
 use crate::report::scale::Scale;
 use crate::report::svg::{Anchor, Svg};
-use crate::report::text::{count, probability, shorten, text_width};
+use crate::report::text::{shorten, text_width};
+use crate::words::number::{count, probability};
 use twincal::calibrate::ComponentSummary;
 use twincal::term::Family;
 
@@ -83,7 +84,7 @@ fn rows<'a>(components: &[&'a ComponentSummary], live: usize) -> Vec<Row<'a>> {
     families.sort();
     families.dedup();
     for family in families {
-        rows.push(Row::Family(family_name(family)));
+        rows.push(Row::Family(crate::words::family_name(family)));
         let members = components
             .iter()
             .filter(|t| t.family == family)
@@ -194,37 +195,6 @@ fn draw(rows: &[Row<'_>], width: f64, label: &str) -> String {
         "inclusion probability",
     );
     svg.finish(label)
-}
-
-/// A family in words.
-pub(in crate::report) fn family_name(family: Family) -> &'static str {
-    match family {
-        Family::User => "own expressions",
-        Family::Generic => "generic energy terms",
-        Family::Viscous => "viscous friction",
-        Family::Coulomb => "Coulomb friction",
-        Family::Offset => "torque offset",
-        Family::MotorInertia => "motor inertia",
-        Family::Payload => "payload",
-        Family::PayloadTensor => "inertia of the payload",
-        Family::MassMoments => "centre of mass",
-        Family::Tensor => "inertia tensor",
-        Family::Density => "density",
-        Family::Tilt => "gravity",
-        Family::Spring => "spring",
-        Family::Potential => "conservative torque of one joint",
-        Family::Asymmetry => "direction-dependent friction",
-        Family::Stribeck => "Stribeck friction",
-        Family::QuadraticFriction => "quadratic friction",
-        Family::LoadFriction => "load-dependent friction",
-        Family::CoupledFriction => "friction of coupled motors",
-        Family::CoupledInertia => "inertia of coupled motors",
-        Family::Gain => "torque gain",
-        Family::EncoderZero => "encoder zero",
-        Family::Ripple => "gear ripple",
-        Family::Hysteresis => "friction with hysteresis",
-        Family::WarmUp => "friction that changes with warmth",
-    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,9 @@
 use crate::report::figure::{Figure, Image, NARROW};
 use crate::report::scale::Scale;
 use crate::report::svg::{Anchor, Path, Svg};
-use crate::report::text::{count, first_of, fixed, list, percent, shorten, text_width};
+use crate::report::text::{shorten, text_width};
+use crate::words::list::{first_of, list};
+use crate::words::number::{count, fixed, percent};
 use std::collections::BTreeMap;
 use twincal::calibrate::{Draws, TermSummary};
 

@@ -3,7 +3,7 @@
 use crate::report::figure::{Figure, HALF, Image, Legend};
 use crate::report::plot::{Frame, Panel};
 use crate::report::svg::Svg;
-use crate::report::text::{count, percent};
+use crate::words::number::{count, percent};
 
 /// The figure from all held-out PIT values and the number of rows that count as independent.
 pub(in crate::report) fn figure(pit: &[f64], independent_rows: f64) -> Option<Figure> {

@@ -5,7 +5,8 @@ use crate::report::MENTIONED;
 use crate::report::figure::{Figure, Image, Legend};
 use crate::report::scale::{Scale, extent};
 use crate::report::svg::{Anchor, Svg};
-use crate::report::text::{probability, shorten};
+use crate::report::text::shorten;
+use crate::words::number::probability;
 use twincal::calibrate::{ComponentSummary, TermSummary};
 
 const ROW: f64 = 19.0;

@@ -4,8 +4,8 @@ use crate::report::figure::{Figure, Image, legend};
 use crate::report::plot::{Frame, Panel, thin, thin_band};
 use crate::report::scale::extent;
 use crate::report::svg::Svg;
-use crate::report::text::number;
 use crate::report::view::{Joint, rmse, rows, stands_still_between};
+use crate::words::number::number;
 use std::ops::Range;
 use twincal::validate::Trace;
 

@@ -9,6 +9,7 @@ use super::subtree::WRITTEN_OUT;
 use super::tally::Threshold;
 use super::tree::{Choice, Level, Root, Tree};
 use pulp::Simd;
+use pulp::bytemuck::Pod;
 
 /// A column that is decided above the tasks.
 pub(super) struct Top<V> {
@@ -31,10 +32,7 @@ pub(super) struct Plan<V> {
 /// Makes the tables.
 pub(super) fn plan<S: Simd>(about: Root<'_>) -> Plan<S::f64s> {
     let Root {
-        standard,
-        prior,
-        certain,
-        least,
+        standard, certain, ..
     } = about;
     let lane_components = S::F64_LANES.ilog2() as usize;
     let free = standard.blocks.len() - certain;
@@ -43,122 +41,176 @@ pub(super) fn plan<S: Simd>(about: Root<'_>) -> Plan<S::f64s> {
     let mut levels = Vec::new();
     let mut top = Vec::new();
     for (index, block) in standard.blocks.iter().enumerate() {
-        let seen: Vec<usize> = (0..index)
-            .filter(|&e| standard.blocks[e].family == block.family)
-            .collect();
-        let sure = seen.iter().filter(|&&e| e < certain).count();
-        // Number of the component among those that are branched on: the first ones are the lanes.
-        let number = index.checked_sub(certain);
-        let in_lanes = number.is_none_or(|number| number < lane_components);
-        let below = seen
-            .iter()
-            .filter(|&&e| e >= certain + lane_components)
-            .count();
-        let factor = |lane: usize, count: usize| {
-            let in_lane = seen
-                .iter()
-                .filter(|&&e| {
-                    (certain..certain + lane_components).contains(&e)
-                        && lane >> (e - certain) & 1 == 1
-                })
-                .count();
-            let members = (sure + in_lane + count).min(seen.len());
-            prior.next(block.family, members, seen.len())
-        };
+        let decision = Decision::new(about, &kin, index);
         for d in block.range() {
-            let first = d == block.start;
-            let root = standard.precision[d].sqrt();
-            let counts = if first { 0..=below } else { 0..=0 };
-            let include: Vec<S::f64s> = counts
-                .clone()
-                .map(|count| {
-                    from_lanes(|lane| match first {
-                        true if !kin.may_enter(index, lane) => 0.0,
-                        true => factor(lane, count).0 * block.factor * root,
-                        false => root,
-                    })
-                })
-                .collect();
-            let exclude: Vec<S::f64s> = counts
-                .map(|count| {
-                    from_lanes(|lane| match first {
-                        true if !kin.may_stay_out(index, lane) => 0.0,
-                        true => factor(lane, count).1,
-                        false => 1.0,
-                    })
-                })
-                .collect();
-            if in_lanes {
+            let level = decision.level(d, counters[block.family]);
+            if decision.in_lanes() {
                 top.push(Top {
-                    bit: number,
-                    first,
-                    odds: (include[0], exclude[0]),
+                    bit: decision.number,
+                    first: d == block.start,
+                    odds: (level.include[0], level.exclude[0]),
                 });
             }
-            let (shift, mask) = counters[block.family];
-            levels.push(Level {
-                center: from_lanes(|_| standard.center[d]),
-                precision: standard.precision[d],
-                include,
-                exclude,
-                shift,
-                mask: if first { mask } else { 0 },
-                step: u32::from(first && !in_lanes) << shift,
-                bit: number.map_or(0, |number| 1 << number),
-                needs: kin.needs(index),
-                bound_by: kin.bound_by(index),
-                choice: match (number, first) {
-                    (None, _) => Choice::Certain,
-                    (_, true) => Choice::Free,
-                    (_, false) => Choice::Follows,
-                },
-                left: standard.blocks.len() - index,
-            });
+            levels.push(level);
         }
     }
-    for filler in free..lane_components {
+    for lane_bit in free..lane_components {
         let odds = (from_lanes(|_| 0.0), from_lanes(|_| 1.0));
         top.push(Top {
-            bit: Some(filler),
+            bit: Some(lane_bit),
             first: true,
             odds,
         });
-        levels.push(Level {
-            center: from_lanes(|_| 0.0),
-            precision: 1.0,
-            include: vec![odds.0],
-            exclude: vec![odds.1],
-            shift: 0,
-            mask: 0,
-            step: 0,
-            bit: 1 << filler,
-            needs: 0,
-            bound_by: 0,
-            choice: Choice::Free,
-            left: 0,
-        });
+        levels.push(filler(lane_bit, odds));
     }
     let padded = levels.len();
     levels.reverse();
+    let tree = tree_of(about, levels, padded - top.len());
+    Plan { tree, top, padded }
+}
+
+/// The tree over `levels`, of which the first `below` are decided below the lanes.
+fn tree_of<V: Copy>(about: Root<'_>, levels: Vec<Level<V>>, below: usize) -> Tree<V> {
+    let standard = about.standard;
     let written_out = levels
         .iter()
-        .take(WRITTEN_OUT.min(padded - top.len()))
+        .take(WRITTEN_OUT.min(below))
         .take_while(|level| level.choice == Choice::Free && level.needs == 0 && level.bound_by == 0)
         .count();
     let noise = Some(standard.noise_factor())
         .filter(|x| x.is_finite())
         .unwrap_or(0.0);
-    Plan {
-        tree: Tree {
-            levels,
-            shape: standard.shape,
-            noise,
-            written_out,
-            heavy: Threshold::new(),
-            least,
-        },
-        top,
-        padded,
+    Tree {
+        levels,
+        shape: standard.shape,
+        noise,
+        written_out,
+        heavy: Threshold::new(),
+        least: about.least,
+    }
+}
+
+/// A column without data that only fills a lane: always out.
+fn filler<V: Pod>(lane_bit: usize, odds: Odds<V>) -> Level<V> {
+    Level {
+        center: from_lanes(|_| 0.0),
+        precision: 1.0,
+        include: vec![odds.0],
+        exclude: vec![odds.1],
+        shift: 0,
+        mask: 0,
+        step: 0,
+        bit: 1 << lane_bit,
+        needs: 0,
+        bound_by: 0,
+        choice: Choice::Free,
+        left: 0,
+    }
+}
+
+/// What the decision on one component depends on: those decided before it.
+struct Decision<'a> {
+    about: Root<'a>,
+    kin: &'a Kin,
+    /// Place in `standard.blocks`.
+    index: usize,
+    /// Number among the components that are branched on, the first of which are the lanes; `None` if certain.
+    number: Option<usize>,
+    /// Places of its family's components that are decided before it.
+    seen: Vec<usize>,
+    /// How many of those are certain.
+    sure: usize,
+    /// How many of those are decided below the lanes.
+    below: usize,
+}
+
+impl<'a> Decision<'a> {
+    fn new(about: Root<'a>, kin: &'a Kin, index: usize) -> Self {
+        let blocks = &about.standard.blocks;
+        let seen: Vec<usize> = (0..index)
+            .filter(|&e| blocks[e].family == blocks[index].family)
+            .collect();
+        let first_below = about.certain + kin.lane_components;
+        Self {
+            about,
+            kin,
+            index,
+            number: index.checked_sub(about.certain),
+            sure: seen.iter().filter(|&&e| e < about.certain).count(),
+            below: seen.iter().filter(|&&e| e >= first_below).count(),
+            seen,
+        }
+    }
+
+    /// Whether it is decided above the tasks.
+    fn in_lanes(&self) -> bool {
+        self.number
+            .is_none_or(|number| number < self.kin.lane_components)
+    }
+
+    /// P(z = 1) and P(z = 0) in a lane, with `count` members of the family below the lanes.
+    fn prior(&self, lane: usize, count: usize) -> (f64, f64) {
+        let certain = self.about.certain;
+        let lanes = certain..certain + self.kin.lane_components;
+        let in_lane = (self.seen.iter())
+            .filter(|&&e| lanes.contains(&e) && lane >> (e - certain) & 1 == 1)
+            .count();
+        let members = (self.sure + in_lane + count).min(self.seen.len());
+        let family = self.about.standard.blocks[self.index].family;
+        self.about.prior.next(family, members, self.seen.len())
+    }
+
+    /// Factors of the including and the excluding branch at a position, by members of the family below the lanes.
+    fn odds<V: Pod>(&self, d: usize) -> (Vec<V>, Vec<V>) {
+        let (standard, kin, index) = (self.about.standard, self.kin, self.index);
+        let block = standard.blocks[index];
+        let first = d == block.start;
+        let root = standard.precision[d].sqrt();
+        let counts = if first { 0..=self.below } else { 0..=0 };
+        let include = |count: usize| {
+            from_lanes(|lane| match first {
+                true if !kin.may_enter(index, lane) => 0.0,
+                true => self.prior(lane, count).0 * block.factor * root,
+                false => root,
+            })
+        };
+        let exclude = |count: usize| {
+            from_lanes(|lane| match first {
+                true if !kin.may_stay_out(index, lane) => 0.0,
+                true => self.prior(lane, count).1,
+                false => 1.0,
+            })
+        };
+        (
+            counts.clone().map(include).collect(),
+            counts.map(exclude).collect(),
+        )
+    }
+
+    /// The table of one of its columns; `counter`: (shift, mask) of its family's.
+    fn level<V: Pod>(&self, d: usize, counter: (u32, u32)) -> Level<V> {
+        let standard = self.about.standard;
+        let (shift, mask) = counter;
+        let first = d == standard.blocks[self.index].start;
+        let (include, exclude) = self.odds(d);
+        Level {
+            center: from_lanes(|_| standard.center[d]),
+            precision: standard.precision[d],
+            include,
+            exclude,
+            shift,
+            mask: if first { mask } else { 0 },
+            step: u32::from(first && !self.in_lanes()) << shift,
+            bit: self.number.map_or(0, |number| 1 << number),
+            needs: self.kin.needs(self.index),
+            bound_by: self.kin.bound_by(self.index),
+            choice: match (self.number, first) {
+                (None, _) => Choice::Certain,
+                (_, true) => Choice::Free,
+                (_, false) => Choice::Follows,
+            },
+            left: standard.blocks.len() - self.index,
+        }
     }
 }
 

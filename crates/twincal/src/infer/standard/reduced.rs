@@ -13,6 +13,7 @@
 use super::{Block, Standard, halves_in, nudged};
 use crate::infer::answer::Averages;
 use crate::infer::certain::Certain;
+use crate::linear_algebra::Cholesky;
 
 /// See the module's text. Sets of components are by place in `open.blocks`.
 #[derive(Debug)]
@@ -94,107 +95,23 @@ impl<'a> Reduced<'a> {
             blocks.flat_map(|block| block.range()).collect()
         };
         let (gone, left) = (positions(&gone_places), positions(&places));
-        let (size, out, count) = (full.size(), gone.len(), left.len());
-        let at = |i: usize, j: usize| full.matrix[i * size + j];
-        let square: Vec<f64> = gone
-            .iter()
-            .flat_map(|&i| gone.iter().map(move |&j| at(i, j)))
-            .collect();
-        let factor = nudged(&square, out).ok()?;
-        // L⁻¹ A_CO by columns, L⁻¹ h_C
-        let mut cross: Vec<f64> = left
-            .iter()
-            .flat_map(|&o| gone.iter().map(move |&c| at(c, o)))
-            .collect();
-        cross
-            .chunks_exact_mut(out)
-            .for_each(|column| factor.solve_lower(column));
-        let mut origin: Vec<f64> = gone.iter().map(|&c| full.offset[c]).collect();
-        factor.solve_lower(&mut origin);
-        let column = |o: usize| &cross[o * out..(o + 1) * out];
-        let inner = |x: &[f64], y: &[f64]| -> f64 { x.iter().zip(y).map(|(x, y)| x * y).sum() };
-        let mut matrix = vec![0.0; count * count];
-        for i in 0..count {
-            for j in 0..=i {
-                let value = at(left[i], left[j]) - inner(column(i), column(j));
-                matrix[i * count + j] = value;
-                matrix[j * count + i] = value;
-            }
-        }
-        let stretch: Vec<f64> = left
-            .iter()
-            .enumerate()
-            // A ⪰ V⁻¹: no Schur complement is smaller than the slab's part.
-            .map(|(i, &d)| matrix[i * count + i].max(full.precision[d]).sqrt())
-            .collect();
-        for i in 0..count {
-            for j in 0..count {
-                matrix[i * count + j] /= stretch[i] * stretch[j];
-            }
-            matrix[i * count + i] = 1.0;
-        }
-        let offset = (0..count)
-            .map(|i| (full.offset[left[i]] - inner(column(i), &origin)) / stretch[i])
-            .collect();
-        let mut response = cross;
-        for (column, stretch) in response.chunks_exact_mut(out).zip(&stretch) {
-            factor.solve_upper(column);
-            column.iter_mut().for_each(|x| *x /= stretch);
-        }
-        factor.solve_upper(&mut origin);
-        origin.iter_mut().for_each(|x| *x = -*x);
-        let with = |values: &[f64], scaled: fn(f64, f64) -> f64| -> Vec<f64> {
-            let pairs = left.iter().zip(&stretch);
-            pairs
-                .map(|(&d, stretch)| scaled(values[d], *stretch))
-                .collect()
-        };
-        let mut start = 0;
-        let blocks: Vec<Block> = places
-            .iter()
-            .map(|&b| {
-                let block = Block {
-                    start,
-                    ..full.blocks[b]
-                };
-                start += block.len;
-                block
-            })
-            .collect();
-        let mut held = full.held.clone();
-        let mut log_held = full.log_held - 0.5 * factor.log_determinant();
-        for &b in &gone_places {
-            held[full.blocks[b].family] += 1;
-            log_held += full.blocks[b].factor.ln();
-        }
-        log_held += gone
-            .iter()
-            .map(|&c| 0.5 * full.precision[c].ln())
-            .sum::<f64>();
-        let (sure, active) = (0..blocks.len()).partition(|&b| certain.sure[blocks[b].component]);
-        let lower = with(&full.lower, |lower, stretch| lower * stretch);
-        // Of those with a column that goes none acts.
-        let halves = halves_in(&full.halves, &left, |i| 1.0 / stretch[i]);
+        let elimination = Elimination::new(full, &gone, &left)?;
+        let mut matrix = elimination.complement(full, &left);
+        let stretch = unit_diagonal(full, &left, &mut matrix);
+        let offset = elimination.offset(full, &left, &stretch);
+        let (held, log_held) = elimination.held(full, &gone_places, &gone);
         let open = Standard {
-            order: left.iter().map(|&d| full.order[d]).collect(),
-            names: left.iter().map(|&d| full.names[d].clone()).collect(),
-            component: full.component.clone(),
-            blocks,
+            blocks: consecutive(full, &places),
             held,
             log_held,
-            scale: with(&full.scale, |scale, stretch| scale * stretch),
-            unit: full.unit,
             matrix,
-            center: with(&full.center, |center, stretch| center * stretch),
             offset,
-            precision: with(&full.precision, |own, stretch| own / (stretch * stretch)),
-            bounded: lower.iter().any(|&l| l > f64::NEG_INFINITY) || !halves.is_empty(),
-            lower,
-            halves,
-            shape: full.shape,
-            full_scale: full.full_scale,
-            log_constant: full.log_constant,
+            ..stretched(full, &left, &stretch)
         };
+        let (sure, active) =
+            (0..open.blocks.len()).partition(|&b| certain.sure[open.blocks[b].component]);
+        let spread = elimination.factor.inverse_diagonal();
+        let (origin, response) = elimination.solved(&stretch);
         Some(Self {
             full,
             open,
@@ -203,7 +120,7 @@ impl<'a> Reduced<'a> {
             places,
             gone_places,
             left,
-            spread: factor.inverse_diagonal(),
+            spread,
             gone,
             stretch,
             origin,
@@ -331,6 +248,179 @@ impl<'a> Reduced<'a> {
             wide.moment[d] = origin * origin - 2.0 * origin * along + square + phi * self.spread[c];
         }
         wide
+    }
+}
+
+/// A_CC factored, and what couples it to the columns that are left.
+struct Elimination {
+    /// L of A_CC.
+    factor: Cholesky,
+    /// Columns of C.
+    out: usize,
+    /// L⁻¹ A_CO by columns.
+    cross: Vec<f64>,
+    /// L⁻¹ h_C.
+    origin: Vec<f64>,
+}
+
+impl Elimination {
+    /// `None` where A_CC has no factor.
+    fn new(full: &Standard, gone: &[usize], left: &[usize]) -> Option<Self> {
+        let (size, out) = (full.size(), gone.len());
+        let at = |i: usize, j: usize| full.matrix[i * size + j];
+        let square: Vec<f64> = gone
+            .iter()
+            .flat_map(|&i| gone.iter().map(move |&j| at(i, j)))
+            .collect();
+        let factor = nudged(&square, out).ok()?;
+        let mut cross: Vec<f64> = left
+            .iter()
+            .flat_map(|&o| gone.iter().map(move |&c| at(c, o)))
+            .collect();
+        cross
+            .chunks_exact_mut(out)
+            .for_each(|column| factor.solve_lower(column));
+        let mut origin: Vec<f64> = gone.iter().map(|&c| full.offset[c]).collect();
+        factor.solve_lower(&mut origin);
+        Some(Self {
+            factor,
+            out,
+            cross,
+            origin,
+        })
+    }
+
+    /// Column o of L⁻¹ A_CO.
+    fn column(&self, o: usize) -> &[f64] {
+        &self.cross[o * self.out..(o + 1) * self.out]
+    }
+
+    /// A_OO − A_OC A_CC⁻¹ A_CO.
+    fn complement(&self, full: &Standard, left: &[usize]) -> Vec<f64> {
+        let (size, count) = (full.size(), left.len());
+        let mut matrix = vec![0.0; count * count];
+        for i in 0..count {
+            for j in 0..=i {
+                let value = full.matrix[left[i] * size + left[j]]
+                    - inner_product(self.column(i), self.column(j));
+                matrix[i * count + j] = value;
+                matrix[j * count + i] = value;
+            }
+        }
+        matrix
+    }
+
+    /// h_O − A_OC A_CC⁻¹ h_C in the units of the columns that are left.
+    fn offset(&self, full: &Standard, left: &[usize], stretch: &[f64]) -> Vec<f64> {
+        (0..left.len())
+            .map(|i| {
+                (full.offset[left[i]] - inner_product(self.column(i), &self.origin)) / stretch[i]
+            })
+            .collect()
+    }
+
+    /// `held` and `log_held` of a [`Standard`] without these columns.
+    fn held(&self, full: &Standard, gone_places: &[usize], gone: &[usize]) -> (Vec<usize>, f64) {
+        let mut held = full.held.clone();
+        let mut log_held = full.log_held - 0.5 * self.factor.log_determinant();
+        for &b in gone_places {
+            held[full.blocks[b].family] += 1;
+            log_held += full.blocks[b].factor.ln();
+        }
+        log_held += gone
+            .iter()
+            .map(|&c| 0.5 * full.precision[c].ln())
+            .sum::<f64>();
+        (held, log_held)
+    }
+
+    /// `−A_CC⁻¹ h_C`, and T in the units of the columns that are left.
+    fn solved(self, stretch: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let Self {
+            factor,
+            out,
+            cross: mut response,
+            mut origin,
+        } = self;
+        for (column, stretch) in response.chunks_exact_mut(out).zip(stretch) {
+            factor.solve_upper(column);
+            column.iter_mut().for_each(|x| *x /= stretch);
+        }
+        factor.solve_upper(&mut origin);
+        origin.iter_mut().for_each(|x| *x = -*x);
+        (origin, response)
+    }
+}
+
+/// `xᵀy`.
+fn inner_product(x: &[f64], y: &[f64]) -> f64 {
+    x.iter().zip(y).map(|(x, y)| x * y).sum()
+}
+
+/// Scales the matrix of the columns that are left to a unit diagonal; units of each per unit of `full`.
+fn unit_diagonal(full: &Standard, left: &[usize], matrix: &mut [f64]) -> Vec<f64> {
+    let count = left.len();
+    let stretch: Vec<f64> = left
+        .iter()
+        .enumerate()
+        // A ⪰ V⁻¹: no Schur complement is smaller than the slab's part.
+        .map(|(i, &d)| matrix[i * count + i].max(full.precision[d]).sqrt())
+        .collect();
+    for i in 0..count {
+        for j in 0..count {
+            matrix[i * count + j] /= stretch[i] * stretch[j];
+        }
+        matrix[i * count + i] = 1.0;
+    }
+    stretch
+}
+
+/// The blocks at some places, one after the other.
+fn consecutive(full: &Standard, places: &[usize]) -> Vec<Block> {
+    let mut start = 0;
+    places
+        .iter()
+        .map(|&b| {
+            let block = Block {
+                start,
+                ..full.blocks[b]
+            };
+            start += block.len;
+            block
+        })
+        .collect()
+}
+
+/// Some positions of `full` in other units; blocks, matrix and offset are empty.
+fn stretched(full: &Standard, left: &[usize], stretch: &[f64]) -> Standard {
+    let with = |values: &[f64], scaled: fn(f64, f64) -> f64| -> Vec<f64> {
+        let pairs = left.iter().zip(stretch);
+        pairs
+            .map(|(&d, stretch)| scaled(values[d], *stretch))
+            .collect()
+    };
+    let lower = with(&full.lower, |lower, stretch| lower * stretch);
+    // Of those with a column that goes none acts.
+    let halves = halves_in(&full.halves, left, |i| 1.0 / stretch[i]);
+    Standard {
+        order: left.iter().map(|&d| full.order[d]).collect(),
+        names: left.iter().map(|&d| full.names[d].clone()).collect(),
+        component: full.component.clone(),
+        blocks: Vec::new(),
+        held: Vec::new(),
+        log_held: 0.0,
+        scale: with(&full.scale, |scale, stretch| scale * stretch),
+        unit: full.unit,
+        matrix: Vec::new(),
+        center: with(&full.center, |center, stretch| center * stretch),
+        offset: Vec::new(),
+        precision: with(&full.precision, |own, stretch| own / (stretch * stretch)),
+        bounded: lower.iter().any(|&l| l > f64::NEG_INFINITY) || !halves.is_empty(),
+        lower,
+        halves,
+        shape: full.shape,
+        full_scale: full.full_scale,
+        log_constant: full.log_constant,
     }
 }
 

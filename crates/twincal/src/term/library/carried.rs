@@ -1,6 +1,5 @@
 //! What a library says of the payload: where it is told, which columns it has, and whether motion tells its parts apart.
 
-use super::super::inertial::last_link;
 use super::Library;
 use crate::robot::Robot;
 
@@ -9,7 +8,7 @@ impl Library {
     pub fn payload_frame<'a>(&'a self, robot: &'a Robot) -> &'a str {
         match &self.payload_frame {
             Some(name) => name,
-            None => last_link(robot),
+            None => robot.last_link(),
         }
     }
 

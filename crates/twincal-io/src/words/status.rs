@@ -1,12 +1,11 @@
 //! An effect's status and its one reason, in words.
 
-use super::text::{first_of, list, number, percent, probability};
+use super::NAMED;
+use super::list::{first_of, list};
+use super::number::{number, percent, probability};
 use twincal::calibrate::{
     Alike, Calibration, ComponentSummary, LeftOutData, LeftOutError, Status, StatusReason,
 };
-
-/// Members of a set that are named; the others are counted.
-const NAMED: usize = 3;
 
 /// Why a component has its status: "lowers the error of left-out logs by 12.0 % (5.3 standard errors)"; empty where its probability says it all.
 #[must_use]
@@ -58,13 +57,13 @@ fn left_out(error: &LeftOutError) -> String {
 }
 
 /// Names of the effects with this status that are likelier in than not.
-pub(super) fn with(status: Status, calibration: &Calibration) -> Vec<&ComponentSummary> {
+pub(crate) fn with(status: Status, calibration: &Calibration) -> Vec<&ComponentSummary> {
     let all = calibration.components.iter();
     all.filter(|own| own.status == status && own.is_in())
         .collect()
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "report"))]
 mod tests {
     use super::*;
     use crate::report::fixture;

@@ -1,78 +1,83 @@
-//! Rows on which the training data say less than on others, in words: motion that training did not have, or torque that it leaves open.
+//! Rows on which the training data say less than on others: motion that training did not have, or torque that it leaves open.
 
-use super::text::{list, number, percent, subject};
-use super::view::{Joint, unit_of};
-use twincal::assess::{Beyond, Cause, tested_beyond};
+use super::list::{list, subject};
+use super::number::{number, percent};
+use super::units::unit_of;
+use twincal::Code;
+use twincal::assess::{Assessment, Claim};
 use twincal::calibrate::Calibration;
 
 /// "34 of 80 moving rows".
-fn rows(own: &Beyond<'_>) -> String {
-    let [beyond, all] = own.rows();
+fn rows(claim: &Claim) -> String {
+    let [beyond, all] = ["rows_beyond", "rows"].map(|name| claim.number(name));
     format!("{beyond} of {all} moving rows")
 }
 
 /// Joints that are predicted worse there, or whose intervals hold less there.
-pub(super) fn worse(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
-    let own = twincal::assess::beyond(calibration).filter(|own| own.narrow || own.further_off);
-    let told = own.map(|own| {
-        let (within, beyond) = (own.within, own.beyond);
-        let (place, elsewhere) = match own.cause {
-            Cause::NewMotion => ("beyond the training motion", "within it"),
-            Cause::OpenTorque => ("where training leaves its torque open", "elsewhere"),
+pub(super) fn worse(assessment: &Assessment, calibration: &Calibration) -> Vec<String> {
+    let codes = [Code::WorseOnNewMotion, Code::WorseOnOpenTorque];
+    let claims = assessment.claims.iter();
+    let claims = claims.filter(|claim| codes.contains(&claim.code));
+    claims
+        .map(|claim| worse_there(claim, calibration))
+        .collect()
+}
+
+fn worse_there(claim: &Claim, calibration: &Calibration) -> String {
+    let (place, elsewhere) = match claim.code {
+        Code::WorseOnNewMotion => ("beyond the training motion", "within it"),
+        _ => ("where training leaves its torque open", "elsewhere"),
+    };
+    let joint = claim.subject.name();
+    let mut said = Vec::new();
+    if claim.has("rms_beyond") {
+        said.push(format!(
+            "its error is {} {}, {elsewhere} {}",
+            number(claim.number("rms_beyond"), 3),
+            unit_of(calibration, joint),
+            number(claim.number("rms_within"), 3)
+        ));
+    }
+    if claim.has("coverage95_beyond") {
+        let within = claim.number("coverage95_within");
+        let seen = match within.is_finite() {
+            false => String::new(),
+            true => format!(", {elsewhere} {}", percent(within)),
         };
-        let mut said = Vec::new();
-        if own.further_off {
-            said.push(format!(
-                "its error is {} {}, {elsewhere} {}",
-                number(beyond.rmse_calibrated, 3),
-                unit_of(joints, &beyond.joint),
-                number(within.rmse_calibrated, 3)
-            ));
-        }
-        if own.narrow {
-            let seen = match within.rows {
-                0 => String::new(),
-                _ => format!(", {elsewhere} {}", percent(within.coverage95)),
-            };
-            said.push(format!(
-                "its 95 % intervals hold {}{seen}",
-                percent(beyond.coverage95)
-            ));
-        }
-        format!(
-            "{}: {place} ({}) {}.",
-            subject(&[&beyond.joint]),
-            rows(&own),
-            said.join("; ")
-        )
-    });
-    told.collect()
+        let there = percent(claim.number("coverage95_beyond"));
+        said.push(format!("its 95 % intervals hold {there}{seen}"));
+    }
+    let said = said.join("; ");
+    format!("{}: {place} ({}) {said}.", subject(&[joint]), rows(claim))
 }
 
 /// Joints that were mostly tested there.
-pub(super) fn mostly(calibration: &Calibration) -> Vec<String> {
-    let told = |wanted: Cause| -> Vec<String> {
-        tested_beyond(calibration)
-            .filter(|own| own.cause == wanted)
-            .map(|own| format!("{} ({})", own.beyond.joint, rows(&own)))
-            .collect()
-    };
+pub(super) fn mostly(assessment: &Assessment) -> Vec<String> {
     let each = [
-        (Cause::NewMotion, "Tested mostly beyond the training motion"),
         (
-            Cause::OpenTorque,
+            Code::TestedOnNewMotion,
+            "Tested mostly beyond the training motion",
+        ),
+        (
+            Code::TestedOnOpenTorque,
             "Training leaves the torque open, known less well than its noise, on most tested rows",
         ),
     ];
-    let each = each.map(|(cause, words)| (told(cause), words)).into_iter();
+    let told = |code: Code| -> Vec<String> {
+        let claims = assessment.claims(code);
+        claims
+            .map(|claim| format!("{} ({})", claim.subject.name(), rows(claim)))
+            .collect()
+    };
+    let each = each.map(|(code, words)| (told(code), words)).into_iter();
     each.filter(|(names, _)| !names.is_empty())
         .map(|(names, words)| format!("{words}: {}.", list(&names)))
         .collect()
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "report"))]
 mod tests {
-    use super::super::verdict::tests::judged;
+    use crate::words::tests::judged;
     use twincal::validate::Split;
 
     /// The elbow beyond on so many rows, within on as many; new motion where its held-out velocity is `speed` times what it is.

@@ -1,46 +1,37 @@
-//! What the verdict rests on, a sentence each: error of held-out torque, what friction alone would leave, intervals, effects.
+//! What the answer rests on, a sentence each: error of held-out torque, what friction alone would leave, intervals, effects.
 
-use super::figures::inclusion::family_name;
-use super::limits::other_shares;
-use super::standstill::at_standstill;
-use super::status::with;
-use super::text::{count, first_of, list, number, percent};
-use super::view::{Joint, pooled_unit, unit_of};
+use super::list::{first_of, list};
+use super::number::{count, number, percent};
+use super::units::{pooled_unit, unit_of};
+use super::{NAMED, family_name, rest, with};
 use twincal::Code;
-use twincal::assess::{
-    FEW, all_at_rest, decisive, friction_only, has_standstill, independent_rows, rest_got_worse,
-    rows_of,
-};
+use twincal::assess::{Assessment, Claim, has_standstill};
 use twincal::calibrate::{Calibration, ComponentSummary, Status};
-use twincal::validate::{JointScore, Scores, Split};
+use twincal::validate::Split;
 
-/// Change of an error from which other rows are told apart.
-pub(super) const WORTH_TELLING: f64 = 0.05;
-/// The same of unfiltered torque, which has noise that no twin explains.
-const UNFILTERED_WORTH_TELLING: f64 = 0.25;
-/// The same of the share of rows that intervals hold.
+/// Share of rows at standstill from which what intervals hold there is told apart.
 const SHARE_WORTH_TELLING: f64 = 0.01;
 /// Held-out time that is told because it is short, s.
 const SHORT: f64 = 30.0;
-/// Share of the intervals' width that would have done from which they are called too wide, and the share of rows that they then hold.
-const MUCH_TOO_WIDE: f64 = 0.5;
-const SHARE_ALL: f64 = 0.99;
-/// Joints that are named; the others are counted.
-pub(super) const NAMED: usize = 3;
 
-pub(super) fn grounds(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
-    let mut out = vec![torque_error(calibration, joints)];
-    out.extend(unfiltered(calibration, joints));
+pub(super) fn grounds(assessment: &Assessment, calibration: &Calibration) -> Vec<String> {
+    let mut out: Vec<String> = torque_error(assessment, calibration).into_iter().collect();
+    out.extend(as_logged(assessment, calibration));
     // Where it got worse it is among what to mind.
-    out.extend(at_standstill(calibration, joints).filter(|_| !rest_got_worse(calibration)));
-    out.extend(friction_alone(calibration, joints));
-    out.push(held(calibration));
+    out.extend(rest::error(
+        assessment,
+        calibration,
+        &[Code::TorqueErrorAtRest],
+    ));
+    out.extend(friction_alone(assessment, calibration));
+    out.extend(held(assessment));
     out.extend(effects_found(calibration));
     out
 }
 
-/// "13.8 → 0.710 N·m, 94.9 % less".
-pub(super) fn change([before, after]: [f64; 2], unit: &str) -> String {
+/// "13.8 → 0.710 N·m, 94.9 % less", of an error by the model alone and by the twin.
+pub(super) fn change(claim: &Claim, unit: &str) -> String {
+    let [before, after] = [claim.number("rms_nominal"), claim.number("rms_calibrated")];
     let way = match after / before - 1.0 {
         c if c.abs() < 5e-4 => "unchanged".into(),
         c if c < 0.0 => format!("{} less", percent(-c)),
@@ -58,10 +49,9 @@ pub(super) fn below_cutoff(calibration: &Calibration) -> String {
 }
 
 /// RMSE before and after, of joints that move, for what the filter lets pass.
-fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
-    let validation = &calibration.validation;
-    let judged = decisive(validation);
-    let split = match validation.split {
+fn torque_error(assessment: &Assessment, calibration: &Calibration) -> Option<String> {
+    let claim = assessment.claims(Code::TorqueError).next()?;
+    let split = match calibration.validation.split {
         Split::HeldoutLogs => "held-out logs",
         Split::LeaveOneLogOut => "logs left out one at a time, by fits of the others",
         Split::LeaveLogGroupsOut => "logs left out in five groups, by fits of the others",
@@ -72,176 +62,177 @@ fn torque_error(calibration: &Calibration, joints: &[Joint<'_>]) -> String {
         Split::NotTested => "nothing was held out",
     };
     let below = below_cutoff(calibration);
-    let which = match has_standstill(validation) {
+    let which = match has_standstill(&calibration.validation) {
         true => "; joints that move",
         false => "",
     };
-    let mut findings = calibration.findings.iter();
-    let which = match findings.any(|f| f.code == Code::UrdfDynamics) {
-        true => format!("{which}; your model without the friction that its file states"),
-        false => which.to_owned(),
+    let which = match assessment.claims(Code::UrdfDynamics).next() {
+        Some(_) => format!("{which}; your model without the friction that its file states"),
+        None => which.to_owned(),
     };
-    let unit = pooled_unit(joints);
-    let told = change([judged.rmse_nominal, judged.rmse_calibrated], unit);
-    format!("Torque error (RMSE){below} on {split}{which}: {told}.")
+    let told = change(claim, pooled_unit(calibration));
+    Some(format!(
+        "Torque error (RMSE){below} on {split}{which}: {told}."
+    ))
 }
 
 /// The same of torque as it was logged, of moving joints as well, where that is another matter: "Unfiltered, … : 0.959 → 0.373 N·m; there Joint1 has
 /// 0.467 left, 136 % of its torque's standard deviation."
-fn unfiltered(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
-    if below_cutoff(calibration).is_empty() {
-        return None;
-    }
-    let unit = pooled_unit(joints);
-    let validation = &calibration.validation;
-    let judged = decisive(validation);
-    // Results of earlier versions do not have it; there rows at standstill are in it.
-    let known = rows_of(&validation.raw_moving) > 0;
-    let (raw, which) = match (known, has_standstill(validation)) {
-        (true, true) => (&validation.raw_moving, ""),
-        (_, false) => (&validation.raw, ""),
-        (false, true) => (&validation.raw, " (standstill with it)"),
-    };
-    let lost: Vec<String> = (raw.joints.iter())
-        .filter(|j| j.rows > 0 && j.rmse_calibrated > j.torque_sd)
-        .map(|j| {
-            let share = percent(j.rmse_calibrated / j.torque_sd);
-            let error = number(j.rmse_calibrated, 3);
+fn as_logged(assessment: &Assessment, calibration: &Calibration) -> Option<String> {
+    let claim = assessment.claims(Code::RawTorqueError).next()?;
+    let lost = assessment.claims(Code::JointRawErrorAboveTorque);
+    let lost: Vec<String> = lost
+        .map(|own| {
+            let (error, sd) = (own.number("rms_calibrated"), own.number("torque_sd"));
             format!(
-                "{} has {error} left, {share} of its torque's standard deviation",
-                j.joint
+                "{} has {} left, {} of its torque's standard deviation",
+                own.subject.name(),
+                number(error, 3),
+                percent(error / sd)
             )
         })
         .collect();
-    let apart = (raw.rmse_calibrated / judged.rmse_calibrated - 1.0).abs();
-    let worth_telling = apart > UNFILTERED_WORTH_TELLING || !lost.is_empty();
-    (rows_of(raw) > 0 && worth_telling).then(|| {
-        // The filter has no rows for half its window at both ends: much of a short log.
-        let ends = match held_out_seconds(calibration) < SHORT {
-            true => ", the log's ends too",
-            false => "",
-        };
-        let lost = match lost.is_empty() {
-            true => String::new(),
-            false => format!("; there {}", list(&lost)),
-        };
-        format!(
-            "Unfiltered, as it was logged and as `twincal predict` gives it (noise of torque and motion included{ends}){which}: {} → {} {unit}{lost}.",
-            number(raw.rmse_nominal, 3),
-            number(raw.rmse_calibrated, 3)
-        )
-    })
+    // The filter has no rows for half its window at both ends: much of a short log.
+    let ends = match over_all(assessment).is_some_and(|own| own.number("seconds") < SHORT) {
+        true => ", the log's ends too",
+        false => "",
+    };
+    let lost = match lost.is_empty() {
+        true => String::new(),
+        false => format!("; there {}", list(&lost)),
+    };
+    Some(format!(
+        "Unfiltered, as it was logged and as `twincal predict` gives it (noise of torque and motion included{ends}): {} → {} {}{lost}.",
+        number(claim.number("rms_nominal"), 3),
+        number(claim.number("rms_calibrated"), 3),
+        pooled_unit(calibration)
+    ))
 }
 
 /// What the first thing that anybody adds to a model would leave: errors of a model without friction are large by that alone.
-fn friction_alone(calibration: &Calibration, joints: &[Joint<'_>]) -> Option<String> {
-    let scores = decisive(&calibration.validation);
-    let left = friction_only(scores)?;
-    let told = format!("{} {}", number(left, 3), pooled_unit(joints));
-    Some(match left > scores.rmse_nominal {
-        false => {
-            let (worse, _) = with_friction(scores, joints);
-            let worse = match worse.is_empty() {
-                true => String::new(),
-                false => format!("; such a fit is worse than your model on {}", list(&worse)),
-            };
-            format!("Viscous and Coulomb friction and an offset alone would leave {told}{worse}.")
-        }
-        true => {
-            let (worse, better) = with_friction(scores, joints);
-            let better = match better {
-                0 => String::new(),
-                1 => "; better on one joint".into(),
-                n => format!("; better on {n} joints"),
-            };
-            format!(
-                "Viscous and Coulomb friction and an offset alone, fitted to the training rows, would leave {told}, more than your model does: \
-                 worse on {}{better}.",
-                list(&worse)
-            )
-        }
-    })
-}
-
-/// Joints on which friction alone would be worse than the model, the worst first, and the number of the others.
-fn with_friction(scores: &Scores, joints: &[Joint<'_>]) -> (Vec<String>, usize) {
-    let own = scores.joints.iter().filter(|joint| joint.rows > 0);
-    let own = own.filter_map(|joint| Some((joint, joint.rmse_friction?)));
-    let (mut worse, better): (Vec<_>, Vec<_>) =
-        own.partition(|(joint, left)| *left > joint.rmse_nominal);
-    let growth = |(joint, left): &(&JointScore, f64)| left - joint.rmse_nominal;
-    worse.sort_by(|a, b| growth(b).total_cmp(&growth(a)));
-    let named = worse.iter().map(|(joint, left)| {
-        let unit = unit_of(joints, &joint.joint);
+fn friction_alone(assessment: &Assessment, calibration: &Calibration) -> Option<String> {
+    let claim = assessment.claims(Code::FrictionAlone).next()?;
+    let left = claim.number("rms_friction");
+    let told = format!("{} {}", number(left, 3), pooled_unit(calibration));
+    let worse = assessment.claims(Code::JointFrictionAloneWorse);
+    let worse = worse.map(|own| {
+        let joint = own.subject.name();
         format!(
-            "{} ({} → {} {unit})",
-            joint.joint,
-            number(joint.rmse_nominal, 3),
-            number(*left, 3)
+            "{joint} ({} → {} {})",
+            number(own.number("rms_nominal"), 3),
+            number(own.number("rms_friction"), 3),
+            unit_of(calibration, joint)
         )
     });
-    (first_of(named.collect(), NAMED), better.len())
+    let worse = first_of(worse.collect(), NAMED);
+    if left <= claim.number("rms_nominal") {
+        let worse = match worse.is_empty() {
+            true => String::new(),
+            false => format!("; such a fit is worse than your model on {}", list(&worse)),
+        };
+        return Some(format!(
+            "Viscous and Coulomb friction and an offset alone would leave {told}{worse}."
+        ));
+    }
+    let better = match claim.number("joints_better") {
+        0.0 => String::new(),
+        1.0 => "; better on one joint".into(),
+        n => format!("; better on {n} joints"),
+    };
+    Some(format!(
+        "Viscous and Coulomb friction and an offset alone, fitted to the training rows, would leave {told}, more than your model does: \
+         worse on {}{better}.",
+        list(&worse)
+    ))
+}
+
+/// What is claimed of the intervals over all joints.
+fn over_all(assessment: &Assessment) -> Option<&Claim> {
+    let codes = [
+        Code::IntervalsHold,
+        Code::NarrowIntervals,
+        Code::NarrowIntervalsInMotion,
+        Code::WideIntervals,
+    ];
+    codes
+        .into_iter()
+        .find_map(|code| assessment.claims(code).next())
 }
 
 /// How much the 95 % intervals hold: of moving joints, and of all rows where some stand still.
-fn held(calibration: &Calibration) -> String {
-    let all = &calibration.validation.filtered;
-    let judged = decisive(&calibration.validation);
-    let (rows, share) = (count(rows_of(judged)), percent(judged.coverage95));
-    let seconds = held_out_seconds(calibration);
-    let short = match seconds < SHORT {
-        true => format!(" ({} s of log)", number(seconds, 2)),
-        false => String::new(),
+fn held(assessment: &Assessment) -> Option<String> {
+    let claim = over_all(assessment)?;
+    let (rows, share) = (claim.number("rows"), claim.number("coverage95"));
+    let (rows, shown) = (count(rows as u64), percent(share));
+    let short = match claim.number("seconds") {
+        seconds if seconds < SHORT => format!(" ({} s of log)", number(seconds, 2)),
+        _ => String::new(),
     };
     // Where all is inside, that is no praise.
-    let factor = calibration.validation.conformal.as_ref().map(|c| c.factor);
-    let enough = independent_rows(calibration) >= FEW;
-    let wide = match factor.filter(|f| *f < MUCH_TOO_WIDE && judged.coverage95 > SHARE_ALL) {
-        Some(factor) if enough => format!(
-            ": they are wider than they need to be, {} of their width would have done",
-            percent(factor)
+    let needed = percent(claim.number("width_needed"));
+    let enough = assessment.claims(Code::FewHeldOutRows).next().is_none();
+    let wide = match (claim.has("width_needed"), enough) {
+        (false, _) => String::new(),
+        (true, true) => format!(
+            ": they are wider than they need to be, {needed} of their width would have done"
         ),
-        Some(factor) => format!(
-            "; {} of their width would have done for these few",
-            percent(factor)
-        ),
-        None => String::new(),
+        (true, false) => format!("; {needed} of their width would have done for these few"),
     };
-    let single = match other_shares(calibration) {
+    let single = match other_shares(assessment) {
         Some(told) => format!(" On single joints, {told}."),
         None => String::new(),
     };
-    if !has_standstill(&calibration.validation) {
-        return format!(
-            "The 95 % intervals contain {share} of the {rows} held-out values{short}{wide}.{single}"
-        );
+    if !claim.has("rows_at_rest") {
+        return Some(format!(
+            "The 95 % intervals contain {shown} of the {rows} held-out values{short}{wide}.{single}"
+        ));
     }
-    let differ = (judged.coverage95 - all.coverage95).abs() > SHARE_WORTH_TELLING;
-    let all = match differ {
+    let (still, at_rest) = (
+        claim.number("rows_at_rest"),
+        claim.number("coverage95_at_rest"),
+    );
+    let moving = claim.number("rows");
+    let all = (share * moving + at_rest * still) / (moving + still);
+    let all = match (share - all).abs() > SHARE_WORTH_TELLING {
         true => format!(
             ", and {} of the {} at standstill, where they are widened",
-            percent(all_at_rest(&calibration.validation).map_or(f64::NAN, |own| own.coverage95)),
-            count(rows_of(all).saturating_sub(rows_of(judged)))
+            percent(at_rest),
+            count(still as u64)
         ),
         false => String::new(),
     };
-    format!(
-        "The 95 % intervals contain {share} of the {rows} held-out values of moving joints{short}{all}{wide}.{single}"
-    )
+    Some(format!(
+        "The 95 % intervals contain {shown} of the {rows} held-out values of moving joints{short}{all}{wide}.{single}"
+    ))
 }
 
-/// From the first held-out row to the last, in s.
-pub(super) fn held_out_seconds(calibration: &Calibration) -> f64 {
-    let scores = &calibration.validation.filtered;
-    let rows = scores.joints.iter().map(|joint| joint.rows).max();
-    rows.unwrap_or(0).saturating_sub(1) as f64 / calibration.kept_rate_hz()
+/// "a little outside 92 to 98 %: joint_2 91.1 %; within chance for so few rows: joint_3 88.3 %": joints of several whose intervals hold another
+/// share than promised, and are called neither too narrow nor too wide.
+pub(super) fn other_shares(assessment: &Assessment) -> Option<String> {
+    let codes = [
+        (Code::JointCoverageOff, "a little outside 92 to 98 %"),
+        (Code::JointCoverageByChance, "within chance for so few rows"),
+    ];
+    let each = codes.map(|(code, words)| {
+        let claims = assessment.claims(code);
+        let shares = claims.map(|own| {
+            let share = percent(own.number("coverage95"));
+            format!("{} {share}", own.subject.name())
+        });
+        (words, shares.collect::<Vec<_>>())
+    });
+    let told = each.iter().filter(|(_, shares)| !shares.is_empty());
+    let told: Vec<String> = told
+        .map(|(words, shares)| format!("{words}: {}", list(shares)))
+        .collect();
+    (!told.is_empty()).then(|| told.join("; "))
 }
 
 /// Effects up to this number are named; more are counted by family.
 const FEW_EFFECTS: usize = 3;
 
 /// "Established: viscous friction (6) and payload.", the equivalent sets and the tentative effects.
-pub(super) fn effects_found(calibration: &Calibration) -> Vec<String> {
+fn effects_found(calibration: &Calibration) -> Vec<String> {
     let established = with(Status::Established, calibration);
     let mut out = vec![match established.len() {
         0 => "No effect is established.".into(),
@@ -277,10 +268,10 @@ fn by_family(effects: &[&ComponentSummary]) -> String {
     list(&kinds)
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "report"))]
 mod tests {
-    use super::super::verdict::tests::judged;
     use super::*;
+    use crate::words::tests::judged;
     use twincal::{Code, Finding, Severity};
 
     /// Standstill rows as many as moving ones: of these the mean square is 4 before and 0.25 after; at rest `still` before and after, joint by joint.

@@ -1,30 +1,20 @@
 //! Where a twin does not hold, in sentences: the claims against it, what matters most first.
 
-use super::beyond;
-use super::findings;
-use super::shape;
-use super::standstill::{at_standstill, hardly_at_rest};
-use super::text::{THIN, list, number, percent, subject};
-use super::view::{Joint, pooled_unit, standard_deviation, unit_of};
-use twincal::assess::{
-    Assessment, CLEARLY_LOST, FEW, by_chance, decisive, has_standstill, memory, rest_got_worse,
-    too_narrow, too_wide,
-};
+use super::list::{list, subject};
+use super::number::{THIN, number, percent};
+use super::units::{pooled_unit, unit_of};
+use super::{beyond, rest, shape};
+use twincal::assess::{Assessment, has_standstill};
 use twincal::calibrate::Calibration;
-use twincal::validate::JointScore;
 use twincal::{Code, Finding, Severity};
 
-/// Shares of rows inside that nothing needs to be said of: 92 to 98 % in whole percent.
-const ABOUT: (f64, f64) = (0.915, 0.985);
-/// It in words.
+/// Share of the torque's standard deviation from which a constant would do better, not only as well.
+const CLEARLY_LOST: f64 = 1.05;
+/// Intervals that are judged.
 const LEVEL_WORDS: &str = "95 % intervals";
 
 /// Where the twin does not hold and what to mind, in the order of the report.
-pub(super) fn limits(
-    assessment: &Assessment,
-    calibration: &Calibration,
-    joints: &[Joint<'_>],
-) -> Vec<String> {
+pub(super) fn limits(assessment: &Assessment, calibration: &Calibration) -> Vec<String> {
     let mistakes = calibration.findings.iter().filter(|f| f.forbids_yes());
     let mut out: Vec<String> = mistakes.map(|f| said(f, calibration)).collect();
     if assessment.claims(Code::NotConverged).next().is_some() {
@@ -36,12 +26,13 @@ pub(super) fn limits(
         .filter(|f| f.severity == Severity::Degraded && !f.forbids_yes());
     out.extend(degraded.map(|f| said(f, calibration)));
     out.extend(too_few(assessment));
-    out.extend(limits_of_torque(assessment, calibration, joints));
-    out.extend(at_standstill(calibration, joints).filter(|_| rest_got_worse(calibration)));
-    out.extend(raw_is_worse(assessment, joints));
-    out.extend(friction_does_as_well(assessment, joints));
-    out.extend(beyond::mostly(calibration));
-    out.extend(hardly_at_rest(calibration, joints));
+    out.extend(limits_of_torque(assessment, calibration));
+    let worse = [Code::WorseAtRest, Code::WorseInFewPauses];
+    out.extend(rest::error(assessment, calibration, &worse));
+    out.extend(raw_is_worse(assessment, calibration));
+    out.extend(friction_does_as_well(assessment, calibration));
+    out.extend(beyond::mostly(assessment));
+    out.extend(rest::not_tested(assessment, calibration));
     out
 }
 
@@ -55,13 +46,6 @@ fn said(finding: &Finding, calibration: &Calibration) -> String {
         true => format!("{}: {}", finding.subject, finding.message),
         false => finding.message.clone(),
     }
-}
-
-/// Where on the page more of it stands.
-pub(super) fn pointers(calibration: &Calibration) -> Vec<String> {
-    let mut out: Vec<String> = findings::warnings(calibration).into_iter().collect();
-    out.push("Outside the motion listed under “What the data cannot tell” it extrapolates.".into());
-    out
 }
 
 /// What is shown at once where there is more to fold away.
@@ -92,11 +76,7 @@ fn named(assessment: &Assessment, code: Code) -> Vec<&str> {
 }
 
 /// What errors and intervals of held-out torque say against the twin.
-fn limits_of_torque(
-    assessment: &Assessment,
-    calibration: &Calibration,
-    joints: &[Joint<'_>],
-) -> Vec<String> {
+fn limits_of_torque(assessment: &Assessment, calibration: &Calibration) -> Vec<String> {
     let mut out = Vec::new();
     out.extend(of_joints(
         &named(assessment, Code::JointTorqueWorse),
@@ -122,76 +102,58 @@ fn limits_of_torque(
             &format!("their intervals are {words} {held}"),
         ));
     }
-    out.extend(above_torque(assessment, calibration, joints));
+    out.extend(above_torque(assessment, calibration));
     let words = "the error left is more than half of the torque's standard deviation";
     let large = named(assessment, Code::JointErrorLarge);
     out.extend(of_joints(&large, words, words));
-    out.extend(beyond::worse(calibration, joints));
-    out.extend(shape::sentences(calibration, joints));
+    out.extend(beyond::worse(assessment, calibration));
+    out.extend(shape::sentences(assessment, calibration));
     out
 }
 
 /// Joints on which a constant would predict the torque as well.
-fn above_torque(
-    assessment: &Assessment,
-    calibration: &Calibration,
-    joints: &[Joint<'_>],
-) -> Option<String> {
+fn above_torque(assessment: &Assessment, calibration: &Calibration) -> Option<String> {
     let claims = || assessment.claims(Code::JointErrorAboveTorque);
     let share = |(error, sd): (f64, f64)| error / sd;
     let numbers = || claims().map(|c| (c.number("rms_calibrated"), c.number("torque_sd")));
     let shares: Vec<String> = numbers().map(|n| whole_percent(share(n))).collect();
     let deviations: Vec<String> = claims()
         .map(|claim| {
-            let unit = unit_of(joints, claim.subject.name());
+            let unit = unit_of(calibration, claim.subject.name());
             format!("{} {unit}", number(claim.number("torque_sd"), 3))
         })
         .collect();
     let better = numbers().all(|n| share(n) > CLEARLY_LOST);
     let names = named(assessment, Code::JointErrorAboveTorque);
+    let unseen = match claims().any(|claim| claim.has("hardly_driven_held_out")) {
+        true => "; it is hardly driven in the held-out log",
+        false => "",
+    };
     let words = format!(
         "the error left is {} of the torque's standard deviation ({}): a constant would do {}{}",
         list(&shares),
         deviations.join(", "),
         if better { "better" } else { "as well" },
-        hardly_driven(&names, calibration)
+        unseen
     );
     of_joints(&names, &words, &words)
-}
-
-/// Whether such a joint is hardly driven in a held-out log: then nothing could be seen there.
-fn hardly_driven(names: &[&str], calibration: &Calibration) -> &'static str {
-    let held_out = |log: &str| {
-        let mut logs = calibration.logs.iter();
-        logs.any(|own| own.name == log && own.role == "heldout")
-    };
-    let mut findings = calibration.findings.iter();
-    let own = findings.any(|f| {
-        f.code == Code::JointNotDriven
-            && held_out(&f.subject)
-            && names.iter().any(|name| f.names(name))
-    });
-    match own {
-        true => "; it is hardly driven in the held-out log",
-        false => "",
-    }
 }
 
 /// How many rows count, how many are needed, and what to do.
 fn too_few(assessment: &Assessment) -> Option<String> {
     let claim = assessment.claims(Code::FewHeldOutRows).next()?;
-    let independent = claim.number("independent_rows");
+    let [independent, needed] = ["independent_rows", "needed"].map(|name| claim.number(name));
     // Not rounded up to what is needed.
     let shown = (10.0 * independent).floor() / 10.0;
     Some(format!(
-        "The held-out rows count as {shown:.1} independent ones over all joints, {FEW} are needed: hold out {} times as much, by another log \
+        "The held-out rows count as {shown:.1} independent ones over all joints, {needed} are needed: hold out {} times as much, by another log \
          with --heldout or by longer logs.",
-        number(FEW / independent, 2)
+        number(needed / independent, 2)
     ))
 }
 
 /// Joints on which what was found besides friction gains nothing, and by how much friction alone is better.
-fn friction_does_as_well(assessment: &Assessment, joints: &[Joint<'_>]) -> Option<String> {
+fn friction_does_as_well(assessment: &Assessment, calibration: &Calibration) -> Option<String> {
     let claims = assessment.claims(Code::JointFrictionAlone);
     let named: Vec<String> = claims
         .map(|claim| {
@@ -200,7 +162,7 @@ fn friction_does_as_well(assessment: &Assessment, joints: &[Joint<'_>]) -> Optio
                 "{joint} ({} instead of {} {})",
                 number(claim.number("rms_friction"), 3),
                 number(claim.number("rms_calibrated"), 3),
-                unit_of(joints, joint)
+                unit_of(calibration, joint)
             )
         })
         .collect();
@@ -213,13 +175,13 @@ fn friction_does_as_well(assessment: &Assessment, joints: &[Joint<'_>]) -> Optio
 }
 
 /// Torque as it was logged, where the twin predicts it worse than the model did.
-fn raw_is_worse(assessment: &Assessment, joints: &[Joint<'_>]) -> Option<String> {
+fn raw_is_worse(assessment: &Assessment, calibration: &Calibration) -> Option<String> {
     let claim = assessment.claims(Code::RawTorqueWorse).next()?;
     Some(format!(
         "Unfiltered torque is predicted worse than by the model alone: RMSE {} → {} {}.",
         number(claim.number("rms_nominal"), 3),
         number(claim.number("rms_calibrated"), 3),
-        pooled_unit(joints)
+        pooled_unit(calibration)
     ))
 }
 
@@ -228,66 +190,11 @@ fn whole_percent(share: f64) -> String {
     format!("{:.0}{THIN}%", 100.0 * share)
 }
 
-/// "a little outside 92 to 98 %: joint_2 91.1 %; within chance for so few rows: joint_3 88.3 %": joints of several whose intervals hold another
-/// share than promised, where neither [`too_narrow`] nor [`too_wide`] says so.
-pub(super) fn other_shares(calibration: &Calibration) -> Option<String> {
-    let scores = decisive(&calibration.validation);
-    let several = scores.joints.iter().filter(|j| j.rows > 0).count() > 1;
-    let memory = |j: &JointScore| memory(&calibration.noise, &j.joint);
-    let told = |j: &JointScore| too_narrow(j, memory(j)) || too_wide(j, memory(j));
-    let outside = |j: &&JointScore| {
-        let inside = (ABOUT.0..=ABOUT.1).contains(&j.coverage95);
-        several && j.rows > 0 && !inside && !told(j)
-    };
-    let (few, many): (Vec<&JointScore>, Vec<&JointScore>) = scores
-        .joints
-        .iter()
-        .filter(outside)
-        .partition(|j| by_chance(j, memory(j)));
-    let shares = |joints: &[&JointScore]| -> String {
-        let each = joints.iter();
-        let each: Vec<String> = each
-            .map(|j| format!("{} {}", j.joint, percent(j.coverage95)))
-            .collect();
-        list(&each)
-    };
-    let mut out = Vec::new();
-    if !many.is_empty() {
-        out.push(format!("a little outside 92 to 98 %: {}", shares(&many)));
-    }
-    if !few.is_empty() {
-        out.push(format!("within chance for so few rows: {}", shares(&few)));
-    }
-    (!out.is_empty()).then(|| out.join("; "))
-}
-
-/// Which held-out rows of a joint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Rows {
-    All,
-    /// Those in which it moves; all where it never does.
-    Moving,
-}
-
-/// Standard deviation of the measured held-out torque.
-pub(super) fn torque_deviation(joint: &Joint<'_>, which: Rows) -> f64 {
-    let rows = || {
-        let traces = joint.traces.iter();
-        traces.flat_map(|t| t.measured.iter().copied().zip(t.standstill.iter().copied()))
-    };
-    let left_out = which == Rows::Moving && rows().any(|(_, still)| !still);
-    standard_deviation(
-        rows()
-            .filter(|(_, still)| !(left_out && *still))
-            .map(|(torque, _)| torque),
-    )
-}
-
-#[cfg(test)]
+#[cfg(all(test, feature = "report"))]
 mod tests {
-    use super::super::verdict::tests::judged;
     use super::*;
-    use crate::report::shape::tests::pit;
+    use crate::words::tests::judged;
+    use crate::words::tests::pit;
 
     #[test]
     fn three_are_shown_and_the_rest_is_folded_but_for_one_alone() {
@@ -328,32 +235,6 @@ mod tests {
     }
 
     #[test]
-    fn the_error_of_moving_rows_is_measured_by_their_torque() {
-        let mut calibration = crate::report::fixture::two_joints();
-        for trace in &mut calibration.validation.traces {
-            let rows = trace.measured.len();
-            // ±2 while it moves, 0 while it stands still.
-            trace.standstill = (0..rows).map(|i| i % 2 == 1).collect();
-            let sign = |i: usize| if i.is_multiple_of(4) { 2.0 } else { -2.0 };
-            trace.measured = (0..rows)
-                .map(|i| if i % 2 == 1 { 0.0 } else { sign(i) })
-                .collect();
-        }
-        let joints = crate::report::view::joints(&calibration);
-        let of = |rows| torque_deviation(&joints[0], rows);
-        assert!(
-            (of(Rows::Moving) - 2.0).abs() < 0.01,
-            "{}",
-            of(Rows::Moving)
-        );
-        assert!(
-            (of(Rows::All) - 2f64.sqrt()).abs() < 0.01,
-            "{}",
-            of(Rows::All)
-        );
-    }
-
-    #[test]
     fn joints_without_a_score_are_no_rows_at_standstill() {
         let mut validation = crate::report::fixture::two_joints().validation;
         validation.moving = validation.filtered.clone();
@@ -373,7 +254,7 @@ mod tests {
             for ((score, rows), share) in scores.iter_mut().zip(rows).zip(shares) {
                 (score.rows, score.coverage95) = (rows, share);
             }
-            other_shares(&calibration)
+            crate::words::grounds::other_shares(&twincal::assess::assess(&calibration))
         };
         let thin = "\u{202f}";
         let said = format!(

@@ -1,77 +1,19 @@
 //! The recording to make next: what it has to hold so that this data's open questions get an answer.
 
-use super::grounds::NAMED;
-use super::text::{first_of, list};
+use super::NAMED;
+use super::list::{first_of, list};
 use twincal::Code;
-use twincal::assess::{FEW, driven_together, hardly_at_rest, independent_rows, new_motion};
-use twincal::calibrate::{Alike, Calibration};
-use twincal::validate::Split;
+use twincal::assess::{Assessment, Request, RequestCode};
 
 /// In one phrase, without its beginning; `None` where nothing is known that it would show.
-pub(super) fn next(calibration: &Calibration) -> Option<String> {
-    let mut holds = Vec::new();
-    let findings = || calibration.findings.iter();
-    let mut more: Vec<String> = findings()
-        .filter(|f| f.code == Code::UnseenMotion && !f.subject.is_empty())
-        .map(|f| f.subject.clone())
-        .collect();
-    more.dedup();
-    if !more.is_empty() {
-        holds.push(format!(
-            "with more motion of {}",
-            list(&first_of(more, NAMED))
-        ));
+pub(super) fn next(assessment: &Assessment) -> Option<String> {
+    if assessment.reason == Code::NotTested {
+        let words = "another motion, given with --heldout; or at least three logs to fit.";
+        return Some(words.into());
     }
-    if let Some((together, logs)) = driven_together(calibration) {
-        holds.push(format!(
-            "with no joint at rest or hardly driven, as in {} of these {logs} logs",
-            match together {
-                0 => "none".to_owned(),
-                n => format!("only {n}"),
-            }
-        ));
-    }
-    let new: Vec<String> = new_motion(calibration).map(str::to_owned).collect();
-    if !new.is_empty() {
-        holds.push(format!(
-            "with the motion of {} that only the held-out logs have",
-            list(&first_of(new, NAMED))
-        ));
-    }
-    let apart: Vec<String> = (calibration.groups.iter())
-        .filter(|group| group.alike == Alike::TheseLogs && !group.settled)
-        .filter_map(|group| group.members.first().cloned())
-        .collect();
-    if !apart.is_empty() {
-        holds.push(format!(
-            "of another motion, so that {} can be told from what is alike in these",
-            list(&first_of(apart, NAMED))
-        ));
-    }
-    if findings().any(|f| f.code == Code::QuantisedEncoder) {
-        holds.push("with the encoder’s full resolution".into());
-    }
-    let untried = calibration.validation.split == Split::LastThirty;
-    let few = independent_rows(calibration) < FEW;
+    let holds = to_fit(&assessment.next);
     let fitted = (!holds.is_empty()).then(|| format!("to fit with these, {}", holds.join("; ")));
-    // Standstill is no part of a fit.
-    let pauses = match hardly_at_rest(calibration) {
-        Some(_) => " with pauses in several poses",
-        None => "",
-    };
-    let test = match (untried, few, pauses) {
-        (true, ..) => Some(format!(
-            "another motion{pauses}, given with --heldout, as the test: so far only later parts of the fitted motion were tried"
-        )),
-        (false, true, _) => Some(format!(
-            "another motion{pauses}, given with --heldout, for a longer test"
-        )),
-        (false, false, "") => None,
-        (false, false, _) => Some(format!(
-            "another motion{pauses}, given with --heldout, to test standstill"
-        )),
-    };
-    match (fitted, test) {
+    match (fitted, to_test(&assessment.next)) {
         (None, None) => None,
         (Some(one), None) => Some(format!("one {one}.")),
         (None, Some(test)) => Some(format!("{test}.")),
@@ -79,11 +21,64 @@ pub(super) fn next(calibration: &Calibration) -> Option<String> {
     }
 }
 
-#[cfg(test)]
+/// What a log to fit has to hold.
+fn to_fit(requests: &[Request]) -> Vec<String> {
+    let of = |code: RequestCode| requests.iter().filter(move |own| own.code == code);
+    let named = |code| {
+        let names: Vec<String> = of(code).map(|own| own.subject.name().to_owned()).collect();
+        (!names.is_empty()).then(|| list(&first_of(names, NAMED)))
+    };
+    let mut out = Vec::new();
+    out.extend(named(RequestCode::MoreMotion).map(|all| format!("with more motion of {all}")));
+    out.extend(of(RequestCode::JointsTogether).map(|own| {
+        let number = |name: &str| own.evidence.get(name).unwrap_or(f64::NAN);
+        let together = match number("together") {
+            0.0 => "none".to_owned(),
+            n => format!("only {n}"),
+        };
+        let logs = number("logs");
+        format!("with no joint at rest or hardly driven, as in {together} of these {logs} logs")
+    }));
+    out.extend(
+        named(RequestCode::MotionOfHeldOutLogs)
+            .map(|all| format!("with the motion of {all} that only the held-out logs have")),
+    );
+    out.extend(named(RequestCode::AnotherMotion).map(|all| {
+        format!("of another motion, so that {all} can be told from what is alike in these")
+    }));
+    if named(RequestCode::FullResolution).is_some() {
+        out.push("with the encoder’s full resolution".into());
+    }
+    out
+}
+
+/// What a log that is not fitted has to hold, and what for.
+fn to_test(requests: &[Request]) -> Option<String> {
+    let asked = |code| requests.iter().any(|own| own.code == code);
+    let pauses = match asked(RequestCode::HeldOutPauses) {
+        true => " with pauses in several poses",
+        false => "",
+    };
+    let what = if asked(RequestCode::HeldOutLog) {
+        ", as the test: so far only later parts of the fitted motion were tried"
+    } else if asked(RequestCode::LongerHeldOutLog) {
+        ", for a longer test"
+    } else if pauses.is_empty() {
+        return None;
+    } else {
+        ", to test standstill"
+    };
+    Some(format!(
+        "another motion{pauses}, given with --heldout{what}"
+    ))
+}
+
+#[cfg(all(test, feature = "report"))]
 mod tests {
     use super::*;
     use crate::report::fixture;
-    use twincal::calibrate::{Group, LogSummary};
+    use twincal::calibrate::{Alike, Calibration, Group, LogSummary};
+    use twincal::validate::Split;
     use twincal::{Code, Finding, Severity};
 
     #[test]
@@ -96,7 +91,7 @@ mod tests {
                 log.standstill.iter_mut().for_each(|rows| *rows = 0);
             }
             change(&mut calibration);
-            next(&calibration)
+            next(&twincal::assess::assess(&calibration))
         };
         assert_eq!(of(&|_| ()), None);
         let untried = of(&|c| c.validation.split = Split::LastThirty);
@@ -122,6 +117,7 @@ mod tests {
                 for ((log, code), joint) in logs.zip(joints) {
                     let words = format!("joint `{joint}` …");
                     let own = Finding::new(Severity::Note, code, log.name.as_str(), words, 1);
+                    let own = own.of_joint(joint);
                     c.findings.extend((!joint.is_empty()).then_some(own));
                 }
             })

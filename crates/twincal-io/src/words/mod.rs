@@ -1,0 +1,132 @@
+//! The one place that makes sentences of what may be concluded: codes and numbers in, English out. Terminal, page, `predict`, `export` and `diff` show
+//! these sentences; none of them decides anything.
+
+mod beyond;
+#[cfg(feature = "report")]
+mod compact;
+mod family;
+mod grounds;
+mod headline;
+mod intervals;
+mod limits;
+pub(crate) mod list;
+mod next;
+pub(crate) mod number;
+mod remedy;
+mod rest;
+mod shape;
+mod status;
+pub(crate) mod units;
+
+#[cfg(feature = "report")]
+pub(crate) use compact::compact;
+pub(crate) use family::family_name;
+pub use intervals::drawn_alike;
+#[cfg(feature = "report")]
+pub(crate) use intervals::guarantee;
+pub use number::percent;
+pub use remedy::{Remedy, When, remedy};
+pub use status::reason;
+pub(crate) use status::with;
+pub use units::pooled_unit;
+
+use twincal::Code;
+use twincal::assess::{Assessment, assess};
+use twincal::calibrate::Calibration;
+
+/// Joints and effects that a sentence names; the others are counted.
+const NAMED: usize = 3;
+
+/// Whether the calibrated torque can be used, in words.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Answer {
+    /// May it be used?
+    pub answer: twincal::assess::Answer,
+    /// What decides.
+    pub reason: Code,
+    /// One sentence.
+    pub headline: String,
+    /// What it rests on.
+    pub grounds: Vec<String>,
+    /// What log, sampler, held-out torque and the effects say against it: what matters most.
+    pub limits: Vec<String>,
+    /// And the rest of that.
+    pub folded: Vec<String>,
+    /// The recording to make next, where that would show more.
+    pub next: Option<String>,
+}
+
+/// What may be concluded from a calibration, in words.
+///
+/// # Example
+/// ```no_run
+/// let twin = twincal_io::load("twincal-out")?;
+/// println!("{}", twincal_io::words::answer(&twin).headline);
+/// # Ok::<(), twincal_io::error::Error>(())
+/// ```
+#[must_use]
+pub fn answer(calibration: &Calibration) -> Answer {
+    of_assessment(&assess(calibration), calibration)
+}
+
+/// The words of an assessment; the calibration has the names, units and effects.
+pub(crate) fn of_assessment(assessment: &Assessment, calibration: &Calibration) -> Answer {
+    let (answer, reason) = (assessment.answer, assessment.reason);
+    let (limits, folded) = match reason {
+        Code::NotTested => Default::default(),
+        _ => limits::fold(limits::limits(assessment, calibration)),
+    };
+    Answer {
+        answer,
+        reason,
+        headline: headline::headline(assessment, calibration),
+        grounds: grounds::grounds(assessment, calibration),
+        limits,
+        folded,
+        next: next::next(assessment),
+    }
+}
+
+#[cfg(all(test, feature = "report"))]
+pub(crate) mod tests {
+    use super::{Answer, answer};
+    use crate::report::fixture;
+    use twincal::calibrate::Calibration;
+    use twincal::validate::Pit;
+
+    /// A good twin of two joints without findings, changed; where its moving rows are not, they are as all rows.
+    pub(crate) fn changed(change: impl Fn(&mut Calibration)) -> Calibration {
+        let mut calibration = fixture::two_joints();
+        calibration.findings.clear();
+        let moving = calibration.validation.moving.clone();
+        change(&mut calibration);
+        if calibration.validation.moving == moving {
+            calibration.validation.moving = calibration.validation.filtered.clone();
+        }
+        calibration
+    }
+
+    /// What is said of it, nothing folded away.
+    pub(crate) fn judged(change: impl Fn(&mut Calibration)) -> Answer {
+        let mut answer = answer(&changed(change));
+        answer.limits.append(&mut answer.folded);
+        answer
+    }
+
+    /// PIT with this many of 20 bins' share inside the middle ten, and a slope.
+    pub(crate) fn pit(middle: f64, slope: f64) -> Pit {
+        let bin = |i: usize| {
+            let share = if (5..15).contains(&i) {
+                middle
+            } else {
+                1.0 - middle
+            };
+            share / 10.0 + slope * (i as f64 - 9.5) / 1000.0
+        };
+        Pit {
+            histogram: (0..20).map(bin).collect(),
+            distance: 0.12,
+            chance: 0.05,
+        }
+    }
+}

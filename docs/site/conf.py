@@ -1,0 +1,28 @@
+"""Sphinx settings of the documentation: the pages of docs, and a reference that is made from the program (reference.py)."""
+
+import re
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+project = "twincal"
+author = "the authors of twincal"
+release = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["version"]
+extensions = ["myst_parser"]
+myst_enable_extensions = ["deflist", "dollarmath"]
+myst_heading_anchors = 4
+exclude_patterns = ["site"]
+html_theme = "pydata_sphinx_theme"
+html_title = f"twincal {release}"
+html_theme_options = {"show_prev_next": False, "navigation_with_keys": False, "use_edit_page_button": False}
+html_show_sourcelink = False
+
+
+def setup(app):
+    """The README is no page of the site: its place is the first page."""
+
+    def first_page(_, __, source):
+        source[0] = re.sub(r"\]\((?:\.\./)+README\.md(#[^)]*)?\)", "](/index.md)", source[0])
+
+    app.connect("source-read", first_page)

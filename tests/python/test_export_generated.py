@@ -1,0 +1,238 @@
+"""Generated model files: the MJCF of a URDF in MuJoCo, the URDF of an MJCF in Pinocchio, each against the other program's own reading."""
+
+import re
+import subprocess
+import xml.etree.ElementTree as tree
+from xml.sax.saxutils import quoteattr
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+from conftest import program
+from test_dynamics import ROBOTS, configuration, moving_joints
+from test_nominal_torque import TREE, mujoco_inverse
+
+STATES = 200
+# Robots of the package, and joints that are locked.
+URDFS = {
+    "ur_description/urdf/ur5_robot.urdf": {},
+    "panda_description/urdf/panda.urdf": {"panda_finger_joint1": 0.02, "panda_finger_joint2": 0.03},
+    "kinova_description/robots/kinova.urdf": {"j2s6s200_joint_2": 0.3},
+    "a1_description/urdf/a1.urdf": {},
+    "xarm_description/urdf/xarm7.urdf": {"joint3": -0.7},
+}
+
+
+def generated(model, folder, **locked):
+    """The file of the other format, and the notes about it."""
+    arguments = [f"{joint}={position}" for joint, position in locked.items()]
+    done = subprocess.run([program("examples/export_generated"), str(model), *arguments], capture_output=True)
+    assert done.returncode == 0, done.stderr.decode()
+    file = folder / f"generated{'.xml' if str(model).endswith('urdf') else '.urdf'}"
+    file.write_bytes(done.stdout)
+    return file, done.stderr.decode()
+
+
+def states(joints, seed=11):
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-1, 1, (3, STATES, joints)) * np.reshape([np.pi, 2, 5], (3, 1, 1))
+
+
+def without_constraints(model):
+    """Limits, dry friction and equalities act as constraints in `mj_inverse`: a torque model is without."""
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    return model
+
+
+def loaded(file):
+    """MuJoCo's model, and for each joint its place."""
+    model = without_constraints(mujoco.MjModel.from_xml_path(str(file)))
+    return model, [model.joint(k).name for k in range(model.njnt)]
+
+
+def pinocchio_torque(model, q, qd, qdd, gravity=None):
+    data = model.createData()
+    if gravity is not None:
+        model.gravity.linear = np.asarray(gravity)
+    return np.array([pin.rnea(model, data, configuration(model, a), b, c) for a, b, c in zip(q, qd, qdd)])
+
+
+def require_same(ours, truth):
+    """To 1e-9 of the joint's largest torque; a joint without torque: of the robot's."""
+    scale = np.maximum(np.abs(truth).max(0), 1e-3 * np.abs(truth).max())
+    error = (np.abs(ours - truth).max(0) / scale).max()
+    print(f"largest relative error {error:.1e}")
+    assert error < 1e-9
+
+
+@pytest.mark.parametrize("name", URDFS)
+def test_mujoco_on_a_generated_mjcf_is_pinocchio_on_the_urdf(name, tmp_path):
+    file, notes = generated(ROBOTS / name, tmp_path, **URDFS[name])
+    model, joints = loaded(file)
+    truth = pin.buildModelFromUrdf(str(ROBOTS / name))
+    locked = {truth.getJointId(joint): position for joint, position in URDFS[name].items()}
+    at = np.zeros(truth.nv)
+    for joint, position in locked.items():
+        at[truth.joints[joint].idx_v] = position
+    truth = pin.buildReducedModel(truth, list(locked), configuration(truth, at))
+    assert sorted(joints) == sorted(truth.names[1:])
+    assert ("fixed where they were locked" in notes) == bool(locked)
+    q, qd, qdd = states(len(joints))
+    place = [joints.index(joint) for joint in truth.names[1:]]
+    expected = pinocchio_torque(truth, q[:, place], qd[:, place], qdd[:, place])
+    # Damping and dry friction that the URDF states are in the file; Pinocchio's recursion has none.
+    stated = {joint.get("name"): joint.find("dynamics") for joint in tree.parse(ROBOTS / name).getroot().findall("joint")}
+    for k, joint in enumerate(truth.names[1:]):
+        own = stated[joint].attrib if stated[joint] is not None else {}
+        expected[:, k] += float(own.get("damping", 0)) * qd[:, place[k]]
+        assert model.joint(joint).frictionloss[0] == pytest.approx(float(own.get("friction", 0)), rel=1e-9)
+    require_same(mujoco_inverse(model, q, qd, qdd)[:, place], expected)
+
+
+def test_limits_motors_and_names_are_in_the_mjcf(tmp_path):
+    name = "ur_description/urdf/ur5_robot.urdf"
+    file, notes = generated(ROBOTS / name, tmp_path)
+    model = mujoco.MjModel.from_xml_path(str(file))
+    for joint in tree.parse(ROBOTS / name).getroot().findall("joint"):
+        if joint.get("type") != "revolute":
+            continue
+        limit = {key: float(value) for key, value in joint.find("limit").attrib.items()}
+        own = model.joint(joint.get("name"))
+        np.testing.assert_allclose(own.range, [limit["lower"], limit["upper"]], rtol=1e-11)
+        motor = model.actuator(joint.get("name"))
+        assert motor.trnid[0] == own.id and motor.ctrlrange[1] == limit["effort"]
+        assert joint.find("child").get("link") == model.body(own.bodyid[0]).name
+    assert model.nu == 6 and "velocity limits" in notes
+    assert file.read_text().split("<!-- ")[1].startswith("Generated by twincal")
+    assert [joint for joint in moving_joints(ROBOTS / name)] == [model.joint(k).name for k in range(model.njnt)]
+
+
+@pytest.fixture
+def tree_mjcf(tmp_path):
+    file = tmp_path / "tree.xml"
+    file.write_text(TREE)
+    return file
+
+
+def without_what_no_urdf_holds(file):
+    model = without_constraints(mujoco.MjModel.from_xml_path(str(file)))
+    model.dof_armature[:] = 0
+    model.jnt_stiffness[:] = 0
+    return model
+
+
+def test_pinocchio_on_a_generated_urdf_is_mujoco_on_the_mjcf(tree_mjcf, tmp_path):
+    file, notes = generated(tree_mjcf, tmp_path)
+    truth = without_what_no_urdf_holds(tree_mjcf)
+    model = pin.buildModelFromUrdf(str(file))
+    names = [truth.joint(k).name for k in range(truth.njnt)]
+    place = [names.index(joint) for joint in model.names[1:]]
+    q, qd, qdd = states(len(names))
+    assert "gravity" in notes
+    ours = pinocchio_torque(model, q[:, place], qd[:, place], qdd[:, place], truth.opt.gravity)
+    dynamics = {joint.get("name"): joint.find("dynamics") for joint in tree.parse(file).getroot().findall("joint")}
+    ours += qd[:, place] * [float(dynamics[joint].get("damping")) for joint in model.names[1:]]
+    require_same(ours, mujoco_inverse(truth, q, qd, qdd)[:, place])
+
+
+def test_there_and_back_is_the_same_robot(tree_mjcf, tmp_path):
+    urdf, _ = generated(tree_mjcf, tmp_path)
+    file, _ = generated(urdf, tmp_path)
+    ours, names = loaded(file)
+    # A URDF states no gravity: the generated MJCF has the usual one.
+    truth = without_what_no_urdf_holds(tree_mjcf)
+    truth.opt.gravity[:] = [0, 0, -9.81]
+    assert names == [truth.joint(k).name for k in range(truth.njnt)]
+    q, qd, qdd = states(len(names))
+    require_same(mujoco_inverse(ours, q, qd, qdd), mujoco_inverse(truth, q, qd, qdd))
+
+
+NAMES = [
+    '"/><inertial mass="9"/><!--',
+    "--> ]]> <x & 'y' \"z\"",
+    "\u202egnp.exe \u2066\u05d0\u05d1",
+    "n" * 200,
+    "tab\tand\nline",
+    "&amp;&#60;",
+    "\u20ac \U0001f916 \u4e2d",
+    "-- a --- b -",
+]
+
+
+def arm_of(names):
+    """A URDF of a chain with these names of robot, links and joints."""
+    q = lambda text: quoteattr(text, {"\n": "&#10;", "\t": "&#9;", "\r": "&#13;"})
+    inertial = '<inertial><origin xyz="0.1 0.02 0"/><mass value="2"/><inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial>'
+    links = [f"<link name={q(name)}>{inertial}</link>" for name in names]
+    joints = [
+        f'<joint name={q(child)} type="continuous"><origin xyz="0.2 0 0.1" rpy="0.3 1.5707963267948966 -2"/>'
+        f"<parent link={q(parent)}/><child link={q(child)}/><axis xyz=\"0 1 0\"/><limit effort=\"9\" velocity=\"1\"/></joint>"
+        for parent, child in zip(names, names[1:])
+    ]
+    return f"<robot name={q(names[0])}>{''.join(links + joints)}</robot>"
+
+
+def test_names_are_data(tmp_path):
+    """Every name comes through both formats letter by letter, and nothing else does."""
+    file = tmp_path / "arm.urdf"
+    file.write_text(arm_of(NAMES))
+    mjcf, _ = generated(file, tmp_path)
+    model, joints = loaded(mjcf)
+    assert joints == NAMES[1:]
+    # A strict reader takes it: the names in the comment (of joints with a velocity limit) do not end it.
+    assert len(list(tree.parse(mjcf).getroot().iter("body"))) == len(NAMES)
+    assert "n" * 100 in mjcf.read_text().split("-->")[0]
+    assert [model.body(k).name for k in range(1, model.nbody)] == NAMES
+    assert model.body_mass.sum() == pytest.approx(2 * len(NAMES), rel=1e-12)
+    assert not re.search("[\u202a-\u202e\u2066-\u2069]", mjcf.read_text().split("-->")[0])
+    back, _ = generated(mjcf, tmp_path)
+    root = tree.parse(back).getroot()
+    assert root.get("name") == NAMES[0]
+    assert [link.get("name") for link in root.findall("link")] == ["world", *NAMES]
+    assert [joint.get("name") for joint in root.findall("joint")][1:] == NAMES[1:]
+    # Pinocchio's reader has its own view of names with line ends: these are left out.
+    plain = [name for name in NAMES if "\n" not in name]
+    file.write_text(arm_of(plain))
+    back, _ = generated(generated(file, tmp_path)[0], tmp_path)
+    ours, truth = pin.buildModelFromUrdf(str(back)), pin.buildModelFromUrdf(str(file))
+    assert list(ours.names)[1:] == list(truth.names)[1:] == plain[1:]
+    q, qd, qdd = states(len(plain) - 1)
+    require_same(pinocchio_torque(ours, q, qd, qdd), pinocchio_torque(truth, q, qd, qdd))
+
+
+MIMIC = """
+<robot name="gripper">
+  <link name="base"/>
+  <link name="left"><inertial><origin xyz="0 0.1 0"/><mass value="0.5"/><inertia ixx="0.001" iyy="0.001" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="right"><inertial><origin xyz="0 0.1 0.1"/><mass value="0.3"/><inertia ixx="0.001" iyy="0.001" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="tip"/>
+  <joint name="open" type="revolute"><parent link="base"/><child link="left"/><axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="0" velocity="2"/></joint>
+  <joint name="follow" type="revolute"><parent link="base"/><child link="right"/><axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="9" velocity="2"/>
+    <mimic joint="open" multiplier="-1.5" offset="0.2"/></joint>
+  <joint name="slide" type="prismatic"><parent link="left"/><child link="tip"/><axis xyz="0 0 1"/><limit lower="0" upper="0" effort="9" velocity="2"/></joint>
+</robot>
+"""
+
+
+def test_a_mimicking_joint_is_an_equality_and_a_massless_link_loads(tmp_path):
+    file = tmp_path / "gripper.urdf"
+    file.write_text(MIMIC)
+    mjcf, notes = generated(file, tmp_path)
+    model, joints = loaded(mjcf)
+    assert joints == ["open", "slide", "follow"] and model.neq == 1 and model.nu == 2
+    assert "MuJoCo refuses moving bodies without mass" in notes and "`slide`" in notes
+    np.testing.assert_allclose(model.eq_data[0][:5], [0.2, -1.5, 0, 0, 0])
+    truth = pin.buildModelFromUrdf(str(file))
+    x, v, a = states(2)
+    # Order open, slide, follow in MuJoCo; the torque of a leader is its own plus multiplier times the follower's.
+    full = lambda y, shift: np.stack([y[:, 0], y[:, 1], -1.5 * y[:, 0] + shift], 1)
+    q, qd, qdd = full(x, 0.2), full(v, 0), full(a, 0)
+    place = [joints.index(joint) for joint in truth.names[1:]]
+    expected = np.empty_like(q)
+    expected[:, place] = pinocchio_torque(truth, q[:, place], qd[:, place], qdd[:, place])
+    ours = mujoco_inverse(model, q, qd, qdd)
+    moved = [joints.index("open"), joints.index("follow")]
+    require_same(ours[:, moved], expected[:, moved])
+    # The massless tip has 1e-12 of the robot's 0.8 kg.
+    assert np.abs(ours[:, joints.index("slide")]).max() < 1e-10
