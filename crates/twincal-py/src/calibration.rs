@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use twincal::calibrate::Along;
 use twincal::posterior::draws::draw;
 use twincal_cli::session::Fitted;
-use twincal_io::report::answer;
+use twincal_io::words::answer;
 
 /// Random stream of draws that Python asks for.
 const STREAM: u64 = (1 << 32) + 3;

@@ -17,6 +17,9 @@ use twincal_cli::Failure;
 /// Random stream of its draws.
 const STREAM: u64 = (1 << 32) + 4;
 
+/// A NumPy array.
+type Numbers<'py> = Bound<'py, PyArray1<f64>>;
+
 /// A posterior of coefficients.
 #[pyclass(frozen, module = "twincal._twincal")]
 #[derive(Debug)]
@@ -119,25 +122,25 @@ pub(crate) fn regress(
 impl Regression {
     /// Posterior inclusion probability of each column.
     #[getter]
-    fn inclusion<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn inclusion<'py>(&self, py: Python<'py>) -> Numbers<'py> {
         PyArray1::from_slice(py, &self.regressed.posterior.inclusion)
     }
 
     /// Posterior mean of each coefficient.
     #[getter]
-    fn mean<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn mean<'py>(&self, py: Python<'py>) -> Numbers<'py> {
         PyArray1::from_slice(py, &self.regressed.posterior.mean)
     }
 
     /// Posterior sd of each coefficient.
     #[getter]
-    fn sd<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn sd<'py>(&self, py: Python<'py>) -> Numbers<'py> {
         PyArray1::from_slice(py, &self.regressed.posterior.sd)
     }
 
     /// Ends of the central 95 % interval of each coefficient, column * 2 + end.
     #[getter]
-    fn interval95<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn interval95<'py>(&self, py: Python<'py>) -> Numbers<'py> {
         let ends = self
             .summaries
             .iter()
@@ -181,7 +184,7 @@ impl Regression {
         &self,
         py: Python<'py>,
         rows: PyReadonlyArray1<'py, f64>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+    ) -> PyResult<(Numbers<'py>, Numbers<'py>)> {
         let rows = numbers(py, &rows)?;
         let (mean, sd) =
             pool::detached(py, None, || Ok::<_, Problem>(self.regressed.predict(rows)))?;
@@ -209,12 +212,7 @@ impl Regression {
     }
 
     /// Draws of the coefficients, draw * columns + column.
-    fn draws<'py>(
-        &self,
-        py: Python<'py>,
-        count: usize,
-        seed: u64,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn draws<'py>(&self, py: Python<'py>, count: usize, seed: u64) -> PyResult<Numbers<'py>> {
         let posterior = &self.regressed.posterior;
         let draws = pool::detached(py, None, || {
             pool::require_memory("draws", &[count, posterior.mean.len().max(1)])?;

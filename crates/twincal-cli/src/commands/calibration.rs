@@ -113,6 +113,14 @@ impl Print {
     }
 }
 
+/// A fit that ended without a result.
+pub(super) struct Ended {
+    /// Why.
+    pub(super) failure: Failure,
+    /// What was found before.
+    findings: Vec<Finding>,
+}
+
 impl Job<'_> {
     /// Calibrates and writes.
     pub(super) fn run(
@@ -128,10 +136,10 @@ impl Job<'_> {
         };
         let stored = match self.result(&watch) {
             Ok(stored) => stored,
-            Err((failure, findings)) => {
+            Err(ended) => {
                 drop(progress);
-                summary::before_the_error(&findings, terminal);
-                return Err(failure);
+                summary::before_the_error(&ended.findings, terminal);
+                return Err(ended.failure);
             }
         };
         let code = exit::of_fit(
@@ -155,18 +163,19 @@ impl Job<'_> {
         })
     }
 
-    /// Calibrates: the result as it will lie in its folder. An error comes with what was found before it.
+    /// Calibrates: the result as it will lie in its folder.
     pub(super) fn result(
         &mut self,
         watch: &dyn Fn(Stage) -> twincal::Result<()>,
-    ) -> Result<StoredTwin, (Failure, Vec<Finding>)> {
+    ) -> Result<StoredTwin, Box<Ended>> {
+        let ended = |failure, findings| Box::new(Ended { failure, findings });
         let calibration = self.calibrate(watch).map_err(|stopped| {
             let as_given = self.logs.as_given(stopped.error);
             let error = self.config.locate(self.heldout.as_given(as_given));
-            (error.into(), stopped.findings)
+            ended(error.into(), stopped.findings)
         })?;
         require_strict(self.settings.log.strict, &calibration.findings)
-            .map_err(|failure| (failure, Vec::new()))?;
+            .map_err(|failure| ended(failure, Vec::new()))?;
         Ok(StoredTwin {
             gates: self.settings.gates,
             read_as: Some(ReadAs::of(&self.settings.log, self.logs.given())),

@@ -246,7 +246,7 @@ pub struct Fitted {
 
 impl Fitted {
     fn of(job: &mut Job<'_>, watch: &dyn Fn(Stage) -> twincal::Result<()>) -> Outcome<Self> {
-        let stored = job.result(watch).map_err(|(failure, _)| failure)?;
+        let stored = job.result(watch).map_err(|ended| ended.failure)?;
         Ok(Self {
             run_log: job.run_log(&stored),
             model: Some(job.robot.source.clone()),
