@@ -1,12 +1,14 @@
 """Speed of the Python package: inverse dynamics, regressor and predictions of arrays, one core and all of them.
 
-    RAYON_NUM_THREADS=1 python benches/peers/package.py MODEL [TWIN]
+    RAYON_NUM_THREADS=1 python benches/peers/package.py MODEL [TWIN [PROGRAM]]
 
-MODEL is a URDF; TWIN, the folder of a result, adds predictions. Each line is the best of five runs.
+MODEL is a URDF; TWIN, the folder of a result, adds predictions; PROGRAM, the example torque_speed of twincal-io, the same in Rust.
+Each line is the best of five runs.
 """
 
 from __future__ import annotations
 
+import subprocess
 import sys
 import time
 
@@ -48,9 +50,14 @@ def main() -> None:
     if len(sys.argv) > 2:
         twin = twincal.Calibration.load(sys.argv[2])
         joints = len(twin.joint_names)
-        states = np.random.default_rng(1).uniform(-1.0, 1.0, (3, STATES, joints))
+        places = 0.618033988749895 * np.arange(STATES * joints)
+        states = [(2.0 * ((start + places) % 1.0) - 1.0).reshape(STATES, joints) for start in (0.1, 0.4, 0.7)]
         seconds = best(lambda: twin.predict(*states))
         print(f"predict: {1e9 * seconds / STATES:.0f} ns per state of {joints} joints")
+        if len(sys.argv) > 3:
+            told = subprocess.run([sys.argv[3], sys.argv[2], str(STATES)], capture_output=True, check=True, text=True)
+            rust = float(told.stdout)
+            print(f"Twin::torque: {1e9 * rust / STATES:.0f} ns per state; rows per second of Python over Rust: {rust / seconds:.2f}")
 
 
 if __name__ == "__main__":

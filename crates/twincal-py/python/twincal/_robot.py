@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from twincal import _twincal
@@ -170,7 +171,9 @@ class Robot:
             For arrays of other types and shapes.
         """
         shape, arrays = states(len(self.joint_names), q, qd, qdd)
-        return self._robot.inverse_dynamics(arrays).reshape(shape)
+        tau = np.empty(arrays[0].shape)
+        self._robot.inverse_dynamics(arrays, tau)
+        return tau.reshape(shape)
 
     def regressor(self, q: npt.ArrayLike, qd: npt.ArrayLike, qdd: npt.ArrayLike) -> Floats:
         """Regressor Y of the inertial parameters: τ = Y(q, q̇, q̈) π.
