@@ -22,7 +22,7 @@ mod _twincal {
     #[pymodule_export]
     use super::log::Log;
     #[pymodule_export]
-    use super::regression::{Regression, regress};
+    use super::regression::{Regression, decoys, regress};
     #[pymodule_export]
     use super::robot::Robot;
     #[pymodule_export]

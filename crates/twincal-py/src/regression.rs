@@ -55,8 +55,11 @@ impl Asked {
         let noise = match self.noise.as_str() {
             "iid" => NoiseModel::Iid,
             "ar1" => NoiseModel::Ar1,
-            "tempered" => NoiseModel::Tempered,
-            other => return Err(unknown("noise", other, "`iid`, `ar1`, `tempered`")),
+            "tempered" | "decoys" => NoiseModel::Tempered,
+            other => {
+                let known = "`iid`, `ar1`, `tempered`, `decoys`";
+                return Err(unknown("noise", other, known));
+            }
         };
         let method = match self.method.as_str() {
             "auto" => Choice::Auto,
@@ -92,21 +95,39 @@ impl Asked {
     }
 }
 
-/// Regresses `y` on columns, `x[column * rows + row]`; `breaks` are rows that start a new run.
+/// The decoys of a calibration at the states of one joint, decoy * rows + row.
+#[pyfunction]
+pub(crate) fn decoys<'py>(
+    py: Python<'py>,
+    q: PyReadonlyArray1<'py, f64>,
+    qd: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Numbers<'py>> {
+    let (q, qd) = (numbers(py, &q)?, numbers(py, &qd)?);
+    if q.len() != qd.len() {
+        let problem = format!("{} positions and {} velocities", q.len(), qd.len());
+        let failure = Failure::usage(problem, "give one velocity per position");
+        return Err(Problem::from(failure).raise(py));
+    }
+    Ok(PyArray1::from_vec(py, regression::decoys(q, qd)))
+}
+
+/// Regresses `y` on columns, `x[column * rows + row]`; `breaks` are rows that start a new run, `decoys` is laid out as `x` and may be empty.
 #[pyfunction]
 pub(crate) fn regress(
     py: Python<'_>,
     x: PyReadonlyArray1<'_, f64>,
     y: PyReadonlyArray1<'_, f64>,
+    decoys: PyReadonlyArray1<'_, f64>,
     breaks: Vec<usize>,
     asked: Asked,
 ) -> PyResult<Regression> {
-    let (x, y) = (numbers(py, &x)?, numbers(py, &y)?);
+    let (x, y, decoys) = (numbers(py, &x)?, numbers(py, &y)?, numbers(py, &decoys)?);
     let settings = asked.settings().map_err(|problem| problem.raise(py))?;
     let design = Design {
         x,
         y,
         breaks: &breaks,
+        decoys,
     };
     pool::detached(py, None, || {
         let regressed = regression::regress(design, &settings)?;
@@ -169,8 +190,8 @@ impl Regression {
 
     /// Rows that count as one.
     #[getter]
-    fn autocorrelation_time(&self) -> f64 {
-        self.regressed.autocorrelation_time
+    fn rows_per_independent(&self) -> f64 {
+        self.regressed.rows_per_independent
     }
 
     /// ln of the evidence; none with Gibbs.

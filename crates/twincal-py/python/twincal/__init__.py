@@ -12,6 +12,7 @@
 `Calibration`           assessment, effects, torque with intervals, files
 `Statistics`            what a fit takes of each log, which adds
 `SpikeSlabRegressor`    the same regression for any columns, as scikit-learn has it
+`decoys`                functions of a joint's motion that show what no column describes
 `plot`                  figures of matplotlib
 ======================  ==================================================================
 
@@ -24,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 from twincal import errors
 from twincal._calibration import Calibration, Draws, Torque, fit
+from twincal._decoys import decoys
 from twincal._log import Log
 from twincal._robot import Robot
 from twincal._statistics import Plan, Statistics
@@ -49,6 +51,7 @@ __all__ = [
     "Statistics",
     "Table",
     "Torque",
+    "decoys",
     "errors",
     "fit",
     "plot",

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils import check_random_state
+from sklearn.utils import check_array, check_random_state
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from twincal import _twincal
@@ -40,9 +40,10 @@ class SpikeSlabRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
     Parameters
     ----------
-    noise : {"iid", "ar1", "tempered"}
+    noise : {"iid", "ar1", "tempered", "decoys"}
         Independent rows; first-order autoregression; independent rows that count by the
-        autocorrelation time of the residual.
+        autocorrelation time of the residual; the same, or by what is left along the decoys of
+        `fit` where that is more, so that what no column describes counts as noise.
     method : {"auto", "exact", "gibbs"}
         How the posterior is computed.
     groups : array_like of int, shape (n_features,), optional
@@ -73,6 +74,8 @@ class SpikeSlabRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     intercept_ : float
     sigma_ : float
         Standard deviation of one row around the model.
+    rows_per_independent_ : float
+        Rows that count as one; 1 unless `noise` is "tempered" or "decoys".
     rho_ : float
         First-order autocorrelation of the noise; 0 unless `noise="ar1"`.
     log_evidence_ : float or None
@@ -105,7 +108,12 @@ class SpikeSlabRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self.random_state = random_state
 
     def fit(
-        self, X: npt.ArrayLike, y: npt.ArrayLike, *, runs: npt.ArrayLike | None = None
+        self,
+        X: npt.ArrayLike,
+        y: npt.ArrayLike,
+        *,
+        runs: npt.ArrayLike | None = None,
+        decoys: npt.ArrayLike | None = None,
     ) -> SpikeSlabRegressor:
         """Fits the model.
 
@@ -116,6 +124,9 @@ class SpikeSlabRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         runs : array_like, shape (n_samples,), optional
             Rows with another number than the row before begin a new run: noise is not correlated
             across it.
+        decoys : array_like, shape (n_samples, n_decoys), optional
+            For `noise="decoys"`: functions of what drives y that no column is made of, as
+            `twincal.decoys` makes them of a joint's motion.
 
         Returns
         -------
@@ -140,7 +151,8 @@ class SpikeSlabRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             breaks = (1 + np.flatnonzero(own[1:] != own[:-1])).tolist()
         columns = np.ascontiguousarray(rows.T).reshape(-1)
         target = np.ascontiguousarray(target, dtype=np.float64)
-        self.regression_ = _twincal.regress(columns, target, breaks, asked)
+        beside = self._decoys(decoys, len(target))
+        self.regression_ = _twincal.regress(columns, target, beside, breaks, asked)
         found = self.regression_
         self.coef_ = found.mean
         self.coef_std_ = found.sd
@@ -148,6 +160,7 @@ class SpikeSlabRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self.inclusion_probability_ = found.inclusion
         self.intercept_ = found.intercept
         self.sigma_ = found.sigma
+        self.rows_per_independent_ = found.rows_per_independent
         self.rho_ = found.rho
         self.log_evidence_ = found.log_evidence
         return self
@@ -180,6 +193,20 @@ class SpikeSlabRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         count = whole("n", n)
         drawn = self.regression_.draws(count, whole("seed", seed))
         return drawn.reshape(count, len(self.coef_))
+
+    def _decoys(self, decoys: npt.ArrayLike | None, rows: int) -> Floats:
+        """Decoy after decoy; empty unless the noise asks for them."""
+        if (decoys is None) != (self.noise != "decoys"):
+            raise ValueError(
+                'give decoys=… for noise="decoys" and for no other noise; '
+                "twincal.decoys(q, qd) makes those of a joint"
+            )
+        if decoys is None:
+            return np.zeros(0)
+        own: Floats = check_array(decoys, dtype=np.float64)
+        if len(own) != rows:
+            raise ValueError(f"decoys has shape {own.shape}; give {rows} rows, as X has")
+        return np.ascontiguousarray(own.T).reshape(-1)
 
     def _asked(self, features: int) -> _Asked:
         asked = _Asked()

@@ -393,7 +393,7 @@ impl Taken<'_> {
         }
         let cross = self.take(joint, Quantity::Decoys, block)?.values;
         let squares = self.take(joint, Quantity::DecoySquares, block)?.values;
-        let decoys = JointDecoys::of_numbers(size - 1, cross, &squares);
+        let decoys = JointDecoys::of_numbers(size - 1, cross, squares);
         decoys.ok_or_else(|| self.of_another_size(joint))
     }
 

@@ -7,7 +7,7 @@ use crate::gram::{Gram, JointGram};
 use crate::likelihood::{Columns, assemble};
 use crate::linear_algebra::Cholesky;
 use crate::prior::PriorSettings;
-use crate::statistics::{DECOYS, Unit, of_joint, residual_form};
+use crate::statistics::{Unit, of_joint, residual_form};
 
 /// Columns that are in with this probability at least may have taken something from the decoys.
 const IN_SOME_MODEL: f64 = 0.05;
@@ -74,9 +74,9 @@ pub(super) fn misfit(
             continue;
         }
         let (mut within, mut left_out) = (Ratio::default(), Ratio::default());
-        let mut unexplained = [false; DECOYS];
+        let all = &total.joints[joint].decoys;
+        let mut unexplained = vec![false; all.count()];
         for (k, unexplained) in unexplained.iter_mut().enumerate() {
-            let all = &total.joints[joint].decoys;
             let left = all.square(k) - factor * whole.form(own, all.columns(k));
             *unexplained = left > LEFT * all.square(k);
             if *unexplained {
@@ -88,7 +88,7 @@ pub(super) fn misfit(
                 continue;
             };
             let beta = of_joint(own, &acting.beta);
-            for k in (0..DECOYS).filter(|&k| unexplained[k]) {
+            for k in (0..out.count()).filter(|&k| unexplained[k]) {
                 let expected = out.square(k) + factor * acting.form(own, out.columns(k));
                 left_out.add(out.residual(k, &beta).powi(2), expected);
             }

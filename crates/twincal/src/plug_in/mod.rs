@@ -12,7 +12,7 @@ mod passband;
 mod tempering;
 mod usual;
 
-pub(crate) use tempering::fit_tempered;
+pub(crate) use tempering::{count_misfit, fit_tempered};
 
 use crate::diagnostics::integrated_autocorrelation_time;
 use crate::error::Result;

@@ -11,7 +11,6 @@ use super::{
     Fit, FitSettings, Moving, ROUNDING_OF_SUMS, correlation_time, fit_sums, start, weights,
 };
 use crate::error::Result;
-use crate::gram::Gram;
 use crate::likelihood::{Columns, NoiseSettings};
 use crate::observations::Part;
 use crate::statistics::{Sums, Training, Unit};
@@ -42,12 +41,27 @@ pub(crate) fn fit_tempered(
     let (all, known) = (Moving::All, None);
     let mut fitted = fit_sums(data, columns, settings, &white, all, known)?;
     let times = correlation_times(sums, &total, (settings.noise, &fitted));
-    let units = &training.units;
-    let kept: Vec<Gram> = (0..units.len())
-        .map(|unit| training.without(unit))
-        .collect();
+    let measured = (&training, &total, sums.cutoff);
+    fitted = count_misfit(measured, times, columns, settings, fitted)?;
+    let kept = training.all_but_each();
+    let factors = interval_factors((&training, &kept, rows), columns, settings, &fitted)?;
+    Ok((fitted, factors))
+}
+
+/// Lets misfit count as noise beside the autocorrelation times τ, in turn with the fit under both; `fitted` is that with independent rows.
+///
+/// # Errors
+/// Those of [`super::fit`].
+pub(crate) fn count_misfit(
+    (training, total, cutoff): (&Training, &Unit, f64),
+    times: Vec<f64>,
+    columns: &Columns,
+    settings: FitSettings<'_>,
+    mut fitted: Fit,
+) -> Result<Fit> {
+    let (units, kept) = (&training.units, training.all_but_each());
     for round in 1..=ROUNDS {
-        let measured = (&total, &units[..], &kept[..]);
+        let measured = (total, &units[..], &kept[..]);
         let found = misfit(measured, (columns, settings.prior), &fitted)?;
         let mut plug_in = fitted.plug_in.clone();
         plug_in.autocorrelation_time.clone_from(&times);
@@ -66,11 +80,10 @@ pub(crate) fn fit_tempered(
             ROUNDS => Moving::SlabScale,
             _ => Moving::SlabScaleRoughly,
         };
-        let known = Some(&fitted.posterior);
+        let (data, known) = ((total, cutoff), Some(&fitted.posterior));
         fitted = fit_sums(data, columns, settings, &plug_in, moving, known)?;
     }
-    let factors = interval_factors((&training, &kept, rows), columns, settings, &fitted)?;
-    Ok((fitted, factors))
+    Ok(fitted)
 }
 
 /// τ of each joint, in rows: the autocorrelation time of its residual, and what weighing the rows costs.

@@ -20,25 +20,14 @@ const REVERSAL: f64 = 0.02;
 /// ```text
 /// φ = {1, cos k q, sin k q; k = 1…8} × {1, tanh(q̇/v)}        φᵀ[X | y],   φ_kᵀφ_k
 /// ```
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct JointDecoys {
     /// Columns of the joint, or signals that they are made of.
     columns: usize,
     /// φ_kᵀ[X | y], `k * (columns + 1) + column`.
     cross: Vec<f64>,
-    /// φ_kᵀφ_k.
-    square: [f64; DECOYS],
-}
-
-impl Default for JointDecoys {
-    /// No rows yet.
-    fn default() -> Self {
-        Self {
-            columns: 0,
-            cross: Vec::new(),
-            square: [0.0; DECOYS],
-        }
-    }
+    /// φ_kᵀφ_k; empty without rows.
+    square: Vec<f64>,
 }
 
 impl JointDecoys {
@@ -48,7 +37,7 @@ impl JointDecoys {
         let signals = rows.signals();
         let width = signals + 1;
         let mut sums = vec![0.0; DECOYS * width];
-        let mut square = [0.0; DECOYS];
+        let mut square = vec![0.0; DECOYS];
         rows.visit_signals(all.len(), part.rows.clone(), &mut |range, columns| {
             let motion = [&all.q[joint], &all.qd[joint]];
             let [q, qd] = motion.map(|values| values.some(range.clone()));
@@ -88,15 +77,31 @@ impl JointDecoys {
         }
     }
 
+    /// Sums over rows of decoys that somebody else has made; φ, X and y are row after row of one column after the other.
+    pub(crate) fn of_rows(phi: &[&[f64]], x: &[&[f64]], y: &[f64]) -> Self {
+        let all = || x.iter().copied().chain([y]);
+        let cross = |phi: &&[f64]| -> Vec<f64> { all().map(|x| dot(phi, x)).collect() };
+        Self {
+            columns: x.len(),
+            cross: phi.iter().flat_map(cross).collect(),
+            square: phi.iter().map(|phi| dot(phi, phi)).collect(),
+        }
+    }
+
+    /// Number of decoys; 0 without rows.
+    pub(crate) fn count(&self) -> usize {
+        self.square.len()
+    }
+
     /// φ_kᵀ[X | y] and φ_kᵀφ_k; `None` where there are none.
-    pub(crate) fn numbers(&self) -> Option<(&[f64], &[f64; DECOYS])> {
+    pub(crate) fn numbers(&self) -> Option<(&[f64], &[f64])> {
         (!self.cross.is_empty()).then_some((&self.cross, &self.square))
     }
 
     /// Sums over so many signals from [`Self::numbers`]; `None` for another number of them.
-    pub(crate) fn of_numbers(columns: usize, cross: Vec<f64>, square: &[f64]) -> Option<Self> {
-        let square = square.try_into().ok()?;
-        (cross.len() == DECOYS * (columns + 1)).then_some(Self {
+    pub(crate) fn of_numbers(columns: usize, cross: Vec<f64>, square: Vec<f64>) -> Option<Self> {
+        let fits = square.len() == DECOYS && cross.len() == DECOYS * (columns + 1);
+        fits.then_some(Self {
             columns,
             cross,
             square,
@@ -112,7 +117,7 @@ impl JointDecoys {
         Self {
             columns: columns.len(),
             cross: own.collect(),
-            square: self.square,
+            square: self.square.clone(),
         }
     }
 
@@ -130,7 +135,7 @@ impl JointDecoys {
         Self {
             columns: recipes.columns(),
             cross: cross.collect(),
-            square: self.square,
+            square: self.square.clone(),
         }
     }
 
@@ -179,7 +184,7 @@ impl AddAssign<&JointDecoys> for JointDecoys {
 }
 
 /// All decoys at one state.
-fn decoys(q: f64, qd: f64) -> [f64; DECOYS] {
+pub(crate) fn decoys(q: f64, qd: f64) -> [f64; DECOYS] {
     let (direction, (sin, cos)) = ((qd / REVERSAL).tanh(), q.sin_cos());
     let mut all = [0.0; DECOYS];
     let (mut c, mut s) = (1.0, 0.0);

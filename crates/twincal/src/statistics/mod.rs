@@ -6,7 +6,7 @@ mod spectrum;
 mod sums;
 mod weighing;
 
-pub(crate) use decoys::{DECOYS, JointDecoys};
+pub(crate) use decoys::{JointDecoys, decoys};
 pub(crate) use log_sums::{BLOCKS, JointBlock, JointSums, LogSums};
 pub(crate) use spectrum::{Bands, Spectrum};
 pub(crate) use sums::{GROUPS, Purpose, Runs, Sums};
@@ -61,6 +61,13 @@ impl Training {
         let mut total = Unit::default();
         self.units.iter().for_each(|unit| total += unit);
         total
+    }
+
+    /// [`Self::without`] each unit.
+    pub(crate) fn all_but_each(&self) -> Vec<Gram> {
+        (0..self.units.len())
+            .map(|unit| self.without(unit))
+            .collect()
     }
 
     /// Columns and torque of all units but one.

@@ -1,14 +1,18 @@
 //! Spike-and-slab regression of any columns: the likelihood, prior and inference of a calibration without a robot.
 
+mod rows;
+
 use crate::diagnostics::integrated_autocorrelation_time;
 use crate::error::{Error, Result};
-use crate::gram::{Gram, JointAccumulator, JointGram, Workspace};
+use crate::gram::Gram;
 use crate::infer::{InferenceSettings, infer};
-use crate::likelihood::{Columns, NoiseModel, NoiseSettings, PlugIn};
-use crate::plug_in::{FitSettings, Moving, first, fit_gram};
+use crate::likelihood::{Columns, NoiseModel, NoiseSettings};
+use crate::plug_in::{FitSettings, Moving, count_misfit, first, fit_gram};
 use crate::posterior::Posterior;
 use crate::prior::PriorSettings;
+use crate::statistics::decoys as at_state;
 use crate::term::Family;
+use rows::Rows;
 use serde::{Deserialize, Serialize};
 
 /// Data of a regression.
@@ -20,6 +24,9 @@ pub struct Design<'a> {
     pub y: &'a [f64],
     /// Rows, ascending, at which a new run begins: noise is not correlated across it. Row 0 begins one anyway.
     pub breaks: &'a [usize],
+    /// Decoys, `decoys[k * rows + row]`: functions of the same state that no column is made of. What the columns leave along them comes
+    /// again with the state, so that under `Tempered` it counts as noise beside the autocorrelation. May be empty.
+    pub decoys: &'a [f64],
 }
 
 /// Everything that can be chosen.
@@ -27,7 +34,7 @@ pub struct Design<'a> {
 pub struct Settings {
     /// Component of each column, 0..C without a gap: its columns are in or out together.
     pub groups: Vec<usize>,
-    /// Likelihood; `Tempered` divides statistics by the autocorrelation time of the residual.
+    /// Likelihood; `Tempered` divides statistics by the autocorrelation time of the residual, or by its misfit along the decoys where that is more.
     pub noise: NoiseModel,
     /// A constant is in the model: columns and `y` are centred, which is a flat prior on it.
     pub intercept: bool,
@@ -51,7 +58,7 @@ pub struct Regressed {
     /// AR(1) coefficient; 0 unless `Ar1`.
     pub rho: f64,
     /// Rows that count as one; 1 unless `Tempered`.
-    pub autocorrelation_time: f64,
+    pub rows_per_independent: f64,
     /// Rows.
     pub rows: usize,
     covariance: Vec<f64>,
@@ -68,22 +75,12 @@ pub struct Regressed {
 /// # Errors
 /// [`Error::Setting`] for lengths that do not fit together, groups with a gap and numbers that are not finite; those of [`infer`].
 /// # Source
-/// paper eq. (5); method sections 5–7.
+/// paper eq. (5); method sections 5–7; misfit along decoys: [`crate::plug_in`].
 pub fn regress(design: Design<'_>, settings: &Settings) -> Result<Regressed> {
     check(&design, settings)?;
-    let (rows, count) = (design.y.len(), settings.groups.len());
-    let mean = |values: &[f64]| match settings.intercept {
-        true => values.iter().sum::<f64>() / rows as f64,
-        false => 0.0,
-    };
-    let centre = mean(design.y);
-    let offsets: Vec<f64> = design.x.chunks_exact(rows).map(mean).collect();
-    let x: Vec<f64> = (design.x.chunks_exact(rows).zip(&offsets))
-        .flat_map(|(column, offset)| column.iter().map(move |value| value - offset))
-        .collect();
-    let y: Vec<f64> = design.y.iter().map(|value| value - centre).collect();
+    let rows = Rows::new(&design, settings.intercept);
     let gram = Gram {
-        joints: vec![statistics(&x, &y, design.breaks, count)],
+        joints: vec![rows.statistics()],
     };
     let columns = columns(&settings.groups);
     let fit_settings = FitSettings {
@@ -99,31 +96,49 @@ pub fn regress(design: Design<'_>, settings: &Settings) -> Result<Regressed> {
     let start = first(1, &columns, &settings.prior);
     let mut fit = fit_gram(&gram, &columns, fit_settings, &start, Moving::All)?;
     if settings.noise == NoiseModel::Tempered {
-        let runs = residual(&x, &y, design.breaks, &fit.posterior.mean);
+        let runs = rows.residual(&fit.posterior.mean);
         let runs: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
-        let plug_in = PlugIn {
-            autocorrelation_time: vec![integrated_autocorrelation_time(&runs).max(1.0)],
-            ..fit.plug_in
-        };
-        fit = fit_gram(&gram, &columns, fit_settings, &plug_in, Moving::SlabScale)?;
+        let times = vec![integrated_autocorrelation_time(&runs).max(1.0)];
+        let training = rows.training();
+        let measured = (&training, &training.total(), 0.0);
+        fit = count_misfit(measured, times, &columns, fit_settings, fit)?;
     }
     let posterior = infer(&fit.problem, &settings.inference)?;
     let rho = fit.plug_in.rho[0];
     let products = posterior
         .mean
         .iter()
-        .zip(&offsets)
+        .zip(&rows.offsets)
         .map(|(beta, x)| beta * x);
     Ok(Regressed {
-        intercept: centre - products.sum::<f64>(),
+        intercept: rows.centre - products.sum::<f64>(),
         sigma: (posterior.noise / (1.0 - rho * rho)).sqrt(),
         rho,
-        autocorrelation_time: fit.plug_in.autocorrelation_time[0],
-        rows,
+        rows_per_independent: fit.plug_in.autocorrelation_time[0].max(fit.plug_in.misfit[0]),
+        rows: rows.y.len(),
         covariance: posterior.covariance(),
-        offsets,
+        offsets: rows.offsets,
         posterior,
     })
+}
+
+/// The decoys of a calibration for one joint, `decoys[k * rows + row]`: constant and harmonics of its position, each alone and times the direction of
+/// motion.
+///
+/// ```text
+/// {1, cos k q, sin k q; k = 1…8} × {1, tanh(q̇/v)},   v = 0.02 rad/s
+/// ```
+///
+/// # Panics
+/// If positions `q`, rad, and velocities `qd`, rad/s, are not equally many.
+#[must_use]
+pub fn decoys(q: &[f64], qd: &[f64]) -> Vec<f64> {
+    assert_eq!(q.len(), qd.len(), "one velocity per position");
+    let states: Vec<_> = q.iter().zip(qd).map(|(q, qd)| at_state(*q, *qd)).collect();
+    let count = states.first().map_or(0, |own| own.len());
+    (0..count)
+        .flat_map(|k| states.iter().map(move |own| own[k]))
+        .collect()
 }
 
 impl Regressed {
@@ -136,7 +151,7 @@ impl Regressed {
         let count = self.offsets.len();
         assert!(count > 0 && x.len().is_multiple_of(count), "whole rows");
         // the constant is as uncertain as the mean of so many rows
-        let constant = self.sigma * self.sigma * self.autocorrelation_time / self.rows as f64;
+        let constant = self.sigma * self.sigma * self.rows_per_independent / self.rows as f64;
         let of_row = |row: &[f64]| {
             let products = row
                 .iter()
@@ -170,7 +185,11 @@ fn check(design: &Design<'_>, settings: &Settings) -> Result<()> {
         );
         return refuse("x", problem, "give one column of two rows or more");
     }
-    for (key, values) in [("x", design.x), ("y", design.y)] {
+    if !design.decoys.len().is_multiple_of(rows) {
+        let problem = format!("{} numbers for {rows} rows", design.decoys.len());
+        return refuse("decoys", problem, "give one number for every row");
+    }
+    for (key, values) in [("x", design.x), ("y", design.y), ("decoys", design.decoys)] {
         if let Some(place) = values.iter().position(|value| !value.is_finite()) {
             let problem = format!("{} in row {}", values[place], place % rows);
             return refuse(key, problem, "leave out rows that are not known");
@@ -186,40 +205,6 @@ fn check(design: &Design<'_>, settings: &Settings) -> Result<()> {
         );
     }
     Ok(())
-}
-
-/// Sums over the rows.
-fn statistics(x: &[f64], y: &[f64], breaks: &[usize], count: usize) -> JointGram {
-    let rows = y.len();
-    let mut sums = JointAccumulator::new((0..count as u32).collect());
-    let mut workspace = Workspace::default();
-    for run in runs(rows, breaks) {
-        let (own, keep) = (&x[run.start..], vec![true; run.len()]);
-        sums.push_block(own, rows, &y[run], &keep, true, &mut workspace);
-    }
-    sums.finish()
-}
-
-/// Ranges of rows between breaks.
-fn runs(rows: usize, breaks: &[usize]) -> Vec<std::ops::Range<usize>> {
-    let inner = breaks.iter().copied().filter(|row| (1..rows).contains(row));
-    let mut ends: Vec<usize> = std::iter::once(0).chain(inner).chain([rows]).collect();
-    ends.sort_unstable();
-    ends.dedup();
-    ends.windows(2).map(|pair| pair[0]..pair[1]).collect()
-}
-
-/// `y − Xβ`, run by run.
-fn residual(x: &[f64], y: &[f64], breaks: &[usize], beta: &[f64]) -> Vec<Vec<f64>> {
-    let rows = y.len();
-    let mut left = y.to_vec();
-    for (column, beta) in x.chunks_exact(rows).zip(beta) {
-        left.iter_mut()
-            .zip(column)
-            .for_each(|(y, x)| *y -= beta * x);
-    }
-    let own = runs(rows, breaks).into_iter();
-    own.map(|run| left[run].to_vec()).collect()
 }
 
 /// Columns without bounds, parents or physical priors.
@@ -291,6 +276,7 @@ mod tests {
             x: &x,
             y: &y,
             breaks: &[],
+            decoys: &[],
         };
         let found = regress(design, &settings(NoiseModel::Iid, false)).unwrap();
         // β ~ N(0, v φ) with rms 1, φ ~ InvGamma(a0, b0), each column in with probability ½
@@ -338,6 +324,7 @@ mod tests {
                 x: &x,
                 y,
                 breaks: &[],
+                decoys: &[],
             };
             regress(design, &settings(NoiseModel::Iid, true)).unwrap()
         };
@@ -346,5 +333,60 @@ mod tests {
         assert!((other.posterior.mean[0] - one.posterior.mean[0]).abs() < 1e-9);
         let error = |found: &Regressed| (found.predict(&x[..2]).0[0] - found.intercept).abs();
         assert!((error(&one) - error(&other)).abs() < 1e-9);
+    }
+
+    /// No column is in: rows count by what the decoys leave, by its definition over all rows and over left-out fifths.
+    #[test]
+    fn misfit_along_decoys_counts_as_noise() {
+        let rows = 500;
+        let mut random = Random::new(5, 0);
+        let q: Vec<f64> = (0..rows).map(|i| (0.7 * i as f64).sin()).collect();
+        let decoys: Vec<f64> = (1..4)
+            .flat_map(|k| q.iter().map(move |q| (k as f64 * q).cos()))
+            .collect();
+        let mut noise = |_| random.normal();
+        let y: Vec<f64> = q
+            .iter()
+            .map(|q| (2.0 * q).cos())
+            .zip((0..rows).map(&mut noise))
+            .map(|(a, b)| a + b)
+            .collect();
+        let x: Vec<f64> = (0..rows).chain(0..rows).map(noise).collect();
+        let design = Design {
+            x: &x,
+            y: &y,
+            breaks: &[],
+            decoys: &decoys,
+        };
+        let mut hardly_in = settings(NoiseModel::Tempered, false);
+        hardly_in.prior.inclusion = Some(Inclusion::Probability(1e-9));
+        let found = regress(design, &hardly_in).unwrap();
+        let dot = |p: &[f64], q: &[f64]| -> f64 { p.iter().zip(q).map(|(p, q)| p * q).sum() };
+        let variance = dot(&y, &y) / rows as f64;
+        let ratio = |pieces: usize| {
+            let size = rows / pieces;
+            let (mut squares, mut expected) = (0.0, 0.0);
+            for phi in decoys.chunks_exact(rows) {
+                for (phi, y) in phi.chunks_exact(size).zip(y.chunks_exact(size)) {
+                    squares += dot(phi, y).powi(2);
+                    expected += dot(phi, phi);
+                }
+            }
+            squares / expected / variance
+        };
+        let misfit = ratio(1).max(ratio(5));
+        assert!(misfit > 5.0, "{misfit}");
+        let error = found.rows_per_independent / misfit - 1.0;
+        assert!(
+            error.abs() < 1e-6,
+            "{} and {misfit}",
+            found.rows_per_independent
+        );
+        let without = Design {
+            decoys: &[],
+            ..design
+        };
+        let without = regress(without, &hardly_in).unwrap();
+        assert!(without.rows_per_independent < 2.0);
     }
 }
