@@ -18,6 +18,8 @@ html_theme = "pydata_sphinx_theme"
 html_title = f"twincal {release}"
 html_theme_options = {"show_prev_next": False, "navigation_with_keys": False, "use_edit_page_button": False}
 html_show_sourcelink = False
+html_static_path = ["static"]
+html_css_files = ["notebook.css"]
 
 
 def setup(app):
