@@ -9,14 +9,17 @@ ROOT = Path(__file__).resolve().parents[2]
 project = "twincal"
 author = "the authors of twincal"
 release = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["version"]
-extensions = ["myst_parser"]
+extensions = ["myst_nb"]  # myst_parser with notebooks
+nb_execution_mode = "off"  # docs/notebooks/run executes them
 myst_enable_extensions = ["deflist", "dollarmath"]
 myst_heading_anchors = 4
-exclude_patterns = ["site"]
+exclude_patterns = ["site", "**/.ipynb_checkpoints"]
 html_theme = "pydata_sphinx_theme"
 html_title = f"twincal {release}"
 html_theme_options = {"show_prev_next": False, "navigation_with_keys": False, "use_edit_page_button": False}
 html_show_sourcelink = False
+html_static_path = ["static"]
+html_css_files = ["notebook.css"]
 
 
 def setup(app):

@@ -1,6 +1,7 @@
 """What users read holds none of the phrases of docs/words.toml: documents, schemas, help, terminal, page, and every text in the Rust sources."""
 
 import html
+import json
 import re
 import subprocess
 import tomllib
@@ -71,6 +72,20 @@ def test_documents():
     paths = [ROOT / "README.md", *sorted((ROOT / "schema").glob("*.json"))]
     paths += [path for folder in ("docs", "docs/howto") for path in sorted((ROOT / folder).glob("*.md"))]
     found = {path.name: wrong for path in paths if (wrong := banned(path.read_text()))}
+    assert not found, found
+
+
+def test_notebooks():
+    """Prose, code and printed text; not the figures, nor tables twice."""
+    found = {}
+    for path in sorted((ROOT / "docs/notebooks").glob("*.ipynb")):
+        cells = json.loads(path.read_text())["cells"]
+        own = ["".join(cell["source"]) for cell in cells]
+        outputs = [output for cell in cells for output in cell.get("outputs", [])]
+        own += ["".join(output.get("text", output.get("data", {}).get("text/plain", ""))) for output in outputs]
+        if wrong := banned("\n\n".join(own)):
+            found[path.name] = wrong
+        assert outputs and all(output["output_type"] != "error" for output in outputs), f"{path.name} is not executed"
     assert not found, found
 
 

@@ -150,7 +150,7 @@ def residual(
     ax = _axes(ax)
     ax.plot(floats("q", q)[:, own], left[:, own], ".", markersize=2, color=_BLUE)
     ax.axhline(0.0, color="black", linewidth=0.8)
-    ax.set_xlabel(f"position of {calibration.joint_names[own]}")
+    ax.set_xlabel(_motion_label(calibration, own, "position"))
     ax.set_ylabel(_label(calibration, own, "residual torque"))
     return ax
 
@@ -220,8 +220,9 @@ def law(
     ax = _axes(ax)
     ax.fill_between(x, low, high, color=_BLUE, alpha=0.25, linewidth=0.0, label="95 % interval")
     ax.plot(x, mean, color=_BLUE, label=", ".join(components))
-    ax.set_xlabel(f"{along} of {name}")
-    ax.set_ylabel(_label(calibration, calibration.joint_names.index(name), "torque found"))
+    number = calibration.joint_names.index(name)
+    ax.set_xlabel(_motion_label(calibration, number, along))
+    ax.set_ylabel(_label(calibration, number, "torque found"))
     ax.legend()
     return ax
 
@@ -229,3 +230,9 @@ def law(
 def _label(calibration: Calibration, joint: int, what: str) -> str:
     names: list[Any] = [calibration.joint_names[joint], calibration.torque_units[joint]]
     return f"{what} of {names[0]} [{names[1]}]"
+
+
+def _motion_label(calibration: Calibration, joint: int, along: str) -> str:
+    """Position or velocity with its unit, of a slider in m."""
+    unit = "m" if calibration.torque_units[joint] == "N" else "rad"
+    return f"{along} of {calibration.joint_names[joint]} [{unit}{'/s' if along == 'velocity' else ''}]"
