@@ -9,7 +9,20 @@ ROOT = Path(__file__).resolve().parents[2]
 project = "twincal"
 author = "the authors of twincal"
 release = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["version"]
-extensions = ["myst_nb"]  # myst_parser with notebooks
+extensions = [
+    "myst_nb",  # myst_parser with notebooks
+    "autoapi.extension",  # the Python package from its sources, without importing it
+    "sphinx.ext.napoleon",  # docstrings of NumPy's kind
+]
+autoapi_dirs = [str(ROOT / "crates/twincal-py/python")]
+autoapi_root = "reference/python"
+autoapi_options = ["members", "undoc-members", "imported-members", "show-module-summary"]
+autoapi_own_page_level = "class"
+autoapi_add_toctree_entry = False
+autoapi_python_class_content = "both"
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
 nb_execution_mode = "off"  # docs/notebooks/run executes them
 myst_enable_extensions = ["deflist", "dollarmath"]
 myst_heading_anchors = 4

@@ -87,9 +87,18 @@ impl Progress {
             }
             counted.as_ref().map_or(0.0, |(_, since)| since.seconds())
         };
+        if matches!(self.shown, Shown::Lines) && !begins_a_tenth(done, all) {
+            return;
+        }
         let left = left(seconds, done, all);
         self.step(&format!("{what}: {done} of {all} done{left}"));
     }
+}
+
+/// Whether the first of `all` parts of a further tenth is done: a file has ten lines of a step and not one for every part.
+fn begins_a_tenth(done: usize, all: usize) -> bool {
+    let tenth = |done: usize| 10 * done / all.max(1);
+    done == 0 || tenth(done) > tenth(done - 1)
 }
 
 /// ", about 12 s left", once a step has taken more than two seconds.
@@ -114,7 +123,13 @@ impl Drop for Progress {
 
 #[cfg(test)]
 mod tests {
-    use super::left;
+    use super::{begins_a_tenth, left};
+
+    #[test]
+    fn a_file_has_a_line_for_every_tenth() {
+        let lines = |all: usize| (0..=all).filter(|&done| begins_a_tenth(done, all)).count();
+        assert_eq!([3, 10, 64, 1000].map(lines), [4, 11, 11, 11]);
+    }
 
     #[test]
     fn what_is_left_is_estimated_beyond_two_seconds() {

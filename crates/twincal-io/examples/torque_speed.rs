@@ -1,6 +1,7 @@
 //! Seconds that `Twin::torque` takes for so many states: `torque_speed TWIN STATES`, best of five; the peer of `predict` in benches/peers/package.py.
 
 use std::error::Error;
+use std::io::Write as _;
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -23,6 +24,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         seconds = seconds.min(began.elapsed().as_secs_f64());
         assert_eq!(torque.mean.len(), numbers);
     }
-    println!("{seconds:.4}");
+    writeln!(std::io::stdout(), "{seconds:.4}")?;
     Ok(())
 }

@@ -135,20 +135,27 @@ impl Robot {
         })
     }
 
-    /// Regressor of states: state * joints * parameters + joint * parameters + body * 10 + parameter.
+    /// Regressor of states: state * joints * parameters + joint * parameters + body * 10 + parameter; likewise into an array of NumPy.
     fn regressor<'py>(
         &self,
         py: Python<'py>,
         states: States<'py>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        mut out: PyReadwriteArray1<'py, f64>,
+    ) -> PyResult<()> {
         let [q, qd, qdd] = [&states[0], &states[1], &states[2]].map(|own| numbers(py, own));
         let motion = [q?, qd?, qdd?];
-        let values = pool::detached(py, None, || {
-            let parameters = 10 * self.input.robot().bodies().len();
-            pool::require_memory("regressor", &[motion[0].len(), parameters])?;
-            Ok::<_, Problem>(self.columns(motion))
-        })?;
-        Ok(PyArray1::from_vec(py, values))
+        let values = out.as_slice_mut();
+        let values = values.map_err(|e| Problem::Panicked(e.to_string()).raise(py))?;
+        pool::detached(py, None, || {
+            self.columns(motion, values);
+            Ok::<_, Problem>(())
+        })
+    }
+
+    /// Refuses a regressor of so many numbers that the memory does not hold.
+    fn require_regressor(&self, py: Python<'_>, numbers: usize) -> PyResult<()> {
+        let parameters = 10 * self.input.robot().bodies().len();
+        pool::require_memory("regressor", &[numbers, parameters]).map_err(|e| e.raise(py))
     }
 }
 
@@ -211,7 +218,8 @@ impl Robot {
         }
     }
 
-    fn columns(&self, [q, qd, qdd]: [&[f64]; 3]) -> Vec<f64> {
+    /// Regressor of states; `values` are all its numbers.
+    fn columns(&self, [q, qd, qdd]: [&[f64]; 3], values: &mut [f64]) {
         let robot = self.input.robot();
         let dof = robot.dof();
         let parameters = 10 * robot.bodies().len();
@@ -223,13 +231,13 @@ impl Robot {
             to_body_frame(&placement)
         };
         let maps: Vec<_> = robot.bodies().into_iter().map(of_link).collect();
-        let mut values = vec![0.0; q.len() * parameters];
         let memory = || {
             let motion = [(); 3].map(|()| vec![0.0; BLOCK * dof]);
             (motion, regressor.block(robot))
         };
         let chunks = values.par_chunks_mut(BLOCK * dof * parameters).enumerate();
         chunks.for_each_init(memory, |(motion, block), (number, out)| {
+            out.fill(0.0);
             let len = out.len() / (dof * parameters);
             let at = number * BLOCK * dof..(number * BLOCK + len) * dof;
             for (own, all) in motion.iter_mut().zip([q, qd, qdd]) {
@@ -256,6 +264,5 @@ impl Robot {
                 }
             }
         });
-        values
     }
 }

@@ -118,3 +118,22 @@ def test_draws_have_the_moments_of_the_terms(result):
     assert np.abs(draws.included.mean(axis=0) - terms["pip"][live]).max() < 0.02
     again = result.draws(20_000, seed=3)
     assert np.array_equal(draws.coefficients, again.coefficients)
+
+
+def test_torque_of_a_log_is_the_program_s(arm, result, tmp_path):
+    time, q, qd, qdd, tau = arm.runs["run3"]
+    result.save(tmp_path / "twin")
+    done = run("predict", arm.folder / "run3.csv", "--twin", tmp_path / "twin", cwd=tmp_path)
+    theirs = [line.split(",") for line in done.stdout.decode().splitlines()[1:]]
+    for log in (twincal.Log.read(arm.folder / "run3.csv"), arm.log("run3")):
+        own = result.predict_log(log)
+        assert len(own.time) == len(theirs) and own.mean.shape == (len(theirs), 2)
+        for column, of in ((3, own.mean[:, 0]), (5, own.high[:, 0]), (9, own.low[:, 1])):
+            assert np.array_equal([float(row[column]) for row in theirs], of)
+        error = np.sqrt(np.mean((own.measured - own.mean) ** 2))
+        assert error < 0.05 < np.sqrt(np.mean((own.measured - own.nominal) ** 2))
+    # positions alone: the same up to what differentiating them costs
+    alone = result.predict_log(twincal.Log(time, q, name="alone"))
+    assert np.isnan(alone.measured).all()
+    near = np.interp(alone.time, own.time, own.mean[:, 1])
+    assert np.sqrt(np.mean((alone.mean[:, 1] - near) ** 2)) < 0.05

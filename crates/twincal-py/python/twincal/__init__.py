@@ -24,7 +24,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from twincal import errors
-from twincal._calibration import Calibration, Draws, Torque, fit
+from twincal._calibration import Calibration, Draws, LogTorque, Torque, fit
 from twincal._decoys import decoys
 from twincal._log import Log
 from twincal._robot import Robot
@@ -35,7 +35,7 @@ from twincal.errors import Error
 
 if TYPE_CHECKING:
     from twincal import plot
-    from twincal._regressor import SpikeSlabRegressor
+    from twincal.regressor import SpikeSlabRegressor
 
 __version__ = _version()
 
@@ -45,6 +45,7 @@ __all__ = [
     "Draws",
     "Error",
     "Log",
+    "LogTorque",
     "Plan",
     "Robot",
     "SpikeSlabRegressor",
@@ -63,7 +64,7 @@ def __getattr__(name: str) -> Any:
     import importlib
 
     if name == "SpikeSlabRegressor":
-        return importlib.import_module("twincal._regressor").SpikeSlabRegressor
+        return importlib.import_module("twincal.regressor").SpikeSlabRegressor
     if name == "plot":
         return importlib.import_module("twincal.plot")
     raise AttributeError(f"module 'twincal' has no attribute {name!r}")

@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from io import StringIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -34,6 +35,25 @@ class Torque(NamedTuple):
     """Upper end."""
     outside: npt.NDArray[np.bool_]
     """The joint is where the logs have not been, or its torque is less certain than the noise."""
+
+
+class LogTorque(NamedTuple):
+    """Torque of a log, filtered as in the fit; N rows and n joints."""
+
+    time: Floats
+    """s, shape (N,)."""
+    measured: Floats
+    """Torque of the log, shape (N, n); NaN where there is none."""
+    nominal: Floats
+    """Torque of the model alone."""
+    mean: Floats
+    """Model plus the mean of what was found, N·m or N."""
+    low: Floats
+    """Lower end of the central 95 % interval of measured torque."""
+    high: Floats
+    """Upper end."""
+    outside: npt.NDArray[np.bool_]
+    """Some joint is where the logs of the fit have not been, shape (N,)."""
 
 
 class Draws(NamedTuple):
@@ -348,6 +368,33 @@ class Calibration:
             more = ["--draws", str(whole("draws", draws))] if draws is not None else []
             arguments = ["export", "--twin", twin, "--to", to, "-o", os.fspath(path), "--json"]
             return _run([*arguments, *more, *(["--force"] if force else [])])[1]
+
+    def predict_log(self, log: Log) -> LogTorque:
+        """Torque of a log, as `twincal predict` does: velocity and acceleration where it has none.
+
+        Parameters
+        ----------
+        log : Log
+            Positions over time; torque is not needed.
+
+        Returns
+        -------
+        LogTorque
+
+        Raises
+        ------
+        twincal.Error
+            For a log that cannot be used.
+        """
+        with self._folder() as twin, _files(logs_of("log", log)) as paths:
+            text = _twincal.call(["predict", *paths, "--twin", twin])[1]
+        text = text.replace("false", "0").replace("true", "1")
+        while ",," in text:  # no measured torque
+            text = text.replace(",,", ",nan,")
+        rows = np.loadtxt(StringIO(text), delimiter=",", skiprows=1, ndmin=2)
+        joints = rows[:, 1:-1].reshape(len(rows), len(self.joint_names), 5)
+        own = (np.ascontiguousarray(joints[:, :, place]) for place in range(5))
+        return LogTorque(rows[:, 0].copy(), *own, rows[:, -1] == 1.0)
 
     def check(self, logs: Log | Iterable[Log]) -> dict[str, Any]:
         """Scores the twin on new logs, as `twincal check` does.

@@ -196,7 +196,10 @@ class Robot:
             For arrays of other types and shapes.
         """
         shape, arrays = states(len(self.joint_names), q, qd, qdd)
-        return self._robot.regressor(arrays).reshape(*shape, len(self.bodies), 10)
+        self._robot.require_regressor(arrays[0].size)
+        values = np.empty(arrays[0].size * len(self.bodies) * 10)
+        self._robot.regressor(arrays, values)
+        return values.reshape(*shape, len(self.bodies), 10)
 
     def __repr__(self) -> str:
         return f"<twincal.Robot {self.name!r}: {', '.join(self.joint_names)}>"
