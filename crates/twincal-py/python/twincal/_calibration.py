@@ -387,14 +387,17 @@ class Calibration:
             For a log that cannot be used.
         """
         with self._folder() as twin, _files(logs_of("log", log)) as paths:
-            text = _twincal.call(["predict", *paths, "--twin", twin])[1]
+            place = twin + ".csv"
+            _twincal.call(["predict", *paths, "--twin", twin, "--output", place])
+            with open(place, encoding="utf-8") as file:
+                text = file.read()
         text = text.replace("false", "0").replace("true", "1")
         while ",," in text:  # no measured torque
             text = text.replace(",,", ",nan,")
         rows = np.loadtxt(StringIO(text), delimiter=",", skiprows=1, ndmin=2)
         joints = rows[:, 1:-1].reshape(len(rows), len(self.joint_names), 5)
-        own = (np.ascontiguousarray(joints[:, :, place]) for place in range(5))
-        return LogTorque(rows[:, 0].copy(), *own, rows[:, -1] == 1.0)
+        measured, nominal, mean, low, high = np.ascontiguousarray(np.moveaxis(joints, 2, 0))
+        return LogTorque(rows[:, 0].copy(), measured, nominal, mean, low, high, rows[:, -1] == 1.0)
 
     def check(self, logs: Log | Iterable[Log]) -> dict[str, Any]:
         """Scores the twin on new logs, as `twincal check` does.
