@@ -1,6 +1,6 @@
 //! The steps of the program as functions, for programs that have arrays instead of files and want values instead of text.
 //!
-//! A fit from here and `twincal fit` run the same code ([`super::calibration::Job`]), so that the same files give the same result.
+//! A fit from here and `twincal fit` run the same code (`Job` in `calibration`), so that the same files give the same result.
 
 use super::calibration::{Job, command};
 use super::inputs::{LogInput, Long, RobotInput};
