@@ -118,21 +118,14 @@ impl Robot {
             .collect()
     }
 
-    /// Torque of states, into an array that NumPy has allocated: it asks for large pages, which is half the time of a million states.
+    /// Torque of states, into an array that NumPy has allocated: unlike a `Vec` it has large pages.
     fn inverse_dynamics<'py>(
         &self,
         py: Python<'py>,
         states: States<'py>,
-        mut out: PyReadwriteArray1<'py, f64>,
+        out: PyReadwriteArray1<'py, f64>,
     ) -> PyResult<()> {
-        let [q, qd, qdd] = [&states[0], &states[1], &states[2]].map(|own| numbers(py, own));
-        let motion = [q?, qd?, qdd?];
-        let tau = out.as_slice_mut();
-        let tau = tau.map_err(|e| Problem::Panicked(e.to_string()).raise(py))?;
-        pool::detached(py, None, || {
-            self.torque(motion, tau);
-            Ok::<_, Problem>(())
-        })
+        fill(py, &states, out, |motion, tau| self.torque(motion, tau))
     }
 
     /// Regressor of states: state * joints * parameters + joint * parameters + body * 10 + parameter; likewise into an array of NumPy.
@@ -140,15 +133,10 @@ impl Robot {
         &self,
         py: Python<'py>,
         states: States<'py>,
-        mut out: PyReadwriteArray1<'py, f64>,
+        out: PyReadwriteArray1<'py, f64>,
     ) -> PyResult<()> {
-        let [q, qd, qdd] = [&states[0], &states[1], &states[2]].map(|own| numbers(py, own));
-        let motion = [q?, qd?, qdd?];
-        let values = out.as_slice_mut();
-        let values = values.map_err(|e| Problem::Panicked(e.to_string()).raise(py))?;
-        pool::detached(py, None, || {
+        fill(py, &states, out, |motion, values| {
             self.columns(motion, values);
-            Ok::<_, Problem>(())
         })
     }
 
@@ -157,6 +145,23 @@ impl Robot {
         let parameters = 10 * self.input.robot().bodies().len();
         pool::require_memory("regressor", &[numbers, parameters]).map_err(|e| e.raise(py))
     }
+}
+
+/// Fills an array with what follows from positions, velocities and accelerations, while other threads of Python run.
+fn fill<'py>(
+    py: Python<'py>,
+    states: &States<'py>,
+    mut out: PyReadwriteArray1<'py, f64>,
+    work: impl FnOnce([&[f64]; 3], &mut [f64]) + Send,
+) -> PyResult<()> {
+    let [q, qd, qdd] = [0, 1, 2].map(|own| numbers(py, &states[own]));
+    let motion = [q?, qd?, qdd?];
+    let out = out.as_slice_mut();
+    let out = out.map_err(|e| Problem::Panicked(e.to_string()).raise(py))?;
+    pool::detached(py, None, || {
+        work(motion, out);
+        Ok::<_, Problem>(())
+    })
 }
 
 /// The outer frame, seen from a frame in it.

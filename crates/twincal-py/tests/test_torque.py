@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import twincal
-from conftest import run, torque
+from conftest import SETTINGS, run, torque
 
 pinocchio = pytest.importorskip("pinocchio")
 
@@ -137,3 +137,14 @@ def test_torque_of_a_log_is_the_program_s(arm, result, tmp_path):
     assert np.isnan(alone.measured).all()
     near = np.interp(alone.time, own.time, own.mean[:, 1])
     assert np.sqrt(np.mean((alone.mean[:, 1] - near) ** 2)) < 0.05
+
+
+def test_torque_of_a_log_where_a_joint_s_name_has_two_lines(arm, tmp_path):
+    model = tmp_path / "lines.urdf"
+    model.write_text(arm.model.read_text().replace('"elbow"', '"el&#10;bow"'))
+    robot = twincal.Robot.from_urdf(model)
+    assert "\n" in robot.joint_names[1]
+    result = twincal.fit(robot, arm.log("run1"), **SETTINGS)
+    own = result.predict_log(arm.log("run3"))
+    assert own.mean.shape == (len(own.time), 2) and np.isfinite(own.mean).all()
+    assert own.time[0] < 1.0

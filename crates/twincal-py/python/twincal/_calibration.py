@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -389,12 +390,13 @@ class Calibration:
         with self._folder() as twin, _files(logs_of("log", log)) as paths:
             place = twin + ".csv"
             _twincal.call(["predict", *paths, "--twin", twin, "--output", place])
-            with open(place, encoding="utf-8") as file:
+            with open(place, encoding="utf-8", newline="") as file:
+                next(csv.reader(file))  # names, which may hold line feeds
                 text = file.read()
         text = text.replace("false", "0").replace("true", "1")
         while ",," in text:  # no measured torque
             text = text.replace(",,", ",nan,")
-        rows = np.loadtxt(StringIO(text), delimiter=",", skiprows=1, ndmin=2)
+        rows = np.loadtxt(StringIO(text), delimiter=",", ndmin=2)
         joints = rows[:, 1:-1].reshape(len(rows), len(self.joint_names), 5)
         measured, nominal, mean, low, high = np.ascontiguousarray(np.moveaxis(joints, 2, 0))
         return LogTorque(rows[:, 0].copy(), measured, nominal, mean, low, high, rows[:, -1] == 1.0)

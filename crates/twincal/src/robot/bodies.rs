@@ -2,9 +2,7 @@
 
 use super::coordinates::Source;
 use super::inertia::{LARGEST, Moments, check};
-use super::spatial::{
-    IDENTITY, Matrix, axis_angle, is_about_x, multiply, norm, scale, transpose, z_to,
-};
+use super::spatial::{IDENTITY, Matrix, is_about_x, multiply, norm, scale, transpose, z_to};
 use super::tree::Tree;
 use super::{JointDescription, JointKind, Placement, RobotDescription};
 use crate::error::{Code, Error, Finding, Result, Severity};
@@ -83,16 +81,7 @@ pub(crate) fn lay_out(
             Source::Still(_) if joint.kind == JointKind::Fixed => (parent_body, frame),
             Source::Still(position) => {
                 let axis = unit_axis(joint, findings)?;
-                let moved = match joint.kind {
-                    JointKind::Prismatic => Placement {
-                        rotation: IDENTITY,
-                        translation: scale(position, axis),
-                    },
-                    _ => Placement {
-                        rotation: axis_angle(axis, position),
-                        translation: [0.0; 3],
-                    },
-                };
+                let moved = Placement::of_joint(joint.kind, axis, position);
                 (parent_body, frame.compose(&moved))
             }
             Source::Follows {

@@ -1,6 +1,6 @@
 //! Vectors, rotations and frames in three dimensions, on plain arrays.
 
-use super::Placement;
+use super::{JointKind, Placement};
 
 /// A vector.
 pub type Vector = [f64; 3];
@@ -137,6 +137,21 @@ pub fn z_to(axis: Vector) -> Matrix {
 }
 
 impl Placement {
+    /// What a joint adds to its own placement at a position, rad (m): a rotation about its axis, of length 1, or for a slider a shift along it.
+    #[must_use]
+    pub fn of_joint(kind: JointKind, axis: [f64; 3], position: f64) -> Self {
+        match kind {
+            JointKind::Prismatic => Self {
+                rotation: IDENTITY,
+                translation: scale(position, axis),
+            },
+            JointKind::Revolute | JointKind::Continuous | JointKind::Fixed => Self {
+                rotation: axis_angle(axis, position),
+                translation: [0.0; 3],
+            },
+        }
+    }
+
     /// The frame of the parent itself.
     pub const IDENTITY: Self = Self {
         rotation: IDENTITY,

@@ -2,7 +2,7 @@
 
 use super::Plan;
 use std::collections::BTreeMap;
-use twincal::robot::spatial::{IDENTITY, axis_angle, norm, scale};
+use twincal::robot::spatial::{norm, scale};
 use twincal::robot::{JointDescription, JointKind, Placement, Robot, RobotDescription};
 use twincal::words::quoted;
 use twincal::write_back::WriteBack;
@@ -82,16 +82,7 @@ fn still(joints: &[JointDescription], locked: &BTreeMap<String, f64>) -> Vec<Opt
 /// Makes a joint fixed at a position.
 fn fix(joint: &mut JointDescription, position: f64) {
     let axis = scale(1.0 / norm(joint.axis), joint.axis);
-    let moved = match joint.kind {
-        JointKind::Prismatic => Placement {
-            rotation: IDENTITY,
-            translation: scale(position, axis),
-        },
-        _ => Placement {
-            rotation: axis_angle(axis, position),
-            translation: [0.0; 3],
-        },
-    };
+    let moved = Placement::of_joint(joint.kind, axis, position);
     let placement = joint.placement.compose(&moved);
     *joint = JointDescription {
         placement,
