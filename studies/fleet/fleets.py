@@ -61,7 +61,8 @@ class Fleet:
     rate: int = 200  # Hz
     seed: int = 1
     kind: str = "standard"
-    sds: float = 6.0  # size of a deviation, in standard errors of one window
+    sds: float = 6.0  # size of a deviation, in standard deviations
+    of: str = "window"  # whose: the error of one window, or "units": that error and the scatter of the units
     short: bool = False  # whether there is a unit with a short log
 
     @property
@@ -133,36 +134,44 @@ class Unit:
         joint = possible[rng.integers(len(possible))]
         sign = rng.choice((-1.0, 1.0)) if kind == "zero" else 1.0
         error = float(np.median(errors[joint]))
-        size = float(sign * fleet.sds * error)
-        spread, beside = {
-            "mass": lambda: (SCATTER["adapter"] * self.type.adapter[0], self.adapter - self.type.adapter[0]),
-            "drag": lambda: (SCATTER["friction"] * self.type.arm.coulomb[joint], self.coulomb[joint] - self.type.arm.coulomb[joint]),
-            "zero": lambda: (SCATTER["zero"], self.zero[joint]),
-        }[kind]()
+        spread, beside = self.scatter(kind, joint)
+        size = float(sign * fleet.sds * (np.hypot(error, spread) if fleet.of == "units" else error))
         return {"kind": kind, "joint": joint, "effect": "payload" if joint is None else f"{joints[joint]}.{family}", "family": family,
                 "size": size, "unit": unit, "standard_error": error, "window_sds": [round(abs(size) / x, 2) for x in errors[joint]],
                 "scatter_sds": float(abs(size) / spread), "beside": float(beside), "total": float(size + beside)}  # fmt: skip
 
+    def scatter(self, kind, joint):
+        """Standard deviation of the scatter of what a deviation changes, and what this unit has of it beyond the type."""
+        common = self.type
+        if kind == "mass":
+            return SCATTER["adapter"] * common.adapter[0], self.adapter - common.adapter[0]
+        if kind == "drag":
+            return SCATTER["friction"] * common.arm.coulomb[joint], self.coulomb[joint] - common.arm.coulomb[joint]
+        return SCATTER["zero"], self.zero[joint]
+
     def window_errors(self, kind, joint):
         """Standard errors of a deviation of size 1, one per window in which it acts."""
-        return [standard_error(self.columns(window), kind, joint) for window in range(ONSET, self.fleet.windows)]
+        return [standard_error(columns, kind, joint) for columns in self.columns]
 
-    @lru_cache(maxsize=16)  # noqa: B019: a unit lives as long as its process works on it
-    def columns(self, window):
-        """Columns of `sizes.py` of one window."""
-        keep = self.keep(window)
-        path = self.path(window, self.fleet.seconds)
-        some = Motion(*(getattr(path, name)[::keep] for name in ("t", "q", "qd", "qdd")))
-        return columns_of_window(self.model, some, self.fleet.recorder, self.type.noise_sd, GRIPPER)
+    @cached_property
+    def columns(self):
+        """Columns of `sizes.py` of each window in which a deviation acts."""
+        paths = [self.thinned(self.path(window, self.fleet.seconds)) for window in range(ONSET, self.fleet.windows)]
+        return [columns_of_window(self.model, path, self.fleet.recorder, self.type.noise_sd, GRIPPER) for path in paths]
 
-    def keep(self, window):
+    @property
+    def keep(self):
         """Steps of the motion per row: friction with a state needs BASE_RATE."""
         return BASE_RATE // self.fleet.rate if self.fleet.kind == "lugre" else 1
+
+    def thinned(self, path, every=1):
+        """A motion at the rate of the logs, or each `every`-th of its rows."""
+        return Motion(*(getattr(path, name)[:: self.keep * every] for name in ("t", "q", "qd", "qdd")))
 
     def path(self, window, seconds):
         """The motion of a window."""
         rng = np.random.default_rng([self.fleet.seed, self.number, window, 34])
-        rate = self.fleet.rate * self.keep(window)
+        rate = self.fleet.rate * self.keep
         t = np.arange(int(seconds * rate)) / rate
         return Motion(t, *getattr(arms, MOTIONS[rng.integers(len(MOTIONS))])(self.type.arm, rng, t))
 
@@ -184,7 +193,7 @@ class Unit:
 
     def log(self, window, seconds):
         """The log of a window, and its torque without noise."""
-        recorder, keep = self.fleet.recorder, self.keep(window)
+        recorder, keep = self.fleet.recorder, self.keep
         path = self.path(window, seconds)
         clean = torque(*self.state(window), path, keep)
         rng = np.random.default_rng([self.fleet.seed, self.number, window, 35])
@@ -202,8 +211,7 @@ class Unit:
         if self.name == SHORT[0]:
             windows = windows[-1:]
             _, path, clean = self.log(self.fleet.windows, SHORT[2])
-            keep = self.keep(self.fleet.windows)
-            np.savez(folder / "new.npz", tau=clean, **{name: getattr(path, name)[::keep] for name in ("t", "q", "qd", "qdd")})
+            np.savez(folder / "new.npz", tau=clean, **vars(self.thinned(path)))
         for window in windows:
             log, _, _ = self.log(window, SHORT[1] if self.name == SHORT[0] else self.fleet.seconds)
             write_parquet(folder / f"{self.name}-w{window + 1}.parquet", log, self.start(window))
@@ -262,10 +270,10 @@ def make(fleet, folder, jobs=1):
     return truth
 
 
-def fleet_of(given):
-    """The fleet that arguments ask for; `panda` is a robot and a standard fleet."""
+def fleet_of(given, seed):
+    """The fleet that arguments ask for; the kind `panda` is a standard fleet of that robot."""
     robot = "panda" if given.kind == "panda" else given.robot
-    return Fleet(robot, given.units, given.windows, given.seconds, given.rate, given.seed, given.kind, given.sds, given.short)
+    return Fleet(robot, given.units, given.windows, given.seconds, given.rate, seed, given.kind, given.sds, given.of, given.short)
 
 
 def add_arguments(arguments):
@@ -276,7 +284,9 @@ def add_arguments(arguments):
     arguments.add_argument("--windows", type=int, default=Fleet.windows, help="weeks, at least 3")
     arguments.add_argument("--seconds", type=float, default=Fleet.seconds, help="length of a log")
     arguments.add_argument("--rate", type=int, default=Fleet.rate, help="Hz")
-    arguments.add_argument("--sds", type=float, default=Fleet.sds, help="size of a deviation in standard errors of one window")
+    arguments.add_argument("--sds", type=float, default=Fleet.sds, help="size of a deviation in standard deviations")
+    arguments.add_argument("--of", choices=("window", "units"), default=Fleet.of,
+                           help="standard deviation of one window's error, or of that and the scatter of the units")  # fmt: skip
     arguments.add_argument("--short", action="store_true", help="one more unit, `new`, with a log of 10 s")
     arguments.add_argument("--jobs", type=int, default=1, help="processes that simulate")
 
@@ -287,7 +297,7 @@ def main():
     arguments.add_argument("--seed", type=int, default=Fleet.seed)
     arguments.add_argument("-o", "--output", type=Path, default=Path("fleet"))
     given = arguments.parse_args()
-    for unit in make(fleet_of(given), given.output, given.jobs)["units"]:
+    for unit in make(fleet_of(given, given.seed), given.output, given.jobs)["units"]:
         for one in unit["deviations"]:
             print(f"{unit['robot']}: {one['effect']} {one['size']:+.4g} {one['unit']}, {one['scatter_sds']:.1f} standard deviations of the scatter")
 

@@ -13,6 +13,7 @@ from math import exp
 
 import numpy as np
 import pinocchio as pin
+from defects import PAYLOAD_RADIUS
 from oracle import THIN, body_columns, friction_columns, low_pass
 
 COLLINEAR = 1e-7  # singular values below this share of the largest are no direction
@@ -34,7 +35,7 @@ def columns_of_window(model, path, recorder, sd, centre):
     scale = 1.0 / (sd * (0.5 * (1.0 + (1.0 + rho) / (1.0 - rho))) ** 0.5)
     rows = lambda part: (low_pass(part, recorder.rate)[::THIN] * (THIN**0.5 * scale[:, None])).reshape(-1, part.shape[2])
     body = rows(body_columns(model, model.nv - 1, path, 1))
-    ball = pin.Inertia(1.0, np.array(centre), 0.4 * 0.05**2 * np.eye(3)).toDynamicParameters()
+    ball = pin.Inertia(1.0, np.array(centre), 0.4 * PAYLOAD_RADIUS**2 * np.eye(3)).toDynamicParameters()
     return {"mass": body @ ball, "body": body, "friction": rows(friction_columns(path.qd)), "zeros": rows(zero_columns(model, path))}
 
 
