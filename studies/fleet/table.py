@@ -91,7 +91,7 @@ def found_types(lines):
 
 def kind_rows(lines):
     """One row per kind of deviation."""
-    head = ["deviation", "planted", "unit named", "effect right", "only a stand-in", "onset within one window", "interval holds size", "size / scatter sd"]
+    head = ["deviation", "planted", "unit named", "effect right", "only a stand-in", "with a wrong effect", "onset within one window", "interval holds size", "size / scatter sd"]
     rows = [head, ["---"] * len(head)]
     pairs = defaultdict(list)
     for line in lines:
@@ -100,10 +100,11 @@ def kind_rows(lines):
                 pairs[one["kind"]].append((unit, one))
     for kind, found in sorted(pairs.items()):
         stand = sum(not one["found"] and any(effect["judged"] == "stand_in" for effect in unit["effects"]) for unit, one in found)
+        wrong = sum(any(effect["judged"] == "wrong" for effect in unit["effects"]) for unit, _ in found)
         late = [abs(one["onset_off"]) <= 1 for _, one in found if one["onset_off"] is not None]
         scatter = np.median([one["scatter_sds"] for _, one in found])
         rows.append([kind, len(found), share(sum(unit["named"] for unit, _ in found), len(found)), share(sum(one["found"] for _, one in found), len(found)),
-                     stand, share(sum(late), len(late)), share(*marks([one for _, one in found], "covers")), f"{scatter:.2g}"])  # fmt: skip
+                     stand, wrong, share(sum(late), len(late)), share(*marks([one for _, one in found], "covers")), f"{scatter:.2g}"])  # fmt: skip
     return rows if pairs else []
 
 
