@@ -84,6 +84,13 @@ Example:
   twincal merge statistics/*.arrow -o all.arrow
 ")]
     Merge(Merge),
+    /// Which robots of a type deviate, and what is wrong with the model of all.
+    #[command(before_help = "\
+Examples:
+  twincal fleet statistics/*/*.arrow -o fleet
+  twincal fleet statistics/*/*.arrow --window 1d --fdr 0.01 -o fleet
+")]
+    Fleet(Fleet),
     /// Score a twin on new logs: exit code 0, or 1 where a gate says no.
     #[command(
         before_help = "\
@@ -151,6 +158,7 @@ impl Command {
             Self::Fit(flags) => flags.log.json,
             Self::Statistics(flags) => flags.log.json,
             Self::Merge(flags) => flags.json,
+            Self::Fleet(flags) => flags.json,
             Self::Check(flags) => flags.log.json,
             Self::Predict(flags) => flags.log.json,
             Self::Diff(flags) => flags.json,
@@ -356,7 +364,8 @@ pub(crate) struct StatisticsFlags {
     #[arg(long, value_name = "MODEL")]
     pub(crate) model: Option<PathBuf>,
     /// A plan that was written before, or `auto`: that of the folder where there
-    /// is one, else one is made by a fit to these logs (twelve of them at most).
+    /// is one, else one is made by a fit to these logs (twelve of them at most);
+    /// `fleet`: the same with columns about what that fit finds, for many robots.
     #[arg(long, value_name = "FILE", default_value = "auto")]
     pub(crate) plan: PathBuf,
     /// The robot that was logged [default: the model's name].
@@ -389,6 +398,45 @@ pub(crate) struct Merge {
     /// Replace an existing file.
     #[arg(long)]
     pub(crate) force: bool,
+    /// Print the result as JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// What the logs of a fleet belong to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum By {
+    /// The robot that `twincal statistics --robot NAME` named.
+    Robot,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Fleet {
+    /// Files that `twincal statistics` or `twincal merge` wrote, of three robots
+    /// at least, all with one plan.
+    #[arg(value_name = "STATISTICS", required = true)]
+    pub(crate) files: Vec<PathBuf>,
+    /// What is one unit.
+    #[arg(long, value_name = "WHAT", value_enum, default_value = "robot")]
+    pub(crate) by: By,
+    /// Length of a window; a robot's change begins with one: 7d, 12h.
+    #[arg(long, value_name = "LENGTH", default_value = "7d")]
+    pub(crate) window: String,
+    /// Expected share of named robots that do not deviate, at most.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.05)]
+    pub(crate) fdr: f64,
+    /// Folder of the result.
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// Replace an earlier result.
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Seed of all random numbers.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Threads; the result is the same for any number.
+    #[arg(long, value_name = "N")]
+    pub(crate) threads: Option<u64>,
     /// Print the result as JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,

@@ -56,6 +56,8 @@ pub mod twin_json;
     allow(dead_code, reason = "some sentences stand in the report alone")
 )]
 pub mod words;
+#[cfg(feature = "tables")]
+pub mod fleet;
 pub mod export;
 
 pub use error::{Error, Place, Result};

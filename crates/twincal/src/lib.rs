@@ -38,6 +38,7 @@ pub mod cross_check;
 pub mod calibrate;
 pub mod assess;
 pub mod compare;
+pub mod fleet;
 pub mod evaluator;
 pub mod write_back;
 pub mod builder;

@@ -10,6 +10,7 @@ mod diff;
 mod doctor;
 mod export;
 mod fit;
+mod fleet;
 mod inputs;
 mod inspect;
 mod merge;
@@ -43,6 +44,7 @@ pub(crate) fn run(command: &Command, terminal: &mut Terminal) -> Outcome<u8> {
         Command::Fit(flags) => fit::run(flags, terminal),
         Command::Statistics(flags) => statistics::run(flags, terminal),
         Command::Merge(flags) => merge::run(flags, terminal),
+        Command::Fleet(flags) => fleet::run(flags, terminal),
         Command::Check(flags) => check::run(flags, terminal),
         Command::Predict(flags) => predict::run(flags, terminal),
         Command::Diff(flags) => diff::run(flags, terminal),

@@ -16,7 +16,7 @@ use serde::Serialize;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use twincal::Finding;
-use twincal::calibrate::{CalibrationSettings, Plan, Statistics, plan};
+use twincal::calibrate::{About, CalibrationSettings, Plan, Statistics, plan_about};
 use twincal_io::artifact::{Inputs, OutputFile};
 use twincal_io::config::Settings;
 use twincal_io::memory;
@@ -149,7 +149,12 @@ impl Road<'_> {
     /// The plan that was given, that of the folder, or a new one.
     fn plan(&mut self) -> Outcome<Plan> {
         let own = self.flags.output.join(PLAN);
-        let given = Path::new("auto") != self.flags.plan;
+        let about = match self.flags.plan.to_str() {
+            Some("auto") => Some(About::Model),
+            Some("fleet") => Some(About::Found),
+            _ => None,
+        };
+        let given = about.is_none();
         let there = own.symlink_metadata().is_ok();
         let plan = match (given, there) {
             (true, _) => read_plan(&self.flags.plan)?,
@@ -158,7 +163,7 @@ impl Road<'_> {
                     .step(&format!("using the plan {}", own.to_string_lossy()));
                 return read_plan(&own);
             }
-            (false, false) => self.new_plan()?,
+            (false, false) => self.new_plan(about.unwrap_or_default())?,
         };
         if given && there {
             if read_plan(&own)? != plan {
@@ -173,7 +178,7 @@ impl Road<'_> {
         Ok(plan)
     }
 
-    fn new_plan(&mut self) -> Outcome<Plan> {
+    fn new_plan(&mut self, about: About) -> Outcome<Plan> {
         let logs = &self.flags.logs;
         let step = logs.len().div_ceil(MOST_FOR_PLAN);
         let some: Vec<PathBuf> = logs.iter().step_by(step).cloned().collect();
@@ -186,7 +191,7 @@ impl Road<'_> {
         };
         let step = |stage| show(stage, "", &self.progress);
         let logs = std::mem::take(&mut read.logs);
-        let made = plan(robot, logs, &settings, &step);
+        let made = plan_about(about, robot, logs, &settings, &step);
         let (plan, findings) =
             made.map_err(|stopped| Failure::from(read.as_given(stopped.error)))?;
         self.findings.extend(findings);

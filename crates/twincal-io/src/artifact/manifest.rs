@@ -27,6 +27,8 @@ pub enum Maker {
     Demo,
     /// `twincal export --draws`.
     Export,
+    /// `twincal fleet`.
+    Fleet,
 }
 
 /// Size and checksum of one file.

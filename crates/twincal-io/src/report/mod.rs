@@ -10,6 +10,7 @@ mod effects;
 mod figure;
 mod figures;
 mod findings;
+pub(crate) mod fleet;
 mod first_screen;
 mod honesty;
 #[cfg(test)]

@@ -91,6 +91,19 @@ pub(super) fn fill(
     calibration: &Calibration,
     run: &ReportContext,
 ) -> Result<String, minijinja::Error> {
+    let mut environment = environment()?;
+    environment.add_template("report.html", include_str!("report.html"))?;
+    environment.add_template("report.css", include_str!("report.css"))?;
+    let joints = view::joints(calibration);
+    let page = gather(calibration, run, &joints)
+        .map_err(|error| minijinja::Error::new(ErrorKind::BadSerialization, error.to_string()))?;
+    environment
+        .get_template("report.html")?
+        .render(Serde(&page))
+}
+
+/// Templates in which every string is cleaned and escaped, with the filters for names and sentences.
+pub(super) fn environment() -> Result<Environment<'static>, minijinja::Error> {
     let mut environment = Environment::new();
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
     environment.set_syntax(
@@ -113,14 +126,7 @@ pub(super) fn fill(
     environment.add_filter("prose", |text: String| {
         Value::from_safe_string(text::breakable(&text, LONG))
     });
-    environment.add_template("report.html", include_str!("report.html"))?;
-    environment.add_template("report.css", include_str!("report.css"))?;
-    let joints = view::joints(calibration);
-    let page = gather(calibration, run, &joints)
-        .map_err(|error| minijinja::Error::new(ErrorKind::BadSerialization, error.to_string()))?;
-    environment
-        .get_template("report.html")?
-        .render(Serde(&page))
+    Ok(environment)
 }
 
 fn gather<'a>(

@@ -4,7 +4,10 @@
 mod beyond;
 #[cfg(feature = "report")]
 mod compact;
+mod date;
 mod family;
+#[cfg(feature = "tables")]
+pub mod fleet;
 mod grounds;
 mod headline;
 mod intervals;
@@ -20,6 +23,7 @@ pub(crate) mod units;
 
 #[cfg(feature = "report")]
 pub(crate) use compact::compact;
+pub use date::utc;
 pub(crate) use family::family_name;
 pub use intervals::drawn_alike;
 #[cfg(feature = "report")]

@@ -24,9 +24,12 @@ pub use checks::sweep::SweepPoint;
 pub use data::log_summary::LogSummary;
 pub use fit::compact::{Compact, CompactTerm};
 pub use from_statistics::calibrate_statistics;
+pub(crate) use data::all_logs::hardly_act;
+pub(crate) use fit::columns::columns_of;
+pub(crate) use log_statistics::LogStatistics;
 pub use log_statistics::Statistics;
 pub use outlook::{LookedAt, Outlook, outlook};
-pub use plan::{Plan, VERSION as PLAN_VERSION};
+pub use plan::{About, Plan, VERSION as PLAN_VERSION};
 pub use progress::Stage;
 pub use records::{Header, Quantity, Record};
 pub use result::calibration::{
@@ -88,6 +91,20 @@ pub fn plan<'a>(
     settings: &CalibrationSettings,
     progress: &dyn Fn(Stage),
 ) -> std::result::Result<(Plan, Vec<Finding>), Stopped> {
+    plan_about(About::Model, robot, logs, settings, progress)
+}
+
+/// [`plan`] with columns about the model file or about what the fit finds.
+///
+/// # Errors
+/// Those of [`calibrate`].
+pub fn plan_about<'a>(
+    about: About,
+    robot: &Robot,
+    logs: impl Into<Logs<'a>>,
+    settings: &CalibrationSettings,
+    progress: &dyn Fn(Stage),
+) -> std::result::Result<(Plan, Vec<Finding>), Stopped> {
     let watch = |stage: Stage| {
         progress(stage);
         Ok(())
@@ -99,7 +116,7 @@ pub fn plan<'a>(
                    recordings: &mut Option<(Logs<'_>, Logs<'_>)>,
                    findings: &mut Vec<Finding>| {
         watch(Stage::Rows)?;
-        plan::road(request, recordings, findings)
+        plan::road(about, request, recordings, findings)
     };
     let plan = attempt(
         robot,

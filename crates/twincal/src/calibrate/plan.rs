@@ -1,6 +1,7 @@
 //! The plan: what must be the same for all logs whose statistics are to be added.
 
 use super::exit::{Exit, Pass};
+use super::fit::relinearise;
 use super::request::{Recorded, Request};
 use super::settings::CalibrationSettings;
 use super::stages;
@@ -42,8 +43,20 @@ impl Plan {
     }
 }
 
+/// What the columns of a plan are worked out about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum About {
+    /// The model file, as those of a fit are where nothing that it finds multiplies another effect.
+    #[default]
+    Model,
+    /// What the plan's fit finds: for other robots of the type, which have that and a little more. A joint zero of one of them acts on the payload
+    /// of all.
+    Found,
+}
+
 /// The same road as that of a calibration, as far as the fit that decides.
 pub(super) fn road(
+    about: About,
     request: Request<'_>,
     recordings: &mut Option<(Logs<'_>, Logs<'_>)>,
     findings: &mut Vec<Finding>,
@@ -54,7 +67,12 @@ pub(super) fn road(
     let settings = &rows.prepared.settings;
     require_even_rows(settings).map_err(Exit::Failed)?;
     rows.weigh(findings)?;
-    stages::estimate(&rows, findings)?;
+    let estimated = stages::estimate(&rows, findings)?;
+    if about == About::Found {
+        let found = relinearise::found(&rows.library, &estimated.fitted.fit);
+        drop(estimated);
+        rows.prepared.library_settings.linearised_at = found;
+    }
     Ok(Plan {
         version: VERSION,
         noise: rows.prepared.settings.noise.model,

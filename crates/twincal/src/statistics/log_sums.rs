@@ -89,6 +89,18 @@ impl LogSums {
         self
     }
 
+    /// Fifths in the place of tenths: what a fit of one or two logs leaves out, and more than one of many does.
+    pub(crate) fn coarse(&self) -> Self {
+        let mut sums = self.clone();
+        for joint in &mut sums.joints {
+            for pair in joint.blocks.chunks_exact_mut(2) {
+                let second = std::mem::take(&mut pair[1]);
+                pair[0] += &second;
+            }
+        }
+        sums
+    }
+
     /// Without some columns, by their numbers; those behind move up.
     pub(crate) fn without(&self, dropped: &[usize]) -> Self {
         Self {

@@ -251,7 +251,7 @@ pub(in crate::calibrate) fn zero_columns<'a>(
 }
 
 /// Columns whose squares over so many rows are next to nothing.
-pub(in crate::calibrate) fn hardly_act(
+pub(crate) fn hardly_act(
     square: &[f64],
     rows: usize,
     library: &Library,

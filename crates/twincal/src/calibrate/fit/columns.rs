@@ -12,7 +12,7 @@ use crate::term::{Family, Library};
 ///
 /// # Errors
 /// [`Error::Setting`] if a component that is forced in has no column, or heredity makes no sense.
-pub(in crate::calibrate) fn columns_of(
+pub(crate) fn columns_of(
     robot: &Robot,
     library: &Library,
     settings: &CalibrationSettings,

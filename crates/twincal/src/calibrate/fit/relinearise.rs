@@ -140,8 +140,8 @@ pub(in crate::calibrate) fn finding(names: &[&str], open: Option<f64>) -> Option
     })
 }
 
-/// Coefficients of the effects that are in.
-fn found(library: &Library, fit: &Fit) -> BTreeMap<String, f64> {
+/// Coefficients of the effects of the robot model that are in, by name of their term.
+pub(in crate::calibrate) fn found(library: &Library, fit: &Fit) -> BTreeMap<String, f64> {
     let columns = library.columns().iter().enumerate();
     let posterior = &fit.posterior;
     let own = columns.filter(|(column, _)| {

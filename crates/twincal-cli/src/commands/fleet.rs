@@ -1,0 +1,177 @@
+//! `twincal fleet`: which robots of a type deviate, and what is wrong with the model of all.
+
+use super::start_threads;
+use super::summary::paragraph;
+use crate::args::Fleet as Flags;
+use crate::failure::{Failure, Outcome};
+use crate::names::display_names;
+use crate::progress::Progress;
+use crate::terminal::Terminal;
+use rayon::prelude::*;
+use std::path::PathBuf;
+use std::sync::Mutex;
+use twincal::fleet::{Fleet, FleetResult, FleetSettings, FleetStage};
+use twincal_io::artifact::{Claim, Inputs, Maker, Replace};
+use twincal_io::fleet::{self, FLEET, PAGE, fleet_json, fleet_page, reason};
+use twincal_io::words::fleet as words;
+use twincal_io::statistics::StatisticsFile;
+
+/// Files that are read at a time.
+const BATCH: usize = 8;
+/// Robots that are printed.
+const SHOWN: usize = 20;
+
+pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
+    let settings = settings(flags)?;
+    let mut inputs = Inputs::default();
+    flags.files.iter().for_each(|path| inputs.add(path));
+    let replace = match flags.force {
+        true => Replace::Artifact,
+        false => Replace::Never,
+    };
+    let claim = Claim::new(&flags.output, replace, &inputs)?;
+    start_threads(flags.threads.map(|threads| threads as usize))?;
+    let progress = Progress::new();
+    let (fleet, model) = read(&flags.files, &progress)?;
+    let progress = Mutex::new(progress);
+    let watch = |stage: FleetStage| {
+        let (what, done, all) = match stage {
+            FleetStage::Noise => ("measuring noise", 0, 1),
+            FleetStage::Scatter(done, all) => ("learning how robots differ", done, all),
+            FleetStage::Posterior(done, all) => ("sampling the posterior", done, all),
+        };
+        if let Ok(progress) = progress.lock() {
+            progress.counted(what, done, all);
+        }
+        Ok(())
+    };
+    let result = fleet.fit(&settings, &watch).map_err(twincal_io::Error::from)?;
+    let about = fleet::Inputs {
+        model,
+        window_seconds: settings.window,
+        false_discovery_rate: settings.false_discovery_rate,
+        seed: flags.seed,
+        statistics: display_names(&flags.files),
+    };
+    let json = fleet_json(&result, &about)?;
+    let page = fleet_page(&result, &about)?;
+    claim.commit(
+        Maker::Fleet,
+        vec![(FLEET, json.clone()), (PAGE, page.into_bytes())],
+    )?;
+    terminal.complete(&flags.output);
+    drop(progress);
+    if flags.json {
+        terminal.data(&String::from_utf8_lossy(&json));
+    } else {
+        print(&result, terminal);
+        terminal.say(&flags.output.to_string_lossy());
+    }
+    Ok(0)
+}
+
+fn settings(flags: &Flags) -> Outcome<FleetSettings> {
+    let mut settings = FleetSettings {
+        window: seconds(&flags.window)?,
+        false_discovery_rate: flags.fdr,
+        ..FleetSettings::default()
+    };
+    settings.calibration.inference.seed = flags.seed;
+    Ok(settings)
+}
+
+/// `7d`, `12h`, `30min` or `90s` in seconds.
+fn seconds(text: &str) -> Outcome<f64> {
+    let split = text.find(|c: char| c.is_ascii_alphabetic());
+    let (number, unit) = text.split_at(split.unwrap_or(text.len()));
+    let factor = match unit {
+        "w" => 7.0 * 86_400.0,
+        "d" => 86_400.0,
+        "h" => 3600.0,
+        "min" => 60.0,
+        "s" => 1.0,
+        _ => f64::NAN,
+    };
+    let seconds = number.trim().parse().map_or(f64::NAN, |n: f64| n * factor);
+    if seconds > 0.0 && seconds.is_finite() {
+        return Ok(seconds);
+    }
+    Err(Failure::usage(
+        format!("--window {text}: no length of time"),
+        "give a number with w, d, h, min or s, such as 7d",
+    ))
+}
+
+/// All files, one by one.
+fn read(files: &[PathBuf], progress: &Progress) -> Outcome<(Fleet, String)> {
+    let mut fleet = Fleet::default();
+    let mut model = String::new();
+    for (batch, paths) in files.chunks(BATCH).enumerate() {
+        progress.counted("reading statistics", batch * BATCH, files.len());
+        let read: Vec<twincal_io::Result<StatisticsFile>> =
+            (paths.par_iter()).map(|path| StatisticsFile::read(path)).collect();
+        for file in read {
+            let file = file?;
+            if model.is_empty() {
+                model.clone_from(&file.model.name);
+            }
+            fleet.add(&file.statistics);
+        }
+    }
+    Ok((fleet, model))
+}
+
+/// Which robots deviate, then what is wrong for all, then what is left out.
+fn print(result: &FleetResult, terminal: &mut Terminal) {
+    terminal.heading(&words::headline(result));
+    for unit in result.units.iter().filter(|unit| unit.deviates).take(SHOWN) {
+        terminal.say(&format!(
+            "  {} (probability {})",
+            unit.robot,
+            words::chance(unit.probability)
+        ));
+        for own in &unit.deviations {
+            let value = words::main_value(&own.parameters);
+            let value = value.map_or_else(|| "–".into(), words::difference);
+            paragraph(
+                &format!(
+                    "{}: {value}, {} (PIP {})",
+                    own.story,
+                    words::since(own),
+                    words::chance(own.pip)
+                ),
+                terminal,
+            );
+        }
+    }
+    let named = result.units.iter().filter(|unit| unit.deviates).count();
+    if named > SHOWN {
+        terminal.say(&format!("  and {} more: see {PAGE}", named - SHOWN));
+    }
+    terminal.say("");
+    terminal.heading(&words::of_type(result));
+    let sure = result.type_effects.iter().filter(|own| own.pip >= 0.5);
+    for effect in sure.clone().take(SHOWN) {
+        let value = words::main_value(&effect.parameters);
+        let value = value.map_or_else(|| "–".into(), words::value);
+        paragraph(
+            &format!(
+                "{}: {value} (PIP {})",
+                effect.story,
+                words::chance(effect.pip)
+            ),
+            terminal,
+        );
+    }
+    if !result.left_out.is_empty() {
+        terminal.say("");
+        terminal.heading("Left out");
+        for own in result.left_out.iter().take(SHOWN) {
+            paragraph(
+                &format!("{}, log {}: {}", own.robot, own.log, reason(&own.reason).1),
+                terminal,
+            );
+        }
+    }
+    terminal.say("");
+}

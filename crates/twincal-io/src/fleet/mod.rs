@@ -1,0 +1,16 @@
+//! What `twincal fleet` writes: `fleet.json` for programs, `fleet.html` for people.
+
+mod json;
+#[cfg(feature = "report")]
+mod page;
+mod reason;
+
+pub use json::{FleetJson, Inputs, fleet_json};
+#[cfg(feature = "report")]
+pub use page::fleet_page;
+pub use reason::reason;
+
+/// The answer, for programs.
+pub const FLEET: &str = "fleet.json";
+/// The answer, for people.
+pub const PAGE: &str = "fleet.html";
