@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -15,7 +16,7 @@ from threading import Event, Thread
 
 import pytest
 import twincal
-from conftest import run
+from conftest import ROOT, run
 from twincal import fleet
 from twincal._engine import _logs
 from twincal._store import Item
@@ -237,3 +238,20 @@ def test_without_ray_the_error_says_what_to_install(shared, tmp_path, monkeypatc
     with pytest.raises(twincal.errors.UsageError) as refused:
         shared.make(tmp_path / "out", engine="ray")
     assert "twincal[ray]" in refused.value.remedy
+
+
+PAGE = ROOT / "docs/howto/many_logs.md"
+
+
+@pytest.mark.skipif(not PAGE.exists(), reason="the documents are not beside the tests")
+def test_the_page_prints_what_it_quotes(tmp_path):
+    for name in ("arm.urdf", "run.csv", "monday.csv", "friday.csv"):
+        shutil.copy(ROOT / "examples/arm" / name, tmp_path)
+    blocks = re.findall(r"```(\w+)\n(.*?)```", PAGE.read_text(), flags=re.S)
+    first = {kind: next(text for own, text in blocks if own == kind) for kind, _ in blocks}
+    done = run(*first["sh"].split()[1:], cwd=tmp_path)
+    assert done.stdout.decode() == first["text"], done.stderr
+    subprocess.run(["sh", "-c", first["bash"]], cwd=tmp_path, check=True)
+    code = [sys.executable, "-c", first["python"]]
+    done = subprocess.run(code, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.stdout == first["console"], done.stderr

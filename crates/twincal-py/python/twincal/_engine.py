@@ -38,8 +38,8 @@ class FleetStatistics(NamedTuple):
     def __repr__(self) -> str:
         made = sum(file.made for file in self.files)
         return (
-            f"<twincal.fleet.FleetStatistics: {len(self.files)} files ({made} made now), "
-            f"{len(self.faults)} faults, {len(self.stale)} stale>"
+            f"<twincal.fleet.FleetStatistics: files {len(self.files)} (made now {made}), "
+            f"faults {len(self.faults)}, stale {len(self.stale)}>"
         )
 
 

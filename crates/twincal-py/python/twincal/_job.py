@@ -15,7 +15,8 @@ from twincal import _twincal
 from twincal._store import Item, LocalStore, Store, persist
 from twincal.errors import Error, UsageError
 
-_PREFIX = "twincal-fleet-"
+# A temporary folder: PREFIX…/WORK, and PREFIX…/LOCK that its process holds.
+_PREFIX, _WORK, _LOCK = "twincal-fleet-", "work", "lock"
 
 
 class Fault(NamedTuple):
@@ -181,24 +182,33 @@ def _command(job: Job, folder: str) -> list[str]:
 def scratch() -> Iterator[str]:
     """A temporary folder; those of processes that were killed are removed first."""
     sweep()
-    folder = tempfile.mkdtemp(prefix=_PREFIX)
-    with open(os.path.join(folder, "new"), "wb") as lock:
+    place = tempfile.mkdtemp(prefix=_PREFIX)
+    with open(os.path.join(place, "new"), "wb") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         # Named when it is locked: a folder without a lock is one that is being made.
-        os.rename(lock.name, os.path.join(folder, "lock"))
+        os.rename(lock.name, os.path.join(place, _LOCK))
+        folder = os.path.join(place, _WORK)
+        os.mkdir(folder)
         try:
             yield folder
         finally:
-            shutil.rmtree(folder, ignore_errors=True)
+            _remove(place)
 
 
 def sweep() -> None:
     """Removes temporary folders whose process is no more: nobody holds their lock."""
     base = tempfile.gettempdir()
     for name in os.listdir(base):
-        if not name.startswith(_PREFIX):
-            continue
-        folder = os.path.join(base, name)
-        with suppress(OSError), open(os.path.join(folder, "lock"), "rb") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            shutil.rmtree(folder, ignore_errors=True)
+        if name.startswith(_PREFIX):
+            place = os.path.join(base, name)
+            with suppress(OSError), open(os.path.join(place, _LOCK), "rb") as lock:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                _remove(place)
+
+
+def _remove(place: str) -> None:
+    """The lock goes last, so that a removal that was interrupted is taken up again."""
+    shutil.rmtree(os.path.join(place, _WORK), ignore_errors=True)
+    with suppress(OSError):
+        os.unlink(os.path.join(place, _LOCK))
+        os.rmdir(place)
