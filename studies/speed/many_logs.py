@@ -43,9 +43,9 @@ LINK = """<link name="{}"><inertial><origin xyz="0.2 0 0"/><mass value="2"/>
 
 
 def cpu():
-    """CPU seconds of processes that ended, and the largest memory of one in MB."""
+    """CPU seconds of processes that ended."""
     usage = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+    return usage.ru_utime + usage.ru_stime
 
 
 def large(robot, minutes, number, folder):
@@ -85,10 +85,10 @@ def scaling(given, folder):
         size = sum(file.stat().st_size for file in (folder / ending).iterdir()) / 1e6
         for workers in (1, 2):
             with tempfile.TemporaryDirectory() as out:
-                before, began = cpu()[0], time.perf_counter()
+                before, began = cpu(), time.perf_counter()
                 made = fleet.statistics(folder / ending, model, folder / "planned/plan.json", output=out, config=config,
                                         workers=workers)  # fmt: skip
-                seconds, used = time.perf_counter() - began, cpu()[0] - before
+                seconds, used = time.perf_counter() - began, cpu() - before
                 assert len(made.files) == given.logs, made.faults
                 print(f"{ending:8} {workers:<8} {size:<7.0f} {seconds:<6.1f} {size / seconds:<6.1f} {size / used:<14.1f} {rows / used:.0f}")
 
@@ -135,11 +135,11 @@ def merging(counts, folder):
     config.write_text('[library]\ngeneric = false\nfamilies = ["payload", "viscous", "coulomb"]\n')
     if not (folder / "small-plan/plan.json").exists():
         plan(sorted((folder / "small").iterdir())[:3], model, config, folder / "small-plan")
-    began = time.perf_counter()
+    before, began = cpu(), time.perf_counter()
     made = fleet.statistics(folder / "small", model, folder / "small-plan/plan.json", output=folder / "small-statistics", config=config)
-    seconds, new = time.perf_counter() - began, sum(file.made for file in made.files)
+    seconds, used, new = time.perf_counter() - began, cpu() - before, sum(file.made for file in made.files)
     files = [Path(own.file) for own in made.files]
-    print(f"{new} files of statistics made in {seconds:.1f} s; the largest has {max(file.stat().st_size for file in files) / 1e3:.0f} kB")
+    print(f"{new} files of statistics made in {seconds:.1f} s with {1e3 * used / max(new, 1):.0f} ms of CPU each; the largest has {max(file.stat().st_size for file in files) / 1e3:.0f} kB")
     print("files    s      largest process, MB   merged file, MB")
     for count in counts:
         with tempfile.TemporaryDirectory(dir=folder) as tree:

@@ -70,7 +70,15 @@ def children() -> list[int]:
 
 def leftovers(output: Path) -> list[Path]:
     scratch = Path(tempfile.gettempdir()).glob("twincal-fleet-*")
-    return [*scratch, *output.rglob("*.part")]
+    return [*scratch, *output.rglob(".*.part")]
+
+
+@pytest.fixture
+def own_temporary(tmp_path, monkeypatch):
+    """A temporary folder without those of other programs."""
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
+    monkeypatch.setattr(tempfile, "tempdir", None)
 
 
 def test_files_are_those_of_the_program(shared, made, tmp_path):
@@ -120,7 +128,21 @@ def test_faults_are_named_and_stop_nothing(shared, made, tmp_path):
     assert contents(result) == contents(made)
 
 
-def test_a_killed_worker_costs_nothing(shared, made, tmp_path):
+def test_a_log_that_is_written_meanwhile_is_a_fault(shared, tmp_path):
+    logs = tmp_path / "logs"
+    shutil.copytree(shared.logs, logs)
+
+    def write(_: str, done: int, __: int) -> None:
+        if done == 1:
+            with open(logs / LOGS[-1], "a") as file:
+                file.write("\n")
+
+    result = shared.make(tmp_path / "out", logs, workers=1, progress=write)
+    assert [(own.log, own.code) for own in result.faults] == [(LOGS[-1], "changed")]
+    assert not shared.make(tmp_path / "out", logs, workers=1).faults
+
+
+def test_a_killed_worker_costs_nothing(shared, made, tmp_path, own_temporary):
     killed = []
 
     def kill(stage: str, done: int, parts: int) -> None:
