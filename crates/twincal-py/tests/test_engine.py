@@ -237,6 +237,8 @@ def test_what_is_wrong_for_all_logs_is_an_error(shared, arm, tmp_path):
     with pytest.raises(twincal.errors.UsageError):
         shared.make(out, tmp_path / "empty")
     with pytest.raises(twincal.errors.UsageError):
+        shared.make(shared.logs)
+    with pytest.raises(twincal.errors.UsageError):
         shared.make(out, [shared.logs / "one", shared.logs / "two"])
     with pytest.raises(twincal.errors.UsageError):
         shared.make(out, robot={"one/day1/run1.csv": "one"})
@@ -253,6 +255,13 @@ def test_what_is_wrong_for_all_logs_is_an_error(shared, arm, tmp_path):
     (out / "plan.json").write_text(json.dumps(other))
     with pytest.raises(twincal.errors.UsageError, match="another plan"):
         shared.make(out)
+
+
+def test_a_worker_of_another_version_ends_the_run(shared, tmp_path, monkeypatch):
+    monkeypatch.setattr("twincal._engine._twincal.version", lambda: "0.0.0")
+    with pytest.raises(twincal.errors.UsageError, match="0.0.0"):
+        shared.make(tmp_path / "out", workers=2)
+    assert not children()
 
 
 def test_without_ray_the_error_says_what_to_install(shared, tmp_path, monkeypatch):

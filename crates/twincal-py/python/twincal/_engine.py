@@ -244,14 +244,16 @@ def _read(what: str, place: Place) -> tuple[str, bytes]:
 
 def _tasks(job: Job, listed: list[Task]) -> list[Task]:
     """Logs with the names of their outputs, without those in the output folder."""
+    if type(job.output) is type(job.source):
+        own = posixpath.relpath(job.output.root or ".", job.source.root or ".") + "/"
+        if own == "./":
+            raise UsageError("output is the folder of the dataset", "give another folder")
+        listed = [task for task in listed if not task.log.startswith(own)]
     if not listed:
         raise UsageError(
             f"dataset {job.source.shown('')}: holds no log",
             f"give a folder with files that end in {', '.join(_ENDINGS)}",
         )
-    own = posixpath.relpath(job.output.root or ".", job.source.root or ".") + "/"
-    if type(job.output) is type(job.source) and not own.startswith("."):
-        listed = [task for task in listed if not task.log.startswith(own)]
     digest = hashlib.sha256(job.version.encode())
     for data in (job.model[0].encode(), job.model[1], job.plan, job.config or b""):
         digest.update(hashlib.sha256(data).digest())

@@ -31,8 +31,8 @@ def results(
             while waiting or busy:
                 while waiting and len(busy) < most:
                     worker = idle.pop() if idle else _Worker(job, ready)
-                    worker.begin(waiting.popleft())
                     busy.add(worker)
+                    worker.begin(waiting.popleft())
                 for key, _ in ready.select():
                     worker = key.data
                     if worker not in busy:
@@ -40,8 +40,8 @@ def results(
                         idle.remove(worker)
                         worker.end()
                         continue
-                    busy.remove(worker)
                     result = worker.result()
+                    busy.remove(worker)
                     if result is not None:
                         idle.append(worker)
                         yield result
