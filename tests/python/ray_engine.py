@@ -200,7 +200,7 @@ def compare(folder, port):
 
 
 def other_library(folder, port, local):
-    """The folder of one robot by fsspec gives the same bytes; names differ, as entity tags stand in for times."""
+    """The folder of one robot by fsspec: every good log is made; its path below that folder is its name."""
     import s3fs
 
     store = s3fs.S3FileSystem(endpoint_url=f"http://127.0.0.1:{port}")
