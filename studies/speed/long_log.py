@@ -68,9 +68,9 @@ def log(name, minutes, seed=1):
     return columns
 
 
-def write(name, minutes, file, apart):
+def write(name, minutes, file, apart, seed=1):
     """The log as a file: columns, or one JointState message per row in chunks packed by zstd; two on topics of their own if `apart`."""
-    columns = log(name, minutes)
+    columns = log(name, minutes, seed)
     if file.suffix == ".parquet":
         pq.write_table(pa.table(columns), file)
         return

@@ -7,6 +7,8 @@ What a page is, for these tests:
   A line `…` is any number of lines that were left out; nothing else is. In every other line words are equal, spaces apart,
   and numbers to 3 significant digits: they differ by at most one unit of the third digit, or of the last one where there are
   fewer. Nothing is excluded: commands of the pages print neither times nor absolute paths.
+- ```python and ```bash blocks, and the ```console block with their output, need the Python package, Ray or GNU parallel;
+  crates/twincal-py/tests/test_engine.py runs what needs the package alone.
 """
 
 import importlib.util
@@ -120,16 +122,16 @@ def test_lines_are_compared():
     assert missing("a 1\n", "a 1\nb 2\n") is not None
 
 
-def test_there_are_five_pages_of_at_most_four_commands():
+def test_there_are_six_pages_of_at_most_four_commands():
     """Every page begins with what one gets and what one needs, has real output, and is linked from the README."""
-    assert [page.stem for page in PAGES] == ["before_and_after_a_service", "friction_for_a_controller", "gate_in_ci", "payload",
-                                             "torque_is_a_current"]  # fmt: skip
+    assert [page.stem for page in PAGES] == ["before_and_after_a_service", "friction_for_a_controller", "gate_in_ci", "many_logs",
+                                             "payload", "torque_is_a_current"]  # fmt: skip
     readme = (ROOT / "README.md").read_text()
     for page in PAGES:
         text = page.read_text()
         typed = [line for kind, block in blocks(page) if kind == "sh" for line, _ in commands(block)]
         assert 1 <= len(typed) <= 4, (page.name, typed)
-        assert {kind for kind, _ in blocks(page)} <= {"sh", "text", "toml", "yaml"}, page.name
+        assert {kind for kind, _ in blocks(page)} <= {"sh", "text", "toml", "yaml", "python", "bash", "console"}, page.name
         assert re.search(r"^You get [^\n]*(\n[^\n]+)?\n\nYou need ", text, re.MULTILINE) and "\n## When it is not so\n" in text, page.name
         assert max(map(len, text.splitlines())) <= 100, page.name
         assert f"docs/howto/{page.name}" in readme, page.name

@@ -22,6 +22,7 @@ def test_mypy_is_strict(tmp_path):
         + "".join(
             f"[mypy-{name}.*]\nignore_missing_imports = True\nfollow_imports = skip\n"
             for name in ("sklearn", "pandas", "polars", "xarray", "matplotlib", "tqdm", "arviz")
+            + ("fsspec", "pyarrow", "ray")
         )
     )
     done = subprocess.run(

@@ -13,6 +13,7 @@
 `Statistics`            what a fit takes of each log, which adds
 `SpikeSlabRegressor`    the same regression for any columns, as scikit-learn has it
 `decoys`                functions of a joint's motion that show what no column describes
+`fleet`                 many logs of many robots, on all cores or a Ray cluster
 `plot`                  figures of matplotlib
 ======================  ==================================================================
 
@@ -34,7 +35,7 @@ from twincal._twincal import version as _version
 from twincal.errors import Error
 
 if TYPE_CHECKING:
-    from twincal import plot
+    from twincal import fleet, plot
     from twincal.regressor import SpikeSlabRegressor
 
 __version__ = _version()
@@ -55,20 +56,21 @@ __all__ = [
     "decoys",
     "errors",
     "fit",
+    "fleet",
     "plot",
 ]
 
 
 def __getattr__(name: str) -> Any:
-    """Imports what needs scikit-learn or matplotlib when it is first used."""
+    """Imports what needs other packages when it is first used."""
     import importlib
 
     if name == "SpikeSlabRegressor":
         return importlib.import_module("twincal.regressor").SpikeSlabRegressor
-    if name == "plot":
-        return importlib.import_module("twincal.plot")
+    if name in ("fleet", "plot"):
+        return importlib.import_module(f"twincal.{name}")
     raise AttributeError(f"module 'twincal' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), "SpikeSlabRegressor", "plot"])
+    return sorted([*globals(), "SpikeSlabRegressor", "fleet", "plot"])
