@@ -101,6 +101,7 @@ def main():
         "commands.md": commands(program),
         "config.md": of_schema("schema/twincal.schema.json", "Keys of twincal.toml", lambda key: f"[{key}]"),
         "result.md": of_schema("schema/result.schema.json", "result.json", lambda key: f"`{key}`"),
+        "fleet.md": of_schema("schema/fleet.schema.json", "fleet.json", lambda key: f"`{key}`"),
     }
     for name, text in pages.items():
         (PAGES / name).write_text(text)

@@ -80,7 +80,7 @@ def make_statistics(program, folder, truth, force):
     if force or not (plan / "plan.json").exists():
         shutil.rmtree(plan, ignore_errors=True)
         some = [f"{robot}-w1.parquet" for robot in robots if robot != SHORT[0]][:PLAN_LOGS]
-        call(folder, program, "statistics", *some, *CONFIG, "--plan", "auto", "-o", plan, *again)
+        call(folder, program, "statistics", *some, *CONFIG, "--plan", "fleet", "-o", plan, *again)
         # these logs come again with the name of their unit
         for extra in plan.glob("*.arrow"):
             extra.unlink()

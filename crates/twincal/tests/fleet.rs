@@ -30,7 +30,11 @@ struct Study {
 
 fn log_of(unit: usize, week: usize, noise: &mut Random) -> Recording {
     let scatter = 0.01 * (unit as f64 - 3.0);
-    let gained = if unit + 1 == UNITS && week > 0 { GAIN } else { 0.0 };
+    let gained = if unit + 1 == UNITS && week > 0 {
+        GAIN
+    } else {
+        0.0
+    };
     let real = two_link::arm(2.0 + TYPE + scatter + gained).expect("an arm");
     let name = format!("unit{unit}-week{week}");
     let phase = 0.3 + 0.7 * unit as f64 + 0.9 * week as f64;
@@ -45,10 +49,16 @@ fn study() -> Study {
     settings.library.families = vec![Family::Payload, Family::Viscous, Family::Coulomb];
     let mut noise = Random::new(4, 0);
     let logs: Vec<Vec<Recording>> = (0..UNITS)
-        .map(|unit| (0..WEEKS).map(|week| log_of(unit, week, &mut noise)).collect())
+        .map(|unit| {
+            (0..WEEKS)
+                .map(|week| log_of(unit, week, &mut noise))
+                .collect()
+        })
         .collect();
     let some: Vec<Recording> = logs.iter().map(|unit| unit[0].clone()).collect();
-    let plan = plan_about(About::Found, &nominal, some, &settings, &|_| {}).expect("a plan").0;
+    let plan = plan_about(About::Found, &nominal, some, &settings, &|_| {})
+        .expect("a plan")
+        .0;
     Study {
         nominal,
         settings,
@@ -66,7 +76,11 @@ impl Study {
     fn fleet(&self, without: impl Fn(usize, usize) -> bool) -> Fleet {
         let mut fleet = Fleet::default();
         for (unit, logs) in self.logs.iter().enumerate() {
-            for (week, log) in logs.iter().enumerate().filter(|(week, _)| !without(unit, *week)) {
+            for (week, log) in logs
+                .iter()
+                .enumerate()
+                .filter(|(week, _)| !without(unit, *week))
+            {
                 assert!(log.name.ends_with(&format!("week{week}")));
                 fleet.add(&self.statistics(&format!("unit{unit}"), log));
             }
@@ -91,7 +105,11 @@ fn unit<'a>(result: &'a FleetResult, name: &str) -> &'a twincal::fleet::UnitSumm
 
 /// Mean and sd of every coefficient of all units but one.
 fn others(result: &FleetResult, but: &str) -> Vec<(f64, f64)> {
-    let mut units: Vec<_> = result.units.iter().filter(|unit| unit.robot != but).collect();
+    let mut units: Vec<_> = result
+        .units
+        .iter()
+        .filter(|unit| unit.robot != but)
+        .collect();
     units.sort_by(|a, b| a.robot.cmp(&b.robot));
     let numbers = units.iter().flat_map(|unit| unit.mean.iter().zip(&unit.sd));
     numbers.map(|(mean, sd)| (*mean, *sd)).collect()
@@ -103,7 +121,11 @@ fn the_arm_that_gained_mass_is_named_with_its_week() {
     let result = study.fit(study.fleet(|_, _| false)).expect("a fleet");
     assert_eq!(result.windows.len(), WEEKS);
     assert!(result.left_out.is_empty());
-    let payload = result.type_effects.iter().find(|own| own.name == "payload").expect("payload");
+    let payload = result
+        .type_effects
+        .iter()
+        .find(|own| own.name == "payload")
+        .expect("payload");
     assert!(payload.pip > 0.99, "{payload:?}");
     let mass = &payload.parameters[0];
     assert!((mass.value - TYPE).abs() < 0.05, "{mass:?}");
@@ -115,7 +137,10 @@ fn the_arm_that_gained_mass_is_named_with_its_week() {
     assert_eq!(own.name, "payload");
     assert_eq!(own.since, Some(result.windows[1]));
     let gained = &own.parameters[0];
-    assert!(gained.interval95[0] < GAIN && GAIN < gained.interval95[1], "{gained:?}");
+    assert!(
+        gained.interval95[0] < GAIN && GAIN < gained.interval95[1],
+        "{gained:?}"
+    );
     assert_eq!(own.course.len(), WEEKS);
 }
 
@@ -142,7 +167,9 @@ fn bad_input_is_left_out_by_name_and_moves_nobody() {
     let mut fleet = study.fleet(|_, _| false);
     fleet.add(&study.statistics("bad", &scaled));
     let result = study.fit(fleet).expect("a fleet");
-    assert!(matches!(result.left_out[..], [ref own] if own.robot == "bad" && matches!(own.reason, Reason::Size { .. })));
+    assert!(
+        matches!(result.left_out[..], [ref own] if own.robot == "bad" && matches!(own.reason, Reason::Size { .. }))
+    );
     same(&result, "torque");
     // The log of another arm.
     let mut fleet = study.fleet(|unit, week| unit == 2 && week == 1);
@@ -150,9 +177,18 @@ fn bad_input_is_left_out_by_name_and_moves_nobody() {
     fleet.add(&study.statistics("unit2", &twice));
     fleet.add(&study.statistics("bad", &twice));
     let result = study.fit(fleet).expect("a fleet");
-    let names: Vec<&str> = result.left_out.iter().map(|own| own.robot.as_str()).collect();
+    let names: Vec<&str> = result
+        .left_out
+        .iter()
+        .map(|own| own.robot.as_str())
+        .collect();
     assert_eq!(names, ["bad", "unit2"]);
-    assert!(result.left_out.iter().all(|own| matches!(own.reason, Reason::Twice { .. })));
+    assert!(
+        result
+            .left_out
+            .iter()
+            .all(|own| matches!(own.reason, Reason::Twice { .. }))
+    );
     // Another robot, and another plan.
     let other = two_link::arm(1.5).expect("an arm");
     let mut fleet = study.fleet(|_, _| false);
@@ -172,7 +208,9 @@ fn bad_input_is_left_out_by_name_and_moves_nobody() {
 #[test]
 fn a_week_may_be_empty_and_a_clock_a_day_off() {
     let study = study();
-    let result = study.fit(study.fleet(|unit, week| unit == 1 && week == 1)).expect("a fleet");
+    let result = study
+        .fit(study.fleet(|unit, week| unit == 1 && week == 1))
+        .expect("a fleet");
     assert_eq!(unit(&result, "unit1").logs.len(), WEEKS - 1);
     assert!(unit(&result, "unit6").deviates && !unit(&result, "unit1").deviates);
     let mut fleet = study.fleet(|unit, week| unit == 1 && week == 1);
@@ -187,13 +225,24 @@ fn a_week_may_be_empty_and_a_clock_a_day_off() {
 fn fewer_than_three_units_and_impossible_settings_are_refused() {
     let study = study();
     let error = study.fit(study.fleet(|unit, _| unit > 1)).unwrap_err();
-    assert!(error.to_string().contains("fewer than three units"), "{error}");
+    assert!(
+        error.to_string().contains("fewer than three units"),
+        "{error}"
+    );
     let settings = FleetSettings {
         window: 0.0,
         ..FleetSettings::default()
     };
-    let error = study.fleet(|_, _| false).fit(&settings, &|_| Ok(())).unwrap_err();
+    let error = study
+        .fleet(|_, _| false)
+        .fit(&settings, &|_| Ok(()))
+        .unwrap_err();
     assert!(error.to_string().contains("fleet.window"), "{error}");
-    let stopped = study.fleet(|_, _| false).fit(&FleetSettings::default(), &|_| Err(Error::Cancelled));
-    assert_eq!(stopped.unwrap_err().to_string(), Error::Cancelled.to_string());
+    let stopped = study
+        .fleet(|_, _| false)
+        .fit(&FleetSettings::default(), &|_| Err(Error::Cancelled));
+    assert_eq!(
+        stopped.unwrap_err().to_string(),
+        Error::Cancelled.to_string()
+    );
 }

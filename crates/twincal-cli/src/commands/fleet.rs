@@ -1,7 +1,7 @@
 //! `twincal fleet`: which robots of a type deviate, and what is wrong with the model of all.
 
 use super::start_threads;
-use super::summary::paragraph;
+use super::summary::{indented, paragraph};
 use crate::args::Fleet as Flags;
 use crate::failure::{Failure, Outcome};
 use crate::names::display_names;
@@ -13,8 +13,8 @@ use std::sync::Mutex;
 use twincal::fleet::{Fleet, FleetResult, FleetSettings, FleetStage};
 use twincal_io::artifact::{Claim, Inputs, Maker, Replace};
 use twincal_io::fleet::{self, FLEET, PAGE, fleet_json, fleet_page, reason};
-use twincal_io::words::fleet as words;
 use twincal_io::statistics::StatisticsFile;
+use twincal_io::words::fleet as words;
 
 /// Files that are read at a time.
 const BATCH: usize = 8;
@@ -45,7 +45,9 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
         }
         Ok(())
     };
-    let result = fleet.fit(&settings, &watch).map_err(twincal_io::Error::from)?;
+    let result = fleet
+        .fit(&settings, &watch)
+        .map_err(twincal_io::Error::from)?;
     let about = fleet::Inputs {
         model,
         window_seconds: settings.window,
@@ -108,8 +110,9 @@ fn read(files: &[PathBuf], progress: &Progress) -> Outcome<(Fleet, String)> {
     let mut model = String::new();
     for (batch, paths) in files.chunks(BATCH).enumerate() {
         progress.counted("reading statistics", batch * BATCH, files.len());
-        let read: Vec<twincal_io::Result<StatisticsFile>> =
-            (paths.par_iter()).map(|path| StatisticsFile::read(path)).collect();
+        let read: Vec<twincal_io::Result<StatisticsFile>> = (paths.par_iter())
+            .map(|path| StatisticsFile::read(path))
+            .collect();
         for file in read {
             let file = file?;
             if model.is_empty() {
@@ -126,22 +129,16 @@ fn print(result: &FleetResult, terminal: &mut Terminal) {
     terminal.heading(&words::headline(result));
     for unit in result.units.iter().filter(|unit| unit.deviates).take(SHOWN) {
         terminal.say(&format!(
-            "  {} (probability {})",
+            "  {}, probability {}",
             unit.robot,
             words::chance(unit.probability)
         ));
         for own in &unit.deviations {
             let value = words::main_value(&own.parameters);
             let value = value.map_or_else(|| "–".into(), words::difference);
-            paragraph(
-                &format!(
-                    "{}: {value}, {} (PIP {})",
-                    own.story,
-                    words::since(own),
-                    words::chance(own.pip)
-                ),
-                terminal,
-            );
+            let (since, pip) = (words::since(own), words::chance(own.pip));
+            let text = format!("{}: {value}, {since}, PIP {pip}", own.story);
+            indented(&text, ["    ", "      "], terminal);
         }
     }
     let named = result.units.iter().filter(|unit| unit.deviates).count();
@@ -151,17 +148,11 @@ fn print(result: &FleetResult, terminal: &mut Terminal) {
     terminal.say("");
     terminal.heading(&words::of_type(result));
     let sure = result.type_effects.iter().filter(|own| own.pip >= 0.5);
-    for effect in sure.clone().take(SHOWN) {
+    for effect in sure.take(SHOWN) {
         let value = words::main_value(&effect.parameters);
         let value = value.map_or_else(|| "–".into(), words::value);
-        paragraph(
-            &format!(
-                "{}: {value} (PIP {})",
-                effect.story,
-                words::chance(effect.pip)
-            ),
-            terminal,
-        );
+        let pip = words::chance(effect.pip);
+        paragraph(&format!("{}: {value}, PIP {pip}", effect.story), terminal);
     }
     if !result.left_out.is_empty() {
         terminal.say("");

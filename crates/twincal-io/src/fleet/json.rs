@@ -116,7 +116,9 @@ impl<'a> FleetJson<'a> {
             twincal: env!("CARGO_PKG_VERSION"),
             inputs,
             windows: (result.windows.iter())
-                .map(|span| Window { start: start(*span) })
+                .map(|span| Window {
+                    start: start(*span),
+                })
                 .collect(),
             type_effects: result.type_effects.iter().map(effect).collect(),
             units: result.units.iter().map(unit).collect(),

@@ -24,8 +24,18 @@ pub fn fleet_page(result: &FleetResult, inputs: &Inputs) -> Result<String> {
             result.windows.len(),
         ),
         rate: crate::words::percent(inputs.false_discovery_rate),
-        deviating: result.units.iter().filter(|unit| unit.deviates).map(robot(result)).collect(),
-        others: result.units.iter().filter(|unit| !unit.deviates).map(robot(result)).collect(),
+        deviating: result
+            .units
+            .iter()
+            .filter(|unit| unit.deviates)
+            .map(robot(result))
+            .collect(),
+        others: result
+            .units
+            .iter()
+            .filter(|unit| !unit.deviates)
+            .map(robot(result))
+            .collect(),
         effects: (result.type_effects.iter().filter(|own| own.pip >= 0.05))
             .map(|own| Effect {
                 name: own.name.clone(),
@@ -56,7 +66,11 @@ fn robot(result: &FleetResult) -> impl Fn(&UnitSummary) -> Robot + '_ {
     |unit| Robot {
         name: unit.robot.clone(),
         probability: words::chance(unit.probability),
-        deviations: unit.deviations.iter().map(|own| deviation(own, result)).collect(),
+        deviations: unit
+            .deviations
+            .iter()
+            .map(|own| deviation(own, result))
+            .collect(),
         logs: unit.logs.clone(),
         rows: unit.rows,
     }

@@ -127,7 +127,11 @@ fn draw(course: &[(String, CoursePoint)]) -> String {
         svg.line("m", panel.at(x, below), panel.at(x, above));
         let hint = format!("{day}: {:.4} ± {:.4}", point.value, point.sd);
         svg.circle("ring", panel.at(x, point.value), 3.5, Some(&hint));
-        svg.line("c", panel.at(x - 0.5, point.mean), panel.at(x + 0.5, point.mean));
+        svg.line(
+            "c",
+            panel.at(x - 0.5, point.mean),
+            panel.at(x + 0.5, point.mean),
+        );
     }
     svg.finish("Difference to the type, window by window")
 }

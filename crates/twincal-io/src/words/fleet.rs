@@ -33,7 +33,9 @@ pub fn of_type(result: &FleetResult) -> String {
 /// The parameter that stands for an effect: a mass where there is one, else the first.
 #[must_use]
 pub fn main_value(values: &[Value]) -> Option<&Value> {
-    let mass = values.iter().find(|own| own.name == "mass" || own.name == "m");
+    let mass = values
+        .iter()
+        .find(|own| own.name == "mass" || own.name == "m");
     mass.or(values.first())
 }
 

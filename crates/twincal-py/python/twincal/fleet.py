@@ -2,12 +2,14 @@
 
 ======================  ==================================================================
 `statistics`            a folder or an object store of logs to a file of statistics per log
+`fit`                   files of statistics to a `Fleet`: which robots deviate, since when
 ======================  ==================================================================
 """
 
 from __future__ import annotations
 
 from twincal._engine import FleetStatistics, statistics
+from twincal._fleet import Fleet, fit
 from twincal._job import Fault, File
 
-__all__ = ["Fault", "File", "FleetStatistics", "statistics"]
+__all__ = ["Fault", "File", "Fleet", "FleetStatistics", "fit", "statistics"]

@@ -21,11 +21,11 @@ mod testing;
 
 pub use checks::left_out::{LeftOutData, LeftOutError};
 pub use checks::sweep::SweepPoint;
+pub(crate) use data::all_logs::hardly_act;
 pub use data::log_summary::LogSummary;
+pub(crate) use fit::columns::columns_of;
 pub use fit::compact::{Compact, CompactTerm};
 pub use from_statistics::calibrate_statistics;
-pub(crate) use data::all_logs::hardly_act;
-pub(crate) use fit::columns::columns_of;
 pub(crate) use log_statistics::LogStatistics;
 pub use log_statistics::Statistics;
 pub use outlook::{LookedAt, Outlook, outlook};

@@ -225,7 +225,9 @@ impl Prepared {
         let of_start = weights.chunks_exact(SCALES.len());
         Conditional {
             deviates: 1.0 - none / total,
-            starts: of_start.map(|own| own.iter().sum::<f64>() / total).collect(),
+            starts: of_start
+                .map(|own| own.iter().sum::<f64>() / total)
+                .collect(),
         }
     }
 }

@@ -208,5 +208,7 @@ pub(super) fn times(matrix: &[f64], x: &[f64]) -> Vec<f64> {
 }
 
 fn add(sum: &mut [f64], more: &[f64]) {
-    sum.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+    sum.iter_mut()
+        .zip(more)
+        .for_each(|(sum, more)| *sum += more);
 }

@@ -1,7 +1,7 @@
 //! The logs of a fleet, as little of each as the posterior needs, and which of them are left out.
 
-use crate::calibrate::Plan;
 use crate::calibrate::LogStatistics;
+use crate::calibrate::Plan;
 use crate::gram::{Gram, JointGram};
 use crate::robot::Robot;
 use crate::statistics::{JointBlock, LogSums};
@@ -127,14 +127,20 @@ pub(super) fn largest(families: Vec<Family>) -> Option<(Family, Vec<LeftOut>)> {
         names.len()
     };
     // Of equally large ones the first.
-    let most = (0..families.len()).rev().max_by_key(|&i| units(&families[i]))?;
+    let most = (0..families.len())
+        .rev()
+        .max_by_key(|&i| units(&families[i]))?;
     let mut families = families;
     let family = families.swap_remove(most);
     let mut left_out = Vec::new();
     for other in families {
         let same = other.robot == family.robot;
         for log in &other.logs {
-            let reason = if same { Reason::OtherPlan } else { Reason::OtherRobot };
+            let reason = if same {
+                Reason::OtherPlan
+            } else {
+                Reason::OtherRobot
+            };
             left_out.push(log.left_out(reason));
         }
     }
@@ -167,7 +173,10 @@ fn twice(logs: &[KeptLog], reasons: &mut [Option<Reason>]) {
     let mut by_size: BTreeMap<(usize, u64), Vec<usize>> = BTreeMap::new();
     for (i, log) in logs.iter().enumerate() {
         let torque = log.torque.iter().sum::<f64>();
-        by_size.entry((log.rows, torque.to_bits())).or_default().push(i);
+        by_size
+            .entry((log.rows, torque.to_bits()))
+            .or_default()
+            .push(i);
     }
     for own in by_size.values().filter(|own| own.len() > 1) {
         for (place, &b) in own.iter().enumerate() {
@@ -229,7 +238,10 @@ fn odd(logs: &[KeptLog], reasons: &mut [Option<Reason>]) {
         })
         .collect();
     for &i in &kept {
-        let ratios = medians.iter().enumerate().map(|(j, median)| size(i, j) / median);
+        let ratios = medians
+            .iter()
+            .enumerate()
+            .map(|(j, median)| size(i, j) / median);
         let ratios: Vec<f64> = ratios.filter(|r| *r > 0.0 && r.is_finite()).collect();
         let all = |is: fn(f64) -> bool| !ratios.is_empty() && ratios.iter().all(|r| is(*r));
         if all(|r| r > ODD) || all(|r| r < 1.0 / ODD) {

@@ -99,9 +99,8 @@ impl Fleet {
             self.thin();
         }
         let keep = place % self.step == 0;
-        let same = |family: &Family| {
-            family.robot == statistics.robot && family.plan == statistics.plan
-        };
+        let same =
+            |family: &Family| family.robot == statistics.robot && family.plan == statistics.plan;
         let at = self.families.iter().position(same);
         let at = at.unwrap_or_else(|| {
             self.families.push(Family {
@@ -213,7 +212,8 @@ fn require(settings: &FleetSettings) -> Result<()> {
 fn no_units() -> Error {
     Error::Statistics {
         problem: "fewer than three units with the same model and plan".into(),
-        remedy: "give statistics of three robots at least, made with one plan and --robot NAME".into(),
+        remedy: "give statistics of three robots at least, made with one plan and --robot NAME"
+            .into(),
     }
 }
 

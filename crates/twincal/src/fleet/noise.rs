@@ -5,10 +5,10 @@ use crate::calibrate::CalibrationSettings;
 use crate::error::Result;
 use crate::gram::{Gram, JointGram};
 use crate::likelihood::Columns;
+use crate::likelihood::NoiseModel;
 use crate::linear_algebra::Cholesky;
 use crate::plug_in::{Fit, FitSettings, Moving, fit, fit_tempered, start};
 use crate::prior::Prior;
-use crate::likelihood::NoiseModel;
 use crate::statistics::{Purpose, Runs, Sums, of_joint, residual_form};
 use rayon::prelude::*;
 

@@ -223,7 +223,11 @@ impl UnitPosterior {
             let columns = &hierarchy.columns[deviation.component];
             for &k in columns {
                 // From the start on, b has δ in it.
-                let scatter = if deviation.start == 0 { one.offset[k] } else { 0.0 };
+                let scatter = if deviation.start == 0 {
+                    one.offset[k]
+                } else {
+                    0.0
+                };
                 let after = own.iter_mut().skip(deviation.start);
                 after.for_each(|mean| mean[k] += b[k] - scatter);
             }
@@ -234,7 +238,8 @@ impl UnitPosterior {
             add(sum, own);
         }
         let last = own.last().into_iter().flatten().zip(variance);
-        (self.squares.iter_mut().zip(last)).for_each(|(sum, (x, variance))| *sum += x * x + variance);
+        (self.squares.iter_mut().zip(last))
+            .for_each(|(sum, (x, variance))| *sum += x * x + variance);
     }
 
     fn join(&mut self, other: Self) {
@@ -260,7 +265,9 @@ impl UnitPosterior {
 }
 
 fn add(sum: &mut [f64], more: &[f64]) {
-    sum.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+    sum.iter_mut()
+        .zip(more)
+        .for_each(|(sum, more)| *sum += more);
 }
 
 fn scale(values: &mut [f64], factor: f64) {

@@ -1,11 +1,11 @@
 //! What a fleet's posterior says in physical words: effects of the type, and the units that deviate.
 
+use super::Known;
 use super::deviations::Deviation;
 use super::discoveries::named;
 use super::hierarchy::{Hierarchy, dot};
 use super::logs::LeftOut;
 use super::posterior::{FleetPosterior, UnitPosterior};
-use super::Known;
 use crate::term::{Family, Library};
 
 /// Deviations less likely than this are not listed.
@@ -235,7 +235,11 @@ impl About<'_> {
             let key = |unit: &UnitSummary| (!unit.deviates, -unit.probability);
             let ((x, p), (y, q)) = (key(a), key(b));
             let by_name = a.robot.cmp(&b.robot);
-            if x || y { x.cmp(&y).then(by_name) } else { p.total_cmp(&q).then(by_name) }
+            if x || y {
+                x.cmp(&y).then(by_name)
+            } else {
+                p.total_cmp(&q).then(by_name)
+            }
         });
         let mut type_effects: Vec<TypeEffect> = (components.iter().enumerate())
             .filter(|(at, own)| *at == 0 || components[at - 1].index != own.index)
@@ -263,7 +267,11 @@ impl About<'_> {
     }
 
     fn natural(&self, columns: &[usize], draw: impl Iterator<Item = f64>) -> Vec<f64> {
-        columns.iter().zip(draw).map(|(&k, x)| self.root(k) * x).collect()
+        columns
+            .iter()
+            .zip(draw)
+            .map(|(&k, x)| self.root(k) * x)
+            .collect()
     }
 
     fn type_effect(

@@ -121,7 +121,9 @@ impl<'a> Chain<'a> {
         let posterior = self.of_type()?;
         let draws = draw(&posterior, KEPT, self.seed, stream);
         let size = self.hierarchy.size();
-        let mu: Vec<Vec<f64>> = (draws.beta.chunks_exact(size)).map(<[f64]>::to_vec).collect();
+        let mu: Vec<Vec<f64>> = (draws.beta.chunks_exact(size))
+            .map(<[f64]>::to_vec)
+            .collect();
         if let Some(last) = mu.last() {
             self.mu.clone_from(last);
         }

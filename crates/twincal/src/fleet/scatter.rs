@@ -64,8 +64,8 @@ pub(super) fn learn(
         let (variance, deviations) = {
             let (gram, linear) = of_type_of(&units);
             let stream = 2 + round as u64;
-            let mut chain = Chain::new(hierarchy, &units, (&gram, &linear), (seed, stream))
-                .with_states(states);
+            let mut chain =
+                Chain::new(hierarchy, &units, (&gram, &linear), (seed, stream)).with_states(states);
             let mut found = Vec::new();
             for iteration in 0..ITERATIONS {
                 let own = chain.iterate()?;
@@ -148,12 +148,15 @@ fn updated(
                     .collect();
                 sum += squares(&mut own) / found.len() as f64;
             }
-            let left = |prepared: &Prepared| {
-                1.0 - prepared.unit.posterior[k * size + k] / now[component]
-            };
+            let left =
+                |prepared: &Prepared| 1.0 - prepared.unit.posterior[k * size + k] / now[component];
             free += units.iter().map(left).sum::<f64>();
         }
-        let next = if free > 1e-9 { sum / free } else { now[component] };
+        let next = if free > 1e-9 {
+            sum / free
+        } else {
+            now[component]
+        };
         next.clamp(BOUNDS.0, BOUNDS.1)
     };
     hierarchy.columns.iter().enumerate().map(of).collect()

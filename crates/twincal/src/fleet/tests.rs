@@ -21,7 +21,9 @@ fn small(units: usize, deviating: usize, seed: u64) -> Hierarchy {
         let (mut precision, mut score) = (vec![0.0; COLUMNS * COLUMNS], vec![0.0; COLUMNS]);
         for _ in 0..14 {
             let shared = random.normal();
-            let x: Vec<f64> = (0..COLUMNS).map(|_| 0.5 * shared + random.normal()).collect();
+            let x: Vec<f64> = (0..COLUMNS)
+                .map(|_| 0.5 * shared + random.normal())
+                .collect();
             let y = dot(&x, beta) + random.normal();
             for i in 0..COLUMNS {
                 score[i] += x[i] * y;
@@ -60,7 +62,9 @@ fn small(units: usize, deviating: usize, seed: u64) -> Hierarchy {
         prior,
         columns: (0..COLUMNS).map(|k| vec![k]).collect(),
         names: (0..COLUMNS).map(|k| format!("c{k}")).collect(),
-        odds: (0..COLUMNS).map(|k| f64::from(u8::from(k < deviating))).collect(),
+        odds: (0..COLUMNS)
+            .map(|k| f64::from(u8::from(k < deviating)))
+            .collect(),
         plug_in: Scatter {
             variance: vec![0.04, 0.01, 0.04, 0.09, 0.02, 0.04],
             share: 0.15,
@@ -119,7 +123,8 @@ fn enumerate(hierarchy: &Hierarchy, deviating: usize) -> Truth {
         let row = |cell: usize| &roots[cell].0[k * COLUMNS..(k + 1) * COLUMNS];
         for i in 0..=k {
             for j in 0..=k {
-                matrix[(a * COLUMNS + i) * size + b * COLUMNS + j] += variance * row(a)[i] * row(b)[j];
+                matrix[(a * COLUMNS + i) * size + b * COLUMNS + j] +=
+                    variance * row(a)[i] * row(b)[j];
             }
         }
     };
@@ -145,7 +150,9 @@ fn enumerate(hierarchy: &Hierarchy, deviating: usize) -> Truth {
             let (state, prior) = states[left % states.len()];
             left /= states.len();
             log += prior.ln();
-            let Some((start, scale)) = state else { continue };
+            let Some((start, scale)) = state else {
+                continue;
+            };
             let (unit, k) = (digit / deviating, digit % deviating);
             for a in start..WINDOWS {
                 for b in start..WINDOWS {
@@ -162,7 +169,12 @@ fn enumerate(hierarchy: &Hierarchy, deviating: usize) -> Truth {
         // E[μ_k] = Σ over cells of the row of L times the solved data.
         let mean = (0..COLUMNS).map(|k| {
             let inside = f64::from(u8::from(model >> k & 1 == 1));
-            let own = |cell: usize| dot(&roots[cell].0[k * COLUMNS..(k + 1) * COLUMNS], &half[cell * COLUMNS..(cell + 1) * COLUMNS]);
+            let own = |cell: usize| {
+                dot(
+                    &roots[cell].0[k * COLUMNS..(k + 1) * COLUMNS],
+                    &half[cell * COLUMNS..(cell + 1) * COLUMNS],
+                )
+            };
             inside * (0..cells).map(own).sum::<f64>()
         });
         (log, mean.collect())
@@ -176,7 +188,10 @@ fn enumerate(hierarchy: &Hierarchy, deviating: usize) -> Truth {
             (model, combination, log, mean)
         })
         .collect();
-    let largest = all.iter().map(|own| own.2).fold(f64::NEG_INFINITY, f64::max);
+    let largest = all
+        .iter()
+        .map(|own| own.2)
+        .fold(f64::NEG_INFINITY, f64::max);
     let total: f64 = all.iter().map(|own| (own.2 - largest).exp()).sum();
     let mut truth = Truth {
         inclusion: vec![0.0; COLUMNS],
@@ -227,7 +242,10 @@ fn compare(units: usize, deviating: usize, seed: u64) {
     let truth = enumerate(&hierarchy, deviating);
     let found = sampled(&hierarchy, 4000);
     let near = |what: &str, a: f64, b: f64| {
-        assert!((a - b).abs() < 0.025, "{what}: sampled {a:.4}, enumerated {b:.4}");
+        assert!(
+            (a - b).abs() < 0.025,
+            "{what}: sampled {a:.4}, enumerated {b:.4}"
+        );
     };
     for k in 0..COLUMNS {
         near(&format!("z{k}"), found.inclusion[k], truth.inclusion[k]);
@@ -238,8 +256,16 @@ fn compare(units: usize, deviating: usize, seed: u64) {
     for (unit, own) in found.units.iter().enumerate() {
         near(&format!("unit {unit}"), own.deviates, truth.any[unit]);
         for k in 0..deviating {
-            near(&format!("unit {unit} c{k}"), own.inclusion[k], truth.deviates[unit][k]);
-            near(&format!("unit {unit} c{k} late"), own.starts[k][1], truth.late[unit][k]);
+            near(
+                &format!("unit {unit} c{k}"),
+                own.inclusion[k],
+                truth.deviates[unit][k],
+            );
+            near(
+                &format!("unit {unit} c{k} late"),
+                own.starts[k][1],
+                truth.late[unit][k],
+            );
         }
     }
     // The test is of something: probabilities that are neither 0 nor 1.
@@ -264,7 +290,10 @@ fn a_missing_window_is_no_window() {
     hierarchy.units[2].windows.remove(0);
     let found = sampled(&hierarchy, 50);
     assert_eq!(found.units[2].starts[0].len(), 1);
-    let mut means = found.units.iter().flat_map(|unit| unit.means.iter().flatten());
+    let mut means = found
+        .units
+        .iter()
+        .flat_map(|unit| unit.means.iter().flatten());
     assert!(means.all(|x| x.is_finite()));
 }
 
@@ -272,12 +301,22 @@ fn a_missing_window_is_no_window() {
 #[test]
 fn chains_are_the_same_on_one_thread() {
     let hierarchy = small(3, 2, 13);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    let (many, one) = (sampled(&hierarchy, 40), pool.install(|| sampled(&hierarchy, 40)));
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .unwrap();
+    let (many, one) = (
+        sampled(&hierarchy, 40),
+        pool.install(|| sampled(&hierarchy, 40)),
+    );
     assert_eq!(many.inclusion, one.inclusion);
     assert_eq!(many.mu, one.mu);
     let units = |found: &FleetPosterior| -> Vec<(f64, Vec<Vec<f64>>)> {
-        found.units.iter().map(|unit| (unit.deviates, unit.means.clone())).collect()
+        found
+            .units
+            .iter()
+            .map(|unit| (unit.deviates, unit.means.clone()))
+            .collect()
     };
     assert_eq!(units(&many), units(&one));
 }

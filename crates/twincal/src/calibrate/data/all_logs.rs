@@ -251,11 +251,7 @@ pub(in crate::calibrate) fn zero_columns<'a>(
 }
 
 /// Columns whose squares over so many rows are next to nothing.
-pub(crate) fn hardly_act(
-    square: &[f64],
-    rows: usize,
-    library: &Library,
-) -> Vec<usize> {
+pub(crate) fn hardly_act(square: &[f64], rows: usize, library: &Library) -> Vec<usize> {
     let cells = (rows * library.joints()).max(1) as f64;
     let typical = library.typical_sizes();
     let is_zero = |k: &usize| {

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LogFacts {
     pub(crate) summary: LogSummary,
-    /// First and last stamp, s.
+    /// First and last stamp, s; since 1970 where the log says so.
     pub(crate) ends: [f64; 2],
     pub(crate) payload: Payload,
     /// Range of the motion per joint: `[q_min, q_max, qd_min, qd_max, qdd_min, qdd_max]`.
@@ -26,7 +26,7 @@ impl LogFacts {
     pub(in crate::calibrate) fn of(log: &Log, payload: Payload) -> Self {
         Self {
             summary: log.summary.clone(),
-            ends: log.ends,
+            ends: log.ends.map(|stamp| log.origin + stamp),
             payload,
             hull: hull(&log.observations),
             states: states(&log.observations),

@@ -11,8 +11,10 @@ pub(in crate::calibrate) struct Log {
     pub(in crate::calibrate) incidents: Vec<Incident>,
     pub(in crate::calibrate) observations: Observations,
     pub(in crate::calibrate) summary: LogSummary,
-    /// First and last stamp, s.
+    /// First and last stamp, s from `origin` on.
     pub(in crate::calibrate) ends: [f64; 2],
+    /// Where stamps count from, s: since 1970 for a bag, 0 where they say that themselves.
+    pub(in crate::calibrate) origin: f64,
     /// Of a log in chapters, statistics at the cut-offs of the sweep with nothing left out: made while its chapters were there.
     pub(in crate::calibrate) elsewhere: Vec<Option<Gram>>,
 }

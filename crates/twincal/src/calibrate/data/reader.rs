@@ -80,7 +80,7 @@ impl Reader<'_> {
         let mut warm = vec![false; self.robot.dof()];
         let mut room = Room::new(long.rows_at_most(self.pipeline), long.log.shelf().cloned());
         let mut summaries = Vec::new();
-        let mut ends: Option<[f64; 2]> = None;
+        let (mut ends, mut origin): (Option<[f64; 2]>, f64) = (None, 0.0);
         let mut elsewhere: Vec<_> = (role.elsewhere().iter())
             .map(|_| Some(GramSum::default()))
             .collect();
@@ -97,6 +97,7 @@ impl Reader<'_> {
             self.add_at(role.elsewhere(), chapter, (&[], true), &mut elsewhere);
             summaries.push(log.summary);
             let [first, last] = log.ends;
+            origin = log.origin;
             ends = Some([ends.map_or(first, |ends| ends[0]), last]);
             Ok(())
         })?;
@@ -122,6 +123,7 @@ impl Reader<'_> {
             observations,
             summary,
             ends,
+            origin,
             elsewhere: (elsewhere.into_iter())
                 .map(|sum| sum.map(GramSum::finish))
                 .collect(),
@@ -151,6 +153,7 @@ impl Reader<'_> {
             summary: LogSummary::of(recording, role.word(), pipeline, &trajectory),
             observations,
             ends: ends.unwrap_or_default(),
+            origin: recording.start_ns as f64 * 1e-9,
             elsewhere: Vec::new(),
         };
         Ok((log, trajectory))

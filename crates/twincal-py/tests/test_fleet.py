@@ -1,0 +1,77 @@
+"""`twincal.fleet.fit` gives what `twincal fleet` writes; a small fleet of a planar arm with one robot that changed."""
+
+import json
+
+import numpy as np
+import pandas
+import pytest
+import twincal
+from twincal import fleet
+
+MONDAY = 1_767_571_200
+WEEK = 7 * 86_400
+UNITS, WEEKS = 5, 3
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory, arm):
+    """Statistics of five arms over three weeks; `unit4` has more Coulomb friction from the second week on."""
+    folder = tmp_path_factory.mktemp("fleet")
+    robot = twincal.Robot.from_urdf(arm.model)
+    names = robot.joint_names
+    for unit in range(UNITS):
+        (folder / "logs" / f"unit{unit}").mkdir(parents=True)
+        for week in range(WEEKS):
+            rng = np.random.default_rng([unit, week])
+            time = np.arange(1500) / 100.0
+            w = 2 * np.pi * 0.1 * np.arange(1, 6)
+            a, b = rng.normal(size=(2, len(names), 5)) / 2.5
+            s, c = np.sin(np.outer(time, w)), np.cos(np.outer(time, w))
+            q, qd, qdd = s @ a.T + c @ b.T, (c * w) @ a.T - (s * w) @ b.T, -(s * w**2) @ a.T - (c * w**2) @ b.T
+            drag = np.full(len(names), 1.0 + 0.02 * unit)
+            drag[0] += 1.0 * (unit == 4 and week > 0)
+            tau = robot.inverse_dynamics(q, qd, qdd) + drag * np.tanh(qd / 0.01) + 0.1 * rng.normal(size=q.shape)
+            start = MONDAY + week * WEEK + 3600 * (8 + unit)
+            columns = {"t": ((start + time) * 1e9).astype("datetime64[ns]")}
+            for j, name in enumerate(names):
+                columns |= {f"{name}.q": q[:, j], f"{name}.qd": qd[:, j], f"{name}.tau": tau[:, j]}
+            pandas.DataFrame(columns).to_parquet(folder / "logs" / f"unit{unit}" / f"week{week}.parquet")
+    config = folder / "plan.toml"
+    config.write_text('[library]\nfamilies = ["viscous", "coulomb", "payload", "offset"]\n')
+    some = [str(folder / "logs" / f"unit{unit}" / "week0.parquet") for unit in (0, 2)]
+    arguments = ["statistics", *some, "--model", str(arm.model), "--plan", "fleet", "--config", str(config)]
+    twincal._twincal.call([*arguments, "-o", str(folder / "plan")])
+    files = fleet.statistics(folder / "logs", arm.model, folder / "plan" / "plan.json", output=folder / "st", workers=2)
+    assert not files.faults
+    return folder, sorted((folder / "st").rglob("*.arrow"))
+
+
+def test_the_robot_that_changed_is_named_with_its_window(made):
+    folder, files = made
+    result = fleet.fit(files, folder / "out")
+    assert result.deviating == ["unit4"]
+    own = result.units[0]["deviations"][0]
+    assert own["family"] == "coulomb" and own["since"] == "2026-01-12T00:00:00Z"
+    low, high = own["parameters"][0]["interval95"]
+    assert low < 1.0 < high
+    assert json.loads((folder / "out" / "fleet.json").read_text())["units"] == result.units
+    assert "<script" not in result.report.read_text()
+    frame = result.to_pandas()
+    assert set(frame["robot"]) == {f"unit{unit}" for unit in range(UNITS)}
+    assert frame.loc[frame["deviates"], "since"].iloc[0] == pandas.Timestamp("2026-01-12", tz="UTC")
+    assert "1 deviate" in repr(result)
+
+
+def test_bad_arguments_are_errors(made, tmp_path):
+    folder, files = made
+    with pytest.raises(TypeError, match="list of paths"):
+        fleet.fit(files[0], tmp_path / "out")
+    with pytest.raises(ValueError, match="empty"):
+        fleet.fit([], tmp_path / "out")
+    with pytest.raises(twincal.Error, match="fewer than three"):
+        fleet.fit(files[:2], tmp_path / "out")
+    with pytest.raises(twincal.Error, match="no length of time"):
+        fleet.fit(files, tmp_path / "out", window="soon")
+    with pytest.raises(twincal.Error, match="between 0 and 1"):
+        fleet.fit(files, tmp_path / "out", fdr=2.0)
+    assert not (tmp_path / "out").exists()
