@@ -27,7 +27,7 @@ from table import markdown
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = Path(os.environ.get("TWINCAL", ROOT / "target/release/twincal"))
 LIMIT = 3600.0  # s, for one command
-PLAN_LOGS = 6  # the first log of so many units makes the plan
+PLAN_LOGS = 6  # so many logs of the first unit make the plan: a plan takes what robots differ in for noise
 CONFIG = ("--config", "twincal.toml")
 POOLED = Path("out") / "twins" / SHORT[0]  # the twin of the short unit, where `fleet` writes one
 
@@ -79,7 +79,7 @@ def make_statistics(program, folder, truth, force):
     plan = folder / "st" / "plan"
     if force or not (plan / "plan.json").exists():
         shutil.rmtree(plan, ignore_errors=True)
-        some = [f"{robot}-w1.parquet" for robot in robots if robot != SHORT[0]][:PLAN_LOGS]
+        some = [f"{robots[0]}-w{week}.parquet" for week in range(1, PLAN_LOGS + 1)]
         call(folder, program, "statistics", *some, *CONFIG, "--plan", "fleet", "-o", plan, *again)
         # these logs come again with the name of their unit
         for extra in plan.glob("*.arrow"):

@@ -47,6 +47,7 @@ fn study() -> Study {
     let nominal = two_link::arm(2.0).expect("an arm");
     let mut settings = CalibrationSettings::default();
     settings.library.families = vec![Family::Payload, Family::Viscous, Family::Coulomb];
+    settings.library.terms = vec!["sin(q1 - q2)".into()];
     let mut noise = Random::new(4, 0);
     let logs: Vec<Vec<Recording>> = (0..UNITS)
         .map(|unit| {

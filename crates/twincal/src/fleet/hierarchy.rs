@@ -1,14 +1,15 @@
 //! The regression behind a fleet: normal sums of every unit and window, and the plug-ins of the hierarchy over them.
 //!
 //! ```text
-//! β_utk = μ_k + δ_uk + [t ≥ s_uc] b_uk,     k a column of component c, u a unit, t a window
+//! β_utk = μ_k + δ_uk + [t ≥ s_uc] b_uk + ε_utk,     k a column of component c, u a unit, t a window
 //! z_c ∈ {0,1}   μ_k | z_c=1 ~ N(0, d_k), else 0                       what is wrong with the model file of all
 //! δ_uk ~ N(0, ω_c² d_k)                                               scatter of units
+//! ε_utk ~ N(0, ν_c² d_k)                                              scatter of windows: what no candidate describes differs with the motion
 //! w_uc ∈ {0,1}  b_uk | w_uc=1 ~ N(0, g² d_k), g² one of SCALES        what one unit has more, from window s_uc on
 //! ln p(y_ut | β) = −½ βᵀΛ_ut β + η_utᵀβ + constant
 //! ```
 //! s_uc is the unit's first window with probability 1/2, otherwise one of its later ones. d_k is the slab variance of a calibration; all
-//! below is in units of √d_k, so that slabs are 1. ω_c and the expected share of deviations π are plug-ins, learned from all units.
+//! below is in units of √d_k, so that slabs are 1. ω_c, ν_c and the expected share of deviations π are plug-ins, learned from all units.
 
 use crate::linear_algebra::Cholesky;
 use crate::prior::Prior;
@@ -53,6 +54,8 @@ pub(super) struct Hierarchy {
 pub(super) struct Scatter {
     /// ω_c².
     pub(super) variance: Vec<f64>,
+    /// ν_c².
+    pub(super) windows: Vec<f64>,
     /// π: probability that a unit deviates in a component with odds of 1.
     pub(super) share: f64,
 }
@@ -65,18 +68,28 @@ impl Hierarchy {
 
     /// ω² of each column.
     pub(super) fn scatter(&self) -> Vec<f64> {
+        self.by_column(&self.plug_in.variance)
+    }
+
+    /// ν² of each column.
+    pub(super) fn window_scatter(&self) -> Vec<f64> {
+        self.by_column(&self.plug_in.windows)
+    }
+
+    fn by_column(&self, variances: &[f64]) -> Vec<f64> {
         let mut of_columns = vec![0.0; self.size()];
-        for (columns, variance) in self.columns.iter().zip(&self.plug_in.variance) {
+        for (columns, variance) in self.columns.iter().zip(variances) {
             columns.iter().for_each(|&k| of_columns[k] = *variance);
         }
         of_columns
     }
 }
 
-/// What a unit says with scatter integrated out, for the starts of its windows.
+/// What a unit says with scatter of windows and of units integrated out, for the starts of its windows.
 ///
 /// ```text
-/// A_s = Σ_{t≥s} Λ_t   E_s = Σ_{t≥s} η_t   P = (A_1 + D⁻¹)⁻¹,  D = diag(ω²)
+/// R_t = (Λ_t + N⁻¹)⁻¹,  N = diag(ν²)          Λ̃_t = Λ_t − Λ_t R_t Λ_t,   η̃_t = η_t − Λ_t R_t η_t
+/// A_s = Σ_{t≥s} Λ̃_t   E_s = Σ_{t≥s} η̃_t   P = (A_1 + D⁻¹)⁻¹,  D = diag(ω²)
 /// g_s(μ) = E_s − A_s μ − A_s P (E_1 − A_1 μ)          score of a change from s on
 /// H_ss'  = A_max(s,s') − A_s P A_s'                   its information
 /// ```
@@ -92,13 +105,14 @@ pub(super) struct Unit {
 }
 
 impl Unit {
-    pub(super) fn new(sums: &UnitSums, scatter: &[f64]) -> Self {
+    pub(super) fn new(sums: &UnitSums, scatter: &[f64], of_windows: &[f64]) -> Self {
         let size = scatter.len();
         let (mut after, mut score) = (Vec::new(), Vec::new());
         let (mut precision, mut linear) = (vec![0.0; size * size], vec![0.0; size]);
         for window in sums.windows.iter().rev() {
-            add(&mut precision, &window.precision);
-            add(&mut linear, &window.score);
+            let (own, own_linear) = window.softened(of_windows);
+            add(&mut precision, &own);
+            add(&mut linear, &own_linear);
             after.push(precision.clone());
             score.push(linear.clone());
         }
@@ -178,6 +192,58 @@ impl Unit {
             left.iter_mut().zip(explained).for_each(|(l, e)| *l -= e);
         }
         times(&self.posterior, &left)
+    }
+}
+
+impl Window {
+    /// Λ̃ = Λ − Λ R Λ and η̃ = η − Λ R η: what the window says of the unit, its own scatter integrated out.
+    fn softened(&self, of_windows: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let n = of_windows.len();
+        let spread = scattered(&self.precision, of_windows);
+        let half = crate::linear_algebra::product(&self.precision, &spread, [n, n, n]);
+        let mut precision = crate::linear_algebra::product(&half, &self.precision, [n, n, n]);
+        (precision.iter_mut().zip(&self.precision)).for_each(|(less, own)| *less = own - *less);
+        // Products round each triangle in its own way.
+        for i in 0..n {
+            for k in 0..i {
+                let mean = 0.5 * (precision[i * n + k] + precision[k * n + i]);
+                (precision[i * n + k], precision[k * n + i]) = (mean, mean);
+            }
+        }
+        let explained = times(&half, &self.score);
+        let linear = self.score.iter().zip(explained).map(|(own, less)| own - less);
+        (precision, linear.collect())
+    }
+
+    /// E[ε | β], and how much of its prior variance the data leave to each ε_k, 0 to 1, with that of δ, P, in it:
+    ///
+    /// ```text
+    /// E[ε] = R (η − Λ β)        (R + W P Wᵀ)_kk / ν_k²,   W = R Λ = 1 − R N⁻¹
+    /// ```
+    pub(super) fn scatter(
+        &self,
+        of_windows: &[f64],
+        beta: &[f64],
+        posterior: &[f64],
+    ) -> (Vec<f64>, Vec<f64>) {
+        let n = of_windows.len();
+        let spread = scattered(&self.precision, of_windows);
+        let explained = times(&self.precision, beta);
+        let left: Vec<f64> = (self.score.iter().zip(explained))
+            .map(|(own, less)| own - less)
+            .collect();
+        let share = |at: usize| {
+            let unit = f64::from(u8::from(at / n == at % n));
+            unit - spread[at] / of_windows[at % n]
+        };
+        let weights: Vec<f64> = (0..n * n).map(share).collect();
+        let half = crate::linear_algebra::product(&weights, posterior, [n, n, n]);
+        let open = (0..n).map(|k| {
+            let row = k * n..(k + 1) * n;
+            let of_unit = dot(&half[row.clone()], &weights[row]);
+            (spread[k * n + k] + of_unit) / of_windows[k]
+        });
+        (times(&spread, &left), open.collect())
     }
 }
 

@@ -361,6 +361,7 @@ impl Known {
             prior,
             plug_in: Scatter {
                 variance: vec![1.0; columns.len()],
+                windows: vec![1.0; columns.len()],
                 share: 0.0,
             },
             columns,

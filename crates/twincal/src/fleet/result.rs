@@ -95,7 +95,7 @@ pub struct CoursePoint {
     pub window: usize,
     /// Difference to the mean of the type.
     pub value: f64,
-    /// Its standard deviation.
+    /// Its standard deviation, with the scatter of windows.
     pub sd: f64,
     /// The same difference as all windows together say it.
     pub mean: f64,
@@ -368,6 +368,7 @@ impl About<'_> {
         type_mean: &[f64],
     ) -> Vec<CoursePoint> {
         let size = self.hierarchy.size();
+        let scatter = self.hierarchy.window_scatter()[column];
         let windows = self.hierarchy.units[at].windows.iter().zip(&unit.means);
         windows
             .filter_map(|(window, mean)| {
@@ -378,7 +379,7 @@ impl About<'_> {
                 (own > 0.0).then(|| CoursePoint {
                     window: window.index,
                     value: scale * ((window.score[column] - explained) / own - type_mean[column]),
-                    sd: scale / own.sqrt(),
+                    sd: scale * (1.0 / own + scatter).sqrt(),
                     mean: scale * (mean[column] - type_mean[column]),
                 })
             })

@@ -57,6 +57,8 @@ pub(super) struct Iteration {
     pub(super) inclusion: Vec<f64>,
     /// Draws of μ, K each.
     pub(super) mu: Vec<Vec<f64>>,
+    /// That of them which units were looked at with.
+    pub(super) of_units: Vec<f64>,
     /// Unit by unit.
     pub(super) units: Vec<UnitIteration>,
 }
@@ -151,6 +153,7 @@ impl<'a> Chain<'a> {
         Ok(Iteration {
             inclusion: posterior.inclusion,
             mu,
+            of_units: self.mu.clone(),
             units,
         })
     }

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! ω_c² = Σ_u Σ_{k∈c} E[δ_uk]² / Σ_u Σ_{k∈c} (1 − P_kk/ω_c²)         (MacKay's fixed point)
+//! ν_c² = Σ_ut Σ_{k∈c} E[ε_utk]² / Σ_ut Σ_{k∈c} (1 − Var(ε_utk)/ν_c²)
 //! π    = (1 + Σ_uc P(w_uc = 1)) / ((U₀ /ε + U) Σ_c o_c)
 //! ```
 //! The first rounds know no deviations: there the sum of squares is that of a normal distribution with the median of |E[δ]|, which a few
@@ -11,14 +12,16 @@
 //! MacKay, Bayesian interpolation, Neural Computation 4 (1992), eq. 4.8 and 4.9, for one precision per component.
 
 use super::deviations::{Prepared, Rules, State};
-use super::hierarchy::{Hierarchy, Unit};
-use super::sampler::{Chain, Iteration, of_type};
+use super::hierarchy::{Hierarchy, Unit, UnitSums};
+use super::sampler::{Chain, Iteration, UnitIteration, of_type};
 use crate::error::Result;
 use rayon::prelude::*;
 
 /// ω² before anything is known, and its bounds, in squares of the slab's sd.
 const FIRST: f64 = 1e-3;
 const BOUNDS: (f64, f64) = (1e-10, 4.0);
+/// ν² before anything is known: windows of one unit are alike.
+const FIRST_WINDOWS: f64 = 1e-5;
 /// Rounds without deviations, and rounds with them.
 const ROBUST_ROUNDS: usize = 10;
 const ROUNDS: usize = 8;
@@ -42,26 +45,30 @@ pub(super) fn learn(
 ) -> Result<Vec<State>> {
     let components = hierarchy.columns.len();
     hierarchy.plug_in.variance = vec![FIRST; components];
+    hierarchy.plug_in.windows = vec![FIRST_WINDOWS; components];
     hierarchy.plug_in.share = share(hierarchy, 0.0);
     let none = vec![0.0; components];
     let odds = std::mem::replace(&mut hierarchy.odds, none);
     for round in 0..ROBUST_ROUNDS {
         watch(round, ROBUST_ROUNDS + ROUNDS)?;
         let units = prepared(hierarchy);
-        let variance = {
+        let (variance, windows) = {
             let (gram, linear) = of_type_of(&units);
             let mut chain = Chain::new(hierarchy, &units, (&gram, &linear), (seed, 1));
-            let found = chain.iterate()?;
-            updated(hierarchy, &units, &[found], robust_squares)
+            let found = [chain.iterate()?];
+            (
+                updated(hierarchy, &units, &found, robust_squares),
+                updated_windows(hierarchy, &units, &found[0], robust_squares),
+            )
         };
-        hierarchy.plug_in.variance = variance;
+        (hierarchy.plug_in.variance, hierarchy.plug_in.windows) = (variance, windows);
     }
     hierarchy.odds = odds;
     let mut states = vec![State::default(); hierarchy.units.len()];
     for round in 0..ROUNDS {
         watch(ROBUST_ROUNDS + round, ROBUST_ROUNDS + ROUNDS)?;
         let units = prepared(hierarchy);
-        let (variance, deviations) = {
+        let (variance, windows, deviations) = {
             let (gram, linear) = of_type_of(&units);
             let stream = 2 + round as u64;
             let mut chain =
@@ -74,10 +81,12 @@ pub(super) fn learn(
                 }
             }
             let variance = updated(hierarchy, &units, &found, squares);
+            let last = found.last().expect("a round has iterations");
+            let windows = updated_windows(hierarchy, &units, last, squares);
             states = chain.into_states();
-            (variance, deviations(&found))
+            (variance, windows, deviations(&found))
         };
-        hierarchy.plug_in.variance = variance;
+        (hierarchy.plug_in.variance, hierarchy.plug_in.windows) = (variance, windows);
         hierarchy.plug_in.share = share(hierarchy, deviations);
     }
     Ok(states)
@@ -85,14 +94,14 @@ pub(super) fn learn(
 
 /// The units under the present plug-ins.
 pub(super) fn prepared(hierarchy: &Hierarchy) -> Vec<Prepared> {
-    let scatter = hierarchy.scatter();
+    let (scatter, of_windows) = (hierarchy.scatter(), hierarchy.window_scatter());
     let rules = Rules {
         columns: &hierarchy.columns,
         odds: &hierarchy.odds,
         share: hierarchy.plug_in.share,
     };
     (hierarchy.units.par_iter())
-        .map(|sums| Prepared::new(Unit::new(sums, &scatter), rules))
+        .map(|sums| Prepared::new(Unit::new(sums, &scatter, &of_windows), rules))
         .collect()
 }
 
@@ -157,6 +166,43 @@ fn updated(
         } else {
             now[component]
         };
+        next.clamp(BOUNDS.0, BOUNDS.1)
+    };
+    hierarchy.columns.iter().enumerate().map(of).collect()
+}
+
+/// ν² of every component from one iteration: of units with two windows or more, for one window does not tell its scatter from that of units.
+fn updated_windows(
+    hierarchy: &Hierarchy,
+    units: &[Prepared],
+    found: &Iteration,
+    squares: fn(&mut [f64]) -> f64,
+) -> Vec<f64> {
+    let of_windows = hierarchy.window_scatter();
+    let of_unit = |((sums, prepared), one): ((&UnitSums, &Prepared), &UnitIteration)| {
+        let mut own = Vec::new();
+        for (start, window) in sums.windows.iter().enumerate().filter(|_| sums.windows.len() > 1) {
+            let mut beta = one.offset.clone();
+            (beta.iter_mut().zip(&found.of_units)).for_each(|(beta, mu)| *beta += mu);
+            for (deviation, b) in one.deviations.iter().filter(|(own, _)| own.start <= start) {
+                let columns = &hierarchy.columns[deviation.component];
+                columns.iter().for_each(|&k| beta[k] += b[k]);
+            }
+            own.push(window.scatter(&of_windows, &beta, &prepared.unit.posterior));
+        }
+        own
+    };
+    let pairs = hierarchy.units.par_iter().zip(units).zip(&found.units);
+    let all: Vec<(Vec<f64>, Vec<f64>)> = pairs.flat_map_iter(of_unit).collect();
+    let now = &hierarchy.plug_in.windows;
+    let of = |(component, columns): (usize, &Vec<usize>)| {
+        let (mut sum, mut free) = (0.0, 0.0);
+        for &k in columns {
+            let mut own: Vec<f64> = all.iter().map(|(mean, _)| mean[k]).collect();
+            sum += if own.is_empty() { 0.0 } else { squares(&mut own) };
+            free += all.iter().map(|(_, open)| 1.0 - open[k]).sum::<f64>();
+        }
+        let next = if free > 1e-9 { sum / free } else { now[component] };
         next.clamp(BOUNDS.0, BOUNDS.1)
     };
     hierarchy.columns.iter().enumerate().map(of).collect()

@@ -67,6 +67,7 @@ fn small(units: usize, deviating: usize, seed: u64) -> Hierarchy {
             .collect(),
         plug_in: Scatter {
             variance: vec![0.04, 0.01, 0.04, 0.09, 0.02, 0.04],
+            windows: vec![0.02, 0.04, 0.01, 0.01, 0.03, 0.02],
             share: 0.15,
         },
     }
@@ -140,6 +141,9 @@ fn enumerate(hierarchy: &Hierarchy, deviating: usize) -> Truth {
                     let mut variance = f64::from(u8::from(inside));
                     if a / WINDOWS == b / WINDOWS {
                         variance += hierarchy.plug_in.variance[k];
+                    }
+                    if a == b {
+                        variance += hierarchy.plug_in.windows[k];
                     }
                     spread(&mut matrix, a, b, k, variance);
                 }
