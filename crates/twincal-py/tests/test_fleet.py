@@ -38,7 +38,7 @@ def made(tmp_path_factory, arm):
             pandas.DataFrame(columns).to_parquet(folder / "logs" / f"unit{unit}" / f"week{week}.parquet")
     config = folder / "plan.toml"
     config.write_text('[library]\nfamilies = ["viscous", "coulomb", "payload", "offset"]\n')
-    some = [str(folder / "logs" / f"unit{unit}" / "week0.parquet") for unit in (0, 2)]
+    some = [str(folder / "logs" / f"unit{unit}" / f"week{week}.parquet") for unit in (0,) for week in range(WEEKS)]
     arguments = ["statistics", *some, "--model", str(arm.model), "--plan", "fleet", "--config", str(config)]
     twincal._twincal.call([*arguments, "-o", str(folder / "plan")])
     files = fleet.statistics(folder / "logs", arm.model, folder / "plan" / "plan.json", output=folder / "st", workers=2)

@@ -56,7 +56,7 @@ fn study() -> Study {
                 .collect()
         })
         .collect();
-    let some: Vec<Recording> = logs.iter().map(|unit| unit[0].clone()).collect();
+    let some: Vec<Recording> = logs[0].clone();
     let plan = plan_about(About::Found, &nominal, some, &settings, &|_| {})
         .expect("a plan")
         .0;

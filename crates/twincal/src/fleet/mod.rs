@@ -409,7 +409,8 @@ struct Group {
     columns: Vec<usize>,
 }
 
-/// What wears, drags, is moved or is put on changes in service; the shape of a law seldom does, and what a link weighs hardly ever. What a tensor
+/// What wears, drags, is moved or is put on changes in service; a drive constant or a spring seldom does, and what a link weighs hardly ever. The
+/// shape of a friction law is no cause to name: a motion that shows it badly moves its coefficients far, and its level has a name. What a tensor
 /// adds to a small body is next to nothing.
 fn odds(family: TermFamily) -> f64 {
     match family {
@@ -419,7 +420,12 @@ fn odds(family: TermFamily) -> f64 {
         | TermFamily::EncoderZero
         | TermFamily::Offset
         | TermFamily::Tilt => 1.0,
-        TermFamily::PayloadTensor => 0.0,
+        TermFamily::PayloadTensor
+        | TermFamily::Potential
+        | TermFamily::CoupledFriction
+        | TermFamily::CoupledInertia
+        | TermFamily::Ripple => 0.0,
+        family if family.is_friction() => 0.0,
         family if family.is_level() => BODY,
         _ => SELDOM,
     }
