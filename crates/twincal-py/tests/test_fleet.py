@@ -68,7 +68,7 @@ def test_bad_arguments_are_errors(made, tmp_path):
         fleet.fit(files[0], tmp_path / "out")
     with pytest.raises(ValueError, match="empty"):
         fleet.fit([], tmp_path / "out")
-    with pytest.raises(twincal.Error, match="fewer than three"):
+    with pytest.raises(twincal.Error, match="robots with the same model"):
         fleet.fit(files[:2], tmp_path / "out")
     with pytest.raises(twincal.Error, match="no length of time"):
         fleet.fit(files, tmp_path / "out", window="soon")

@@ -227,7 +227,9 @@ fn fewer_than_three_units_and_impossible_settings_are_refused() {
     let study = study();
     let error = study.fit(study.fleet(|unit, _| unit > 1)).unwrap_err();
     assert!(
-        error.to_string().contains("fewer than three units"),
+        error
+            .to_string()
+            .contains("robots with the same model and plan"),
         "{error}"
     );
     let settings = FleetSettings {

@@ -8,6 +8,7 @@ use crate::names::display_names;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Mutex;
 use twincal::fleet::{Fleet, FleetResult, FleetSettings, FleetStage};
@@ -19,7 +20,7 @@ use twincal_io::words::fleet as words;
 /// Files that are read at a time.
 const BATCH: usize = 8;
 /// Robots that are printed.
-const SHOWN: usize = 20;
+const SHOWN: usize = 12;
 
 pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
     let settings = settings(flags)?;
@@ -32,7 +33,7 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
     let claim = Claim::new(&flags.output, replace, &inputs)?;
     start_threads(flags.threads.map(|threads| threads as usize))?;
     let progress = Progress::new();
-    let (fleet, model) = read(&flags.files, &progress)?;
+    let (fleet, models) = read(&flags.files, &progress)?;
     let progress = Mutex::new(progress);
     let watch = |stage: FleetStage| {
         let (what, done, all) = match stage {
@@ -48,8 +49,12 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
     let result = fleet
         .fit(&settings, &watch)
         .map_err(twincal_io::Error::from)?;
+    let model = result
+        .units
+        .first()
+        .and_then(|unit| models.get(&unit.robot));
     let about = fleet::Inputs {
-        model,
+        model: model.cloned().unwrap_or_default(),
         window_seconds: settings.window,
         false_discovery_rate: settings.false_discovery_rate,
         seed: flags.seed,
@@ -104,10 +109,10 @@ fn seconds(text: &str) -> Outcome<f64> {
     ))
 }
 
-/// All files, one by one.
-fn read(files: &[PathBuf], progress: &Progress) -> Outcome<(Fleet, String)> {
+/// All files, and the model's name of each robot.
+fn read(files: &[PathBuf], progress: &Progress) -> Outcome<(Fleet, BTreeMap<String, String>)> {
     let mut fleet = Fleet::default();
-    let mut model = String::new();
+    let mut models = BTreeMap::new();
     for (batch, paths) in files.chunks(BATCH).enumerate() {
         progress.counted("reading statistics", batch * BATCH, files.len());
         let read: Vec<twincal_io::Result<StatisticsFile>> = (paths.par_iter())
@@ -115,13 +120,11 @@ fn read(files: &[PathBuf], progress: &Progress) -> Outcome<(Fleet, String)> {
             .collect();
         for file in read {
             let file = file?;
-            if model.is_empty() {
-                model.clone_from(&file.model.name);
-            }
+            models.insert(file.statistics.robot_name.clone(), file.model.name.clone());
             fleet.add(&file.statistics);
         }
     }
-    Ok((fleet, model))
+    Ok((fleet, models))
 }
 
 /// Which robots deviate, then what is wrong for all, then what is left out.
@@ -133,6 +136,9 @@ fn print(result: &FleetResult, terminal: &mut Terminal) {
             unit.robot,
             words::chance(unit.probability)
         ));
+        if unit.deviations.is_empty() {
+            terminal.say("    several effects, none likely alone");
+        }
         for own in &unit.deviations {
             let value = words::main_value(&own.parameters);
             let value = value.map_or_else(|| "–".into(), words::difference);
@@ -142,27 +148,37 @@ fn print(result: &FleetResult, terminal: &mut Terminal) {
         }
     }
     let named = result.units.iter().filter(|unit| unit.deviates).count();
-    if named > SHOWN {
-        terminal.say(&format!("  and {} more: see {PAGE}", named - SHOWN));
-    }
+    more(named, terminal);
     terminal.say("");
     terminal.heading(&words::of_type(result));
-    let sure = result.type_effects.iter().filter(|own| own.pip >= 0.5);
-    for effect in sure.take(SHOWN) {
+    let sure = || result.type_effects.iter().filter(|own| own.pip >= 0.5);
+    for effect in sure().take(SHOWN) {
         let value = words::main_value(&effect.parameters);
         let value = value.map_or_else(|| "–".into(), words::value);
         let pip = words::chance(effect.pip);
         paragraph(&format!("{}: {value}, PIP {pip}", effect.story), terminal);
+    }
+    more(sure().count(), terminal);
+    if let Some(doubt) = words::doubt(result) {
+        paragraph(&doubt, terminal);
     }
     if !result.left_out.is_empty() {
         terminal.say("");
         terminal.heading("Left out");
         for own in result.left_out.iter().take(SHOWN) {
             paragraph(
-                &format!("{}, log {}: {}", own.robot, own.log, reason(&own.reason).1),
+                &format!("{}, log {}: {}", own.robot, own.log, reason(&own.reason)),
                 terminal,
             );
         }
     }
+    more(result.left_out.len(), terminal);
     terminal.say("");
+}
+
+/// Says how many are not printed.
+fn more(all: usize, terminal: &mut Terminal) {
+    if all > SHOWN {
+        terminal.say(&format!("  and {} more: see {PAGE}", all - SHOWN));
+    }
 }

@@ -123,14 +123,11 @@ impl<'a> FleetJson<'a> {
             type_effects: result.type_effects.iter().map(effect).collect(),
             units: result.units.iter().map(unit).collect(),
             left_out: (result.left_out.iter())
-                .map(|own| {
-                    let (code, reason) = reason(&own.reason);
-                    LeftOut {
-                        robot: &own.robot,
-                        log: &own.log,
-                        code,
-                        reason,
-                    }
+                .map(|own| LeftOut {
+                    robot: &own.robot,
+                    log: &own.log,
+                    code: own.reason.code(),
+                    reason: reason(&own.reason),
                 })
                 .collect(),
             sampling: Sampling {

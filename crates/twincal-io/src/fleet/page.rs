@@ -16,6 +16,7 @@ pub fn fleet_page(result: &FleetResult, inputs: &Inputs) -> Result<String> {
     let logs: usize = result.units.iter().map(|unit| unit.logs.len()).sum();
     let page = FleetPage {
         headline: words::headline(result),
+        doubt: words::doubt(result).unwrap_or_default(),
         of_type: words::of_type(result),
         about: format!(
             "{}: {} robots, {} windows, {logs} logs, {rows} rows",
@@ -51,7 +52,7 @@ pub fn fleet_page(result: &FleetResult, inputs: &Inputs) -> Result<String> {
             .map(|own| LeftOut {
                 robot: own.robot.clone(),
                 log: own.log.clone(),
-                reason: reason(&own.reason).1,
+                reason: reason(&own.reason),
             })
             .collect(),
     };
@@ -66,9 +67,8 @@ fn robot(result: &FleetResult) -> impl Fn(&UnitSummary) -> Robot + '_ {
     |unit| Robot {
         name: unit.robot.clone(),
         probability: words::chance(unit.probability),
-        deviations: unit
-            .deviations
-            .iter()
+        // Figures of those that are named.
+        deviations: (unit.deviations.iter().filter(|_| unit.deviates))
             .map(|own| deviation(own, result))
             .collect(),
         logs: unit.logs.clone(),

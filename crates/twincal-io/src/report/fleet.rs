@@ -19,6 +19,8 @@ const HALF_OF_95: f64 = 1.96;
 pub(crate) struct FleetPage {
     /// How many robots deviate.
     pub(crate) headline: String,
+    /// What makes the answer doubtful; may be empty.
+    pub(crate) doubt: String,
     /// What is wrong for all of them.
     pub(crate) of_type: String,
     /// Model and amount of data.

@@ -4,6 +4,8 @@ use super::number::{number, probability, with_sd};
 use super::utc;
 use twincal::fleet::{DeviationSummary, FleetResult, Value, WindowSpan};
 
+/// Difference of a probability between chains from which on it is said.
+const DISAGREE: f64 = 0.1;
 /// Half of a central 95 % interval of a normal distribution, in standard deviations.
 const HALF_OF_95: f64 = 1.96;
 
@@ -13,7 +15,7 @@ pub fn headline(result: &FleetResult) -> String {
     let all = result.units.len();
     let named = result.units.iter().filter(|unit| unit.deviates).count();
     match named {
-        0 => format!("None of {all} robots deviates from its type."),
+        0 => format!("None of {all} robots is named as deviating from its type."),
         1 => format!("1 of {all} robots deviates from its type."),
         n => format!("{n} of {all} robots deviate from their type."),
     }
@@ -24,7 +26,7 @@ pub fn headline(result: &FleetResult) -> String {
 pub fn of_type(result: &FleetResult) -> String {
     let sure = result.type_effects.iter().filter(|own| own.pip >= 0.5);
     match sure.count() {
-        0 => "The model file misses nothing that all robots have in common.".into(),
+        0 => "No effect that all robots have in common is more likely than not.".into(),
         1 => "The model file misses 1 effect that all robots have in common.".into(),
         n => format!("The model file misses {n} effects that all robots have in common."),
     }
@@ -68,11 +70,28 @@ pub fn since(own: &DeviationSummary) -> String {
     }
 }
 
-/// The day a window starts: `2026-01-19`.
+/// What makes the answer doubtful: chains that disagree.
+#[must_use]
+pub fn doubt(result: &FleetResult) -> Option<String> {
+    (result.spread > DISAGREE).then(|| {
+        format!(
+            "The chains differ by up to {:.2} in the probability of a robot: read probabilities as that uncertain.",
+            result.spread
+        )
+    })
+}
+
+/// When a window starts: `2026-01-19`, and the time where that is not midnight.
 #[must_use]
 pub fn day(span: WindowSpan) -> String {
     match span.since {
-        Some(since) => utc(since.max(0.0) as u64)[..10].to_owned(),
+        Some(since) => {
+            let text = utc(since.max(0.0) as u64);
+            match &text[11..16] {
+                "00:00" => text[..10].to_owned(),
+                time => format!("{} {time} UTC", &text[..10]),
+            }
+        }
         None => "no date".into(),
     }
 }

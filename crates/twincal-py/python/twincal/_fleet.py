@@ -37,7 +37,7 @@ class Fleet:
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         self.folder = Path(folder)
-        read: dict[str, Any] = json.loads((self.folder / _JSON).read_text())
+        read: dict[str, Any] = json.loads((self.folder / _JSON).read_text(encoding="utf-8"))
         self.type_effects: list[dict[str, Any]] = read["type_effects"]
         self.units: list[dict[str, Any]] = read["units"]
         self.left_out: list[dict[str, Any]] = read["left_out"]
@@ -102,8 +102,8 @@ def fit(
     Parameters
     ----------
     statistics : iterable of paths
-        Files of `twincal statistics`, `Statistics.write` or `twincal.fleet.statistics`, of three
-        robots at least, all with one plan.
+        Local files of `twincal statistics`, `Statistics.write` or `twincal.fleet.statistics`, of
+        three robots at least, all with one plan.
     output : path
         Folder for `fleet.json` and `fleet.html`.
     window : str

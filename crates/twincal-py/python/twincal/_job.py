@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import shutil
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import chdir, contextmanager, suppress
@@ -196,14 +197,25 @@ def scratch() -> Iterator[str]:
 
 
 def sweep() -> None:
-    """Removes temporary folders whose process is no more: nobody holds their lock."""
+    """Removes temporary folders of this user whose process is no more: nobody holds their lock.
+
+    Others may put anything into the temporary folder: links and files that block are left alone.
+    """
     base = tempfile.gettempdir()
     for name in os.listdir(base):
         if name.startswith(_PREFIX):
             place = os.path.join(base, name)
-            with suppress(OSError), open(os.path.join(place, _LOCK), "rb") as lock:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                _remove(place)
+            with suppress(OSError):
+                about = os.lstat(place)
+                if not stat.S_ISDIR(about.st_mode) or about.st_uid != os.getuid():
+                    continue
+                flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK
+                lock = os.open(os.path.join(place, _LOCK), flags)
+                try:
+                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    _remove(place)
+                finally:
+                    os.close(lock)
 
 
 def _remove(place: str) -> None:

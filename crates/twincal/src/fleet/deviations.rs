@@ -1,6 +1,6 @@
 //! Which deviations a unit has, given what its type has: one Gibbs step per component over "none" and every start and size.
 
-use super::hierarchy::{SCALES, Unit, dot};
+use super::hierarchy::{SCALES, Unit, dot, factored};
 use crate::linear_algebra::{Cholesky, symmetric_eigen};
 use crate::random::Random;
 
@@ -407,8 +407,7 @@ impl Known {
         for (a, &(_, _, scale)) in columns.iter().enumerate() {
             matrix[a * size + a] += 1.0 / SCALES[scale];
         }
-        let factor =
-            Cholesky::new(&matrix, size).expect("information plus a slab is positive definite");
+        let factor = factored(matrix, size);
         Self {
             columns,
             shared,

@@ -16,7 +16,7 @@ pub(super) fn named(probabilities: &[f64], rate: f64) -> Vec<bool> {
     let mut sum = 0.0;
     for (place, &unit) in order.iter().enumerate() {
         sum += 1.0 - probabilities[unit];
-        if sum > rate * (place + 1) as f64 {
+        if sum.is_nan() || sum > rate * (place + 1) as f64 {
             break;
         }
         named[unit] = true;

@@ -100,8 +100,10 @@ pub(super) struct Unit {
     after: Vec<Vec<f64>>,
     /// E_s.
     score: Vec<Vec<f64>>,
-    /// P, and its Cholesky factor's stand-in: K × K row-major.
+    /// P, K × K row-major.
     pub(super) posterior: Vec<f64>,
+    /// ω² of each column.
+    scatter: Vec<f64>,
 }
 
 impl Unit {
@@ -121,6 +123,7 @@ impl Unit {
         Self {
             size,
             posterior: scattered(&precision, scatter),
+            scatter: scatter.to_vec(),
             after,
             score,
         }
@@ -133,13 +136,10 @@ impl Unit {
 
     /// A_1 − A_1 P A_1, and E_1 − A_1 P E_1: what the unit says of μ where it does not deviate.
     pub(super) fn of_type(&self) -> (Vec<f64>, Vec<f64>) {
-        let n = self.size;
         let (after, score) = (&self.after[0], &self.score[0]);
-        let spread = crate::linear_algebra::product(after, &self.posterior, [n, n, n]);
-        let mut gram = crate::linear_algebra::product(&spread, after, [n, n, n]);
-        (gram.iter_mut().zip(after)).for_each(|(product, own)| *product = own - *product);
-        let linear = (0..n).map(|i| score[i] - dot(&spread[i * n..(i + 1) * n], score));
-        (gram, linear.collect())
+        let gram = without(after, &self.posterior, &self.scatter);
+        let spread = times(&self.posterior, score).into_iter().zip(&self.scatter);
+        (gram, spread.map(|(x, variance)| x / variance).collect())
     }
 
     /// g_s(μ) of every start.
@@ -198,21 +198,14 @@ impl Unit {
 impl Window {
     /// Λ̃ = Λ − Λ R Λ and η̃ = η − Λ R η: what the window says of the unit, its own scatter integrated out.
     fn softened(&self, of_windows: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let n = of_windows.len();
         let spread = scattered(&self.precision, of_windows);
-        let half = crate::linear_algebra::product(&self.precision, &spread, [n, n, n]);
-        let mut precision = crate::linear_algebra::product(&half, &self.precision, [n, n, n]);
-        (precision.iter_mut().zip(&self.precision)).for_each(|(less, own)| *less = own - *less);
-        // Products round each triangle in its own way.
-        for i in 0..n {
-            for k in 0..i {
-                let mean = 0.5 * (precision[i * n + k] + precision[k * n + i]);
-                (precision[i * n + k], precision[k * n + i]) = (mean, mean);
-            }
-        }
-        let explained = times(&half, &self.score);
-        let linear = self.score.iter().zip(explained).map(|(own, less)| own - less);
-        (precision, linear.collect())
+        let precision = without(&self.precision, &spread, of_windows);
+        // 1 − Λ R = N⁻¹ R.
+        let spread = times(&spread, &self.score).into_iter().zip(of_windows);
+        (
+            precision,
+            spread.map(|(x, variance)| x / variance).collect(),
+        )
     }
 
     /// E[ε | β], and how much of its prior variance the data leave to each ε_k, 0 to 1, with that of δ, P, in it:
@@ -247,6 +240,34 @@ impl Window {
     }
 }
 
+/// Λ − Λ R Λ of R = (Λ + N⁻¹)⁻¹, as a sum of two positive semidefinite matrices: Wᵀ Λ W + Λ R N⁻¹ R Λ with W = 1 − R Λ = R N⁻¹. As a difference
+/// it loses its sign to rounding where Λ is large, as of logs without noise.
+fn without(precision: &[f64], spread: &[f64], variance: &[f64]) -> Vec<f64> {
+    use crate::linear_algebra::{product, product_transposed};
+    let n = variance.len();
+    // R Λ row by row, and from it Λ R N⁻¹ R Λ = (N^-½ R Λ)ᵀ (N^-½ R Λ).
+    let explained = product(spread, precision, [n, n, n]);
+    let scaled: Vec<f64> = (0..n * n)
+        .map(|at| explained[at % n * n + at / n] / variance[at % n].sqrt())
+        .collect();
+    // Wᵀ row by row: N⁻¹ R.
+    let weights: Vec<f64> = (0..n * n)
+        .map(|at| spread[at % n * n + at / n] / variance[at / n])
+        .collect();
+    let half = product(&weights, precision, [n, n, n]);
+    let mut sum = product_transposed(&half, &weights, [n, n, n]);
+    let more = product_transposed(&scaled, &scaled, [n, n, n]);
+    (sum.iter_mut().zip(more)).for_each(|(sum, more)| *sum += more);
+    // Products round each triangle in its own way.
+    for i in 0..n {
+        for k in 0..i {
+            let mean = 0.5 * (sum[i * n + k] + sum[k * n + i]);
+            (sum[i * n + k], sum[k * n + i]) = (mean, mean);
+        }
+    }
+    sum
+}
+
 /// (Λ + D⁻¹)⁻¹ = D^½ (1 + D^½ Λ D^½)⁻¹ D^½, which small scatter does not harm.
 fn scattered(precision: &[f64], scatter: &[f64]) -> Vec<f64> {
     let n = scatter.len();
@@ -255,12 +276,24 @@ fn scattered(precision: &[f64], scatter: &[f64]) -> Vec<f64> {
         .map(|(at, value)| value * root[at / n] * root[at % n])
         .collect();
     (0..n).for_each(|i| matrix[i * n + i] += 1.0);
-    let factor = Cholesky::new(&matrix, n).expect("1 plus a Gram matrix is positive definite");
-    let mut inverse = factor.inverse();
+    let mut inverse = factored(matrix, n).inverse();
     for (at, value) in inverse.iter_mut().enumerate() {
         *value *= root[at / n] * root[at % n];
     }
     inverse
+}
+
+/// Cholesky factor of a matrix that is positive definite but for rounding, which is added to its diagonal.
+pub(super) fn factored(mut matrix: Vec<f64>, size: usize) -> Cholesky {
+    for rounding in [1e-14, 1e-11, 1e-8] {
+        match Cholesky::new(&matrix, size) {
+            Ok(factor) => return factor,
+            Err(_) => (0..size).for_each(|i| matrix[i * size + i] *= 1.0 + rounding),
+        }
+    }
+    let largest = (0..size).map(|i| matrix[i * size + i]).fold(1.0, f64::max);
+    (0..size).for_each(|i| matrix[i * size + i] += 1e-6 * largest);
+    Cholesky::new(&matrix, size).expect("sums are finite and their rounding is smaller than this")
 }
 
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 /// Stamps behind it are seconds since 1970, s: September 2001.
 const ABSOLUTE: f64 = 1e9;
-/// A unit whose torque is more than this many times the median unit's on every joint, or less than one over it, has another unit of torque.
+/// A log whose torque is more than this many times the median log's on every joint, or less than one over it, has another unit of torque.
 const ODD: f64 = 30.0;
 
 /// Why a log or a unit is left out.
@@ -33,13 +33,28 @@ pub enum Reason {
         /// s.
         seconds: f64,
     },
-    /// The unit's torque is this many times that of the median unit on every joint.
+    /// The log's torque is this many times that of the median log on every joint.
     Size {
         /// Geometric mean over the joints.
         ratio: f64,
     },
     /// Its sums hold numbers that are not finite.
     NotFinite,
+}
+
+impl Reason {
+    /// The reason as one word for programs: `other_plan`, `twice`, …
+    #[must_use]
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::OtherRobot => "other_robot",
+            Self::OtherPlan => "other_plan",
+            Self::Twice { .. } => "twice",
+            Self::Overlap { .. } => "overlap",
+            Self::Size { .. } => "torque_unit",
+            Self::NotFinite => "not_finite",
+        }
+    }
 }
 
 /// A log that does not count.
@@ -75,6 +90,40 @@ pub(super) struct Family {
     pub(super) robot: Robot,
     pub(super) plan: Plan,
     pub(super) logs: Vec<KeptLog>,
+    /// Robots met so far, and every how many of them keep all of their sums.
+    units: BTreeMap<String, usize>,
+    step: usize,
+}
+
+impl Family {
+    pub(super) fn new(robot: Robot, plan: Plan) -> Self {
+        Self {
+            robot,
+            plan,
+            logs: Vec::new(),
+            units: BTreeMap::new(),
+            step: 1,
+        }
+    }
+
+    /// Adds the logs of a robot; of `measured` robots to twice as many all sums are kept.
+    pub(super) fn add(&mut self, robot: &str, logs: &[LogStatistics], measured: usize) {
+        let count = self.units.len();
+        let place = *self.units.entry(robot.to_owned()).or_insert(count);
+        while place / self.step >= 2 * measured {
+            self.step *= 2;
+            for log in &mut self.logs {
+                if self.units[&log.robot] % self.step != 0 {
+                    log.sums = None;
+                }
+            }
+        }
+        for log in logs {
+            let mut kept = KeptLog::new(robot, log);
+            kept.sums = (place % self.step == 0).then(|| log.sums.coarse());
+            self.logs.push(kept);
+        }
+    }
 }
 
 impl KeptLog {
@@ -100,7 +149,11 @@ impl KeptLog {
     }
 
     fn is_finite(&self) -> bool {
-        let finite = |gram: &JointGram| gram.s0.values.iter().all(|x| x.is_finite());
+        let finite = |gram: &JointGram| {
+            let sums = [&gram.s0, &gram.d, &gram.first, &gram.last];
+            sums.iter()
+                .all(|sum| sum.values.iter().all(|x| x.is_finite()))
+        };
         self.gram.joints.iter().all(finite) && self.torque.iter().all(|x| x.is_finite())
     }
 

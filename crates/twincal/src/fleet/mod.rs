@@ -27,7 +27,7 @@ use logs::{Family, KeptLog};
 use noise::Noise;
 use posterior::Length;
 
-/// Units in which noise is measured.
+/// Robots in which noise is measured: so many to twice as many, evenly in the order of their files.
 const MEASURED: usize = 5;
 /// Factor on the probability of a deviation in what seldom changes on a robot in service, and in the body of a link.
 const SELDOM: f64 = 0.1;
@@ -66,9 +66,6 @@ impl Default for FleetSettings {
 #[derive(Debug, Clone, Default)]
 pub struct Fleet {
     families: Vec<Family>,
-    /// Units met so far, and every how many of them keep all of their sums.
-    units: Vec<String>,
-    step: usize,
 }
 
 /// What a fit of a fleet is doing.
@@ -85,46 +82,15 @@ pub enum FleetStage {
 impl Fleet {
     /// Adds the logs of one unit: `statistics.robot_name` says which.
     pub fn add(&mut self, statistics: &Statistics) {
-        let robot = &statistics.robot_name;
-        let place = match self.units.iter().position(|unit| unit == robot) {
-            Some(place) => place,
-            None => {
-                self.units.push(robot.clone());
-                self.units.len() - 1
-            }
-        };
-        self.step = self.step.max(1);
-        while place / self.step >= 2 * MEASURED {
-            self.step *= 2;
-            self.thin();
-        }
-        let keep = place % self.step == 0;
         let same =
             |family: &Family| family.robot == statistics.robot && family.plan == statistics.plan;
         let at = self.families.iter().position(same);
         let at = at.unwrap_or_else(|| {
-            self.families.push(Family {
-                robot: statistics.robot.clone(),
-                plan: statistics.plan.clone(),
-                logs: Vec::new(),
-            });
+            let family = Family::new(statistics.robot.clone(), statistics.plan.clone());
+            self.families.push(family);
             self.families.len() - 1
         });
-        for log in &statistics.logs {
-            let mut kept = KeptLog::new(robot, log);
-            kept.sums = keep.then(|| log.sums.coarse());
-            self.families[at].logs.push(kept);
-        }
-    }
-
-    /// Fewer units keep all of their sums.
-    fn thin(&mut self) {
-        let kept: Vec<&String> = self.units.iter().step_by(self.step).collect();
-        for log in self.families.iter_mut().flat_map(|family| &mut family.logs) {
-            if !kept.contains(&&log.robot) {
-                log.sums = None;
-            }
-        }
+        self.families[at].add(&statistics.robot_name, &statistics.logs, MEASURED);
     }
 
     /// The posterior of the fleet. `watch` is called before every stage and now and then within one; an error of it ends the fit.
@@ -138,13 +104,14 @@ impl Fleet {
         watch: &(dyn Fn(FleetStage) -> Result<()> + Sync),
     ) -> Result<FleetResult> {
         require(settings)?;
-        let (family, mut left_out) = logs::largest(self.families).ok_or_else(no_units)?;
+        let (family, mut left_out) =
+            logs::largest(self.families).ok_or_else(|| no_units(0, &[]))?;
         let (kept, more) = logs::sifted(family.logs);
         left_out.extend(more);
         left_out.sort_by(|a, b| (&a.robot, &a.log).cmp(&(&b.robot, &b.log)));
         let units = by_unit(kept);
         if units.len() < 3 {
-            return Err(no_units());
+            return Err(no_units(units.len(), &left_out));
         }
         let mut calibration = settings.calibration.clone();
         calibration.library = family.plan.library.clone();
@@ -152,7 +119,7 @@ impl Fleet {
         watch(FleetStage::Noise)?;
         let known = Known::new(&family.robot, &units, &calibration)?;
         let spans = spans(&units, settings.window);
-        let mut hierarchy = known.hierarchy(units, &spans);
+        let mut hierarchy = known.hierarchy(units, (&spans, settings.window));
         let seed = calibration.inference.seed;
         let states = scatter::learn(&mut hierarchy, seed, &|done, all| {
             watch(FleetStage::Scatter(done, all))
@@ -192,7 +159,7 @@ fn require(settings: &FleetSettings) -> Result<()> {
             "give a share such as 0.05",
         );
     }
-    if !(settings.window > 0.0) {
+    if !settings.window.is_finite() || settings.window <= 0.0 {
         return wrong(
             "fleet.window",
             format!("{} s is no length of time", settings.window),
@@ -209,9 +176,19 @@ fn require(settings: &FleetSettings) -> Result<()> {
     Ok(())
 }
 
-fn no_units() -> Error {
+fn no_units(units: usize, left_out: &[LeftOut]) -> Error {
+    let out = match left_out {
+        [] => String::new(),
+        [first, ..] => format!(
+            ", {} logs left out, the first `{}` of `{}`: {}",
+            left_out.len(),
+            first.log,
+            first.robot,
+            first.reason.code()
+        ),
+    };
     Error::Statistics {
-        problem: "fewer than three units with the same model and plan".into(),
+        problem: format!("{units} robots with the same model and plan{out}"),
         remedy: "give statistics of three robots at least, made with one plan and --robot NAME"
             .into(),
     }
@@ -321,15 +298,14 @@ impl Known {
     }
 
     /// Sums of every unit and window; the logs are gone with it.
-    fn hierarchy(&self, units: Vec<FleetUnit>, spans: &[WindowSpan]) -> Hierarchy {
+    fn hierarchy(&self, units: Vec<FleetUnit>, (spans, window): (&[WindowSpan], f64)) -> Hierarchy {
         use rayon::prelude::*;
         let sums = units.into_par_iter().zip(&self.factors);
         let of_unit = |(unit, factor): (FleetUnit, &Vec<f64>)| {
             let mut windows: Vec<(usize, Gram)> = Vec::new();
             for log in unit.logs {
-                let start = log.since_1970();
-                let at = spans.iter().rposition(|span| span.starts_before(start));
-                let at = at.unwrap_or(0);
+                let own = number(&log, window);
+                let at = spans.partition_point(|span| span.number < own);
                 match windows.iter_mut().find(|(index, _)| *index == at) {
                     Some((_, sum)) => *sum += &log.gram,
                     None => windows.push((at, log.gram)),

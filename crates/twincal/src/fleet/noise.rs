@@ -1,12 +1,12 @@
 //! Noise of a fleet: how much one row of each joint says, measured in a few units by the fit of a calibration.
 
+use super::hierarchy::factored;
 use super::logs::KeptLog;
 use crate::calibrate::CalibrationSettings;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gram::{Gram, JointGram};
 use crate::likelihood::Columns;
 use crate::likelihood::NoiseModel;
-use crate::linear_algebra::Cholesky;
 use crate::plug_in::{Fit, FitSettings, Moving, fit, fit_tempered, start};
 use crate::prior::Prior;
 use crate::statistics::{Purpose, Runs, Sums, of_joint, residual_form};
@@ -44,6 +44,13 @@ pub(super) fn measure(
             Some(unit) if unit[0].robot == log.robot => unit.push(log),
             _ => units.push(vec![log]),
         }
+    }
+    if units.is_empty() {
+        return Err(Error::Statistics {
+            problem: "no robot is left whose noise was to be measured".into(),
+            remedy: "give the files of the robots that count alone: see left_out of the others"
+                .into(),
+        });
     }
     let fits: Vec<Fit> = (units.par_iter())
         .map(|unit| fitted(unit, zero, columns, settings))
@@ -135,8 +142,7 @@ impl Noise {
         let size = self.slab.len();
         let (mut precision, mut beta) = self.normal_sums(gram, &self.factor);
         (0..size).for_each(|k| precision[k * size + k] += 1.0);
-        let factor = Cholesky::new(&precision, size).expect("a slab makes it positive definite");
-        factor.solve(&mut beta);
+        factored(precision, size).solve(&mut beta);
         (beta.iter_mut().zip(&self.slab)).for_each(|(beta, d)| *beta *= d.sqrt());
         let of = |own: &JointGram| {
             let left = residual_form(&own.s0, &of_joint(own, &beta));

@@ -78,9 +78,10 @@ pub(super) fn sample(
             watch(done.fetch_add(1, Ordering::Relaxed), all)?;
             let mut one = own.iterate()?;
             if iteration >= settling {
+                sums.add(hierarchy, &units, &one);
                 let seed = (length.seed, STREAM + stream * 1_000_000 + iteration as u64);
                 add_scatter(&mut one, hierarchy, &units, seed);
-                sums.add(hierarchy, &units, one);
+                sums.add_draws(hierarchy, one);
             }
         }
         Ok(sums)
@@ -110,9 +111,17 @@ fn add_scatter(
                 .map(|at| prepared.unit.posterior[at])
                 .collect();
             let mut noise: Vec<f64> = columns.iter().map(|_| random.normal()).collect();
-            if let Ok(factor) = Cholesky::new(&covariance, columns.len()) {
-                noise = lower_times(factor.lower(), &noise);
-            }
+            let sds = columns
+                .iter()
+                .map(|&k| prepared.unit.posterior[k * size + k].sqrt());
+            noise = match Cholesky::new(&covariance, columns.len()) {
+                Ok(factor) => lower_times(factor.lower(), &noise),
+                Err(_) => noise
+                    .iter()
+                    .zip(sds)
+                    .map(|(noise, sd)| noise * sd)
+                    .collect(),
+            };
             for (&k, noise) in columns.iter().zip(noise) {
                 b[k] += mean[k] + noise;
             }
@@ -153,13 +162,24 @@ impl Sums {
         }
     }
 
-    fn add(&mut self, hierarchy: &Hierarchy, units: &[Prepared], one: Iteration) {
+    fn add(&mut self, hierarchy: &Hierarchy, units: &[Prepared], one: &Iteration) {
         self.iterations += 1.0;
         add(&mut self.inclusion, &one.inclusion);
         let size = hierarchy.size();
-        for ((sums, unit), prepared) in self.units.iter_mut().zip(one.units).zip(units) {
+        for ((sums, unit), prepared) in self.units.iter_mut().zip(&one.units).zip(units) {
             let diagonal = prepared.unit.posterior.iter().step_by(size + 1).copied();
             sums.add(hierarchy, unit, (one.mu.last(), diagonal.collect()));
+        }
+    }
+
+    /// Draws of the type and of what deviates, with scatter.
+    fn add_draws(&mut self, hierarchy: &Hierarchy, one: Iteration) {
+        for (sums, unit) in self.units.iter_mut().zip(one.units) {
+            for (deviation, b) in unit.deviations {
+                let columns = hierarchy.columns[deviation.component].iter();
+                sums.draws
+                    .push((deviation, columns.map(|&k| b[k]).collect()));
+            }
         }
         self.mu.extend(one.mu);
     }
@@ -204,7 +224,7 @@ impl UnitPosterior {
     fn add(
         &mut self,
         hierarchy: &Hierarchy,
-        one: UnitIteration,
+        one: &UnitIteration,
         (mu, variance): (Option<&Vec<f64>>, Vec<f64>),
     ) {
         self.deviates += f64::from(u8::from(!one.deviations.is_empty()));
@@ -222,17 +242,9 @@ impl UnitPosterior {
         for (deviation, b) in &one.deviations {
             let columns = &hierarchy.columns[deviation.component];
             for &k in columns {
-                // From the start on, b has δ in it.
-                let scatter = if deviation.start == 0 {
-                    one.offset[k]
-                } else {
-                    0.0
-                };
                 let after = own.iter_mut().skip(deviation.start);
-                after.for_each(|mean| mean[k] += b[k] - scatter);
+                after.for_each(|mean| mean[k] += b[k]);
             }
-            let drawn = columns.iter().map(|&k| b[k]).collect();
-            self.draws.push((*deviation, drawn));
         }
         for (sum, own) in self.means.iter_mut().zip(&own) {
             add(sum, own);

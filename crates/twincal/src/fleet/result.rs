@@ -24,17 +24,6 @@ pub struct WindowSpan {
     pub since: Option<f64>,
 }
 
-impl WindowSpan {
-    /// Whether a log that starts then, s since 1970, may be in it, where it is the last one that begins before.
-    pub(super) fn starts_before(&self, start: Option<f64>) -> bool {
-        match (self.since, start) {
-            (Some(since), Some(start)) => since <= start,
-            (None, _) => true,
-            (Some(_), None) => false,
-        }
-    }
-}
-
 /// A number with its central 95 % interval.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Value {
@@ -141,6 +130,15 @@ pub struct FleetResult {
     pub share: f64,
     /// Largest difference of a unit's probability between the chains.
     pub spread: f64,
+}
+
+/// Place of the largest number, of equal ones the first.
+fn likeliest(values: &[f64]) -> usize {
+    let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    values
+        .iter()
+        .position(|value| *value == largest)
+        .unwrap_or(0)
 }
 
 /// What the words of a result come from.
@@ -334,14 +332,18 @@ impl About<'_> {
         let component = &own.library.components()[own.index];
         let starts = &unit.starts[c];
         let total: f64 = starts.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        let latest = (0..starts.len()).max_by(|&a, &b| starts[a].total_cmp(&starts[b]));
-        let start = latest.unwrap_or(0);
+        // First whether it was there from the start, then with which later window it came.
+        let later: f64 = starts.iter().skip(1).sum();
+        let start = match starts.first() {
+            Some(first) if later > *first => likeliest(&starts[1..]) + 1,
+            _ => 0,
+        };
         let windows = &self.hierarchy.units[at].windows;
         let mut onset = vec![0.0; self.spans.len()];
         for (window, share) in windows.iter().zip(starts) {
             onset[window.index] = share / total;
         }
-        // A change is told against the unit before, what was there from the start against the type.
+        // A change is the difference to the unit before, what was there from the start the one to the type.
         let alike = |found: &Deviation| (found.start == 0) == (start == 0);
         let draws: Vec<Vec<f64>> = (unit.draws.iter())
             .filter(|(found, _)| found.component == c && alike(found))

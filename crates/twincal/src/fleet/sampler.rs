@@ -5,10 +5,9 @@
 //! [`Hierarchy`] as its stationary distribution, up to models of the type too light to be listed.
 
 use super::deviations::{Conditional, Deviation, Prepared, Rules, State};
-use super::hierarchy::{Hierarchy, Unit};
+use super::hierarchy::{Hierarchy, Unit, factored};
 use crate::error::Result;
 use crate::infer::{Choice, InferenceSettings, approximate, infer};
-use crate::linear_algebra::Cholesky;
 use crate::posterior::draws::draw;
 use crate::posterior::{Posterior, Problem};
 use crate::random::Random;
@@ -205,8 +204,7 @@ fn type_posterior(
         full[i * size + i] += 1.0 / slab;
     }
     let mut mean = linear.clone();
-    let factor = Cholesky::new(&full, size).expect("a slab keeps the sums positive definite");
-    factor.solve(&mut mean);
+    factored(full, size).solve(&mut mean);
     let yy = linear.iter().zip(&mean).map(|(r, b)| r * b).sum::<f64>();
     let mut prior = hierarchy.prior.clone();
     (prior.shape, prior.scale) = (KNOWN_NOISE, KNOWN_NOISE);

@@ -3,7 +3,7 @@
 //! ```text
 //! ω_c² = Σ_u Σ_{k∈c} E[δ_uk]² / Σ_u Σ_{k∈c} (1 − P_kk/ω_c²)         (MacKay's fixed point)
 //! ν_c² = Σ_ut Σ_{k∈c} E[ε_utk]² / Σ_ut Σ_{k∈c} (1 − Var(ε_utk)/ν_c²)
-//! π    = (1 + Σ_uc P(w_uc = 1)) / ((U₀ /ε + U) Σ_c o_c)
+//! π    = (1 + Σ_uc P(w_uc = 1)) / ((10 + U) Σ_c o_c), 1/2 at most
 //! ```
 //! The first rounds know no deviations: there the sum of squares is that of a normal distribution with the median of |E[δ]|, which a few
 //! units that deviate do not move.
@@ -181,7 +181,12 @@ fn updated_windows(
     let of_windows = hierarchy.window_scatter();
     let of_unit = |((sums, prepared), one): ((&UnitSums, &Prepared), &UnitIteration)| {
         let mut own = Vec::new();
-        for (start, window) in sums.windows.iter().enumerate().filter(|_| sums.windows.len() > 1) {
+        for (start, window) in sums
+            .windows
+            .iter()
+            .enumerate()
+            .filter(|_| sums.windows.len() > 1)
+        {
             let mut beta = one.offset.clone();
             (beta.iter_mut().zip(&found.of_units)).for_each(|(beta, mu)| *beta += mu);
             for (deviation, b) in one.deviations.iter().filter(|(own, _)| own.start <= start) {
@@ -199,10 +204,18 @@ fn updated_windows(
         let (mut sum, mut free) = (0.0, 0.0);
         for &k in columns {
             let mut own: Vec<f64> = all.iter().map(|(mean, _)| mean[k]).collect();
-            sum += if own.is_empty() { 0.0 } else { squares(&mut own) };
+            sum += if own.is_empty() {
+                0.0
+            } else {
+                squares(&mut own)
+            };
             free += all.iter().map(|(_, open)| 1.0 - open[k]).sum::<f64>();
         }
-        let next = if free > 1e-9 { sum / free } else { now[component] };
+        let next = if free > 1e-9 {
+            sum / free
+        } else {
+            now[component]
+        };
         next.clamp(BOUNDS.0, BOUNDS.1)
     };
     hierarchy.columns.iter().enumerate().map(of).collect()
