@@ -38,10 +38,9 @@ def made(tmp_path_factory, arm):
             pandas.DataFrame(columns).to_parquet(folder / "logs" / f"unit{unit}" / f"week{week}.parquet")
     config = folder / "plan.toml"
     config.write_text('[library]\nfamilies = ["viscous", "coulomb", "payload", "offset"]\n')
-    some = [str(folder / "logs" / f"unit{unit}" / f"week{week}.parquet") for unit in (0,) for week in range(WEEKS)]
-    arguments = ["statistics", *some, "--model", str(arm.model), "--plan", "fleet", "--config", str(config)]
-    twincal._twincal.call([*arguments, "-o", str(folder / "plan")])
-    files = fleet.statistics(folder / "logs", arm.model, folder / "plan" / "plan.json", output=folder / "st", workers=2)
+    some = [folder / "logs" / "unit0" / f"week{week}.parquet" for week in range(WEEKS)]
+    plan = fleet.plan(some, arm.model, folder / "plan", config=config)
+    files = fleet.statistics(folder / "logs", arm.model, plan, output=folder / "st", workers=2)
     assert not files.faults
     return folder, sorted((folder / "st").rglob("*.arrow"))
 
@@ -68,6 +67,10 @@ def test_bad_arguments_are_errors(made, tmp_path):
         fleet.fit(files[0], tmp_path / "out")
     with pytest.raises(ValueError, match="empty"):
         fleet.fit([], tmp_path / "out")
+    with pytest.raises(TypeError, match="list of paths"):
+        fleet.plan("run.csv", "arm.urdf", tmp_path / "plan")
+    with pytest.raises(twincal.Error, match="arm.urdf"):
+        fleet.plan(["run.csv"], tmp_path / "arm.urdf", tmp_path / "plan")
     with pytest.raises(twincal.Error, match="robots with the same model"):
         fleet.fit(files[:2], tmp_path / "out")
     with pytest.raises(twincal.Error, match="no length of time"):

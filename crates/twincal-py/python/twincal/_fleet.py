@@ -88,6 +88,55 @@ def _rows(unit: dict[str, Any]) -> list[dict[str, Any]]:
     return rows or [about]
 
 
+def plan(
+    logs: Iterable[str | os.PathLike[str]],
+    model: str | os.PathLike[str],
+    output: str | os.PathLike[str],
+    *,
+    config: str | os.PathLike[str] | None = None,
+) -> Path:
+    """How logs of a fleet become statistics, from some logs of one robot: `twincal statistics --plan fleet`.
+
+    Parameters
+    ----------
+    logs : iterable of paths
+        Logs of one robot. Of several robots the plan is worse: what robots differ in looks like noise.
+    model : path
+        URDF or MJCF.
+    output : path
+        Folder for `plan.json` and the statistics of these logs.
+    config : path, optional
+        A `twincal.toml`.
+
+    Returns
+    -------
+    pathlib.Path
+        `plan.json`, for `statistics`.
+
+    Raises
+    ------
+    twincal.Error
+        For logs or a model that cannot be used.
+    """
+    settings = ["--no-config"] if config is None else ["--config", os.fspath(config)]
+    arguments = ["statistics", "--plan", "fleet", "--model", os.fspath(model), *settings]
+    paths = [os.fspath(path) for path in _paths("logs", logs)]
+    _twincal.call([*arguments, "-o", os.fspath(output), "--", *paths])
+    return Path(output) / "plan.json"
+
+
+def _paths(
+    name: str, paths: Iterable[str | os.PathLike[str]]
+) -> list[str | os.PathLike[str]]:
+    """A list of at least one path."""
+    if isinstance(paths, (str, bytes, os.PathLike)):
+        raise TypeError(f"{name} is one path; give a list of paths")
+    given = list(paths)
+    if not given:
+        raise ValueError(f"{name} is empty; give at least one path")
+    return given
+
+
 def fit(
     statistics: Iterable[str | os.PathLike[str]],
     output: str | os.PathLike[str],
@@ -124,11 +173,7 @@ def fit(
     twincal.Error
         For files that are none, fewer than three robots, a folder that is there already.
     """
-    if isinstance(statistics, (str, bytes, os.PathLike)):
-        raise TypeError("statistics is one path; give a list of paths")
-    files = [os.fspath(path) for path in statistics]
-    if not files:
-        raise ValueError("statistics is empty; give files that `twincal statistics` wrote")
+    files = [os.fspath(path) for path in _paths("statistics", statistics)]
     arguments = ["fleet", "--json", "-o", os.fspath(output), "--window", window]
     arguments += ["--fdr", repr(float(fdr)), "--seed", str(int(seed))]
     _twincal.call([*arguments, *(["--force"] if force else []), "--", *files])
