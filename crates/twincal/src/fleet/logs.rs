@@ -113,14 +113,14 @@ impl Family {
         while place / self.step >= 2 * measured {
             self.step *= 2;
             for log in &mut self.logs {
-                if self.units[&log.robot] % self.step != 0 {
+                if !self.units[&log.robot].is_multiple_of(self.step) {
                     log.sums = None;
                 }
             }
         }
         for log in logs {
             let mut kept = KeptLog::new(robot, log);
-            kept.sums = (place % self.step == 0).then(|| log.sums.coarse());
+            kept.sums = place.is_multiple_of(self.step).then(|| log.sums.coarse());
             self.logs.push(kept);
         }
     }
