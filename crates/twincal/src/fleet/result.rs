@@ -105,7 +105,7 @@ pub struct UnitSummary {
     pub logs: Vec<String>,
     /// Rows behind the filters.
     pub rows: usize,
-    /// E[β] in its last window, in the columns of [`FleetResult::columns`].
+    /// Posterior mean of β in its last window, in the columns of [`FleetResult::columns`].
     pub mean: Vec<f64>,
     /// sd of β likewise.
     pub sd: Vec<f64>,
@@ -124,7 +124,7 @@ pub struct FleetResult {
     pub left_out: Vec<LeftOut>,
     /// Names of the columns.
     pub columns: Vec<String>,
-    /// E[μ], column by column.
+    /// Posterior mean of μ, column by column.
     pub mean: Vec<f64>,
     /// π: share of units that is expected to deviate in one effect.
     pub share: f64,
