@@ -186,7 +186,7 @@ def judged(truth, said):
 
 
 def pooling(truth, motion, alone, pooled):
-    """Held-out error of the short unit's twin from the fleet over that of its own log's twin.
+    """Held-out error of the short unit's twin from the fleet over that of the twin fitted to its log alone.
 
     `alone` and `pooled` are rows of the motion and torque there. Errors are against the torque without noise, in standard deviations of
     each joint's noise, over the rows that both predict. `pooled` is None where the fleet wrote no twin.

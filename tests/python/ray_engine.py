@@ -101,7 +101,7 @@ def working():
 
 
 def drive(arguments):
-    """The driver: a process of its own, which may kill a worker and itself."""
+    """The driver: a separate process, which may kill a worker and itself."""
     dataset, plan, output, worker_dies, driver_dies = json.loads(arguments)
     began, done_last = time.monotonic(), None
 

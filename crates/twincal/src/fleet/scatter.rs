@@ -58,7 +58,7 @@ pub(super) fn learn(
             let found = [chain.iterate()?];
             (
                 updated(hierarchy, &units, &found, robust_squares),
-                updated_windows(hierarchy, &units, &found[0], robust_squares),
+                updated_windows(hierarchy, &units, &found, robust_squares),
             )
         };
         (hierarchy.plug_in.variance, hierarchy.plug_in.windows) = (variance, windows);
@@ -81,8 +81,7 @@ pub(super) fn learn(
                 }
             }
             let variance = updated(hierarchy, &units, &found, squares);
-            let last = found.last().expect("a round has iterations");
-            let windows = updated_windows(hierarchy, &units, last, squares);
+            let windows = updated_windows(hierarchy, &units, &found, squares);
             states = chain.into_states();
             (variance, windows, deviations(&found))
         };
@@ -161,23 +160,28 @@ fn updated(
                 |prepared: &Prepared| 1.0 - prepared.unit.posterior[k * size + k] / now[component];
             free += units.iter().map(left).sum::<f64>();
         }
-        let next = if free > 1e-9 {
-            sum / free
-        } else {
-            now[component]
-        };
-        next.clamp(BOUNDS.0, BOUNDS.1)
+        next(sum, free, now[component])
     };
     hierarchy.columns.iter().enumerate().map(of).collect()
 }
 
-/// ν² of every component from one iteration: of units with two windows or more, for one window does not tell its scatter from that of units.
+/// The variance that squares ask for; where no data leave it open, the one before.
+fn next(sum: f64, free: f64, now: f64) -> f64 {
+    let asked = if free > 1e-9 { sum / free } else { now };
+    asked.clamp(BOUNDS.0, BOUNDS.1)
+}
+
+/// ν² of every component from the last iteration: of units with two windows or more, for one window does not tell its scatter from that of units.
 fn updated_windows(
     hierarchy: &Hierarchy,
     units: &[Prepared],
-    found: &Iteration,
+    found: &[Iteration],
     squares: fn(&mut [f64]) -> f64,
 ) -> Vec<f64> {
+    let now = &hierarchy.plug_in.windows;
+    let Some(found) = found.last() else {
+        return now.clone();
+    };
     let of_windows = hierarchy.window_scatter();
     let of_unit = |((sums, prepared), one): ((&UnitSums, &Prepared), &UnitIteration)| {
         let mut own = Vec::new();
@@ -199,7 +203,6 @@ fn updated_windows(
     };
     let pairs = hierarchy.units.par_iter().zip(units).zip(&found.units);
     let all: Vec<(Vec<f64>, Vec<f64>)> = pairs.flat_map_iter(of_unit).collect();
-    let now = &hierarchy.plug_in.windows;
     let of = |(component, columns): (usize, &Vec<usize>)| {
         let (mut sum, mut free) = (0.0, 0.0);
         for &k in columns {
@@ -211,12 +214,7 @@ fn updated_windows(
             };
             free += all.iter().map(|(_, open)| 1.0 - open[k]).sum::<f64>();
         }
-        let next = if free > 1e-9 {
-            sum / free
-        } else {
-            now[component]
-        };
-        next.clamp(BOUNDS.0, BOUNDS.1)
+        next(sum, free, now[component])
     };
     hierarchy.columns.iter().enumerate().map(of).collect()
 }
