@@ -20,6 +20,7 @@ from fleets import GRIPPER, ONSET, Fleet, Unit, type_of  # noqa: E402
 from shared import COULOMB_VELOCITY  # noqa: E402
 from worlds import links_of  # noqa: E402
 
+MOVING = 0.05  # rad/s: slower than this a joint may be about to turn
 NAMED = 0.5  # PIP
 SURE = 0.99  # PIP of a true effect of the type
 STAND_IN = 0.8
@@ -189,12 +190,15 @@ def pooling(truth, motion, alone, pooled):
     """Held-out error of the short unit's twin from the fleet over that of the twin fitted to its log alone.
 
     `alone` and `pooled` are rows of the motion and torque there. Errors are against the torque without noise, in standard deviations of
-    each joint's noise, over the rows that both predict. `pooled` is None where the fleet wrote no twin.
+    each joint's noise, over the rows that both predict and in which a joint has been moving for 0.1 s and goes on for 0.1 s: about a
+    reversal both err by what the plan's filter makes of the jump of dry friction.
     """
-    none = pooled is None
     sd, clean = np.array(truth["noise_sd"]), motion["tau"]
-    pooled = alone if none else pooled
     common, first, second = np.intersect1d(alone[0], pooled[0], return_indices=True)
-    error = lambda said, rows: float(np.sqrt(np.mean(((said[rows] - clean[common]) / sd) ** 2)))
+    reach = round(0.1 / (motion["t"][1] - motion["t"][0]))
+    padded = np.pad(np.abs(motion["qd"]), ((reach, reach), (0, 0)), mode="edge")
+    slowest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=0).min(axis=-1)
+    moves = slowest[common] > MOVING
+    error = lambda said, rows: float(np.sqrt(np.mean((((said[rows] - clean[common]) / sd) ** 2)[moves])))
     own, shared = error(alone[1], first), error(pooled[1], second)
-    return {"alone": own, "pooled": None if none else shared, "ratio": None if none else shared / own}
+    return {"alone": own, "pooled": shared, "ratio": shared / own}

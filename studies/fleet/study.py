@@ -29,7 +29,7 @@ PROGRAM = Path(os.environ.get("TWINCAL", ROOT / "target/release/twincal"))
 LIMIT = 3600.0  # s, for one command
 PLAN_LOGS = 6  # so many logs of the first unit make the plan: a plan takes what robots differ in for noise
 CONFIG = ("--config", "twincal.toml")
-POOLED = Path("out") / "twins" / SHORT[0]  # the twin of the short unit, where `fleet` writes one
+POOLED = Path("pooled")  # the twin of the short unit that `fleet` writes
 
 
 def fingerprint(program):
@@ -85,6 +85,8 @@ def make_statistics(program, folder, truth, force):
         for extra in plan.glob("*.arrow"):
             extra.unlink()
     for robot in robots:
+        if not force and any((folder / "st" / robot).glob("*.arrow")):
+            continue
         logs = sorted(path.name for path in folder.glob(f"{robot}-w*.parquet"))
         call(folder, program, "statistics", *logs, *CONFIG, "--robot", robot, "--plan", plan / "plan.json", "-o", f"st/{robot}", *again)
 
@@ -104,13 +106,12 @@ def predicted(program, folder, motion, twin):
 
 
 def short_unit(program, folder, truth):
-    """Held-out errors of the unit with the short log: fitted alone, and by the fleet where that wrote a twin."""
+    """Held-out errors of the unit with the short log, from the same statistics: fitted alone, and by the fleet."""
     motion = np.load(folder / "new.npz")
-    log = next(folder.glob(f"{SHORT[0]}-w*.parquet")).name
-    call(folder, program, "fit", log, *CONFIG, "-o", "alone", "--force")
-    alone = predicted(program, folder, motion, "alone")
-    pooled = predicted(program, folder, motion, POOLED) if (folder / POOLED).is_dir() else None
-    return pooling(truth, motion, alone, pooled)
+    files = sorted(str(path.relative_to(folder)) for path in folder.glob(f"st/{SHORT[0]}/*.arrow"))
+    call(folder, program, "fit", "--statistics", *files, "-o", "alone", "--force")
+    both = [predicted(program, folder, motion, twin) for twin in ("alone", POOLED)]
+    return pooling(truth, motion, *both)
 
 
 def one(program, fleet, folder, given):
@@ -130,7 +131,8 @@ def one(program, fleet, folder, given):
         make_statistics(program, folder, truth, given.again)
         clock("statistics")
         files = sorted(str(path.relative_to(folder)) for path in folder.glob("st/*/*.arrow"))
-        call(folder, program, "fleet", *files, "--by", "robot", "--window", "7d", "-o", "out", "--force")
+        twin = ("--twin", f"{SHORT[0]}={POOLED}") if fleet.short else ()
+        call(folder, program, "fleet", *files, "--by", "robot", "--window", "7d", *twin, "-o", "out", "--force")
         clock("fleet")
         return line | judgement(program, folder, truth)
     except Failed as why:

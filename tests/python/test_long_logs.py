@@ -65,9 +65,9 @@ def log(minutes, seed=1):
     return pa.table(columns)
 
 
-def run(*command):
+def run(*command, threads=2):
     """What a command prints, and the largest memory that it took, MB."""
-    command = [program("twincal"), *map(str, command), "--threads", "2"]
+    command = [program("twincal"), *map(str, command), "--threads", str(threads)]
     # Through a small process: the largest memory of a child counts what its parent had when it was started.
     done = subprocess.run([sys.executable, "-c", MEASURED, *command], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -75,11 +75,11 @@ def run(*command):
     return words, float(memory)
 
 
-def fitted(folder, file):
+def fitted(folder, file, threads=2):
     """result.json of a fit, and the largest memory that it took, MB."""
     (folder / "twincal.toml").write_text(CONFIG)
     config = folder / "twincal.toml"
-    _, memory = run("fit", file, "--model", ASSETS / "arm.urdf", "--config", config, "-o", folder / "out", "--force")
+    _, memory = run("fit", file, "--model", ASSETS / "arm.urdf", "--config", config, "-o", folder / "out", "--force", threads=threads)
     return json.loads((folder / "out/result.json").read_text()), memory
 
 
@@ -102,11 +102,12 @@ def test_memory_does_not_grow_with_the_log(tmp_path, long_log):
     memory = {}
     for minutes, table in [(51, long_log), (204, log(204))]:
         pa.parquet.write_table(table, tmp_path / "run.parquet")
-        result, memory[minutes] = fitted(tmp_path, tmp_path / "run.parquet")
+        # With two threads what both hold at a time differs by some 12 MB from run to run, with one by 2 MB.
+        result, memory[minutes] = fitted(tmp_path, tmp_path / "run.parquet", threads=1)
         agrees(result)
         assert result["logs"][0]["samples"] == table.num_rows
         assert any(finding["code"] == "chapters" for finding in result["findings"])
-    assert memory[204] - memory[51] < 32, memory
+    assert memory[204] - memory[51] < 20, memory
     # In memory the numbers alone would be 685 MB.
     assert memory[204] < 250, memory
 

@@ -353,6 +353,15 @@ impl InferenceRow {
                 ess: Some(ess),
                 seed,
             },
+            Method::Fleet { chains, draws, .. } => Self {
+                method: "fleet",
+                models: None,
+                chains: Some(chains),
+                draws: Some(draws),
+                r_hat: None,
+                ess: None,
+                seed,
+            },
         }
     }
 }

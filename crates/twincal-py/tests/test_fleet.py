@@ -55,6 +55,7 @@ def test_the_robot_that_changed_is_named_with_its_window(made):
     assert low < 1.0 < high
     assert json.loads((folder / "out" / "fleet.json").read_text())["units"] == result.units
     assert "<script" not in result.report.read_text()
+    assert result.corrected_model == folder / "out" / "type.urdf" and result.corrected_model.exists()
     frame = result.to_pandas()
     assert set(frame["robot"]) == {f"unit{unit}" for unit in range(UNITS)}
     assert frame.loc[frame["deviates"], "since"].iloc[0] == pandas.Timestamp("2026-01-12", tz="UTC")
@@ -78,3 +79,23 @@ def test_bad_arguments_are_errors(made, tmp_path):
     with pytest.raises(twincal.Error, match="between 0 and 1"):
         fleet.fit(files, tmp_path / "out", fdr=2.0)
     assert not (tmp_path / "out").exists()
+
+
+def test_twins_predict_torque_of_their_robot(made, arm):
+    """Coulomb friction of the first joint is 1 + 0.02 × number, of `unit4` another 1 N·m since the second week."""
+    folder, files = made
+    paths = {"unit4": folder / "twin4", "unit1": folder / "twin1"}
+    result = fleet.fit(files, folder / "with-twins", type_twin=folder / "type", twins=paths)
+    assert result.units == fleet.Fleet(folder / "out").units
+    robot = twincal.Robot.from_urdf(arm.model)
+    n = len(robot.joint_names)
+    q, qd, qdd = np.zeros((1, n)), np.full((1, n), 0.8), np.zeros((1, n))
+    of_model = robot.inverse_dynamics(q, qd, qdd)[0, 0]
+    for path, friction in [(paths["unit4"], 2.08), (paths["unit1"], 1.02), (folder / "type", 1.04)]:
+        twin = twincal.Calibration.load(path)
+        torque = twin.predict(q, qd, qdd)
+        assert abs(torque.mean[0, 0] - of_model - friction) < 0.1, (path, torque.mean, of_model)
+        assert torque.low[0, 0] < of_model + friction < torque.high[0, 0]
+    with pytest.raises(twincal.Error, match="nobody"):
+        fleet.fit(files, folder / "none", twins={"nobody": folder / "nobody"})
+    assert not (folder / "nobody").exists() and not (folder / "none").exists()

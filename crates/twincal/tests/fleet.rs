@@ -5,7 +5,9 @@
 mod two_link;
 
 use twincal::Error;
-use twincal::calibrate::{About, CalibrationSettings, Plan, Statistics, plan_about};
+use twincal::calibrate::{
+    About, Calibration, CalibrationSettings, Plan, Statistics, Status, plan_about,
+};
 use twincal::fleet::{Fleet, FleetResult, FleetSettings, Reason};
 use twincal::prelude::*;
 use twincal::random::Random;
@@ -75,7 +77,10 @@ impl Study {
 
     /// All logs but those of which `without` says yes.
     fn fleet(&self, without: impl Fn(usize, usize) -> bool) -> Fleet {
-        let mut fleet = Fleet::default();
+        self.added_to(Fleet::default(), without)
+    }
+
+    fn added_to(&self, mut fleet: Fleet, without: impl Fn(usize, usize) -> bool) -> Fleet {
         for (unit, logs) in self.logs.iter().enumerate() {
             for (week, log) in logs
                 .iter()
@@ -143,6 +148,50 @@ fn the_arm_that_gained_mass_is_named_with_its_week() {
         "{gained:?}"
     );
     assert_eq!(own.course.len(), WEEKS);
+}
+
+/// A twin has the moments that the fleet says of its robot, and nothing changes for being asked; a robot without logs is refused.
+#[test]
+fn twins_are_what_the_fleet_says() {
+    let study = study();
+    let plain = study.fit(study.fleet(|_, _| false)).expect("a fleet");
+    let asked = ["unit6", "unit2"].map(String::from);
+    let fleet = study.added_to(Fleet::with_twins(asked), |_, _| false);
+    let result = study.fit(fleet).expect("a fleet");
+    assert_eq!(result.units, plain.units);
+    assert_eq!(result.type_effects, plain.type_effects);
+    assert!(plain.twins.is_empty());
+    let robots: Vec<&str> = (result.twins.iter())
+        .map(|twin| twin.robot.as_str())
+        .collect();
+    assert_eq!(robots, ["unit2", "unit6"]);
+    for twin in &result.twins {
+        let (own, summary) = (&twin.calibration.twin, unit(&result, &twin.robot));
+        assert_eq!(own.posterior.mean, summary.mean);
+        for (sd, of_window) in own.posterior.sd.iter().zip(&summary.sd) {
+            assert!(sd >= of_window, "a window to come scatters, too");
+        }
+    }
+    let mass = |calibration: &Calibration| {
+        let payload = calibration.components.iter().find(|c| c.name == "payload");
+        let payload = payload.expect("payload");
+        assert_eq!(payload.status, Status::Established);
+        payload.parameters[0].mean
+    };
+    let of_type = result.type_twin.as_ref().expect("the twin of the type");
+    for (a, b) in of_type.twin.posterior.mean.iter().zip(&result.mean) {
+        assert!((a - b).abs() <= 1e-9 * b.abs(), "{a} {b}"); // the same sum in another order
+    }
+    assert!((mass(of_type) - TYPE).abs() < 0.05, "{}", mass(of_type));
+    let changed = TYPE + 0.03 + GAIN;
+    let found = mass(&result.twins[1].calibration);
+    assert!((found - changed).abs() < 0.05, "{found} for {changed}");
+    // Of the robot that changed only the logs since then say what its torque is like.
+    assert_eq!(result.twins[1].calibration.logs.len(), WEEKS - 1);
+    assert_eq!(result.twins[0].calibration.logs.len(), WEEKS);
+    let nobody = study.added_to(Fleet::with_twins(["ghost".to_owned()]), |_, _| false);
+    let error = study.fit(nobody).expect_err("no such robot");
+    assert!(error.to_string().contains("`ghost`"), "{error}");
 }
 
 /// Whatever else is among the statistics, what is said of the other arms stays within a tenth of a standard deviation.

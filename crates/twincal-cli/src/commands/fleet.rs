@@ -1,5 +1,7 @@
 //! `twincal fleet`: which robots of a type deviate, and what is wrong with the model of all.
 
+mod twins;
+
 use super::start_threads;
 use super::summary::{indented, paragraph};
 use crate::args::Fleet as Flags;
@@ -13,9 +15,10 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use twincal::fleet::{Fleet, FleetResult, FleetSettings, FleetStage};
 use twincal_io::artifact::{Claim, Inputs, Maker, Replace};
-use twincal_io::fleet::{self, FLEET, PAGE, fleet_json, fleet_page, reason};
-use twincal_io::statistics::StatisticsFile;
+use twincal_io::fleet::{self, Corrected, FLEET, PAGE, fleet_json, fleet_page, reason};
+use twincal_io::statistics::{ModelFile, StatisticsFile};
 use twincal_io::words::fleet as words;
+use twins::Twins;
 
 /// Files that are read at a time.
 const BATCH: usize = 8;
@@ -31,50 +34,66 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
         false => Replace::Never,
     };
     let claim = Claim::new(&flags.output, replace, &inputs)?;
+    let twins = Twins::claim(flags, replace, &inputs)?;
     start_threads(flags.threads.map(|threads| threads as usize))?;
     let progress = Progress::new();
-    let (fleet, models) = read(&flags.files, &progress)?;
+    let asked = Fleet::with_twins(twins.robots());
+    let (fleet, models) = read(asked, &flags.files, &progress)?;
     let progress = Mutex::new(progress);
     let watch = |stage: FleetStage| {
-        let (what, done, all) = match stage {
-            FleetStage::Noise => ("measuring noise", 0, 1),
-            FleetStage::Scatter(done, all) => ("learning how robots differ", done, all),
-            FleetStage::Posterior(done, all) => ("sampling the posterior", done, all),
-        };
         if let Ok(progress) = progress.lock() {
-            progress.counted(what, done, all);
+            show(stage, &progress);
         }
         Ok(())
     };
     let result = fleet
         .fit(&settings, &watch)
         .map_err(twincal_io::Error::from)?;
-    let model = result
-        .units
-        .first()
-        .and_then(|unit| models.get(&unit.robot));
+    let model = models.of(&result)?;
+    let of_type = (result.type_twin.as_ref()).map(|twin| twins::model_of_type(twin, model));
+    let (file, refused) = match of_type.transpose() {
+        Ok(file) => (file, None),
+        Err(failure) => (None, Some(failure.words().0)),
+    };
     let about = fleet::Inputs {
-        model: model.cloned().unwrap_or_default(),
+        model: model.name.clone(),
         window_seconds: settings.window,
         false_discovery_rate: settings.false_discovery_rate,
         seed: flags.seed,
         statistics: display_names(&flags.files),
+        corrected: Corrected {
+            file: file.as_ref().map(|(name, _)| *name),
+            refused,
+        },
     };
     let json = fleet_json(&result, &about)?;
     let page = fleet_page(&result, &about)?;
-    claim.commit(
-        Maker::Fleet,
-        vec![(FLEET, json.clone()), (PAGE, page.into_bytes())],
-    )?;
+    let mut files = vec![(FLEET, json.clone()), (PAGE, page.into_bytes())];
+    files.extend(file);
+    twins.write(&result, model, terminal)?;
+    claim.commit(Maker::Fleet, files)?;
     terminal.complete(&flags.output);
     drop(progress);
     if flags.json {
         terminal.data(&String::from_utf8_lossy(&json));
-    } else {
-        print(&result, terminal);
-        terminal.say(&flags.output.to_string_lossy());
+        return Ok(0);
     }
+    print(&result, terminal);
+    if let Some(problem) = &about.corrected.refused {
+        paragraph(&format!("No corrected model file: {problem}"), terminal);
+    }
+    terminal.say(&flags.output.to_string_lossy());
     Ok(0)
+}
+
+fn show(stage: FleetStage, progress: &Progress) {
+    let (what, done, all) = match stage {
+        FleetStage::Noise => ("measuring noise", 0, 1),
+        FleetStage::Scatter(done, all) => ("learning how robots differ", done, all),
+        FleetStage::Posterior(done, all) => ("sampling the posterior", done, all),
+        FleetStage::Twins => ("making twins", 0, 1),
+    };
+    progress.counted(what, done, all);
 }
 
 fn settings(flags: &Flags) -> Outcome<FleetSettings> {
@@ -109,10 +128,35 @@ fn seconds(text: &str) -> Outcome<f64> {
     ))
 }
 
-/// All files, and the model's name of each robot.
-fn read(files: &[PathBuf], progress: &Progress) -> Outcome<(Fleet, BTreeMap<String, String>)> {
-    let mut fleet = Fleet::default();
-    let mut models = BTreeMap::new();
+/// Every model file once, and which of them a robot has.
+#[derive(Default)]
+struct Models {
+    files: Vec<ModelFile>,
+    of_robot: BTreeMap<String, usize>,
+}
+
+impl Models {
+    fn add(&mut self, robot: &str, model: ModelFile) {
+        let at = self.files.iter().position(|file| *file == model);
+        let at = at.unwrap_or_else(|| {
+            self.files.push(model);
+            self.files.len() - 1
+        });
+        self.of_robot.insert(robot.to_owned(), at);
+    }
+
+    /// That of the robots that count.
+    fn of(&self, result: &FleetResult) -> Outcome<&ModelFile> {
+        let first = result.units.first();
+        let at = first.and_then(|unit| self.of_robot.get(&unit.robot));
+        at.map(|at| &self.files[*at])
+            .ok_or_else(|| Failure::usage("no robot counts", "give statistics of three robots"))
+    }
+}
+
+/// All files, added to the fleet, and the model of each robot.
+fn read(mut fleet: Fleet, files: &[PathBuf], progress: &Progress) -> Outcome<(Fleet, Models)> {
+    let mut models = Models::default();
     for (batch, paths) in files.chunks(BATCH).enumerate() {
         progress.counted("reading statistics", batch * BATCH, files.len());
         let read: Vec<twincal_io::Result<StatisticsFile>> = (paths.par_iter())
@@ -120,7 +164,7 @@ fn read(files: &[PathBuf], progress: &Progress) -> Outcome<(Fleet, BTreeMap<Stri
             .collect();
         for file in read {
             let file = file?;
-            models.insert(file.statistics.robot_name.clone(), file.model.name.clone());
+            models.add(&file.statistics.robot_name, file.model);
             fleet.add(&file.statistics);
         }
     }

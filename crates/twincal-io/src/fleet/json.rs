@@ -22,6 +22,18 @@ pub struct Inputs {
     pub seed: u64,
     /// Files of statistics, by name.
     pub statistics: Vec<String>,
+    /// The model file with what is wrong for all robots put right.
+    #[serde(skip)]
+    pub corrected: Corrected,
+}
+
+/// The corrected model file of a type, or why there is none.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct Corrected {
+    /// Its name beside `fleet.json`.
+    pub file: Option<&'static str>,
+    /// Why there is none.
+    pub refused: Option<String>,
 }
 
 /// `fleet.json`, see `schema/fleet.schema.json`.
@@ -32,6 +44,7 @@ pub struct FleetJson<'a> {
     inputs: &'a Inputs,
     windows: Vec<Window>,
     type_effects: Vec<Effect<'a>>,
+    corrected_model: &'a Corrected,
     units: Vec<Unit<'a>>,
     left_out: Vec<LeftOut<'a>>,
     sampling: Sampling,
@@ -121,6 +134,7 @@ impl<'a> FleetJson<'a> {
                 })
                 .collect(),
             type_effects: result.type_effects.iter().map(effect).collect(),
+            corrected_model: &inputs.corrected,
             units: result.units.iter().map(unit).collect(),
             left_out: (result.left_out.iter())
                 .map(|own| LeftOut {

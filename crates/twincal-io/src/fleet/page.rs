@@ -24,6 +24,7 @@ pub fn fleet_page(result: &FleetResult, inputs: &Inputs) -> Result<String> {
             result.units.len(),
             result.windows.len(),
         ),
+        corrected: inputs.corrected.clone(),
         rate: crate::words::percent(inputs.false_discovery_rate),
         deviating: result
             .units

@@ -4,6 +4,7 @@ use super::page::environment;
 use super::plot::{Frame, Panel};
 use super::svg::Svg;
 use crate::error::{Error, Result};
+use crate::fleet::Corrected;
 use minijinja::value::Serde;
 use serde::Serialize;
 use twincal::fleet::CoursePoint;
@@ -23,6 +24,8 @@ pub(crate) struct FleetPage {
     pub(crate) doubt: String,
     /// What is wrong for all of them.
     pub(crate) of_type: String,
+    /// The corrected model file.
+    pub(crate) corrected: Corrected,
     /// Model and amount of data.
     pub(crate) about: String,
     /// False discovery rate.

@@ -247,6 +247,18 @@ pub(super) fn convergence(calibration: &Calibration) -> Vec<String> {
             count(models),
             number(missing, 2)
         )),
+        Method::Fleet {
+            robots,
+            chains,
+            draws,
+            spread,
+        } => out.push(format!(
+            "From the statistics of {} robots: {} chains of {} draws; the probability that a robot deviates differs by {} between them at most.",
+            count(robots as u64),
+            count(chains as u64),
+            count(draws as u64),
+            number(spread, 2)
+        )),
         Method::Gibbs {
             chains,
             draws,

@@ -3,9 +3,8 @@
 use super::number::{number, probability, with_sd};
 use super::utc;
 use twincal::fleet::{DeviationSummary, FleetResult, Value, WindowSpan};
+use twincal::posterior::CHAINS_APART;
 
-/// Difference of a probability between chains from which on it is said.
-const DISAGREE: f64 = 0.1;
 /// Half of a central 95 % interval of a normal distribution, in standard deviations.
 const HALF_OF_95: f64 = 1.96;
 
@@ -73,7 +72,7 @@ pub fn since(own: &DeviationSummary) -> String {
 /// What makes the answer doubtful: chains that disagree.
 #[must_use]
 pub fn doubt(result: &FleetResult) -> Option<String> {
-    (result.spread > DISAGREE).then(|| {
+    (result.spread > CHAINS_APART).then(|| {
         format!(
             "The chains differ by up to {:.2} in the probability of a robot: read probabilities as that uncertain.",
             result.spread

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +33,8 @@ class Fleet:
         Logs that do not count: `robot`, `log`, `code`, `reason`.
     windows : list of dict
         Windows that hold logs: `start`.
+    corrected_model : pathlib.Path or None
+        The model file with what is established for all robots; None where no physical one was found.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
@@ -42,6 +44,8 @@ class Fleet:
         self.units: list[dict[str, Any]] = read["units"]
         self.left_out: list[dict[str, Any]] = read["left_out"]
         self.windows: list[dict[str, Any]] = read["windows"]
+        file: str | None = read["corrected_model"]["file"]
+        self.corrected_model: Path | None = self.folder / file if file else None
 
     @property
     def deviating(self) -> list[str]:
@@ -144,6 +148,8 @@ def fit(
     window: str = "7d",
     fdr: float = 0.05,
     seed: int = 1,
+    type_twin: str | os.PathLike[str] | None = None,
+    twins: Mapping[str, str | os.PathLike[str]] | None = None,
     force: bool = False,
 ) -> Fleet:
     """One posterior over the robots of a type, as `twincal fleet` computes it.
@@ -161,6 +167,11 @@ def fit(
         Expected share of named robots that do not deviate, at most.
     seed : int
         Seed of all random numbers.
+    type_twin : path, optional
+        Folder for the twin of the type: what a robot does of which no log is there.
+        `Calibration.load` reads it.
+    twins : mapping of robot to path, optional
+        Folders for the twins of these robots, each as it is in its last window.
     force : bool
         Replace an earlier result.
 
@@ -176,5 +187,9 @@ def fit(
     files = [os.fspath(path) for path in _paths("statistics", statistics)]
     arguments = ["fleet", "--json", "-o", os.fspath(output), "--window", window]
     arguments += ["--fdr", repr(float(fdr)), "--seed", str(int(seed))]
+    if type_twin is not None:
+        arguments += ["--type-twin", os.fspath(type_twin)]
+    for robot, folder in (twins or {}).items():
+        arguments += ["--twin", f"{robot}={os.fspath(folder)}"]
     _twincal.call([*arguments, *(["--force"] if force else []), "--", *files])
     return Fleet(output)

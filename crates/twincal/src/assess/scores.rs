@@ -2,7 +2,7 @@
 
 use crate::calibrate::Calibration;
 use crate::likelihood::JointNoise;
-use crate::posterior::Method;
+use crate::posterior::{CHAINS_APART, Method};
 use crate::validate::{Scores, Validation};
 
 /// Held-out rows, in independent ones, below which nothing is promised.
@@ -67,5 +67,6 @@ pub fn converged(calibration: &Calibration) -> bool {
         Method::Exact { .. } => true,
         Method::Search { missing, .. } => missing < 1e-3,
         Method::Gibbs { r_hat, ess, .. } => r_hat <= 1.01 && ess >= 400.0,
+        Method::Fleet { spread, .. } => spread <= CHAINS_APART,
     }
 }

@@ -16,6 +16,7 @@ use super::fit::fitted::{self, Fitted};
 use super::fit::noise_of::noise_of;
 use super::log_statistics::{LogStatistics, Statistics, require_read_back};
 use super::plan::require_even_rows;
+use super::pooled::Pooled;
 use super::progress::{Stage, Watch};
 use super::result::calibration::Calibration;
 use super::result::summary::{Pieces, SecondOpinion};
@@ -27,6 +28,7 @@ use crate::error::{Error, Finding, Result};
 use crate::gram::Gram;
 use crate::infer::infer_near;
 use crate::likelihood::{Columns, Spread};
+use crate::posterior::Posterior;
 use crate::robot::Robot;
 use crate::self_check::self_check;
 use crate::signal::{Logs, ReadyLog, ready};
@@ -53,9 +55,24 @@ pub fn calibrate_statistics<'a>(
         Ok(())
     };
     let (heldout, mut findings) = (heldout.into(), Vec::new());
-    let fit = road(statistics, &heldout, settings, &watch, &mut findings);
+    let job = (statistics, None);
+    let fit = road(job, &heldout, settings, &watch, &mut findings);
     let read_back = heldout.0.iter().try_for_each(require_read_back);
     (read_back.and(fit)).map_err(|error| Stopped { error, findings })
+}
+
+/// A calibration with the posterior of a fleet: noise and range of motion are those of the robot's own statistics.
+///
+/// # Errors
+/// Those of [`calibrate_statistics`].
+pub(crate) fn calibrate_pooled(
+    statistics: &Statistics,
+    pooled: &Pooled,
+    settings: &CalibrationSettings,
+) -> Result<Calibration> {
+    let job = (statistics, Some(pooled));
+    let nothing = Logs(Vec::new());
+    road(job, &nothing, settings, &|_| Ok(()), &mut Vec::new())
 }
 
 /// The logs' statistics over the columns that act, and what else is known.
@@ -69,7 +86,7 @@ struct Known {
 }
 
 fn road(
-    statistics: &Statistics,
+    (statistics, pooled): (&Statistics, Option<&Pooled>),
     heldout: &Logs<'_>,
     settings: &CalibrationSettings,
     progress: &Watch<'_>,
@@ -83,7 +100,7 @@ fn road(
     settings.library = plan.library.clone();
     settings.noise.model = plan.noise;
     progress(Stage::Rows)?;
-    let known = known(statistics, &settings, findings)?;
+    let known = known((statistics, pooled), &settings, findings)?;
     progress(Stage::Inference)?;
     let Known {
         library,
@@ -92,10 +109,16 @@ fn road(
         facts,
         ..
     } = &known;
-    let fitted = estimated((robot, sums, columns), &settings, findings)?;
+    let fitted = match pooled {
+        None => estimated((robot, sums, columns), &settings, findings)?,
+        Some(pooled) => pooled.fitted((robot, sums, columns), &settings, findings)?,
+    };
     let fit = &fitted.fit;
     let inside = compact::members(&fit.problem, &fit.posterior);
-    let compact = compact::refit(&fit.problem, &inside, &fit.posterior)?;
+    let compact: Posterior = match pooled {
+        None => compact::refit(&fit.problem, &inside, &fit.posterior)?,
+        Some(pooled) => pooled.compact(&inside, &fit.posterior)?,
+    };
     let twin = twin(statistics, &known, &fitted);
     let own = held_out::Own {
         twin: &twin,
@@ -113,7 +136,10 @@ fn road(
     findings.extend(worse::of_compact(validation.compact));
     progress(Stage::Sensitivity)?;
     let opinion = SecondOpinion {
-        sandwich: sandwich::sds(fit, &compact, sums),
+        sandwich: match pooled {
+            None => sandwich::sds(fit, &compact, sums),
+            Some(pooled) => vec![None; pooled.mean.len()],
+        },
         compact: compact::summary(library, &fit.problem, &fit.posterior, &compact, &fit.gram),
     };
     let (zero, states) = (&known.zero_columns, &facts.states);
@@ -132,6 +158,7 @@ fn road(
         validation,
         sweep: Vec::new(),
         opinion,
+        pooled: pooled.is_some(),
     };
     stages::told(pieces, &excitation, findings)
 }
@@ -152,7 +179,7 @@ fn estimated(
 }
 
 fn known(
-    statistics: &Statistics,
+    (statistics, pooled): (&Statistics, Option<&Pooled>),
     settings: &CalibrationSettings,
     findings: &mut Vec<Finding>,
 ) -> Result<Known> {
@@ -166,16 +193,23 @@ fn known(
         .map(|log| log.about.facts.clone())
         .collect();
     let facts = Facts::of(&logs, &[]);
-    let all = sums(&statistics.logs, settings, &[]);
-    let squares = squares(&all.total().gram, every_candidate.columns().len());
-    let zero_columns = all_logs::hardly_act(&squares, all.rows(), &every_candidate);
+    let zero_columns = match pooled {
+        Some(pooled) => pooled.zero_columns.clone(),
+        None => {
+            let all = sums(&statistics.logs, settings, &[]);
+            let squares = squares(&all.total().gram, every_candidate.columns().len());
+            all_logs::hardly_act(&squares, all.rows(), &every_candidate)
+        }
+    };
     findings.extend(all_logs::zero_findings(&every_candidate, &zero_columns));
     let library = every_candidate.without_columns(&zero_columns);
     let mut columns = columns_of(robot, &library, settings, facts.payload_apart)?;
     columns.one_motion = logs.len() == 1;
     columns.halves = dissipative::halves(robot, &plan.library, &columns, &facts.hull);
     let cutoff = settings.signal.cutoff_hz;
-    all_logs::require_enough((robot, &library), &facts.summaries, &columns, cutoff)?;
+    if pooled.is_none() {
+        all_logs::require_enough((robot, &library), &facts.summaries, &columns, cutoff)?;
+    }
     Ok(Known {
         sums: sums(&statistics.logs, settings, &zero_columns),
         library,

@@ -4,8 +4,8 @@ use crate::calibrate::LogStatistics;
 use crate::calibrate::Plan;
 use crate::gram::{Gram, JointGram};
 use crate::robot::Robot;
-use crate::statistics::{JointBlock, LogSums};
-use std::collections::BTreeMap;
+use crate::statistics::JointBlock;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Stamps behind it are seconds since 1970, s: September 2001.
 const ABSOLUTE: f64 = 1e9;
@@ -80,8 +80,30 @@ pub(super) struct KeptLog {
     /// Rows, and squares of the measured torque of each joint.
     pub(super) rows: usize,
     torque: Vec<f64>,
-    /// All sums, of a few units: noise is measured there.
-    pub(super) sums: Option<LogSums>,
+    /// Of a few units noise is measured.
+    pub(super) measured: bool,
+    /// All sums, of those and of units whose twin is asked for.
+    pub(super) statistics: Option<Box<LogStatistics>>,
+}
+
+/// All statistics of a log.
+#[derive(Debug, Clone)]
+pub(super) struct KeptStatistics {
+    pub(super) robot: String,
+    pub(super) measured: bool,
+    /// Number of its window; `None` without a date.
+    pub(super) window: Option<i64>,
+    pub(super) statistics: LogStatistics,
+}
+
+impl KeptStatistics {
+    /// Under a name that says whose log it is.
+    pub(super) fn named(&self) -> LogStatistics {
+        let mut statistics = self.statistics.clone();
+        let name = &mut statistics.about.facts.summary.name;
+        *name = format!("{}/{name}", self.robot);
+        statistics
+    }
 }
 
 /// Logs with one robot model and one plan.
@@ -106,21 +128,30 @@ impl Family {
         }
     }
 
-    /// Adds the logs of a robot; of `measured` robots to twice as many all sums are kept.
-    pub(super) fn add(&mut self, robot: &str, logs: &[LogStatistics], measured: usize) {
+    /// Adds the logs of a robot; of `measured` robots to twice as many, and of those asked for, all sums are kept.
+    pub(super) fn add(
+        &mut self,
+        robot: &str,
+        logs: &[LogStatistics],
+        (measured, asked): (usize, &BTreeSet<String>),
+    ) {
         let count = self.units.len();
         let place = *self.units.entry(robot.to_owned()).or_insert(count);
         while place / self.step >= 2 * measured {
             self.step *= 2;
             for log in &mut self.logs {
-                if !self.units[&log.robot].is_multiple_of(self.step) {
-                    log.sums = None;
+                log.measured = self.units[&log.robot].is_multiple_of(self.step);
+                if !log.measured && !asked.contains(&log.robot) {
+                    log.statistics = None;
                 }
             }
         }
         for log in logs {
             let mut kept = KeptLog::new(robot, log);
-            kept.sums = place.is_multiple_of(self.step).then(|| log.sums.coarse());
+            kept.measured = place.is_multiple_of(self.step);
+            if kept.measured || asked.contains(robot) {
+                kept.statistics = Some(Box::new(log.coarse()));
+            }
             self.logs.push(kept);
         }
     }
@@ -144,7 +175,8 @@ impl KeptLog {
             gram: Gram {
                 joints: joints.into_iter().map(|own| own.gram).collect(),
             },
-            sums: None,
+            measured: false,
+            statistics: None,
         }
     }
 

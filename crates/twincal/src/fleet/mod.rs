@@ -10,22 +10,27 @@ mod posterior;
 mod result;
 mod sampler;
 mod scatter;
+mod twins;
 
 pub use logs::{LeftOut, Reason};
 pub use result::{
     CoursePoint, DeviationSummary, FleetResult, TypeEffect, UnitSummary, Value, WindowSpan,
 };
+pub use twins::FleetTwin;
 
 use crate::calibrate::{CalibrationSettings, Statistics};
 use crate::error::{Error, Result};
 use crate::gram::Gram;
 use crate::likelihood::Columns;
+use crate::posterior::Method;
 use crate::robot::Robot;
 use crate::term::{Family as TermFamily, Library};
 use hierarchy::{Hierarchy, Scatter, UnitSums, Window};
-use logs::{Family, KeptLog};
+use logs::{Family, KeptLog, KeptStatistics};
 use noise::Noise;
 use posterior::Length;
+use std::collections::BTreeSet;
+use twins::Twins;
 
 /// Robots in which noise is measured: so many to twice as many, evenly in the order of their files.
 const MEASURED: usize = 5;
@@ -66,6 +71,7 @@ impl Default for FleetSettings {
 #[derive(Debug, Clone, Default)]
 pub struct Fleet {
     families: Vec<Family>,
+    twins: BTreeSet<String>,
 }
 
 /// What a fit of a fleet is doing.
@@ -77,9 +83,20 @@ pub enum FleetStage {
     Scatter(usize, usize),
     /// The posterior is sampled: iterations done, and all of them.
     Posterior(usize, usize),
+    /// Twins are made of it.
+    Twins,
 }
 
 impl Fleet {
+    /// A fleet of which these robots get a twin each.
+    #[must_use]
+    pub fn with_twins(robots: impl IntoIterator<Item = String>) -> Self {
+        Self {
+            families: Vec::new(),
+            twins: robots.into_iter().collect(),
+        }
+    }
+
     /// Adds the logs of one unit: `statistics.robot_name` says which.
     pub fn add(&mut self, statistics: &Statistics) {
         let same =
@@ -90,14 +107,15 @@ impl Fleet {
             self.families.push(family);
             self.families.len() - 1
         });
-        self.families[at].add(&statistics.robot_name, &statistics.logs, MEASURED);
+        let kept = (MEASURED, &self.twins);
+        self.families[at].add(&statistics.robot_name, &statistics.logs, kept);
     }
 
     /// The posterior of the fleet. `watch` is called before every stage and now and then within one; an error of it ends the fit.
     ///
     /// # Errors
-    /// [`Error::Statistics`] with fewer than three units, [`Error::Setting`] for impossible settings, those of a calibration, and what
-    /// `watch` returns.
+    /// [`Error::Statistics`] with fewer than three units, [`Error::Setting`] for impossible settings and for a twin of a robot that is not
+    /// there, those of a calibration, and what `watch` returns.
     pub fn fit(
         self,
         settings: &FleetSettings,
@@ -109,16 +127,18 @@ impl Fleet {
         let (kept, more) = logs::sifted(family.logs);
         left_out.extend(more);
         left_out.sort_by(|a, b| (&a.robot, &a.log).cmp(&(&b.robot, &b.log)));
-        let units = by_unit(kept);
+        let mut units = by_unit(kept);
         if units.len() < 3 {
             return Err(no_units(units.len(), &left_out));
         }
+        require_twins(&self.twins, &units)?;
         let mut calibration = settings.calibration.clone();
         calibration.library = family.plan.library.clone();
         calibration.noise.model = family.plan.noise;
         watch(FleetStage::Noise)?;
         let known = Known::new(&family.robot, &units, &calibration)?;
         let spans = spans(&units, settings.window);
+        let kept = kept_statistics(&mut units, settings.window);
         let mut hierarchy = known.hierarchy(units, (&spans, settings.window));
         let seed = calibration.inference.seed;
         let states = scatter::learn(&mut hierarchy, seed, &|done, all| {
@@ -132,6 +152,7 @@ impl Fleet {
         let posterior = posterior::sample(&hierarchy, states, length, &|done, all| {
             watch(FleetStage::Posterior(done, all))
         })?;
+        watch(FleetStage::Twins)?;
         let about = result::About {
             known: &known,
             hierarchy: &hierarchy,
@@ -139,8 +160,58 @@ impl Fleet {
             left_out,
             rate: settings.false_discovery_rate,
         };
-        Ok(about.result(&posterior))
+        let mut result = about.result(&posterior);
+        let twins = Twins {
+            robot: &family.robot,
+            plan: &family.plan,
+            settings: &calibration,
+            known: &known,
+            hierarchy: &hierarchy,
+            posterior: &posterior,
+            method: Method::Fleet {
+                robots: known.units.len(),
+                chains: settings.chains,
+                draws: settings.draws,
+                spread: posterior.spread,
+            },
+            kept,
+        };
+        result.type_twin = Some(twins.of_type()?);
+        for robot in &self.twins {
+            let twin = twins.of_robot(robot, &result)?;
+            result.twins.push(twin);
+        }
+        Ok(result)
     }
+}
+
+/// # Errors
+/// [`Error::Setting`] for a robot that has no logs, or none that count.
+fn require_twins(asked: &BTreeSet<String>, units: &[FleetUnit]) -> Result<()> {
+    let there = |robot: &&String| units.iter().any(|unit| unit.name == **robot);
+    match asked.iter().find(|robot| !there(robot)) {
+        None => Ok(()),
+        Some(robot) => Err(Error::Setting {
+            key: "fleet.twins".into(),
+            problem: format!("no log of a robot `{robot}` counts"),
+            remedy: "give the name that its statistics were made with (--robot)".into(),
+        }),
+    }
+}
+
+/// Takes all statistics out of the logs that have them.
+fn kept_statistics(units: &mut [FleetUnit], window: f64) -> Vec<KeptStatistics> {
+    let logs = units.iter_mut().flat_map(|unit| &mut unit.logs);
+    let taken = logs.filter_map(|log| {
+        let statistics = *log.statistics.take()?;
+        Some(KeptStatistics {
+            robot: log.robot.clone(),
+            measured: log.measured,
+            window: number(log, window),
+            statistics,
+        })
+    });
+    taken.collect()
 }
 
 fn require(settings: &FleetSettings) -> Result<()> {
@@ -270,7 +341,7 @@ impl Known {
         let zero = crate::calibrate::hardly_act(&squares, rows, &every_candidate);
         let library = every_candidate.without_columns(&zero);
         let columns = crate::calibrate::columns_of(robot, &library, settings, false)?;
-        let measured: Vec<KeptLog> = logs().filter(|log| log.sums.is_some()).cloned().collect();
+        let measured: Vec<KeptLog> = logs().filter(|log| log.measured).cloned().collect();
         let noise = noise::measure(&measured, &zero, &columns, settings)?;
         let grams: Vec<Gram> = units
             .iter()

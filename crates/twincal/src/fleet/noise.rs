@@ -39,7 +39,7 @@ pub(super) fn measure(
     settings: &CalibrationSettings,
 ) -> Result<Noise> {
     let mut units: Vec<Vec<&KeptLog>> = Vec::new();
-    for log in logs.iter().filter(|log| log.sums.is_some()) {
+    for log in logs.iter().filter(|log| log.measured) {
         match units.last_mut() {
             Some(unit) if unit[0].robot == log.robot => unit.push(log),
             _ => units.push(vec![log]),
@@ -83,8 +83,8 @@ fn fitted(
         NoiseModel::Iid | NoiseModel::Tempered => Runs::Apart,
     };
     let mut sums = Sums::empty(runs, (unit.len(), Purpose::Fit));
-    for own in unit.iter().filter_map(|log| log.sums.as_ref()) {
-        sums.add(&own.without(zero));
+    for own in unit.iter().filter_map(|log| log.statistics.as_ref()) {
+        sums.add(&own.sums.without(zero));
     }
     let own = FitSettings {
         noise: settings.noise,

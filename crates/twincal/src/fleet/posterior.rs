@@ -40,8 +40,8 @@ pub(super) struct UnitPosterior {
     pub(super) draws: Vec<(Deviation, Vec<f64>)>,
     /// E[β] in each of the unit's windows, K each.
     pub(super) means: Vec<Vec<f64>>,
-    /// E[β²] in the last window, K.
-    pub(super) squares: Vec<f64>,
+    /// E[β βᵀ] in the last window, K × K row-major.
+    pub(super) second: Vec<f64>,
 }
 
 /// How long chains are.
@@ -152,7 +152,7 @@ impl Sums {
             inclusion: vec![0.0; components],
             starts: vec![vec![0.0; sums.windows.len()]; components],
             means: vec![vec![0.0; size]; sums.windows.len()],
-            squares: vec![0.0; size],
+            second: vec![0.0; size * size],
             ..UnitPosterior::default()
         };
         Self {
@@ -165,10 +165,9 @@ impl Sums {
     fn add(&mut self, hierarchy: &Hierarchy, units: &[Prepared], one: &Iteration) {
         self.iterations += 1.0;
         add(&mut self.inclusion, &one.inclusion);
-        let size = hierarchy.size();
         for ((sums, unit), prepared) in self.units.iter_mut().zip(&one.units).zip(units) {
-            let diagonal = prepared.unit.posterior.iter().step_by(size + 1).copied();
-            sums.add(hierarchy, unit, (one.mu.last(), diagonal.collect()));
+            let covariance = &prepared.unit.posterior;
+            sums.add(hierarchy, unit, (one.mu.last(), covariance));
         }
     }
 
@@ -220,12 +219,12 @@ impl Sums {
 }
 
 impl UnitPosterior {
-    /// `variance` is that of scatter given everything else.
+    /// `covariance` is that of scatter given everything else.
     fn add(
         &mut self,
         hierarchy: &Hierarchy,
         one: &UnitIteration,
-        (mu, variance): (Option<&Vec<f64>>, Vec<f64>),
+        (mu, covariance): (Option<&Vec<f64>>, &[f64]),
     ) {
         self.deviates += f64::from(u8::from(!one.deviations.is_empty()));
         for (component, conditional) in one.conditional.iter().enumerate() {
@@ -249,15 +248,19 @@ impl UnitPosterior {
         for (sum, own) in self.means.iter_mut().zip(&own) {
             add(sum, own);
         }
-        let last = own.last().into_iter().flatten().zip(variance);
-        (self.squares.iter_mut().zip(last))
-            .for_each(|(sum, (x, variance))| *sum += x * x + variance);
+        let last = own.last().map_or(&[][..], Vec::as_slice);
+        for (i, x) in last.iter().enumerate() {
+            let at = i * last.len();
+            let row = self.second[at..].iter_mut().zip(&covariance[at..]);
+            row.zip(last)
+                .for_each(|((sum, covariance), other)| *sum += x * other + covariance);
+        }
     }
 
     fn join(&mut self, other: Self) {
         self.deviates += other.deviates;
         add(&mut self.inclusion, &other.inclusion);
-        add(&mut self.squares, &other.squares);
+        add(&mut self.second, &other.second);
         for (own, other) in self.means.iter_mut().zip(&other.means) {
             add(own, other);
         }
@@ -270,7 +273,7 @@ impl UnitPosterior {
     fn scale(&mut self, weight: f64) {
         self.deviates *= weight;
         scale(&mut self.inclusion, weight);
-        scale(&mut self.squares, weight);
+        scale(&mut self.second, weight);
         self.means.iter_mut().for_each(|own| scale(own, weight));
         self.starts.iter_mut().for_each(|own| scale(own, weight));
     }

@@ -6,6 +6,8 @@ use super::discoveries::named;
 use super::hierarchy::{Hierarchy, dot};
 use super::logs::LeftOut;
 use super::posterior::{FleetPosterior, UnitPosterior};
+use super::twins::FleetTwin;
+use crate::calibrate::Calibration;
 use crate::term::{Family, Library};
 
 /// Deviations less likely than this are not listed.
@@ -130,6 +132,10 @@ pub struct FleetResult {
     pub share: f64,
     /// Largest difference of a unit's probability between the chains.
     pub spread: f64,
+    /// What a robot of the type does of which no log is there: the mean of the type, and how robots differ.
+    pub type_twin: Option<Calibration>,
+    /// Twins of the robots that [`Fleet::with_twins`](super::Fleet::with_twins) named, in the order of their names.
+    pub twins: Vec<FleetTwin>,
 }
 
 /// Place of the largest number, of equal ones the first.
@@ -256,6 +262,8 @@ impl About<'_> {
             share: self.hierarchy.plug_in.share,
             spread: posterior.spread,
             left_out: self.left_out,
+            type_twin: None,
+            twins: Vec::new(),
         }
     }
 
@@ -317,9 +325,14 @@ impl About<'_> {
             mean: (last.iter().enumerate())
                 .map(|(k, mean)| mean * self.root(k))
                 .collect(),
-            sd: (unit.squares.iter().zip(last).enumerate())
-                .map(|(k, (square, mean))| (square - mean * mean).max(0.0).sqrt() * self.root(k))
-                .collect(),
+            sd: (unit
+                .second
+                .iter()
+                .step_by(last.len() + 1)
+                .zip(last)
+                .enumerate())
+            .map(|(k, (square, mean))| (square - mean * mean).max(0.0).sqrt() * self.root(k))
+            .collect(),
         }
     }
 

@@ -89,6 +89,9 @@ impl Site {
     }
 }
 
+/// Difference of a robot's probability between the chains of a fleet above which they disagree.
+pub const CHAINS_APART: f64 = 0.1;
+
 /// How the posterior was computed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "method", rename_all = "snake_case")]
@@ -115,6 +118,17 @@ pub enum Method {
         r_hat: f64,
         /// Smallest bulk ESS over terms.
         ess: f64,
+    },
+    /// That of a fleet: chains that alternate between the type and its robots.
+    Fleet {
+        /// Robots whose statistics are behind it.
+        robots: usize,
+        /// Chains.
+        chains: usize,
+        /// Draws per chain after it settled.
+        draws: usize,
+        /// Largest difference between the chains of the probability that a robot deviates.
+        spread: f64,
     },
 }
 

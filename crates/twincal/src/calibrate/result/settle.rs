@@ -81,6 +81,18 @@ pub(in crate::calibrate) fn settle(
     groups.iter().for_each(|group| effects.test_set(group));
 }
 
+/// The effects of a fleet: what is claimed is established. Sets stay where no member is.
+pub(in crate::calibrate) fn by_probability(
+    components: &mut [ComponentSummary],
+    groups: &mut Vec<Group>,
+) {
+    for own in components.iter_mut().filter(|own| own.is_claimed()) {
+        own.status = Status::Established;
+    }
+    let established = |name: &String| matches!(components.iter().find(|own| own.name == *name), Some(own) if own.status == Status::Established);
+    groups.retain(|group| !group.members.iter().any(established));
+}
+
 impl Effects<'_> {
     /// How much these effects, with what needs them, lower the error of left-out data together.
     fn lowered(&self, effects: &[usize]) -> Option<LeftOutError> {

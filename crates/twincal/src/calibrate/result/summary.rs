@@ -57,6 +57,8 @@ pub(in crate::calibrate) struct Pieces<'a> {
     pub(in crate::calibrate) validation: Validation,
     pub(in crate::calibrate) sweep: Vec<SweepPoint>,
     pub(in crate::calibrate) opinion: SecondOpinion,
+    /// The posterior is that of a fleet: it has no other prior, and left-out rows of one robot decide nothing.
+    pub(in crate::calibrate) pooled: bool,
 }
 
 /// Everything a reader gets, from the pieces of [`crate::calibrate::calibrate`].
@@ -92,7 +94,11 @@ pub(in crate::calibrate) fn summarise(
         component.told_as = told_as;
     }
     let mut groups = groups(&fit.problem, &fit.posterior, told_apart);
-    settle::settle(&mut components, &mut groups, fit, told_apart, sums);
+    if pieces.pooled {
+        settle::by_probability(&mut components, &mut groups);
+    } else {
+        settle::settle(&mut components, &mut groups, fit, told_apart, sums);
+    }
     findings.extend(common_gain::finding(
         &components,
         settings.drive_gain_sd > 0.0,
@@ -139,7 +145,10 @@ fn judged_terms(
     } = pieces;
     let squares = mean_squares(&fit.gram, columns.names.len(), &fit.plug_in.weight);
     let rms: Vec<f64> = squares.into_iter().map(f64::sqrt).collect();
-    let sensitivity = sensitivity(&fit.problem, &fit.posterior)?;
+    let sensitivity = match pieces.pooled {
+        true => vec![Vec::new(); columns.names.len()],
+        false => sensitivity(&fit.problem, &fit.posterior)?,
+    };
     let mut terms = terms(library, fit, &rms, &sensitivity, scale);
     for (&index, sd) in library.columns().iter().zip(&opinion.sandwich) {
         terms[index].sandwich_sd = *sd;

@@ -34,6 +34,7 @@ pub(in crate::calibrate) fn conclude(
         validation: validated.validation,
         sweep: checked.sweep,
         opinion: checked.opinion,
+        pooled: false,
     };
     let mut calibration = told(pieces, &checked.excitation, findings)?;
     calibration.lags = rows.lags;
