@@ -1,7 +1,9 @@
 //! The command line: commands, flags and their help, examples first.
 
+mod design;
 mod fleet;
 
+pub(crate) use design::Design;
 pub(crate) use fleet::Fleet;
 
 use clap::error::{ContextKind, ContextValue};
@@ -95,6 +97,15 @@ Examples:
   twincal fleet statistics/*/*.arrow --window 1d --fdr 0.01 -o fleet
 ")]
     Fleet(Fleet),
+    /// The motion to record: within the robot's limits, what shows most.
+    #[command(before_help = "\
+Examples:
+  twincal design --model arm.urdf -o motion
+  twincal design --twin twincal-out -o motion
+  twincal design --twin twincal-out --decide payload -o motion
+  twincal design --model arm.urdf --limits limits.toml --duration 30 -o motion
+")]
+    Design(Design),
     /// Score a twin on new logs: exit code 0, or 1 where a gate says no.
     #[command(
         before_help = "\
@@ -163,6 +174,7 @@ impl Command {
             Self::Statistics(flags) => flags.log.json,
             Self::Merge(flags) => flags.json,
             Self::Fleet(flags) => flags.json,
+            Self::Design(flags) => flags.json,
             Self::Check(flags) => flags.log.json,
             Self::Predict(flags) => flags.log.json,
             Self::Diff(flags) => flags.json,

@@ -12,6 +12,7 @@ mod clock;
 mod commands;
 mod exit;
 mod failure;
+mod interrupts;
 mod names;
 mod progress;
 mod terminal;
@@ -54,12 +55,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     outcome.unwrap_or(failure::BUG)
 }
 
-/// Ctrl-C ends the program at once with 130: what is on disk is complete at any moment. A write beyond the file-size
-/// limit must fail with an error instead of killing the program.
+/// Ctrl-C ends the program. A write beyond the file-size limit must fail with an error instead of killing it.
 fn listen_to_signals() {
     use signal_hook::{consts, flag};
+    interrupts::end_the_program();
     // Where a handler cannot be installed the system's own reaction stays.
-    let _ =
-        flag::register_conditional_shutdown(consts::SIGINT, 130, Arc::new(AtomicBool::new(true)));
     let _ = flag::register(consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
 }

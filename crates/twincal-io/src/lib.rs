@@ -59,6 +59,7 @@ pub mod words;
 #[cfg(feature = "tables")]
 pub mod fleet;
 pub mod export;
+pub mod design;
 
 pub use error::{Error, Place, Result};
 pub use files::{load, read_recording, read_robot, save};

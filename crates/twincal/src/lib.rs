@@ -39,6 +39,7 @@ pub mod calibrate;
 pub mod assess;
 pub mod compare;
 pub mod fleet;
+pub mod design;
 pub mod evaluator;
 pub mod write_back;
 pub mod builder;

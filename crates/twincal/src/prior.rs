@@ -56,7 +56,7 @@ pub const SETTLED: f64 = 1e300;
 /// A component is in or out with all its columns: a payload (10 columns), a friction (1). Components are independent of
 /// each other but for the Beta–Binomial of their family and for heredity: a model that holds a child without its parent has
 /// probability 0, and all others share what it would have had ([`Prior::log_admissible`]).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Prior {
     /// v_k: `β_k | z_k=1, φ ~ N(0, φ v_k)` in the column's own units, K.
     pub slab: Vec<f64>,
@@ -69,6 +69,7 @@ pub struct Prior {
     /// r_f > 0: factor on the prior odds of the components of each family; 1 leaves them alone.
     pub odds: Vec<f64>,
     /// β_k ≥ lower_k (≤ 0, so that 0 is allowed); −∞: free, K. The slab is truncated there and normalised again.
+    #[serde(deserialize_with = "free_if_null")]
     pub lower: Vec<f64>,
     /// Bounds on sums of coefficients; the slab of a model is truncated to what acts there and normalised again.
     pub halves: Vec<HalfSpace>,
@@ -81,7 +82,7 @@ pub struct Prior {
 }
 
 /// `Σ factor · β_k ≥ lower` over the columns that are in.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HalfSpace {
     /// (column, factor), the first factor positive.
     pub terms: Vec<(usize, f64)>,
@@ -94,6 +95,13 @@ pub struct HalfSpace {
     pub replaces: Option<usize>,
     /// Bounds of different groups share no column.
     pub group: usize,
+}
+
+/// JSON has no −∞: it is written as null.
+fn free_if_null<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+    let bounds: Vec<Option<f64>> = Deserialize::deserialize(from)?;
+    let free = |bound: Option<f64>| bound.unwrap_or(f64::NEG_INFINITY);
+    Ok(bounds.into_iter().map(free).collect())
 }
 
 impl HalfSpace {

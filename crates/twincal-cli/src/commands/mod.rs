@@ -6,6 +6,7 @@ mod calibration;
 mod check;
 mod checkup;
 mod demo;
+mod design;
 mod diff;
 mod doctor;
 mod export;
@@ -45,6 +46,7 @@ pub(crate) fn run(command: &Command, terminal: &mut Terminal) -> Outcome<u8> {
         Command::Statistics(flags) => statistics::run(flags, terminal),
         Command::Merge(flags) => merge::run(flags, terminal),
         Command::Fleet(flags) => fleet::run(flags, terminal),
+        Command::Design(flags) => design::run(flags, terminal),
         Command::Check(flags) => check::run(flags, terminal),
         Command::Predict(flags) => predict::run(flags, terminal),
         Command::Diff(flags) => diff::run(flags, terminal),

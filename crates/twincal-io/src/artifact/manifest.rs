@@ -29,6 +29,8 @@ pub enum Maker {
     Export,
     /// `twincal fleet`.
     Fleet,
+    /// `twincal design`.
+    Design,
 }
 
 /// Size and checksum of one file.

@@ -181,6 +181,7 @@ fn arm(names: &[&str], logs: usize, rows: usize) -> Calibration {
         twin: twin(names, posterior, joint_noise.clone()),
         components: components(&terms),
         compact: Some(compact(&terms)),
+        problem: None,
         terms,
         noise: joint_noise,
         prior: prior(),

@@ -12,6 +12,7 @@ mod words;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use states::{Reference, reference};
 pub use states::{States, random_states};
 pub use words::{sentence, sentences};
 

@@ -86,16 +86,16 @@ impl States {
 }
 
 /// How large columns and torques are at random states.
-pub(super) struct Reference<'a> {
+pub(crate) struct Reference<'a> {
     robot: &'a Robot,
     /// rms of each column, in torque of size 1 per joint; NaN for a column that is no number somewhere.
-    pub(super) size: Vec<f64>,
+    pub(crate) size: Vec<f64>,
     /// Weight of each joint's rows.
     weight: Vec<f64>,
 }
 
 /// Sizes of everything at random states.
-pub(super) fn reference<'a>(robot: &'a Robot, library: &Library, all: &States) -> Reference<'a> {
+pub(crate) fn reference<'a>(robot: &'a Robot, library: &Library, all: &States) -> Reference<'a> {
     let (dof, len) = (robot.dof(), all.len);
     let mut torque = vec![0.0; dof * len];
     nominal_torque(robot, all.motion(), &mut torque);
@@ -126,7 +126,7 @@ pub(super) fn reference<'a>(robot: &'a Robot, library: &Library, all: &States) -
 
 impl Reference<'_> {
     /// ⟨Φᵀ W Φ⟩ of some columns, each of size 1 at random states, over states; row-major.
-    pub(super) fn power(&self, library: &Library, columns: &[usize], states: &States) -> Vec<f64> {
+    pub(crate) fn power(&self, library: &Library, columns: &[usize], states: &States) -> Vec<f64> {
         let (dof, len, count) = (self.robot.dof(), states.len, columns.len());
         let mut out = vec![Vec::new(); dof];
         library.evaluate(states.motion(), &mut out);

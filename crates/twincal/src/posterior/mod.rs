@@ -6,6 +6,7 @@ pub mod draws;
 pub mod mixture;
 pub mod student;
 pub mod summary;
+mod triangle;
 
 use crate::prior::Prior;
 use serde::{Deserialize, Serialize};
@@ -17,9 +18,10 @@ use serde::{Deserialize, Serialize};
 ///              − ½Σ_{k∈z} ln v_k − ½ ln|A_z| − (a0+n/2) ln(b0 + RSS_z/2)
 /// A_z = G_zz + V_z⁻¹,  RSS_z = yy − r_zᵀ A_z⁻¹ r_z
 /// ```
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Problem {
-    /// G, K × K row-major.
+    /// G, K × K row-major; written as its lower triangle.
+    #[serde(with = "triangle")]
     pub gram: Vec<f64>,
     /// r = Φᵀy, K.
     pub xy: Vec<f64>,

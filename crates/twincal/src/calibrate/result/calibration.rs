@@ -7,6 +7,7 @@ use crate::calibrate::fit::compact::Compact;
 use crate::error::Finding;
 use crate::lag::Lags;
 use crate::likelihood::{JointNoise, NoiseModel};
+use crate::posterior::Problem;
 use crate::prior::Inclusion;
 use crate::term::{Family, Term};
 use crate::twin::Twin;
@@ -328,6 +329,10 @@ pub struct Calibration {
     /// The compact twin; `None` in files that are older than it.
     #[serde(default)]
     pub compact: Option<Compact>,
+    /// The regression behind the posterior, for the design of a motion that decides what it leaves open; `None` in the twins of a fleet and in
+    /// files that are older than it.
+    #[serde(default)]
+    pub problem: Option<Problem>,
     /// Held-out scores.
     pub validation: Validation,
     /// Normalised residual autocorrelation at lags 0..=20 rows: entries 2j and 2j+1 are joint j before and after calibration.

@@ -122,6 +122,7 @@ pub(in crate::calibrate) fn summarise(
         groups,
         sweep: pieces.sweep,
         compact: Some(opinion.compact.clone()),
+        problem: (!pieces.pooled).then(|| fit.problem.clone()),
         validation: pieces.validation,
         autocorrelation: autocorrelation(sums, &fit.posterior.mean),
         logs: facts.summaries.clone(),

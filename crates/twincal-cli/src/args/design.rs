@@ -1,0 +1,57 @@
+//! Flags of `twincal design`.
+
+use clap::Args;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+pub(crate) struct Design {
+    /// Folder that `twincal fit` wrote: the motion is to decide what it leaves open.
+    #[arg(
+        long,
+        value_name = "DIR",
+        conflicts_with = "model",
+        required_unless_present = "model"
+    )]
+    pub(crate) twin: Option<PathBuf>,
+    /// Robot model (URDF, MJCF): the motion is to show body, motors and friction.
+    #[arg(long, value_name = "MODEL")]
+    pub(crate) model: Option<PathBuf>,
+    /// Effects to decide; without it those with a probability of 0.05 to 0.95.
+    #[arg(long, value_name = "NAME", num_args = 1.., requires = "twin")]
+    pub(crate) decide: Vec<String>,
+    /// Length of the motion in seconds.
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 20.0,
+        allow_negative_numbers = true
+    )]
+    pub(crate) duration: f64,
+    /// The controller's rate in Hz.
+    #[arg(
+        long,
+        value_name = "HZ",
+        default_value_t = 500.0,
+        allow_negative_numbers = true
+    )]
+    pub(crate) rate: f64,
+    /// Limits and start of joints, over those of the model: TOML with
+    /// [joint.NAME] position = [a, b], velocity, acceleration, jerk, torque, start.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) limits: Option<PathBuf>,
+    /// Folder of the result.
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// Replace an earlier result.
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Seed of all random numbers.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Threads; the result is the same for any number.
+    #[arg(long, value_name = "N")]
+    pub(crate) threads: Option<u64>,
+    /// Print the result as JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+}

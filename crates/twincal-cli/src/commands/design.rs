@@ -1,0 +1,263 @@
+//! `twincal design`: the motion to record, within the limits of the robot.
+
+use super::inputs::RobotInput;
+use super::start_threads;
+use super::summary::paragraph;
+use super::table::{print_table, table};
+use crate::args::Design as Flags;
+use crate::failure::{Failure, Outcome};
+use crate::interrupts::Caught;
+use crate::progress::Progress;
+use crate::terminal::Terminal;
+use std::path::Path;
+use std::sync::Mutex;
+use twincal::design::{
+    Design, DesignSettings, DesignStage, FoundTorque, JointLimits, NominalTorque, Questions, Task,
+    TorqueLimits, design, joint_limits,
+};
+use twincal::robot::Robot;
+use twincal::term::{Family, Library, LibrarySettings};
+use twincal::words::significant as number;
+use twincal_io::artifact::{Artifact, Claim, Inputs, Maker, Replace};
+use twincal_io::config::Config;
+use twincal_io::design::{
+    About, DESIGN, KEYFRAMES, Limits, MOTION, TRAJECTORY, WARNING, design_json, joint_trajectory,
+    motion_csv, mujoco_keyframes, read_limits,
+};
+use twincal_io::twin_json::StoredTwin;
+
+/// Candidates whose coefficients a motion is designed for where no twin says which are in question: the rigid body, motors and friction.
+const FAMILIES: [Family; 7] = [
+    Family::Density,
+    Family::MassMoments,
+    Family::Tensor,
+    Family::MotorInertia,
+    Family::Viscous,
+    Family::Coulomb,
+    Family::Offset,
+];
+
+/// The robot, and what is known of it.
+struct Known {
+    robot: Robot,
+    model: String,
+    stored: Option<StoredTwin>,
+}
+
+impl Known {
+    fn read(flags: &Flags) -> Outcome<Self> {
+        if let Some(folder) = &flags.twin {
+            let stored = StoredTwin::read(&Artifact::open(folder)?, true)?;
+            return Ok(Self {
+                robot: stored.calibration.twin.robot.clone(),
+                model: stored.context.model.clone(),
+                stored: Some(stored),
+            });
+        }
+        let model = flags.model.as_ref().ok_or_else(super::no_model)?;
+        let input = RobotInput::read(model, &Config::default().settings()?)?;
+        Ok(Self {
+            robot: input.robot,
+            model: input.file.name,
+            stored: None,
+        })
+    }
+}
+
+pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
+    let mut inputs = Inputs::default();
+    let given = [&flags.model, &flags.twin, &flags.limits];
+    given
+        .into_iter()
+        .flatten()
+        .for_each(|path| inputs.add(path));
+    let replace = match flags.force {
+        true => Replace::Artifact,
+        false => Replace::Never,
+    };
+    let claim = Claim::new(&flags.output, replace, &inputs)?;
+    start_threads(flags.threads.map(|threads| threads as usize))?;
+    let known = Known::read(flags)?;
+    let stated = match &flags.limits {
+        Some(path) => read_limits(path)?,
+        None => Limits::default(),
+    };
+    let limits = joint_limits(&known.robot, &stated.joints).map_err(twincal_io::Error::from)?;
+    let settings = DesignSettings {
+        duration: flags.duration,
+        rate: flags.rate,
+        seed: flags.seed,
+        ..DesignSettings::default()
+    };
+    let found = match &known.stored {
+        None => {
+            let torque = NominalTorque::new(&known.robot, &limits);
+            searched(&known.robot, &limits, (&torque, None), &settings)?
+        }
+        Some(stored) => deciding(stored, &flags.decide, &limits, &settings)?,
+    };
+    let about = About {
+        model: known.model,
+        settings: &settings,
+        limits: &limits,
+    };
+    let json = design_json(&found, &about)?;
+    let motion = &found.motion;
+    let files = vec![
+        (MOTION, motion_csv(motion).into_bytes()),
+        (DESIGN, json.clone()),
+        (TRAJECTORY, joint_trajectory(motion).into_bytes()),
+        (KEYFRAMES, mujoco_keyframes(motion).into_bytes()),
+    ];
+    claim.commit(Maker::Design, files)?;
+    terminal.complete(&flags.output);
+    if flags.json {
+        terminal.data(&String::from_utf8_lossy(&json));
+    } else {
+        print(&found, &limits, &flags.output, terminal);
+    }
+    Ok(0)
+}
+
+/// A motion that decides what a twin leaves open.
+fn deciding(
+    stored: &StoredTwin,
+    decide: &[String],
+    limits: &[JointLimits],
+    settings: &DesignSettings,
+) -> Outcome<Design> {
+    let (calibration, twin) = (&stored.calibration, &stored.calibration.twin);
+    let Some(problem) = &calibration.problem else {
+        return Err(Failure::usage(
+            "the twin does not hold the regression behind it",
+            "fit again with this version of twincal; the twin of a fleet has none",
+        ));
+    };
+    let core = twincal_io::Error::from;
+    let library = twin.library().map_err(core)?;
+    let torque = FoundTorque::new(twin, limits).map_err(core)?;
+    let noise = (&twin.noise[..], calibration.kept_rate_hz());
+    let questions = Questions::new((problem, &twin.posterior), &library, noise, decide);
+    let questions = questions.map_err(core)?;
+    searched(&twin.robot, limits, (&torque, Some(&questions)), settings)
+}
+
+/// The search, with its gain on standard error; Ctrl-C ends it with what it has.
+fn searched(
+    robot: &Robot,
+    limits: &[JointLimits],
+    (torque, questions): (&dyn TorqueLimits, Option<&Questions<'_>>),
+    settings: &DesignSettings,
+) -> Outcome<Design> {
+    let library = LibrarySettings {
+        families: FAMILIES.to_vec(),
+        ..LibrarySettings::default()
+    };
+    let (library, _) = Library::propose(robot, &library).map_err(twincal_io::Error::from)?;
+    let task = Task {
+        robot,
+        library: &library,
+        questions,
+        limits,
+        torque: Some(torque),
+        clearance: None,
+    };
+    let progress = Mutex::new(Progress::new());
+    let caught = Caught::new();
+    let watch = |stage: DesignStage| {
+        if caught.is_asked() {
+            return Err(twincal::Error::Cancelled);
+        }
+        if let Ok(progress) = progress.lock() {
+            let what = format!("searching, gain {}", number(stage.gain, 3));
+            progress.counted(&what, stage.done, stage.all);
+        }
+        Ok(())
+    };
+    Ok(design(&task, settings, &watch).map_err(twincal_io::Error::from)?)
+}
+
+/// What the motion is expected to say of each question.
+fn print_promises(found: &Design, terminal: &mut Terminal) {
+    if found.promises.is_empty() {
+        return;
+    }
+    let mut rows = table(&["effect", "PIP now", "decided rightly", "wrongly", "sd then"]);
+    let percent = |share: f64| format!("{} %", (100.0 * share).round());
+    for promise in &found.promises {
+        rows.add_row([
+            promise.effect.clone(),
+            number(promise.pip, 2),
+            percent(promise.right),
+            percent(promise.wrong),
+            promise.sd.map_or_else(|| "–".into(), |sd| number(sd, 2)),
+        ]);
+    }
+    print_table(&rows, terminal);
+    for promise in found.promises.iter().filter(|own| own.structural) {
+        let text = format!(
+            "{}: no motion of this robot tells it from the others; a known load or another base pose does.",
+            promise.effect
+        );
+        paragraph(&text, terminal);
+    }
+    terminal.say("");
+}
+
+fn print(found: &Design, limits: &[JointLimits], output: &Path, terminal: &mut Terminal) {
+    let motion = &found.motion;
+    let early = match found.stopped {
+        true => ", ended early",
+        false => "",
+    };
+    terminal.heading(&format!(
+        "Motion of {} s at {} Hz{early}",
+        number((motion.len - 1) as f64 / motion.rate, 3),
+        number(motion.rate, 4)
+    ));
+    paragraph(
+        &format!(
+            "{} base parameters: ln det {}, condition number {}.",
+            found.columns,
+            number(found.log_determinant, 3),
+            number(found.condition, 3)
+        ),
+        terminal,
+    );
+    terminal.say("");
+    print_promises(found, terminal);
+    let mut rows = table(&["joint", "from", "to", "velocity", "acceleration", "jerk"]);
+    for used in &found.used {
+        let share = |at: usize| format!("{} %", (100.0 * used.share[at]).round());
+        rows.add_row([
+            used.joint.clone(),
+            number(used.position[0], 3),
+            number(used.position[1], 3),
+            share(0),
+            share(1),
+            share(2),
+        ]);
+    }
+    print_table(&rows, terminal);
+    terminal.say("Shares are of the limits, by the control points that bound them.");
+    let assumed = |key: &str| {
+        let own = limits.iter().filter(|own| own.assumed.contains(&key));
+        own.map(|own| own.joint.as_str()).collect::<Vec<_>>()
+    };
+    for (key, rule) in [
+        ("acceleration", "velocity / 0.2 s"),
+        ("jerk", "acceleration / 0.1 s"),
+        ("position", "±π"),
+    ] {
+        let joints = assumed(key);
+        if !joints.is_empty() {
+            paragraph(
+                &format!("{key} limit assumed: {rule} ({})", joints.join(", ")),
+                terminal,
+            );
+        }
+    }
+    paragraph("Collisions are not checked.", terminal);
+    paragraph(WARNING, terminal);
+    terminal.say(&output.join(MOTION).to_string_lossy());
+}

@@ -1,0 +1,119 @@
+//! The file of `--limits`: what a motion must stay within.
+//!
+//! ```toml
+//! [joint.elbow]
+//! position = [-2.0, 2.0]   # rad
+//! velocity = 1.5           # rad/s
+//! acceleration = 6.0       # rad/s²
+//! jerk = 60.0              # rad/s³
+//! torque = 50.0            # N·m
+//! start = 0.4              # rad
+//! ```
+
+use crate::error::{Error, Place, Result};
+use crate::open::InputFile;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+use twincal::design::StatedLimits;
+
+/// Largest file, bytes.
+const MAX_BYTES: u64 = 1 << 20;
+const REMEDY: &str = "keys of [joint.NAME] are position, velocity, acceleration, jerk, torque and start; those of the file are joint";
+
+/// What the file states.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Limits {
+    /// By name of the joint.
+    pub joints: BTreeMap<String, StatedLimits>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(default)]
+    joint: BTreeMap<String, JointTable>,
+}
+
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct JointTable {
+    position: Option<[f64; 2]>,
+    velocity: Option<f64>,
+    acceleration: Option<f64>,
+    jerk: Option<f64>,
+    torque: Option<f64>,
+    start: Option<f64>,
+}
+
+/// Reads limits from a file.
+///
+/// # Errors
+/// A file that cannot be read, wrong TOML, an unknown key or a wrong type, with line and column.
+pub fn read_limits(path: &Path) -> Result<Limits> {
+    let name = path.display().to_string();
+    let bytes = InputFile::new(path, MAX_BYTES)
+        .read()
+        .map_err(|refusal| refusal.into_error(&name, "give an existing file with --limits"))?;
+    let text = String::from_utf8(bytes).map_err(|e| {
+        let place = Place::of_offset(&name, e.as_bytes(), e.utf8_error().valid_up_to());
+        Error::content(place, "not UTF-8", "save the file as UTF-8")
+    })?;
+    parse(&name, &text)
+}
+
+fn parse(name: &str, text: &str) -> Result<Limits> {
+    let file: File = toml::from_str(text).map_err(|e| {
+        let place = match e.span() {
+            Some(span) => Place::of_offset(name, text.as_bytes(), span.start),
+            None => Place::file(name),
+        };
+        let problem = e.message().split_whitespace().collect::<Vec<_>>().join(" ");
+        Error::content(place, problem, REMEDY)
+    })?;
+    let joints = file.joint.into_iter().map(|(name, own)| {
+        let stated = StatedLimits {
+            position: own.position,
+            velocity: own.velocity,
+            acceleration: own.acceleration,
+            jerk: own.jerk,
+            torque: own.torque,
+            start: own.start,
+        };
+        (name, stated)
+    });
+    Ok(Limits {
+        joints: joints.collect(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stated_limits_are_read() {
+        let text =
+            "[joint.elbow]\nposition = [-2.0, 2]\nvelocity = 1.5\n[joint.\"a b\"]\nstart = 1\n";
+        let limits = parse("limits.toml", text).expect("limits");
+        assert_eq!(limits.joints["elbow"].position, Some([-2.0, 2.0]));
+        assert_eq!(limits.joints["a b"].start, Some(1.0));
+        assert_eq!(limits.joints["elbow"].jerk, None);
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_place() {
+        for (text, says) in [
+            ("[joint.elbow]\nvelocty = 1\n", ":2:"),
+            ("[joint.elbow]\nposition = [1]\n", ":2:"),
+            ("[joints.elbow]\n", "joints"),
+            ("velocity = ", ":1:"),
+        ] {
+            let error = parse("limits.toml", text).expect_err(text).to_string();
+            assert!(
+                error.contains(says) && error.contains("limits.toml"),
+                "{error}"
+            );
+        }
+    }
+}

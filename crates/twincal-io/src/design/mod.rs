@@ -1,0 +1,21 @@
+//! What `twincal design` reads and writes: limits of joints, and a motion in the forms that controllers and simulators take.
+
+mod forms;
+mod json;
+mod limits;
+
+pub use forms::{joint_trajectory, motion_csv, mujoco_keyframes};
+pub use json::{About, design_json};
+pub use limits::{Limits, read_limits};
+
+/// The motion as a table.
+pub const MOTION: &str = "motion.csv";
+/// What it shows, for programs.
+pub const DESIGN: &str = "design.json";
+/// The motion as a ROS 2 `trajectory_msgs/JointTrajectory`.
+pub const TRAJECTORY: &str = "trajectory.yaml";
+/// The motion as keyframes of MuJoCo.
+pub const KEYFRAMES: &str = "keyframes.xml";
+
+/// Stands in every output.
+pub const WARNING: &str = "Simulated only. Run it at 10 % speed first. No warranty of clearance.";

@@ -1,0 +1,155 @@
+//! What rows of a motion say of independent columns: M = Σ Φᵀ W Φ.
+
+use super::spline::Spline;
+use crate::excitation::{Reference, STATES, States, random_states, reference};
+use crate::linear_algebra::{Cholesky, symmetric_eigen};
+use crate::robot::Robot;
+use crate::term::Library;
+
+/// A column is independent of those chosen before it if so much of its power at random states is left, as a share.
+const INDEPENDENT: f64 = 1e-6;
+/// Information of every column before the motion, in rows: what keeps a matrix of few rows from being singular.
+const BEFORE: f64 = 1e-6;
+/// Samples of a span.
+pub(super) const SAMPLES: usize = 8;
+
+/// What a search maximises: a function of sums over the rows of a motion.
+pub(super) trait Objective: Sync {
+    /// K of the K × K sums.
+    fn size(&self) -> usize;
+
+    /// Sums over states.
+    fn of(&self, states: &States) -> Vec<f64>;
+
+    /// What is to be large, of sums over so many rows of a motion that lasts so long, s.
+    fn value(&self, sums: &[f64], rows: f64, duration: f64) -> f64;
+}
+
+/// Independent columns of a library, each of size 1 at random states, in torque of size 1 per joint.
+pub(super) struct Information<'a> {
+    library: &'a Library,
+    reference: Reference<'a>,
+    /// The independent columns, ascending.
+    pub(super) columns: Vec<usize>,
+}
+
+impl<'a> Information<'a> {
+    pub(super) fn new(robot: &'a Robot, library: &'a Library) -> Self {
+        let all = random_states(robot, STATES);
+        let reference = reference(robot, library, &all);
+        let shown: Vec<usize> = (0..library.columns().len())
+            .filter(|&k| reference.size[k].is_finite() && reference.size[k] > 0.0)
+            .collect();
+        let power = reference.power(library, &shown, &all);
+        let columns = independent(&power, shown.len())
+            .into_iter()
+            .map(|k| shown[k])
+            .collect();
+        Self {
+            library,
+            reference,
+            columns,
+        }
+    }
+
+    /// ln det(M/n + ε): 0 for n rows that show every column like random states do, and none together with another.
+    pub(super) fn log_determinant(&self, sums: &[f64], rows: f64) -> f64 {
+        let size = self.size();
+        let mut matrix: Vec<f64> = sums.iter().map(|x| x / rows).collect();
+        (0..size).for_each(|k| matrix[k * size + k] += BEFORE);
+        Cholesky::new(&matrix, size).map_or(f64::NEG_INFINITY, |factor| factor.log_determinant())
+    }
+
+    /// Largest over smallest singular value of the rows.
+    pub(super) fn condition(&self, sums: &[f64]) -> f64 {
+        let Some((values, _)) = symmetric_eigen(sums, self.size()) else {
+            return f64::INFINITY;
+        };
+        let largest = values.iter().copied().fold(0.0, f64::max);
+        let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
+        (largest / smallest.max(0.0)).sqrt()
+    }
+}
+
+impl Objective for Information<'_> {
+    fn size(&self) -> usize {
+        self.columns.len()
+    }
+
+    fn of(&self, states: &States) -> Vec<f64> {
+        let mut sums = (self.reference).power(self.library, &self.columns, states);
+        sums.iter_mut().for_each(|x| *x *= states.len as f64);
+        sums
+    }
+
+    fn value(&self, sums: &[f64], rows: f64, _duration: f64) -> f64 {
+        self.log_determinant(sums, rows)
+    }
+}
+
+/// Columns whose part outside the span of those before is large enough: a pivoted Cholesky decomposition.
+fn independent(power: &[f64], size: usize) -> Vec<usize> {
+    let mut left: Vec<f64> = (0..size).map(|k| power[k * size + k]).collect();
+    let own = left.clone();
+    let (mut chosen, mut rows): (Vec<usize>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
+    loop {
+        let free = (0..size).filter(|k| !chosen.contains(k));
+        let Some(best) = free.max_by(|&a, &b| left[a].total_cmp(&left[b]).then(b.cmp(&a))) else {
+            break;
+        };
+        if left[best] <= INDEPENDENT * own[best] {
+            break;
+        }
+        let root = left[best].sqrt();
+        let row: Vec<f64> = (0..size)
+            .map(|k| {
+                let before: f64 = rows.iter().map(|row| row[best] * row[k]).sum();
+                (power[best * size + k] - before) / root
+            })
+            .collect();
+        (left.iter_mut().zip(&row)).for_each(|(left, x)| *left = (*left - x * x).max(0.0));
+        rows.push(row);
+        chosen.push(best);
+    }
+    chosen.sort_unstable();
+    chosen
+}
+
+/// States of some spans of a motion, [`SAMPLES`] each.
+pub(super) fn states_of(splines: &[Spline], spans: std::ops::Range<usize>) -> States {
+    let len = spans.len() * SAMPLES;
+    let mut states = States {
+        len,
+        still: vec![false; splines.len() * len],
+        ..States::default()
+    };
+    for spline in splines {
+        for span in spans.clone() {
+            for sample in 0..SAMPLES {
+                let part = (sample as f64 + 0.5) / SAMPLES as f64;
+                let [q, qd, qdd] = spline.state(span, part);
+                states.q.push(q);
+                states.qd.push(qd);
+                states.qdd.push(qdd);
+            }
+        }
+    }
+    states
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of x, y and x + y two are independent; of a column without power nothing is left.
+    #[test]
+    fn dependent_columns_are_left_out() {
+        let (x, y) = ([1.0, 0.0, 2.0], [0.0, 1.0, 1.0]);
+        let columns = [x, y, [1.0, 1.0, 3.0], [0.0; 3]];
+        let dot = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let power: Vec<f64> = (columns.iter())
+            .flat_map(|a| columns.iter().map(move |b| dot(a, b)))
+            .collect();
+        assert_eq!(independent(&power, 4).len(), 2);
+    }
+}

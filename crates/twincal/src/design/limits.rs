@@ -1,0 +1,157 @@
+//! What a motion must stay within, joint by joint.
+
+use crate::error::{Error, Result};
+use crate::robot::{JointKind, Robot};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+/// Time in which a joint may reach its velocity limit where no acceleration is stated, s.
+pub const SPEED_UP: f64 = 0.2;
+/// Time in which it may reach that acceleration where no jerk is stated, s.
+pub const JERK_TIME: f64 = 0.1;
+/// Positions of a joint that turns without end, rad: half a turn either way.
+const WITHOUT_END: f64 = PI;
+
+/// Limits of one joint that replace those of the model file; rad, m, N·m or N, and s.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct StatedLimits {
+    /// Smallest and largest position.
+    pub position: Option<[f64; 2]>,
+    /// Largest speed.
+    pub velocity: Option<f64>,
+    /// Largest acceleration.
+    pub acceleration: Option<f64>,
+    /// Largest jerk.
+    pub jerk: Option<f64>,
+    /// Largest torque.
+    pub torque: Option<f64>,
+    /// Position at the motion's start and end.
+    pub start: Option<f64>,
+}
+
+/// Limits of one joint in force.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct JointLimits {
+    /// Name of the joint.
+    pub joint: String,
+    /// Smallest and largest position.
+    pub position: [f64; 2],
+    /// Largest speed.
+    pub velocity: f64,
+    /// Largest acceleration.
+    pub acceleration: f64,
+    /// Largest jerk.
+    pub jerk: f64,
+    /// Largest torque; `None`: not limited.
+    pub torque: Option<f64>,
+    /// Position at the start and at the end.
+    pub start: f64,
+    /// Keys that nobody stated: `acceleration` is velocity / 0.2 s, `jerk` acceleration / 0.1 s, `position` of a joint that turns without end ±π.
+    pub assumed: Vec<&'static str>,
+}
+
+/// Limits of every joint: stated ones, those of the model file, and what is assumed.
+///
+/// # Errors
+/// [`Error::Setting`] with the joint's name for one that is not there, without a velocity limit or a range of positions, with a limit that is no
+/// positive number, and with a start outside the range.
+pub fn joint_limits(
+    robot: &Robot,
+    stated: &BTreeMap<String, StatedLimits>,
+) -> Result<Vec<JointLimits>> {
+    let names = robot.joint_names();
+    if let Some(unknown) = stated.keys().find(|name| !names.contains(&name.as_str())) {
+        let known = crate::robot::did_you_mean(unknown, names.iter().copied());
+        return Err(refused(unknown, "is no joint that moves".into(), &known));
+    }
+    (0..robot.dof())
+        .map(|joint| {
+            let own = stated.get(names[joint]).copied().unwrap_or_default();
+            of_joint(robot, joint, own)
+        })
+        .collect()
+}
+
+fn of_joint(robot: &Robot, joint: usize, stated: StatedLimits) -> Result<JointLimits> {
+    let description = robot.joint(joint);
+    let (name, file) = (description.name.as_str(), description.limits);
+    let mut assumed = Vec::new();
+    let endless = description.kind == JointKind::Continuous;
+    let of_file = (file.lower.zip(file.upper))
+        .filter(|_| !endless)
+        .map(|(low, high)| [low, high]);
+    let position = match stated.position.or(of_file) {
+        Some(range) => range,
+        None if endless => {
+            assumed.push("position");
+            [-WITHOUT_END, WITHOUT_END]
+        }
+        None => {
+            let problem = "has no range of positions".into();
+            let remedy = format!("state position = [low, high] for [joint.{name}]");
+            return Err(refused(name, problem, &remedy));
+        }
+    };
+    if !(position[0] < position[1] && position.iter().all(|x| x.is_finite())) {
+        let problem = format!("has the positions {} to {}", position[0], position[1]);
+        return Err(refused(name, problem, "give the smaller one first"));
+    }
+    let velocity = stated.velocity.or(file.velocity.filter(|v| *v > 0.0));
+    let Some(velocity) = velocity else {
+        let remedy = format!("state velocity for [joint.{name}], rad/s or m/s");
+        return Err(refused(name, "has no velocity limit".into(), &remedy));
+    };
+    let acceleration = stated.acceleration.unwrap_or_else(|| {
+        assumed.push("acceleration");
+        velocity / SPEED_UP
+    });
+    let jerk = stated.jerk.unwrap_or_else(|| {
+        assumed.push("jerk");
+        acceleration / JERK_TIME
+    });
+    let torque = stated.torque.or(file.effort.filter(|effort| *effort > 0.0));
+    let numbers = [
+        ("velocity", Some(velocity)),
+        ("acceleration", Some(acceleration)),
+        ("jerk", Some(jerk)),
+        ("torque", torque),
+    ];
+    for (key, value) in numbers {
+        let wrong = value.filter(|x| !(*x > 0.0 && x.is_finite()));
+        if let Some(value) = wrong {
+            let problem = format!("has the {key} limit {value}");
+            return Err(refused(name, problem, "give a positive number"));
+        }
+    }
+    let middle = 0.5 * (position[0] + position[1]);
+    let inside = |x: f64| position[0] <= x && x <= position[1];
+    let start = stated
+        .start
+        .unwrap_or(if inside(0.0) { 0.0 } else { middle });
+    if !inside(start) {
+        let problem = format!(
+            "starts at {start}, outside {} to {}",
+            position[0], position[1]
+        );
+        return Err(refused(name, problem, "give a start within the limits"));
+    }
+    Ok(JointLimits {
+        joint: name.to_owned(),
+        position,
+        velocity,
+        acceleration,
+        jerk,
+        torque,
+        start,
+        assumed,
+    })
+}
+
+fn refused(joint: &str, problem: String, remedy: &str) -> Error {
+    Error::Setting {
+        key: format!("limits.joint.{joint}"),
+        problem: format!("joint `{joint}` {problem}"),
+        remedy: remedy.to_owned(),
+    }
+}

@@ -1,0 +1,424 @@
+//! Open questions of a posterior, what rows of a motion say of them, and whether the motion decides them.
+//!
+//! ```text
+//! A = G + G_new + V⁻¹                           precision of the columns in question, after the motion
+//! S_q = A_qq − A_qo A_oo⁻¹ A_oq                 of those of one effect, all others free
+//! λ_q = tr(S_q E[β_q β_qᵀ | in]) / φ            twice the expected ln Bayes factor for an effect that is there
+//! maximise Σ_q ln(1 + λ_q) + ε ln det A
+//! ```
+//! # Source
+//! Box & Hill 1967 (expected information between models); Chaloner & Verdinelli 1995.
+
+use super::information::Objective;
+use crate::error::{Error, Result};
+use crate::excitation::States;
+use crate::infer::approximate;
+use crate::likelihood::JointNoise;
+use crate::linear_algebra::{Cholesky, product_transposed};
+use crate::posterior::draws::draw;
+use crate::posterior::{Posterior, Problem};
+use crate::random::Random;
+use crate::term::Library;
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// A column takes part in the search from this inclusion probability on.
+const ACTIVE: f64 = 0.02;
+/// Probabilities between which an effect is open, and outside which it is decided.
+const OPEN: [f64; 2] = [0.05, 0.95];
+/// Weight of ln det A beside the questions.
+const REST: f64 = 0.02;
+/// Robots that are drawn from the posterior to see whether the motion decides.
+const WORLDS: usize = 64;
+/// Random streams of those worlds and of their noise.
+const STREAM: u64 = 11 << 60;
+/// Rows of random motion that stand for all that the robot can show, and the λ below which even those say nothing.
+const ENDLESS: f64 = 1e6;
+
+/// What is asked of a posterior.
+#[derive(Debug)]
+pub struct Questions<'a> {
+    problem: &'a Problem,
+    posterior: &'a Posterior,
+    library: &'a Library,
+    /// What a row of each joint counts, 1/(N·m)² in units of φ.
+    factor: Vec<f64>,
+    /// Rows that count as independent, of all joints, per row of the motion.
+    counted: f64,
+    /// Rows per second that a fit keeps.
+    rate: f64,
+    /// Columns that take part, ascending.
+    active: Vec<usize>,
+    open: Vec<Question>,
+}
+
+/// One effect that may be there or not.
+#[derive(Debug, Clone)]
+struct Question {
+    name: String,
+    /// Places among the active columns.
+    places: Vec<usize>,
+    /// E[β βᵀ | in].
+    second: Vec<f64>,
+}
+
+/// What a motion is expected to say of one question, by simulation from the posterior.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Promise {
+    /// Name of the effect.
+    pub effect: String,
+    /// Its probability now.
+    pub pip: f64,
+    /// Probability that its PIP leaves 0.05 … 0.95 on the side of the truth.
+    pub right: f64,
+    /// That it leaves it on the other side.
+    pub wrong: f64,
+    /// Median sd of its first coefficient afterwards, where it is there.
+    pub sd: Option<f64>,
+    /// No motion of this robot tells it from the others.
+    pub structural: bool,
+}
+
+impl<'a> Questions<'a> {
+    /// Of a twin's posterior; without `names` every effect whose probability is between 0.05 and 0.95.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a name that is no effect with a column, and where nothing is open.
+    pub fn new(
+        (problem, posterior): (&'a Problem, &'a Posterior),
+        library: &'a Library,
+        (noise, rate): (&[JointNoise], f64),
+        names: &[String],
+    ) -> Result<Self> {
+        let count = problem.prior.components();
+        let mut name_of = vec![String::new(); count];
+        for (&component, &term) in problem.prior.component.iter().zip(library.columns()) {
+            let own = library.terms()[term].component;
+            name_of[component].clone_from(&library.components()[own].name);
+        }
+        let pip = |component: usize| {
+            let mut all = posterior.component.iter().zip(&posterior.inclusion);
+            all.find(|(own, _)| **own == component)
+                .map_or(0.0, |(_, pip)| *pip)
+        };
+        for name in names {
+            if !name_of.contains(name) {
+                let known = crate::robot::did_you_mean(name, name_of.iter().map(String::as_str));
+                let problem = format!("`{name}` is no effect of this twin");
+                return Err(setting(problem, &known));
+            }
+        }
+        let is_open = |component: usize| match names.is_empty() {
+            true => (OPEN[0]..OPEN[1]).contains(&pip(component)),
+            false => names.contains(&name_of[component]),
+        };
+        // A payload's tensor goes with its mass: one question.
+        let is_first = |component: usize| !name_of[..component].contains(&name_of[component]);
+        let asked: Vec<usize> = (0..count)
+            .filter(|&component| is_open(component) && is_first(component))
+            .collect();
+        if asked.is_empty() {
+            return Err(setting(
+                "no effect has a probability between 0.05 and 0.95".into(),
+                "name effects with --decide, or give --model for a motion that shows all",
+            ));
+        }
+        let active: Vec<usize> = (0..posterior.inclusion.len())
+            .filter(|&k| {
+                posterior.inclusion[k] >= ACTIVE || asked.contains(&problem.prior.component[k])
+            })
+            .collect();
+        let shares = shares(noise);
+        let open = asked.into_iter().map(|component| {
+            let of = |k: &usize| problem.prior.component[*k] == component;
+            let places = (0..active.len()).filter(|&at| of(&active[at])).collect();
+            Question::new((problem, posterior), &name_of[component], places, &active)
+        });
+        Ok(Self {
+            open: open.collect(),
+            factor: (noise.iter().zip(&shares))
+                .map(|(own, share)| own.weight * share)
+                .collect(),
+            counted: shares.iter().sum(),
+            problem,
+            posterior,
+            library,
+            rate,
+            active,
+        })
+    }
+
+    /// Names of the effects in question.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.open.iter().map(|own| own.name.as_str())
+    }
+
+    /// A over the active columns, in units of 1/φ.
+    fn precision(&self, sums: &[f64], scale: f64) -> Vec<f64> {
+        let (size, all) = (self.active.len(), self.problem.names.len());
+        let mut matrix = Vec::with_capacity(size * size);
+        for (i, &a) in self.active.iter().enumerate() {
+            for (j, &b) in self.active.iter().enumerate() {
+                let slab = if i == j {
+                    1.0 / self.problem.prior.slab[a]
+                } else {
+                    0.0
+                };
+                matrix.push(self.problem.gram[a * all + b] + slab + scale * sums[i * size + j]);
+            }
+        }
+        matrix
+    }
+
+    /// λ of every question, and ln det A in slab units.
+    fn said(&self, sums: &[f64], scale: f64) -> Option<(Vec<f64>, f64)> {
+        let size = self.active.len();
+        let factor = Cholesky::new(&self.precision(sums, scale), size).ok()?;
+        let inverse = factor.inverse();
+        let of = |question: &Question| question.lambda(&inverse, size, self.posterior.noise);
+        let lambda: Option<Vec<f64>> = self.open.iter().map(of).collect();
+        let slab = self.active.iter().map(|&k| self.problem.prior.slab[k].ln());
+        Some((lambda?, factor.log_determinant() + slab.sum::<f64>()))
+    }
+
+    /// What rows of the motion count as rows of a fit.
+    fn scale(&self, rows: f64, duration: f64) -> f64 {
+        self.rate * duration / rows
+    }
+
+    /// Σ f φ φᵀ over states, of some columns.
+    fn sums_of(&self, columns: &[usize], states: &States) -> Vec<f64> {
+        let (len, size) = (states.len, columns.len());
+        let mut out = vec![Vec::new(); self.factor.len()];
+        self.library.evaluate(states.motion(), &mut out);
+        let mut sums = vec![0.0; size * size];
+        for (joint, factor) in self.factor.iter().enumerate() {
+            let own = self.library.columns_of_joint(joint);
+            let (mut places, mut values) = (Vec::new(), Vec::new());
+            for (column, signal) in own.iter().zip(out[joint].chunks_exact(len.max(1))) {
+                let Ok(at) = columns.binary_search(column) else {
+                    continue;
+                };
+                places.push(at);
+                values.extend_from_slice(signal);
+            }
+            let count = places.len();
+            let products = product_transposed(&values, &values, [count, len, count]);
+            for (i, &a) in places.iter().enumerate() {
+                for (j, &b) in places.iter().enumerate() {
+                    sums[a * size + b] += factor * products[i * count + j];
+                }
+            }
+        }
+        sums
+    }
+
+    /// Whether the motion decides each question, in worlds drawn from the posterior.
+    ///
+    /// # Errors
+    /// Those of inference.
+    pub(super) fn promises(
+        &self,
+        (states, random): (&States, &States),
+        duration: f64,
+        seed: u64,
+    ) -> Result<Vec<Promise>> {
+        let all: Vec<usize> = (0..self.problem.names.len()).collect();
+        let mut gram = self.sums_of(&all, states);
+        let scale = self.scale(states.len as f64, duration);
+        gram.iter_mut().for_each(|x| *x *= scale);
+        let counted = self.counted * self.rate * duration;
+        let worlds = draw(self.posterior, WORLDS, seed, STREAM);
+        let judged: Vec<Vec<Judged>> = (0..worlds.models.len())
+            .into_par_iter()
+            .map(|world| {
+                let beta = &worlds.beta[world * all.len()..(world + 1) * all.len()];
+                let noise = worlds.noise[world];
+                let mut random = Random::new(seed, STREAM + 1 + world as u64);
+                let problem = self.after(&gram, (beta, noise), counted, &mut random);
+                let posterior = approximate(&problem, Some(self.posterior))?;
+                Ok(self.judged(beta, &posterior))
+            })
+            .collect::<Result<_>>()?;
+        let endless = self.sums_of(&self.active, random);
+        let most = self.said(&endless, ENDLESS).map(|(lambda, _)| lambda);
+        let promise = |(at, question): (usize, &Question)| {
+            let own: Vec<&Judged> = judged.iter().map(|world| &world[at]).collect();
+            let share = |side: Option<bool>| {
+                own.iter().filter(|own| own.right == side).count() as f64 / own.len().max(1) as f64
+            };
+            let mut sds: Vec<f64> = own.iter().filter_map(|own| own.sd).collect();
+            sds.sort_by(f64::total_cmp);
+            let first = self.active[question.places[0]];
+            Promise {
+                effect: question.name.clone(),
+                pip: self.posterior.inclusion[first],
+                right: share(Some(true)),
+                wrong: share(Some(false)),
+                sd: sds.get(sds.len() / 2).copied(),
+                structural: most.as_ref().is_none_or(|lambda| lambda[at] < 1.0),
+            }
+        };
+        Ok(self.open.iter().enumerate().map(promise).collect())
+    }
+
+    /// The regression with rows of the motion added: r = G β + φ^½ L ξ.
+    fn after(
+        &self,
+        gram: &[f64],
+        (beta, noise): (&[f64], f64),
+        counted: f64,
+        random: &mut Random,
+    ) -> Problem {
+        let size = beta.len();
+        let mut problem = self.problem.clone();
+        let shaken = shaken(gram, size, random);
+        let (mut explained, mut cross) = (0.0, 0.0);
+        for a in 0..size {
+            let row = &gram[a * size..(a + 1) * size];
+            let through: f64 = row.iter().zip(beta).map(|(g, b)| g * b).sum();
+            explained += beta[a] * through;
+            cross += beta[a] * shaken[a];
+            problem.xy[a] += through + noise.sqrt() * shaken[a];
+        }
+        (problem.gram.iter_mut().zip(gram)).for_each(|(sum, own)| *sum += own);
+        problem.yy += explained + 2.0 * noise.sqrt() * cross + noise * counted;
+        problem.n += counted;
+        problem
+    }
+
+    /// Each question in one world.
+    fn judged(&self, beta: &[f64], posterior: &Posterior) -> Vec<Judged> {
+        let of = |question: &Question| {
+            let first = self.active[question.places[0]];
+            let is_there = (question.places.iter()).any(|&at| beta[self.active[at]] != 0.0);
+            let pip = posterior.inclusion[first];
+            let said = match pip {
+                pip if pip >= OPEN[1] => Some(true),
+                pip if pip <= OPEN[0] => Some(false),
+                _ => None,
+            };
+            Judged {
+                right: said.map(|said| said == is_there),
+                sd: is_there.then(|| posterior.sd[first]),
+            }
+        };
+        self.open.iter().map(of).collect()
+    }
+}
+
+/// What a row of each joint counts; a joint that did not move is taken for the one that counts least.
+fn shares(noise: &[JointNoise]) -> Vec<f64> {
+    let share = |own: &JointNoise| (own.n > 0.0).then(|| (own.n_eff / own.n).clamp(0.0, 1.0));
+    let least = noise.iter().filter_map(share).fold(1.0, f64::min);
+    noise
+        .iter()
+        .map(|own| share(own).unwrap_or(least))
+        .collect()
+}
+
+/// One question in one world.
+struct Judged {
+    /// `None`: still open.
+    right: Option<bool>,
+    sd: Option<f64>,
+}
+
+/// A draw of N(0, G) from any positive semidefinite G, by a Cholesky decomposition that leaves out what has no power.
+fn shaken(gram: &[f64], size: usize, random: &mut Random) -> Vec<f64> {
+    let mut lower = vec![0.0_f64; size * size];
+    for k in 0..size {
+        let row = |a: usize| a * size;
+        let square: f64 = (0..k).map(|j| lower[row(k) + j].powi(2)).sum();
+        let pivot = gram[row(k) + k] - square;
+        if pivot <= 1e-12 * gram[row(k) + k] {
+            continue;
+        }
+        let root = pivot.sqrt();
+        for a in k..size {
+            let product: f64 = (0..k).map(|j| lower[row(a) + j] * lower[row(k) + j]).sum();
+            lower[row(a) + k] = (gram[row(a) + k] - product) / root;
+        }
+    }
+    let normal: Vec<f64> = (0..size).map(|_| random.normal()).collect();
+    let rows = lower.chunks_exact(size.max(1));
+    rows.map(|row| row.iter().zip(&normal).map(|(l, x)| l * x).sum())
+        .collect()
+}
+
+impl Question {
+    fn new(
+        (problem, posterior): (&Problem, &Posterior),
+        name: &str,
+        places: Vec<usize>,
+        active: &[usize],
+    ) -> Self {
+        let size = places.len();
+        let (mut second, mut weight) = (vec![0.0; size * size], 0.0);
+        let columns: Vec<u32> = places.iter().map(|&at| active[at] as u32).collect();
+        for model in &posterior.models {
+            let at = |column: &u32| model.members.binary_search(column).ok();
+            let Some(own) = columns.iter().map(at).collect::<Option<Vec<usize>>>() else {
+                continue;
+            };
+            let noise = model.scale / (posterior.shape - 1.0).max(f64::MIN_POSITIVE);
+            let members = model.members.len();
+            let inverse = Cholesky::from_lower(model.factor.clone(), members).inverse();
+            weight += model.weight;
+            for (i, &a) in own.iter().enumerate() {
+                for (j, &b) in own.iter().enumerate() {
+                    let value = model.mean[a] * model.mean[b] + noise * inverse[a * members + b];
+                    second[i * size + j] += model.weight * value;
+                }
+            }
+        }
+        if weight > 0.0 {
+            second.iter_mut().for_each(|x| *x /= weight);
+        } else {
+            // No listed model has it: as large as its prior.
+            let slab = |i: usize| problem.prior.slab[columns[i] as usize];
+            (0..size).for_each(|i| second[i * size + i] = posterior.noise * slab(i));
+        }
+        Self {
+            name: name.to_owned(),
+            places,
+            second,
+        }
+    }
+
+    /// tr(S E[β βᵀ]) / φ with S⁻¹ the block of A⁻¹.
+    fn lambda(&self, inverse: &[f64], size: usize, noise: f64) -> Option<f64> {
+        let own = self.places.len();
+        let block: Vec<f64> = (self.places.iter())
+            .flat_map(|&a| self.places.iter().map(move |&b| inverse[a * size + b]))
+            .collect();
+        let schur = Cholesky::new(&block, own).ok()?.inverse();
+        let trace: f64 = schur.iter().zip(&self.second).map(|(s, b)| s * b).sum();
+        Some(trace / noise)
+    }
+}
+
+impl Objective for Questions<'_> {
+    fn size(&self) -> usize {
+        self.active.len()
+    }
+
+    fn of(&self, states: &States) -> Vec<f64> {
+        self.sums_of(&self.active, states)
+    }
+
+    fn value(&self, sums: &[f64], rows: f64, duration: f64) -> f64 {
+        let said = self.said(sums, self.scale(rows, duration));
+        said.map_or(f64::NEG_INFINITY, |(lambda, rest)| {
+            lambda.iter().map(|own| own.ln_1p()).sum::<f64>() + REST * rest
+        })
+    }
+}
+
+fn setting(problem: String, remedy: &str) -> Error {
+    Error::Setting {
+        key: "design.decide".into(),
+        problem,
+        remedy: remedy.into(),
+    }
+}

@@ -1,0 +1,192 @@
+//! One chain of local changes to a motion, each within all limits, by the information that it gives.
+
+use super::Task;
+use super::information::{Objective, states_of};
+use super::limits::JointLimits;
+use super::spline::{HELD, Spline, steps};
+use crate::excitation::States;
+use crate::random::Random;
+use std::f64::consts::PI;
+use std::ops::Range;
+
+/// Half widths of a change, control points.
+const WIDTHS: [usize; 5] = [1, 2, 3, 5, 8];
+/// Share of changes whose step is drawn from all that is feasible; the others are small.
+const WIDE: f64 = 0.3;
+/// sd of a small step, as a share of the feasible range.
+const SMALL: f64 = 0.1;
+/// Accepted changes after which sums are taken anew: rounding.
+const ANEW: usize = 500;
+/// Loss that is accepted with probability 1/e at the start; it falls linearly to 0 at half of the proposals.
+const WARM: f64 = 0.3;
+
+/// A motion with what it says.
+#[derive(Debug, Clone)]
+pub(super) struct Found {
+    pub(super) splines: Vec<Spline>,
+    pub(super) sums: Vec<f64>,
+    pub(super) value: f64,
+}
+
+/// A chain of its own random stream.
+pub(super) struct Chain<'a> {
+    task: &'a Task<'a>,
+    objective: &'a dyn Objective,
+    bounds: Vec<[[f64; 2]; 4]>,
+    spans: usize,
+    rows: f64,
+    duration: f64,
+    random: Random,
+    now: Found,
+    best: Found,
+    accepted: usize,
+}
+
+impl<'a> Chain<'a> {
+    pub(super) fn new(
+        task: &'a Task<'a>,
+        objective: &'a dyn Objective,
+        (spans, span): (usize, f64),
+        (seed, stream): (u64, u64),
+    ) -> Self {
+        let at_rest = |own: &JointLimits| Spline::at(own.start, spans, span);
+        let splines: Vec<Spline> = task.limits.iter().map(at_rest).collect();
+        let states = states_of(&splines, 0..spans);
+        let (sums, rows) = (objective.of(&states), states.len as f64);
+        let duration = span * spans as f64;
+        let value = objective.value(&sums, rows, duration);
+        let now = Found {
+            splines,
+            sums,
+            value,
+        };
+        Self {
+            task,
+            objective,
+            bounds: task.limits.iter().map(bounds).collect(),
+            spans,
+            rows,
+            duration,
+            random: Random::new(seed, stream),
+            best: now.clone(),
+            now,
+            accepted: 0,
+        }
+    }
+
+    pub(super) fn into_best(self) -> Found {
+        self.best
+    }
+
+    pub(super) fn best(&self) -> f64 {
+        self.best.value
+    }
+
+    /// One proposal; `done` is the share of all proposals that were made.
+    pub(super) fn step(&mut self, done: f64) {
+        let joint = self.below(self.bounds.len());
+        let inner = self.spans + 5 - 2 * HELD;
+        let centre = HELD + self.below(inner);
+        let width = WIDTHS[self.below(WIDTHS.len())];
+        let Some((direction, changed)) = self.change(joint, centre, width) else {
+            return;
+        };
+        let mut splines = self.now.splines.clone();
+        (splines[joint].points.iter_mut().zip(&direction)).for_each(|(c, d)| *c += d);
+        let after = states_of(&splines, changed.clone());
+        if self
+            .task
+            .torque
+            .is_some_and(|torque| !torque.allows(&after))
+        {
+            return;
+        }
+        let before = states_of(&self.now.splines, changed);
+        let mut sums = self.objective.of(&after);
+        let old = self.objective.of(&before);
+        for ((sum, old), now) in sums.iter_mut().zip(&old).zip(&self.now.sums) {
+            *sum += now - old;
+        }
+        let value = self.objective.value(&sums, self.rows, self.duration);
+        let warmth = WARM * (1.0 - 2.0 * done).max(0.0);
+        let threshold = self.now.value + warmth * self.random.uniform().ln();
+        if value.is_nan() || value < threshold || !self.is_clear(&after) {
+            return;
+        }
+        self.now = Found {
+            splines,
+            sums,
+            value,
+        };
+        self.accepted += 1;
+        if self.accepted.is_multiple_of(ANEW) {
+            let all = states_of(&self.now.splines, 0..self.spans);
+            self.now.sums = self.objective.of(&all);
+            self.now.value = (self.objective).value(&self.now.sums, self.rows, self.duration);
+        }
+        if self.now.value > self.best.value {
+            self.best = self.now.clone();
+        }
+    }
+
+    /// A feasible step of a bump of control points, and the spans that it moves.
+    fn change(
+        &mut self,
+        joint: usize,
+        centre: usize,
+        width: usize,
+    ) -> Option<(Vec<f64>, Range<usize>)> {
+        let spline = &self.now.splines[joint];
+        let count = spline.points.len();
+        let first = (centre + 1).saturating_sub(width).max(HELD);
+        let last = (centre + width - 1).min(count - HELD - 1);
+        let mut direction = vec![0.0; count];
+        for (i, own) in direction.iter_mut().enumerate().take(last + 1).skip(first) {
+            let away = i.abs_diff(centre) as f64 / width as f64;
+            *own = (0.5 * PI * away).cos().powi(2);
+        }
+        let [low, high] = steps(spline, &direction, &self.bounds[joint])?;
+        let step = match self.random.uniform() < WIDE {
+            true => low + (high - low) * self.random.uniform(),
+            false => (SMALL * (high - low) * self.random.normal()).clamp(low, high),
+        };
+        direction.iter_mut().for_each(|own| *own *= step);
+        Some((
+            direction,
+            first.saturating_sub(5)..(last + 1).min(self.spans),
+        ))
+    }
+
+    fn is_clear(&self, states: &States) -> bool {
+        let Some(clearance) = self.task.clearance else {
+            return true;
+        };
+        (0..states.len).all(|k| clearance.allows(&position(states, k)))
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        ((self.random.uniform() * count as f64) as usize).min(count - 1)
+    }
+}
+
+/// Positions of one state.
+pub(super) fn position(states: &States, k: usize) -> Vec<f64> {
+    states
+        .q
+        .iter()
+        .skip(k)
+        .step_by(states.len)
+        .copied()
+        .collect()
+}
+
+/// Bounds on position, velocity, acceleration and jerk.
+pub(super) fn bounds(limits: &JointLimits) -> [[f64; 2]; 4] {
+    let even = |most: f64| [-most, most];
+    [
+        limits.position,
+        even(limits.velocity),
+        even(limits.acceleration),
+        even(limits.jerk),
+    ]
+}

@@ -1,0 +1,228 @@
+//! Limits hold everywhere, motions repeat, and what is impossible is refused with its cause.
+
+use super::*;
+use crate::robot::testing::tree;
+use crate::term::{Family, LibrarySettings};
+use std::collections::BTreeMap;
+
+fn library(robot: &Robot) -> Library {
+    let settings = LibrarySettings {
+        families: vec![
+            Family::Density,
+            Family::MassMoments,
+            Family::Tensor,
+            Family::Viscous,
+            Family::Coulomb,
+        ],
+        ..LibrarySettings::default()
+    };
+    Library::propose(robot, &settings).expect("a library").0
+}
+
+fn stated(robot: &Robot, torque: Option<f64>) -> BTreeMap<String, StatedLimits> {
+    let own = StatedLimits {
+        position: Some([-1.1, 1.3]),
+        velocity: Some(1.7),
+        acceleration: Some(6.0),
+        jerk: Some(70.0),
+        torque,
+        start: Some(0.1),
+    };
+    let names = robot.joint_names().into_iter();
+    names.map(|name| (name.to_owned(), own)).collect()
+}
+
+fn short() -> DesignSettings {
+    DesignSettings {
+        duration: 8.0,
+        rate: 250.0,
+        proposals: 400,
+        chains: 2,
+        ..DesignSettings::default()
+    }
+}
+
+fn designed(robot: &Robot, limits: &[JointLimits], settings: &DesignSettings) -> Result<Design> {
+    let library = library(robot);
+    let torque = NominalTorque::new(robot, limits);
+    let task = Task {
+        robot,
+        library: &library,
+        questions: None,
+        limits,
+        torque: Some(&torque),
+        clearance: None,
+    };
+    design(&task, settings, &|_| Ok(()))
+}
+
+/// Every sample, and jerk by differences of the acceleration between samples.
+#[test]
+fn no_limit_is_broken_and_both_ends_rest() {
+    let robot = tree();
+    let limits = joint_limits(&robot, &stated(&robot, Some(400.0))).expect("limits");
+    let found = designed(&robot, &limits, &short()).expect("a motion");
+    let (motion, len) = (&found.motion, found.motion.len);
+    assert_eq!(len, 2001);
+    for (j, own) in limits.iter().enumerate() {
+        let of = |all: &[f64]| all[j * len..(j + 1) * len].to_vec();
+        let (q, qd, qdd) = (of(&motion.q), of(&motion.qd), of(&motion.qdd));
+        let most = |x: &[f64]| x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        assert!(
+            q.iter()
+                .all(|q| (own.position[0]..=own.position[1]).contains(q))
+        );
+        assert!(most(&qd) <= own.velocity && most(&qdd) <= own.acceleration);
+        let jerk: Vec<f64> = (qdd.windows(2))
+            .map(|pair| (pair[1] - pair[0]) * motion.rate)
+            .collect();
+        assert!(most(&jerk) <= own.jerk);
+        assert!(most(&q) > 0.2 && most(&qd) > 0.2, "joint {j} moves");
+        for end in [0, len - 1] {
+            assert!((q[end] - own.start).abs() < 1e-12);
+            assert!(qd[end].abs() < 1e-9 && qdd[end].abs() < 1e-9);
+        }
+    }
+    let states = States {
+        len,
+        q: motion.q.clone(),
+        qd: motion.qd.clone(),
+        qdd: motion.qdd.clone(),
+        still: vec![false; motion.q.len()],
+    };
+    assert!(
+        NominalTorque::new(&robot, &limits)
+            .exceeded(&states)
+            .is_none()
+    );
+}
+
+/// A motion of the same search that only draws feasible changes shows less than one that chooses them.
+#[test]
+fn a_longer_search_shows_more() {
+    let robot = tree();
+    let limits = joint_limits(&robot, &stated(&robot, None)).expect("limits");
+    let value = |proposals: usize| {
+        let settings = DesignSettings {
+            proposals,
+            ..short()
+        };
+        let found = designed(&robot, &limits, &settings).expect("a motion");
+        (found.log_determinant, found.condition)
+    };
+    let (few, many) = (value(20), value(800));
+    assert!(many.0 > few.0 + 1.0 && many.1 < few.1, "{few:?} {many:?}");
+}
+
+#[test]
+fn the_motion_is_the_same_on_any_number_of_threads() {
+    let robot = tree();
+    let limits = joint_limits(&robot, &stated(&robot, None)).expect("limits");
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.expect("threads")
+            .install(|| designed(&robot, &limits, &short()).expect("a motion"))
+    };
+    assert_eq!(on(1), on(3));
+}
+
+#[test]
+fn whoever_ends_the_search_gets_the_best_motion_so_far() {
+    let robot = tree();
+    let limits = joint_limits(&robot, &stated(&robot, None)).expect("limits");
+    let library = library(&robot);
+    let task = Task {
+        robot: &robot,
+        library: &library,
+        questions: None,
+        limits: &limits,
+        torque: None,
+        clearance: None,
+    };
+    let after = |stage: DesignStage| match stage.done >= 200 {
+        true => Err(Error::Cancelled),
+        false => Ok(()),
+    };
+    let found = design(&task, &short(), &after).expect("a motion");
+    assert!(found.stopped && found.log_determinant.is_finite());
+    let most = found
+        .motion
+        .qd
+        .iter()
+        .fold(0.0_f64, |most, x| most.max(x.abs()));
+    assert!(most > 0.1, "{most}");
+}
+
+struct Wall;
+
+impl Clearance for Wall {
+    fn too_close(&self, q: &[f64]) -> Option<(String, String, f64)> {
+        (q[0] > 0.5).then(|| ("link1".into(), "wall".into(), 0.01))
+    }
+}
+
+#[test]
+fn forbidden_space_is_kept_free() {
+    let robot = tree();
+    let limits = joint_limits(&robot, &stated(&robot, None)).expect("limits");
+    let library = library(&robot);
+    let task = |limits| Task {
+        robot: &robot,
+        library: &library,
+        questions: None,
+        limits,
+        torque: None,
+        clearance: Some(&Wall),
+    };
+    let found = design(&task(&limits), &short(), &|_| Ok(())).expect("a motion");
+    let first = &found.motion.q[..found.motion.len];
+    assert!(first.iter().all(|q| *q <= 0.5));
+    let mut inside = limits.clone();
+    inside[0].start = 0.6;
+    let error = design(&task(&inside), &short(), &|_| Ok(())).expect_err("in the wall");
+    let text = error.to_string();
+    assert!(
+        matches!(error, Error::Refused { .. }) && text.contains("`wall`"),
+        "{text}"
+    );
+}
+
+#[test]
+fn what_is_impossible_is_refused_by_name() {
+    let robot = tree();
+    let weak = joint_limits(&robot, &stated(&robot, Some(0.5))).expect("limits");
+    let error = designed(&robot, &weak, &short()).expect_err("no torque");
+    assert!(matches!(error, Error::Refused { .. }), "{error}");
+    let wrong = |change: &dyn Fn(&mut StatedLimits), says: &str| {
+        let mut stated = stated(&robot, None);
+        change(stated.get_mut("joint2").expect("joint2"));
+        let error = joint_limits(&robot, &stated).expect_err(says);
+        let text = error.to_string();
+        assert!(text.contains("joint2") && text.contains(says), "{text}");
+    };
+    wrong(&|own| own.velocity = None, "velocity");
+    wrong(&|own| own.position = Some([1.0, -1.0]), "1 to -1");
+    wrong(&|own| own.start = Some(3.0), "starts at 3");
+    wrong(&|own| own.jerk = Some(-1.0), "jerk");
+    wrong(&|own| own.acceleration = Some(f64::NAN), "acceleration");
+    let mut unknown = stated(&robot, None);
+    unknown.insert("joint22".into(), StatedLimits::default());
+    let error = joint_limits(&robot, &unknown).expect_err("unknown");
+    assert!(error.to_string().contains("joint22"), "{error}");
+    for (duration, rate) in [
+        (0.0, 500.0),
+        (f64::NAN, 500.0),
+        (0.1, 500.0),
+        (20.0, -1.0),
+        (1e9, 1e9),
+    ] {
+        let settings = DesignSettings {
+            duration,
+            rate,
+            ..short()
+        };
+        let limits = joint_limits(&robot, &stated(&robot, None)).expect("limits");
+        let error = designed(&robot, &limits, &settings).expect_err("settings");
+        assert!(matches!(error, Error::Setting { .. }), "{error}");
+    }
+}

@@ -1,0 +1,97 @@
+//! Torque that a motion needs against the limits of the joints: of the model file, or with the effects that were found.
+
+use super::TorqueLimits;
+use super::limits::JointLimits;
+use crate::error::Result;
+use crate::excitation::States;
+use crate::robot::Robot;
+use crate::term::{Family, Library};
+use crate::twin::Twin;
+
+/// Share of a torque limit that is used: what stands between samples may be a little more.
+const TORQUE_SHARE: f64 = 0.97;
+/// Half of a central 95 % interval of a normal distribution, in standard deviations.
+const HALF_OF_95: f64 = 1.96;
+
+/// Torque of the model file against the limits of the joints.
+#[derive(Debug)]
+pub struct NominalTorque<'a> {
+    robot: &'a Robot,
+    limits: &'a [JointLimits],
+}
+
+impl<'a> NominalTorque<'a> {
+    /// Of a robot with these limits.
+    #[must_use]
+    pub fn new(robot: &'a Robot, limits: &'a [JointLimits]) -> Self {
+        Self { robot, limits }
+    }
+
+    fn torque(&self, states: &States) -> Vec<f64> {
+        let mut torque = vec![0.0; self.robot.dof() * states.len];
+        crate::robot::nominal_torque(self.robot, states.motion(), &mut torque);
+        torque
+    }
+}
+
+impl TorqueLimits for NominalTorque<'_> {
+    fn exceeded(&self, states: &States) -> Option<(String, f64, f64)> {
+        exceeded(self.limits, &self.torque(states), states.len)
+    }
+}
+
+/// Torque of the model file with the posterior mean of all effects, and a payload at the far end of its interval.
+#[derive(Debug)]
+pub struct FoundTorque<'a> {
+    twin: &'a Twin,
+    library: Library,
+    limits: &'a [JointLimits],
+    beta: Vec<f64>,
+}
+
+impl<'a> FoundTorque<'a> {
+    /// Of a twin's robot with these limits.
+    ///
+    /// # Errors
+    /// Those of [`Twin::library`].
+    pub fn new(twin: &'a Twin, limits: &'a [JointLimits]) -> Result<Self> {
+        let library = twin.library()?;
+        let posterior = &twin.posterior;
+        let beta = (library.columns().iter().enumerate()).map(|(k, &term)| {
+            let mean = posterior.mean[k];
+            match library.terms()[term].family {
+                Family::Payload | Family::PayloadTensor => {
+                    mean + HALF_OF_95 * posterior.sd[k].copysign(mean)
+                }
+                _ => mean,
+            }
+        });
+        Ok(Self {
+            beta: beta.collect(),
+            twin,
+            library,
+            limits,
+        })
+    }
+}
+
+impl TorqueLimits for FoundTorque<'_> {
+    fn exceeded(&self, states: &States) -> Option<(String, f64, f64)> {
+        let motion = states.motion();
+        let torque = (self.library).torque_with(&self.twin.robot, motion, true, &self.beta);
+        exceeded(self.limits, &torque, states.len)
+    }
+}
+
+/// The first joint whose largest torque is beyond its limit, with both.
+fn exceeded(limits: &[JointLimits], torque: &[f64], len: usize) -> Option<(String, f64, f64)> {
+    let own = limits.iter().zip(torque.chunks_exact(len));
+    for (limits, torque) in own {
+        let Some(limit) = limits.torque else { continue };
+        let largest = torque.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        if largest > TORQUE_SHARE * limit {
+            return Some((limits.joint.clone(), largest, limit));
+        }
+    }
+    None
+}

@@ -1,0 +1,188 @@
+"""`twincal design`: limits hold between samples (by Pinocchio), the tables agree, and what is impossible is refused with its cause."""
+
+import json
+import signal
+import subprocess
+import time
+import tomllib
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from conftest import ROOT, program
+
+ARM = ROOT / "examples" / "arm" / "arm.urdf"
+
+
+def design(folder, *flags, code=0):
+    command = [program("twincal"), "design", "--model", ARM, "-o", folder / "motion", "--force", *flags]
+    done = subprocess.run([str(one) for one in command], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    assert done.returncode == code, done.stderr
+    return done
+
+
+def table(folder):
+    lines = (folder / "motion" / "motion.csv").read_text().splitlines()
+    return lines[0].split(","), np.array([[float(x) for x in line.split(",")] for line in lines[1:]])
+
+
+def limits(folder, text):
+    (folder / "limits.toml").write_text(text)
+    return "--limits", folder / "limits.toml"
+
+
+@pytest.fixture(scope="module")
+def names():
+    return list(pin.buildModelFromUrdf(str(ARM)).names)[1:]
+
+
+@pytest.fixture(scope="module")
+def stated(names):
+    """Limits of every joint, narrow ones."""
+    one = 'position = [-1.0, 0.8]\nvelocity = 1.1\nacceleration = 4.0\njerk = 50.0\ntorque = {torque}\nstart = 0.1\n'
+    return lambda torque: "".join(f'[joint."{name}"]\n{one.format(torque=torque)}' for name in names)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory, stated):
+    folder = tmp_path_factory.mktemp("design")
+    model = pin.buildModelFromUrdf(str(ARM))
+    rest = np.abs(pin.computeGeneralizedGravity(model, model.createData(), np.full(model.nq, 0.1)))
+    torque = 1.5 * float(rest.max()) + 2.0
+    design(folder, "--duration", 10, "--rate", 250, *limits(folder, stated(torque)))
+    return folder, torque
+
+
+def test_no_limit_is_broken(made):
+    """Derivatives are those of q, and jerk is that of q̈ between samples; torque by Pinocchio."""
+    folder, most = made
+    header, rows = table(folder)
+    n = (len(header) - 1) // 3
+    assert header == ["t", *(f"{what}{j + 1}" for what in ("q", "qd", "qdd") for j in range(n))]
+    t, q, qd, qdd = rows[:, 0], *(rows[:, 1 + k * n : 1 + (k + 1) * n] for k in range(3))
+    assert np.allclose(np.diff(t), 1 / 250) and t[-1] == 10.0
+    assert np.abs(np.gradient(q, t, axis=0, edge_order=2) - qd).max() < 2e-3
+    assert np.abs(np.gradient(qd, t, axis=0, edge_order=2) - qdd).max() < 2e-2
+    assert q.min() >= -1.0 and q.max() <= 0.8
+    assert np.abs(qd).max() <= 1.1 and np.abs(qdd).max() <= 4.0
+    assert np.abs(np.diff(qdd, axis=0)).max() * 250 <= 50.0
+    assert np.all(np.ptp(q, axis=0) > 0.3)
+    for end in (0, -1):
+        assert np.allclose(q[end], 0.1) and np.allclose(qd[end], 0.0, atol=1e-9) and np.allclose(qdd[end], 0.0, atol=1e-9)
+    model = pin.buildModelFromUrdf(str(ARM))
+    data = model.createData()
+    torque = np.array([pin.rnea(model, data, *state) for state in zip(q, qd, qdd, strict=True)])
+    assert np.abs(torque).max() <= most
+
+
+def test_the_other_forms_say_the_same(made, names):
+    folder, _ = made
+    _, rows = table(folder)
+    n = len(names)
+    lines = (folder / "motion" / "trajectory.yaml").read_text().splitlines()
+    assert "10 % speed" in lines[0]
+    said = [json.loads(line.strip()[2:]) for line in lines[2 : 2 + n]]
+    assert said == names
+    positions = [json.loads(line.split(":", 1)[1]) for line in lines if "positions:" in line]
+    times = [float(line.split("sec: ")[1].split(",")[0]) + 1e-9 * float(line.split("nanosec: ")[1].rstrip("}")) for line in lines if "sec: " in line]
+    picked = np.round(np.array(times) * 250).astype(int)
+    assert picked[0] == 0 and picked[-1] == len(rows) - 1
+    assert np.array_equal(np.array(positions), rows[picked, 1 : 1 + n])
+    about = json.loads((folder / "motion" / "design.json").read_text())
+    assert about["samples"] == len(rows) and "10 % speed" in about["warning"]
+
+
+def test_more_is_shown_than_by_random_motion(made, names):
+    """ln det of the rows of Pinocchio's regressor in base coordinates: more than the best of twenty random motions in the limits of motion."""
+    folder, _ = made
+    _, rows = table(folder)
+    model = pin.buildModelFromUrdf(str(ARM))
+    data, n = model.createData(), len(names)
+    rng = np.random.default_rng(5)
+    anywhere = [rng.uniform(-1, 1, n) * scale for _ in range(200) for scale in (1.0, 1.1, 4.0)]
+    stack = lambda states: np.vstack([pin.computeJointTorqueRegressor(model, data, *state) for state in states])
+    general = stack(zip(anywhere[0::3], anywhere[1::3], anywhere[2::3], strict=True))
+    scale = np.linalg.norm(general, axis=0)
+    kept = np.flatnonzero(scale > 1e-9)
+    _, values, basis = np.linalg.svd(general[:, kept] / scale[kept], full_matrices=False)
+    basis = basis[values > 1e-8 * values[0]]
+
+    def log_determinant(q, qd, qdd):
+        own = stack(zip(q[::10], qd[::10], qdd[::10], strict=True))[:, kept] / scale[kept] @ basis.T
+        return np.linalg.slogdet(own.T @ own / len(own))[1]
+
+    designed = log_determinant(*(rows[:, 1 + k * n : 1 + (k + 1) * n] for k in range(3)))
+    t = rows[:, 0]
+    others = []
+    for _ in range(20):
+        w = 2 * np.pi * np.arange(1, 9) / t[-1]
+        a, b = rng.normal(size=(2, n, w.size))
+        q = (np.sin(np.outer(t, w)) @ a.T + np.cos(np.outer(t, w)) @ b.T) * np.sin(np.pi * t / t[-1])[:, None] ** 2
+        qd = np.gradient(q, t, axis=0)
+        qdd = np.gradient(qd, t, axis=0)
+        parts = [(q, 0.9), (qd, 1.1), (qdd, 4.0), (np.gradient(qdd, t, axis=0)[5:-5], 50.0)]
+        largest = np.maximum.reduce([np.abs(x).max(0) / most for x, most in parts])
+        others.append(log_determinant(q / largest - 0.1, qd / largest, qdd / largest))
+    assert designed > max(others) + 1.0, (designed, others)
+
+
+def test_the_same_bytes_for_a_seed_on_any_number_of_threads(tmp_path, stated):
+    motions = []
+    for threads, seed in ((1, 7), (2, 7), (2, 8)):
+        folder = tmp_path / f"{threads}-{seed}"
+        folder.mkdir()
+        design(folder, "--duration", 5, "--rate", 100, "--seed", seed, "--threads", threads, *limits(folder, stated(500)))
+        motions.append((folder / "motion" / "motion.csv").read_bytes())
+    assert motions[0] == motions[1] != motions[2]
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "says"),
+    [
+        (("velocity = 1.1", "velocity = -1.1"), 2, "velocity"),
+        (("position = [-1.0, 0.8]", "position = [0.8, -1.0]"), 2, "positions"),
+        (("start = 0.1", "start = 3.0"), 2, "starts at 3"),
+        (("start = 0.1", "strat = 0.1"), 2, "strat"),
+        (("torque = 500", "torque = 0.001"), 4, "torque"),
+    ],
+)
+def test_what_is_wrong_is_said(tmp_path, stated, names, change, code, says):
+    done = design(tmp_path, *limits(tmp_path, stated(500).replace(*change)), code=code)
+    assert says in done.stderr and not (tmp_path / "motion").exists()
+    if code == 4:
+        assert names[0] in done.stderr or names[1] in done.stderr
+
+
+def test_a_joint_without_a_velocity_limit_is_named(tmp_path, names):
+    text = ARM.read_text()
+    assert "velocity=" in text
+    import re
+
+    (tmp_path / "slow.urdf").write_text(re.sub(r'velocity="[^"]*"', 'velocity="0"', text))
+    command = [program("twincal"), "design", "--model", tmp_path / "slow.urdf", "-o", tmp_path / "motion"]
+    done = subprocess.run([str(one) for one in command], capture_output=True, text=True)
+    assert done.returncode == 2 and names[0] in done.stderr and "velocity" in done.stderr
+    done = design(tmp_path, *limits(tmp_path, '[joint.nobody]\nvelocity = 1.0\n'), code=2)
+    assert "nobody" in done.stderr
+
+
+def test_ctrl_c_keeps_the_best_motion(tmp_path, stated):
+    (tmp_path / "limits.toml").write_text(stated(500))
+    command = [program("twincal"), "design", "--model", ARM, "--limits", tmp_path / "limits.toml", "-o", tmp_path / "motion",
+               "--threads", 1, "--duration", 60]  # fmt: skip
+    running = subprocess.Popen([str(one) for one in command], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    time.sleep(2.0)
+    running.send_signal(signal.SIGINT)
+    out, _ = running.communicate(timeout=60)
+    if running.returncode == 0 and "ended early" not in out:
+        pytest.skip("the search was faster than the signal")
+    assert running.returncode == 0, out
+    about = json.loads((tmp_path / "motion" / "design.json").read_text())
+    assert about["stopped"] and about["samples"] == 60 * 500 + 1
+
+
+def test_limits_in_the_docs_are_limits(names):
+    text = (ROOT / "docs" / "design.md").read_text()
+    block = text.split("```toml\n")[1].split("```")[0]
+    keys = {key for own in tomllib.loads(block)["joint"].values() for key in own}
+    assert keys == {"position", "velocity", "acceleration", "jerk", "torque", "start"}
