@@ -12,6 +12,7 @@
 `Calibration`           assessment, effects, torque with intervals, files
 `Statistics`            what a fit takes of each log, which adds
 `SpikeSlabRegressor`    the same regression for any columns, as scikit-learn has it
+`design`                the motion to record: what decides open effects, within limits
 `decoys`                functions of a joint's motion that show what no column describes
 `fleet`                 many logs of many robots, on all cores or a Ray cluster
 `plot`                  figures of matplotlib
@@ -27,6 +28,7 @@ from typing import TYPE_CHECKING, Any
 from twincal import errors
 from twincal._calibration import Calibration, Draws, LogTorque, Torque, fit
 from twincal._decoys import decoys
+from twincal._design import Motion, design
 from twincal._log import Log
 from twincal._robot import Robot
 from twincal._statistics import Plan, Statistics
@@ -47,6 +49,7 @@ __all__ = [
     "Error",
     "Log",
     "LogTorque",
+    "Motion",
     "Plan",
     "Robot",
     "SpikeSlabRegressor",
@@ -54,6 +57,7 @@ __all__ = [
     "Table",
     "Torque",
     "decoys",
+    "design",
     "errors",
     "fit",
     "fleet",
