@@ -1,6 +1,7 @@
 """`twincal design`: limits hold between samples (by Pinocchio), the tables agree, and what is impossible is refused with its cause."""
 
 import json
+import re
 import signal
 import subprocess
 import time
@@ -156,8 +157,6 @@ def test_what_is_wrong_is_said(tmp_path, stated, names, change, code, says):
 def test_a_joint_without_a_velocity_limit_is_named(tmp_path, names):
     text = ARM.read_text()
     assert "velocity=" in text
-    import re
-
     (tmp_path / "slow.urdf").write_text(re.sub(r'velocity="[^"]*"', 'velocity="0"', text))
     command = [program("twincal"), "design", "--model", tmp_path / "slow.urdf", "-o", tmp_path / "motion"]
     done = subprocess.run([str(one) for one in command], capture_output=True, text=True)
@@ -171,7 +170,10 @@ def test_ctrl_c_keeps_the_best_motion(tmp_path, stated):
     command = [program("twincal"), "design", "--model", ARM, "--limits", tmp_path / "limits.toml", "-o", tmp_path / "motion",
                "--threads", 1, "--duration", 60]  # fmt: skip
     running = subprocess.Popen([str(one) for one in command], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    time.sleep(2.0)
+    for line in running.stderr:
+        if "searching" in line:
+            break
+    time.sleep(0.5)
     running.send_signal(signal.SIGINT)
     out, _ = running.communicate(timeout=60)
     if running.returncode == 0 and "ended early" not in out:

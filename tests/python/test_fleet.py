@@ -7,6 +7,7 @@ another seed would miss one of three robots with a probability of 14 %.
 import importlib.util
 import json
 import sys
+import tomllib
 from types import SimpleNamespace
 
 import jsonschema
@@ -46,7 +47,7 @@ def made(tmp_path_factory):
     """The folder of a fleet, and how it is judged."""
     folder = tmp_path_factory.mktemp("fleet") / "made"
     given = SimpleNamespace(jobs=1, again=False)
-    line = study().one(program("twincal"), fleets.Fleet(units=20, seed=SEED, short=True), folder, given)
+    line = study().one(program("twincal"), fleets.Fleet(units=20, seed=SEED), folder, given)
     assert "error" not in line, line
     return folder, line
 
@@ -65,23 +66,16 @@ def test_the_robots_that_changed_are_named_with_effect_and_week(made):
         assert planted["found"] and abs(planted["onset_off"]) <= 1, robot
 
 
-def test_a_short_log_borrows_from_the_type(made):
-    """No gain is promised for one fleet: the limit of the study, 0.7, is one of ten fleets."""
-    _, line = made
-    assert line["pooling"]["ratio"] < 1.0, line["pooling"]
-
-
 def test_the_corrected_model_weighs_what_the_robots_weigh(made):
     """Gravity torque of the model file, the corrected one, and the file with the planted adapter, by Pinocchio."""
     folder, _ = made
     truth = json.loads((folder / "truth.json").read_text())
     file = json.loads((folder / "out" / "fleet.json").read_text())["corrected_model"]["file"]
-    nominal = next((folder / "pooled").glob("model.*"))
+    nominal = tomllib.loads((folder / "twincal.toml").read_text())["model"]["file"]
     models = [pin.buildModelFromUrdf(str(path)) for path in (nominal, folder / "out" / file, nominal)]
     mass, centre = truth["adapter"]
-    frame = models[2].frames[models[2].getFrameId("tool0")]
     adapter = pin.Inertia(mass, np.array(centre), np.zeros((3, 3)))
-    models[2].appendBodyToJoint(frame.parentJoint, adapter, frame.placement)
+    models[2].appendBodyToJoint(models[2].njoints - 1, adapter, pin.SE3.Identity())
     datas = [model.createData() for model in models]
     rng = np.random.default_rng(3)
     lacks, left = [], []

@@ -135,24 +135,20 @@ def test_all_commands_take_long_logs_in_chapters(tmp_path, long_log):
     again = table.set_column(0, "t", pc.add(table["t"], end))
     pa.parquet.write_table(pa.concat_tables([table, again]), longer)
     fitted(tmp_path, long)
-    memory = {}
+    memory = {}  # on one thread: what two hold at a time differs by 20 MB from run to run
     for file in (long, longer):
         for command in (["predict", file, "--twin", tmp_path / "out", "-o", tmp_path / f"of_{file.name}", "--force"],
                         ["check", file, "--twin", tmp_path / "out", "--json"],
                         ["inspect", model, file, "--config", config, "--json"],
                         ["doctor", file, "--model", model, "--config", config, "--json"]):  # fmt: skip
-            # The least of several runs: holes in the heap differ by 20 MB from run to run where two threads write.
-            words, least = run(*command)
-            for _ in range(2 if command[0] == "predict" else 0):
-                least = min(least, run(*command)[1])
-            memory[command[0], file.stem] = least
+            words, memory[command[0], file.stem] = run(*command, threads=1)
             if command[0] in ("inspect", "doctor"):
                 (seen,) = json.loads(words)["logs"]
                 assert (seen["samples"], seen["segments"]) == (pa.parquet.read_metadata(file).num_rows, 1)
                 for j in range(2):
                     assert abs(seen["joints"][j]["q_sd"] / np.std(table[f"q{j + 1}"].to_numpy()) - 1) < 1e-3
     for command in ("predict", "check", "inspect", "doctor"):
-        assert memory[command, "longer"] - memory[command, "long"] < 32, memory
+        assert memory[command, "longer"] - memory[command, "long"] < 20, memory
     # What lies around the place where the first two chapters meet, as a log of its own.
     rows = np.arange(100_000, 500_000)
     pa.parquet.write_table(table.take(rows), short)
