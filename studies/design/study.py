@@ -1,6 +1,6 @@
 """Whether a designed motion decides what a poor log leaves open, beside random motion in the same limits.
 
-    run --program P --seeds FIRST LAST [--robot ur5] [--pair payload|spring] [--keep DIR] [--lines X.jsonl]
+    run --program P --seeds FIRST LAST [--robot ur5] [--pair payload|spring] [--scale 1] [--keep DIR] [--lines X.jsonl]
 
 Per seed: a robot with one of two causes, a poor log, a twin; then 20 s of designed and of random motion, each simulated and fitted together
 with the poor log. A question is decided where a PIP leaves 0.05 … 0.95, rightly where the cause is the true one.
@@ -42,7 +42,7 @@ FAMILIES = ["viscous", "coulomb", "payload", "density", "spring", "potential"]
 class World:
     """A robot with one cause of a pair, and its friction."""
 
-    def __init__(self, robot, pair, seed):
+    def __init__(self, robot, pair, seed, scale=1.0):
         self.robot, self.pair, self.seed = robot, pair, seed
         self.file = model_file(robot)
         self.model = pin.buildModelFromUrdf(str(self.file))
@@ -54,7 +54,7 @@ class World:
         names = {"before_last": links[joints[-2]], "second": joints[1]}
         self.effects = [name.format(**names) for name in PAIRS[pair]["effects"]]
         self.real = self.model.copy()
-        size = PAIRS[pair]["sizes"][self.true]
+        self.size = size = scale * PAIRS[pair]["sizes"][self.true]
         if self.pair == "payload":
             joint = self.dof if self.true == 0 else self.dof - 1
             own = self.real.inertias[joint]
@@ -68,8 +68,8 @@ class World:
         rigid = np.array([pin.rnea(self.real, self.data, *state) for state in zip(q, qd, qdd, strict=True)])
         tau = rigid + FRICTION[0] * qd + FRICTION[1] * np.tanh(qd / COULOMB_VELOCITY)
         if self.pair == "spring":
-            away, size = q[:, 1] - self.start[1], PAIRS["spring"]["sizes"][self.true]
-            tau[:, 1] += size * (away if self.true == 0 else np.sin(q[:, 1]))
+            away = q[:, 1] - self.start[1]
+            tau[:, 1] += self.size * (away if self.true == 0 else np.sin(q[:, 1]))
         return tau
 
     def write(self, path, motion, number):
@@ -161,6 +161,7 @@ def main():
     arguments.add_argument("--seeds", type=int, nargs=2, metavar=("FIRST", "LAST"), required=True)
     arguments.add_argument("--robot", choices=sorted(START), default="ur5")
     arguments.add_argument("--pair", choices=sorted(PAIRS), default="payload")
+    arguments.add_argument("--scale", type=float, default=1.0, help="factor on the size of the cause")
     arguments.add_argument("--keep", type=Path)
     arguments.add_argument("--lines", type=Path)
     given = arguments.parse_args()
@@ -169,7 +170,7 @@ def main():
         folder = (given.keep or Path(tempfile.mkdtemp())) / f"{given.robot}-{given.pair}-{seed}"
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
-        line = one(given.program.resolve(), World(given.robot, given.pair, seed), folder)
+        line = one(given.program.resolve(), World(given.robot, given.pair, seed, given.scale), folder)
         if not given.keep:
             shutil.rmtree(folder)
         lines.append(line)
