@@ -1,5 +1,6 @@
 """`twincal design`: limits hold between samples (by Pinocchio), the tables agree, and what is impossible is refused with its cause."""
 
+import importlib.util
 import json
 import re
 import signal
@@ -181,6 +182,36 @@ def test_ctrl_c_keeps_the_best_motion(tmp_path, stated):
     assert running.returncode == 0, out
     about = json.loads((tmp_path / "motion" / "design.json").read_text())
     assert about["stopped"] and about["samples"] == 60 * 500 + 1
+
+
+@pytest.fixture(scope="module")
+def decided(tmp_path_factory):
+    """One robot of the study (long form: `studies/design/run`): 30 g more of a link, which a poor log leaves open."""
+    spec = importlib.util.spec_from_file_location("design_study", ROOT / "studies" / "design" / "study.py")
+    study = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(study)
+    folder = tmp_path_factory.mktemp("study")
+    return folder, study.one(program("twincal"), study.World("ur5", "payload", 21, 0.12), folder)
+
+
+def test_the_motion_decides_what_a_poor_log_leaves_open(decided):
+    """Seed 21 was not used to choose anything; of the eight that were, the designed motion decides seven."""
+    _, line = decided
+    assert line["true"] == "wrist_2_link.density" and 0.05 < line["before"][1] < 0.95, line
+    assert line["designed"]["right"] and not line["designed"]["wrong"], line
+    # a payload's tensor is no question of its own
+    assert [own["effect"] for own in line["promises"]] == line["effects"]
+    for own in line["promises"]:
+        assert own["right"] + own["wrong"] <= 1.0 and not own["structural"], own
+
+
+def test_an_effect_that_is_none_is_refused_by_name(decided, tmp_path):
+    folder, _ = decided
+    command = [program("twincal"), "design", "--twin", folder / "poor", "--decide", "nobody", "-o", tmp_path / "motion"]
+    command += ["--limits", folder / "limits.toml"]
+    done = subprocess.run([str(one) for one in command], capture_output=True, text=True)
+    assert done.returncode == 2 and "nobody" in done.stderr
+    assert not (tmp_path / "motion").exists()
 
 
 def test_limits_in_the_docs_are_limits(names):

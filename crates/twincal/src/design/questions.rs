@@ -422,3 +422,46 @@ fn setting(problem: String, remedy: &str) -> Error {
         remedy: remedy.into(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A = [[2, 1], [1, 3]]: of the first column 2 − 1/3 is left where the second is free.
+    #[test]
+    fn what_others_explain_says_nothing_of_an_effect() {
+        let inverse = Cholesky::new(&[2.0, 1.0, 1.0, 3.0], 2)
+            .expect("positive")
+            .inverse();
+        let question = Question {
+            name: "first".into(),
+            places: vec![0],
+            second: vec![0.49],
+        };
+        let lambda = question.lambda(&inverse, 2, 0.25).expect("a number");
+        assert!(
+            (lambda - (2.0 - 1.0 / 3.0) * 0.49 / 0.25).abs() < 1e-12,
+            "{lambda}"
+        );
+    }
+
+    /// Second moments of 20 000 draws within 5 standard errors (false alarm 4e-6 in all, the seed is fixed); the third row is the sum of the
+    /// others.
+    #[test]
+    fn noise_of_rows_has_their_covariance_where_columns_depend_too() {
+        let gram = [2.0, 0.5, 2.5, 0.5, 1.0, 1.5, 2.5, 1.5, 4.0];
+        let mut random = Random::new(3, 0);
+        let draws: Vec<Vec<f64>> = (0..20_000).map(|_| shaken(&gram, 3, &mut random)).collect();
+        for (place, wanted) in gram.iter().enumerate() {
+            let (a, b) = (place / 3, place % 3);
+            let sum: f64 = draws.iter().map(|draw| draw[a] * draw[b]).sum();
+            let error = ((gram[4 * a] * gram[4 * b] + wanted * wanted) / 20_000.0).sqrt();
+            assert!((sum / 20_000.0 - wanted).abs() < 5.0 * error, "{a} {b}");
+        }
+        assert!(
+            draws
+                .iter()
+                .all(|draw| (draw[0] + draw[1] - draw[2]).abs() < 1e-9)
+        );
+    }
+}

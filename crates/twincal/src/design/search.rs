@@ -28,7 +28,7 @@ pub(super) struct Found {
     pub(super) value: f64,
 }
 
-/// A chain of its own random stream.
+/// One chain of the search.
 pub(super) struct Chain<'a> {
     task: &'a Task<'a>,
     objective: &'a dyn Objective,
