@@ -44,6 +44,7 @@ pub mod log;
 pub mod table;
 pub mod context;
 pub mod artifact;
+pub mod collision;
 pub mod assessment;
 #[cfg(feature = "report")]
 pub mod report;

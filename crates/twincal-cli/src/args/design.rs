@@ -6,14 +6,10 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub(crate) struct Design {
     /// Folder that `twincal fit` wrote: the motion is to decide what it leaves open.
-    #[arg(
-        long,
-        value_name = "DIR",
-        conflicts_with = "model",
-        required_unless_present = "model"
-    )]
+    #[arg(long, value_name = "DIR", required_unless_present = "model")]
     pub(crate) twin: Option<PathBuf>,
     /// Robot model (URDF, MJCF): the motion is to show body, motors and friction.
+    /// With --twin: where its meshes are found.
     #[arg(long, value_name = "MODEL")]
     pub(crate) model: Option<PathBuf>,
     /// Effects to decide; without it those with a probability of 0.05 to 0.95.
@@ -36,7 +32,8 @@ pub(crate) struct Design {
     )]
     pub(crate) rate: f64,
     /// Limits and start of joints, over those of the model: TOML with
-    /// [joint.NAME] position = [a, b], velocity, acceleration, jerk, torque, start.
+    /// [joint.NAME] position = [a, b], velocity, acceleration, jerk, torque, start;
+    /// margin, floor, [[box]] and ignore for collisions.
     #[arg(long, value_name = "FILE")]
     pub(crate) limits: Option<PathBuf>,
     /// Folder of the result.

@@ -7,23 +7,26 @@ use super::table::{print_table, table};
 use crate::args::Design as Flags;
 use crate::failure::{Failure, Outcome};
 use crate::interrupts::Caught;
+use crate::names::display_names;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use twincal::design::{
     Design, DesignSettings, DesignStage, FoundTorque, JointLimits, NominalTorque, Questions, Task,
-    TorqueLimits, design, joint_limits,
+    TorqueLimits, design, joint_limits, with_free_start,
 };
-use twincal::robot::Robot;
+use twincal::robot::{Robot, RobotDescription};
 use twincal::term::{Family, Library, LibrarySettings};
 use twincal::words::significant as number;
-use twincal_io::artifact::{Artifact, Claim, Inputs, Maker, Replace};
+use twincal_io::artifact::{Artifact, Claim, Inputs, MODEL_MJCF, MODEL_URDF, Maker, Replace};
+use twincal_io::collision::CollisionWorld;
 use twincal_io::config::Config;
 use twincal_io::design::{
     About, DESIGN, KEYFRAMES, Limits, MOTION, TRAJECTORY, WARNING, design_json, joint_trajectory,
     motion_csv, mujoco_keyframes, read_limits,
 };
+use twincal_io::model::{Geometry, parse_model, read_model};
 use twincal_io::twin_json::StoredTwin;
 
 /// Candidates whose coefficients a motion is designed for where no twin says which are in question: the rigid body, motors and friction.
@@ -40,26 +43,64 @@ const FAMILIES: [Family; 7] = [
 /// The robot, and what is known of it.
 struct Known {
     robot: Robot,
+    /// Name of the model.
     model: String,
     stored: Option<StoredTwin>,
+    geometry: Geometry,
+    /// Where the model file is: its meshes are found from there.
+    path: PathBuf,
 }
 
 impl Known {
     fn read(flags: &Flags) -> Outcome<Self> {
-        if let Some(folder) = &flags.twin {
-            let stored = StoredTwin::read(&Artifact::open(folder)?, true)?;
+        let settings = Config::default().settings()?;
+        let Some(folder) = &flags.twin else {
+            let path = flags.model.as_ref().ok_or_else(super::no_model)?;
+            let model = read_model(path, &settings.model)?;
+            let geometry = model.geometry()?;
+            let input = RobotInput::new(model, display_names(&[path]).remove(0), &settings)?;
             return Ok(Self {
-                robot: stored.calibration.twin.robot.clone(),
-                model: stored.context.model.clone(),
-                stored: Some(stored),
+                robot: input.robot,
+                model: input.file.name,
+                stored: None,
+                geometry,
+                path: path.clone(),
             });
+        };
+        let artifact = Artifact::open(folder)?;
+        let stored = StoredTwin::read(&artifact, true)?;
+        let (path, model) = match &flags.model {
+            Some(path) => (path.clone(), read_model(path, &settings.model)?),
+            None => {
+                let is_model = |name: &&str| [MODEL_URDF, MODEL_MJCF].contains(name);
+                let name = artifact.names().find(is_model).unwrap_or(MODEL_URDF);
+                let model = parse_model(name, &artifact.read(name)?, &settings.model)?;
+                (folder.join(name), model)
+            }
+        };
+        let robot = stored.calibration.twin.robot.clone();
+        let links = |description: &RobotDescription| -> Vec<String> {
+            description
+                .links
+                .iter()
+                .map(|own| own.name.clone())
+                .collect()
+        };
+        if links(&model.description) != links(robot.description()) {
+            return Err(Failure::usage(
+                format!(
+                    "{} is not the model of the twin: other links",
+                    path.display()
+                ),
+                "give the model file that was fitted, for its meshes",
+            ));
         }
-        let model = flags.model.as_ref().ok_or_else(super::no_model)?;
-        let input = RobotInput::read(model, &Config::default().settings()?)?;
         Ok(Self {
-            robot: input.robot,
-            model: input.file.name,
-            stored: None,
+            robot,
+            model: stored.context.model.clone(),
+            stored: Some(stored),
+            geometry: model.geometry()?,
+            path,
         })
     }
 }
@@ -89,17 +130,25 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
         seed: flags.seed,
         ..DesignSettings::default()
     };
-    let found = match &known.stored {
+    let geometry = (&known.geometry, known.path.as_path());
+    let world = CollisionWorld::new(&known.robot, geometry, &limits, &stated.surroundings)?;
+    let within = Within {
+        limits: &limits,
+        world: &world,
+    };
+    let (found, limits) = match &known.stored {
         None => {
             let torque = NominalTorque::new(&known.robot, &limits);
-            searched(&known.robot, &limits, (&torque, None), &settings)?
+            searched(&known.robot, &within, (&torque, None), &settings)?
         }
-        Some(stored) => deciding(stored, &flags.decide, &limits, &settings)?,
+        Some(stored) => deciding(stored, &flags.decide, &within, &settings)?,
     };
     let about = About {
         model: known.model,
         settings: &settings,
         limits: &limits,
+        surroundings: &stated.surroundings,
+        world: &world,
     };
     let json = design_json(&found, &about)?;
     let motion = &found.motion;
@@ -114,18 +163,31 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
     if flags.json {
         terminal.data(&String::from_utf8_lossy(&json));
     } else {
-        print(&found, &limits, &flags.output, terminal);
+        let within = Within {
+            limits: &limits,
+            world: &world,
+        };
+        print(&found, &within, &flags.output, terminal);
     }
     Ok(0)
+}
+
+/// A motion, and the limits with the start that it has.
+type Found = (Design, Vec<JointLimits>);
+
+/// What a motion stays within.
+struct Within<'a> {
+    limits: &'a [JointLimits],
+    world: &'a CollisionWorld,
 }
 
 /// A motion that decides what a twin leaves open.
 fn deciding(
     stored: &StoredTwin,
     decide: &[String],
-    limits: &[JointLimits],
+    within: &Within<'_>,
     settings: &DesignSettings,
-) -> Outcome<Design> {
+) -> Outcome<Found> {
     let (calibration, twin) = (&stored.calibration, &stored.calibration.twin);
     let Some(problem) = &calibration.problem else {
         return Err(Failure::usage(
@@ -135,20 +197,20 @@ fn deciding(
     };
     let core = twincal_io::Error::from;
     let library = twin.library().map_err(core)?;
-    let torque = FoundTorque::new(twin, limits).map_err(core)?;
+    let torque = FoundTorque::new(twin, within.limits).map_err(core)?;
     let noise = (&twin.noise[..], calibration.kept_rate_hz());
     let questions = Questions::new((problem, &twin.posterior), &library, noise, decide);
     let questions = questions.map_err(core)?;
-    searched(&twin.robot, limits, (&torque, Some(&questions)), settings)
+    searched(&twin.robot, within, (&torque, Some(&questions)), settings)
 }
 
 /// The search, with its gain on standard error; Ctrl-C ends it with what it has.
 fn searched(
     robot: &Robot,
-    limits: &[JointLimits],
+    within: &Within<'_>,
     (torque, questions): (&dyn TorqueLimits, Option<&Questions<'_>>),
     settings: &DesignSettings,
-) -> Outcome<Design> {
+) -> Outcome<Found> {
     let library = LibrarySettings {
         families: FAMILIES.to_vec(),
         ..LibrarySettings::default()
@@ -158,9 +220,14 @@ fn searched(
         robot,
         library: &library,
         questions,
-        limits,
+        limits: within.limits,
         torque: Some(torque),
-        clearance: None,
+        clearance: Some(within.world),
+    };
+    let limits = with_free_start(&task).map_err(twincal_io::Error::from)?;
+    let task = Task {
+        limits: &limits,
+        ..task
     };
     let progress = Mutex::new(Progress::new());
     let caught = Caught::new();
@@ -174,7 +241,8 @@ fn searched(
         }
         Ok(())
     };
-    Ok(design(&task, settings, &watch).map_err(twincal_io::Error::from)?)
+    let found = design(&task, settings, &watch).map_err(twincal_io::Error::from)?;
+    Ok((found, limits))
 }
 
 /// What the motion is expected to say of each question.
@@ -204,7 +272,44 @@ fn print_promises(found: &Design, terminal: &mut Terminal) {
     terminal.say("");
 }
 
-fn print(found: &Design, limits: &[JointLimits], output: &Path, terminal: &mut Terminal) {
+/// How close the motion comes, and what was assumed.
+fn print_clearance(found: &Design, world: &CollisionWorld, terminal: &mut Terminal) {
+    let margin = number(world.margin(), 3);
+    let text = match &found.closest {
+        Some(own) => format!(
+            "Smallest distance {} m ({} and {}, at {} s); margin {margin} m.",
+            number(own.distance, 3),
+            own.between[0],
+            own.between[1],
+            number(own.time, 3)
+        ),
+        None => format!("Nothing comes close; margin {margin} m."),
+    };
+    paragraph(&text, terminal);
+    for own in &world.assumed {
+        let instead = match own.radius > 0.0 {
+            true => format!(
+                "a capsule of radius {} m stands for it",
+                number(own.radius, 2)
+            ),
+            false => "nothing stands for it".into(),
+        };
+        paragraph(
+            &format!("{}: {}; {instead}.", own.link, own.reason),
+            terminal,
+        );
+    }
+    let pairs = world.ignored.iter().map(|own| own.between.join(" and "));
+    let pairs: Vec<String> = pairs.collect();
+    if !pairs.is_empty() {
+        paragraph(
+            &format!("Not checked against each other: {}.", pairs.join("; ")),
+            terminal,
+        );
+    }
+}
+
+fn print(found: &Design, within: &Within<'_>, output: &Path, terminal: &mut Terminal) {
     let motion = &found.motion;
     let early = match found.stopped {
         true => ", ended early",
@@ -241,13 +346,17 @@ fn print(found: &Design, limits: &[JointLimits], output: &Path, terminal: &mut T
     print_table(&rows, terminal);
     terminal.say("Shares are of the limits, by the control points that bound them.");
     let assumed = |key: &str| {
-        let own = limits.iter().filter(|own| own.assumed.contains(&key));
+        let own = within
+            .limits
+            .iter()
+            .filter(|own| own.assumed.contains(&key));
         own.map(|own| own.joint.as_str()).collect::<Vec<_>>()
     };
     for (key, rule) in [
         ("acceleration", "velocity / 0.2 s"),
         ("jerk", "acceleration / 0.1 s"),
         ("position", "±π"),
+        ("start", "0, the middle, or a position that is free"),
     ] {
         let joints = assumed(key);
         if !joints.is_empty() {
@@ -257,7 +366,7 @@ fn print(found: &Design, limits: &[JointLimits], output: &Path, terminal: &mut T
             );
         }
     }
-    paragraph("Collisions are not checked.", terminal);
+    print_clearance(found, within.world, terminal);
     paragraph(WARNING, terminal);
     terminal.say(&output.join(MOTION).to_string_lossy());
 }

@@ -1,9 +1,10 @@
 //! `design.json`: what a designed motion shows, for programs.
 
 use super::WARNING;
+use crate::collision::{AssumedShape, CollisionWorld, IgnoredPair, StatedBox, Surroundings};
 use crate::error::{Error, Result};
 use serde::Serialize;
-use twincal::design::{Design, DesignSettings, JointLimits, JointUse, Promise};
+use twincal::design::{Approach, Design, DesignSettings, JointLimits, JointUse, Promise};
 
 /// Version of the format.
 const SCHEMA: u64 = 1;
@@ -17,6 +18,22 @@ pub struct About<'a> {
     pub settings: &'a DesignSettings,
     /// In force.
     pub limits: &'a [JointLimits],
+    /// What stands around the robot.
+    pub surroundings: &'a Surroundings,
+    /// Its geometry.
+    pub world: &'a CollisionWorld,
+}
+
+/// What was looked at for collisions.
+#[derive(Debug, Serialize)]
+struct ClearanceJson<'a> {
+    margin: f64,
+    floor: Option<f64>,
+    boxes: &'a [StatedBox],
+    pairs: usize,
+    closest: Option<&'a Approach>,
+    assumed: &'a [AssumedShape],
+    ignored: &'a [IgnoredPair],
 }
 
 #[derive(Debug, Serialize)]
@@ -36,6 +53,7 @@ struct DesignJson<'a> {
     limits: &'a [JointLimits],
     promises: &'a [Promise],
     used: &'a [JointUse],
+    clearance: ClearanceJson<'a>,
 }
 
 /// The file.
@@ -59,6 +77,15 @@ pub fn design_json(design: &Design, about: &About<'_>) -> Result<Vec<u8>> {
         limits: about.limits,
         promises: &design.promises,
         used: &design.used,
+        clearance: ClearanceJson {
+            margin: about.surroundings.margin,
+            floor: about.surroundings.floor,
+            boxes: &about.surroundings.boxes,
+            pairs: about.world.pairs(),
+            closest: design.closest.as_ref(),
+            assumed: &about.world.assumed,
+            ignored: &about.world.ignored,
+        },
     };
     let mut bytes = serde_json::to_vec_pretty(&file).map_err(|e| Error::Internal {
         what: "a design as JSON".into(),

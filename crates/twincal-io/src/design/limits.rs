@@ -9,7 +9,20 @@
 //! torque = 50.0            # N·m
 //! start = 0.4              # rad
 //! ```
+//! What stands around it, in the frame of the base:
+//! ```toml
+//! margin = 0.02            # m
+//! floor = 0.0              # m, height against gravity
+//! ignore = [["wrist_1_link", "wrist_3_link"]]
+//! [[box]]
+//! name = "table"
+//! low = [0.2, -0.5, -0.1]  # m
+//! high = [1.0, 0.5, 0.3]
+//! keep = "outside"         # or "inside"
+//! links = ["tool0"]        # without: all that move
+//! ```
 
+use crate::collision::{Keep, StatedBox, Surroundings};
 use crate::error::{Error, Place, Result};
 use crate::open::InputFile;
 use serde::Deserialize;
@@ -19,13 +32,16 @@ use twincal::design::StatedLimits;
 
 /// Largest file, bytes.
 const MAX_BYTES: u64 = 1 << 20;
-const REMEDY: &str = "keys of [joint.NAME] are position, velocity, acceleration, jerk, torque and start; those of the file are joint";
+const REMEDY: &str = "keys of [joint.NAME] are position, velocity, acceleration, jerk, torque and start, of [[box]] name, low, high, keep and \
+                      links; those of the file are joint, box, margin, floor and ignore";
 
 /// What the file states.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Limits {
     /// By name of the joint.
     pub joints: BTreeMap<String, StatedLimits>,
+    /// What stands around the robot.
+    pub surroundings: Surroundings,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -33,6 +49,24 @@ pub struct Limits {
 struct File {
     #[serde(default)]
     joint: BTreeMap<String, JointTable>,
+    margin: Option<f64>,
+    floor: Option<f64>,
+    #[serde(default)]
+    ignore: Vec<[String; 2]>,
+    #[serde(default, rename = "box")]
+    boxes: Vec<BoxTable>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BoxTable {
+    name: String,
+    low: [f64; 3],
+    high: [f64; 3],
+    #[serde(default)]
+    keep: Keep,
+    #[serde(default)]
+    links: Vec<String>,
 }
 
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
@@ -82,8 +116,21 @@ fn parse(name: &str, text: &str) -> Result<Limits> {
         };
         (name, stated)
     });
+    let boxes = file.boxes.into_iter().map(|own| StatedBox {
+        name: own.name,
+        low: own.low,
+        high: own.high,
+        keep: own.keep,
+        links: own.links,
+    });
     Ok(Limits {
         joints: joints.collect(),
+        surroundings: Surroundings {
+            margin: file.margin.unwrap_or(Surroundings::default().margin),
+            floor: file.floor,
+            boxes: boxes.collect(),
+            ignore: file.ignore,
+        },
     })
 }
 
@@ -99,6 +146,16 @@ mod tests {
         assert_eq!(limits.joints["elbow"].position, Some([-2.0, 2.0]));
         assert_eq!(limits.joints["a b"].start, Some(1.0));
         assert_eq!(limits.joints["elbow"].jerk, None);
+        assert_eq!(limits.surroundings, Surroundings::default());
+        let text = "floor = -0.1\nignore = [[\"a\", \"b\"]]\n[[box]]\nname = \"w\"\nlow = [0, 0, 0]\nhigh = [1, 1, 1]\nkeep = \"inside\"\n";
+        let around = parse("limits.toml", text)
+            .expect("surroundings")
+            .surroundings;
+        assert_eq!((around.floor, around.margin), (Some(-0.1), 0.02));
+        assert_eq!(
+            (around.boxes[0].keep, around.ignore.len()),
+            (Keep::Inside, 1)
+        );
     }
 
     #[test]
@@ -107,6 +164,8 @@ mod tests {
             ("[joint.elbow]\nvelocty = 1\n", ":2:"),
             ("[joint.elbow]\nposition = [1]\n", ":2:"),
             ("[joints.elbow]\n", "joints"),
+            ("[[box]]\nname = \"w\"\nkeep = \"out\"\n", "outside"),
+            ("ignore = [[\"a\"]]\n", ":1:"),
             ("velocity = ", ":1:"),
         ] {
             let error = parse("limits.toml", text).expect_err(text).to_string();

@@ -1,11 +1,13 @@
 //! Robot models: URDF and MJCF files into a [`RobotDescription`]; the root element decides which of the two it is.
 //!
-//! Only kinematics, inertias and what makes nominal torque are read. Meshes are never opened.
+//! Only kinematics, inertias and what makes nominal torque are read; [`Model::geometry`] says where the meshes are.
 
 pub(crate) mod xml;
 mod include;
 pub(crate) mod mjcf;
+mod shapes;
 mod urdf;
+mod urdf_shapes;
 
 use crate::error::{Error, Place, Result};
 use crate::log::MAX_NAME;
@@ -16,6 +18,10 @@ use twincal::Finding;
 use twincal::robot::spatial::{apply, roll_pitch_yaw, transpose};
 use twincal::robot::{Robot, RobotDescription};
 use xml::{Document, Element};
+
+pub(crate) use mjcf::seen_from;
+pub use shapes::{Form, Geometry, LinkShape, MeshFile};
+pub(crate) use xml::shorten;
 
 /// Attributes that are names.
 const NAMES: [&str; 10] = [

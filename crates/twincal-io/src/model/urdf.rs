@@ -322,7 +322,7 @@ fn define_world(
 }
 
 /// `<origin xyz rpy>` of an element; the identity without one.
-fn origin(document: &Document, element: &Element) -> Result<Placement> {
+pub(super) fn origin(document: &Document, element: &Element) -> Result<Placement> {
     let Some(origin) = document.child(element, "origin") else {
         return Ok(Placement::IDENTITY);
     };
@@ -350,7 +350,7 @@ fn name(document: &Document, element: &Element) -> Result<String> {
 }
 
 /// A number that must be there.
-fn required(document: &Document, element: &Element, key: &str) -> Result<f64> {
+pub(super) fn required(document: &Document, element: &Element, key: &str) -> Result<f64> {
     match document.number(element, key)? {
         Some(value) => Ok(value),
         None => Err(document.error(

@@ -1,8 +1,8 @@
 //! What rows of a motion say of independent columns: M = Σ Φᵀ W Φ.
 
-use super::spline::Spline;
+use super::spline::{Spline, StateWeights};
 use crate::excitation::{Reference, STATES, States, random_states, reference};
-use crate::linear_algebra::{Cholesky, symmetric_eigen};
+use crate::linear_algebra::{Cholesky, product, symmetric_eigen};
 use crate::robot::Robot;
 use crate::term::Library;
 
@@ -11,7 +11,7 @@ const INDEPENDENT: f64 = 1e-6;
 /// Information of every column before the motion, in rows: what keeps a matrix of few rows from being singular.
 const BEFORE: f64 = 1e-6;
 /// Samples of a span.
-pub(super) const SAMPLES: usize = 8;
+pub(super) const SAMPLES: usize = 4;
 
 /// What a search maximises: a function of sums over the rows of a motion.
 pub(super) trait Objective: Sync {
@@ -23,6 +23,51 @@ pub(super) trait Objective: Sync {
 
     /// What is to be large, of sums over so many rows of a motion that lasts so long, s.
     fn value(&self, sums: &[f64], rows: f64, duration: f64) -> f64;
+
+    /// ∂value/∂sums, K × K and symmetric; `None` where there is none.
+    fn gradient(&self, sums: &[f64], rows: f64, duration: f64) -> Option<Vec<f64>>;
+
+    /// tr(W · sums) of each state by itself.
+    fn shown(&self, matrix: &[f64], states: &States) -> Vec<f64>;
+}
+
+/// Σ_j f_jᵀ W f_j of each state, f_j the row of joint j in some columns (ascending), each value times `factor(joint, column)`.
+pub(super) fn quadratic(
+    library: &Library,
+    columns: &[usize],
+    (matrix, states): (&[f64], &States),
+    factor: impl Fn(usize, usize) -> f64,
+) -> Vec<f64> {
+    let (len, size, dof) = (states.len, columns.len(), library.joints());
+    let mut out = vec![Vec::new(); dof];
+    library.evaluate(states.motion(), &mut out);
+    let mut shown = vec![0.0; len];
+    for (joint, out) in out.iter().enumerate() {
+        let (mut places, mut values) = (Vec::new(), Vec::new());
+        let own = library.columns_of_joint(joint).iter();
+        for (column, signal) in own.zip(out.chunks_exact(len.max(1))) {
+            let Ok(at) = columns.binary_search(column) else {
+                continue;
+            };
+            let factor = factor(joint, *column);
+            places.push(at);
+            values.extend(signal.iter().map(|value| factor * value));
+        }
+        let block: Vec<f64> = (places.iter())
+            .flat_map(|&a| places.iter().map(move |&b| matrix[a * size + b]))
+            .collect();
+        let count = places.len();
+        let weighed = product(&block, &values, [count, count, len]);
+        for (values, weighed) in values
+            .chunks_exact(len.max(1))
+            .zip(weighed.chunks_exact(len.max(1)))
+        {
+            for ((shown, a), b) in shown.iter_mut().zip(values).zip(weighed) {
+                *shown += a * b;
+            }
+        }
+    }
+    shown
 }
 
 /// Independent columns of a library, each of size 1 at random states, in torque of size 1 per joint.
@@ -85,6 +130,22 @@ impl Objective for Information<'_> {
     fn value(&self, sums: &[f64], rows: f64, _duration: f64) -> f64 {
         self.log_determinant(sums, rows)
     }
+
+    fn gradient(&self, sums: &[f64], rows: f64, _duration: f64) -> Option<Vec<f64>> {
+        let size = self.size();
+        let mut matrix: Vec<f64> = sums.iter().map(|x| x / rows).collect();
+        (0..size).for_each(|k| matrix[k * size + k] += BEFORE);
+        let mut inverse = Cholesky::new(&matrix, size).ok()?.inverse();
+        inverse.iter_mut().for_each(|x| *x /= rows);
+        Some(inverse)
+    }
+
+    fn shown(&self, matrix: &[f64], states: &States) -> Vec<f64> {
+        let reference = &self.reference;
+        let factor =
+            |joint: usize, column: usize| reference.weight[joint].sqrt() / reference.size[column];
+        quadratic(self.library, &self.columns, (matrix, states), factor)
+    }
 }
 
 /// Columns whose part outside the span of those before is large enough: a pivoted Cholesky decomposition.
@@ -123,11 +184,11 @@ pub(super) fn states_of(splines: &[Spline], spans: std::ops::Range<usize>) -> St
         still: vec![false; splines.len() * len],
         ..States::default()
     };
+    let weights: [StateWeights; SAMPLES] = std::array::from_fn(StateWeights::of_sample);
     for spline in splines {
         for span in spans.clone() {
-            for sample in 0..SAMPLES {
-                let part = (sample as f64 + 0.5) / SAMPLES as f64;
-                let [q, qd, qdd] = spline.state(span, part);
+            for weights in &weights {
+                let [q, qd, qdd] = spline.state(span, weights);
                 states.q.push(q);
                 states.qd.push(qd);
                 states.qdd.push(qdd);

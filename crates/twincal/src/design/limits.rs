@@ -47,7 +47,8 @@ pub struct JointLimits {
     pub torque: Option<f64>,
     /// Position at the start and at the end.
     pub start: f64,
-    /// Keys that nobody stated: `acceleration` is velocity / 0.2 s, `jerk` acceleration / 0.1 s, `position` of a joint that turns without end ±π.
+    /// Keys that nobody stated: `acceleration` is velocity / 0.2 s, `jerk` acceleration / 0.1 s, `position` of a joint that turns without end
+    /// ±π, `start` 0, the middle, or another one where the robot cannot rest there.
     pub assumed: Vec<&'static str>,
 }
 
@@ -126,9 +127,10 @@ fn of_joint(robot: &Robot, joint: usize, stated: StatedLimits) -> Result<JointLi
     }
     let middle = 0.5 * (position[0] + position[1]);
     let inside = |x: f64| position[0] <= x && x <= position[1];
-    let start = stated
-        .start
-        .unwrap_or(if inside(0.0) { 0.0 } else { middle });
+    let start = stated.start.unwrap_or_else(|| {
+        assumed.push("start");
+        if inside(0.0) { 0.0 } else { middle }
+    });
     if !inside(start) {
         let problem = format!(
             "starts at {start}, outside {} to {}",
@@ -146,6 +148,19 @@ fn of_joint(robot: &Robot, joint: usize, stated: StatedLimits) -> Result<JointLi
         start,
         assumed,
     })
+}
+
+/// The k-th of a sequence of positions that fills the limits evenly: multiples of square roots of primes.
+#[must_use]
+pub fn spread_positions(k: usize, limits: &[JointLimits]) -> Vec<f64> {
+    let is_prime = |n: &usize| (2..*n).take_while(|d| d * d <= *n).all(|d| n % d != 0);
+    let mut primes = (2..).filter(is_prime);
+    let positions = limits.iter().map(|own| {
+        let root = (primes.next().unwrap_or(2) as f64).sqrt();
+        let share = (root * (k + 1) as f64).fract();
+        own.position[0] + share * (own.position[1] - own.position[0])
+    });
+    positions.collect()
 }
 
 fn refused(joint: &str, problem: String, remedy: &str) -> Error {

@@ -12,6 +12,8 @@
 //! # Source
 //! D-optimality: Swevers et al. 1997; simulated annealing: Kirkpatrick et al. 1983.
 
+mod ascent;
+mod clearance;
 mod information;
 mod limits;
 mod motion;
@@ -22,7 +24,8 @@ mod spline;
 #[cfg(test)]
 mod tests;
 
-pub use limits::{JERK_TIME, JointLimits, SPEED_UP, StatedLimits, joint_limits};
+pub use clearance::{Approach, Clearance, Path};
+pub use limits::{JERK_TIME, JointLimits, SPEED_UP, StatedLimits, joint_limits, spread_positions};
 pub use motion::{DesignedMotion, JointUse};
 pub use questions::{Promise, Questions};
 pub use torque::{FoundTorque, NominalTorque};
@@ -38,11 +41,16 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Length of a span of the splines, s, where the motion is long enough.
-const SPAN: f64 = 0.5;
+const SPAN: f64 = 0.25;
 /// Spans at least: five control points at either end stay, and some have to move.
 const LEAST_SPANS: usize = 10;
 /// Proposals between two looks at whether to go on.
 const BATCH: usize = 50;
+/// Proposals that a step uphill counts as in what is done.
+const STEP: usize = 50;
+
+/// Other starts that are tried, farther and farther away.
+const STARTS: usize = 1000;
 
 /// How a motion is designed.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,8 +63,10 @@ pub struct DesignSettings {
     pub seed: u64,
     /// Searches of their own random numbers; the best one counts.
     pub chains: usize,
-    /// Changes that each proposes.
+    /// Random changes that each proposes first.
     pub proposals: usize,
+    /// Steps uphill that each makes then.
+    pub steps: usize,
 }
 
 impl Default for DesignSettings {
@@ -66,7 +76,8 @@ impl Default for DesignSettings {
             rate: 500.0,
             seed: 1,
             chains: 4,
-            proposals: 6000,
+            proposals: 2000,
+            steps: 200,
         }
     }
 }
@@ -78,19 +89,11 @@ pub trait TorqueLimits: Sync {
         self.exceeded(states).is_none()
     }
 
+    /// |τ| of every joint in every state as a share of what may be used of its limit, `[joint * len + state]`.
+    fn shares(&self, states: &States) -> Vec<f64>;
+
     /// Name of the joint that has too little torque in some state, with that torque and its limit.
     fn exceeded(&self, states: &States) -> Option<(String, f64, f64)>;
-}
-
-/// How far a robot is from itself, from the floor and from forbidden space.
-pub trait Clearance: Sync {
-    /// True where nothing is closer than the margin at these positions.
-    fn allows(&self, q: &[f64]) -> bool {
-        self.too_close(q).is_none()
-    }
-
-    /// The two things that are too close at these positions, with their distance, m.
-    fn too_close(&self, q: &[f64]) -> Option<(String, String, f64)>;
 }
 
 /// What is asked for.
@@ -137,6 +140,8 @@ pub struct Design {
     pub promises: Vec<Promise>,
     /// How much of its limits each joint uses.
     pub used: Vec<JointUse>,
+    /// The smallest distance of the motion; `None` where collisions are not looked at, or nothing can come close.
+    pub closest: Option<Approach>,
     /// `watch` ended the search early: the motion is the best one until then.
     pub stopped: bool,
 }
@@ -161,45 +166,54 @@ pub fn design(
         None => &information,
     };
     let done = AtomicUsize::new(0);
-    let all = settings.chains * settings.proposals;
+    let all = settings.chains * (settings.proposals + STEP * settings.steps);
     let best = Mutex::new(f64::NEG_INFINITY);
-    let run = |number: usize| -> Result<(Found, bool)> {
+    let look = |made: usize, own: f64| -> Result<bool> {
+        let done = done.fetch_add(made, Ordering::Relaxed);
+        let gain = largest(&best, own);
+        match watch(DesignStage { done, all, gain }) {
+            Err(Error::Cancelled) => Ok(true),
+            other => other.map(|()| false),
+        }
+    };
+    let run = |number: usize| -> Result<(Searched, bool)> {
         let random = (settings.seed, number as u64);
         let mut chain = Chain::new(task, objective, (spans, span), random);
-        let mut stopped = false;
         for at in 0..settings.proposals {
-            if at.is_multiple_of(BATCH) {
-                let made = done.fetch_add(BATCH.min(settings.proposals - at), Ordering::Relaxed);
-                let gain = largest(&best, chain.best());
-                let stage = DesignStage {
-                    done: made,
-                    all,
-                    gain,
-                };
-                match watch(stage) {
-                    Err(Error::Cancelled) => {
-                        stopped = true;
-                        break;
-                    }
-                    other => other?,
-                }
+            let made = BATCH.min(settings.proposals - at);
+            if at.is_multiple_of(BATCH) && look(made, chain.best())? {
+                return Ok((chain.into_best(), true));
             }
             chain.step(at as f64 / settings.proposals as f64);
         }
-        Ok((chain.into_best(), stopped))
+        let mut climb = chain.climb();
+        for at in 0..settings.steps {
+            if look(STEP, climb.best().value)? {
+                return Ok((climb.into_best(), true));
+            }
+            if !climb.step(at as f64 / settings.steps as f64) && at > settings.steps / 2 {
+                break;
+            }
+        }
+        Ok((climb.into_best(), false))
     };
-    let found: Vec<(Found, bool)> = (0..settings.chains)
+    let found: Vec<(Searched, bool)> = (0..settings.chains)
         .into_par_iter()
         .map(run)
         .collect::<Result<_>>()?;
     let stopped = found.iter().any(|(_, stopped)| *stopped);
     let best = found.into_iter().map(|(found, _)| found);
-    let best = best.reduce(|a, b| if b.value > a.value { b } else { a });
-    let Some(best) = best else {
-        return Err(setting("chains", "0 searches".into(), "use at least one"));
+    let best = best.reduce(|a, b| if b.0.value > a.0.value { b } else { a });
+    let best = match best {
+        None => return Err(setting("chains", "0 searches".into(), "use at least one")),
+        Some((_, Some(binding))) => return Err(motion::impossible(&binding)),
+        Some((best, None)) => best,
     };
     motion::finished(task, settings, &information, best, stopped)
 }
+
+/// What a chain found, and what forbade every change where there was none.
+type Searched = (Found, Option<String>);
 
 /// The larger of a number that is shared and one's own, which is shared then.
 fn largest(shared: &Mutex<f64>, own: f64) -> f64 {
@@ -234,6 +248,35 @@ fn spans(settings: &DesignSettings) -> Result<(usize, f64)> {
     Ok((spans, duration / spans as f64))
 }
 
+/// Limits with a start where the robot can rest: where nobody stated one, and the usual one is not free, another as near to it as is found.
+///
+/// # Errors
+/// [`Error::Refused`] for a stated start where the robot cannot rest, and where no other one is found.
+pub fn with_free_start(task: &Task<'_>) -> Result<Vec<JointLimits>> {
+    let first = require_start(task);
+    let usual = task.limits.to_vec();
+    let is_assumed = |own: &JointLimits| own.assumed.contains(&"start");
+    if first.is_ok() || !usual.iter().any(is_assumed) {
+        return first.map(|()| usual);
+    }
+    for k in 0..STARTS {
+        let share = (k + 1) as f64 / STARTS as f64;
+        let there = spread_positions(k, &usual);
+        let mut moved = usual.clone();
+        let free = moved.iter_mut().zip(&there);
+        free.filter(|(own, _)| is_assumed(own))
+            .for_each(|(own, q)| own.start += share * (q - own.start));
+        let other = Task {
+            limits: &moved,
+            ..*task
+        };
+        if require_start(&other).is_ok() {
+            return Ok(moved);
+        }
+    }
+    first.map(|()| usual)
+}
+
 /// # Errors
 /// [`Error::Refused`] where the robot cannot rest at the start.
 fn require_start(task: &Task<'_>) -> Result<()> {
@@ -256,13 +299,16 @@ fn require_start(task: &Task<'_>) -> Result<()> {
                 .into(),
         });
     }
-    if let Some((one, other, distance)) = task.clearance.and_then(|own| own.too_close(&q)) {
+    let at_rest = Path::at_rest(&q);
+    if let Some(approach) = task.clearance.and_then(|own| own.breach(&at_rest)) {
+        let [one, other] = approach.between;
         return Err(Error::Refused {
             problem: format!(
                 "at the start `{one}` and `{other}` are {} m apart, closer than the margin",
-                crate::words::significant(distance, 2)
+                crate::words::significant(approach.distance, 2)
             ),
-            remedy: "give another start position in the limits file, or a smaller margin".into(),
+            remedy: "give another start in the limits file or a smaller margin, or name the two under `ignore`"
+                .into(),
         });
     }
     Ok(())

@@ -1,16 +1,20 @@
 //! The motion that was found, at the controller's rate, checked once more between the samples of the search.
 
+use super::clearance::{Approach, path_of};
 use super::information::{Information, Objective as _, states_of};
-use super::search::{Found, position};
-use super::spline::Spline;
+use super::search::Found;
+use super::spline::{Spline, StateWeights};
 use super::{Design, DesignSettings, Task};
 use crate::error::{Error, Result};
 use crate::excitation::{STATES, States, random_states};
 use serde::Serialize;
+use std::ops::Range;
 
 /// Factor on the motion about its start where a sample between those of the search breaks a limit, and how often.
 const SMALLER: f64 = 0.97;
 const TRIES: usize = 40;
+/// Samples of a span at which distances of the result are looked at: one each millisecond.
+const PER_SPAN: usize = 256;
 
 /// Position, velocity and acceleration of every joint over time.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,7 +59,10 @@ pub(super) fn finished(
     let mut binding = String::new();
     for _ in 0..TRIES {
         let states = sampled(&splines, settings);
-        match breaks(task, &states) {
+        let spans = splines[0].points.len() - 5;
+        let broken = (task.too_much_torque(&states))
+            .or_else(|| task.too_close(&splines, 0..spans, PER_SPAN));
+        match broken {
             None => {
                 let motion = DesignedMotion {
                     joints: task.limits.iter().map(|own| own.joint.clone()).collect(),
@@ -65,7 +72,6 @@ pub(super) fn finished(
                     qd: states.qd,
                     qdd: states.qdd,
                 };
-                let spans = splines[0].points.len() - 5;
                 let rows = states_of(&splines, 0..spans);
                 let sums = information.of(&rows);
                 let random = random_states(task.robot, STATES);
@@ -75,7 +81,9 @@ pub(super) fn finished(
                     }
                     None => Vec::new(),
                 };
+                let path = || path_of(&splines, 0..spans, PER_SPAN);
                 return Ok(Design {
+                    closest: task.clearance.and_then(|own| own.closest(&path())),
                     promises,
                     motion,
                     columns: information.size(),
@@ -92,10 +100,15 @@ pub(super) fn finished(
             (spline.points.iter_mut()).for_each(|c| *c = start + SMALLER * (*c - start));
         }
     }
-    Err(Error::Refused {
+    Err(impossible(&binding))
+}
+
+/// No motion is within the limits; `binding` is the one that forbids it.
+pub(super) fn impossible(binding: &str) -> Error {
+    Error::Refused {
         problem: format!("no motion from the start is within the limits: {binding}"),
         remedy: "give another start, wider limits or a smaller margin".into(),
-    })
+    }
 }
 
 /// Every sample at the rate.
@@ -106,12 +119,17 @@ fn sampled(splines: &[Spline], settings: &DesignSettings) -> States {
         still: vec![false; splines.len() * len],
         ..States::default()
     };
-    for spline in splines {
-        let spans = spline.points.len() - 5;
-        for sample in 0..len {
-            let place = (sample as f64 / settings.rate / spline.span).min(spans as f64);
+    let (spans, length) = (splines[0].points.len() - 5, splines[0].span);
+    let places: Vec<(usize, StateWeights)> = (0..len)
+        .map(|sample| {
+            let place = (sample as f64 / settings.rate / length).min(spans as f64);
             let span = (place as usize).min(spans - 1);
-            let [q, qd, qdd] = spline.state(span, place - span as f64);
+            (span, StateWeights::at(place - span as f64))
+        })
+        .collect();
+    for spline in splines {
+        for (span, weights) in &places {
+            let [q, qd, qdd] = spline.state(*span, weights);
             states.q.push(q);
             states.qd.push(qd);
             states.qdd.push(qdd);
@@ -120,21 +138,36 @@ fn sampled(splines: &[Spline], settings: &DesignSettings) -> States {
     states
 }
 
-/// The first constraint that a motion breaks, in words.
-fn breaks(task: &Task<'_>, states: &States) -> Option<String> {
-    if let Some((joint, torque, limit)) = task.torque.and_then(|own| own.exceeded(states)) {
-        return Some(format!(
+impl Task<'_> {
+    /// The joint that has too little torque in some state, in words.
+    pub(super) fn too_much_torque(&self, states: &States) -> Option<String> {
+        let (joint, torque, limit) = self.torque?.exceeded(states)?;
+        Some(format!(
             "joint `{joint}` would need {} of torque, its limit is {}",
             crate::words::significant(torque, 3),
             crate::words::significant(limit, 3)
-        ));
+        ))
     }
-    let clearance = task.clearance?;
-    (0..states.len).find_map(|k| {
-        let (one, other, distance) = clearance.too_close(&position(states, k))?;
-        let distance = crate::words::significant(distance, 2);
-        Some(format!("`{one}` and `{other}` would be {distance} m apart"))
-    })
+
+    /// What comes too close in some spans, in words.
+    pub(super) fn too_close(
+        &self,
+        splines: &[Spline],
+        spans: Range<usize>,
+        per_span: usize,
+    ) -> Option<String> {
+        let clearance = self.clearance?;
+        let Approach {
+            between: [one, other],
+            distance,
+            time,
+        } = clearance.breach(&path_of(splines, spans, per_span))?;
+        Some(format!(
+            "`{one}` and `{other}` would be {} m apart at {} s",
+            crate::words::significant(distance, 2),
+            crate::words::significant(time, 3)
+        ))
+    }
 }
 
 fn used(task: &Task<'_>, splines: &[Spline]) -> Vec<JointUse> {

@@ -9,12 +9,12 @@
 //! # Source
 //! Box & Hill 1967 (expected information between models); Chaloner & Verdinelli 1995.
 
-use super::information::Objective;
+use super::information::{Objective, quadratic};
 use crate::error::{Error, Result};
 use crate::excitation::States;
 use crate::infer::approximate;
 use crate::likelihood::JointNoise;
-use crate::linear_algebra::{Cholesky, product_transposed};
+use crate::linear_algebra::{Cholesky, product, product_transposed};
 use crate::posterior::draws::draw;
 use crate::posterior::{Posterior, Problem};
 use crate::random::Random;
@@ -388,13 +388,18 @@ impl Question {
 
     /// tr(S E[β βᵀ]) / φ with S⁻¹ the block of A⁻¹.
     fn lambda(&self, inverse: &[f64], size: usize, noise: f64) -> Option<f64> {
+        let schur = self.schur(inverse, size)?;
+        let trace: f64 = schur.iter().zip(&self.second).map(|(s, b)| s * b).sum();
+        Some(trace / noise)
+    }
+
+    /// S, the inverse of the effect's block of A⁻¹.
+    fn schur(&self, inverse: &[f64], size: usize) -> Option<Vec<f64>> {
         let own = self.places.len();
         let block: Vec<f64> = (self.places.iter())
             .flat_map(|&a| self.places.iter().map(move |&b| inverse[a * size + b]))
             .collect();
-        let schur = Cholesky::new(&block, own).ok()?.inverse();
-        let trace: f64 = schur.iter().zip(&self.second).map(|(s, b)| s * b).sum();
-        Some(trace / noise)
+        Some(Cholesky::new(&block, own).ok()?.inverse())
     }
 }
 
@@ -412,6 +417,41 @@ impl Objective for Questions<'_> {
         said.map_or(f64::NEG_INFINITY, |(lambda, rest)| {
             lambda.iter().map(|own| own.ln_1p()).sum::<f64>() + REST * rest
         })
+    }
+
+    /// ∂λ/∂A = A⁻¹ Pᵀ S B S P A⁻¹ / φ with P the places of the effect, S its Schur complement and B = E[β βᵀ | in].
+    fn gradient(&self, sums: &[f64], rows: f64, duration: f64) -> Option<Vec<f64>> {
+        let (size, scale) = (self.active.len(), self.scale(rows, duration));
+        let factor = Cholesky::new(&self.precision(sums, scale), size).ok()?;
+        let inverse = factor.inverse();
+        let mut gradient: Vec<f64> = inverse.iter().map(|x| REST * scale * x).collect();
+        for question in &self.open {
+            let count = question.places.len();
+            let schur = question.schur(&inverse, size)?;
+            let trace: f64 = schur.iter().zip(&question.second).map(|(s, b)| s * b).sum();
+            let lambda = trace / self.posterior.noise;
+            let left = product(&schur, &question.second, [count; 3]);
+            let middle = product(&left, &schur, [count; 3]);
+            let rows: Vec<f64> = (question.places.iter())
+                .flat_map(|&a| inverse[a * size..(a + 1) * size].iter().copied())
+                .collect();
+            let through = product(&middle, &rows, [count, count, size]);
+            let weight = scale / (self.posterior.noise * (1.0 + lambda));
+            for a in 0..size {
+                for b in 0..size {
+                    let sum: f64 = (0..count)
+                        .map(|k| rows[k * size + a] * through[k * size + b])
+                        .sum();
+                    gradient[a * size + b] += weight * sum;
+                }
+            }
+        }
+        Some(gradient)
+    }
+
+    fn shown(&self, matrix: &[f64], states: &States) -> Vec<f64> {
+        let factor = |joint: usize, _| self.factor[joint].sqrt();
+        quadratic(self.library, &self.active, (matrix, states), factor)
     }
 }
 

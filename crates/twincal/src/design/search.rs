@@ -1,16 +1,16 @@
 //! One chain of local changes to a motion, each within all limits, by the information that it gives.
 
 use super::Task;
+use super::ascent::Climb;
 use super::information::{Objective, states_of};
 use super::limits::JointLimits;
 use super::spline::{HELD, Spline, steps};
-use crate::excitation::States;
 use crate::random::Random;
 use std::f64::consts::PI;
 use std::ops::Range;
 
 /// Half widths of a change, control points.
-const WIDTHS: [usize; 5] = [1, 2, 3, 5, 8];
+const WIDTHS: [usize; 6] = [1, 2, 4, 6, 10, 16];
 /// Share of changes whose step is drawn from all that is feasible; the others are small.
 const WIDE: f64 = 0.3;
 /// sd of a small step, as a share of the feasible range.
@@ -19,6 +19,9 @@ const SMALL: f64 = 0.1;
 const ANEW: usize = 500;
 /// Loss that is accepted with probability 1/e at the start; it falls linearly to 0 at half of the proposals.
 const WARM: f64 = 0.3;
+
+/// Samples of a span, at which distances are looked at; between two of them what moves adds to the margin.
+pub(super) const PER_SPAN: usize = 64;
 
 /// A motion with what it says.
 #[derive(Debug, Clone)]
@@ -40,6 +43,7 @@ pub(super) struct Chain<'a> {
     now: Found,
     best: Found,
     accepted: usize,
+    refused: Option<String>,
 }
 
 impl<'a> Chain<'a> {
@@ -71,11 +75,22 @@ impl<'a> Chain<'a> {
             best: now.clone(),
             now,
             accepted: 0,
+            refused: None,
         }
     }
 
-    pub(super) fn into_best(self) -> Found {
-        self.best
+    /// The best motion, and what forbade the last change where none was possible at all.
+    pub(super) fn into_best(self) -> (Found, Option<String>) {
+        let never = self.refused.filter(|_| self.accepted == 0);
+        (self.best, never)
+    }
+
+    /// The best motion goes on uphill.
+    pub(super) fn climb(self) -> Climb<'a> {
+        let (spans, rows, duration) = (self.spans, self.rows, self.duration);
+        let (task, objective) = (self.task, self.objective);
+        let found = self.into_best();
+        Climb::new(task, objective, found, (spans, rows, duration))
     }
 
     pub(super) fn best(&self) -> f64 {
@@ -94,14 +109,11 @@ impl<'a> Chain<'a> {
         let mut splines = self.now.splines.clone();
         (splines[joint].points.iter_mut().zip(&direction)).for_each(|(c, d)| *c += d);
         let after = states_of(&splines, changed.clone());
-        if self
-            .task
-            .torque
-            .is_some_and(|torque| !torque.allows(&after))
-        {
+        if let Some(problem) = self.task.too_much_torque(&after) {
+            self.refused = Some(problem);
             return;
         }
-        let before = states_of(&self.now.splines, changed);
+        let before = states_of(&self.now.splines, changed.clone());
         let mut sums = self.objective.of(&after);
         let old = self.objective.of(&before);
         for ((sum, old), now) in sums.iter_mut().zip(&old).zip(&self.now.sums) {
@@ -110,7 +122,11 @@ impl<'a> Chain<'a> {
         let value = self.objective.value(&sums, self.rows, self.duration);
         let warmth = WARM * (1.0 - 2.0 * done).max(0.0);
         let threshold = self.now.value + warmth * self.random.uniform().ln();
-        if value.is_nan() || value < threshold || !self.is_clear(&after) {
+        if value.is_nan() || value < threshold {
+            return;
+        }
+        if let Some(problem) = self.task.too_close(&splines, changed, PER_SPAN) {
+            self.refused = Some(problem);
             return;
         }
         self.now = Found {
@@ -157,27 +173,9 @@ impl<'a> Chain<'a> {
         ))
     }
 
-    fn is_clear(&self, states: &States) -> bool {
-        let Some(clearance) = self.task.clearance else {
-            return true;
-        };
-        (0..states.len).all(|k| clearance.allows(&position(states, k)))
-    }
-
     fn below(&mut self, count: usize) -> usize {
         ((self.random.uniform() * count as f64) as usize).min(count - 1)
     }
-}
-
-/// Positions of one state.
-pub(super) fn position(states: &States, k: usize) -> Vec<f64> {
-    states
-        .q
-        .iter()
-        .skip(k)
-        .step_by(states.len)
-        .copied()
-        .collect()
 }
 
 /// Bounds on position, velocity, acceleration and jerk.

@@ -7,7 +7,7 @@
 //! The first and the last five control points of a joint are equal: at both ends the joint rests, with no velocity, acceleration or jerk.
 
 /// Degree of the spline.
-const DEGREE: usize = 5;
+pub(super) const DEGREE: usize = 5;
 /// Control points at either end that stay at the start position.
 pub(super) const HELD: usize = DEGREE;
 
@@ -29,22 +29,19 @@ impl Spline {
         }
     }
 
-    /// Position, velocity and acceleration at a place of a span, both from 0 on; `part` is the share of the span, 0 to 1.
-    pub(super) fn state(&self, span: usize, part: f64) -> [f64; 3] {
+    /// Position, velocity and acceleration at a place of a span: exactly 0 where control points are equal.
+    pub(super) fn state(&self, span: usize, weights: &StateWeights) -> [f64; 3] {
         let own = &self.points[span..span + DEGREE + 1];
-        let sum = |degree: usize, points: &[f64]| -> f64 {
-            let weights = weights(degree, part);
+        let first: [f64; DEGREE] = std::array::from_fn(|i| (own[i + 1] - own[i]) / self.span);
+        let second: [f64; DEGREE - 1] =
+            std::array::from_fn(|i| (first[i + 1] - first[i]) / self.span);
+        let sum = |weights: &[f64], points: &[f64]| -> f64 {
             weights.iter().zip(points).map(|(w, c)| w * c).sum()
         };
-        let first: Vec<f64> = own.windows(2).map(|c| (c[1] - c[0]) / self.span).collect();
-        let second: Vec<f64> = first
-            .windows(2)
-            .map(|c| (c[1] - c[0]) / self.span)
-            .collect();
         [
-            sum(DEGREE, own),
-            sum(DEGREE - 1, &first),
-            sum(DEGREE - 2, &second),
+            sum(&weights.position, own),
+            sum(&weights.velocity, &first),
+            sum(&weights.acceleration, &second),
         ]
     }
 
@@ -58,6 +55,48 @@ impl Spline {
                 .collect();
         }
         points
+    }
+}
+
+/// Weights of the control points of a span on position, and of their differences on velocity and acceleration.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct StateWeights {
+    position: Vec<f64>,
+    velocity: Vec<f64>,
+    acceleration: Vec<f64>,
+}
+
+impl StateWeights {
+    /// At the middle of a sample of the search.
+    pub(super) fn of_sample(sample: usize) -> Self {
+        Self::at((sample as f64 + 0.5) / super::information::SAMPLES as f64)
+    }
+
+    /// Adds to slopes over the control points of a span what slopes over position, velocity and acceleration are of them.
+    pub(super) fn add_transposed(&self, [q, qd, qdd]: [f64; 3], span: f64, points: &mut [f64]) {
+        for (point, weight) in points.iter_mut().zip(&self.position) {
+            *point += q * weight;
+        }
+        for (i, weight) in self.velocity.iter().enumerate() {
+            let slope = qd * weight / span;
+            points[i] -= slope;
+            points[i + 1] += slope;
+        }
+        for (i, weight) in self.acceleration.iter().enumerate() {
+            let slope = qdd * weight / (span * span);
+            points[i] += slope;
+            points[i + 1] -= 2.0 * slope;
+            points[i + 2] += slope;
+        }
+    }
+
+    /// At a share of a span, 0 to 1.
+    pub(super) fn at(part: f64) -> Self {
+        Self {
+            position: weights(DEGREE, part),
+            velocity: weights(DEGREE - 1, part),
+            acceleration: weights(DEGREE - 2, part),
+        }
     }
 }
 
@@ -134,7 +173,7 @@ mod tests {
         let time = |span: usize, part: f64| 0.4 * (span as f64 + part);
         let at = |t: f64| {
             let span = ((t / 0.4) as usize).min(11);
-            spline.state(span, t / 0.4 - span as f64)
+            spline.state(span, &StateWeights::at(t / 0.4 - span as f64))
         };
         let hull = |order: usize| {
             let points = spline.derivative(order);

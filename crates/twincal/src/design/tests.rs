@@ -5,7 +5,7 @@ use crate::robot::testing::tree;
 use crate::term::{Family, LibrarySettings};
 use std::collections::BTreeMap;
 
-fn library(robot: &Robot) -> Library {
+pub(super) fn library(robot: &Robot) -> Library {
     let settings = LibrarySettings {
         families: vec![
             Family::Density,
@@ -19,7 +19,7 @@ fn library(robot: &Robot) -> Library {
     Library::propose(robot, &settings).expect("a library").0
 }
 
-fn stated(robot: &Robot, torque: Option<f64>) -> BTreeMap<String, StatedLimits> {
+pub(super) fn stated(robot: &Robot, torque: Option<f64>) -> BTreeMap<String, StatedLimits> {
     let own = StatedLimits {
         position: Some([-1.1, 1.3]),
         velocity: Some(1.7),
@@ -156,8 +156,25 @@ fn whoever_ends_the_search_gets_the_best_motion_so_far() {
 struct Wall;
 
 impl Clearance for Wall {
-    fn too_close(&self, q: &[f64]) -> Option<(String, String, f64)> {
-        (q[0] > 0.5).then(|| ("link1".into(), "wall".into(), 0.01))
+    fn breach(&self, path: &Path) -> Option<Approach> {
+        self.closest(path).filter(|own| own.distance < 0.0)
+    }
+
+    fn nearness(&self, q: &[f64]) -> f64 {
+        ((0.5 - q[0]) / 0.05).clamp(1e-3, 1.0).ln()
+    }
+
+    fn closest(&self, path: &Path) -> Option<Approach> {
+        let first = &path.q[..path.len];
+        let (at, q) = (first.iter().enumerate()).max_by(|a, b| a.1.total_cmp(b.1))?;
+        let fastest = path.speed[..path.spans()]
+            .iter()
+            .fold(0.0_f64, |a, b| a.max(*b));
+        Some(Approach {
+            between: ["link1".into(), "wall".into()],
+            distance: 0.5 - q - 0.5 * path.step * fastest,
+            time: path.start + at as f64 * path.step,
+        })
     }
 }
 
@@ -176,7 +193,32 @@ fn forbidden_space_is_kept_free() {
     };
     let found = design(&task(&limits), &short(), &|_| Ok(())).expect("a motion");
     let first = &found.motion.q[..found.motion.len];
-    assert!(first.iter().all(|q| *q <= 0.5));
+    let largest = first.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b));
+    assert!(largest <= 0.5 && largest > 0.3, "{largest}");
+    let closest = found.closest.expect("a wall");
+    assert!(
+        closest.distance >= 0.0 && closest.distance < 0.2,
+        "{closest:?}"
+    );
+    let at = (closest.time * found.motion.rate).round() as usize;
+    assert!(
+        (first[at] - largest).abs() < 0.02,
+        "{} {largest}",
+        first[at]
+    );
+    let mut corner = limits.clone();
+    corner[0].start = 0.5;
+    corner
+        .iter_mut()
+        .skip(1)
+        .for_each(|own| own.position = [own.start - 1e-12, own.start + 1e-12]);
+    corner[0].position = [0.5 - 1e-12, 0.6];
+    let error = design(&task(&corner), &short(), &|_| Ok(())).expect_err("no way");
+    let text = error.to_string();
+    assert!(
+        text.contains("no motion") && text.contains("`wall`"),
+        "{text}"
+    );
     let mut inside = limits.clone();
     inside[0].start = 0.6;
     let error = design(&task(&inside), &short(), &|_| Ok(())).expect_err("in the wall");

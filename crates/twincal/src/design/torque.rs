@@ -38,6 +38,10 @@ impl TorqueLimits for NominalTorque<'_> {
     fn exceeded(&self, states: &States) -> Option<(String, f64, f64)> {
         exceeded(self.limits, &self.torque(states), states.len)
     }
+
+    fn shares(&self, states: &States) -> Vec<f64> {
+        shares(self.limits, self.torque(states), states.len)
+    }
 }
 
 /// Torque of the model file with the posterior mean of all effects, and a payload at the far end of its interval.
@@ -75,12 +79,32 @@ impl<'a> FoundTorque<'a> {
     }
 }
 
+impl FoundTorque<'_> {
+    fn torque(&self, states: &States) -> Vec<f64> {
+        let motion = states.motion();
+        (self.library).torque_with(&self.twin.robot, motion, true, &self.beta)
+    }
+}
+
 impl TorqueLimits for FoundTorque<'_> {
     fn exceeded(&self, states: &States) -> Option<(String, f64, f64)> {
-        let motion = states.motion();
-        let torque = (self.library).torque_with(&self.twin.robot, motion, true, &self.beta);
-        exceeded(self.limits, &torque, states.len)
+        exceeded(self.limits, &self.torque(states), states.len)
     }
+
+    fn shares(&self, states: &States) -> Vec<f64> {
+        shares(self.limits, self.torque(states), states.len)
+    }
+}
+
+/// |τ| of every joint as a share of what is used of its limit, 0 where there is none.
+fn shares(limits: &[JointLimits], mut torque: Vec<f64>, len: usize) -> Vec<f64> {
+    for (limits, torque) in limits.iter().zip(torque.chunks_exact_mut(len)) {
+        let most = limits
+            .torque
+            .map_or(f64::INFINITY, |limit| TORQUE_SHARE * limit);
+        torque.iter_mut().for_each(|x| *x = x.abs() / most);
+    }
+    torque
 }
 
 /// The first joint whose largest torque is beyond its limit, with both.

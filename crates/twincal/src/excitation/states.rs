@@ -91,7 +91,7 @@ pub(crate) struct Reference<'a> {
     /// rms of each column, in torque of size 1 per joint; NaN for a column that is no number somewhere.
     pub(crate) size: Vec<f64>,
     /// Weight of each joint's rows.
-    weight: Vec<f64>,
+    pub(crate) weight: Vec<f64>,
 }
 
 /// Sizes of everything at random states.

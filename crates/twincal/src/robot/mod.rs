@@ -25,6 +25,7 @@ mod base_parameters;
 mod gravity;
 mod derivative;
 mod mass_matrix;
+mod placements;
 mod energy_regressor;
 mod energy;
 
@@ -50,6 +51,7 @@ pub use inertia::principal_axes;
 pub use mass_matrix::mass_matrices;
 pub use names::{did_you_mean, nearest_names};
 pub use parameters::{PARAMETERS, PINOCCHIO_ORDER, body_parameters, inertia_of, to_body_frame};
+pub use placements::MovingBody;
 pub use regressor::{Pair, Regressor, RegressorBlock};
 
 use crate::error::{Code, Error, Finding, Result, Severity};

@@ -7,6 +7,7 @@ use super::super::xml::{Document, Element, shorten};
 use super::compiler::Compiler;
 use super::defaults::{Defaults, View};
 use super::inertial::{moved, of_body, shift};
+use super::shapes::Placed;
 use super::sites::{BodySite, JointSite, Sites};
 use crate::error::{Error, Result};
 use twincal::robot::spatial::{add, apply, axis_angle, norm, scale};
@@ -35,6 +36,7 @@ pub(super) struct Tree<'a> {
     pub(super) references: Vec<f64>,
     pub(super) findings: Vec<Finding>,
     pub(super) sites: Sites,
+    pub(super) geoms: Vec<Placed<'a>>,
     bodies: usize,
 }
 
@@ -66,6 +68,7 @@ impl<'a> Tree<'a> {
             references: vec![],
             findings: vec![],
             sites: Sites::default(),
+            geoms: vec![],
             bodies: 0,
         }
     }
@@ -84,6 +87,7 @@ impl<'a> Tree<'a> {
                 "put it into a <body>",
             ));
         }
+        self.push_geoms(&parts, WORLD, [0.0; 3]);
         self.push_children(&mut tasks, &parts, WORLD, [0.0; 3], false);
         while let Some(task) = tasks.pop() {
             self.read_body(task, &mut tasks)?;
@@ -188,8 +192,19 @@ impl<'a> Tree<'a> {
             name: name.clone(),
             inertia,
         });
+        self.push_geoms(&parts, &name, origin);
         self.push_children(tasks, &parts, &name, origin, moves);
         Ok(())
+    }
+
+    /// Geoms of a body, whose link has its origin there.
+    fn push_geoms(&mut self, parts: &[Part<'a>], link: &str, origin: [f64; 3]) {
+        let geoms = parts.iter().filter(|p| p.element.name == "geom");
+        self.geoms.extend(geoms.map(|part| Placed {
+            part: part.clone(),
+            link: link.to_owned(),
+            origin,
+        }));
     }
 
     /// Child bodies as tasks; the last pushed is the next read, so in reverse.

@@ -122,6 +122,29 @@ impl Compiler {
         })
     }
 
+    /// `refquat` of a mesh: orientation of the frame that it is seen from.
+    ///
+    /// # Errors
+    /// At the attribute that is no orientation.
+    pub(super) fn reference_rotation(&self, view: &View<'_, '_>) -> Result<Matrix> {
+        let Some((element, attribute)) = view.get("refquat") else {
+            return Ok(IDENTITY);
+        };
+        let document = view.document;
+        quaternion(document.exactly(element, attribute)?).ok_or_else(|| {
+            let problem = format!(
+                "refquat=\"{}\" is no orientation",
+                shorten(&attribute.value)
+            );
+            document.attribute_error(
+                element,
+                attribute,
+                problem,
+                "give four numbers, not all zero",
+            )
+        })
+    }
+
     /// Orientation by `quat`, `axisangle`, `xyaxes`, `zaxis` or `euler`.
     pub(super) fn rotation(&self, view: &View<'_, '_>) -> Result<Matrix> {
         const WAYS: [&str; 5] = ["quat", "axisangle", "xyaxes", "zaxis", "euler"];

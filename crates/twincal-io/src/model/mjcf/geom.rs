@@ -81,7 +81,7 @@ pub(super) fn inertia(
 }
 
 /// Half sizes (as MuJoCo means them) and placement in the body.
-fn shape(
+pub(super) fn shape(
     compiler: &Compiler,
     view: &View<'_, '_>,
     kind: &str,

@@ -6,11 +6,14 @@ mod couplings;
 mod defaults;
 mod geom;
 mod inertial;
+mod shapes;
 mod sites;
 mod unknown;
 
 use super::xml::{Document, Element};
 use crate::error::Result;
+pub(super) use shapes::of_document as geometry;
+pub(crate) use shapes::seen_from;
 pub(crate) use sites::{BodySite, JointSite, Sites};
 
 use body::Tree;

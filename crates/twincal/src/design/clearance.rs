@@ -1,0 +1,101 @@
+//! Distance of a moving robot from itself, from the floor and from forbidden space, between samples too.
+
+use super::spline::{Spline, StateWeights};
+use std::ops::Range;
+
+/// Positions of all joints on an even grid of time, with what bounds the motion between them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Path {
+    /// rad or m, `[joint * len + sample]`.
+    pub q: Vec<f64>,
+    /// Samples of each joint.
+    pub len: usize,
+    /// Time between two samples, s.
+    pub step: f64,
+    /// Samples of a span; the last sample ends the last span.
+    pub per_span: usize,
+    /// Largest speed of each joint anywhere in each span, rad/s or m/s, `[joint * spans + span]`.
+    pub speed: Vec<f64>,
+    /// Time of the first sample, s.
+    pub start: f64,
+}
+
+impl Path {
+    /// Spans of the path.
+    #[must_use]
+    pub fn spans(&self) -> usize {
+        self.len.div_ceil(self.per_span).saturating_sub(1).max(1)
+    }
+
+    /// A robot at rest.
+    #[must_use]
+    pub fn at_rest(q: &[f64]) -> Self {
+        Self {
+            q: q.to_vec(),
+            len: 1,
+            step: 0.0,
+            per_span: 1,
+            speed: vec![0.0; q.len()],
+            start: 0.0,
+        }
+    }
+
+    /// Positions of one sample.
+    #[must_use]
+    pub fn position(&self, sample: usize) -> Vec<f64> {
+        let own = self.q.iter().skip(sample).step_by(self.len);
+        own.copied().collect()
+    }
+}
+
+/// Two things, how far they are apart, and when.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Approach {
+    /// Names of links, boxes or the floor.
+    pub between: [String; 2],
+    /// m; 0 where they overlap.
+    pub distance: f64,
+    /// s since the motion's start.
+    pub time: f64,
+}
+
+/// How far a robot is from itself, from the floor and from forbidden space.
+pub trait Clearance: Sync {
+    /// The first approach closer than the margin; `None`: at every moment of the path, between samples too, nothing is closer.
+    fn breach(&self, path: &Path) -> Option<Approach>;
+
+    /// Σ ln(what is left to the margin, as a share of a short distance) over what is nearer than that: 0 where nothing is, and smaller the nearer.
+    fn nearness(&self, q: &[f64]) -> f64;
+
+    /// The smallest distance at the samples of the path; `None` where nothing can come close.
+    fn closest(&self, path: &Path) -> Option<Approach>;
+}
+
+/// Some spans of a motion.
+pub(super) fn path_of(splines: &[Spline], spans: Range<usize>, per_span: usize) -> Path {
+    let len = spans.len() * per_span + 1;
+    let span = splines.first().map_or(0.0, |spline| spline.span);
+    let weights: Vec<StateWeights> = (0..per_span)
+        .map(|at| StateWeights::at(at as f64 / per_span as f64))
+        .collect();
+    let at_end = StateWeights::at(1.0);
+    let mut path = Path {
+        q: Vec::with_capacity(splines.len() * len),
+        len,
+        step: span / per_span as f64,
+        per_span,
+        speed: Vec::with_capacity(splines.len() * spans.len()),
+        start: spans.start as f64 * span,
+    };
+    for spline in splines {
+        for at in spans.clone() {
+            let own = &spline.points[at..at + 6];
+            path.q
+                .extend(weights.iter().map(|own| spline.state(at, own)[0]));
+            let fastest = own.windows(2).map(|c| (c[1] - c[0]).abs());
+            path.speed.push(fastest.fold(0.0, f64::max) / span);
+        }
+        path.q.push(spline.state(spans.end - 1, &at_end)[0]);
+    }
+    path
+}
