@@ -25,6 +25,7 @@ use twincal_io::design::{
     motion_csv, mujoco_keyframes, read_limits,
 };
 use twincal_io::twin_json::StoredTwin;
+use twincal_io::words::design as words;
 
 /// Candidates whose coefficients a motion is designed for where no twin says which are in question: the rigid body, motors and friction.
 const FAMILIES: [Family; 7] = [
@@ -183,52 +184,30 @@ fn print_promises(found: &Design, terminal: &mut Terminal) {
         return;
     }
     let mut rows = table(&["effect", "PIP now", "decided rightly", "wrongly", "sd then"]);
-    let percent = |share: f64| format!("{} %", (100.0 * share).round());
     for promise in &found.promises {
         rows.add_row([
             promise.effect.clone(),
-            number(promise.pip, 2),
-            percent(promise.right),
-            percent(promise.wrong),
+            words::chance(promise.pip),
+            words::share(promise.right),
+            words::share(promise.wrong),
             promise.sd.map_or_else(|| "–".into(), |sd| number(sd, 2)),
         ]);
     }
     print_table(&rows, terminal);
     for promise in found.promises.iter().filter(|own| own.structural) {
-        let text = format!(
-            "{}: no motion of this robot tells it from the others; a known load or another base pose does.",
-            promise.effect
-        );
-        paragraph(&text, terminal);
+        paragraph(&words::undecidable(&promise.effect), terminal);
     }
     terminal.say("");
 }
 
 fn print(found: &Design, limits: &[JointLimits], output: &Path, terminal: &mut Terminal) {
-    let motion = &found.motion;
-    let early = match found.stopped {
-        true => ", ended early",
-        false => "",
-    };
-    terminal.heading(&format!(
-        "Motion of {} s at {} Hz{early}",
-        number((motion.len - 1) as f64 / motion.rate, 3),
-        number(motion.rate, 4)
-    ));
-    paragraph(
-        &format!(
-            "{} base parameters: ln det {}, condition number {}.",
-            found.columns,
-            number(found.log_determinant, 3),
-            number(found.condition, 3)
-        ),
-        terminal,
-    );
+    terminal.heading(&words::headline(found));
+    paragraph(&words::information(found), terminal);
     terminal.say("");
     print_promises(found, terminal);
     let mut rows = table(&["joint", "from", "to", "velocity", "acceleration", "jerk"]);
     for used in &found.used {
-        let share = |at: usize| format!("{} %", (100.0 * used.share[at]).round());
+        let share = |at: usize| words::share(used.share[at]);
         rows.add_row([
             used.joint.clone(),
             number(used.position[0], 3),
@@ -239,25 +218,11 @@ fn print(found: &Design, limits: &[JointLimits], output: &Path, terminal: &mut T
         ]);
     }
     print_table(&rows, terminal);
-    terminal.say("Shares are of the limits, by the control points that bound them.");
-    let assumed = |key: &str| {
-        let own = limits.iter().filter(|own| own.assumed.contains(&key));
-        own.map(|own| own.joint.as_str()).collect::<Vec<_>>()
-    };
-    for (key, rule) in [
-        ("acceleration", "velocity / 0.2 s"),
-        ("jerk", "acceleration / 0.1 s"),
-        ("position", "±π"),
-    ] {
-        let joints = assumed(key);
-        if !joints.is_empty() {
-            paragraph(
-                &format!("{key} limit assumed: {rule} ({})", joints.join(", ")),
-                terminal,
-            );
-        }
+    terminal.say(words::SHARES);
+    for text in words::assumed(limits) {
+        paragraph(&text, terminal);
     }
-    paragraph("Collisions are not checked.", terminal);
+    paragraph(&words::clearance(found), terminal);
     paragraph(WARNING, terminal);
     terminal.say(&output.join(MOTION).to_string_lossy());
 }
