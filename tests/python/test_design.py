@@ -8,6 +8,7 @@ import subprocess
 import time
 import tomllib
 
+import browser
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -92,6 +93,26 @@ def test_the_other_forms_say_the_same(made, names):
     assert np.array_equal(np.array(positions), rows[picked, 1 : 1 + n])
     about = json.loads((folder / "motion" / "design.json").read_text())
     assert about["samples"] == len(rows) and "10 % speed" in about["warning"]
+
+
+@pytest.mark.skipif(browser.installed() is None, reason="no browser: install chromium")
+def test_the_page_fits_a_desk_and_a_phone(made, names, tmp_path):
+    """The warning is on the first screen, every joint has three curves, nothing is fetched or refused, nothing scrolls sideways."""
+    folder, _ = made
+    chromium = browser.Browser(tmp_path / "profile")
+    try:
+        for width, height in ((1280, 900), (390, 844)):
+            chromium.open(folder / "motion" / "design.html", width, height)
+            assert chromium.value("document.documentElement.scrollWidth") <= width
+            assert chromium.value("document.getElementById('warning').getBoundingClientRect().bottom") <= height
+            assert chromium.value("document.querySelectorAll('.curves svg').length") == 3 * len(names)
+            assert chromium.value("document.scripts.length + document.images.length") == 0
+            for quiet in ("Log.entryAdded", "Runtime.exceptionThrown", "Runtime.consoleAPICalled"):
+                assert chromium.happened(quiet) == []
+            urls = [event["request"]["url"] for event in chromium.happened("Network.requestWillBeSent")]
+            assert all(url.startswith("file:") for url in urls) and len(urls) == 1
+    finally:
+        chromium.close()
 
 
 def test_more_is_shown_than_by_random_motion(made, names):

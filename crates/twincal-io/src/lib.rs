@@ -22,7 +22,7 @@
 //! |---|---|
 //! | `tables` (default) | logs in Parquet, Arrow, NPZ; predictions as Parquet |
 //! | `bags` (default) | logs in MCAP, SQLite bags, rosbag2 folders; predictions as MCAP |
-//! | `report` (default) | `report.html`, and its figures |
+//! | `report` (default) | `report.html`, `fleet.html`, `design.html`, and their figures |
 //!
 //! CSV is always read and written. Without `tables` and `bags` nothing in C is compiled.
 

@@ -21,8 +21,8 @@ use twincal::words::significant as number;
 use twincal_io::artifact::{Artifact, Claim, Inputs, Maker, Replace};
 use twincal_io::config::Config;
 use twincal_io::design::{
-    About, DESIGN, KEYFRAMES, Limits, MOTION, TRAJECTORY, WARNING, design_json, joint_trajectory,
-    motion_csv, mujoco_keyframes, read_limits,
+    About, DESIGN, KEYFRAMES, Limits, MOTION, PAGE, TRAJECTORY, WARNING, design_json, design_page,
+    joint_trajectory, motion_csv, mujoco_keyframes, read_limits,
 };
 use twincal_io::twin_json::StoredTwin;
 use twincal_io::words::design as words;
@@ -101,12 +101,16 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
         model: known.model,
         settings: &settings,
         limits: &limits,
+        kinds: (0..known.robot.dof())
+            .map(|joint| known.robot.joint_kind(joint))
+            .collect(),
     };
     let json = design_json(&found, &about)?;
     let motion = &found.motion;
     let files = vec![
         (MOTION, motion_csv(motion).into_bytes()),
         (DESIGN, json.clone()),
+        (PAGE, design_page(&found, &about)?.into_bytes()),
         (TRAJECTORY, joint_trajectory(motion).into_bytes()),
         (KEYFRAMES, mujoco_keyframes(motion).into_bytes()),
     ];

@@ -4,6 +4,7 @@ use super::WARNING;
 use crate::error::{Error, Result};
 use serde::Serialize;
 use twincal::design::{Design, DesignSettings, JointLimits, JointUse, Promise};
+use twincal::robot::JointKind;
 
 /// Version of the format.
 const SCHEMA: u64 = 1;
@@ -17,6 +18,8 @@ pub struct About<'a> {
     pub settings: &'a DesignSettings,
     /// In force.
     pub limits: &'a [JointLimits],
+    /// Kind of each joint: sliders move in m.
+    pub kinds: Vec<JointKind>,
 }
 
 #[derive(Debug, Serialize)]

@@ -1,15 +1,23 @@
 //! What `twincal design` reads and writes: limits of joints, and a motion in the forms that controllers and simulators take.
 
+#[cfg(test)]
+mod fixture;
 mod forms;
 mod json;
 mod limits;
+#[cfg(feature = "report")]
+mod page;
 
 pub use forms::{joint_trajectory, motion_csv, mujoco_keyframes};
 pub use json::{About, design_json};
 pub use limits::{Limits, read_limits};
+#[cfg(feature = "report")]
+pub use page::design_page;
 
 /// The motion as a table.
 pub const MOTION: &str = "motion.csv";
+/// What it shows, for people.
+pub const PAGE: &str = "design.html";
 /// What it shows, for programs.
 pub const DESIGN: &str = "design.json";
 /// The motion as a ROS 2 `trajectory_msgs/JointTrajectory`.
