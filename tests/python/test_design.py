@@ -10,7 +10,9 @@ import tomllib
 
 import browser
 import numpy as np
+import pandas as pd
 import pinocchio as pin
+import pyarrow.parquet as pq
 import pytest
 from conftest import ROOT, program
 
@@ -93,6 +95,17 @@ def test_the_other_forms_say_the_same(made, names):
     assert np.array_equal(np.array(positions), rows[picked, 1 : 1 + n])
     about = json.loads((folder / "motion" / "design.json").read_text())
     assert about["samples"] == len(rows) and "10 % speed" in about["warning"]
+
+
+def test_parquet_holds_the_same_doubles(made, names):
+    """By pandas and PyArrow; the joints' names stand in the metadata."""
+    folder, _ = made
+    header, rows = table(folder)
+    read = pd.read_parquet(folder / "motion" / "motion.parquet")
+    assert list(read.columns) == header and set(map(str, read.dtypes)) == {"float64"}
+    assert np.array_equal(read.to_numpy(), rows)
+    kept = pq.read_schema(folder / "motion" / "motion.parquet").metadata
+    assert json.loads(kept[b"joints"]) == names and kept[b"rate"] == b"250" and b"10 % speed" in kept[b"warning"]
 
 
 @pytest.mark.skipif(browser.installed() is None, reason="no browser: install chromium")

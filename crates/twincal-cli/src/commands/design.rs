@@ -21,8 +21,8 @@ use twincal::words::significant as number;
 use twincal_io::artifact::{Artifact, Claim, Inputs, Maker, Replace};
 use twincal_io::config::Config;
 use twincal_io::design::{
-    About, DESIGN, KEYFRAMES, Limits, MOTION, PAGE, TRAJECTORY, WARNING, design_json, design_page,
-    joint_trajectory, motion_csv, mujoco_keyframes, read_limits,
+    About, DESIGN, KEYFRAMES, Limits, MOTION, PAGE, TABLE, TRAJECTORY, WARNING, design_json,
+    design_page, joint_trajectory, motion_csv, motion_parquet, mujoco_keyframes, read_limits,
 };
 use twincal_io::twin_json::StoredTwin;
 use twincal_io::words::design as words;
@@ -109,6 +109,7 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
     let motion = &found.motion;
     let files = vec![
         (MOTION, motion_csv(motion).into_bytes()),
+        (TABLE, motion_parquet(motion)?),
         (DESIGN, json.clone()),
         (PAGE, design_page(&found, &about)?.into_bytes()),
         (TRAJECTORY, joint_trajectory(motion).into_bytes()),

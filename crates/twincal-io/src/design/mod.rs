@@ -7,15 +7,21 @@ mod json;
 mod limits;
 #[cfg(feature = "report")]
 mod page;
+#[cfg(feature = "tables")]
+mod parquet;
 
 pub use forms::{joint_trajectory, motion_csv, mujoco_keyframes};
 pub use json::{About, design_json};
 pub use limits::{Limits, read_limits};
 #[cfg(feature = "report")]
 pub use page::design_page;
+#[cfg(feature = "tables")]
+pub use parquet::motion_parquet;
 
 /// The motion as a table.
 pub const MOTION: &str = "motion.csv";
+/// The same table in Parquet.
+pub const TABLE: &str = "motion.parquet";
 /// What it shows, for people.
 pub const PAGE: &str = "design.html";
 /// What it shows, for programs.
