@@ -9,6 +9,7 @@ import time
 import tomllib
 
 import browser
+import jsonschema
 import numpy as np
 import pandas as pd
 import pinocchio as pin
@@ -106,6 +107,23 @@ def test_parquet_holds_the_same_doubles(made, names):
     assert np.array_equal(read.to_numpy(), rows)
     kept = pq.read_schema(folder / "motion" / "motion.parquet").metadata
     assert json.loads(kept[b"joints"]) == names and kept[b"rate"] == b"250" and b"10 % speed" in kept[b"warning"]
+
+
+def schema(name):
+    read = json.loads((ROOT / "schema" / f"{name}.schema.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(read)
+    return jsonschema.Draft202012Validator(read)
+
+
+def test_files_are_what_their_schemas_say(made):
+    folder, _ = made
+    about = json.loads((folder / "motion" / "design.json").read_text())
+    assert schema("design").is_valid(about)
+    assert not schema("design").is_valid({**about, "samples": "many"}) and not schema("design").is_valid({"schema": 1})
+    stated = tomllib.loads((folder / "limits.toml").read_text())
+    assert schema("limits").is_valid(stated)
+    for wrong in ({"velocty": 1.0}, {"velocity": -1.0}, {"position": [1.0]}):
+        assert not schema("limits").is_valid({"joint": {"elbow": wrong}})
 
 
 @pytest.mark.skipif(browser.installed() is None, reason="no browser: install chromium")
