@@ -1,4 +1,4 @@
-"""Makes docs/reference from the program and its schemas: commands, keys of twincal.toml, layout of result.json.
+"""Makes docs/reference from the program and its schemas: commands, keys of twincal.toml and of limits, layouts of result.json, fleet.json and design.json.
 
     python docs/site/reference.py path/to/twincal
 """
@@ -101,6 +101,8 @@ def main():
         "commands.md": commands(program),
         "config.md": of_schema("schema/twincal.schema.json", "Keys of twincal.toml", lambda key: f"[{key}]"),
         "result.md": of_schema("schema/result.schema.json", "result.json", lambda key: f"`{key}`"),
+        "design.md": of_schema("schema/design.schema.json", "design.json", lambda key: f"`{key}`"),
+        "limits.md": of_schema("schema/limits.schema.json", "Keys of a limits file", lambda key: f"[{key}]"),
         "fleet.md": of_schema("schema/fleet.schema.json", "fleet.json", lambda key: f"`{key}`"),
     }
     for name, text in pages.items():

@@ -8,8 +8,12 @@ import subprocess
 import time
 import tomllib
 
+import browser
+import jsonschema
 import numpy as np
+import pandas as pd
 import pinocchio as pin
+import pyarrow.parquet as pq
 import pytest
 from conftest import ROOT, program
 
@@ -92,6 +96,54 @@ def test_the_other_forms_say_the_same(made, names):
     assert np.array_equal(np.array(positions), rows[picked, 1 : 1 + n])
     about = json.loads((folder / "motion" / "design.json").read_text())
     assert about["samples"] == len(rows) and "10 % speed" in about["warning"]
+
+
+def test_parquet_holds_the_same_doubles(made, names):
+    """By pandas and PyArrow; the joints' names stand in the metadata."""
+    folder, _ = made
+    header, rows = table(folder)
+    read = pd.read_parquet(folder / "motion" / "motion.parquet")
+    assert list(read.columns) == header and set(map(str, read.dtypes)) == {"float64"}
+    assert np.array_equal(read.to_numpy(), rows)
+    kept = pq.read_schema(folder / "motion" / "motion.parquet").metadata
+    assert json.loads(kept[b"joints"]) == names and kept[b"rate"] == b"250" and b"10 % speed" in kept[b"warning"]
+
+
+def schema(name):
+    read = json.loads((ROOT / "schema" / f"{name}.schema.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(read)
+    return jsonschema.Draft202012Validator(read)
+
+
+def test_files_are_what_their_schemas_say(made):
+    folder, _ = made
+    about = json.loads((folder / "motion" / "design.json").read_text())
+    assert schema("design").is_valid(about)
+    assert not schema("design").is_valid({**about, "samples": "many"}) and not schema("design").is_valid({"schema": 1})
+    stated = tomllib.loads((folder / "limits.toml").read_text())
+    assert schema("limits").is_valid(stated)
+    for wrong in ({"velocty": 1.0}, {"velocity": -1.0}, {"position": [1.0]}):
+        assert not schema("limits").is_valid({"joint": {"elbow": wrong}})
+
+
+@pytest.mark.skipif(browser.installed() is None, reason="no browser: install chromium")
+def test_the_page_fits_a_desk_and_a_phone(made, names, tmp_path):
+    """The warning is on the first screen, every joint has three curves, nothing is fetched or refused, nothing scrolls sideways."""
+    folder, _ = made
+    chromium = browser.Browser(tmp_path / "profile")
+    try:
+        for width, height in ((1280, 900), (390, 844)):
+            chromium.open(folder / "motion" / "design.html", width, height)
+            assert chromium.value("document.documentElement.scrollWidth") <= width
+            assert chromium.value("document.getElementById('warning').getBoundingClientRect().bottom") <= height
+            assert chromium.value("document.querySelectorAll('.curves svg').length") == 3 * len(names)
+            assert chromium.value("document.scripts.length + document.images.length") == 0
+            for quiet in ("Log.entryAdded", "Runtime.exceptionThrown", "Runtime.consoleAPICalled"):
+                assert chromium.happened(quiet) == []
+            urls = [event["request"]["url"] for event in chromium.happened("Network.requestWillBeSent")]
+            assert all(url.startswith("file:") for url in urls) and len(urls) == 1
+    finally:
+        chromium.close()
 
 
 def test_more_is_shown_than_by_random_motion(made, names):

@@ -61,7 +61,7 @@ def test_sources():
         for line, text in texts(path.read_text()):
             if wrong := banned(text):
                 found[f"{path.relative_to(ROOT)}:{line}"] = wrong
-    for name in ("report.html", "report.js"):
+    for name in ("report.html", "report.js", "fleet.html", "design.html"):
         if wrong := banned((ROOT / "crates/twincal-io/src/report" / name).read_text()):
             found[name] = wrong
     assert not found, found

@@ -2,9 +2,11 @@
 
 mod design;
 mod fleet;
+mod schema;
 
 pub(crate) use design::Design;
 pub(crate) use fleet::Fleet;
+pub(crate) use schema::{Described, Schema};
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
@@ -158,9 +160,13 @@ Examples:
   twincal completions fish > ~/.config/fish/completions/twincal.fish
 ")]
     Completions(Completions),
-    /// Print the JSON Schema of twincal.toml.
-    #[command(before_help = "Example:\n  twincal schema > twincal.schema.json\n")]
-    Schema,
+    /// Print the JSON Schema of twincal.toml or of another file.
+    #[command(before_help = "\
+Examples:
+  twincal schema > twincal.schema.json
+  twincal schema limits > limits.schema.json
+")]
+    Schema(Schema),
 }
 
 impl Command {
@@ -180,7 +186,7 @@ impl Command {
             Self::Diff(flags) => flags.json,
             Self::Export(flags) => flags.json,
             Self::Report(flags) => flags.json,
-            Self::Init(_) | Self::Completions(_) | Self::Schema => false,
+            Self::Init(_) | Self::Completions(_) | Self::Schema(_) => false,
         }
     }
 }

@@ -474,13 +474,17 @@ fn fit_prints_its_result_file_as_json() {
 }
 
 #[test]
-fn schema_prints_the_published_file() {
-    let published = fs::read_to_string(concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../schema/twincal.schema.json"
-    ))
-    .unwrap();
-    assert_eq!(run(folder().path(), ["schema"]).expect(0).out, published);
+fn schema_prints_the_published_files() {
+    let folder = folder();
+    for (words, file) in [
+        (&["schema"][..], "twincal"),
+        (&["schema", "limits"], "limits"),
+        (&["schema", "design"], "design"),
+    ] {
+        let schemas = concat!(env!("CARGO_MANIFEST_DIR"), "/../../schema");
+        let published = fs::read_to_string(format!("{schemas}/{file}.schema.json")).unwrap();
+        assert_eq!(run(folder.path(), words).expect(0).out, published);
+    }
 }
 
 /// A log without torque can be predicted, not fitted and not held out; `doctor` says so before.

@@ -20,9 +20,9 @@
 //! # Features
 //! | feature | what it adds |
 //! |---|---|
-//! | `tables` (default) | logs in Parquet, Arrow, NPZ; predictions as Parquet |
+//! | `tables` (default) | logs in Parquet, Arrow, NPZ; predictions and motions as Parquet |
 //! | `bags` (default) | logs in MCAP, SQLite bags, rosbag2 folders; predictions as MCAP |
-//! | `report` (default) | `report.html`, and its figures |
+//! | `report` (default) | `report.html`, `fleet.html`, `design.html`, and their figures |
 //!
 //! CSV is always read and written. Without `tables` and `bags` nothing in C is compiled.
 

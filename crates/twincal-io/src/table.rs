@@ -139,6 +139,17 @@ impl<W: Write + Send> TableWriter<W> {
         }
     }
 
+    /// Keeps a text beside the table under `key`: in the metadata of Parquet; CSV and MCAP have no place for it.
+    #[cfg(feature = "tables")]
+    pub fn keep(&mut self, key: &str, text: &str) {
+        match &mut self.sink {
+            Sink::Csv { .. } => {}
+            Sink::Parquet(table) => table.keep(key, text),
+            #[cfg(feature = "bags")]
+            Sink::Mcap(_) => {}
+        }
+    }
+
     /// Adds rows: one block per column, all of one length, in the order of the columns.
     ///
     /// # Errors

@@ -23,11 +23,12 @@ use twincal_io::artifact::{Artifact, Claim, Inputs, MODEL_MJCF, MODEL_URDF, Make
 use twincal_io::collision::CollisionWorld;
 use twincal_io::config::Config;
 use twincal_io::design::{
-    About, DESIGN, KEYFRAMES, Limits, MOTION, TRAJECTORY, WARNING, design_json, joint_trajectory,
-    motion_csv, mujoco_keyframes, read_limits,
+    About, DESIGN, KEYFRAMES, Limits, MOTION, PAGE, TABLE, TRAJECTORY, WARNING, design_json,
+    design_page, joint_trajectory, motion_csv, motion_parquet, mujoco_keyframes, read_limits,
 };
 use twincal_io::model::{Geometry, parse_model, read_model};
 use twincal_io::twin_json::StoredTwin;
+use twincal_io::words::design as words;
 
 /// Candidates whose coefficients a motion is designed for where no twin says which are in question: the rigid body, motors and friction.
 const FAMILIES: [Family; 7] = [
@@ -149,12 +150,17 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
         limits: &limits,
         surroundings: &stated.surroundings,
         world: &world,
+        kinds: (0..known.robot.dof())
+            .map(|joint| known.robot.joint_kind(joint))
+            .collect(),
     };
     let json = design_json(&found, &about)?;
     let motion = &found.motion;
     let files = vec![
         (MOTION, motion_csv(motion).into_bytes()),
+        (TABLE, motion_parquet(motion)?),
         (DESIGN, json.clone()),
+        (PAGE, design_page(&found, &about)?.into_bytes()),
         (TRAJECTORY, joint_trajectory(motion).into_bytes()),
         (KEYFRAMES, mujoco_keyframes(motion).into_bytes()),
     ];
@@ -251,89 +257,30 @@ fn print_promises(found: &Design, terminal: &mut Terminal) {
         return;
     }
     let mut rows = table(&["effect", "PIP now", "decided rightly", "wrongly", "sd then"]);
-    let percent = |share: f64| format!("{} %", (100.0 * share).round());
     for promise in &found.promises {
         rows.add_row([
             promise.effect.clone(),
-            number(promise.pip, 2),
-            percent(promise.right),
-            percent(promise.wrong),
+            words::chance(promise.pip),
+            words::share(promise.right),
+            words::share(promise.wrong),
             promise.sd.map_or_else(|| "–".into(), |sd| number(sd, 2)),
         ]);
     }
     print_table(&rows, terminal);
     for promise in found.promises.iter().filter(|own| own.structural) {
-        let text = format!(
-            "{}: no motion of this robot tells it from the others; a known load or another base pose does.",
-            promise.effect
-        );
-        paragraph(&text, terminal);
+        paragraph(&words::undecidable(&promise.effect), terminal);
     }
     terminal.say("");
 }
 
-/// How close the motion comes, and what was assumed.
-fn print_clearance(found: &Design, world: &CollisionWorld, terminal: &mut Terminal) {
-    let margin = number(world.margin(), 3);
-    let text = match &found.closest {
-        Some(own) => format!(
-            "Smallest distance {} m ({} and {}, at {} s); margin {margin} m.",
-            number(own.distance, 3),
-            own.between[0],
-            own.between[1],
-            number(own.time, 3)
-        ),
-        None => format!("Nothing comes close; margin {margin} m."),
-    };
-    paragraph(&text, terminal);
-    for own in &world.assumed {
-        let instead = match own.radius > 0.0 {
-            true => format!(
-                "a capsule of radius {} m stands for it",
-                number(own.radius, 2)
-            ),
-            false => "nothing stands for it".into(),
-        };
-        paragraph(
-            &format!("{}: {}; {instead}.", own.link, own.reason),
-            terminal,
-        );
-    }
-    let pairs = world.ignored.iter().map(|own| own.between.join(" and "));
-    let pairs: Vec<String> = pairs.collect();
-    if !pairs.is_empty() {
-        paragraph(
-            &format!("Not checked against each other: {}.", pairs.join("; ")),
-            terminal,
-        );
-    }
-}
-
 fn print(found: &Design, within: &Within<'_>, output: &Path, terminal: &mut Terminal) {
-    let motion = &found.motion;
-    let early = match found.stopped {
-        true => ", ended early",
-        false => "",
-    };
-    terminal.heading(&format!(
-        "Motion of {} s at {} Hz{early}",
-        number((motion.len - 1) as f64 / motion.rate, 3),
-        number(motion.rate, 4)
-    ));
-    paragraph(
-        &format!(
-            "{} base parameters: ln det {}, condition number {}.",
-            found.columns,
-            number(found.log_determinant, 3),
-            number(found.condition, 3)
-        ),
-        terminal,
-    );
+    terminal.heading(&words::headline(found));
+    paragraph(&words::information(found), terminal);
     terminal.say("");
     print_promises(found, terminal);
     let mut rows = table(&["joint", "from", "to", "velocity", "acceleration", "jerk"]);
     for used in &found.used {
-        let share = |at: usize| format!("{} %", (100.0 * used.share[at]).round());
+        let share = |at: usize| words::share(used.share[at]);
         rows.add_row([
             used.joint.clone(),
             number(used.position[0], 3),
@@ -344,29 +291,13 @@ fn print(found: &Design, within: &Within<'_>, output: &Path, terminal: &mut Term
         ]);
     }
     print_table(&rows, terminal);
-    terminal.say("Shares are of the limits, by the control points that bound them.");
-    let assumed = |key: &str| {
-        let own = within
-            .limits
-            .iter()
-            .filter(|own| own.assumed.contains(&key));
-        own.map(|own| own.joint.as_str()).collect::<Vec<_>>()
-    };
-    for (key, rule) in [
-        ("acceleration", "velocity / 0.2 s"),
-        ("jerk", "acceleration / 0.1 s"),
-        ("position", "±π"),
-        ("start", "0, the middle, or a position that is free"),
-    ] {
-        let joints = assumed(key);
-        if !joints.is_empty() {
-            paragraph(
-                &format!("{key} limit assumed: {rule} ({})", joints.join(", ")),
-                terminal,
-            );
-        }
+    terminal.say(words::SHARES);
+    for text in words::assumed(within.limits) {
+        paragraph(&text, terminal);
     }
-    print_clearance(found, within.world, terminal);
+    for text in words::clearance(found, within.world) {
+        paragraph(&text, terminal);
+    }
     paragraph(WARNING, terminal);
     terminal.say(&output.join(MOTION).to_string_lossy());
 }

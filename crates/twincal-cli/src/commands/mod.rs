@@ -27,7 +27,7 @@ mod summary;
 mod table;
 mod verdict;
 
-use crate::args::Command;
+use crate::args::{Command, Described};
 use crate::failure::{Failure, Outcome};
 use crate::terminal::Terminal;
 use serde::Serialize;
@@ -57,8 +57,12 @@ pub(crate) fn run(command: &Command, terminal: &mut Terminal) -> Outcome<u8> {
             terminal.data(&String::from_utf8_lossy(&script));
             Ok(0)
         }
-        Command::Schema => {
-            terminal.data(&twincal_io::config::schema());
+        Command::Schema(flags) => {
+            terminal.data(&match flags.of {
+                Described::Config => twincal_io::config::schema(),
+                Described::Limits => twincal_io::design::limits_schema(),
+                Described::Design => twincal_io::design::design_schema(),
+            });
             Ok(0)
         }
     }

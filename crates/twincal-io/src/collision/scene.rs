@@ -6,6 +6,7 @@ use super::{CollisionWorld, Placed, mesh, pose, poses};
 use crate::error::{Error, Result};
 use crate::model::{Form, Geometry, LinkShape};
 use parry3d_f64::math::{Pose, Vector};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -51,7 +52,8 @@ impl Default for Surroundings {
 }
 
 /// A box with its edges along the axes of the base.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct StatedBox {
     /// Name in what is said.
     pub name: String,
@@ -66,7 +68,7 @@ pub struct StatedBox {
 }
 
 /// The allowed side of a box.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Keep {
     /// An obstacle.
@@ -77,7 +79,8 @@ pub enum Keep {
 }
 
 /// A link whose geometry is not known: a capsule stands for it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct AssumedShape {
     /// Name of the link.
     pub link: String,
@@ -88,7 +91,8 @@ pub struct AssumedShape {
 }
 
 /// Two links that are not looked at.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct IgnoredPair {
     /// Names of the links.
     pub between: [String; 2],

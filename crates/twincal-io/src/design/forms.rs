@@ -10,19 +10,28 @@ const MESSAGE_RATE: f64 = 100.0;
 /// `t, q1…, qd1…, qdd1…`: s, rad, rad/s, rad/s² (m for sliders).
 #[must_use]
 pub fn motion_csv(motion: &DesignedMotion) -> String {
-    let dof = motion.joints.len();
-    let names = ["q", "qd", "qdd"].into_iter();
-    let names = names.flat_map(|name| (1..=dof).map(move |j| format!(",{name}{j}")));
-    let mut text = format!("t{}\n", names.collect::<String>());
+    let mut text = format!("{}\n", column_names(motion.joints.len()).join(","));
     for k in 0..motion.len {
         // Writing to a string cannot fail.
         let _ = write!(text, "{}", k as f64 / motion.rate);
-        for all in [&motion.q, &motion.qd, &motion.qdd] {
+        for all in quantities(motion) {
             let _ = write!(text, ",{}", row(motion, all, k, ","));
         }
         text.push('\n');
     }
     text
+}
+
+/// Columns of the motion's table.
+pub(super) fn column_names(dof: usize) -> Vec<String> {
+    let names = ["q", "qd", "qdd"].into_iter();
+    let names = names.flat_map(|name| (1..=dof).map(move |j| format!("{name}{j}")));
+    std::iter::once("t".to_owned()).chain(names).collect()
+}
+
+/// Position, velocity and acceleration, `[joint * len + sample]`.
+pub(super) fn quantities(motion: &DesignedMotion) -> [&[f64]; 3] {
+    [&motion.q, &motion.qd, &motion.qdd]
 }
 
 /// Samples that stand in messages: evenly, the last one included.

@@ -3,8 +3,10 @@
 use super::WARNING;
 use crate::collision::{AssumedShape, CollisionWorld, IgnoredPair, StatedBox, Surroundings};
 use crate::error::{Error, Result};
+use schemars::JsonSchema;
 use serde::Serialize;
 use twincal::design::{Approach, Design, DesignSettings, JointLimits, JointUse, Promise};
+use twincal::robot::JointKind;
 
 /// Version of the format.
 const SCHEMA: u64 = 1;
@@ -22,41 +24,217 @@ pub struct About<'a> {
     pub surroundings: &'a Surroundings,
     /// Its geometry.
     pub world: &'a CollisionWorld,
+    /// Kind of each joint: sliders move in m.
+    pub kinds: Vec<JointKind>,
 }
 
-/// What was looked at for collisions.
-#[derive(Debug, Serialize)]
+/// What was looked at for collisions; lengths in m.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, rename = "Clearance")]
 struct ClearanceJson<'a> {
+    /// Smallest distance that is allowed.
     margin: f64,
+    /// Height of the floor over the origin of the base; null: no floor.
     floor: Option<f64>,
+    /// Boxes to stay out of, or in.
     boxes: &'a [StatedBox],
+    /// Pairs of things that were looked at.
     pairs: usize,
-    closest: Option<&'a Approach>,
+    /// The smallest distance of the motion; null: nothing comes close.
+    closest: Option<Closest<'a>>,
+    /// Links whose geometry is assumed.
     assumed: &'a [AssumedShape],
+    /// Pairs of links that were not looked at, or without the margin.
     ignored: &'a [IgnoredPair],
 }
 
-#[derive(Debug, Serialize)]
+/// Two things, how far they are apart, and when.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+struct Closest<'a> {
+    /// Names of links, boxes or the floor.
+    between: [&'a str; 2],
+    /// m.
+    distance: f64,
+    /// s since the motion's start.
+    time: f64,
+}
+
+impl<'a> From<&'a Approach> for Closest<'a> {
+    fn from(own: &'a Approach) -> Self {
+        Self {
+            between: [&own.between[0], &own.between[1]],
+            distance: own.distance,
+            time: own.time,
+        }
+    }
+}
+
+/// What a designed motion shows, what it stays within and how much of that it uses.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, title = "design.json of twincal")]
 struct DesignJson<'a> {
+    /// Version of the format.
+    #[schemars(extend("const" = SCHEMA))]
     schema: u64,
+    /// Version of the program.
     twincal: &'static str,
+    /// What to know before the motion runs.
     warning: &'static str,
+    /// Name of the model.
     model: &'a str,
+    /// Length that was asked for, s.
     duration: f64,
+    /// Rate of the samples, Hz.
     rate: f64,
+    /// Seed of all random numbers.
     seed: u64,
+    /// Samples of the motion, both ends included.
     samples: usize,
+    /// The search was ended early: the motion is the best one until then.
     stopped: bool,
+    /// Independent base parameters.
     base_parameters: usize,
+    /// ln det of the rows' information on the base parameters, scaled to torque of size 1; null: not finite.
+    #[schemars(extend("type" = ["number", "null"]))]
     log_determinant: f64,
+    /// Condition number of the rows: largest over smallest singular value; null: not finite.
+    #[schemars(extend("type" = ["number", "null"]))]
     condition: f64,
-    limits: &'a [JointLimits],
-    promises: &'a [Promise],
-    used: &'a [JointUse],
+    /// Limits in force, joint by joint in the order of the columns.
+    limits: Vec<InForce<'a>>,
+    /// What the motion is expected to say of each open effect; empty without a twin.
+    promises: Vec<Expected<'a>>,
+    /// How much of its limits each joint uses.
+    used: Vec<Used<'a>>,
+    /// What was looked at for collisions.
     clearance: ClearanceJson<'a>,
 }
 
-/// The file.
+/// Limits of one joint in force: rad, rad/s, rad/s², rad/s³, N·m; m and N for sliders.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, rename = "Limits")]
+struct InForce<'a> {
+    /// Name of the joint.
+    joint: &'a str,
+    /// Smallest and largest position.
+    position: [f64; 2],
+    /// Largest speed.
+    velocity: f64,
+    /// Largest acceleration.
+    acceleration: f64,
+    /// Largest jerk.
+    jerk: f64,
+    /// Largest torque; null: not limited.
+    torque: Option<f64>,
+    /// Position at the start and at the end.
+    start: f64,
+    /// Keys of limits that nobody stated.
+    assumed: &'a [&'static str],
+}
+
+impl<'a> From<&'a JointLimits> for InForce<'a> {
+    fn from(own: &'a JointLimits) -> Self {
+        let JointLimits {
+            joint,
+            position,
+            velocity,
+            acceleration,
+            jerk,
+            torque,
+            start,
+            assumed,
+        } = own;
+        Self {
+            joint,
+            position: *position,
+            velocity: *velocity,
+            acceleration: *acceleration,
+            jerk: *jerk,
+            torque: *torque,
+            start: *start,
+            assumed,
+        }
+    }
+}
+
+/// What the motion is expected to say of one effect, by simulation from the posterior.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, rename = "Promise")]
+struct Expected<'a> {
+    /// Name of the effect.
+    effect: &'a str,
+    /// Its posterior inclusion probability now.
+    pip: f64,
+    /// Probability that its PIP leaves 0.05 to 0.95 on the side of the truth.
+    right: f64,
+    /// Probability that its PIP leaves 0.05 to 0.95 on the other side.
+    wrong: f64,
+    /// Median standard deviation of its first coefficient afterwards, where it is there.
+    sd: Option<f64>,
+    /// No motion of this robot distinguishes it from the others.
+    structural: bool,
+}
+
+impl<'a> From<&'a Promise> for Expected<'a> {
+    fn from(own: &'a Promise) -> Self {
+        let Promise {
+            effect,
+            pip,
+            right,
+            wrong,
+            sd,
+            structural,
+        } = own;
+        Self {
+            effect,
+            pip: *pip,
+            right: *right,
+            wrong: *wrong,
+            sd: *sd,
+            structural: *structural,
+        }
+    }
+}
+
+/// How much of its limits one joint uses, by the control points that bound them.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, rename = "Use")]
+struct Used<'a> {
+    /// Name of the joint.
+    joint: &'a str,
+    /// Smallest and largest position.
+    position: [f64; 2],
+    /// Largest velocity, acceleration and jerk as a share of their limits.
+    share: [f64; 3],
+}
+
+impl<'a> From<&'a JointUse> for Used<'a> {
+    fn from(own: &'a JointUse) -> Self {
+        let JointUse {
+            joint,
+            position,
+            share,
+        } = own;
+        Self {
+            joint,
+            position: *position,
+            share: *share,
+        }
+    }
+}
+
+/// The JSON Schema of `design.json`, as published in `schema/design.schema.json`.
+#[must_use]
+pub fn design_schema() -> String {
+    let settings = schemars::generate::SchemaSettings::draft2020_12().for_serialize();
+    let schema = settings
+        .into_generator()
+        .into_root_schema_for::<DesignJson<'_>>();
+    format!("{:#}\n", schema.to_value())
+}
+
+/// The file, see `schema/design.schema.json`.
 ///
 /// # Errors
 /// [`Error::Internal`] if it cannot be written as JSON.
@@ -74,15 +252,15 @@ pub fn design_json(design: &Design, about: &About<'_>) -> Result<Vec<u8>> {
         base_parameters: design.columns,
         log_determinant: design.log_determinant,
         condition: design.condition,
-        limits: about.limits,
-        promises: &design.promises,
-        used: &design.used,
+        limits: about.limits.iter().map(InForce::from).collect(),
+        promises: design.promises.iter().map(Expected::from).collect(),
+        used: design.used.iter().map(Used::from).collect(),
         clearance: ClearanceJson {
             margin: about.surroundings.margin,
             floor: about.surroundings.floor,
             boxes: &about.surroundings.boxes,
             pairs: about.world.pairs(),
-            closest: design.closest.as_ref(),
+            closest: design.closest.as_ref().map(Closest::from),
             assumed: &about.world.assumed,
             ignored: &about.world.ignored,
         },
@@ -93,4 +271,67 @@ pub fn design_json(design: &Design, about: &About<'_>) -> Result<Vec<u8>> {
     })?;
     bytes.push(b'\n');
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::fixture;
+    use serde_json::Value;
+
+    #[test]
+    fn published_schema_is_current() {
+        let path = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../schema/design.schema.json"
+        );
+        let published = std::fs::read_to_string(path).unwrap_or_default();
+        assert!(
+            published == design_schema(),
+            "schema/design.schema.json is stale: write it anew with `twincal schema design`"
+        );
+    }
+
+    /// Keys of a value and of what describes it are the same ones, and all are required.
+    fn same_keys(value: &Value, schema: &Value, of: &str) {
+        let said: Vec<_> = value.as_object().expect(of).keys().collect();
+        let described: Vec<_> = schema["properties"].as_object().expect(of).keys().collect();
+        assert_eq!(said, described, "{of}");
+        assert_eq!(
+            schema["required"].as_array().expect(of).len(),
+            said.len(),
+            "{of}"
+        );
+    }
+
+    #[test]
+    fn a_design_has_the_keys_of_its_schema() {
+        let names = ["a", "b"];
+        let (mut design, limits) = (
+            fixture::design(&names, &["x"], 100),
+            fixture::limits(&names),
+        );
+        design.condition = f64::INFINITY;
+        let settings = fixture::settings(&design);
+        let about = About {
+            model: "arm.urdf".into(),
+            settings: &settings,
+            limits: &limits,
+            surroundings: &Surroundings::default(),
+            world: &super::super::fixture::world(),
+            kinds: vec![JointKind::Revolute; 2],
+        };
+        let bytes = design_json(&design, &about).expect("JSON");
+        let value: Value = serde_json::from_slice(&bytes).expect("JSON");
+        let schema: Value = serde_json::from_str(&design_schema()).expect("JSON");
+        same_keys(&value, &schema, "design");
+        same_keys(&value["limits"][0], &schema["$defs"]["Limits"], "limits");
+        same_keys(
+            &value["promises"][0],
+            &schema["$defs"]["Promise"],
+            "promises",
+        );
+        same_keys(&value["used"][0], &schema["$defs"]["Use"], "used");
+        assert!(value["condition"].is_null() && value["limits"][1]["torque"].is_null());
+    }
 }

@@ -25,6 +25,7 @@
 use crate::collision::{Keep, StatedBox, Surroundings};
 use crate::error::{Error, Place, Result};
 use crate::open::InputFile;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -44,40 +45,71 @@ pub struct Limits {
     pub surroundings: Surroundings,
 }
 
-#[derive(Debug, Default, Deserialize)]
+/// Limits of a motion, over those of the model file.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(title = "limits of twincal design")]
 struct File {
+    /// Joints by name, `[joint.NAME]`.
     #[serde(default)]
     joint: BTreeMap<String, JointTable>,
+    /// Smallest distance between any two things, m; without it 0.02.
     margin: Option<f64>,
+    /// Height of a floor over the origin of the base, against gravity, m; without it there is no floor.
     floor: Option<f64>,
+    /// Pairs of links that are not checked against each other.
     #[serde(default)]
     ignore: Vec<[String; 2]>,
+    /// Boxes with their edges along the axes of the base.
     #[serde(default, rename = "box")]
     boxes: Vec<BoxTable>,
 }
 
-#[derive(Debug, Deserialize)]
+/// A box to stay out of, or in.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "Box")]
 struct BoxTable {
+    /// Name in what is said.
     name: String,
+    /// Smallest coordinates, m.
     low: [f64; 3],
+    /// Largest coordinates, m.
     high: [f64; 3],
+    /// Which side is allowed.
     #[serde(default)]
     keep: Keep,
+    /// Links or frames that it is for; without it all that move.
     #[serde(default)]
     links: Vec<String>,
 }
 
-#[derive(Debug, Clone, Copy, Default, Deserialize)]
+/// `[joint.NAME]`: limits of one joint; of a slider in m and N.
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct JointTable {
+    /// Smallest and largest position, rad.
     position: Option<[f64; 2]>,
+    /// Largest speed, rad/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     velocity: Option<f64>,
+    /// Largest acceleration, rad/s²; default: velocity / 0.2 s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     acceleration: Option<f64>,
+    /// Largest jerk, rad/s³; default: acceleration / 0.1 s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     jerk: Option<f64>,
+    /// Largest torque, N·m; default: that of the model file, else not limited.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     torque: Option<f64>,
+    /// Position at the motion's start and end, rad; default: 0, or the middle where 0 is outside.
     start: Option<f64>,
+}
+
+/// The JSON Schema of a limits file, as published in `schema/limits.schema.json`.
+#[must_use]
+pub fn limits_schema() -> String {
+    format!("{:#}\n", schemars::schema_for!(File).to_value())
 }
 
 /// Reads limits from a file.
@@ -137,6 +169,19 @@ fn parse(name: &str, text: &str) -> Result<Limits> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn published_schema_is_current() {
+        let path = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../schema/limits.schema.json"
+        );
+        let published = std::fs::read_to_string(path).unwrap_or_default();
+        assert!(
+            published == limits_schema(),
+            "schema/limits.schema.json is stale: write it anew with `twincal schema limits`"
+        );
+    }
 
     #[test]
     fn stated_limits_are_read() {

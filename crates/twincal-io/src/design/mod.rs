@@ -1,15 +1,29 @@
 //! What `twincal design` reads and writes: limits of joints, and a motion in the forms that controllers and simulators take.
 
+#[cfg(test)]
+mod fixture;
 mod forms;
 mod json;
 mod limits;
+#[cfg(feature = "report")]
+mod page;
+#[cfg(feature = "tables")]
+mod parquet;
 
 pub use forms::{joint_trajectory, motion_csv, mujoco_keyframes};
-pub use json::{About, design_json};
-pub use limits::{Limits, read_limits};
+pub use json::{About, design_json, design_schema};
+pub use limits::{Limits, limits_schema, read_limits};
+#[cfg(feature = "report")]
+pub use page::design_page;
+#[cfg(feature = "tables")]
+pub use parquet::motion_parquet;
 
 /// The motion as a table.
 pub const MOTION: &str = "motion.csv";
+/// The same table in Parquet.
+pub const TABLE: &str = "motion.parquet";
+/// What it shows, for people.
+pub const PAGE: &str = "design.html";
 /// What it shows, for programs.
 pub const DESIGN: &str = "design.json";
 /// The motion as a ROS 2 `trajectory_msgs/JointTrajectory`.

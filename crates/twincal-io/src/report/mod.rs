@@ -6,10 +6,12 @@
 //! script the page shows the same figures, still. The same calibration gives the same bytes.
 
 mod ambiguity;
+pub(crate) mod design;
 mod effects;
 mod figure;
 mod figures;
 mod findings;
+#[cfg(feature = "tables")]
 pub(crate) mod fleet;
 mod first_screen;
 mod honesty;

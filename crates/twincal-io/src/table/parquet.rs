@@ -5,6 +5,7 @@ use crate::log::stamps;
 use parquet::basic::{Compression, Repetition, Type as Physical, ZstdLevel};
 use parquet::data_type::{BoolType, DoubleType};
 use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
@@ -38,6 +39,12 @@ impl<W: Write + Send> ParquetTable<W> {
             writer: writer.map_err(io_error)?,
             waiting: waiting.collect(),
         })
+    }
+
+    /// Keeps a text under `key` in the file's metadata.
+    pub(super) fn keep(&mut self, key: &str, text: &str) {
+        self.writer
+            .append_key_value_metadata(KeyValue::new(key.to_owned(), text.to_owned()));
     }
 
     /// Adds rows; blocks are those of the columns.
@@ -108,7 +115,7 @@ fn schema(columns: &[(String, ColumnKind)]) -> std::result::Result<Arc<Type>, Pa
                 .map(Arc::new)
         })
         .collect::<std::result::Result<Vec<_>, _>>()?;
-    Type::group_type_builder("predictions")
+    Type::group_type_builder("table")
         .with_fields(fields)
         .build()
         .map(Arc::new)

@@ -5,6 +5,7 @@ mod beyond;
 #[cfg(feature = "report")]
 mod compact;
 mod date;
+pub mod design;
 mod family;
 #[cfg(feature = "tables")]
 pub mod fleet;

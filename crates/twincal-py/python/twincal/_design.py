@@ -20,7 +20,7 @@ class Motion:
     Attributes
     ----------
     folder : pathlib.Path
-        Where `motion.csv`, `trajectory.yaml`, `keyframes.xml` and `design.json` are.
+        Where `motion.csv`, `motion.parquet`, `trajectory.yaml`, `keyframes.xml`, `design.json` and `design.html` are.
     joint_names : list of str
         Joints, in the order of the columns.
     t : numpy.ndarray, shape (samples,)

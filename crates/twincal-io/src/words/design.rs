@@ -1,0 +1,227 @@
+//! What a designed motion is and what it is expected to decide, in sentences and cells of tables.
+
+use super::number::{THIN, fixed, number, probability};
+use crate::collision::CollisionWorld;
+use twincal::design::{Design, JERK_TIME, JointLimits, SPEED_UP};
+use twincal::words::{listed, shortened};
+
+/// What shares of limits are.
+pub const SHARES: &str = "Shares are of the limits, by the control points that bound them.";
+
+/// What it means that a motion decides an effect.
+pub const DECIDED: &str = "Decided: the PIP leaves 0.05 to 0.95 in logs simulated from the posterior. \
+    Expected sd: median sd of the first coefficient afterwards, in SI units, where the effect is there.";
+/// Stands where a limit would.
+pub const NOT_LIMITED: &str = "not limited";
+
+/// Length and rate: "Motion of 20 s at 500 Hz".
+#[must_use]
+pub fn headline(design: &Design) -> String {
+    let motion = &design.motion;
+    let seconds = motion.len.saturating_sub(1) as f64 / motion.rate;
+    let early = match design.stopped {
+        true => ", ended early",
+        false => "",
+    };
+    format!(
+        "Motion of {} s at {} Hz{early}",
+        round(seconds),
+        round(motion.rate)
+    )
+}
+
+/// What the motion was designed for.
+#[must_use]
+pub fn purpose(design: &Design) -> String {
+    match design.promises.len() {
+        0 => "Designed to show body, motors and friction.".into(),
+        1 => "Designed to decide 1 effect of the twin.".into(),
+        n => format!("Designed to decide {n} effects of the twin."),
+    }
+}
+
+/// What its rows say of the base parameters.
+#[must_use]
+pub fn information(design: &Design) -> String {
+    format!(
+        "{} base parameters: ln det {}, condition number {}.",
+        design.columns,
+        number(design.log_determinant, 3),
+        number(design.condition, 3)
+    )
+}
+
+/// How close the motion comes to the robot itself and to what stands around it, and what was assumed of that.
+#[must_use]
+pub fn clearance(design: &Design, world: &CollisionWorld) -> Vec<String> {
+    let margin = number(world.margin(), 3);
+    let mut said = vec![match &design.closest {
+        Some(closest) => format!(
+            "Smallest distance {} m ({} and {}, at {} s); margin {margin} m.",
+            number(closest.distance, 3),
+            shortened(&closest.between[0]),
+            shortened(&closest.between[1]),
+            number(closest.time, 3)
+        ),
+        None => format!("Nothing comes close; margin {margin} m."),
+    }];
+    for assumed in &world.assumed {
+        let instead = match assumed.radius > 0.0 {
+            true => format!(
+                "a capsule of radius {} m instead",
+                number(assumed.radius, 2)
+            ),
+            false => "left out".into(),
+        };
+        said.push(format!(
+            "{}: {}; {instead}.",
+            shortened(&assumed.link),
+            assumed.reason
+        ));
+    }
+    let named = |touching: bool| {
+        let pairs = world.ignored.iter();
+        let pairs = pairs.filter(|pair| (pair.reason == "touching") == touching);
+        let names = pairs.map(|pair| {
+            format!(
+                "{} and {}",
+                shortened(&pair.between[0]),
+                shortened(&pair.between[1])
+            )
+        });
+        names.collect::<Vec<_>>().join("; ")
+    };
+    let kinds = [
+        (named(false), "Not checked against each other"),
+        (named(true), "Checked for contact, without the margin"),
+    ];
+    let pairs = kinds.into_iter().filter(|(pairs, _)| !pairs.is_empty());
+    said.extend(pairs.map(|(pairs, what)| format!("{what}: {pairs}.")));
+    said
+}
+
+/// An effect that no motion decides, and what does.
+#[must_use]
+pub fn undecidable(effect: &str) -> String {
+    format!(
+        "{effect}: no motion of this robot distinguishes it from the others; a known load or another base pose does."
+    )
+}
+
+/// Limits that nobody stated, with the rule that gave them and the joints.
+#[must_use]
+pub fn assumed(limits: &[JointLimits]) -> Vec<String> {
+    let rules = [
+        ("acceleration", format!("velocity / {SPEED_UP} s")),
+        ("jerk", format!("acceleration / {JERK_TIME} s")),
+        ("position", "±π".to_owned()),
+        (
+            "start",
+            "0, the middle, or a position that is free".to_owned(),
+        ),
+    ];
+    let said = rules.into_iter().filter_map(|(key, rule)| {
+        let joints = limits.iter().filter(|own| own.assumed.contains(&key));
+        let names: Vec<_> = joints.map(|own| shortened(&own.joint)).collect();
+        let names = match names.len() {
+            0 => return None,
+            n if n == limits.len() && n > 1 => "all joints".to_owned(),
+            _ => listed(&names, ", "),
+        };
+        Some(format!("{key} limit assumed: {rule} ({names})"))
+    });
+    said.collect()
+}
+
+/// A probability, never rounded to certainty.
+#[must_use]
+pub fn chance(p: f64) -> String {
+    probability(p)
+}
+
+/// A share as whole per cent; "–" if it is no number.
+#[must_use]
+pub fn share(share: f64) -> String {
+    match share.is_finite() {
+        true => format!("{}{THIN}%", fixed(100.0 * share, 0)),
+        false => "–".into(),
+    }
+}
+
+/// What the motion uses of a limit.
+#[must_use]
+pub fn used(part: f64) -> String {
+    format!("{} used", share(part))
+}
+
+/// Positions that the motion stays between.
+#[must_use]
+pub fn range_used([low, high]: [f64; 2]) -> String {
+    format!("{} to {} used", number(low, 3), number(high, 3))
+}
+
+/// What a figure of a joint's motion shows.
+#[must_use]
+pub fn curve(joint: &str, quantity: &str, unit: &str, [low, high]: [f64; 2]) -> String {
+    format!(
+        "{quantity} of {joint} over time, limits {} and {} {unit}",
+        number(low, 3),
+        number(high, 3)
+    )
+}
+
+/// Four digits at most: 500, 2.5, 333.3.
+fn round(x: f64) -> String {
+    let text = number(x, 4);
+    match text.contains('.') && !text.contains('⁻') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn limits(joint: &str, assumed: &[&'static str]) -> JointLimits {
+        JointLimits {
+            joint: joint.into(),
+            position: [-1.0, 1.0],
+            velocity: 1.0,
+            acceleration: 5.0,
+            jerk: 50.0,
+            torque: None,
+            start: 0.0,
+            assumed: assumed.to_vec(),
+        }
+    }
+
+    #[test]
+    fn lengths_and_rates_have_no_empty_digits() {
+        let texts = [20.0, 500.0, 2.5, 1000.0 / 3.0, 8000.0].map(round);
+        assert_eq!(texts, ["20", "500", "2.5", "333.3", "8000"]);
+    }
+
+    #[test]
+    fn an_assumed_limit_has_its_rule_and_its_joints() {
+        let both = [
+            limits("a", &["acceleration", "jerk"]),
+            limits("b", &["jerk", "position"]),
+        ];
+        assert_eq!(
+            assumed(&both),
+            [
+                "acceleration limit assumed: velocity / 0.2 s (a)",
+                "jerk limit assumed: acceleration / 0.1 s (all joints)",
+                "position limit assumed: ±π (b)"
+            ]
+        );
+        assert!(assumed(&[limits("a", &[])]).is_empty());
+    }
+
+    #[test]
+    fn a_share_is_whole_per_cent() {
+        assert_eq!(share(0.9749), "97\u{202f}%");
+        assert_eq!(share(f64::NAN), "–");
+    }
+}
