@@ -271,3 +271,73 @@ def test_limits_in_the_docs_are_limits(names):
     block = text.split("```toml\n")[1].split("```")[0]
     keys = {key for own in tomllib.loads(block)["joint"].values() for key in own}
     assert keys == {"position", "velocity", "acceleration", "jerk", "torque", "start"}
+
+
+def clearance(folder):
+    return json.loads((folder / "motion" / "design.json").read_text())["clearance"]
+
+
+def test_geometry_that_is_missing_is_assumed_and_said(tmp_path, stated):
+    """The example's links have no geometry: capsules, of 8 % of its reach."""
+    said = design(tmp_path, "--duration", 3, *limits(tmp_path, stated(200.0)))
+    own = clearance(tmp_path)
+    assert own["assumed"] and all(one["reason"] == "the model has no geometry" for one in own["assumed"])
+    assert len({one["radius"] for one in own["assumed"]}) == 1
+    assert "capsule of radius" in said.stdout and "no geometry" in said.stdout
+
+
+def test_what_stands_around_is_kept_clear(tmp_path, stated):
+    """A wall in front of where the free motion was: the motion ends before it."""
+    model = pin.buildModelFromUrdf(str(ARM))
+    data, tip = model.createData(), model.nframes - 1
+
+    def reach(folder):
+        _, rows = table(folder)
+        places = []
+        for q in rows[::5, 1 : 1 + model.nq]:
+            pin.framesForwardKinematics(model, data, q)
+            places.append(data.oMf[tip].translation.copy())
+        return np.array(places)
+
+    text = stated(200.0)
+    design(tmp_path, "--duration", 6, *limits(tmp_path, text))
+    free = reach(tmp_path)
+    name = model.frames[tip].name
+    axis = int(np.argmax(np.ptp(free, axis=0)))
+    wall = float(free[0, axis] + 0.5 * (free[:, axis].max() - free[0, axis]))
+    low, high = [-9.0, -9.0, -9.0], [9.0, 9.0, 9.0]
+    high[axis] = wall
+    box = f'[[box]]\nname = "cell"\nlow = {low}\nhigh = {high}\nkeep = "inside"\nlinks = ["{name}"]\n'
+    design(tmp_path, "--duration", 6, *limits(tmp_path, "margin = 0.01\n" + text + box))
+    assert free[:, axis].max() > wall
+    assert reach(tmp_path)[:, axis].max() <= wall - 0.01 + 1e-4
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "says"),
+    [
+        ("floor = 30.0\n", 4, "`floor`"),
+        ("margin = -1.0\n", 2, "-1 m"),
+        ('ignore = [["nolink", "x"]]\n', 2, "nolink"),
+        ('[[box]]\nname = "b"\nlow = [0, 0, 0]\nhigh = [1, -1, 1]\n', 2, "`b`"),
+        ('[[box]]\nname = "b"\nlow = [0, 0, 0]\n', 2, "high"),
+    ],
+)
+def test_impossible_surroundings_are_refused(tmp_path, stated, text, code, says):
+    own = stated(200.0)
+    own = text + own if "[[" not in text or "ignore" in text else own + text
+    done = design(tmp_path, "--duration", 3, *limits(tmp_path, own), code=code)
+    assert says in done.stderr
+    assert not (tmp_path / "motion").exists()
+
+
+@pytest.mark.parametrize("robot", ["ur5"])
+def test_meshes_do_not_touch_in_mujoco(tmp_path, monkeypatch, robot):
+    """One motion of the study: from a random start, over a floor and beside a box, distances by MuJoCo on the same meshes."""
+    spec = importlib.util.spec_from_file_location("contacts", ROOT / "studies" / "design" / "contacts.py")
+    contacts = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(contacts)
+    monkeypatch.setattr(contacts, "SECONDS", 4.0)
+    line = contacts.one(program("twincal"), contacts.Robot(robot), 2, tmp_path)
+    assert line["broken"] == [] and not line["too_close"], line
+    assert line["pairs"] > 10 and abs(line["mujoco"] - line["said"]["distance"]) < 0.005, line

@@ -5,9 +5,9 @@ use parry3d_f64::query::gjk::{CsoPoint, GJKResult, VoronoiSimplex, closest_point
 use parry3d_f64::shape::SupportMap;
 
 /// Directions in which a hull keeps its outermost points.
-const DIRECTIONS: usize = 120;
+const DIRECTIONS: usize = 250;
 /// Points of a ball's hull that stand this much outside it: the hull then holds the ball.
-const OUTSIDE: f64 = 1.05;
+const OUTSIDE: f64 = 1.02;
 
 /// A convex solid in a frame of its body.
 #[derive(Debug, Clone, PartialEq)]

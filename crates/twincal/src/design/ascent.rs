@@ -20,7 +20,7 @@ use crate::linear_algebra::{Cholesky, dot};
 /// Factors on the motion about its start, of which the first that is within torque and clearance counts: a climb begins inside its limits.
 const INSIDE: [f64; 4] = [0.97, 0.98, 0.99, 0.995];
 /// Weight of the barriers at the beginning and at the end.
-const BARRIER: [f64; 2] = [0.3, 0.003];
+const BARRIER: [f64; 2] = [0.5, 0.05];
 /// Step of a difference, as a share of a limit.
 const DIFFERENCE: f64 = 1e-6;
 /// Least distance from a limit that the metric sees, as a share of its range.
@@ -34,6 +34,17 @@ const HALVINGS: usize = 10;
 /// Largest share of a torque limit that the barrier sees.
 const FULL: f64 = 0.9999;
 
+/// Moments that are watched at most; the oldest goes first.
+const MOMENTS: usize = 60;
+
+/// What comes of a step.
+enum Tried {
+    Good(Found),
+    /// Something comes too close, at this time, s.
+    TooClose(f64),
+    Bad,
+}
+
 /// A motion that climbs.
 pub(super) struct Climb<'a> {
     task: &'a Task<'a>,
@@ -45,10 +56,25 @@ pub(super) struct Climb<'a> {
     now: Found,
     best: Found,
     before: Option<Before>,
+    /// Moments between the samples at which something came too close: the barrier looks there, too.
+    watched: Vec<Moment>,
     /// What forbade every change before, until a step is made.
     refused: Option<String>,
     /// Share of the way to the nearest limit that the next step tries.
     reach: f64,
+}
+
+/// A moment of a motion.
+struct Moment {
+    span: usize,
+    weights: StateWeights,
+}
+
+impl Moment {
+    fn position(&self, splines: &[Spline]) -> Vec<f64> {
+        let at = |spline: &Spline| spline.state(self.span, &self.weights)[0];
+        splines.iter().map(at).collect()
+    }
 }
 
 /// What the last step leaves for the next direction.
@@ -77,6 +103,7 @@ impl<'a> Climb<'a> {
             best: found,
             now,
             before: None,
+            watched: Vec::new(),
             refused,
             reach: 0.5,
         }
@@ -143,65 +170,88 @@ impl<'a> Climb<'a> {
         if !(slope > 0.0 && most > 0.0 && most.is_finite()) {
             return false;
         }
-        let here = self.now.value + weight * self.barrier(&self.states());
+        let here = self.now.value + weight * self.barrier(&self.now.splines, &self.states());
         let mut step = (2.0 * self.reach).min(NEARLY) * most;
+        let mut close = None;
         for _ in 0..HALVINGS {
             let needed = here + GAINED * step * slope;
-            if let Some(found) = self.tried(&whole, step, (weight, needed)) {
-                self.reach = step / most;
-                self.now = found;
-                self.refused = None;
-                if self.now.value > self.best.value {
-                    self.best = self.now.clone();
+            match self.tried(&whole, step, (weight, needed)) {
+                Tried::Good(found) => {
+                    self.reach = step / most;
+                    self.now = found;
+                    self.refused = None;
+                    if self.now.value > self.best.value {
+                        self.best = self.now.clone();
+                    }
+                    return true;
                 }
-                return true;
+                Tried::TooClose(time) => close = Some(time),
+                Tried::Bad => {}
             }
             step *= 0.5;
+        }
+        if let Some(time) = close {
+            self.watch(time);
         }
         false
     }
 
+    /// Looks at a moment from now on.
+    fn watch(&mut self, time: f64) {
+        let place = (time / self.now.splines[0].span).clamp(0.0, self.spans as f64);
+        let span = (place as usize).min(self.spans - 1);
+        let weights = StateWeights::at(place - span as f64);
+        let moment = Moment { span, weights };
+        if self.watched.len() == MOMENTS {
+            self.watched.remove(0);
+        }
+        self.watched.push(moment);
+        self.before = None;
+    }
+
     /// The motion a step away; `None` where F is less than needed, or torque or clearance forbid it.
-    fn tried(
-        &self,
-        direction: &[Vec<f64>],
-        step: f64,
-        (weight, needed): (f64, f64),
-    ) -> Option<Found> {
+    fn tried(&self, direction: &[Vec<f64>], step: f64, (weight, needed): (f64, f64)) -> Tried {
         let mut splines = self.now.splines.clone();
         for (spline, along) in splines.iter_mut().zip(direction) {
             (spline.points.iter_mut().zip(along)).for_each(|(c, d)| *c += step * d);
         }
         let states = states_of(&splines, 0..self.spans);
         if self.task.too_much_torque(&states).is_some() {
-            return None;
+            return Tried::Bad;
         }
         let sums = self.objective.of(&states);
         let value = self.objective.value(&sums, self.rows, self.duration);
-        let total = value + weight * self.barrier(&states);
-        let spans = 0..self.spans;
-        let forbidden = !total.is_finite()
-            || total < needed
-            || self.task.too_close(&splines, spans, PER_SPAN).is_some();
-        (!forbidden).then_some(Found {
-            splines,
-            sums,
-            value,
-        })
+        let total = value + weight * self.barrier(&splines, &states);
+        if !total.is_finite() || total < needed {
+            return Tried::Bad;
+        }
+        match self.task.too_close(&splines, 0..self.spans, PER_SPAN) {
+            Some(approach) => Tried::TooClose(approach.time),
+            None => Tried::Good(Found {
+                splines,
+                sums,
+                value,
+            }),
+        }
     }
 
     fn states(&self) -> States {
         states_of(&self.now.splines, 0..self.spans)
     }
 
-    fn barrier(&self, states: &States) -> f64 {
+    /// Of a motion with its states.
+    fn barrier(&self, splines: &[Spline], states: &States) -> f64 {
         let torque: f64 = self.torque_barriers(states).iter().sum();
-        let everywhere = vec![true; states.len];
-        torque
-            + self
-                .clearance_barriers(states, &everywhere)
-                .iter()
-                .sum::<f64>()
+        let clearance = self.clearance_barriers(states, &vec![true; states.len]);
+        let watched = self.watched.iter();
+        let watched: f64 = watched
+            .map(|own| self.nearness(&own.position(splines)))
+            .sum();
+        torque + clearance.iter().sum::<f64>() + watched
+    }
+
+    fn nearness(&self, q: &[f64]) -> f64 {
+        self.task.clearance.map_or(0.0, |own| own.nearness(q))
     }
 
     /// Σ_j ln(1 − share²) of each state.
@@ -280,9 +330,31 @@ impl<'a> Climb<'a> {
                 };
                 there.iter().zip(&here).map(|(a, b)| (a - b) / by).collect()
             });
-            gradient.extend(through(spline, &slopes, self.spans));
+            let mut points = through(spline, &slopes, self.spans);
+            self.add_watched(joint, weight, &mut points);
+            gradient.extend(points);
         }
         gradient.iter().all(|x| x.is_finite()).then_some(gradient)
+    }
+
+    /// Slopes of the watched moments' barrier over the control points of a joint that move.
+    fn add_watched(&self, joint: usize, weight: f64, points: &mut [f64]) {
+        let [low, high] = self.bounds[joint][0];
+        let by = DIFFERENCE * (high - low);
+        for moment in &self.watched {
+            let mut q = moment.position(&self.now.splines);
+            let here = self.nearness(&q);
+            q[joint] += by;
+            let slope = weight * (self.nearness(&q) - here) / by;
+            let mut own = [0.0; DEGREE + 1];
+            (moment.weights).add_transposed([slope, 0.0, 0.0], 1.0, &mut own);
+            for (i, slope) in own.iter().enumerate() {
+                let at = (moment.span + i).checked_sub(HELD);
+                if let Some(point) = at.and_then(|at| points.get_mut(at)) {
+                    *point += slope;
+                }
+            }
+        }
     }
 
     /// H⁻¹ g, joint by joint.
@@ -428,7 +500,7 @@ mod tests {
         };
         let total = |splines: Vec<Spline>| {
             let own = climb(splines);
-            own.now.value + weight * own.barrier(&own.states())
+            own.now.value + weight * own.barrier(&own.now.splines, &own.states())
         };
         let gradient = climb(splines.clone()).gradient(weight).expect("a gradient");
         let inner = spans + DEGREE - 2 * HELD;

@@ -153,7 +153,11 @@ fn of_joint(robot: &Robot, joint: usize, stated: StatedLimits) -> Result<JointLi
 /// The k-th of a sequence of positions that fills the limits evenly: multiples of square roots of primes.
 #[must_use]
 pub fn spread_positions(k: usize, limits: &[JointLimits]) -> Vec<f64> {
-    let is_prime = |n: &usize| (2..*n).take_while(|d| d * d <= *n).all(|d| n % d != 0);
+    let is_prime = |n: &usize| {
+        (2..*n)
+            .take_while(|d| d * d <= *n)
+            .all(|d| !n.is_multiple_of(d))
+    };
     let mut primes = (2..).filter(is_prime);
     let positions = limits.iter().map(|own| {
         let root = (primes.next().unwrap_or(2) as f64).sqrt();

@@ -46,6 +46,8 @@ const SPAN: f64 = 0.25;
 const LEAST_SPANS: usize = 10;
 /// Proposals between two looks at whether to go on.
 const BATCH: usize = 50;
+/// Steps without a gain after which a chain ends, in the second half of them.
+const PATIENCE: usize = 8;
 /// Proposals that a step uphill counts as in what is done.
 const STEP: usize = 50;
 
@@ -76,8 +78,8 @@ impl Default for DesignSettings {
             rate: 500.0,
             seed: 1,
             chains: 4,
-            proposals: 2000,
-            steps: 200,
+            proposals: 1500,
+            steps: 150,
         }
     }
 }
@@ -186,12 +188,14 @@ pub fn design(
             }
             chain.step(at as f64 / settings.proposals as f64);
         }
-        let mut climb = chain.climb();
+        let (mut climb, mut failed) = (chain.climb(), 0);
         for at in 0..settings.steps {
             if look(STEP, climb.best().value)? {
                 return Ok((climb.into_best(), true));
             }
-            if !climb.step(at as f64 / settings.steps as f64) && at > settings.steps / 2 {
+            let gained = climb.step(at as f64 / settings.steps as f64);
+            failed = if gained { 0 } else { failed + 1 };
+            if failed >= PATIENCE && 2 * at > settings.steps {
                 break;
             }
         }

@@ -61,7 +61,7 @@ pub(super) fn finished(
         let states = sampled(&splines, settings);
         let spans = splines[0].points.len() - 5;
         let broken = (task.too_much_torque(&states))
-            .or_else(|| task.too_close(&splines, 0..spans, PER_SPAN));
+            .or_else(|| Some(in_words(&task.too_close(&splines, 0..spans, PER_SPAN)?)));
         match broken {
             None => {
                 let motion = DesignedMotion {
@@ -149,25 +149,26 @@ impl Task<'_> {
         ))
     }
 
-    /// What comes too close in some spans, in words.
+    /// What comes too close in some spans.
     pub(super) fn too_close(
         &self,
         splines: &[Spline],
         spans: Range<usize>,
         per_span: usize,
-    ) -> Option<String> {
+    ) -> Option<Approach> {
         let clearance = self.clearance?;
-        let Approach {
-            between: [one, other],
-            distance,
-            time,
-        } = clearance.breach(&path_of(splines, spans, per_span))?;
-        Some(format!(
-            "`{one}` and `{other}` would be {} m apart at {} s",
-            crate::words::significant(distance, 2),
-            crate::words::significant(time, 3)
-        ))
+        clearance.breach(&path_of(splines, spans, per_span))
     }
+}
+
+/// An approach in words.
+pub(super) fn in_words(approach: &Approach) -> String {
+    let [one, other] = &approach.between;
+    format!(
+        "`{one}` and `{other}` would be {} m apart at {} s",
+        crate::words::significant(approach.distance, 2),
+        crate::words::significant(approach.time, 3)
+    )
 }
 
 fn used(task: &Task<'_>, splines: &[Spline]) -> Vec<JointUse> {

@@ -21,7 +21,7 @@ const ANEW: usize = 500;
 const WARM: f64 = 0.3;
 
 /// Samples of a span, at which distances are looked at; between two of them what moves adds to the margin.
-pub(super) const PER_SPAN: usize = 64;
+pub(super) const PER_SPAN: usize = 128;
 
 /// A motion with what it says.
 #[derive(Debug, Clone)]
@@ -125,8 +125,8 @@ impl<'a> Chain<'a> {
         if value.is_nan() || value < threshold {
             return;
         }
-        if let Some(problem) = self.task.too_close(&splines, changed, PER_SPAN) {
-            self.refused = Some(problem);
+        if let Some(approach) = self.task.too_close(&splines, changed, PER_SPAN) {
+            self.refused = Some(super::motion::in_words(&approach));
             return;
         }
         self.now = Found {
