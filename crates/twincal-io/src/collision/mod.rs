@@ -154,6 +154,10 @@ impl Clearance for CollisionWorld {
     fn nearness(&self, q: &[f64]) -> f64 {
         let bodies = poses(&self.robot, q);
         let near = |pair: &Pair| {
+            // Pairs that are always close have no room to keep away in.
+            if pair.margin < self.margin {
+                return 0.0;
+            }
             let left = self.distance_within(pair, &bodies, pair.margin + NEAR) - pair.margin;
             (left / NEAR).clamp(LEAST, 1.0).ln()
         };

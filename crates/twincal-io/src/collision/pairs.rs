@@ -167,7 +167,7 @@ mod tests {
         assert_eq!(travel.next(33, 0.19), None);
         assert_eq!(travel.next(33, -0.01), None);
         assert_eq!(
-            travel.next(17, 0.0),
+            travel.next(16, 0.0),
             None,
             "the span before moves up to here"
         );

@@ -154,6 +154,10 @@ impl CollisionWorld {
     ) {
         let look = |k| poses(&self.robot, &spread_positions(k, limits));
         let looks: Vec<Vec<Pose>> = (0..LOOKS).map(look).collect();
+        let mut bare = self.clone();
+        bare.solids
+            .iter_mut()
+            .for_each(|own| own.solid = own.solid.bare());
         let mut left_out: BTreeSet<([String; 2], &'static str)> = BTreeSet::new();
         pairs.retain_mut(|pair| {
             let distances = looks
@@ -164,7 +168,11 @@ impl CollisionWorld {
             if distances.iter().any(|own| *own >= pair.margin) {
                 return true;
             }
-            let touching = distances.iter().filter(|own| **own < TOUCHING).count();
+            // Skins of two meshes may touch where the meshes do not.
+            let touching = looks
+                .iter()
+                .filter(|bodies| bare.distance(pair, bodies, &mut None) < TOUCHING);
+            let touching = touching.count();
             let names = [pair.one, pair.other].map(|at| self.solids[at].name.clone());
             pair.margin = TOUCHING;
             let stays = touching > 0 && touching < LOOKS;

@@ -5,7 +5,9 @@ use parry3d_f64::query::gjk::{CsoPoint, GJKResult, VoronoiSimplex, closest_point
 use parry3d_f64::shape::SupportMap;
 
 /// Directions in which a hull keeps its outermost points.
-const DIRECTIONS: usize = 250;
+const DIRECTIONS: usize = 800;
+/// Directions of the corners of an ellipsoid.
+const CORNERS: usize = 250;
 /// Points of a ball's hull that stand this much outside it: the hull then holds the ball.
 const OUTSIDE: f64 = 1.02;
 
@@ -15,6 +17,8 @@ pub(super) struct Solid {
     core: Core,
     /// Everything closer than this to the core belongs to the solid, m.
     skin: f64,
+    /// Share of the skin that holds points of a mesh which the core leaves out, m.
+    hull_skin: f64,
     /// Centre and radius of a ball that holds the solid.
     centre: Vector,
     radius: f64,
@@ -89,7 +93,7 @@ impl Solid {
 
     /// An ellipsoid, or a little more.
     pub(super) fn ellipsoid([a, b, c]: [f64; 3]) -> Self {
-        let points = directions().map(|d| Vector::new(a * d.x, b * d.y, c * d.z) * OUTSIDE);
+        let points = directions(CORNERS).map(|d| Vector::new(a * d.x, b * d.y, c * d.z) * OUTSIDE);
         Self::new(Core::Hull(points.collect()), 0.0)
     }
 
@@ -98,6 +102,7 @@ impl Solid {
         Self {
             core: Core::HalfSpace,
             skin: 0.0,
+            hull_skin: 0.0,
             centre: Vector::ZERO,
             radius: f64::INFINITY,
         }
@@ -114,7 +119,7 @@ impl Solid {
             return Some(Self::new(Core::Hull(points.to_vec()), 0.0));
         }
         let mut kept: Vec<Vector> = Vec::new();
-        for direction in directions() {
+        for direction in directions(DIRECTIONS) {
             let point = outermost(points, direction);
             if !kept.contains(&point) {
                 kept.push(point);
@@ -126,7 +131,10 @@ impl Solid {
             apart(&Pose::IDENTITY, &core, &own, f64::MAX).distance
         });
         let skin = beyond.fold(0.0, f64::max);
-        Some(Self::new(core, skin))
+        Some(Self {
+            hull_skin: skin,
+            ..Self::new(core, skin)
+        })
     }
 
     fn new(core: Core, skin: f64) -> Self {
@@ -149,6 +157,7 @@ impl Solid {
         Self {
             core,
             skin,
+            hull_skin: 0.0,
             centre,
             radius: radius + skin,
         }
@@ -185,6 +194,15 @@ impl Solid {
                     axis: found.axis.map(|axis| own.transform_vector(axis)),
                 }
             }
+        }
+    }
+
+    /// The same solid without the skin that holds what its core leaves out of a mesh.
+    pub(super) fn bare(&self) -> Self {
+        Self {
+            skin: self.skin - self.hull_skin,
+            hull_skin: 0.0,
+            ..self.clone()
         }
     }
 
@@ -243,10 +261,10 @@ fn apart(between: &Pose, one: &Core, other: &Core, far: f64) -> Apart {
 }
 
 /// Directions that are spread evenly over the sphere: a spiral of Fibonacci.
-fn directions() -> impl Iterator<Item = Vector> {
+fn directions(count: usize) -> impl Iterator<Item = Vector> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
-    (0..DIRECTIONS).map(move |k| {
-        let z = 1.0 - (2 * k + 1) as f64 / DIRECTIONS as f64;
+    (0..count).map(move |k| {
+        let z = 1.0 - (2 * k + 1) as f64 / count as f64;
         let across = (1.0 - z * z).sqrt();
         let (sin, cos) = (golden * k as f64).sin_cos();
         Vector::new(across * cos, across * sin, z)

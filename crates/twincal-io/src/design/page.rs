@@ -304,7 +304,7 @@ mod tests {
         for says in [
             "Motion of 2 s at 250 Hz",
             WARNING,
-            "Collisions are not checked.",
+            "Smallest distance 0.031",
             "Designed to decide 2 effects of the twin.",
             "0.31",
             "unidentifiable",

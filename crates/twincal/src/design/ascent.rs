@@ -22,7 +22,7 @@ const INSIDE: [f64; 4] = [0.97, 0.98, 0.99, 0.995];
 /// Weight of the barriers at the beginning and at the end.
 const BARRIER: [f64; 2] = [0.5, 0.05];
 /// Step of a difference, as a share of a limit.
-const DIFFERENCE: f64 = 1e-6;
+const DIFFERENCE: f64 = 1e-8;
 /// Least distance from a limit that the metric sees, as a share of its range.
 const LEAST: f64 = 1e-6;
 /// Largest step as a share of the way to the nearest limit.

@@ -44,6 +44,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 const SPAN: f64 = 0.25;
 /// Spans at least: five control points at either end stay, and some have to move.
 const LEAST_SPANS: usize = 10;
+/// Samples at least.
+const LEAST_SAMPLES: f64 = 80.0;
 /// Proposals between two looks at whether to go on.
 const BATCH: usize = 50;
 /// Steps without a gain after which a chain ends, in the second half of them.
@@ -241,7 +243,7 @@ fn spans(settings: &DesignSettings) -> Result<(usize, f64)> {
             "give the controller's rate",
         ));
     }
-    if duration * rate < (LEAST_SPANS * information::SAMPLES) as f64 || duration * rate > 1e7 {
+    if duration * rate < LEAST_SAMPLES || duration * rate > 1e7 {
         return Err(setting(
             "duration",
             format!("{duration} s at {rate} Hz are {} samples", duration * rate),

@@ -102,16 +102,19 @@ fn no_limit_is_broken_and_both_ends_rest() {
 fn a_longer_search_shows_more() {
     let robot = tree();
     let limits = joint_limits(&robot, &stated(&robot, None)).expect("limits");
-    let value = |proposals: usize| {
+    let value = |proposals: usize, steps: usize| {
         let settings = DesignSettings {
             proposals,
+            steps,
             ..short()
         };
         let found = designed(&robot, &limits, &settings).expect("a motion");
         (found.log_determinant, found.condition)
     };
-    let (few, many) = (value(20), value(800));
+    let (few, many) = (value(20, 0), value(800, 0));
     assert!(many.0 > few.0 + 1.0 && many.1 < few.1, "{few:?} {many:?}");
+    let uphill = value(20, 40);
+    assert!(uphill.0 > many.0 + 1.0, "{uphill:?} {many:?}");
 }
 
 #[test]
