@@ -113,7 +113,7 @@ fn a_longer_search_shows_more() {
     };
     let (few, many) = (value(20, 0), value(800, 0));
     assert!(many.0 > few.0 + 1.0 && many.1 < few.1, "{few:?} {many:?}");
-    let uphill = value(20, 40);
+    let uphill = value(20, 150);
     assert!(uphill.0 > many.0 + 1.0, "{uphill:?} {many:?}");
 }
 
