@@ -33,7 +33,7 @@ TRIES = 50  # random starts
 
 
 def mujoco_model(urdf):
-    """The URDF in MuJoCo with its collision meshes, every link a body of its own."""
+    """The URDF in MuJoCo with its collision meshes, each link a separate body."""
     text = urdf.read_text()
     root = next(above for above in urdf.parents if above.name == "example-robot-data")
     text = text.replace("package://example-robot-data", str(root))

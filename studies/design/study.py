@@ -251,7 +251,7 @@ def seeds_of(given, robot, pair, misfit):
 
 
 def new_line(given, robot, pair, misfit, seed):
-    """Runs one seed in a folder of its own."""
+    """Runs one seed in a separate folder."""
     folder = (given.keep or Path(tempfile.mkdtemp())) / f"{robot}-{pair}-{misfit}-{seed}"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)

@@ -331,6 +331,27 @@ def test_impossible_surroundings_are_refused(tmp_path, stated, text, code, says)
     assert not (tmp_path / "motion").exists()
 
 
+def test_a_start_that_is_not_free_is_moved_unless_it_is_stated(tmp_path, names):
+    """A box around where the tip usually starts."""
+    model = pin.buildModelFromUrdf(str(ARM))
+    data, tip = model.createData(), model.nframes - 1
+    design(tmp_path, "--duration", 3, *limits(tmp_path, "margin = 0.01\n"))
+    usual = table(tmp_path)[1][0, 1 : 1 + model.nq]
+    pin.framesForwardKinematics(model, data, usual)
+    at, name = data.oMf[tip].translation.copy(), model.frames[tip].name
+    low, high = (at - 0.05).tolist(), (at + 0.05).tolist()
+    box = f'[[box]]\nname = "post"\nlow = {low}\nhigh = {high}\nlinks = ["{name}"]\n'
+    said = design(tmp_path, "--duration", 3, *limits(tmp_path, "margin = 0.01\n" + box))
+    moved = table(tmp_path)[1][0, 1 : 1 + model.nq]
+    assert not np.allclose(moved, usual) and "start assumed" in said.stdout
+    pin.framesForwardKinematics(model, data, moved)
+    there = data.oMf[tip].translation
+    assert np.linalg.norm(np.maximum(np.maximum(low - there, there - np.array(high)), 0.0)) >= 0.01 - 1e-6
+    stated = "".join(f'[joint."{joint}"]\nstart = {q}\n' for joint, q in zip(names, usual, strict=True))
+    done = design(tmp_path, "--duration", 3, *limits(tmp_path, "margin = 0.01\n" + box + stated), code=4)
+    assert "`post`" in done.stderr
+
+
 @pytest.mark.parametrize("robot", ["ur5"])
 def test_meshes_do_not_touch_in_mujoco(tmp_path, monkeypatch, robot):
     """One motion of the study: from a random start, over a floor and beside a box, distances by MuJoCo on the same meshes."""

@@ -13,7 +13,7 @@ const MAX_BYTES: u64 = 256 << 20;
 const HEAD: usize = 84;
 const TRIANGLE: usize = 50;
 /// Largest coordinate, m.
-const FARTHEST: f64 = 1e4;
+pub(super) const FARTHEST: f64 = 1e4;
 
 /// Corners of a mesh in its geometry's frame, or why there are none.
 pub(super) fn corners(mesh: &MeshFile, model: &Path) -> Result<Vec<Vector>, String> {
@@ -46,13 +46,18 @@ pub(super) fn corners(mesh: &MeshFile, model: &Path) -> Result<Vec<Vector>, Stri
             .into()
         })
         .collect();
+    readable(placed, name)
+}
+
+/// Corners, where there are some and all are numbers that a robot can have.
+fn readable(corners: Vec<Vector>, name: &str) -> Result<Vec<Vector>, String> {
     let fits = |p: &Vector| p.is_finite() && p.abs().max_element() < FARTHEST;
-    match placed.is_empty() || !placed.iter().all(fits) {
+    match corners.is_empty() || !corners.iter().all(fits) {
         true => Err(format!(
             "`{}` has no corners that can be read",
             crate::model::shorten(name)
         )),
-        false => Ok(placed),
+        false => Ok(corners),
     }
 }
 
@@ -120,7 +125,10 @@ fn text(bytes: &[u8], word: &str) -> Vec<[f64; 3]> {
 pub(super) fn of_form(form: &Form, model: &Path) -> Option<Result<Vec<Vector>, String>> {
     match form {
         Form::Mesh(mesh) => Some(corners(mesh, model)),
-        Form::Points(points) => Some(Ok(points.iter().map(|p| Vector::from(*p)).collect())),
+        Form::Points(points) => {
+            let points = points.iter().map(|p| Vector::from(*p)).collect();
+            Some(readable(points, "vertex"))
+        }
         Form::Other(what) => Some(Err(format!("{what} has no convex hull"))),
         _ => None,
     }

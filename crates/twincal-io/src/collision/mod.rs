@@ -85,19 +85,14 @@ impl CollisionWorld {
     /// Along the direction of an earlier sample the gap is computed in no time: where it is [`ENOUGH`] of the distance there, it counts as the
     /// distance.
     fn distance(&self, pair: &Pair, bodies: &[Pose], axis: &mut Option<Separating>) -> f64 {
-        let (one, other) = (&self.solids[pair.one], &self.solids[pair.other]);
-        let at = |placed: &Placed| match placed.body {
-            Some(body) => bodies[body] * placed.pose,
-            None => placed.pose,
-        };
-        let (own, its) = (at(one), at(other));
+        let [(one, own), (other, its)] = self.placed(pair, bodies);
         if let Some(known) = axis {
-            let gap = (one.solid).gap(&own, &other.solid, &its, known.axis);
+            let gap = one.gap(&own, other, &its, known.axis);
             if gap - pair.margin >= ENOUGH * (known.distance - pair.margin) {
                 return gap;
             }
         }
-        let found = (one.solid).apart(&own, &other.solid, &its, self.margin + FAR);
+        let found = one.apart(&own, other, &its, self.margin + FAR);
         *axis = found.axis.map(|axis| Separating {
             axis,
             distance: found.distance,
@@ -107,14 +102,20 @@ impl CollisionWorld {
 
     /// Distance of a pair at one moment, or a lower bound beyond `far`.
     fn distance_within(&self, pair: &Pair, bodies: &[Pose], far: f64) -> f64 {
-        let (one, other) = (&self.solids[pair.one], &self.solids[pair.other]);
-        let at = |placed: &Placed| match placed.body {
-            Some(body) => bodies[body] * placed.pose,
-            None => placed.pose,
-        };
-        (one.solid)
-            .apart(&at(one), &other.solid, &at(other), far)
-            .distance
+        let [(one, own), (other, its)] = self.placed(pair, bodies);
+        one.apart(&own, other, &its, far).distance
+    }
+
+    /// The two solids of a pair, where they are.
+    fn placed(&self, pair: &Pair, bodies: &[Pose]) -> [(&Solid, Pose); 2] {
+        [pair.one, pair.other].map(|at| {
+            let placed = &self.solids[at];
+            let pose = match placed.body {
+                Some(body) => bodies[body] * placed.pose,
+                None => placed.pose,
+            };
+            (&placed.solid, pose)
+        })
     }
 
     fn approach(&self, pair: &Pair, distance: f64, time: f64) -> Approach {

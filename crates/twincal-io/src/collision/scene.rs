@@ -218,6 +218,14 @@ impl Scene<'_> {
             None => primitive(&shape.form),
         };
         let Some(solid) = solid else { return };
+        // A half of space has no end; of all else a number beyond every robot would overflow in distances.
+        let reach = solid.reach(&at);
+        let fits = reach.is_finite() && reach < mesh::FARTHEST;
+        if !fits && solid != Solid::half_space() {
+            let reason = format!("its geometry reaches farther than {} m", mesh::FARTHEST);
+            self.assume(&shape.link, (body, &link), reason);
+            return;
+        }
         // Half of space stands for a floor: it does not move with a link.
         if body.is_some() && solid == Solid::half_space() {
             return;
@@ -252,7 +260,7 @@ impl Scene<'_> {
         }
     }
 
-    /// Capsules from the link's joint to the joints that it carries, or about the joint.
+    /// Capsules from the link's joint to where it ends, or a ball about the joint.
     fn assume(&mut self, link: &str, (body, frame): (Option<usize>, &Placement), reason: String) {
         let Some(body) = body else {
             // What stands still: the reader is told, nothing stands for it.
@@ -269,11 +277,9 @@ impl Scene<'_> {
             true => Vector::ZERO,
             false => frame.translation.into(),
         };
-        let mut ends: Vec<Vector> = (0..self.bodies.len())
-            .filter(|&child| self.bodies[child].parent == Some(body))
-            .map(|child| self.origin_in_parent(child))
-            .collect();
-        if ends.is_empty() || own.link != link {
+        let mut ends = self.ends_of(link, body, frame);
+        ends.retain(|to| (*to - from).length() > POINT);
+        if ends.is_empty() {
             ends = vec![from];
         }
         for to in ends {
@@ -290,6 +296,31 @@ impl Scene<'_> {
             reason,
             radius,
         });
+    }
+
+    /// Where a link ends, in its body: at the joints and frames that the body carries, and at the centre of mass; of a link that is fixed to
+    /// another one at its centre of mass alone.
+    fn ends_of(&self, link: &str, body: usize, frame: &Placement) -> Vec<Vector> {
+        let links = &self.robot.description().links;
+        let inertia = links
+            .iter()
+            .find(|own| own.name == link)
+            .and_then(|own| own.inertia);
+        let mut ends: Vec<Vector> = inertia
+            .iter()
+            .map(|own| frame.point(own.com).into())
+            .collect();
+        if self.bodies[body].link == link {
+            let children =
+                (0..self.bodies.len()).filter(|&at| self.bodies[at].parent == Some(body));
+            ends.extend(children.map(|child| self.origin_in_parent(child)));
+            let fixed = links
+                .iter()
+                .filter_map(|own| self.robot.home_of_link(&own.name));
+            let fixed = fixed.filter(|(home, _)| *home == Some(body));
+            ends.extend(fixed.map(|(_, at)| Vector::from(at.translation)));
+        }
+        ends
     }
 
     /// Origin of a body in the body that carries it, its joints at 0.
@@ -515,15 +546,16 @@ fn check(robot: &Robot, surroundings: &Surroundings) -> Result<()> {
     for stated in &surroundings.boxes {
         let (low, high) = (stated.low, stated.high);
         let ends = low.iter().zip(&high);
+        let fits = |x: &f64| x.abs() < mesh::FARTHEST;
         if !ends
             .clone()
-            .all(|(low, high)| low < high && low.is_finite() && high.is_finite())
+            .all(|(low, high)| low < high && fits(low) && fits(high))
         {
             let problem = format!("box `{}` is from {low:?} to {high:?}", stated.name);
             return refuse(
                 "limits.box".into(),
                 problem,
-                "give the smaller corner as `low`".into(),
+                "give the smaller corner as `low`, in m".into(),
             );
         }
         let still = |link: &&String| matches!(robot.home_of_link(link), Some((None, _)));

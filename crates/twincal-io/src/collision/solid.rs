@@ -186,6 +186,10 @@ impl Solid {
                 if balls > far {
                     return Apart::exactly(balls);
                 }
+                // A joint far beyond every robot: no distance can be computed, which counts as an overlap.
+                if !balls.is_finite() {
+                    return Apart::exactly(0.0);
+                }
                 let skins = self.skin + other.skin;
                 let between = own.inv_mul(its);
                 let found = apart(&between, &self.core, &other.core, far + skins);

@@ -288,6 +288,36 @@ fn unknown_geometry_is_a_capsule_with_its_reason() {
     }
 }
 
+/// Numbers that no robot has: a capsule, never a panic in the distances.
+#[test]
+fn geometry_beyond_every_robot_is_assumed() {
+    let huge = [
+        r#"<box size="1e308 1 1"/>"#,
+        r#"<cylinder radius="1e300" length="1"/>"#,
+        r#"<sphere radius="1e5"/>"#,
+    ];
+    for geometry in huge {
+        let own = world(geometry, &Surroundings::default()).expect("a world");
+        assert_eq!(own.assumed.len(), 1, "{geometry}");
+        let farther = own.assumed[0].reason.contains("farther than 10000 m");
+        assert!(farther, "{:?}", own.assumed);
+        assert!(at_rest(&own, [0.0, 3.0]).is_some());
+    }
+    let far_away = ARM.replace(r#"xyz="0.5 0 0""#, r#"xyz="1e308 0 0""#);
+    let text = far_away.replace("GEOMETRY", BOX);
+    let model = parse_model("arm.urdf", text.as_bytes(), &ModelSettings::default());
+    let model = model.expect("a model");
+    let geometry = model.geometry().expect("geometry");
+    let (robot, _, limits) = arm(BOX);
+    let around = Surroundings::default();
+    let at = (&geometry, FilePath::new("arm.urdf"));
+    let own = CollisionWorld::new(&robot, at, &limits, &around).expect("a world");
+    assert_eq!(own.assumed.len(), 2);
+    // A slider that leaves the numbers: an overlap.
+    let (ball, away) = (Solid::ball(0.1), Pose::translation(f64::INFINITY, 0.0, 0.0));
+    assert_eq!(ball.distance(&away, &ball, &away, 1.0), 0.0);
+}
+
 #[test]
 fn links_that_no_joint_parts_are_left_out_and_named() {
     let wide = r#"<box size="4 4 4"/>"#;

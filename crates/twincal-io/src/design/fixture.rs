@@ -17,7 +17,7 @@ pub(crate) const HOSTILE: [&str; 3] = [
 
 const RATE: f64 = 250.0;
 
-/// A sine of its own frequency for every joint.
+/// A sine for every joint, each with another frequency.
 pub(crate) fn motion(joints: &[&str], len: usize) -> DesignedMotion {
     let of = |make: fn(f64, f64) -> f64| -> Vec<f64> {
         let joints = (0..joints.len()).map(|joint| 1.0 + joint as f64 / 3.0);

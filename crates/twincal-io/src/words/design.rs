@@ -112,15 +112,24 @@ pub fn undecidable(effect: &str) -> String {
 #[must_use]
 pub fn assumed(limits: &[JointLimits]) -> Vec<String> {
     let rules = [
-        ("acceleration", format!("velocity / {SPEED_UP} s")),
-        ("jerk", format!("acceleration / {JERK_TIME} s")),
-        ("position", "±π".to_owned()),
         (
+            "acceleration",
+            "acceleration limit",
+            format!("velocity / {SPEED_UP} s"),
+        ),
+        (
+            "jerk",
+            "jerk limit",
+            format!("acceleration / {JERK_TIME} s"),
+        ),
+        ("position", "position limit", "±π".to_owned()),
+        (
+            "start",
             "start",
             "0, the middle, or a position that is free".to_owned(),
         ),
     ];
-    let said = rules.into_iter().filter_map(|(key, rule)| {
+    let said = rules.into_iter().filter_map(|(key, what, rule)| {
         let joints = limits.iter().filter(|own| own.assumed.contains(&key));
         let names: Vec<_> = joints.map(|own| shortened(&own.joint)).collect();
         let names = match names.len() {
@@ -128,7 +137,7 @@ pub fn assumed(limits: &[JointLimits]) -> Vec<String> {
             n if n == limits.len() && n > 1 => "all joints".to_owned(),
             _ => listed(&names, ", "),
         };
-        Some(format!("{key} limit assumed: {rule} ({names})"))
+        Some(format!("{what} assumed: {rule} ({names})"))
     });
     said.collect()
 }

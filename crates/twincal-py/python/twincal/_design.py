@@ -72,7 +72,8 @@ def design(
     model : path, optional
         Robot model (URDF, MJCF): the motion is to show body, motors and friction.
     twin : path, optional
-        Folder of a fit, in the place of `model`: the motion is to decide what it leaves open.
+        Folder of a fit: the motion is to decide what it leaves open. With `model` beside it, the
+        meshes of that file are checked for collisions.
     decide : iterable of str
         Effects to decide; without them those with a probability of 0.05 to 0.95.
     duration : float
@@ -97,8 +98,8 @@ def design(
     """
     if isinstance(decide, str):
         raise TypeError("decide is one name; give a list of names")
-    if (model is None) == (twin is None):
-        raise ValueError("give model or twin, one of them")
+    if model is None and twin is None:
+        raise ValueError("give model or twin, at least one of them")
     arguments = ["design", "--json", "-o", os.fspath(output), "--seed", str(int(seed))]
     arguments += ["--duration", repr(float(duration)), "--rate", repr(float(rate))]
     for flag, path in (("--model", model), ("--twin", twin), ("--limits", limits)):

@@ -88,11 +88,6 @@ impl Default for DesignSettings {
 
 /// Whether a robot can produce the torque that states ask for.
 pub trait TorqueLimits: Sync {
-    /// True where every joint's torque is within its limit in all states.
-    fn allows(&self, states: &States) -> bool {
-        self.exceeded(states).is_none()
-    }
-
     /// |τ| of every joint in every state as a share of what may be used of its limit, `[joint * len + state]`.
     fn shares(&self, states: &States) -> Vec<f64>;
 
