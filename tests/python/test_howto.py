@@ -1,7 +1,8 @@
 """The how-to pages (docs/howto): their commands run in order in an empty folder, and print what the pages quote.
 
 What a page is, for these tests:
-- A link to a file of `examples/` is a file that the reader copies into the folder. A ```toml block is `twincal.toml`.
+- A link to a file of `examples/arm`, or to a script of a study, is a file that the reader copies into the folder. A ```toml
+  block is `twincal.toml`, or the file that its first line `# NAME.toml` names.
 - A line of an ```sh block is a command. It ends with exit code 0, or with the one that its comment `# exit code N` states.
 - A ```text block is what the ```sh block above it prints on standard output; standard error (progress, warnings) is not quoted.
   A line `…` is any number of lines that were left out; nothing else is. In every other line words are equal, spaces apart,
@@ -17,6 +18,7 @@ import math
 import os
 import re
 import subprocess
+import sys
 from functools import cache
 from pathlib import Path
 
@@ -25,12 +27,14 @@ import pytest
 from conftest import ROOT, program
 
 EXAMPLES = ROOT / "examples" / "arm"
+STUDIES = ROOT / "studies"
 PAGES = sorted((ROOT / "docs" / "howto").glob("*.md"))
 TRUTH = json.loads((EXAMPLES / "truth.json").read_text())
 LINK = re.compile(r"\]\(([^)#]+)[^)]*\)")
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 EXIT = re.compile(r"# exit code (\d+)$")
 NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+TOML_NAME = re.compile(r"# (\w+\.toml)\n")
 OMITTED = "…"
 
 
@@ -80,13 +84,16 @@ def missing(quoted, printed):
 def followed(page, folder):
     """Follows a page in this folder; returns what was printed beside what is quoted, pair by pair."""
     for name in sorted(set(LINK.findall(page.read_text()))):
-        if (page.parent / name).resolve().parent == EXAMPLES:
-            (folder / Path(name).name).write_bytes((page.parent / name).read_bytes())
-    environment = {**os.environ, "PATH": f"{Path(program('twincal')).parent}{os.pathsep}{os.environ['PATH']}"}
+        file = (page.parent / name).resolve()
+        if file.parent == EXAMPLES or (file.suffix == ".py" and STUDIES in file.parents):
+            (folder / file.name).write_bytes(file.read_bytes())
+    first = [str(Path(file).parent) for file in (program("twincal"), sys.executable)]
+    environment = {**os.environ, "PATH": os.pathsep.join([*first, os.environ["PATH"]])}
     pairs, printed = [], None
     for kind, text in blocks(page):
         if kind == "toml":
-            (folder / "twincal.toml").write_text(text)
+            named = TOML_NAME.match(text)
+            (folder / (named[1] if named else "twincal.toml")).write_text(text)
         elif kind == "sh":
             printed = ""
             for line, code in commands(text):
@@ -122,15 +129,15 @@ def test_lines_are_compared():
     assert missing("a 1\n", "a 1\nb 2\n") is not None
 
 
-def test_there_are_six_pages_of_at_most_four_commands():
+def test_there_are_seven_pages_of_at_most_five_commands():
     """Every page begins with what one gets and what one needs, has real output, and is linked from the README."""
     assert [page.stem for page in PAGES] == ["before_and_after_a_service", "friction_for_a_controller", "gate_in_ci", "many_logs",
-                                             "payload", "torque_is_a_current"]  # fmt: skip
+                                             "motion_that_decides", "payload", "torque_is_a_current"]  # fmt: skip
     readme = (ROOT / "README.md").read_text()
     for page in PAGES:
         text = page.read_text()
         typed = [line for kind, block in blocks(page) if kind == "sh" for line, _ in commands(block)]
-        assert 1 <= len(typed) <= 4, (page.name, typed)
+        assert 1 <= len(typed) <= 5, (page.name, typed)
         assert {kind for kind, _ in blocks(page)} <= {"sh", "text", "toml", "yaml", "python", "bash", "console"}, page.name
         assert re.search(r"^You get [^\n]*(\n[^\n]+)?\n\nYou need ", text, re.MULTILINE) and "\n## When it is not so\n" in text, page.name
         assert max(map(len, text.splitlines())) <= 100, page.name
@@ -193,11 +200,36 @@ def test_the_service_changed_what_diff_says(folder_of):
     assert became == {"payload": "new", "elbow.coulomb": "changed"}, became
 
 
+def test_the_motion_decides_rightly(folder_of):
+    """Every effect that the poor log leaves open, the payload among them; and the payload is the true one."""
+    page = page_named("motion_that_decides")
+    folder = folder_of(page)
+    followed(page, folder)
+    tutorial = module_of(STUDIES / "design" / "tutorial.py")
+    truth = tutorial.World().true
+    before, after = ({own["name"]: own["pip"] or 0.0 for own in json.loads((folder / name / "result.json").read_text())["components"]}
+                     for name in ("poor", "decided"))  # fmt: skip
+    asked = {name for name, pip in before.items() if 0.05 < pip < 0.95}
+    assert {"payload", "base.tilt"} < asked
+    wrong = {name: after[name] for name in asked if not (after[name] >= 0.95 if name in truth else after[name] <= 0.05)}
+    assert not wrong, wrong
+    found = effects(folder / "decided")
+    for name, value in zip(("mass", "com_x", "com_y", "com_z"), (tutorial.PAYLOAD, *tutorial.CENTRE), strict=True):
+        assert within(found["payload", name], value), (name, found["payload", name])
+
+
+def module_of(path):
+    """A script as a module."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = module  # dataclasses look for it
+    spec.loader.exec_module(module)
+    return module
+
+
 def test_logs_are_what_the_script_makes(tmp_path):
     """The shortest of them, simulated anew: within a count of the encoders and two of the last digit of torque."""
-    spec = importlib.util.spec_from_file_location("arm_logs", EXAMPLES / "simulate.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = module_of(EXAMPLES / "simulate.py")
     module.write(tmp_path / "friday.csv", module.WORLDS["friday"])
     made, kept = (np.loadtxt(folder / "friday.csv", delimiter=",", skiprows=1) for folder in (tmp_path, EXAMPLES))
     assert np.abs(made - kept).max(0)[:5].max() <= 1.5 * module.COUNT and np.abs(made - kept).max() <= 0.0201

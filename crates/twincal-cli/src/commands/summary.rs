@@ -135,6 +135,9 @@ fn verdict(calibration: &Calibration, terminal: &mut Terminal) {
     if let Some(next) = &answer.next {
         paragraph(&format!("Next recording: {next}"), terminal);
     }
+    if let Some(motion) = words::design::command(calibration, "DIR") {
+        paragraph(&motion, terminal);
+    }
     terminal.say("");
 }
 

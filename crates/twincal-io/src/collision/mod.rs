@@ -9,6 +9,7 @@
 //! # Source
 //! Distance: Gilbert, Johnson and Keerthi 1988. Advancement: Mirtich 1996.
 
+mod cloud;
 mod mesh;
 mod pairs;
 mod scene;
@@ -21,14 +22,13 @@ pub use scene::{AssumedShape, IgnoredPair, Keep, StatedBox, Surroundings};
 use pairs::Pair;
 use parry3d_f64::math::{Mat3, Pose, Rotation, Vector};
 use solid::Solid;
-use twincal::design::{Approach, Clearance, Path};
+use twincal::design::{Approach, Clearance, NearSlope, Path};
 use twincal::robot::{Placement, Robot};
 
 /// A distance that is larger than the margin by this is not computed closely, m.
 const FAR: f64 = 0.3;
 
-/// Distance beyond the margin at which a search begins to keep away, m, and the share of it that it sees at least.
-const NEAR: f64 = 0.05;
+/// Share of a pair's room that a search sees at least.
 const LEAST: f64 = 1e-3;
 /// Share of the last computed distance beyond the margin above which the gap along its direction is good enough.
 const ENOUGH: f64 = 0.6;
@@ -39,6 +39,9 @@ struct Separating {
     axis: Vector,
     distance: f64,
 }
+
+/// A pair, and a direction that separated it last.
+type Looked<'a> = (&'a Pair, Option<Separating>);
 
 /// A solid with its name on a rigid body.
 #[derive(Debug, Clone)]
@@ -85,14 +88,28 @@ impl CollisionWorld {
     /// Along the direction of an earlier sample the gap is computed in no time: where it is [`ENOUGH`] of the distance there, it counts as the
     /// distance.
     fn distance(&self, pair: &Pair, bodies: &[Pose], axis: &mut Option<Separating>) -> f64 {
+        let enough = axis.map_or(f64::INFINITY, |known| {
+            pair.margin + ENOUGH * (known.distance - pair.margin)
+        });
+        self.looked_at(pair, bodies, axis, (enough, self.margin + FAR))
+    }
+
+    /// Distance of a pair, or a lower bound: the gap along a known axis where it is `enough`, and one beyond `far`.
+    fn looked_at(
+        &self,
+        pair: &Pair,
+        bodies: &[Pose],
+        axis: &mut Option<Separating>,
+        (enough, far): (f64, f64),
+    ) -> f64 {
         let [(one, own), (other, its)] = self.placed(pair, bodies);
         if let Some(known) = axis {
             let gap = one.gap(&own, other, &its, known.axis);
-            if gap - pair.margin >= ENOUGH * (known.distance - pair.margin) {
+            if gap >= enough {
                 return gap;
             }
         }
-        let found = one.apart(&own, other, &its, self.margin + FAR);
+        let found = one.apart(&own, other, &its, far);
         *axis = found.axis.map(|axis| Separating {
             axis,
             distance: found.distance,
@@ -100,10 +117,16 @@ impl CollisionWorld {
         found.distance
     }
 
-    /// Distance of a pair at one moment, or a lower bound beyond `far`.
-    fn distance_within(&self, pair: &Pair, bodies: &[Pose], far: f64) -> f64 {
-        let [(one, own), (other, its)] = self.placed(pair, bodies);
-        one.apart(&own, other, &its, far).distance
+    /// All pairs, none looked at.
+    fn looks(&self) -> Vec<Looked<'_>> {
+        self.pairs.iter().map(|own| (own, None)).collect()
+    }
+
+    /// What is left to the margin as a share of the pair's room, [`LEAST`] to 1.
+    fn near(&self, pair: &Pair, bodies: &[Pose], axis: &mut Option<Separating>) -> f64 {
+        let far = pair.margin + pair.room();
+        let left = self.looked_at(pair, bodies, axis, (far, far)) - pair.margin;
+        (left / pair.room()).clamp(LEAST, 1.0)
     }
 
     /// The two solids of a pair, where they are.
@@ -129,9 +152,10 @@ impl CollisionWorld {
 }
 
 impl Clearance for CollisionWorld {
-    fn breach(&self, path: &Path) -> Option<Approach> {
+    fn breach(&self, path: &Path, joint: Option<usize>) -> Option<Approach> {
         let mut frames = Frames::new(&self.robot, path);
-        for pair in &self.pairs {
+        let concerned = |own: &&Pair| joint.is_none_or(|joint| own.joints().contains(&joint));
+        for pair in self.pairs.iter().filter(concerned) {
             let travel = pair.travel(path);
             let (mut sample, mut axis) = (0, None);
             while sample < path.len {
@@ -152,17 +176,46 @@ impl Clearance for CollisionWorld {
         None
     }
 
-    fn nearness(&self, q: &[f64]) -> f64 {
-        let bodies = poses(&self.robot, q);
-        let near = |pair: &Pair| {
-            // Pairs that are always close have no room to keep away in.
-            if pair.margin < self.margin {
-                return 0.0;
-            }
-            let left = self.distance_within(pair, &bodies, pair.margin + NEAR) - pair.margin;
-            (left / NEAR).clamp(LEAST, 1.0).ln()
+    fn nearness(&self, q: &[f64], len: usize) -> Vec<f64> {
+        let mut pairs = self.looks();
+        let of = |state: usize| {
+            let bodies = poses(&self.robot, &position(q, len, state));
+            let near = |(pair, axis): &mut Looked<'_>| self.near(pair, &bodies, axis).ln();
+            pairs.iter_mut().map(near).sum()
         };
-        self.pairs.iter().map(near).sum()
+        (0..len).map(of).collect()
+    }
+
+    /// Differences over `steps` to either side: what lies between is smoothed, where corners and faces take turns.
+    fn nearness_slopes(&self, q: &[f64], len: usize, steps: &[f64]) -> Vec<NearSlope> {
+        let mut pairs = self.looks();
+        let mut found = Vec::new();
+        for state in 0..len {
+            let mut q = position(q, len, state);
+            let bodies = poses(&self.robot, &q);
+            let mut around: Vec<Option<[Vec<Pose>; 2]>> = vec![None; q.len()];
+            for (pair, axis) in &mut pairs {
+                if self.near(pair, &bodies, axis) >= 1.0 {
+                    continue;
+                }
+                let mut slopes = vec![0.0; q.len()];
+                for joint in pair.joints() {
+                    let around = around[joint].get_or_insert_with(|| {
+                        [-1.0, 1.0].map(|side| {
+                            let here = q[joint];
+                            q[joint] += side * steps[joint];
+                            let there = poses(&self.robot, &q);
+                            q[joint] = here;
+                            there
+                        })
+                    });
+                    let logs = [0, 1].map(|side| self.near(pair, &around[side], &mut None).ln());
+                    slopes[joint] = (logs[1] - logs[0]) / (2.0 * steps[joint]);
+                }
+                found.push(NearSlope { state, slopes });
+            }
+        }
+        found
     }
 
     fn closest(&self, path: &Path) -> Option<Approach> {
@@ -206,6 +259,11 @@ impl<'a> Frames<'a> {
         }
         &self.known[sample]
     }
+}
+
+/// Positions of one state, of `[joint * len + state]`.
+fn position(q: &[f64], len: usize, state: usize) -> Vec<f64> {
+    q.iter().skip(state).step_by(len).copied().collect()
 }
 
 /// Frames of the moving bodies at positions of the joints.

@@ -4,6 +4,11 @@ use super::Placed;
 use twincal::design::{JointLimits, Path};
 use twincal::robot::MovingBody;
 
+/// Distance beyond the margin at which a search begins to keep away, m; of pairs that are always close half of what they usually have.
+const NEAR: f64 = 0.05;
+/// Margin of pairs that touch in some positions, m.
+pub(super) const TOUCHING: f64 = 1e-4;
+
 /// Two solids between which joints move.
 #[derive(Debug, Clone)]
 pub(super) struct Pair {
@@ -49,6 +54,22 @@ impl Pair {
             usual: 0.0,
             gains,
         }
+    }
+
+    /// Distance beyond the margin within which a search keeps away, m.
+    pub(super) fn room(&self) -> f64 {
+        match self.margin > TOUCHING {
+            true => NEAR,
+            false => (0.5 * (self.usual - self.margin)).clamp(TOUCHING, NEAR),
+        }
+    }
+
+    /// Joints that move the two against each other, each once.
+    pub(super) fn joints(&self) -> Vec<usize> {
+        let mut joints: Vec<usize> = self.gains.iter().map(|(joint, _)| *joint).collect();
+        joints.sort_unstable();
+        joints.dedup();
+        joints
     }
 
     /// How far the two may move towards each other along a path.

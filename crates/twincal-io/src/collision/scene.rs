@@ -1,6 +1,6 @@
 //! From a model's geometry and what the user states to the solids and pairs that are looked at.
 
-use super::pairs::Pair;
+use super::pairs::{Pair, TOUCHING};
 use super::solid::Solid;
 use super::{CollisionWorld, Placed, mesh, pose, poses};
 use crate::error::{Error, Result};
@@ -20,8 +20,6 @@ const MARGIN: f64 = 0.02;
 const CAPSULE: f64 = 0.08;
 /// Random positions at which a pair has to be too close, each time, to be left out.
 const LOOKS: usize = 256;
-/// Margin of pairs that are closer than the margin everywhere and touch in some positions, m.
-const TOUCHING: f64 = 1e-4;
 /// Radius of a frame without geometry, m.
 const POINT: f64 = 1e-6;
 /// Name of the floor in what is said.

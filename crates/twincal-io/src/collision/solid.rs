@@ -1,5 +1,6 @@
 //! Convex solids: the hull of a few points with a skin, a cylinder, or half of space; and how far two of them are apart.
 
+use super::cloud::{Cloud, ends, outermost};
 use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::query::gjk::{CsoPoint, GJKResult, VoronoiSimplex, closest_points};
 use parry3d_f64::shape::SupportMap;
@@ -27,7 +28,7 @@ pub(super) struct Solid {
 #[derive(Debug, Clone, PartialEq)]
 enum Core {
     /// The convex hull of points.
-    Hull(Vec<Vector>),
+    Hull(Cloud),
     /// Radius and half length along z.
     Cylinder(f64, f64),
     /// z ≤ 0.
@@ -37,7 +38,7 @@ enum Core {
 impl SupportMap for Core {
     fn local_support_point(&self, dir: Vector) -> Vector {
         match self {
-            Self::Hull(points) => outermost(points, dir),
+            Self::Hull(cloud) => cloud.outermost(dir),
             Self::Cylinder(radius, half) => {
                 let across = dir.x.hypot(dir.y);
                 let at = match across > 0.0 {
@@ -51,27 +52,15 @@ impl SupportMap for Core {
     }
 }
 
-/// The point farthest along a direction; the first one of several.
-fn outermost(points: &[Vector], direction: Vector) -> Vector {
-    let mut best = (f64::NEG_INFINITY, Vector::ZERO);
-    for point in points {
-        let along = point.dot(direction);
-        if along > best.0 {
-            best = (along, *point);
-        }
-    }
-    best.1
-}
-
 impl Solid {
     /// A ball about the origin.
     pub(super) fn ball(radius: f64) -> Self {
-        Self::new(Core::Hull(vec![Vector::ZERO]), radius)
+        Self::new(Core::Hull(Cloud::new([Vector::ZERO])), radius)
     }
 
     /// Everything closer than a radius to a line between two points.
     pub(super) fn capsule(from: Vector, to: Vector, radius: f64) -> Self {
-        Self::new(Core::Hull(vec![from, to]), radius)
+        Self::new(Core::Hull(Cloud::new([from, to])), radius)
     }
 
     /// A box with its centre at the origin.
@@ -83,7 +72,7 @@ impl Solid {
                 .flat_map(|y| signs.iter().map(move |z| (*y, *z)));
             pairs.map(move |(y, z)| Vector::new(x * a, y * b, z * c))
         });
-        Self::new(Core::Hull(corners.collect()), 0.0)
+        Self::new(Core::Hull(Cloud::new(corners)), 0.0)
     }
 
     /// A cylinder with its centre at the origin.
@@ -94,7 +83,7 @@ impl Solid {
     /// An ellipsoid, or a little more.
     pub(super) fn ellipsoid([a, b, c]: [f64; 3]) -> Self {
         let points = directions(CORNERS).map(|d| Vector::new(a * d.x, b * d.y, c * d.z) * OUTSIDE);
-        Self::new(Core::Hull(points.collect()), 0.0)
+        Self::new(Core::Hull(Cloud::new(points)), 0.0)
     }
 
     /// z ≤ 0.
@@ -116,18 +105,21 @@ impl Solid {
             return None;
         }
         if points.len() <= DIRECTIONS {
-            return Some(Self::new(Core::Hull(points.to_vec()), 0.0));
+            return Some(Self::new(
+                Core::Hull(Cloud::new(points.iter().copied())),
+                0.0,
+            ));
         }
         let mut kept: Vec<Vector> = Vec::new();
         for direction in directions(DIRECTIONS) {
-            let point = outermost(points, direction);
+            let (_, point) = outermost(points, direction);
             if !kept.contains(&point) {
                 kept.push(point);
             }
         }
-        let core = Core::Hull(kept);
+        let core = Core::Hull(Cloud::new(kept));
         let beyond = points.iter().map(|point| {
-            let own = Core::Hull(vec![*point]);
+            let own = Core::Hull(Cloud::new([*point]));
             apart(&Pose::IDENTITY, &core, &own, f64::MAX).distance
         });
         let skin = beyond.fold(0.0, f64::max);
@@ -139,14 +131,9 @@ impl Solid {
 
     fn new(core: Core, skin: f64) -> Self {
         let (centre, radius) = match &core {
-            Core::Hull(points) => {
-                let (low, high) = points.iter().fold(
-                    (
-                        Vector::splat(f64::INFINITY),
-                        Vector::splat(f64::NEG_INFINITY),
-                    ),
-                    |(low, high), point| (low.min(*point), high.max(*point)),
-                );
+            Core::Hull(cloud) => {
+                let points = cloud.points();
+                let (low, high) = ends(points);
                 let centre = 0.5 * (low + high);
                 let away = points.iter().map(|point| (*point - centre).length());
                 (centre, away.fold(0.0, f64::max))
@@ -177,8 +164,14 @@ impl Solid {
     /// The distance, with a direction that separates the two.
     pub(super) fn apart(&self, own: &Pose, other: &Self, its: &Pose, far: f64) -> Apart {
         match (&self.core, &other.core) {
-            (Core::HalfSpace, _) => Apart::exactly(other.above(its, own)),
-            (_, Core::HalfSpace) => Apart::exactly(self.above(own, its)),
+            (Core::HalfSpace, _) => Apart {
+                distance: other.above(its, own),
+                axis: Some(own.transform_vector(Vector::Z)),
+            },
+            (_, Core::HalfSpace) => Apart {
+                distance: self.above(own, its),
+                axis: Some(-its.transform_vector(Vector::Z)),
+            },
             _ => {
                 let a = own.transform_point(self.centre);
                 let b = its.transform_point(other.centre);
@@ -245,7 +238,7 @@ impl Apart {
     }
 }
 
-/// Distance of two cores by the algorithm of Gilbert, Johnson and Keerthi, in the first one's frame; `far` where it is at least that.
+/// Distance of two cores by the algorithm of Gilbert, Johnson and Keerthi, in the first one's frame; where it is more than `far`, a lower bound beyond that.
 fn apart(between: &Pose, one: &Core, other: &Core, far: f64) -> Apart {
     let towards = match between.translation.length() > 0.0 {
         true => -between.translation.normalize(),
@@ -258,14 +251,24 @@ fn apart(between: &Pose, one: &Core, other: &Core, far: f64) -> Apart {
             distance: (b - a).length(),
             axis: (b - a).try_normalize(),
         },
-        GJKResult::NoIntersection(_) => Apart::exactly(far),
+        // Along this axis they are apart, unless it did not converge.
+        GJKResult::NoIntersection(axis) => {
+            let gap = -axis.dot(CsoPoint::from_shapes(between, one, other, axis).point);
+            match gap >= far {
+                true => Apart {
+                    distance: gap,
+                    axis: Some(axis),
+                },
+                false => Apart::exactly(0.0),
+            }
+        }
         // What does not converge counts as an overlap: on the safe side.
         GJKResult::Intersection | GJKResult::Proximity(_) => Apart::exactly(0.0),
     }
 }
 
 /// Directions that are spread evenly over the sphere: a spiral of Fibonacci.
-fn directions(count: usize) -> impl Iterator<Item = Vector> {
+pub(super) fn directions(count: usize) -> impl Iterator<Item = Vector> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     (0..count).map(move |k| {
         let z = 1.0 - (2 * k + 1) as f64 / count as f64;

@@ -137,7 +137,7 @@ fn world(geometry: &str, surroundings: &Surroundings) -> crate::error::Result<Co
 }
 
 fn at_rest(world: &CollisionWorld, q: [f64; 2]) -> Option<Approach> {
-    world.breach(&Path::at_rest(&q))
+    world.breach(&Path::at_rest(&q), None)
 }
 
 #[test]
@@ -251,9 +251,10 @@ fn what_happens_between_samples_is_seen() {
     };
     for samples in [2, 3, 9, 100] {
         let path = path(samples);
-        let ends_are_free = [0, samples - 1].map(|k| own.breach(&Path::at_rest(&path.position(k))));
+        let ends_are_free =
+            [0, samples - 1].map(|k| own.breach(&Path::at_rest(&path.position(k)), None));
         assert_eq!(ends_are_free, [None, None]);
-        let hit = own.breach(&path).expect("through the arm's way");
+        let hit = own.breach(&path, None).expect("through the arm's way");
         assert!(hit.time >= 3.0 && hit.time <= 4.0, "{hit:?}");
     }
 }
@@ -371,4 +372,43 @@ fn mjcf_geoms_are_where_mujoco_has_them() {
             near(a.distance, b.distance);
         }
     }
+}
+
+/// A ball over the floor: ln(height beyond the margin) changes as the closed form says, with a second body far above.
+#[test]
+fn slopes_of_what_is_near_are_those_of_closed_forms() {
+    let floor = Surroundings {
+        floor: Some(-0.5),
+        ..Surroundings::default()
+    };
+    let own = world(r#"<sphere radius="0.1"/>"#, &floor).expect("a world");
+    // The centre is 0.2 − sin q₁ − 0.5 sin(q₁ + q₂) high.
+    let [one, both] = [0.3_f64, 0.534];
+    let left = 0.2 - one.sin() - 0.5 * both.sin() + 0.5 - 0.1 - own.margin();
+    assert!((0.02..0.04).contains(&left), "{left}");
+    let q = [0.0, one, 0.0, both - one];
+    let near = own.nearness(&q, 2);
+    assert_eq!(near[0], 0.0, "far in the first state");
+    assert!((near[1] - (left / 0.05).ln()).abs() < 1e-6, "{near:?}");
+    let found = own.nearness_slopes(&q, 2, &[1e-3, 1e-3]);
+    assert!(found.len() == 1 && found[0].state == 1, "{found:?}");
+    let second = -0.5 * both.cos() / left;
+    let wanted = [second - one.cos() / left, second];
+    for (found, wanted) in found[0].slopes.iter().zip(wanted) {
+        assert!((found / wanted - 1.0).abs() < 1e-3, "{found} {wanted}");
+    }
+}
+
+/// A path on which a single joint differs: what that joint does not move is not looked at again.
+#[test]
+fn what_another_joint_moves_is_not_looked_at_again() {
+    let floor = Surroundings {
+        floor: Some(-0.23),
+        ..Surroundings::default()
+    };
+    let own = world(BOX, &floor).expect("a world");
+    // The end of the upper arm is below the floor, whatever the second joint does; the lower arm points up.
+    let below = Path::at_rest(&[0.45, -1.95]);
+    assert!(own.breach(&below, None).is_some() && own.breach(&below, Some(0)).is_some());
+    assert_eq!(own.breach(&below, Some(1)), None);
 }

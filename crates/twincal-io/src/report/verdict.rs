@@ -52,6 +52,8 @@ pub(super) struct Verdict {
     pub(super) pointers: Vec<String>,
     /// What to record next; `None` where nothing more would be learnt from it that is known of.
     pub(super) next: Option<String>,
+    /// The line that designs its motion.
+    pub(super) motion: Option<String>,
 }
 
 /// The assessment of `calibration`, as the page shows it.
@@ -71,6 +73,7 @@ pub(super) fn judge(calibration: &Calibration) -> Verdict {
             _ => pointers(calibration),
         },
         next: words.next,
+        motion: words::design::command(calibration, "DIR"),
     }
 }
 

@@ -1,7 +1,11 @@
 //! What a designed motion is and what it is expected to decide, in sentences and cells of tables.
 
+use super::NAMED;
+use super::list::{first_of, list};
 use super::number::{THIN, fixed, number, probability};
 use crate::collision::CollisionWorld;
+use twincal::assess::open_effects;
+use twincal::calibrate::Calibration;
 use twincal::design::{Design, JERK_TIME, JointLimits, SPEED_UP};
 use twincal::words::{listed, shortened};
 
@@ -13,6 +17,20 @@ pub const DECIDED: &str = "Decided: the PIP leaves 0.05 to 0.95 in logs simulate
     Expected sd: median sd of the first coefficient afterwards, in SI units, where the effect is there.";
 /// Stands where a limit would.
 pub const NOT_LIMITED: &str = "not limited";
+
+/// The line that designs a motion for what a fit leaves open; `folder`: that of the twin. `None` where nothing is open.
+#[must_use]
+pub fn command(calibration: &Calibration, folder: &str) -> Option<String> {
+    let open = open_effects(calibration).into_iter().map(str::to_owned);
+    let open: Vec<String> = open.collect();
+    if open.is_empty() {
+        return None;
+    }
+    let names = list(&first_of(open, NAMED));
+    Some(format!(
+        "twincal design --twin {folder} -o motion designs a motion to decide {names}."
+    ))
+}
 
 /// Length and rate: "Motion of 20 s at 500 Hz".
 #[must_use]

@@ -35,7 +35,7 @@ mod shape;
 
 pub use answer::{Answer, decide, decision_table};
 pub use claim::{Claim, Evidence, Role, Subject};
-pub use next::{Request, RequestCode};
+pub use next::{Request, RequestCode, open_effects};
 pub use rest::{AtRest, Pauses, all_at_rest, at_rest, few_pauses, standstill};
 pub use scores::{
     converged, decisive, friction_only, has_standstill, independent_rows, memory, rows_of,

@@ -5,7 +5,8 @@ use super::claim::{Claim, Evidence, Role, Subject};
 use super::rest::hardly_at_rest;
 use super::scores::{FEW, independent_rows};
 use crate::calibrate::{Alike, Calibration};
-use crate::error::Code;
+use crate::error::{Code, Finding};
+use crate::posterior::OPEN;
 use crate::validate::Split;
 use serde::Serialize;
 
@@ -60,6 +61,21 @@ pub(super) fn requests(calibration: &Calibration, claims: &[Claim]) -> Vec<Reque
         new
     });
     out
+}
+
+/// Names of the effects that are open questions, which a designed motion may decide ([`crate::design::Questions`]); none where the log or
+/// the model is doubtful, or the regression is not at hand.
+#[must_use]
+pub fn open_effects(calibration: &Calibration) -> Vec<&str> {
+    let doubtful = calibration.findings.iter().any(Finding::doubts_the_log);
+    if doubtful || calibration.problem.is_none() {
+        return Vec::new();
+    }
+    let is_open = |pip: f64| (OPEN[0]..OPEN[1]).contains(&pip);
+    let all = calibration.components.iter();
+    all.filter(|own| own.pip.is_some_and(is_open))
+        .map(|own| own.name.as_str())
+        .collect()
 }
 
 fn to_fit(calibration: &Calibration) -> Vec<Request> {

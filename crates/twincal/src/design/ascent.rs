@@ -2,20 +2,21 @@
 //!
 //! ```text
 //! F(c) = value(M(c)) + ν Σ_states barrier      barrier: ln of what is left to the torque limits and to the margin
-//! H    = Σ_k D_kᵀ diag(1/s²) D_k               D_k: k-th difference of control points, s: what is left to its two limits
-//! p    = H⁻¹ g + β p_before                    steps within pᵀ H p < 1 break no limit (Dikin)
+//! p    = H⁻¹ g + β p_before                    H: Dikin's metric ([`Metric`])
 //! ```
 //! The gradient goes through the states: how each of them changes F by small differences, how control points move it by the spline.
 //!
 //! # Source
-//! Affine scaling: Dikin 1967, Barnes 1986. Conjugate directions: Polak and Ribière 1969.
+//! Conjugate directions: Polak and Ribière 1969.
 
 use super::Task;
+use super::clearance::NearSlope;
 use super::information::{Objective, SAMPLES, states_of};
+use super::metric::Metric;
 use super::search::{Found, PER_SPAN};
 use super::spline::{DEGREE, HELD, Spline, StateWeights, steps};
 use crate::excitation::States;
-use crate::linear_algebra::{Cholesky, dot};
+use crate::linear_algebra::dot;
 
 /// Factors on the motion about its start, of which the first that is within torque and clearance counts: a climb begins inside its limits.
 const INSIDE: [f64; 4] = [0.97, 0.98, 0.99, 0.995];
@@ -23,19 +24,21 @@ const INSIDE: [f64; 4] = [0.97, 0.98, 0.99, 0.995];
 const BARRIER: [f64; 2] = [0.5, 0.05];
 /// Step of a difference, as a share of a limit: smaller ones are lost in rounding where hardly anything is shown yet.
 const DIFFERENCE: f64 = 1e-6;
-/// Least distance from a limit that the metric sees, as a share of its range.
-const LEAST: f64 = 1e-6;
+/// The same where distances are concerned: they have a kink wherever another corner or face is the nearest.
+const SMOOTH: f64 = 3e-3;
 /// Largest step as a share of the way to the nearest limit.
 const NEARLY: f64 = 0.95;
 /// Share of what the slope promises that a step has to gain.
 const GAINED: f64 = 1e-4;
+/// Share of the way to the nearest limit below which a step is none.
+const STALLED: f64 = 1e-5;
 /// Halvings of a step.
 const HALVINGS: usize = 10;
 /// Largest share of a torque limit that the barrier sees.
 const FULL: f64 = 0.9999;
 
 /// Moments that are watched at most; the oldest goes first.
-const MOMENTS: usize = 60;
+const MOMENTS: usize = 200;
 
 /// What comes of a step.
 enum Tried {
@@ -64,16 +67,27 @@ pub(super) struct Climb<'a> {
     reach: f64,
 }
 
+/// Something near, and when.
+type Near = (NearSlope, Moment);
+
 /// A moment of a motion.
+#[derive(Debug, Clone)]
 struct Moment {
     span: usize,
     weights: StateWeights,
 }
 
 impl Moment {
-    fn position(&self, splines: &[Spline]) -> Vec<f64> {
-        let at = |spline: &Spline| spline.state(self.span, &self.weights)[0];
-        splines.iter().map(at).collect()
+    /// The slope over the position at this moment as slopes over the control points that move.
+    fn add_slope(&self, slope: f64, points: &mut [f64]) {
+        let mut own = [0.0; DEGREE + 1];
+        (self.weights).add_transposed([slope, 0.0, 0.0], 1.0, &mut own);
+        for (i, slope) in own.iter().enumerate() {
+            let at = (self.span + i).checked_sub(HELD);
+            if let Some(point) = at.and_then(|at| points.get_mut(at)) {
+                *point += slope;
+            }
+        }
     }
 }
 
@@ -121,10 +135,15 @@ impl<'a> Climb<'a> {
     /// One step; `done` is the share of all steps that were made. False where none gains anything.
     pub(super) fn step(&mut self, done: f64) -> bool {
         let weight = BARRIER[0] * (BARRIER[1] / BARRIER[0]).powf(done);
-        let Some(gradient) = self.gradient(weight) else {
+        let near = self.near();
+        let Some(gradient) = self.gradient(weight, &near) else {
             return false;
         };
-        let scaled = self.scaled(&gradient);
+        let mut metric = Metric::new(&self.now.splines, &self.bounds, self.inner());
+        for (own, moment) in &near {
+            metric.add_near(own, moment.span, &moment.weights);
+        }
+        let scaled = metric.scaled(&gradient);
         let square = dot(&gradient, &scaled);
         let conjugate = self.before.take().map(|before| {
             let turned = square - dot(&before.gradient, &scaled);
@@ -136,7 +155,7 @@ impl<'a> Climb<'a> {
         });
         let uphill = conjugate.filter(|own| dot(own, &gradient) > 0.0);
         let direction = uphill.unwrap_or_else(|| scaled.clone());
-        if self.search(&direction, dot(&direction, &gradient), weight) {
+        if self.search(&direction, dot(&direction, &gradient), weight) && self.reach > STALLED {
             self.before = Some(Before {
                 gradient,
                 square,
@@ -144,7 +163,7 @@ impl<'a> Climb<'a> {
             });
             return true;
         }
-        self.search(&scaled, square, weight)
+        self.search(&scaled, square, weight) && self.reach > STALLED
     }
 
     /// Control points that move.
@@ -172,28 +191,32 @@ impl<'a> Climb<'a> {
         }
         let here = self.now.value + weight * self.barrier(&self.now.splines, &self.states());
         let mut step = (2.0 * self.reach).min(NEARLY) * most;
-        let mut close = None;
+        let (mut close, mut good) = (None, None);
         for _ in 0..HALVINGS {
             let needed = here + GAINED * step * slope;
             match self.tried(&whole, step, (weight, needed)) {
-                Tried::Good(found) => {
-                    self.reach = step / most;
-                    self.now = found;
-                    self.refused = None;
-                    if self.now.value > self.best.value {
-                        self.best = self.now.clone();
-                    }
-                    return true;
-                }
+                Tried::Good(found) => good = Some(found),
                 Tried::TooClose(time) => close = Some(time),
                 Tried::Bad => {}
+            }
+            if good.is_some() {
+                break;
             }
             step *= 0.5;
         }
         if let Some(time) = close {
             self.watch(time);
         }
-        false
+        let gained = good.is_some();
+        if let Some(found) = good {
+            self.reach = step / most;
+            self.now = found;
+            self.refused = None;
+            if self.now.value > self.best.value {
+                self.best = self.now.clone();
+            }
+        }
+        gained
     }
 
     /// Looks at a moment from now on.
@@ -206,7 +229,6 @@ impl<'a> Climb<'a> {
             self.watched.remove(0);
         }
         self.watched.push(moment);
-        self.before = None;
     }
 
     /// The motion a step away; `None` where F is less than needed, or torque or clearance forbid it.
@@ -225,7 +247,10 @@ impl<'a> Climb<'a> {
         if !total.is_finite() || total < needed {
             return Tried::Bad;
         }
-        match self.task.too_close(&splines, 0..self.spans, PER_SPAN) {
+        match self
+            .task
+            .too_close(&splines, (0..self.spans, None), PER_SPAN)
+        {
             Some(approach) => Tried::TooClose(approach.time),
             None => Tried::Good(Found {
                 splines,
@@ -242,16 +267,23 @@ impl<'a> Climb<'a> {
     /// Of a motion with its states.
     fn barrier(&self, splines: &[Spline], states: &States) -> f64 {
         let torque: f64 = self.torque_barriers(states).iter().sum();
-        let clearance = self.clearance_barriers(states, &vec![true; states.len]);
-        let watched = self.watched.iter();
-        let watched: f64 = watched
-            .map(|own| self.nearness(&own.position(splines)))
-            .sum();
-        torque + clearance.iter().sum::<f64>() + watched
+        let Some(clearance) = self.task.clearance else {
+            return torque;
+        };
+        let nearness = |q: &[f64], len: usize| clearance.nearness(q, len).iter().sum::<f64>();
+        let watched = nearness(&self.watched_positions(splines), self.watched.len());
+        torque + nearness(&states.q, states.len) + watched
     }
 
-    fn nearness(&self, q: &[f64]) -> f64 {
-        self.task.clearance.map_or(0.0, |own| own.nearness(q))
+    /// Positions at the watched moments, `[joint * moments + moment]`.
+    fn watched_positions(&self, splines: &[Spline]) -> Vec<f64> {
+        let at = |spline: &Spline| -> Vec<f64> {
+            let moments = self.watched.iter();
+            moments
+                .map(|own| spline.state(own.span, &own.weights)[0])
+                .collect()
+        };
+        splines.iter().flat_map(at).collect()
     }
 
     /// Σ_j ln(1 − share²) of each state.
@@ -268,106 +300,71 @@ impl<'a> Climb<'a> {
         barriers
     }
 
-    /// Nearness of the states that are asked for, 0 of the others.
-    fn clearance_barriers(&self, states: &States, asked: &[bool]) -> Vec<f64> {
-        let Some(clearance) = self.task.clearance else {
-            return vec![0.0; states.len];
-        };
-        let near = |(k, asked): (usize, &bool)| {
-            let q = || {
-                states
-                    .q
-                    .iter()
-                    .skip(k)
-                    .step_by(states.len)
-                    .copied()
-                    .collect::<Vec<f64>>()
-            };
-            if *asked {
-                clearance.nearness(&q())
-            } else {
-                0.0
-            }
-        };
-        asked.iter().enumerate().map(near).collect()
-    }
-
     /// ∂F/∂c of the control points that move, joint after joint.
-    fn gradient(&self, weight: f64) -> Option<Vec<f64>> {
+    fn gradient(&self, weight: f64, near: &[Near]) -> Option<Vec<f64>> {
         let matrix = (self.objective).gradient(&self.now.sums, self.rows, self.duration)?;
         let states = self.states();
-        let total = |states: &States, clearance: &[f64]| -> Vec<f64> {
-            let (shown, torque) = (
-                self.objective.shown(&matrix, states),
-                self.torque_barriers(states),
-            );
-            let barriers = torque.iter().zip(clearance).map(|(a, b)| weight * (a + b));
-            shown
-                .iter()
-                .zip(barriers)
-                .map(|(shown, barrier)| shown + barrier)
+        let total = |states: &States| -> Vec<f64> {
+            let shown = self.objective.shown(&matrix, states);
+            let torque = self.torque_barriers(states);
+            let both = shown.iter().zip(torque);
+            both.map(|(shown, torque)| shown + weight * torque)
                 .collect()
         };
-        let clearance = self.clearance_barriers(&states, &vec![true; states.len]);
-        let near: Vec<bool> = clearance.iter().map(|own| *own < 0.0).collect();
-        let here = total(&states, &clearance);
+        let here = total(&states);
         let mut gradient = Vec::new();
         for (joint, spline) in self.now.splines.iter().enumerate() {
             let range = joint * states.len..(joint + 1) * states.len;
             let slopes = [0, 1, 2].map(|order| {
-                let [low, high] = self.bounds[joint][order];
-                let by = DIFFERENCE * (high - low);
+                let by = self.difference(joint, order);
                 let mut moved = states.clone();
                 let own = [&mut moved.q, &mut moved.qd, &mut moved.qdd]
                     .into_iter()
                     .nth(order);
                 let own = own.into_iter().flat_map(|own| &mut own[range.clone()]);
                 own.for_each(|x| *x += by);
-                // Distances depend on positions alone.
-                let there = match order {
-                    0 => total(&moved, &self.clearance_barriers(&moved, &near)),
-                    _ => total(&moved, &clearance),
-                };
-                there.iter().zip(&here).map(|(a, b)| (a - b) / by).collect()
+                let there = total(&moved);
+                (there.iter().zip(&here).map(|(a, b)| (a - b) / by)).collect::<Vec<f64>>()
             });
             let mut points = through(spline, &slopes, self.spans);
-            self.add_watched(joint, weight, &mut points);
+            for (own, moment) in near {
+                moment.add_slope(weight * own.slopes[joint], &mut points);
+            }
             gradient.extend(points);
         }
         gradient.iter().all(|x| x.is_finite()).then_some(gradient)
     }
 
-    /// Slopes of the watched moments' barrier over the control points of a joint that move.
-    fn add_watched(&self, joint: usize, weight: f64, points: &mut [f64]) {
-        let [low, high] = self.bounds[joint][0];
-        let by = DIFFERENCE * (high - low);
-        for moment in &self.watched {
-            let mut q = moment.position(&self.now.splines);
-            let here = self.nearness(&q);
-            q[joint] += by;
-            let slope = weight * (self.nearness(&q) - here) / by;
-            let mut own = [0.0; DEGREE + 1];
-            (moment.weights).add_transposed([slope, 0.0, 0.0], 1.0, &mut own);
-            for (i, slope) in own.iter().enumerate() {
-                let at = (moment.span + i).checked_sub(HELD);
-                if let Some(point) = at.and_then(|at| points.get_mut(at)) {
-                    *point += slope;
-                }
-            }
-        }
+    /// A small change of a joint's position, velocity or acceleration.
+    fn difference(&self, joint: usize, order: usize) -> f64 {
+        let [low, high] = self.bounds[joint][order];
+        DIFFERENCE * (high - low)
     }
 
-    /// H⁻¹ g, joint by joint.
-    fn scaled(&self, gradient: &[f64]) -> Vec<f64> {
-        let inner = self.inner();
-        let mut scaled = gradient.to_vec();
-        for (joint, own) in scaled.chunks_exact_mut(inner).enumerate() {
-            let metric = metric(&self.now.splines[joint], &self.bounds[joint], inner);
-            if let Ok(factor) = Cholesky::new(&metric, inner) {
-                factor.solve(own);
-            }
-        }
-        scaled
+    /// What is near at the states and at the watched moments.
+    fn near(&self) -> Vec<Near> {
+        let Some(clearance) = self.task.clearance else {
+            return Vec::new();
+        };
+        let steps = self
+            .bounds
+            .iter()
+            .map(|own| SMOOTH * (own[0][1] - own[0][0]));
+        let steps: Vec<f64> = steps.collect();
+        let states = self.states();
+        let sampled = clearance.nearness_slopes(&states.q, states.len, &steps);
+        let sampled = sampled.into_iter().map(|own| {
+            let weights = StateWeights::of_sample(own.state % SAMPLES);
+            let span = own.state / SAMPLES;
+            (own, Moment { span, weights })
+        });
+        let positions = self.watched_positions(&self.now.splines);
+        let watched = clearance.nearness_slopes(&positions, self.watched.len(), &steps);
+        let watched = watched.into_iter().map(|own| {
+            let moment = self.watched[own.state].clone();
+            (own, moment)
+        });
+        sampled.chain(watched).collect()
     }
 }
 
@@ -386,7 +383,9 @@ fn inside(
         }
         let states = states_of(&splines, 0..spans);
         let forbidden = task.too_much_torque(&states).is_some()
-            || task.too_close(&splines, 0..spans, PER_SPAN).is_some();
+            || task
+                .too_close(&splines, (0..spans, None), PER_SPAN)
+                .is_some();
         if !forbidden {
             let sums = objective.of(&states);
             let value = objective.value(&sums, rows, duration);
@@ -413,36 +412,6 @@ fn through(spline: &Spline, slopes: &[Vec<f64>; 3], spans: usize) -> Vec<f64> {
         }
     }
     points[HELD..points.len() - HELD].to_vec()
-}
-
-/// Σ_k D_kᵀ diag(1/s²) D_k of the control points of one joint that move.
-fn metric(spline: &Spline, bounds: &[[f64; 2]; 4], inner: usize) -> Vec<f64> {
-    let mut metric = vec![0.0; inner * inner];
-    let mut stencil = vec![1.0];
-    for (order, [low, high]) in bounds.iter().enumerate() {
-        if order > 0 {
-            let before = stencil.iter().map(|w| -w / spline.span).chain([0.0]);
-            let after = std::iter::once(0.0).chain(stencil.iter().map(|w| w / spline.span));
-            stencil = before.zip(after).map(|(a, b)| a + b).collect();
-        }
-        let least = LEAST * (high - low);
-        for (first, x) in spline.derivative(order).iter().enumerate() {
-            let weight = (high - x).max(least).powi(-2) + (x - low).max(least).powi(-2);
-            for (i, a) in stencil.iter().enumerate() {
-                for (j, b) in stencil.iter().enumerate() {
-                    let (row, column) =
-                        ((first + i).checked_sub(HELD), (first + j).checked_sub(HELD));
-                    if let (Some(row), Some(column)) = (row, column)
-                        && row < inner
-                        && column < inner
-                    {
-                        metric[row * inner + column] += weight * a * b;
-                    }
-                }
-            }
-        }
-    }
-    metric
 }
 
 #[cfg(test)]
@@ -503,7 +472,9 @@ mod tests {
             let own = climb(splines);
             own.now.value + weight * own.barrier(&own.now.splines, &own.states())
         };
-        let gradient = climb(splines.clone()).gradient(weight).expect("a gradient");
+        let gradient = climb(splines.clone())
+            .gradient(weight, &[])
+            .expect("a gradient");
         let inner = spans + DEGREE - 2 * HELD;
         for _ in 0..8 {
             let direction: Vec<f64> = gradient.iter().map(|_| random.normal()).collect();
@@ -523,31 +494,6 @@ mod tests {
                 (slope - wanted).abs() < 5e-3 * size,
                 "{slope} {wanted} of {size}"
             );
-        }
-    }
-
-    /// Dikin's ellipsoid lies within the limits, whatever the direction.
-    #[test]
-    fn a_step_of_length_one_breaks_no_limit() {
-        let bounds = [[-1.0, 1.4], [-1.7, 1.7], [-6.0, 6.0], [-70.0, 70.0]];
-        let (spans, mut random) = (14, Random::new(7, 0));
-        let mut spline = Spline::at(0.1, spans, 0.25);
-        let inner = spans + DEGREE - 2 * HELD;
-        for (k, point) in spline.points[HELD..HELD + inner].iter_mut().enumerate() {
-            *point += 0.3 * (0.4 * k as f64).sin().powi(2);
-        }
-        let metric = metric(&spline, &bounds, inner);
-        for _ in 0..200 {
-            let own: Vec<f64> = (0..inner).map(|_| random.normal()).collect();
-            let square: f64 = (0..inner)
-                .map(|i| own[i] * dot(&metric[i * inner..(i + 1) * inner], &own))
-                .sum();
-            let mut moved = vec![0.0; spline.points.len()];
-            for (to, x) in moved[HELD..HELD + inner].iter_mut().zip(&own) {
-                *to = x / square.sqrt();
-            }
-            let [low, high] = steps(&spline, &moved, &bounds).expect("within");
-            assert!(low <= -1.0 && high >= 1.0, "{low} {high}");
         }
     }
 }

@@ -59,13 +59,28 @@ pub struct Approach {
     pub time: f64,
 }
 
+/// How what is left between two things changes with the positions of the joints.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NearSlope {
+    /// Number of the position.
+    pub state: usize,
+    /// ∂ ln(distance beyond the margin) / ∂q of every joint, 1/rad or 1/m.
+    pub slopes: Vec<f64>,
+}
+
 /// How far a robot is from itself, from the floor and from forbidden space.
 pub trait Clearance: Sync {
     /// The first approach closer than the margin; `None`: at every moment of the path, between samples too, nothing is closer.
-    fn breach(&self, path: &Path) -> Option<Approach>;
+    ///
+    /// With `joint` it alone differs from a path on which nothing was closer.
+    fn breach(&self, path: &Path, joint: Option<usize>) -> Option<Approach>;
 
-    /// Σ ln(what is left to the margin, as a share of a short distance) over what is nearer than that: 0 where nothing is, and smaller the nearer.
-    fn nearness(&self, q: &[f64]) -> f64;
+    /// Σ ln(what is left to the margin, as a share of a short distance) over what is nearer than that: 0 where nothing is, and smaller the
+    /// nearer; of each of `len` positions `[joint * len + state]`.
+    fn nearness(&self, q: &[f64], len: usize) -> Vec<f64>;
+
+    /// What makes [`Self::nearness`] less than 0, with its slopes; `steps` are small changes of each joint's position.
+    fn nearness_slopes(&self, q: &[f64], len: usize, steps: &[f64]) -> Vec<NearSlope>;
 
     /// The smallest distance at the samples of the path; `None` where nothing can come close.
     fn closest(&self, path: &Path) -> Option<Approach>;

@@ -16,15 +16,17 @@ mod ascent;
 mod clearance;
 mod information;
 mod limits;
+mod metric;
 mod motion;
 mod questions;
 mod search;
-mod torque;
+mod sizes;
 mod spline;
+mod torque;
 #[cfg(test)]
 mod tests;
 
-pub use clearance::{Approach, Clearance, Path};
+pub use clearance::{Approach, Clearance, NearSlope, Path};
 pub use limits::{JERK_TIME, JointLimits, SPEED_UP, StatedLimits, joint_limits, spread_positions};
 pub use motion::{DesignedMotion, JointUse};
 pub use questions::{Promise, Questions};
@@ -48,10 +50,11 @@ const LEAST_SPANS: usize = 10;
 const LEAST_SAMPLES: f64 = 80.0;
 /// Proposals between two looks at whether to go on.
 const BATCH: usize = 50;
-/// Steps without a gain after which a chain ends, in the second half of them.
-const PATIENCE: usize = 8;
-/// Proposals that a step uphill counts as in what is done.
+/// Steps without a gain after which random changes are tried again.
+const PATIENCE: usize = 4;
+/// Random changes that count as one step uphill in what is done, and how many steps they take then.
 const STEP: usize = 50;
+const AGAIN: usize = 15;
 
 /// Other starts that are tried, farther and farther away.
 const STARTS: usize = 1000;
@@ -79,9 +82,9 @@ impl Default for DesignSettings {
             duration: 20.0,
             rate: 500.0,
             seed: 1,
-            chains: 4,
+            chains: 2,
             proposals: 1500,
-            steps: 150,
+            steps: 180,
         }
     }
 }
@@ -177,26 +180,8 @@ pub fn design(
     };
     let run = |number: usize| -> Result<(Searched, bool)> {
         let random = (settings.seed, number as u64);
-        let mut chain = Chain::new(task, objective, (spans, span), random);
-        for at in 0..settings.proposals {
-            let made = BATCH.min(settings.proposals - at);
-            if at.is_multiple_of(BATCH) && look(made, chain.best())? {
-                return Ok((chain.into_best(), true));
-            }
-            chain.step(at as f64 / settings.proposals as f64);
-        }
-        let (mut climb, mut failed) = (chain.climb(), 0);
-        for at in 0..settings.steps {
-            if look(STEP, climb.best().value)? {
-                return Ok((climb.into_best(), true));
-            }
-            let gained = climb.step(at as f64 / settings.steps as f64);
-            failed = if gained { 0 } else { failed + 1 };
-            if failed >= PATIENCE && 2 * at > settings.steps {
-                break;
-            }
-        }
-        Ok((climb.into_best(), false))
+        let chain = Chain::new(task, objective, (spans, span), random);
+        searched(chain, settings, &look)
     };
     let found: Vec<(Searched, bool)> = (0..settings.chains)
         .into_par_iter()
@@ -215,6 +200,42 @@ pub fn design(
 
 /// What a chain found, and what forbade every change where there was none.
 type Searched = (Found, Option<String>);
+
+/// Random changes, then steps uphill; where these come to nothing, random changes again and uphill from there. True: it was asked to end.
+fn searched(
+    mut chain: Chain<'_>,
+    settings: &DesignSettings,
+    look: &dyn Fn(usize, f64) -> Result<bool>,
+) -> Result<(Searched, bool)> {
+    for at in 0..settings.proposals {
+        let made = BATCH.min(settings.proposals - at);
+        if at.is_multiple_of(BATCH) && look(made, chain.best())? {
+            return Ok((chain.into_best(), true));
+        }
+        chain.step(at as f64 / settings.proposals as f64);
+    }
+    let mut at = 0;
+    while at < settings.steps {
+        let (mut climb, mut failed) = (chain.climb(), 0);
+        while at < settings.steps && failed < PATIENCE {
+            if look(STEP, climb.best().value)? {
+                return Ok((climb.into_best(), true));
+            }
+            let gained = climb.step(at as f64 / settings.steps as f64);
+            failed = if gained { 0 } else { failed + 1 };
+            at += 1;
+        }
+        chain.resume(climb.into_best());
+        for _ in 0..AGAIN.min(settings.steps - at) {
+            if look(STEP, chain.best())? {
+                return Ok((chain.into_best(), true));
+            }
+            (0..STEP).for_each(|_| chain.step(1.0));
+            at += 1;
+        }
+    }
+    Ok((chain.into_best(), false))
+}
 
 /// The larger of a number that is shared and one's own, which is shared then.
 fn largest(shared: &Mutex<f64>, own: f64) -> f64 {
@@ -301,7 +322,7 @@ fn require_start(task: &Task<'_>) -> Result<()> {
         });
     }
     let at_rest = Path::at_rest(&q);
-    if let Some(approach) = task.clearance.and_then(|own| own.breach(&at_rest)) {
+    if let Some(approach) = task.clearance.and_then(|own| own.breach(&at_rest, None)) {
         let [one, other] = approach.between;
         return Err(Error::Refused {
             problem: format!(

@@ -13,8 +13,8 @@ use std::ops::Range;
 /// Factor on the motion about its start where a sample between those of the search breaks a limit, and how often.
 const SMALLER: f64 = 0.97;
 const TRIES: usize = 40;
-/// Samples of a span at which distances of the result are looked at: one each millisecond.
-const PER_SPAN: usize = 256;
+/// Samples of a span at which distances of the result are looked at: four each millisecond.
+const PER_SPAN: usize = 1024;
 
 /// Position, velocity and acceleration of every joint over time.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,8 +60,13 @@ pub(super) fn finished(
     for _ in 0..TRIES {
         let states = sampled(&splines, settings);
         let spans = splines[0].points.len() - 5;
-        let broken = (task.too_much_torque(&states))
-            .or_else(|| Some(in_words(&task.too_close(&splines, 0..spans, PER_SPAN)?)));
+        let broken = (task.too_much_torque(&states)).or_else(|| {
+            Some(in_words(&task.too_close(
+                &splines,
+                (0..spans, None),
+                PER_SPAN,
+            )?))
+        });
         match broken {
             None => {
                 let motion = DesignedMotion {
@@ -153,11 +158,11 @@ impl Task<'_> {
     pub(super) fn too_close(
         &self,
         splines: &[Spline],
-        spans: Range<usize>,
+        (spans, joint): (Range<usize>, Option<usize>),
         per_span: usize,
     ) -> Option<Approach> {
         let clearance = self.clearance?;
-        clearance.breach(&path_of(splines, spans, per_span))
+        clearance.breach(&path_of(splines, spans, per_span), joint)
     }
 }
 

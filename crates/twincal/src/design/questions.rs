@@ -10,13 +10,13 @@
 //! Box & Hill 1967 (expected information between models); Chaloner & Verdinelli 1995.
 
 use super::information::{Objective, quadratic};
+use super::sizes;
 use crate::error::{Error, Result};
 use crate::excitation::States;
 use crate::infer::approximate;
 use crate::likelihood::JointNoise;
 use crate::linear_algebra::{Cholesky, product, product_transposed};
-use crate::posterior::draws::draw;
-use crate::posterior::{Posterior, Problem};
+use crate::posterior::{OPEN, Posterior, Problem};
 use crate::random::Random;
 use crate::term::Library;
 use rayon::prelude::*;
@@ -24,14 +24,13 @@ use serde::Serialize;
 
 /// A column takes part in the search from this inclusion probability on.
 const ACTIVE: f64 = 0.02;
-/// Probabilities between which an effect is open, and outside which it is decided.
-const OPEN: [f64; 2] = [0.05, 0.95];
 /// Weight of ln det A beside the questions.
 const REST: f64 = 0.02;
 /// Robots that are drawn from the posterior to see whether the motion decides.
 const WORLDS: usize = 64;
 /// Random streams of those worlds and of their noise.
 const STREAM: u64 = 11 << 60;
+const NOISE: u64 = STREAM + (1 << 40);
 /// Rows of random motion that stand for all that the robot can show, and the λ below which even those say nothing.
 const ENDLESS: f64 = 1e6;
 
@@ -58,6 +57,8 @@ struct Question {
     name: String,
     /// Places among the active columns.
     places: Vec<usize>,
+    /// Columns that are large or small together: its own, and those of what goes with it.
+    sized: Vec<u32>,
     /// E[β βᵀ | in].
     second: Vec<f64>,
 }
@@ -132,7 +133,15 @@ impl<'a> Questions<'a> {
         let open = asked.into_iter().map(|component| {
             let of = |k: &usize| problem.prior.component[*k] == component;
             let places = (0..active.len()).filter(|&at| of(&active[at])).collect();
-            Question::new((problem, posterior), &name_of[component], places, &active)
+            let together =
+                |k: &u32| name_of[problem.prior.component[*k as usize]] == name_of[component];
+            let sized = (0..problem.names.len() as u32).filter(together).collect();
+            Question::new(
+                (problem, posterior),
+                &name_of[component],
+                (places, sized),
+                &active,
+            )
         });
         Ok(Self {
             open: open.collect(),
@@ -228,14 +237,15 @@ impl<'a> Questions<'a> {
         let scale = self.scale(states.len as f64, duration);
         gram.iter_mut().for_each(|x| *x *= scale);
         let counted = self.counted * self.rate * duration;
-        let worlds = draw(self.posterior, WORLDS, seed, STREAM);
-        let judged: Vec<Vec<Judged>> = (0..worlds.models.len())
-            .into_par_iter()
-            .map(|world| {
-                let beta = &worlds.beta[world * all.len()..(world + 1) * all.len()];
-                let noise = worlds.noise[world];
-                let mut random = Random::new(seed, STREAM + 1 + world as u64);
-                let problem = self.after(&gram, (beta, noise), counted, &mut random);
+        let sized: Vec<&[u32]> = self.open.iter().map(|own| own.sized.as_slice()).collect();
+        let known = (self.problem, self.posterior);
+        let robots = sizes::robots(known, &sized, (WORLDS, seed, STREAM));
+        let judged: Vec<Vec<Judged>> = robots
+            .par_iter()
+            .enumerate()
+            .map(|(world, (beta, noise))| {
+                let mut random = Random::new(seed, NOISE + world as u64);
+                let problem = self.after(&gram, (beta, *noise), counted, &mut random);
                 let posterior = approximate(&problem, Some(self.posterior))?;
                 Ok(self.judged(beta, &posterior))
             })
@@ -350,38 +360,15 @@ impl Question {
     fn new(
         (problem, posterior): (&Problem, &Posterior),
         name: &str,
-        places: Vec<usize>,
+        (places, sized): (Vec<usize>, Vec<u32>),
         active: &[usize],
     ) -> Self {
-        let size = places.len();
-        let (mut second, mut weight) = (vec![0.0; size * size], 0.0);
         let columns: Vec<u32> = places.iter().map(|&at| active[at] as u32).collect();
-        for model in &posterior.models {
-            let at = |column: &u32| model.members.binary_search(column).ok();
-            let Some(own) = columns.iter().map(at).collect::<Option<Vec<usize>>>() else {
-                continue;
-            };
-            let noise = model.scale / (posterior.shape - 1.0).max(f64::MIN_POSITIVE);
-            let members = model.members.len();
-            let inverse = Cholesky::from_lower(model.factor.clone(), members).inverse();
-            weight += model.weight;
-            for (i, &a) in own.iter().enumerate() {
-                for (j, &b) in own.iter().enumerate() {
-                    let value = model.mean[a] * model.mean[b] + noise * inverse[a * members + b];
-                    second[i * size + j] += model.weight * value;
-                }
-            }
-        }
-        if weight > 0.0 {
-            second.iter_mut().for_each(|x| *x /= weight);
-        } else {
-            // No listed model has it: as large as its prior.
-            let slab = |i: usize| problem.prior.slab[columns[i] as usize];
-            (0..size).for_each(|i| second[i * size + i] = posterior.noise * slab(i));
-        }
+        let second = sizes::second_moment((problem, posterior), &columns, &sized);
         Self {
             name: name.to_owned(),
             places,
+            sized,
             second,
         }
     }
@@ -476,6 +463,7 @@ mod tests {
         let question = Question {
             name: "first".into(),
             places: vec![0],
+            sized: vec![0],
             second: vec![0.49],
         };
         let lambda = question.lambda(&inverse, 2, 0.25).expect("a number");

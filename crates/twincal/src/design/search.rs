@@ -20,8 +20,9 @@ const ANEW: usize = 500;
 /// Loss that is accepted with probability 1/e at the start; it falls linearly to 0 at half of the proposals.
 const WARM: f64 = 0.3;
 
-/// Samples of a span, at which distances are looked at; between two of them what moves adds to the margin.
-pub(super) const PER_SPAN: usize = 128;
+/// Samples of a span, at which distances are looked at; between two of them what moves adds to the margin. Fewer for a random change.
+pub(super) const PER_SPAN: usize = 512;
+const PER_CHANGE: usize = 256;
 
 /// A motion with what it says.
 #[derive(Debug, Clone)]
@@ -86,11 +87,20 @@ impl<'a> Chain<'a> {
     }
 
     /// The best motion goes on uphill.
-    pub(super) fn climb(self) -> Climb<'a> {
-        let (spans, rows, duration) = (self.spans, self.rows, self.duration);
-        let (task, objective) = (self.task, self.objective);
-        let found = self.into_best();
-        Climb::new(task, objective, found, (spans, rows, duration))
+    pub(super) fn climb(&self) -> Climb<'a> {
+        let never = self.refused.clone().filter(|_| self.accepted == 0);
+        let found = (self.best.clone(), never);
+        let size = (self.spans, self.rows, self.duration);
+        Climb::new(self.task, self.objective, found, size)
+    }
+
+    /// Goes on from what was found uphill.
+    pub(super) fn resume(&mut self, (found, refused): (Found, Option<String>)) {
+        // Where nothing forbids a change, some were made.
+        self.accepted += usize::from(refused.is_none());
+        self.refused = refused;
+        self.now = found.clone();
+        self.best = found;
     }
 
     pub(super) fn best(&self) -> f64 {
@@ -125,7 +135,10 @@ impl<'a> Chain<'a> {
         if value.is_nan() || value < threshold {
             return;
         }
-        if let Some(approach) = self.task.too_close(&splines, changed, PER_SPAN) {
+        if let Some(approach) = self
+            .task
+            .too_close(&splines, (changed, Some(joint)), PER_CHANGE)
+        {
             self.refused = Some(super::motion::in_words(&approach));
             return;
         }

@@ -159,12 +159,27 @@ fn whoever_ends_the_search_gets_the_best_motion_so_far() {
 struct Wall;
 
 impl Clearance for Wall {
-    fn breach(&self, path: &Path) -> Option<Approach> {
+    fn breach(&self, path: &Path, _: Option<usize>) -> Option<Approach> {
         self.closest(path).filter(|own| own.distance < 0.0)
     }
 
-    fn nearness(&self, q: &[f64]) -> f64 {
-        ((0.5 - q[0]) / 0.05).clamp(1e-3, 1.0).ln()
+    fn nearness(&self, q: &[f64], len: usize) -> Vec<f64> {
+        let of = |q: &f64| ((0.5 - q) / 0.05).clamp(1e-3, 1.0).ln();
+        q[..len].iter().map(of).collect()
+    }
+
+    fn nearness_slopes(&self, q: &[f64], len: usize, _: &[f64]) -> Vec<NearSlope> {
+        let near = q[..len]
+            .iter()
+            .enumerate()
+            .filter(|(_, q)| (0.45..0.49995).contains(*q));
+        let joints = q.len() / len.max(1);
+        near.map(|(state, q)| {
+            let mut slopes = vec![0.0; joints];
+            slopes[0] = -1.0 / (0.5 - q);
+            NearSlope { state, slopes }
+        })
+        .collect()
     }
 
     fn closest(&self, path: &Path) -> Option<Approach> {

@@ -91,6 +91,9 @@ impl Site {
     }
 }
 
+/// Inclusion probabilities between which an effect is an open question, and outside which it is decided.
+pub const OPEN: [f64; 2] = [0.05, 0.95];
+
 /// Difference of a robot's probability between the chains of a fleet above which they disagree.
 pub const CHAINS_APART: f64 = 0.1;
 
