@@ -361,4 +361,4 @@ def test_meshes_do_not_touch_in_mujoco(tmp_path, monkeypatch, robot):
     monkeypatch.setattr(contacts, "SECONDS", 4.0)
     line = contacts.one(program("twincal"), contacts.Robot(robot), 2, tmp_path)
     assert line["broken"] == [] and not line["too_close"], line
-    assert line["pairs"] > 10 and abs(line["mujoco"] - line["said"]["distance"]) < 0.005, line
+    assert line["pairs"] > 10 and abs(min(line["mujoco"], line["around"]) - line["said"]["distance"]) < 0.005, line
