@@ -136,6 +136,14 @@ fn world(geometry: &str, surroundings: &Surroundings) -> crate::error::Result<Co
     )
 }
 
+/// A floor so far above the origin of the base, and nothing else.
+fn floor_at(height: f64) -> Surroundings {
+    Surroundings {
+        floor: Some(height),
+        ..Surroundings::default()
+    }
+}
+
 fn at_rest(world: &CollisionWorld, q: [f64; 2]) -> Option<Approach> {
     world.breach(&Path::at_rest(&q), None)
 }
@@ -157,10 +165,7 @@ fn a_link_that_comes_too_close_is_named_with_the_other_and_the_distance() {
 
 #[test]
 fn floor_and_boxes_count_for_the_links_that_they_name() {
-    let floor = Surroundings {
-        floor: Some(-0.5),
-        ..Surroundings::default()
-    };
+    let floor = floor_at(-0.5);
     let own = world(BOX, &floor).expect("a world");
     assert_eq!(at_rest(&own, [0.0, 0.0]), None);
     let hit = at_rest(&own, [0.6, 0.0]).expect("below");
@@ -377,10 +382,7 @@ fn mjcf_geoms_are_where_mujoco_has_them() {
 /// A ball over the floor: ln(height beyond the margin) changes as the closed form says, with a second body far above.
 #[test]
 fn slopes_of_what_is_near_are_those_of_closed_forms() {
-    let floor = Surroundings {
-        floor: Some(-0.5),
-        ..Surroundings::default()
-    };
+    let floor = floor_at(-0.5);
     let own = world(r#"<sphere radius="0.1"/>"#, &floor).expect("a world");
     // The centre is 0.2 − sin q₁ − 0.5 sin(q₁ + q₂) high.
     let [one, both] = [0.3_f64, 0.534];
@@ -402,10 +404,7 @@ fn slopes_of_what_is_near_are_those_of_closed_forms() {
 /// A path on which a single joint differs: what that joint does not move is not looked at again.
 #[test]
 fn what_another_joint_moves_is_not_looked_at_again() {
-    let floor = Surroundings {
-        floor: Some(-0.23),
-        ..Surroundings::default()
-    };
+    let floor = floor_at(-0.23);
     let own = world(BOX, &floor).expect("a world");
     // The end of the upper arm is below the floor, whatever the second joint does; the lower arm points up.
     let below = Path::at_rest(&[0.45, -1.95]);

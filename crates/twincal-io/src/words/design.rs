@@ -210,6 +210,56 @@ fn round(x: f64) -> String {
 mod tests {
     use super::*;
 
+    /// Effects between 0.05 and 0.95, where the regression is at hand and nothing doubts the log.
+    #[cfg(feature = "report")]
+    #[test]
+    fn the_line_names_what_is_open_and_stands_only_where_a_design_can_begin() {
+        use crate::report::fixture;
+        use twincal::posterior::Problem;
+        use twincal::prior::{Inclusion, Prior};
+        use twincal::{Code, Finding, Severity};
+        let none = Problem {
+            gram: Vec::new(),
+            xy: Vec::new(),
+            yy: 0.0,
+            n: 0.0,
+            log_constant: 0.0,
+            prior: Prior::single(
+                Vec::new(),
+                Vec::new(),
+                Inclusion::Probability(0.5),
+                (1.0, 1.0),
+            ),
+            names: Vec::new(),
+        };
+        let mut own = fixture::two_joints();
+        own.findings.clear();
+        let pips = [0.04, 0.05, 0.5, 0.9, 0.94, 0.95];
+        assert!(own.components.len() >= pips.len());
+        own.components.truncate(pips.len());
+        for (component, pip) in own.components.iter_mut().zip(pips) {
+            component.pip = Some(pip);
+        }
+        assert_eq!(command(&own, "out"), None, "no regression");
+        own.problem = Some(none);
+        let name = |at: usize| own.components[at].name.clone();
+        let said = format!(
+            "twincal design --twin out -o motion designs a motion to decide {}, {}, {} and 1 more.",
+            name(1),
+            name(2),
+            name(3)
+        );
+        assert_eq!(command(&own, "out"), Some(said));
+        let code = Code::SignFlip;
+        own.findings = vec![Finding::new(Severity::Warning, code, "log", "", 1)];
+        assert_eq!(command(&own, "out"), None, "a doubtful log");
+        own.findings.clear();
+        own.components
+            .iter_mut()
+            .for_each(|own| own.pip = Some(0.99));
+        assert_eq!(command(&own, "out"), None, "nothing open");
+    }
+
     fn limits(joint: &str, assumed: &[&'static str]) -> JointLimits {
         JointLimits {
             joint: joint.into(),

@@ -474,7 +474,7 @@ mod tests {
         };
         let gradient = climb(splines.clone())
             .gradient(weight, &[])
-            .expect("a gradient");
+            .expect("the gradient of a motion that shows something");
         let inner = spans + DEGREE - 2 * HELD;
         for _ in 0..8 {
             let direction: Vec<f64> = gradient.iter().map(|_| random.normal()).collect();

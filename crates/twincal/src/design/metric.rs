@@ -191,7 +191,8 @@ mod tests {
             for (to, x) in moved[HELD..HELD + inner].iter_mut().zip(&own) {
                 *to = x / square.sqrt();
             }
-            let [low, high] = steps(&spline, &moved, &BOUNDS).expect("within");
+            let [low, high] =
+                steps(&spline, &moved, &BOUNDS).expect("the spline is within its bounds");
             assert!(low <= -1.0 && high >= 1.0, "{low} {high}");
         }
     }
@@ -222,7 +223,7 @@ mod tests {
         }
         let mut wanted = gradient.clone();
         Cholesky::new(&whole, size)
-            .expect("positive")
+            .expect("H is positive definite")
             .solve(&mut wanted);
         let found = metric.scaled(&gradient);
         let length = dot(&wanted, &wanted).sqrt();

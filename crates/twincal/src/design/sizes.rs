@@ -234,11 +234,11 @@ mod tests {
     #[test]
     fn what_is_not_seen_is_as_large_as_what_is() {
         let problem = problem();
-        let posterior = approximate(&problem, None).expect("posterior");
+        let posterior = approximate(&problem, None).expect("a posterior of two models");
         let shares = closed_form();
         let mean: f64 = (0..SCALES).map(|at| shares[at] * scale(at).powi(2)).sum();
         let model = posterior.models.iter().find(|own| own.members.len() == 2);
-        let phi = model.expect("in").scale / (posterior.shape - 1.0);
+        let phi = model.expect("the model that has the effect").scale / (posterior.shape - 1.0);
         let found = second_moment((&problem, &posterior), &[0, 1], &[0, 1]);
         let wanted = phi * 3.0 * mean;
         assert!(
