@@ -219,10 +219,10 @@ def test_the_motion_decides_rightly(folder_of):
 
 
 def module_of(path):
-    """A script as a module."""
-    spec = importlib.util.spec_from_file_location(path.stem, path)
+    """A script as a module, named after its folder too: other tests import a `simulate`."""
+    spec = importlib.util.spec_from_file_location(f"{path.parent.name}_{path.stem}", path)
     module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module  # dataclasses look for it
+    sys.modules[spec.name] = module  # dataclasses look for it
     spec.loader.exec_module(module)
     return module
 
