@@ -15,6 +15,13 @@ pub(crate) struct Design {
     /// Effects to decide; without it those with a probability of 0.05 to 0.95.
     #[arg(long, value_name = "NAME", num_args = 1.., requires = "twin")]
     pub(crate) decide: Vec<String>,
+    /// Logs that are recorded already, beside those of the twin: what they show the motion need
+    /// not show again. Their torque is not looked at.
+    #[arg(long, value_name = "LOG", num_args = 1..)]
+    pub(crate) after: Vec<PathBuf>,
+    /// Settings file that says how logs of --after are read; without it as those of the twin.
+    #[arg(long, value_name = "FILE", requires = "after")]
+    pub(crate) config: Option<PathBuf>,
     /// Length of the motion in seconds.
     #[arg(
         long,

@@ -204,17 +204,19 @@ fn too_short(validation: &Validation, twin: &Twin) -> String {
 /// Code of logs that the twin was fitted to.
 const FITTED: Code = Code::LogWasFitted;
 
+/// What a log was in the fit of a twin, by its checksum; `None` for one that was not there.
+pub(super) fn role_in_fit<'a>(file: &FileHash, stored: &'a StoredTwin) -> Option<&'a str> {
+    let mut known = stored.context.files.iter();
+    let same = known.find(|own| !own.sha256.is_empty() && own.sha256 == file.sha256)?;
+    let mut logs = stored.calibration.logs.iter();
+    let log = logs.find(|log| log.name == same.name)?;
+    Some(log.role.as_str())
+}
+
 /// Logs that the twin knows already, by their checksums: what they show is no news.
 fn known_logs(files: &[FileHash], stored: &StoredTwin) -> Vec<Finding> {
-    let role = |file: &FileHash| {
-        let mut known = stored.context.files.iter();
-        let same = known.find(|own| !own.sha256.is_empty() && own.sha256 == file.sha256)?;
-        let mut logs = stored.calibration.logs.iter();
-        let log = logs.find(|log| log.name == same.name)?;
-        Some(log.role.as_str())
-    };
     let told = |file: &FileHash| {
-        let (code, what) = match role(file)? {
+        let (code, what) = match role_in_fit(file, stored)? {
             "heldout" => (
                 Code::LogWasHeldout,
                 "one that the twin was judged by when it was fitted: it repeats those scores",

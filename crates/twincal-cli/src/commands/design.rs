@@ -1,6 +1,7 @@
 //! `twincal design`: the motion to record, within the limits of the robot.
 
-use super::inputs::RobotInput;
+use super::check::role_in_fit;
+use super::inputs::{LogInput, Long, RobotInput};
 use super::start_threads;
 use super::summary::paragraph;
 use super::table::{print_table, table};
@@ -12,16 +13,18 @@ use crate::progress::Progress;
 use crate::terminal::Terminal;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
+use twincal::Severity;
 use twincal::design::{
-    Design, DesignSettings, DesignStage, FoundTorque, JointLimits, NominalTorque, Questions, Task,
-    TorqueLimits, design, joint_limits, with_free_start,
+    Design, DesignSettings, DesignStage, FoundTorque, JointLimits, NominalTorque, Questions,
+    Recorded, Task, TorqueLimits, design, joint_limits, with_free_start,
 };
 use twincal::robot::{Robot, RobotDescription};
+use twincal::signal::choose_and_prepare;
 use twincal::term::{Family, Library, LibrarySettings};
 use twincal::words::significant as number;
 use twincal_io::artifact::{Artifact, Claim, Inputs, MODEL_MJCF, MODEL_URDF, Maker, Replace};
 use twincal_io::collision::CollisionWorld;
-use twincal_io::config::Config;
+use twincal_io::config::{Config, Settings};
 use twincal_io::design::{
     About, DESIGN, KEYFRAMES, Limits, MOTION, PAGE, TABLE, TRAJECTORY, WARNING, design_json,
     design_page, joint_trajectory, motion_csv, motion_parquet, mujoco_keyframes, read_limits,
@@ -53,13 +56,12 @@ struct Known {
 }
 
 impl Known {
-    fn read(flags: &Flags) -> Outcome<Self> {
-        let settings = Config::default().settings()?;
+    fn read(flags: &Flags, settings: &Settings) -> Outcome<Self> {
         let Some(folder) = &flags.twin else {
             let path = flags.model.as_ref().ok_or_else(super::no_model)?;
             let model = read_model(path, &settings.model)?;
             let geometry = model.geometry()?;
-            let input = RobotInput::new(model, display_names(&[path]).remove(0), &settings)?;
+            let input = RobotInput::new(model, display_names(&[path]).remove(0), settings)?;
             return Ok(Self {
                 robot: input.robot,
                 model: input.file.name,
@@ -104,22 +106,68 @@ impl Known {
             path,
         })
     }
+
+    /// The motion of logs that the twin does not know yet, read as its own were.
+    fn recorded(
+        &self,
+        paths: &[PathBuf],
+        settings: &Settings,
+        terminal: &mut Terminal,
+    ) -> Outcome<Option<Recorded>> {
+        if paths.is_empty() {
+            return Ok(None);
+        }
+        let progress = Progress::new();
+        let (logs, pipeline) = match &self.stored {
+            Some(stored) => {
+                let logs = LogInput::for_twin(paths, stored, settings.log.clone(), &progress)?;
+                let role = |file| role_in_fit(file, stored);
+                if let Some(known) = logs.files.iter().find(|file| role(file) == Some("fit")) {
+                    return Err(Failure::usage(
+                        format!("{}: the twin was fitted to this log", known.name),
+                        "leave it out of --after: what it shows is in the twin",
+                    ));
+                }
+                (logs, stored.calibration.twin.pipeline.clone())
+            }
+            None => {
+                let long = Long::of_settings(settings);
+                let logs = LogInput::read(paths, &self.robot, &settings.log, long, &progress)?;
+                let signal = &settings.calibration.signal;
+                let chosen = choose_and_prepare(&self.robot, &logs.logs, signal);
+                let pipeline = chosen.map_err(|error| logs.as_given(error))?.pipeline;
+                (logs, pipeline)
+            }
+        };
+        let recorded = Recorded::new(&self.robot, &pipeline, &logs.logs);
+        let (recorded, mut findings) = recorded.map_err(|error| logs.as_given(error))?;
+        drop(progress);
+        findings.splice(0..0, logs.findings);
+        for finding in findings.iter().filter(|own| own.severity > Severity::Note) {
+            terminal.note(&format!("warning: {}", finding.message));
+        }
+        Ok(Some(recorded))
+    }
 }
 
 pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
     let mut inputs = Inputs::default();
-    let given = [&flags.model, &flags.twin, &flags.limits];
-    given
-        .into_iter()
-        .flatten()
-        .for_each(|path| inputs.add(path));
+    let given = [&flags.model, &flags.twin, &flags.limits, &flags.config];
+    let given = given.into_iter().flatten().chain(&flags.after);
+    given.for_each(|path| inputs.add(path));
     let replace = match flags.force {
         true => Replace::Artifact,
         false => Replace::Never,
     };
     let claim = Claim::new(&flags.output, replace, &inputs)?;
     start_threads(flags.threads.map(|threads| threads as usize))?;
-    let known = Known::read(flags)?;
+    let config = match &flags.config {
+        Some(path) => Config::read(path)?,
+        None => Config::default(),
+    };
+    let from_config = config.settings()?;
+    let known = Known::read(flags, &from_config)?;
+    let recorded = known.recorded(&flags.after, &from_config, terminal)?;
     let stated = match &flags.limits {
         Some(path) => read_limits(path)?,
         None => Limits::default(),
@@ -136,6 +184,7 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
     let within = Within {
         limits: &limits,
         world: &world,
+        recorded: recorded.as_ref(),
     };
     let (found, limits) = match &known.stored {
         None => {
@@ -150,6 +199,7 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
         limits: &limits,
         surroundings: &stated.surroundings,
         world: &world,
+        recorded: recorded.as_ref(),
         kinds: (0..known.robot.dof())
             .map(|joint| known.robot.joint_kind(joint))
             .collect(),
@@ -169,11 +219,7 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
     if flags.json {
         terminal.data(&String::from_utf8_lossy(&json));
     } else {
-        let within = Within {
-            limits: &limits,
-            world: &world,
-        };
-        print(&found, &within, &flags.output, terminal);
+        print(&found, &about, &flags.output, terminal);
     }
     Ok(0)
 }
@@ -181,10 +227,11 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
 /// A motion, and the limits with the start that it has.
 type Found = (Design, Vec<JointLimits>);
 
-/// What a motion stays within.
+/// What a motion stays within, and what it follows.
 struct Within<'a> {
     limits: &'a [JointLimits],
     world: &'a CollisionWorld,
+    recorded: Option<&'a Recorded>,
 }
 
 /// A motion that decides what a twin leaves open.
@@ -226,6 +273,7 @@ fn searched(
         robot,
         library: &library,
         questions,
+        recorded: within.recorded,
         limits: within.limits,
         torque: Some(torque),
         clearance: Some(within.world),
@@ -273,9 +321,12 @@ fn print_promises(found: &Design, terminal: &mut Terminal) {
     terminal.say("");
 }
 
-fn print(found: &Design, within: &Within<'_>, output: &Path, terminal: &mut Terminal) {
+fn print(found: &Design, about: &About<'_>, output: &Path, terminal: &mut Terminal) {
     terminal.heading(&words::headline(found));
     paragraph(&words::information(found), terminal);
+    if let Some(recorded) = about.recorded {
+        paragraph(&words::before(recorded), terminal);
+    }
     terminal.say("");
     print_promises(found, terminal);
     let mut rows = table(&["joint", "from", "to", "velocity", "acceleration", "jerk"]);
@@ -292,10 +343,10 @@ fn print(found: &Design, within: &Within<'_>, output: &Path, terminal: &mut Term
     }
     print_table(&rows, terminal);
     terminal.say(words::SHARES);
-    for text in words::assumed(within.limits) {
+    for text in words::assumed(about.limits) {
         paragraph(&text, terminal);
     }
-    for text in words::clearance(found, within.world) {
+    for text in words::clearance(found, about.world) {
         paragraph(&text, terminal);
     }
     paragraph(WARNING, terminal);

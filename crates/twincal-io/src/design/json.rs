@@ -5,7 +5,7 @@ use crate::collision::{AssumedShape, CollisionWorld, IgnoredPair, StatedBox, Sur
 use crate::error::{Error, Result};
 use schemars::JsonSchema;
 use serde::Serialize;
-use twincal::design::{Approach, Design, DesignSettings, JointLimits, JointUse, Promise};
+use twincal::design::{Approach, Design, DesignSettings, JointLimits, JointUse, Promise, Recorded};
 use twincal::robot::JointKind;
 
 /// Version of the format.
@@ -24,6 +24,8 @@ pub struct About<'a> {
     pub surroundings: &'a Surroundings,
     /// Its geometry.
     pub world: &'a CollisionWorld,
+    /// What was recorded before.
+    pub recorded: Option<&'a Recorded>,
     /// Kind of each joint: sliders move in m.
     pub kinds: Vec<JointKind>,
 }
@@ -93,9 +95,11 @@ struct DesignJson<'a> {
     samples: usize,
     /// The search was ended early: the motion is the best one until then.
     stopped: bool,
+    /// Logs recorded before, beside those of the twin.
+    after: Vec<Before<'a>>,
     /// Independent base parameters.
     base_parameters: usize,
-    /// ln det of the rows' information on the base parameters, scaled to torque of size 1; null: not finite.
+    /// ln det of the rows' information on the base parameters, those of `after` included, scaled to torque of size 1; null: not finite.
     #[schemars(extend("type" = ["number", "null"]))]
     log_determinant: f64,
     /// Condition number of the rows: largest over smallest singular value; null: not finite.
@@ -109,6 +113,16 @@ struct DesignJson<'a> {
     used: Vec<Used<'a>>,
     /// What was looked at for collisions.
     clearance: ClearanceJson<'a>,
+}
+
+/// A log that was recorded before.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+struct Before<'a> {
+    /// Its name.
+    log: &'a str,
+    /// Length of what a fit would use of it, s.
+    seconds: f64,
 }
 
 /// Limits of one joint in force: rad, rad/s, rad/s², rad/s³, N·m; m and N for sliders.
@@ -249,6 +263,12 @@ pub fn design_json(design: &Design, about: &About<'_>) -> Result<Vec<u8>> {
         seed: about.settings.seed,
         samples: design.motion.len,
         stopped: design.stopped,
+        after: (about.recorded.iter().flat_map(|own| &own.logs))
+            .map(|(log, seconds)| Before {
+                log,
+                seconds: *seconds,
+            })
+            .collect(),
         base_parameters: design.columns,
         log_determinant: design.log_determinant,
         condition: design.condition,
@@ -313,18 +333,25 @@ mod tests {
         );
         design.condition = f64::INFINITY;
         let settings = fixture::settings(&design);
+        let recorded = Recorded {
+            states: twincal::excitation::States::default(),
+            seconds: 12.5,
+            logs: vec![("monday.csv".into(), 12.5)],
+        };
         let about = About {
             model: "arm.urdf".into(),
             settings: &settings,
             limits: &limits,
             surroundings: &Surroundings::default(),
             world: &super::super::fixture::world(),
+            recorded: Some(&recorded),
             kinds: vec![JointKind::Revolute; 2],
         };
         let bytes = design_json(&design, &about).expect("JSON");
         let value: Value = serde_json::from_slice(&bytes).expect("JSON");
         let schema: Value = serde_json::from_str(&design_schema()).expect("JSON");
         same_keys(&value, &schema, "design");
+        same_keys(&value["after"][0], &schema["$defs"]["Before"], "after");
         same_keys(&value["limits"][0], &schema["$defs"]["Limits"], "limits");
         same_keys(
             &value["promises"][0],

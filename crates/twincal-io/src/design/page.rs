@@ -27,7 +27,7 @@ pub fn design_page(design: &Design, about: &About<'_>) -> Result<String> {
         warning: WARNING.into(),
         clearance: words::clearance(design, about.world),
         purpose: words::purpose(design),
-        numbers: numbers(design),
+        numbers: numbers(design, about),
         questions: design.promises.iter().map(question).collect(),
         decided: words::DECIDED,
         undecidable: structural
@@ -47,8 +47,12 @@ pub fn design_page(design: &Design, about: &About<'_>) -> Result<String> {
     render(&page)
 }
 
-fn numbers(design: &Design) -> Vec<Number> {
-    vec![
+fn numbers(design: &Design, about: &About<'_>) -> Vec<Number> {
+    let before = about.recorded.map(|own| Number {
+        value: words::seconds(own.seconds),
+        name: "recorded before",
+    });
+    let own = [
         Number {
             value: design.columns.to_string(),
             name: "base parameters",
@@ -61,7 +65,8 @@ fn numbers(design: &Design) -> Vec<Number> {
             value: number(design.condition, 3),
             name: "condition number",
         },
-    ]
+    ];
+    own.into_iter().chain(before).collect()
 }
 
 fn question(own: &Promise) -> Question {
@@ -172,6 +177,7 @@ mod tests {
             limits,
             surroundings: &Surroundings::default(),
             world: &fixture::world(),
+            recorded: None,
             kinds: vec![JointKind::Revolute; limits.len()],
         };
         design_page(design, &about).expect("a page")

@@ -6,7 +6,7 @@ use super::number::{THIN, fixed, number, probability};
 use crate::collision::CollisionWorld;
 use twincal::assess::open_effects;
 use twincal::calibrate::Calibration;
-use twincal::design::{Design, JERK_TIME, JointLimits, SPEED_UP};
+use twincal::design::{Design, JERK_TIME, JointLimits, Recorded, SPEED_UP};
 use twincal::words::{listed, shortened};
 
 /// What shares of limits are.
@@ -67,6 +67,25 @@ pub fn information(design: &Design) -> String {
         number(design.log_determinant, 3),
         number(design.condition, 3)
     )
+}
+
+/// What was recorded before and counts in the numbers.
+#[must_use]
+pub fn before(recorded: &Recorded) -> String {
+    let logs = match recorded.logs.len() {
+        1 => "1 log".to_owned(),
+        n => format!("{n} logs"),
+    };
+    format!(
+        "Counted with the motion: {} of {logs} recorded before.",
+        seconds(recorded.seconds)
+    )
+}
+
+/// A length of time.
+#[must_use]
+pub fn seconds(length: f64) -> String {
+    format!("{} s", number(length, 3))
 }
 
 /// How close the motion comes to the robot itself and to what stands around it, and what was assumed of that.

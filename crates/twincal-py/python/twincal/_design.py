@@ -57,6 +57,7 @@ def design(
     model: str | os.PathLike[str] | None = None,
     twin: str | os.PathLike[str] | None = None,
     decide: Iterable[str] = (),
+    after: Iterable[str | os.PathLike[str]] = (),
     duration: float = 20.0,
     rate: float = 500.0,
     limits: str | os.PathLike[str] | None = None,
@@ -76,6 +77,9 @@ def design(
         meshes of that file are checked for collisions.
     decide : iterable of str
         Effects to decide; without them those with a probability of 0.05 to 0.95.
+    after : iterable of path
+        Logs that are recorded already, beside those of the twin: what they show the motion need
+        not show again. Their torque is not looked at.
     duration : float
         Length, s.
     rate : float
@@ -98,6 +102,8 @@ def design(
     """
     if isinstance(decide, str):
         raise TypeError("decide is one name; give a list of names")
+    if isinstance(after, (str, os.PathLike)):
+        raise TypeError("after is one path; give a list of paths")
     if model is None and twin is None:
         raise ValueError("give model or twin, at least one of them")
     arguments = ["design", "--json", "-o", os.fspath(output), "--seed", str(int(seed))]
@@ -107,5 +113,7 @@ def design(
             arguments += [flag, os.fspath(path)]
     names = list(decide)
     arguments += ["--decide", *names] if names else []
+    logs = [os.fspath(path) for path in after]
+    arguments += ["--after", *logs] if logs else []
     _twincal.call([*arguments, *(["--force"] if force else [])])
     return Motion(output)

@@ -442,6 +442,7 @@ mod tests {
             robot: &robot,
             library: &library,
             questions: None,
+            recorded: None,
             limits: &limits,
             torque: Some(&torque),
             clearance: None,

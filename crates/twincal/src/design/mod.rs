@@ -19,6 +19,7 @@ mod limits;
 mod metric;
 mod motion;
 mod questions;
+mod recorded;
 mod search;
 mod sizes;
 mod spline;
@@ -30,6 +31,7 @@ pub use clearance::{Approach, Clearance, NearSlope, Path};
 pub use limits::{JERK_TIME, JointLimits, SPEED_UP, StatedLimits, joint_limits, spread_positions};
 pub use motion::{DesignedMotion, JointUse};
 pub use questions::{Promise, Questions};
+pub use recorded::Recorded;
 pub use torque::{FoundTorque, NominalTorque};
 
 use crate::error::{Error, Result};
@@ -38,6 +40,7 @@ use crate::robot::Robot;
 use crate::term::Library;
 use information::{Information, Objective};
 use rayon::prelude::*;
+use recorded::Following;
 use search::{Chain, Found};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -108,6 +111,8 @@ pub struct Task<'a> {
     pub library: &'a Library,
     /// `None`: the motion is to show the candidates.
     pub questions: Option<&'a Questions<'a>>,
+    /// Motion that is recorded already, and that a fit will have beside this one.
+    pub recorded: Option<&'a Recorded>,
     /// What every joint stays within.
     pub limits: &'a [JointLimits],
     /// `None`: torque is not looked at.
@@ -134,9 +139,9 @@ pub struct Design {
     pub motion: DesignedMotion,
     /// Independent columns that it was designed for.
     pub columns: usize,
-    /// ln det(M/n).
+    /// ln det(M/n), of what is recorded and this motion together.
     pub log_determinant: f64,
-    /// Condition number of the rows: largest over smallest singular value.
+    /// Condition number of their rows: largest over smallest singular value.
     pub condition: f64,
     /// What the motion is expected to say of each question.
     pub promises: Vec<Promise>,
@@ -167,6 +172,8 @@ pub fn design(
         Some(questions) => questions,
         None => &information,
     };
+    let following = task.recorded.map(|own| Following::new(objective, own));
+    let objective = following.as_ref().map_or(objective, |own| own);
     let done = AtomicUsize::new(0);
     let all = settings.chains * (settings.proposals + STEP * settings.steps);
     let best = Mutex::new(f64::NEG_INFINITY);

@@ -2,6 +2,7 @@
 
 use super::clearance::{Approach, path_of};
 use super::information::{Information, Objective as _, states_of};
+use super::recorded::Following;
 use super::search::Found;
 use super::spline::{Spline, StateWeights};
 use super::{Design, DesignSettings, Task};
@@ -68,36 +69,7 @@ pub(super) fn finished(
             )?))
         });
         match broken {
-            None => {
-                let motion = DesignedMotion {
-                    joints: task.limits.iter().map(|own| own.joint.clone()).collect(),
-                    rate: settings.rate,
-                    len: states.len,
-                    q: states.q,
-                    qd: states.qd,
-                    qdd: states.qdd,
-                };
-                let rows = states_of(&splines, 0..spans);
-                let sums = information.of(&rows);
-                let random = random_states(task.robot, STATES);
-                let promises = match task.questions {
-                    Some(own) => {
-                        own.promises((&rows, &random), settings.duration, settings.seed)?
-                    }
-                    None => Vec::new(),
-                };
-                let path = || path_of(&splines, 0..spans, PER_SPAN);
-                return Ok(Design {
-                    closest: task.clearance.and_then(|own| own.closest(&path())),
-                    promises,
-                    motion,
-                    columns: information.size(),
-                    log_determinant: information.log_determinant(&sums, rows.len as f64),
-                    condition: information.condition(&sums),
-                    used: used(task, &splines),
-                    stopped,
-                });
-            }
+            None => return described(task, settings, information, (&splines, states), stopped),
             Some(what) => binding = what,
         }
         for (spline, limits) in splines.iter_mut().zip(task.limits) {
@@ -106,6 +78,48 @@ pub(super) fn finished(
         }
     }
     Err(impossible(&binding))
+}
+
+/// What a motion shows, by itself and with what is recorded.
+fn described(
+    task: &Task<'_>,
+    settings: &DesignSettings,
+    information: &Information<'_>,
+    (splines, states): (&[Spline], States),
+    stopped: bool,
+) -> Result<Design> {
+    let spans = splines[0].points.len() - 5;
+    let rows = states_of(splines, 0..spans);
+    let random = random_states(task.robot, STATES);
+    let mut motions = vec![(&rows, settings.duration)];
+    motions.extend(task.recorded.map(|own| (&own.states, own.seconds)));
+    let promises = match task.questions {
+        Some(own) => own.promises((&motions, &random), settings.seed)?,
+        None => Vec::new(),
+    };
+    let (mut sums, mut count) = (information.of(&rows), rows.len as f64);
+    if let Some(own) = task.recorded {
+        let following = Following::new(information, own);
+        (sums, count, _) = following.both(&sums, count, settings.duration);
+    }
+    let path = || path_of(splines, 0..spans, PER_SPAN);
+    Ok(Design {
+        closest: task.clearance.and_then(|own| own.closest(&path())),
+        promises,
+        motion: DesignedMotion {
+            joints: task.limits.iter().map(|own| own.joint.clone()).collect(),
+            rate: settings.rate,
+            len: states.len,
+            q: states.q,
+            qd: states.qd,
+            qdd: states.qdd,
+        },
+        columns: information.size(),
+        log_determinant: information.log_determinant(&sums, count),
+        condition: information.condition(&sums),
+        used: used(task, splines),
+        stopped,
+    })
 }
 
 /// No motion is within the limits; `binding` is the one that forbids it.

@@ -42,8 +42,8 @@ pub struct Questions<'a> {
     library: &'a Library,
     /// What a row of each joint counts, 1/(N·m)² in units of φ.
     factor: Vec<f64>,
-    /// Rows that count as independent, of all joints, per row of the motion.
-    counted: f64,
+    /// Independent rows of each joint per row.
+    shares: Vec<f64>,
     /// Rows per second that a fit keeps.
     rate: f64,
     /// Columns that take part, ascending.
@@ -148,7 +148,7 @@ impl<'a> Questions<'a> {
             factor: (noise.iter().zip(&shares))
                 .map(|(own, share)| own.weight * share)
                 .collect(),
-            counted: shares.iter().sum(),
+            shares,
             problem,
             posterior,
             library,
@@ -203,13 +203,15 @@ impl<'a> Questions<'a> {
         let mut sums = vec![0.0; size * size];
         for (joint, factor) in self.factor.iter().enumerate() {
             let own = self.library.columns_of_joint(joint);
+            let still = &states.still[joint * len..(joint + 1) * len];
+            let used = |(value, still): (&f64, &bool)| if *still { 0.0 } else { *value };
             let (mut places, mut values) = (Vec::new(), Vec::new());
             for (column, signal) in own.iter().zip(out[joint].chunks_exact(len.max(1))) {
                 let Ok(at) = columns.binary_search(column) else {
                     continue;
                 };
                 places.push(at);
-                values.extend_from_slice(signal);
+                values.extend(signal.iter().zip(still).map(used));
             }
             let count = places.len();
             let products = product_transposed(&values, &values, [count, len, count]);
@@ -222,21 +224,36 @@ impl<'a> Questions<'a> {
         sums
     }
 
-    /// Whether the motion decides each question, in worlds drawn from the posterior.
+    /// What motions add to the regression, each with its length in s: sums of all columns, and rows that count as independent.
+    fn added(&self, motions: &[(&States, f64)]) -> (Vec<f64>, f64) {
+        let all: Vec<usize> = (0..self.problem.names.len()).collect();
+        let (mut gram, mut counted) = (vec![0.0; all.len() * all.len()], 0.0);
+        for &(states, seconds) in motions {
+            let scale = self.scale(states.len.max(1) as f64, seconds);
+            let own = self.sums_of(&all, states);
+            (gram.iter_mut().zip(own)).for_each(|(sum, own)| *sum += scale * own);
+            let joints = self
+                .shares
+                .iter()
+                .zip(states.still.chunks(states.len.max(1)));
+            for (share, still) in joints {
+                let rows = still.iter().filter(|still| !**still).count();
+                counted += share * scale * rows as f64;
+            }
+        }
+        (gram, counted)
+    }
+
+    /// Whether motions decide each question, in worlds drawn from the posterior; each motion with its length in s.
     ///
     /// # Errors
     /// Those of inference.
     pub(super) fn promises(
         &self,
-        (states, random): (&States, &States),
-        duration: f64,
+        (motions, random): (&[(&States, f64)], &States),
         seed: u64,
     ) -> Result<Vec<Promise>> {
-        let all: Vec<usize> = (0..self.problem.names.len()).collect();
-        let mut gram = self.sums_of(&all, states);
-        let scale = self.scale(states.len as f64, duration);
-        gram.iter_mut().for_each(|x| *x *= scale);
-        let counted = self.counted * self.rate * duration;
+        let (gram, counted) = self.added(motions);
         let sized: Vec<&[u32]> = self.open.iter().map(|own| own.sized.as_slice()).collect();
         let known = (self.problem, self.posterior);
         let robots = sizes::robots(known, &sized, (WORLDS, seed, STREAM));

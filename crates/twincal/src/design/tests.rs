@@ -32,7 +32,7 @@ pub(super) fn stated(robot: &Robot, torque: Option<f64>) -> BTreeMap<String, Sta
     names.map(|name| (name.to_owned(), own)).collect()
 }
 
-fn short() -> DesignSettings {
+pub(super) fn short() -> DesignSettings {
     DesignSettings {
         duration: 8.0,
         rate: 250.0,
@@ -42,13 +42,18 @@ fn short() -> DesignSettings {
     }
 }
 
-fn designed(robot: &Robot, limits: &[JointLimits], settings: &DesignSettings) -> Result<Design> {
+pub(super) fn designed(
+    robot: &Robot,
+    limits: &[JointLimits],
+    settings: &DesignSettings,
+) -> Result<Design> {
     let library = library(robot);
     let torque = NominalTorque::new(robot, limits);
     let task = Task {
         robot,
         library: &library,
         questions: None,
+        recorded: None,
         limits,
         torque: Some(&torque),
         clearance: None,
@@ -138,6 +143,7 @@ fn whoever_ends_the_search_gets_the_best_motion_so_far() {
         robot: &robot,
         library: &library,
         questions: None,
+        recorded: None,
         limits: &limits,
         torque: None,
         clearance: None,
@@ -205,6 +211,7 @@ fn forbidden_space_is_kept_free() {
         robot: &robot,
         library: &library,
         questions: None,
+        recorded: None,
         limits,
         torque: None,
         clearance: Some(&Wall),
