@@ -1,6 +1,6 @@
 """Whether a designed motion decides what a poor log leaves open, beside random motion in the same limits.
 
-    run --program P --seeds FIRST LAST [--count 20] [--robot ur5 panda] [--pair payload gain spring] [--misfit none lugre]
+    run --program P --seeds FIRST LAST [--count 20] [--robot ur5 panda] [--pair payload gain spring] [--misfit none lugre lugre_usual]
         [--sds 5] [--lines X.jsonl]
     run --read X.jsonl
 
@@ -46,6 +46,7 @@ PAIRS = {
     "gain": {"effects": ("drives.gain", "payload"), "sizes": (0.05, 0.25), "families": ["gain", "payload"]},
     "spring": {"effects": ("{second}.spring", "{second}.potential"), "sizes": (4.0, 4.0), "families": ["spring", "potential"]},
 }
+USUAL = ("stribeck", "asymmetry", "quadratic_friction", "hysteresis")  # candidates that LuGre friction is near to
 KEYS = ("robot", "pair", "misfit", "sds", "scale")  # of a table
 # The cause of each effect: what `World.real` and `World.torque` change.
 CAUSES = {"payload": ("payload", "density"), "gain": ("gain", "payload"), "spring": ("spring", "potential")}
@@ -71,7 +72,7 @@ class World:
         self.effects = [name.format(**names) for name in PAIRS[pair]["effects"]]
         self.error = None if sds is None else standard_error(robot, pair, self.true, misfit)
         self.size = scale * (PAIRS[pair]["sizes"][self.true] if sds is None else sds * self.error)
-        self.families = ["viscous", "coulomb", *PAIRS[pair]["families"]]
+        self.families = ["viscous", "coulomb", *(USUAL if misfit == "lugre_usual" else ()), *PAIRS[pair]["families"]]
 
     @cached_property
     def real(self):
@@ -269,7 +270,7 @@ def main():
     arguments.add_argument("--count", type=int, help="stop a table after so many kept seeds")
     arguments.add_argument("--robot", choices=sorted(START), nargs="+", default=["ur5"])
     arguments.add_argument("--pair", choices=list(PAIRS), nargs="+", default=["payload"])
-    arguments.add_argument("--misfit", choices=["none", "lugre"], nargs="+", default=["none"])
+    arguments.add_argument("--misfit", choices=["none", "lugre", "lugre_usual"], nargs="+", default=["none"])
     arguments.add_argument("--sds", type=float, default=5.0, help="size of the cause in standard errors; 0: the sizes of PAIRS, a fixed poor log")
     arguments.add_argument("--scale", type=float, default=1.0, help="factor on the size of the cause")
     arguments.add_argument("--keep", type=Path, help="folder in which all files stay")

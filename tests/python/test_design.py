@@ -257,6 +257,29 @@ def test_the_motion_decides_what_a_poor_log_leaves_open(decided):
         assert own["right"] + own["wrong"] <= 1.0 and not own["structural"], own
 
 
+def test_what_a_log_shows_need_not_be_shown_again(made, tmp_path):
+    """A motion after a recorded one: both together show more than the first one twice, and the numbers say what they count."""
+    folder, _ = made
+    alone = json.loads((folder / "motion" / "design.json").read_text())
+    limits_of = ("--limits", folder / "limits.toml", "--duration", 10, "--rate", 250)
+    done = design(tmp_path, *limits_of, "--after", folder / "motion" / "motion.csv")
+    assert "of 1 log recorded before" in done.stdout
+    after = json.loads((tmp_path / "motion" / "design.json").read_text())
+    (log,) = after["after"]
+    assert log["log"] == "motion.csv" and 7.0 < log["seconds"] <= 10.1 and alone["after"] == []
+    assert after["log_determinant"] > alone["log_determinant"] + 1.0
+    again = design(tmp_path, *limits_of, "--after", folder / "motion" / "motion.csv", "--json")
+    assert json.loads(again.stdout) == after
+
+
+def test_a_log_that_the_twin_knows_is_refused(decided, tmp_path):
+    folder, _ = decided
+    log = next(folder.glob("poor*.csv"))
+    command = [program("twincal"), "design", "--twin", folder / "poor", "--after", log, "-o", tmp_path / "motion"]
+    done = subprocess.run([str(one) for one in command], capture_output=True, text=True)
+    assert done.returncode == 2 and "was fitted to this log" in done.stderr, done.stderr
+
+
 def test_an_effect_that_is_none_is_refused_by_name(decided, tmp_path):
     folder, _ = decided
     command = [program("twincal"), "design", "--twin", folder / "poor", "--decide", "nobody", "-o", tmp_path / "motion"]

@@ -14,7 +14,7 @@ use twincal::calibrate::{
     SweepPoint, TermSummary,
 };
 use twincal::lag::Lags;
-use twincal::likelihood::JointNoise;
+use twincal::likelihood::{JointNoise, PayloadSize};
 use twincal::posterior::Method;
 use twincal::prior::Inclusion;
 use twincal::signal::Pipeline;
@@ -117,6 +117,8 @@ struct SlabRow {
     scaled_variance: Option<f64>,
     learned: bool,
     families: Vec<FamilyRow>,
+    /// sd of a payload's slab beside its prior sd, and what other sizes add to its prior odds.
+    payload: PayloadSize,
 }
 
 #[derive(Serialize)]
@@ -303,6 +305,7 @@ impl PriorRow {
                         scaled_variance,
                     })
                     .collect(),
+                payload: prior.payload,
             },
             inclusion: prior.inclusion,
             expected: (prior.families.iter())

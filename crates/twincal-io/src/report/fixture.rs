@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 use twincal::calibrate::{
     Along, Calibration, Curve, Draws, LikelihoodUsed, LogSummary, PriorUsed, TermSummary,
 };
-use twincal::likelihood::{JointNoise, NoiseModel};
+use twincal::likelihood::{JointNoise, NoiseModel, PayloadSize};
 use twincal::posterior::{Method, Model, Posterior};
 use twincal::prior::Inclusion;
 use twincal::robot::{
@@ -291,6 +291,7 @@ fn twin(names: &[&str], posterior: Posterior, noise: Vec<JointNoise>) -> Twin {
 fn prior() -> PriorUsed {
     PriorUsed {
         scaled_variance: vec![(Family::Generic, 240.0)],
+        payload: PayloadSize::default(),
         learned: true,
         inclusion: Inclusion::ExpectedTerms(5.0),
         families: Vec::new(),

@@ -7,6 +7,7 @@
 //! A payload of which a log shows half a kilogram does not have a tensor of a hundred: a motion should decide about one that is likely.
 
 use crate::linear_algebra::{Cholesky, dot, product_transposed};
+use crate::plug_in::size::Evidence;
 use crate::posterior::draws::draw;
 use crate::posterior::{Model, Posterior, Problem};
 use crate::random::Random;
@@ -24,7 +25,8 @@ fn scale(at: usize) -> f64 {
 /// p(s | y, z) of columns that share s.
 pub(super) fn weights(problem: &Problem, members: &[u32], columns: &[u32]) -> [f64; SCALES] {
     let logs: [f64; SCALES] = std::array::from_fn(|at| {
-        log_evidence(problem, members, columns, scale(at)).unwrap_or(f64::NEG_INFINITY)
+        let own = Evidence::new(problem, members, (columns, scale(at)));
+        own.map_or(f64::NEG_INFINITY, |own| own.log())
     });
     let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if most == f64::NEG_INFINITY {
@@ -33,34 +35,6 @@ pub(super) fn weights(problem: &Problem, members: &[u32], columns: &[u32]) -> [f
     let raw = logs.map(|own| (own - most).exp());
     let sum: f64 = raw.iter().sum();
     raw.map(|own| own / sum)
-}
-
-/// ln p(y, z | s) but for what does not depend on s; bounds on coefficients are left out.
-fn log_evidence(problem: &Problem, members: &[u32], columns: &[u32], scale: f64) -> Option<f64> {
-    let (size, all) = (members.len(), problem.names.len());
-    let (mut matrix, mut slabs) = (vec![0.0; size * size], 0.0);
-    for (i, &a) in members.iter().enumerate() {
-        let a = a as usize;
-        for (j, &b) in members.iter().enumerate() {
-            matrix[i * size + j] = problem.gram[a * all + b as usize];
-        }
-        let factor = if columns.contains(&members[i]) {
-            scale
-        } else {
-            1.0
-        };
-        let slab = problem.prior.slab[a] * factor * factor;
-        matrix[i * size + i] += 1.0 / slab;
-        slabs += slab.ln();
-    }
-    let xy: Vec<f64> = members.iter().map(|&a| problem.xy[a as usize]).collect();
-    let factor = Cholesky::new(&matrix, size).ok()?;
-    let mut mean = xy.clone();
-    factor.solve(&mut mean);
-    let rest = (problem.yy - dot(&xy, &mean)).max(0.0);
-    let prior = &problem.prior;
-    let power = prior.shape + 0.5 * problem.n;
-    Some(-0.5 * (slabs + factor.log_determinant()) - power * (prior.scale + 0.5 * rest).ln())
 }
 
 /// A model with another slab of some of its columns, its noise as before.

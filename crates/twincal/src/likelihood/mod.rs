@@ -106,6 +106,27 @@ pub struct PlugIn {
     pub scaled_variance: Vec<f64>,
     /// φ that turns the prior sd of a physical coefficient into its slab variance; 0 until a first fit has told it.
     pub noise: f64,
+    /// How large a payload is.
+    #[serde(default)]
+    pub payload: PayloadSize,
+}
+
+/// The slab of a payload beside its prior sd, and what other slabs that it might have add to its prior odds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PayloadSize {
+    /// s: the slab's sd is s times the prior sd.
+    pub scale: f64,
+    /// Mean evidence over all s as a factor on that of this one.
+    pub odds: f64,
+}
+
+impl Default for PayloadSize {
+    fn default() -> Self {
+        Self {
+            scale: 1.0,
+            odds: 1.0,
+        }
+    }
 }
 
 fn one() -> f64 {
@@ -185,6 +206,7 @@ impl PlugIn {
             variance: vec![1.0; joints],
             scaled_variance: vec![v; families],
             noise: 0.0,
+            payload: PayloadSize::default(),
         }
     }
 
@@ -228,9 +250,9 @@ pub fn mean_squares(grams: &Gram, columns: usize, weight: &[f64]) -> Vec<f64> {
 /// The weighted regression and its prior: all that inference sees.
 ///
 /// ```text
-/// G = Σ_j w_j/t_j G_j(ρ_j)    n = Σ_j p n_j/t_j,   t_j = max(τ_j, λ_j)    v_k = v_family / r_k, or sd_k² / φ
+/// G = Σ_j w_j/t_j G_j(ρ_j)    n = Σ_j p n_j/t_j,   t_j = max(τ_j, λ_j)    v_k = v_family / r_k, or s² sd_k² / φ
 /// ```
-/// with r_k of [`Columns::references`] and p of [`PlugIn::passed`]. A prior sd that physics says gives way to a scale that the user gives.
+/// with r_k of [`Columns::references`] and p of [`PlugIn::passed`]. s is 1 but for a payload ([`PayloadSize`]). A prior sd that physics says gives way to a scale that the user gives.
 ///
 /// # Errors
 /// [`crate::Error::Setting`] if the prior's numbers are impossible for K columns.
@@ -273,7 +295,14 @@ pub fn assemble(
         .enumerate()
         .map(|(k, reference)| {
             let slab = match columns.prior_sd[k] {
-                Some(sd) if learned => sd * sd / noise,
+                Some(sd) if learned => {
+                    let family = columns.families[columns.family_of(k)];
+                    let scale = match family.is_payload() {
+                        true => plug_in.payload.scale,
+                        false => 1.0,
+                    };
+                    scale * scale * sd * sd / noise
+                }
                 _ => plug_in.scaled_variance[columns.family_of(k)] / reference,
             };
             let widest = WIDEST_SLAB / gram[k * count + k];
@@ -284,7 +313,14 @@ pub fn assemble(
         Some(given) => given,
         None => (AUTO_SHAPE, auto_scale(noise, unexplained)),
     };
-    let (families, odds, inclusion) = structure::structure(columns, settings)?;
+    let (families, mut odds, inclusion) = structure::structure(columns, settings)?;
+    let payload = columns
+        .families
+        .iter()
+        .position(|own| *own == Family::Payload);
+    if let Some(payload) = payload.filter(|_| learned) {
+        odds[payload] *= plug_in.payload.odds;
+    }
     Ok(Problem {
         gram,
         xy,

@@ -9,6 +9,7 @@ mod left_out;
 mod memory;
 mod misfit;
 mod passband;
+pub(crate) mod size;
 mod tempering;
 mod usual;
 
@@ -168,6 +169,7 @@ fn fit_sums(
         }
         if settings.prior.scaled_variance == Auto::Auto {
             next.scaled_variance = slab_scales(gram, columns, &plug_in, &problem, &posterior);
+            next.payload = size::payload_size(columns, plug_in.payload, &problem, &posterior);
         }
         if posterior.noise.is_finite() {
             let held = held_by_physics(columns, settings.prior, &problem, &posterior);
@@ -374,6 +376,8 @@ fn largest_change(a: &PlugIn, b: &PlugIn) -> f64 {
         .max(relative(&a.rho, &b.rho))
         .max(relative(&a.autocorrelation_time, &b.autocorrelation_time))
         .max(relative(&a.scaled_variance, &b.scaled_variance))
+        .max(relative(&[a.payload.scale], &[b.payload.scale]))
+        .max(relative(&[a.payload.odds], &[b.payload.odds]))
         .max((a.noise - b.noise).abs() / a.noise.max(b.noise).max(f64::MIN_POSITIVE))
 }
 

@@ -64,6 +64,7 @@ pub use family::Family;
 pub use library::{Library, Scratch, Table};
 pub(crate) use model_column::ModelColumn;
 pub(crate) use overlaps::levels;
+pub(crate) use payload::MASS as PAYLOAD_MASS;
 pub use recipes::Recipes;
 pub use sentence::{Estimate, is_place, told};
 pub use status::Status;

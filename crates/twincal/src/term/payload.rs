@@ -13,6 +13,9 @@ use crate::robot::{Placement, spatial};
 /// Name of the component.
 pub(super) const NAME: &str = "payload";
 
+/// Name of the column of its mass.
+pub(crate) const MASS: &str = "payload.m";
+
 /// Mass, first moments and tensor about the frame's origin.
 const PARAMETERS: usize = 10;
 
@@ -63,7 +66,7 @@ pub(super) fn proposal(mount: &Mount, torque: &[Vec<f64>]) -> Proposal {
         "kg·m²",
     );
     let mass = Candidate::model(
-        format!("{NAME}.m"),
+        MASS.to_owned(),
         Family::Payload,
         "kg",
         story.clone(),

@@ -6,7 +6,7 @@ use crate::calibrate::data::log_summary::LogSummary;
 use crate::calibrate::fit::compact::Compact;
 use crate::error::Finding;
 use crate::lag::Lags;
-use crate::likelihood::{JointNoise, NoiseModel};
+use crate::likelihood::{JointNoise, NoiseModel, PayloadSize};
 use crate::posterior::Problem;
 use crate::prior::Inclusion;
 use crate::term::{Family, Term};
@@ -243,6 +243,9 @@ pub struct PriorUsed {
     pub scaled_variance: Vec<(Family, f64)>,
     /// True if v was learned.
     pub learned: bool,
+    /// How large a payload's slab is beside its prior sd.
+    #[serde(default)]
+    pub payload: PayloadSize,
     /// Inclusion.
     pub inclusion: Inclusion,
     /// Expected numbers of single families, as given.

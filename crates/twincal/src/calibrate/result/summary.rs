@@ -197,6 +197,7 @@ fn prior_used(
             .zip(fit.plug_in.scaled_variance.iter().copied())
             .collect(),
         learned: settings.prior.scaled_variance == Auto::Auto,
+        payload: fit.plug_in.payload,
         inclusion: fit.problem.prior.inclusion,
         families: settings.prior.families.clone(),
         forced: sure,
