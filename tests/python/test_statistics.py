@@ -50,6 +50,7 @@ def test_a_fit_to_statistics_is_the_fit_to_the_logs(robot, tmp_path):
     same = ["components", "terms", "groups", "noise", "prior", "likelihood", "curves", "inference"]
     for key in same + (["validation"] if heldout else []):
         for place, a, b in pairs(whole[key], own[key], key):
-            assert a == pytest.approx(b, rel=1e-9, abs=1e-12), place
+            # 1e-11: a centre of mass of -1 mm has an interval of ± 2 m
+            assert a == pytest.approx(b, rel=1e-9, abs=1e-11), place
     assert own["validation"]["split"] == ("heldout_logs" if heldout else "not_tested")
     assert own["assessment"]["answer"] in ("yes", "yes_within_limits", "not_yet", "no")
