@@ -60,15 +60,18 @@ pub(super) fn measure(
         let of = |joint: usize| median(fits.iter().map(|fit| value(fit, joint)).collect());
         (0..joints).map(of).collect()
     };
+    // Sizes of payloads are the units': the type has the slab that any may have.
+    let prior = |fit: &Fit| (fit.plug_in.payload).undone(&fit.problem.prior, columns);
+    let priors: Vec<Prior> = fits.iter().map(prior).collect();
     let slab = |k: usize| {
-        let own = |fit: &Fit| fit.problem.prior.slab[k] * fit.posterior.noise;
-        median(fits.iter().map(own).collect())
+        let own = |(fit, prior): (&Fit, &Prior)| prior.slab[k] * fit.posterior.noise;
+        median(fits.iter().zip(&priors).map(own).collect())
     };
     Ok(Noise {
         factor: of_joint(&|fit, joint| fit.plug_in.factor(joint) / fit.posterior.noise),
         rho: of_joint(&|fit, joint| fit.plug_in.rho[joint]),
         slab: (0..columns.names.len()).map(slab).collect(),
-        prior: fits[0].problem.prior.clone(),
+        prior: priors[0].clone(),
     })
 }
 

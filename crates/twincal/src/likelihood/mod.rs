@@ -129,6 +129,26 @@ impl Default for PayloadSize {
     }
 }
 
+impl PayloadSize {
+    /// The prior of a problem as it was before the data chose a size.
+    pub(crate) fn undone(self, prior: &Prior, columns: &Columns) -> Prior {
+        let mut prior = prior.clone();
+        for (k, slab) in prior.slab.iter_mut().enumerate() {
+            if columns.families[columns.family_of(k)].is_payload() {
+                *slab /= self.scale * self.scale;
+            }
+        }
+        let payload = columns
+            .families
+            .iter()
+            .position(|own| *own == Family::Payload);
+        if let Some(payload) = payload {
+            prior.odds[payload] /= self.odds;
+        }
+        prior
+    }
+}
+
 fn one() -> f64 {
     1.0
 }

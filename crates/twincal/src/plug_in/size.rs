@@ -328,4 +328,58 @@ mod tests {
         let found = chosen(&own, BOTH, Some((0, 2.0)), 1.0).expect("a size");
         assert_eq!(found, PayloadSize::default());
     }
+
+    /// A quarter of the sd and a fifth of the odds where the payload is, nothing else, and back.
+    #[test]
+    fn a_size_is_in_the_slab_of_the_payload_alone() {
+        use crate::gram::Gram;
+        use crate::likelihood::{PlugIn, assemble};
+        use crate::prior::PriorSettings;
+        use crate::signal::Auto;
+        use crate::term::Family;
+        let columns = Columns {
+            names: vec![MASS.into(), "hand.density".into(), "payload.s1".into()],
+            component: vec![0, 1, 2],
+            family: vec![0, 1, 2],
+            families: vec![Family::Payload, Family::Density, Family::PayloadTensor],
+            prior_sd: vec![Some(5.0), Some(0.5), Some(0.0625)],
+            lower: vec![f64::NEG_INFINITY; 3],
+            forced: Vec::new(),
+            parent: vec![None, None, Some(0)],
+            second_choice: Vec::new(),
+            one_motion: false,
+            halves: Vec::new(),
+        };
+        let prior = PriorSettings {
+            scaled_variance: Auto::Auto,
+            inclusion: None,
+            noise: None,
+            families: Vec::new(),
+            forced: Vec::new(),
+            heredity: None,
+        };
+        let payload = PayloadSize {
+            scale: 0.25,
+            odds: 0.2,
+        };
+        let of = |payload| {
+            let plug_in = PlugIn {
+                noise: 2.0,
+                payload,
+                ..PlugIn::start(0, 3, 1.0)
+            };
+            let gram = Gram { joints: Vec::new() };
+            assemble(&gram, &columns, &plug_in, &prior)
+                .expect("a problem")
+                .prior
+        };
+        let (before, after) = (of(PayloadSize::default()), of(payload));
+        assert_eq!(before.slab, [12.5, 0.125, 0.001953125]);
+        assert_eq!(after.slab, [12.5 / 16.0, 0.125, 0.001953125 / 16.0]);
+        let ratio = |family: usize| after.odds[family] / before.odds[family];
+        assert_eq!([0, 1, 2].map(ratio), [0.2, 1.0, 1.0]);
+        let undone = payload.undone(&after, &columns);
+        assert_eq!(undone.slab, before.slab);
+        assert!((undone.odds[0] / before.odds[0] - 1.0).abs() < 1e-15);
+    }
 }
