@@ -205,15 +205,7 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
             .collect(),
     };
     let json = design_json(&found, &about)?;
-    let motion = &found.motion;
-    let files = vec![
-        (MOTION, motion_csv(motion).into_bytes()),
-        (TABLE, motion_parquet(motion)?),
-        (DESIGN, json.clone()),
-        (PAGE, design_page(&found, &about)?.into_bytes()),
-        (TRAJECTORY, joint_trajectory(motion).into_bytes()),
-        (KEYFRAMES, mujoco_keyframes(motion).into_bytes()),
-    ];
+    let files = files(&found, &about, json.clone())?;
     claim.commit(Maker::Design, files)?;
     terminal.complete(&flags.output);
     if flags.json {
@@ -222,6 +214,23 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
         print(&found, &about, &flags.output, terminal);
     }
     Ok(0)
+}
+
+/// All that is written of a motion.
+fn files(
+    found: &Design,
+    about: &About<'_>,
+    json: Vec<u8>,
+) -> Outcome<Vec<(&'static str, Vec<u8>)>> {
+    let motion = &found.motion;
+    Ok(vec![
+        (MOTION, motion_csv(motion).into_bytes()),
+        (TABLE, motion_parquet(motion)?),
+        (DESIGN, json),
+        (PAGE, design_page(found, about)?.into_bytes()),
+        (TRAJECTORY, joint_trajectory(motion).into_bytes()),
+        (KEYFRAMES, mujoco_keyframes(motion).into_bytes()),
+    ])
 }
 
 /// A motion, and the limits with the start that it has.
