@@ -273,6 +273,13 @@ def test_what_a_log_shows_need_not_be_shown_again(made, tmp_path):
     assert json.loads(again.stdout) == after
 
 
+def test_a_log_is_given_once(made, tmp_path):
+    folder, _ = made
+    log = folder / "motion" / "motion.csv"
+    done = design(tmp_path, "--limits", folder / "limits.toml", "--after", log, log, code=2)
+    assert "the same log" in done.stderr and not (tmp_path / "motion").exists()
+
+
 def test_a_log_that_the_twin_knows_is_refused(decided, tmp_path):
     folder, _ = decided
     log = next(folder.glob("poor*.csv"))

@@ -25,6 +25,7 @@ use twincal::words::significant as number;
 use twincal_io::artifact::{Artifact, Claim, Inputs, MODEL_MJCF, MODEL_URDF, Maker, Replace};
 use twincal_io::collision::CollisionWorld;
 use twincal_io::config::{Config, Settings};
+use twincal_io::context::FileHash;
 use twincal_io::design::{
     About, DESIGN, KEYFRAMES, Limits, MOTION, PAGE, TABLE, TRAJECTORY, WARNING, design_json,
     design_page, joint_trajectory, motion_csv, motion_parquet, mujoco_keyframes, read_limits,
@@ -139,6 +140,7 @@ impl Known {
                 (logs, pipeline)
             }
         };
+        require_once(&logs)?;
         let recorded = Recorded::new(&self.robot, &pipeline, &logs.logs);
         let (recorded, mut findings) = recorded.map_err(|error| logs.as_given(error))?;
         drop(progress);
@@ -214,6 +216,21 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
         print(&found, &about, &flags.output, terminal);
     }
     Ok(0)
+}
+
+/// # Errors
+/// Where a log is given twice: what it shows would count twice.
+fn require_once(logs: &LogInput) -> Outcome<()> {
+    for (place, file) in logs.files.iter().enumerate() {
+        let same = |other: &&FileHash| other.sha256 == file.sha256;
+        if let Some(other) = logs.files[..place].iter().find(same) {
+            return Err(Failure::usage(
+                format!("{} and {} are the same log", other.name, file.name),
+                "give it once: what it shows would count twice",
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// All that is written of a motion.

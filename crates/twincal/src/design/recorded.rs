@@ -29,7 +29,7 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// The motion of logs as a pipeline filters it; their torque is not looked at.
+    /// The motion of logs as a pipeline filters it, and what was found on the way; their torque is not looked at.
     ///
     /// # Errors
     /// Those of [`motion`], and of chapters that cannot be read.

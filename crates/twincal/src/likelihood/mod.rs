@@ -134,15 +134,11 @@ impl PayloadSize {
     pub(crate) fn undone(self, prior: &Prior, columns: &Columns) -> Prior {
         let mut prior = prior.clone();
         for (k, slab) in prior.slab.iter_mut().enumerate() {
-            if columns.families[columns.family_of(k)].is_payload() {
+            if columns.is_payload(k) {
                 *slab /= self.scale * self.scale;
             }
         }
-        let payload = columns
-            .families
-            .iter()
-            .position(|own| *own == Family::Payload);
-        if let Some(payload) = payload {
+        if let Some(payload) = columns.place_of(Family::Payload) {
             prior.odds[payload] /= self.odds;
         }
         prior
@@ -184,6 +180,16 @@ impl Columns {
     /// Index in `families` of a column's family.
     pub fn family_of(&self, column: usize) -> usize {
         self.family[self.component[column]]
+    }
+
+    /// Whether a column is of the payload.
+    pub(crate) fn is_payload(&self, column: usize) -> bool {
+        self.families[self.family_of(column)].is_payload()
+    }
+
+    /// Index in `families` of a family.
+    pub(crate) fn place_of(&self, family: Family) -> Option<usize> {
+        self.families.iter().position(|own| *own == family)
     }
 
     /// What a column's prior variance is multiplied with to be v: the mean of rms² over the columns of its component, so
@@ -316,8 +322,7 @@ pub fn assemble(
         .map(|(k, reference)| {
             let slab = match columns.prior_sd[k] {
                 Some(sd) if learned => {
-                    let family = columns.families[columns.family_of(k)];
-                    let scale = match family.is_payload() {
+                    let scale = match columns.is_payload(k) {
                         true => plug_in.payload.scale,
                         false => 1.0,
                     };
@@ -334,10 +339,7 @@ pub fn assemble(
         None => (AUTO_SHAPE, auto_scale(noise, unexplained)),
     };
     let (families, mut odds, inclusion) = structure::structure(columns, settings)?;
-    let payload = columns
-        .families
-        .iter()
-        .position(|own| *own == Family::Payload);
+    let payload = columns.place_of(Family::Payload);
     if let Some(payload) = payload.filter(|_| learned) {
         odds[payload] *= plug_in.payload.odds;
     }

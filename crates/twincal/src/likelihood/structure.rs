@@ -82,8 +82,7 @@ pub(super) fn structure(
             });
         }
     }
-    let place = |family: Family| columns.families.iter().position(|f| *f == family);
-    let parts = [Family::Payload, Family::PayloadTensor].map(place);
+    let parts = [Family::Payload, Family::PayloadTensor].map(|own| columns.place_of(own));
     if let ([Some(payload), Some(tensor)], None) = (parts, settings.inclusion) {
         odds[payload] /= 1.0 + odds[tensor] / reference(inclusion, count);
     }

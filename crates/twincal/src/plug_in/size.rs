@@ -113,8 +113,9 @@ pub(super) fn payload_size(
     problem: &Problem,
     posterior: &Posterior,
 ) -> PayloadSize {
-    let is_payload = |k: &u32| columns.families[columns.family_of(*k as usize)].is_payload();
-    let own: Vec<u32> = (0..columns.names.len() as u32).filter(is_payload).collect();
+    let own: Vec<u32> = (0..columns.names.len() as u32)
+        .filter(|k| columns.is_payload(*k as usize))
+        .collect();
     let Some(first) = posterior.models.first().filter(|_| !own.is_empty()) else {
         return now;
     };
