@@ -15,6 +15,10 @@ SHARED = ROOT.parent / "shared" / "data"
 sys.path.insert(0, str(STUDY))
 
 
+def pytest_configure(config):
+    config.addinivalue_line("markers", "long: takes half a minute and more; runs in `./check --full`")
+
+
 def program(name):
     """A built program; `TWINCAL_BIN_DIR` overrides `target/release`."""
     folder = Path(os.environ.get("TWINCAL_BIN_DIR", ROOT / "target" / "release"))

@@ -393,3 +393,69 @@ def test_meshes_do_not_touch_in_mujoco(tmp_path, monkeypatch, robot):
     line = contacts.one(program("twincal"), contacts.Robot(robot), 2, tmp_path)
     assert line["broken"] == [] and not line["too_close"], line
     assert line["pairs"] > 10 and abs(min(line["mujoco"], line["around"]) - line["said"]["distance"]) < 0.005, line
+
+
+def test_a_known_load_counts_in_the_torque(tmp_path, names, stated):
+    """Torque by Pinocchio with a point mass in the frame of the tool."""
+    model = pin.buildModelFromUrdf(str(ARM))
+    mass, com = 1.5, [0.05, 0.0, 0.1]
+    tool = model.frames[model.getFrameId("tool0")]
+    model.appendBodyToJoint(tool.parentJoint, pin.Inertia(mass, np.array(com), np.zeros((3, 3))), tool.placement)
+    data = model.createData()
+    rest = np.abs(pin.computeGeneralizedGravity(model, data, np.full(model.nq, 0.1)))
+    torque = 1.2 * float(rest.max()) + 1.0
+    load = f"load = {{ mass = {mass}, com = {com} }}\n"
+    design(tmp_path, "--duration", 5, *limits(tmp_path, load + stated(torque)))
+    _, rows = table(tmp_path)
+    n = model.nq
+    states = (rows[:, 1 + k * n : 1 + (k + 1) * n] for k in range(3))
+    needed = np.array([pin.rnea(model, data, *state) for state in zip(*states, strict=True)])
+    assert np.abs(needed).max() <= torque
+    assert json.loads((tmp_path / "motion" / "design.json").read_text())["load"] == {"mass": mass, "com": com}
+    done = design(tmp_path, *limits(tmp_path, load.replace("1.5", "150") + stated(torque)), code=4)
+    assert "at the start joint" in done.stderr
+
+
+TURNTABLE = """<robot name="turntable"><link name="base"/>
+<link name="plate"><inertial><origin xyz="0.1 0.02 0"/><mass value="2"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="turn" type="revolute"><parent link="base"/><child link="plate"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" velocity="4" effort="50"/></joint></robot>
+"""
+
+
+def test_what_decides_where_no_motion_does_is_said(tmp_path):
+    """A vertical axis feels no gravity: density and motor inertia of its only joint both are torque along q̈. With the base on a wall the
+    plate's weight tells them apart; a known load does not, since it changes neither. A drive's gain it does: the load is in what it multiplies."""
+    t = np.arange(0.0, 20.0, 0.004)
+    w = np.array([2.1, 4.7, 6.9])
+    q = (np.sin(np.outer(t, w)) / w).sum(axis=1)
+    qd, qdd = np.cos(np.outer(t, w)).sum(axis=1), -(w * np.sin(np.outer(t, w))).sum(axis=1)
+    inertia = 0.02 + 2 * (0.1**2 + 0.02**2)
+    tau = 1.08 * inertia * qdd + 0.1 * qd + 0.02 * np.random.default_rng(5).normal(size=t.size)
+    pd.DataFrame({"t": t, "turn.q": q, "turn.qd": qd, "turn.qdd": qdd, "turn.tau": tau}).to_csv(tmp_path / "log.csv", index=False)
+    (tmp_path / "turntable.urdf").write_text(TURNTABLE)
+    said = {}
+    for other, name in (("density", "plate.density"), ("gain", "turn.gain")):
+        (tmp_path / "twincal.toml").write_text(f'[library]\nfamilies = ["viscous", "motor_inertia", "{other}"]\n')
+        given = ("--model", tmp_path / "turntable.urdf", "--config", tmp_path / "twincal.toml")
+        twin, motion = tmp_path / f"twin_{other}", tmp_path / f"motion_{other}"
+        for command in (("fit", tmp_path / "log.csv", *given, "-o", twin), ("design", "--twin", twin, "--decide", "turn.motor_inertia", name, "-o", motion)):
+            done = subprocess.run([program("twincal"), *map(str, command)], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+            assert done.returncode in (0, 3), done.stderr
+        promises = json.loads((motion / "design.json").read_text())["promises"]
+        assert [own["structural"] for own in promises] == [True, True], promises
+        said[other] = [own["decided_by"] for own in promises]
+    assert said == {"density": [["other_base"]] * 2, "gain": [["known_load", "other_base"]] * 2}
+
+
+def test_the_base_of_a_model_stands_as_its_settings_say(tmp_path):
+    """On a wall the plate weighs 2 N·m at the start, more than the drive has; upright it weighs nothing."""
+    (tmp_path / "turntable.urdf").write_text(TURNTABLE)
+    (tmp_path / "twincal.toml").write_text("[model]\nbase = { rpy = [1.5707963, 0.0, 0.0] }\n")
+    stated = limits(tmp_path, "[joint.turn]\ntorque = 1.0\nstart = 0.0\n")
+    command = [program("twincal"), "design", "--model", tmp_path / "turntable.urdf", *stated, "--duration", 4, "-o", tmp_path / "motion"]
+    for given, code in (((), 0), (("--config", tmp_path / "twincal.toml"), 4)):
+        done = subprocess.run([str(one) for one in (*command, *given, "--force")], capture_output=True, text=True)
+        assert done.returncode == code, done.stderr
+    assert "`turn` needs 1.96" in done.stderr

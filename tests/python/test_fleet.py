@@ -95,6 +95,7 @@ def test_the_file_is_what_its_schema_says(made):
         jsonschema.validate({"schema": 1}, schema)
 
 
+@pytest.mark.long
 def test_the_same_bytes_on_one_thread(made, tmp_path):
     folder, _ = made
     files = sorted(str(path.relative_to(folder)) for path in folder.glob("st/unit0[1-4]/*.arrow"))

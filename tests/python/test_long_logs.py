@@ -98,6 +98,7 @@ def long_log():
     return log(51)
 
 
+@pytest.mark.long
 def test_memory_does_not_grow_with_the_log(tmp_path, long_log):
     memory = {}
     for minutes, table in [(51, long_log), (204, log(204))]:
@@ -126,6 +127,7 @@ def test_other_forms_come_in_chapters_too(tmp_path, long_log, form):
     assert memory < 270, memory
 
 
+@pytest.mark.long
 def test_all_commands_take_long_logs_in_chapters(tmp_path, long_log):
     """Twice the log, the same memory; every row predicted, as by a twin that reads the same rows as a short log."""
     table, model, config = long_log, ASSETS / "arm.urdf", tmp_path / "twincal.toml"

@@ -1,4 +1,4 @@
-"""result.json is what `schema/result.schema.json` says: simulated and real robots, tested and not. Truth: the validator jsonschema."""
+"""result.json is what `schema/result.schema.json` says: of the demo, and where it is not. Real robots: test_statistics.py. Truth: the validator jsonschema."""
 
 import copy
 import json
@@ -6,7 +6,7 @@ import subprocess
 
 import jsonschema
 import pytest
-from conftest import ROOT, SHARED, program, twincal
+from conftest import ROOT, program
 
 SCHEMA = json.loads((ROOT / "schema" / "result.schema.json").read_text())
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
@@ -50,26 +50,3 @@ def test_what_the_schema_forbids_is_found(demo):
     assert changed(lambda r: r.pop("terms"))
     assert changed(lambda r: r["components"][0].update(pip="high"))
     assert changed(lambda r: r["validation"].pop("moving"))
-
-
-@pytest.mark.parametrize(
-    ("robot", "model", "logs"),
-    [
-        ("ur10", "model.urdf", ["run0.parquet"]),
-        ("double_pendulum", "model_as_published.urdf", ["run0.csv", "run1.csv", "run2.csv"]),
-    ],
-)
-def test_real_robots_are_as_the_schema_says(robot, model, logs, tmp_path):
-    data = SHARED / robot
-    if not data.is_dir():
-        pytest.skip(f"../shared/data/{robot} is not there")
-    logs = [data / log for log in logs]
-    twincal("fit", *logs, "--model", data / model, "--no-config", "-o", tmp_path / "own")
-    result = json.loads((tmp_path / "own" / "result.json").read_text())
-    assert problems(result) == []
-    twincal("statistics", *logs, "--model", data / model, "--no-config", "-o", tmp_path / "st")
-    files = sorted((tmp_path / "st").glob("*.arrow"))
-    twincal("fit", "--statistics", *files, "--no-config", "-o", tmp_path / "untested")
-    untested = json.loads((tmp_path / "untested" / "result.json").read_text())
-    assert problems(untested) == []
-    assert (untested["assessment"]["answer"], untested["assessment"]["reason"]) == ("not_yet", "not_tested")

@@ -1,9 +1,10 @@
-"""Statistics of real logs: a fit to them is the fit to the logs. Truth: the fit to the logs themselves."""
+"""Statistics of real logs: a fit to them is the fit to the logs. Truth: the fit to the logs themselves, and the schema."""
 
 import json
 
 import pytest
 from conftest import ROOT, SHARED, twincal
+from test_result_schema import problems
 
 CASES = {
     "ur10": ("model.urdf", ["run0.parquet"], [], None),
@@ -52,5 +53,8 @@ def test_a_fit_to_statistics_is_the_fit_to_the_logs(robot, tmp_path):
         for place, a, b in pairs(whole[key], own[key], key):
             # 1e-11: a centre of mass of -1 mm has an interval of ± 2 m
             assert a == pytest.approx(b, rel=1e-9, abs=1e-11), place
+    assert problems(whole) == problems(own) == []
     assert own["validation"]["split"] == ("heldout_logs" if heldout else "not_tested")
     assert own["assessment"]["answer"] in ("yes", "yes_within_limits", "not_yet", "no")
+    if not heldout:
+        assert (own["assessment"]["answer"], own["assessment"]["reason"]) == ("not_yet", "not_tested")

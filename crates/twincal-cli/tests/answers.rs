@@ -1,9 +1,8 @@
 //! What the answer itself may do: scales, outliers, extrapolation; and our own bugs.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{QUICK, command, csv, fit, folder, run};
+use crate::common;
+use crate::common::{QUICK, command, csv, fit, folder, run};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

@@ -1,9 +1,8 @@
 //! What the program leaves on disk: complete or absent, locked, verified, the same bytes for any number of threads.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{command, files, fit, fitted, fitted_copy, folder, run, shell};
+use crate::common;
+use crate::common::{command, files, fit, fitted, fitted_copy, folder, run, shell};
 use std::fs;
 use std::os::unix::ffi::OsStrExt as _;
 use std::path::Path;

@@ -1,9 +1,7 @@
 //! `check` and `predict` read new logs as the fit read its own: every key of `[columns]`, where nobody says otherwise.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{QUICK, Run, csv, fit, folder, run, shell};
+use crate::common::{QUICK, Run, csv, fit, folder, run, shell};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

@@ -1,7 +1,6 @@
 //! Bags of ROS through the program: the same answer as from CSV, exit codes for broken ones, predictions out.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
 #[path = "../../twincal-io/tests/common/logs.rs"]
 #[allow(dead_code, reason = "other tests use other parts of these generators")]
 mod logs;
@@ -9,7 +8,8 @@ mod logs;
 #[allow(dead_code, reason = "other tests use other parts of these generators")]
 mod write;
 
-use common::{csv, fitted_copy, folder, run};
+use crate::common;
+use crate::common::{csv, fitted_copy, folder, run};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;

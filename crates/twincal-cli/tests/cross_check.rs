@@ -1,9 +1,7 @@
 //! Logs that are no recordings of their own get no "Yes" and no guarantee.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{csv, folder, run};
+use crate::common::{csv, folder, run};
 use serde_json::Value;
 use std::fs;
 

@@ -1,9 +1,8 @@
 //! `twincal demo` as a new user runs it.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::run;
+use crate::common;
+use crate::common::run;
 use std::fs;
 
 #[test]

@@ -1,9 +1,8 @@
 //! `twincal diff` on simulated arms of which one was changed by a known number.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{Run, csv, fit, folder, run};
+use crate::common;
+use crate::common::{Run, csv, fit, folder, run};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

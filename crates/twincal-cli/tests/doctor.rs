@@ -1,10 +1,10 @@
 //! `doctor` and `init`: what is wrong with a log is named with its number and its remedy, also where `fit` refuses.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::faulty::{Fault, GOOD, LOOK, PERIOD, RATE, SECONDS, fitted, folder, log, with_config};
-use common::run;
+use crate::common::faulty::{
+    Fault, GOOD, LOOK, PERIOD, RATE, SECONDS, fitted, folder, log, with_config,
+};
+use crate::common::run;
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::fs;

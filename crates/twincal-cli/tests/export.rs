@@ -1,9 +1,8 @@
 //! `twincal export` on a small exact twin: what is written, refused, and left alone.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{ARM, QUICK, Row, Run, csv, files, fit, fitted, fitted_copy, folder, run};
+use crate::common;
+use crate::common::{ARM, QUICK, Row, Run, csv, files, fit, fitted, fitted_copy, folder, run};
 use std::fs;
 
 /// The flag that accepts a file that is worse than the model.

@@ -1,9 +1,8 @@
 //! Help texts and error messages as they stand on a terminal of 80 columns.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{fitted, folder, run};
+use crate::common;
+use crate::common::{fitted, folder, run};
 
 fn narrow(text: &str) -> &str {
     for line in text.lines() {

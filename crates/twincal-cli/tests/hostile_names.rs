@@ -6,9 +6,7 @@
     reason = "a broken test may panic, one that is left out says so"
 )]
 
-mod common;
-
-use common::{ARM, QUICK, csv, fitted_copy, run};
+use crate::common::{ARM, QUICK, csv, fitted_copy, run};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -3,9 +3,7 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{Run, folder, shell};
+use crate::common::{Run, folder, shell};
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;

@@ -1,10 +1,8 @@
 //! `init`: the config that logs ask for, with which a log in other units, signs or order gives what a good one gives.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::faulty::{Fault, GOOD, LOOK, fitted, folder, log};
-use common::run;
+use crate::common::faulty::{Fault, GOOD, LOOK, fitted, folder, log};
+use crate::common::run;
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::fs;

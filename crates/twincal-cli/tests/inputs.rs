@@ -1,9 +1,8 @@
 //! Logs and models that do not fit together, and files that lie: exit codes and words of the program.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{ARM, QUICK, Run, csv, fit, folder, run};
+use crate::common;
+use crate::common::{ARM, QUICK, Run, csv, fit, folder, run};
 use serde_json::Value;
 use std::fs;
 use tempfile::TempDir;

@@ -1,9 +1,8 @@
 //! `inspect`: what a model can show of its parameters, what `fit` would look for, what logs do not show.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{ARM, csv, folder, run};
+use crate::common;
+use crate::common::{ARM, csv, folder, run};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

@@ -1,9 +1,8 @@
 //! Logs that are made to take all memory, a clock that goes backwards, and settings that look like variables of the shell.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{Run, finish, fit, folder, run, shell};
+use crate::common;
+use crate::common::{Run, finish, fit, folder, run, shell};
 use std::fs::{self, File};
 use std::io::Write as _;
 use std::path::Path;

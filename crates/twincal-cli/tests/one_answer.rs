@@ -1,9 +1,7 @@
 //! Terminal, page, result.json, `predict`, `export` and `diff` give one answer about one twin.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{csv, fit, folder, run};
+use crate::common::{csv, fit, folder, run};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

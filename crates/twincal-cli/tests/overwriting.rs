@@ -1,9 +1,7 @@
 //! No command writes over what it reads, or over what the twin was made from: every command, every spelling of a path.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{files, fit, fitted_copy, run};
+use crate::common::{files, fit, fitted_copy, run};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

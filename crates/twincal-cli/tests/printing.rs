@@ -1,9 +1,7 @@
 //! How much `fit` and `demo` print: the answer first, the report's path last, and no more lines than promised.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{Run, command, finish, fit, folder, run};
+use crate::common::{Run, command, finish, fit, folder, run};
 use std::fs;
 use std::path::Path;
 use std::process::Command;

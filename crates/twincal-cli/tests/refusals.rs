@@ -1,9 +1,8 @@
 //! Exit codes and words for bad logs, models, settings and questions: one named test per case of the fault list.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{ARM, Row, Run, csv, fit, folder, run};
+use crate::common;
+use crate::common::{ARM, Row, Run, csv, fit, folder, run};
 use std::fs;
 use tempfile::TempDir;
 

@@ -1,9 +1,7 @@
 //! Which settings hold: `./twincal.toml` is read without being asked for, that is said, and result.json says which file it was.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{QUICK, fitted_copy, folder, run};
+use crate::common::{QUICK, fitted_copy, folder, run};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

@@ -1,9 +1,8 @@
 //! `twincal statistics`, `merge` and `fit --statistics`: the numbers of the fit to the logs, files that are kept, and refusals.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-mod common;
-
-use common::{csv, files, folder, run, shell};
+use crate::common;
+use crate::common::{csv, files, folder, run, shell};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

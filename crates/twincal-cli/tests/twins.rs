@@ -5,9 +5,8 @@
     reason = "a broken test may panic, a skipped one is said"
 )]
 
-mod common;
-
-use common::{Run, csv, fit, folder, run, shell};
+use crate::common;
+use crate::common::{Run, csv, fit, folder, run, shell};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

@@ -5,17 +5,8 @@
     reason = "a test stops where its files do not do what they should"
 )]
 
-#[path = "common/refusals.rs"]
-mod refusals;
-#[path = "common/logs.rs"]
-#[allow(
-    dead_code,
-    reason = "other test files use other parts of these generators"
-)]
-mod logs;
-
-use logs::{arm, motion};
-use refusals::{contains, refused};
+use crate::common::logs::{arm, motion};
+use crate::common::refusals::{contains, refused};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use twincal::signal::Recording;

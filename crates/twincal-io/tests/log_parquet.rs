@@ -6,14 +6,7 @@
     reason = "a test stops where its files do not do what they should, and says what it skips"
 )]
 
-#[path = "common/logs.rs"]
-#[allow(
-    dead_code,
-    reason = "other test files use other parts of these generators"
-)]
-mod logs;
-
-use logs::{LogText, arm, robot};
+use crate::common::logs::{LogText, arm, robot};
 use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;

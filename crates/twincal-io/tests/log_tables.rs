@@ -1,18 +1,9 @@
 //! NPZ files, and tables of well-known recorders.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-#[path = "common/refusals.rs"]
-mod refusals;
-#[path = "common/logs.rs"]
-#[allow(
-    dead_code,
-    reason = "other test files use other parts of these generators"
-)]
-mod logs;
-
-use logs::{arm, motion, robot};
+use crate::common::logs::{arm, motion, robot};
+use crate::common::refusals::{contains, refused};
 use proptest::prelude::*;
-use refusals::{contains, refused};
 use std::fs;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};

@@ -1,9 +1,6 @@
 //! What a log says of a robot that changed since its twin was fitted, and of one that did not. Truth is an arm in closed form.
 
-#[path = "../examples/two_link.rs"]
-#[allow(dead_code, reason = "its `main` and its study are not needed here")]
-mod two_link;
-
+use crate::two_link;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::random::Random;
 use twincal::signal::{Auto, Recording};

@@ -1,9 +1,6 @@
 //! Claims of `assess`: each is made where its numbers say so, and carries them.
 
-#[path = "../examples/two_link.rs"]
-#[allow(dead_code, reason = "an example's main")]
-mod two_link;
-
+use crate::two_link;
 use std::sync::OnceLock;
 use twincal::assess::{Answer, Assessment, Claim, RequestCode, Subject, assess, of_gates};
 use twincal::prelude::*;

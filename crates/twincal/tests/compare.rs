@@ -1,10 +1,7 @@
 //! `compare` against the difference of two distributions in closed form, and against simulated arms of which one carries
 //! something.
 
-#[path = "../examples/two_link.rs"]
-#[allow(dead_code, reason = "its `main` and its study are not needed here")]
-mod two_link;
-
+use crate::two_link;
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::sync::LazyLock;
 use twincal::calibrate::{Calibration, CalibrationSettings, Status, calibrate};

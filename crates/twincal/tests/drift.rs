@@ -1,9 +1,6 @@
 //! A drive that warms up while it is logged: what the fit says of it.
 
-#[path = "../examples/two_link.rs"]
-#[allow(dead_code, reason = "its `main` prints, which a test does not need")]
-mod two_link;
-
+use crate::two_link;
 use twincal::Code;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::random::Random;

@@ -1,9 +1,6 @@
 //! Fleets: the arm that changes is named with its size and its window, and bad input leaves the answers of the others as they are.
 
-#[path = "../examples/two_link.rs"]
-#[allow(dead_code, reason = "its `main` and its study are not needed here")]
-mod two_link;
-
+use crate::two_link;
 use twincal::Error;
 use twincal::calibrate::{
     About, Calibration, CalibrationSettings, Plan, Statistics, Status, plan_about,

@@ -1,9 +1,6 @@
 //! Statistics of logs, and fits from them: the same numbers as from the logs; sums that do not depend on who adds them; refusals.
 
-#[path = "../examples/two_link.rs"]
-#[allow(dead_code, reason = "its `main` and its study are not needed here")]
-mod two_link;
-
+use crate::two_link;
 use twincal::Code;
 use twincal::calibrate::{
     Calibration, CalibrationSettings, Plan, Quantity, Record, Statistics, calibrate,

@@ -1,9 +1,6 @@
 //! Up to twelve logs are left out one by one, more in five groups of logs that follow each other: every one is predicted once.
 
-#[path = "../examples/two_link.rs"]
-#[allow(dead_code, reason = "its `main` and its study are not needed here")]
-mod two_link;
-
+use crate::two_link;
 use twincal::calibrate::{CalibrationSettings, calibrate};
 use twincal::random::Random;
 use twincal::signal::{Auto, Recording};

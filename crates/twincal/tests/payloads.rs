@@ -1,10 +1,7 @@
 //! What logs say that the robot carried: nothing, something known, something unknown. Truth are arms whose last link was
 //! built with the load in it.
 
-#[path = "../examples/two_link.rs"]
-#[allow(dead_code, reason = "its `main` and its study are not needed here")]
-mod two_link;
-
+use crate::two_link;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::random::Random;
 use twincal::signal::{Auto, Payload, Recording};

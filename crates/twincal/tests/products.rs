@@ -1,10 +1,7 @@
 //! Effects that multiply each other: gravity acts on a payload as well, which is not linear in both coefficients together. (Drive constants and
 //! payloads: `payloads.rs`.)
 
-#[path = "../examples/two_link.rs"]
-#[allow(dead_code, reason = "its `main` and its study are not needed here")]
-mod two_link;
-
+use crate::two_link;
 use twincal::Code;
 use twincal::Severity;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};

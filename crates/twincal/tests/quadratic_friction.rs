@@ -1,10 +1,7 @@
 //! Friction that grows less than the speed is told by that name, where it is and nowhere else.
 
-mod common;
-#[path = "../examples/two_link.rs"]
-#[allow(dead_code, reason = "its `main` prints, which a test does not need")]
-mod two_link;
-
+use crate::common;
+use crate::two_link;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::random::Random;
 use twincal::robot::{Robot, Workspace, inverse_dynamics};

@@ -1,7 +1,6 @@
 //! Gear ripple that nobody asked for, on the motions that robots are identified with: friction that no candidate has is none, a gear's is.
 
-mod common;
-
+use crate::common;
 use std::f64::consts::TAU;
 use twincal::calibrate::{Calibration, CalibrationSettings, UnaskedRipple, calibrate};
 use twincal::random::Random;

@@ -1,9 +1,6 @@
 //! Outliers in the torque of a simulated arm, and noise that changes with speed or load: what `[noise]` does to estimates and intervals.
 
-#[path = "../examples/two_link.rs"]
-#[allow(dead_code, reason = "its `main` prints, which a test does not need")]
-mod two_link;
-
+use crate::two_link;
 use twincal::Code;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::random::Random;

@@ -1,9 +1,6 @@
 //! One status per effect, on simulated arms whose truth is known.
 
-#[path = "../examples/two_link.rs"]
-#[allow(dead_code, reason = "its `main` and its study are not needed here")]
-mod two_link;
-
+use crate::two_link;
 use twincal::calibrate::{
     Alike, Calibration, CalibrationSettings, ComponentSummary, LeftOutData, Status, StatusReason,
     calibrate,

@@ -1,9 +1,6 @@
 //! A link's moment about its joint and its motor's inertia are one torque, but no motor has a negative inertia.
 
-#[path = "../examples/two_link.rs"]
-#[allow(dead_code, reason = "its `main` and its study are not needed here")]
-mod two_link;
-
+use crate::two_link;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};
 use twincal::random::Random;
 use twincal::robot::Robot;

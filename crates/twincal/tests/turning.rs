@@ -1,10 +1,7 @@
 //! v_s of Coulomb friction where nobody states one: as the log says, and the usual one where the log does not care.
 
-mod common;
-#[path = "../examples/two_link.rs"]
-#[allow(dead_code, reason = "its `main` prints, which a test does not need")]
-mod two_link;
-
+use crate::common;
+use crate::two_link;
 use std::sync::Arc;
 use twincal::Code;
 use twincal::calibrate::{Calibration, CalibrationSettings, calibrate};

@@ -1,10 +1,7 @@
 //! A wider band where noise is an autoregression, and nowhere else.
 
-mod common;
-#[path = "../examples/two_link.rs"]
-#[allow(dead_code, reason = "its `main` prints, which a test does not need")]
-mod two_link;
-
+use crate::common;
+use crate::two_link;
 use twincal::Code;
 use twincal::calibrate::{Calibration, CalibrationSettings, Stopped, calibrate};
 use twincal::likelihood::NoiseModel;

@@ -19,8 +19,9 @@ pub(crate) struct Design {
     /// not show again. Their torque is not looked at.
     #[arg(long, value_name = "LOG", num_args = 1..)]
     pub(crate) after: Vec<PathBuf>,
-    /// Settings file that says how logs of --after are read; without it as those of the twin.
-    #[arg(long, value_name = "FILE", requires = "after")]
+    /// Settings file: how the base of --model stands, and how logs of --after are read;
+    /// without it as the model says, and as those of the twin were read.
+    #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
     /// Length of the motion in seconds.
     #[arg(
@@ -40,7 +41,7 @@ pub(crate) struct Design {
     pub(crate) rate: f64,
     /// Limits and start of joints, over those of the model: TOML with
     /// [joint.NAME] position = [a, b], velocity, acceleration, jerk, torque, start;
-    /// margin, floor, [[box]] and ignore for collisions.
+    /// load = { mass, com } that is known; margin, floor, [[box]] and ignore for collisions.
     #[arg(long, value_name = "FILE")]
     pub(crate) limits: Option<PathBuf>,
     /// Folder of the result.

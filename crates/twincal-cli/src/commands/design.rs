@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use twincal::Severity;
 use twincal::design::{
-    Design, DesignSettings, DesignStage, FoundTorque, JointLimits, NominalTorque, Questions,
-    Recorded, Task, TorqueLimits, design, joint_limits, with_free_start,
+    Design, DesignSettings, DesignStage, FoundTorque, JointLimits, Load, Loaded, NominalTorque,
+    Questions, Recorded, Task, TorqueLimits, design, joint_limits, with_free_start,
 };
 use twincal::robot::{Robot, RobotDescription};
 use twincal::signal::choose_and_prepare;
@@ -187,10 +187,13 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
         limits: &limits,
         world: &world,
         recorded: recorded.as_ref(),
+        load: stated.load,
     };
     let (found, limits) = match &known.stored {
         None => {
-            let torque = NominalTorque::new(&known.robot, &limits);
+            let loaded = within.loaded(&known.robot, &body_library(&known.robot)?)?;
+            let robot = loaded.as_ref().map_or(&known.robot, |own| &own.robot);
+            let torque = NominalTorque::new(robot, &limits);
             searched(&known.robot, &within, (&torque, None), &settings)?
         }
         Some(stored) => deciding(stored, &flags.decide, &within, &settings)?,
@@ -202,6 +205,7 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
         surroundings: &stated.surroundings,
         world: &world,
         recorded: recorded.as_ref(),
+        load: stated.load,
         kinds: (0..known.robot.dof())
             .map(|joint| known.robot.joint_kind(joint))
             .collect(),
@@ -258,6 +262,19 @@ struct Within<'a> {
     limits: &'a [JointLimits],
     world: &'a CollisionWorld,
     recorded: Option<&'a Recorded>,
+    load: Option<Load>,
+}
+
+impl Within<'_> {
+    /// The robot and its candidates with what it carries in the motion.
+    fn loaded(&self, robot: &Robot, library: &Library) -> Outcome<Option<Loaded>> {
+        let with = |load| Loaded::new(robot, library, load);
+        Ok(self
+            .load
+            .map(with)
+            .transpose()
+            .map_err(twincal_io::Error::from)?)
+    }
 }
 
 /// A motion that decides what a twin leaves open.
@@ -276,11 +293,26 @@ fn deciding(
     };
     let core = twincal_io::Error::from;
     let library = twin.library().map_err(core)?;
-    let torque = FoundTorque::new(twin, within.limits).map_err(core)?;
+    let loaded = within.loaded(&twin.robot, &library)?;
+    let torque = FoundTorque::new(twin, loaded.as_ref(), within.limits).map_err(core)?;
     let noise = (&twin.noise[..], calibration.kept_rate_hz());
-    let questions = Questions::new((problem, &twin.posterior), &library, noise, decide);
-    let questions = questions.map_err(core)?;
+    let known = (problem, &twin.posterior);
+    let questions = Questions::new(known, (&twin.robot, &library), noise, decide);
+    let mut questions = questions.map_err(core)?;
+    if let Some(loaded) = &loaded {
+        questions = questions.carrying(loaded);
+    }
     searched(&twin.robot, within, (&torque, Some(&questions)), settings)
+}
+
+/// Columns of body, motors and friction.
+fn body_library(robot: &Robot) -> Outcome<Library> {
+    let settings = LibrarySettings {
+        families: FAMILIES.to_vec(),
+        ..LibrarySettings::default()
+    };
+    let (library, _) = Library::propose(robot, &settings).map_err(twincal_io::Error::from)?;
+    Ok(library)
 }
 
 /// The search, with its gain on standard error; Ctrl-C ends it with what it has.
@@ -290,14 +322,12 @@ fn searched(
     (torque, questions): (&dyn TorqueLimits, Option<&Questions<'_>>),
     settings: &DesignSettings,
 ) -> Outcome<Found> {
-    let library = LibrarySettings {
-        families: FAMILIES.to_vec(),
-        ..LibrarySettings::default()
-    };
-    let (library, _) = Library::propose(robot, &library).map_err(twincal_io::Error::from)?;
+    let library = body_library(robot)?;
+    let loaded = within.loaded(robot, &library)?;
     let task = Task {
         robot,
         library: &library,
+        loaded: loaded.as_ref(),
         questions,
         recorded: within.recorded,
         limits: within.limits,
@@ -342,7 +372,7 @@ fn print_promises(found: &Design, terminal: &mut Terminal) {
     }
     print_table(&rows, terminal);
     for promise in found.promises.iter().filter(|own| own.structural) {
-        paragraph(&words::undecidable(&promise.effect), terminal);
+        paragraph(&words::undecidable(promise), terminal);
     }
     terminal.say("");
 }
@@ -352,6 +382,9 @@ fn print(found: &Design, about: &About<'_>, output: &Path, terminal: &mut Termin
     paragraph(&words::information(found), terminal);
     if let Some(recorded) = about.recorded {
         paragraph(&words::before(recorded), terminal);
+    }
+    if let Some(load) = about.load {
+        paragraph(&words::carried(load), terminal);
     }
     terminal.say("");
     print_promises(found, terminal);

@@ -44,6 +44,7 @@ pub(crate) fn design(joints: &[&str], effects: &[&str], len: usize) -> Design {
         wrong: 0.016,
         sd: (at + 1 < effects.len()).then_some(0.021),
         structural: at + 1 == effects.len(),
+        decided_by: Vec::new(),
     };
     let used = |name: &&str| JointUse {
         joint: (*name).to_owned(),

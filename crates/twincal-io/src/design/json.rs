@@ -5,7 +5,10 @@ use crate::collision::{AssumedShape, CollisionWorld, IgnoredPair, StatedBox, Sur
 use crate::error::{Error, Result};
 use schemars::JsonSchema;
 use serde::Serialize;
-use twincal::design::{Approach, Design, DesignSettings, JointLimits, JointUse, Promise, Recorded};
+use twincal::design::{
+    Approach, Design, DesignSettings, JointLimits, JointUse, Load, OtherRecording, Promise,
+    Recorded,
+};
 use twincal::robot::JointKind;
 
 /// Version of the format.
@@ -26,6 +29,8 @@ pub struct About<'a> {
     pub world: &'a CollisionWorld,
     /// What was recorded before.
     pub recorded: Option<&'a Recorded>,
+    /// What the robot carries in the motion.
+    pub load: Option<Load>,
     /// Kind of each joint: sliders move in m.
     pub kinds: Vec<JointKind>,
 }
@@ -97,6 +102,8 @@ struct DesignJson<'a> {
     stopped: bool,
     /// Logs recorded before, beside those of the twin.
     after: Vec<Before<'a>>,
+    /// What the robot is known to carry in the motion; null: nothing that its model does not have.
+    load: Option<Carried>,
     /// Independent base parameters.
     base_parameters: usize,
     /// ln det of the rows' information on the base parameters, those of `after` included, scaled to torque of size 1; null: not finite.
@@ -123,6 +130,16 @@ struct Before<'a> {
     log: &'a str,
     /// Length of what a fit would use of it, s.
     seconds: f64,
+}
+
+/// A point mass that is known.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, rename = "Load")]
+struct Carried {
+    /// Mass, kg.
+    mass: f64,
+    /// Centre of mass in the payload frame, m.
+    com: [f64; 3],
 }
 
 /// Limits of one joint in force: rad, rad/s, rad/s², rad/s³, N·m; m and N for sliders.
@@ -188,6 +205,27 @@ struct Expected<'a> {
     sd: Option<f64>,
     /// No motion of this robot distinguishes it from the others.
     structural: bool,
+    /// What does together with such a motion, where it is structural.
+    decided_by: Vec<Otherwise>,
+}
+
+/// A recording of the robot otherwise than it stands.
+#[derive(Debug, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+enum Otherwise {
+    /// With a load that is known.
+    KnownLoad,
+    /// With the base in another pose.
+    OtherBase,
+}
+
+impl From<&OtherRecording> for Otherwise {
+    fn from(own: &OtherRecording) -> Self {
+        match own {
+            OtherRecording::KnownLoad => Self::KnownLoad,
+            OtherRecording::OtherBase => Self::OtherBase,
+        }
+    }
 }
 
 impl<'a> From<&'a Promise> for Expected<'a> {
@@ -199,6 +237,7 @@ impl<'a> From<&'a Promise> for Expected<'a> {
             wrong,
             sd,
             structural,
+            decided_by,
         } = own;
         Self {
             effect,
@@ -207,6 +246,7 @@ impl<'a> From<&'a Promise> for Expected<'a> {
             wrong: *wrong,
             sd: *sd,
             structural: *structural,
+            decided_by: decided_by.iter().map(Otherwise::from).collect(),
         }
     }
 }
@@ -269,6 +309,10 @@ pub fn design_json(design: &Design, about: &About<'_>) -> Result<Vec<u8>> {
                 seconds: *seconds,
             })
             .collect(),
+        load: about.load.map(|own| Carried {
+            mass: own.mass,
+            com: own.com,
+        }),
         base_parameters: design.columns,
         log_determinant: design.log_determinant,
         condition: design.condition,
@@ -345,6 +389,10 @@ mod tests {
             surroundings: &Surroundings::default(),
             world: &super::super::fixture::world(),
             recorded: Some(&recorded),
+            load: Some(Load {
+                mass: 2.0,
+                com: [0.0, 0.0, 0.05],
+            }),
             kinds: vec![JointKind::Revolute; 2],
         };
         let bytes = design_json(&design, &about).expect("JSON");
@@ -352,6 +400,7 @@ mod tests {
         let schema: Value = serde_json::from_str(&design_schema()).expect("JSON");
         same_keys(&value, &schema, "design");
         same_keys(&value["after"][0], &schema["$defs"]["Before"], "after");
+        same_keys(&value["load"], &schema["$defs"]["Load"], "load");
         same_keys(&value["limits"][0], &schema["$defs"]["Limits"], "limits");
         same_keys(
             &value["promises"][0],

@@ -9,6 +9,10 @@
 //! torque = 50.0            # N·m
 //! start = 0.4              # rad
 //! ```
+//! What it carries in the motion beside what its model has, in the payload frame:
+//! ```toml
+//! load = { mass = 2.0, com = [0.0, 0.0, 0.05] } # kg, m
+//! ```
 //! What stands around it, in the frame of the base:
 //! ```toml
 //! margin = 0.02            # m
@@ -29,18 +33,20 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;
-use twincal::design::StatedLimits;
+use twincal::design::{Load, StatedLimits};
 
 /// Largest file, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 const REMEDY: &str = "keys of [joint.NAME] are position, velocity, acceleration, jerk, torque and start, of [[box]] name, low, high, keep and \
-                      links; those of the file are joint, box, margin, floor and ignore";
+                      links, of load mass and com; those of the file are joint, load, box, margin, floor and ignore";
 
 /// What the file states.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Limits {
     /// By name of the joint.
     pub joints: BTreeMap<String, StatedLimits>,
+    /// What the robot carries in the motion.
+    pub load: Option<Load>,
     /// What stands around the robot.
     pub surroundings: Surroundings,
 }
@@ -53,6 +59,8 @@ struct File {
     /// Joints by name, `[joint.NAME]`.
     #[serde(default)]
     joint: BTreeMap<String, JointTable>,
+    /// What the robot is known to carry in the motion beside what its model has; its shape is not looked at.
+    load: Option<LoadTable>,
     /// Smallest distance between any two things, m; without it 0.02.
     margin: Option<f64>,
     /// Height of a floor over the origin of the base, against gravity, m; without it there is no floor.
@@ -63,6 +71,18 @@ struct File {
     /// Boxes with their edges along the axes of the base.
     #[serde(default, rename = "box")]
     boxes: Vec<BoxTable>,
+}
+
+/// A point mass.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "Load")]
+struct LoadTable {
+    /// Mass, kg.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    mass: f64,
+    /// Centre of mass in the payload frame, m.
+    com: [f64; 3],
 }
 
 /// A box to stay out of, or in.
@@ -157,6 +177,10 @@ fn parse(name: &str, text: &str) -> Result<Limits> {
     });
     Ok(Limits {
         joints: joints.collect(),
+        load: file.load.map(|own| Load {
+            mass: own.mass,
+            com: own.com,
+        }),
         surroundings: Surroundings {
             margin: file.margin.unwrap_or(Surroundings::default().margin),
             floor: file.floor,
@@ -192,6 +216,14 @@ mod tests {
         assert_eq!(limits.joints["a b"].start, Some(1.0));
         assert_eq!(limits.joints["elbow"].jerk, None);
         assert_eq!(limits.surroundings, Surroundings::default());
+        assert_eq!(limits.load, None);
+        let text = "load = { mass = 2, com = [0.0, 0.0, 0.05] }\n";
+        let load = parse("limits.toml", text).expect("a load").load;
+        let stated = Load {
+            mass: 2.0,
+            com: [0.0, 0.0, 0.05],
+        };
+        assert_eq!(load, Some(stated));
         let text = "floor = -0.1\nignore = [[\"a\", \"b\"]]\n[[box]]\nname = \"w\"\nlow = [0, 0, 0]\nhigh = [1, 1, 1]\nkeep = \"inside\"\n";
         let around = parse("limits.toml", text)
             .expect("surroundings")
@@ -212,6 +244,8 @@ mod tests {
             ("[[box]]\nname = \"w\"\nkeep = \"out\"\n", "outside"),
             ("ignore = [[\"a\"]]\n", ":1:"),
             ("velocity = ", ":1:"),
+            ("load = { mass = 2 }\n", "com"),
+            ("load = 2\n", ":1:"),
         ] {
             let error = parse("limits.toml", text).expect_err(text).to_string();
             assert!(

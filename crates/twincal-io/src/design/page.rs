@@ -26,13 +26,14 @@ pub fn design_page(design: &Design, about: &About<'_>) -> Result<String> {
         ),
         warning: WARNING.into(),
         clearance: words::clearance(design, about.world),
-        purpose: words::purpose(design),
+        purpose: match about.load {
+            Some(load) => format!("{} {}", words::purpose(design), words::carried(load)),
+            None => words::purpose(design),
+        },
         numbers: numbers(design, about),
         questions: design.promises.iter().map(question).collect(),
         decided: words::DECIDED,
-        undecidable: structural
-            .map(|own| words::undecidable(&own.effect))
-            .collect(),
+        undecidable: structural.map(words::undecidable).collect(),
         joints: (0..design.motion.joints.len())
             .map(|joint| curves(design, about, joint))
             .collect(),
@@ -178,6 +179,7 @@ mod tests {
             surroundings: &Surroundings::default(),
             world: &fixture::world(),
             recorded: None,
+            load: None,
             kinds: vec![JointKind::Revolute; limits.len()],
         };
         design_page(design, &about).expect("a page")

@@ -6,7 +6,9 @@ use super::number::{THIN, fixed, number, probability};
 use crate::collision::CollisionWorld;
 use twincal::assess::open_effects;
 use twincal::calibrate::Calibration;
-use twincal::design::{Design, JERK_TIME, JointLimits, Recorded, SPEED_UP};
+use twincal::design::{
+    Design, JERK_TIME, JointLimits, Load, OtherRecording, Promise, Recorded, SPEED_UP,
+};
 use twincal::words::{listed, shortened};
 
 /// What shares of limits are.
@@ -139,9 +141,28 @@ pub fn clearance(design: &Design, world: &CollisionWorld) -> Vec<String> {
 
 /// An effect that no motion decides, and what does.
 #[must_use]
-pub fn undecidable(effect: &str) -> String {
+pub fn undecidable(promise: &Promise) -> String {
+    let others = promise.decided_by.iter().map(|own| match own {
+        OtherRecording::KnownLoad => "a log with a known load",
+        OtherRecording::OtherBase => "a log with the base in another pose",
+    });
+    let others: Vec<&str> = others.collect();
+    let decides = match others.is_empty() {
+        true => "a known load or another pose of the base changes nothing".to_owned(),
+        false => format!("{} does", others.join(" or ")),
+    };
     format!(
-        "{effect}: no motion of this robot distinguishes it from the others; a known load or another base pose does."
+        "{}: no motion of this robot distinguishes it from the others; {decides}.",
+        promise.effect
+    )
+}
+
+/// What the robot carries in the motion.
+#[must_use]
+pub fn carried(load: Load) -> String {
+    format!(
+        "The robot carries {}{THIN}kg in this motion, which are known: state them as payload of the log.",
+        number(load.mass, 3)
     )
 }
 

@@ -1,7 +1,7 @@
 //! Stamps that repeat, jump, stand still, jitter or are in another unit.
 
-use super::logs::{LogText, arm, motion};
 use super::{AUTO, contains, is_true_motion, options, read_bytes, refused, run, says, silent};
+use crate::common::logs::{LogText, arm, motion};
 use twincal::Severity;
 use twincal::signal::{Trajectory, align, choose_pipeline};
 use twincal_io::log::LogOptions;

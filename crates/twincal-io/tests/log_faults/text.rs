@@ -1,7 +1,7 @@
 //! Delimiters, marks, encodings, broken rows, and which column is which joint.
 
-use super::logs::{LogText, arm};
 use super::{contains, options, read, read_bytes, refused, says};
+use crate::common::logs::{LogText, arm};
 use twincal::Severity;
 use twincal_io::log::{LogOptions, read_csv};
 

@@ -1,7 +1,7 @@
 //! Values that are missing, infinite, wrapped, at rest or to be derived.
 
-use super::logs::{LogText, arm, motion, robot};
 use super::{AUTO, contains, is_true_motion, options, read, refused, run, says, silent};
+use crate::common::logs::{LogText, arm, motion, robot};
 use std::f64::consts::{PI, TAU};
 use twincal::robot::JointKind;
 use twincal::signal::{

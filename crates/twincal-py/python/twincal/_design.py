@@ -30,7 +30,7 @@ class Motion:
     condition : float
         Condition number of the rows on the base parameters.
     promises : list of dict
-        For each open effect: `effect`, `pip`, `right`, `wrong`, `sd`, `structural`.
+        For each open effect: `effect`, `pip`, `right`, `wrong`, `sd`, `structural`, `decided_by`.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
@@ -58,6 +58,7 @@ def design(
     twin: str | os.PathLike[str] | None = None,
     decide: Iterable[str] = (),
     after: Iterable[str | os.PathLike[str]] = (),
+    config: str | os.PathLike[str] | None = None,
     duration: float = 20.0,
     rate: float = 500.0,
     limits: str | os.PathLike[str] | None = None,
@@ -80,12 +81,14 @@ def design(
     after : iterable of path
         Logs that are recorded already, beside those of the twin: what they show the motion need
         not show again. Their torque is not looked at.
+    config : path, optional
+        Settings file: how the base of `model` stands, and how logs of `after` are read.
     duration : float
         Length, s.
     rate : float
         The controller's rate, Hz.
     limits : path, optional
-        TOML file of limits over those of the model.
+        TOML file of limits over those of the model; `load` in it is what the robot is known to carry.
     seed : int
         Seed of all random numbers.
     force : bool
@@ -108,7 +111,7 @@ def design(
         raise ValueError("give model or twin, at least one of them")
     arguments = ["design", "--json", "-o", os.fspath(output), "--seed", str(int(seed))]
     arguments += ["--duration", repr(float(duration)), "--rate", repr(float(rate))]
-    for flag, path in (("--model", model), ("--twin", twin), ("--limits", limits)):
+    for flag, path in (("--model", model), ("--twin", twin), ("--limits", limits), ("--config", config)):
         if path is not None:
             arguments += [flag, os.fspath(path)]
     names = list(decide)

@@ -437,10 +437,11 @@ mod tests {
         let robot = tree();
         let limits = joint_limits(&robot, &stated(&robot, Some(60.0))).expect("limits");
         let (library, torque) = (library(&robot), NominalTorque::new(&robot, &limits));
-        let information = Information::new(&robot, &library);
+        let information = Information::new(&robot, &library, None);
         let task = Task {
             robot: &robot,
             library: &library,
+            loaded: None,
             questions: None,
             recorded: None,
             limits: &limits,

@@ -16,6 +16,7 @@ mod ascent;
 mod clearance;
 mod information;
 mod limits;
+mod load;
 mod metric;
 mod motion;
 mod questions;
@@ -23,15 +24,18 @@ mod recorded;
 mod search;
 mod sizes;
 mod spline;
+mod structural;
 mod torque;
 #[cfg(test)]
 mod tests;
 
 pub use clearance::{Approach, Clearance, NearSlope, Path};
 pub use limits::{JERK_TIME, JointLimits, SPEED_UP, StatedLimits, joint_limits, spread_positions};
+pub use load::{Load, Loaded};
 pub use motion::{DesignedMotion, JointUse};
 pub use questions::{Promise, Questions};
 pub use recorded::Recorded;
+pub use structural::OtherRecording;
 pub use torque::{FoundTorque, NominalTorque};
 
 use crate::error::{Error, Result};
@@ -109,6 +113,8 @@ pub struct Task<'a> {
     pub robot: &'a Robot,
     /// Candidates: their columns are what the motion is to show where nothing is asked, and what its condition number is of.
     pub library: &'a Library,
+    /// The same with what the robot is known to carry in the motion; [`Questions::carrying`] and the torque are to have it, too.
+    pub loaded: Option<&'a Loaded>,
     /// `None`: the motion is to show the candidates.
     pub questions: Option<&'a Questions<'a>>,
     /// Motion that is recorded already, and that a fit will have beside this one.
@@ -167,7 +173,7 @@ pub fn design(
 ) -> Result<Design> {
     let (spans, span) = spans(settings)?;
     require_start(task)?;
-    let information = Information::new(task.robot, task.library);
+    let information = Information::new(task.robot, task.library, task.loaded);
     let objective: &dyn Objective = match task.questions {
         Some(questions) => questions,
         None => &information,

@@ -2,7 +2,7 @@
 
 use super::clearance::{Approach, path_of};
 use super::information::{Information, Objective as _, states_of};
-use super::recorded::Following;
+use super::recorded::{Following, Recorded};
 use super::search::Found;
 use super::spline::{Spline, StateWeights};
 use super::{Design, DesignSettings, Task};
@@ -91,10 +91,14 @@ fn described(
     let spans = splines[0].points.len() - 5;
     let rows = states_of(splines, 0..spans);
     let random = random_states(task.robot, STATES);
-    let mut motions = vec![(&rows, settings.duration)];
-    motions.extend(task.recorded.map(|own| (&own.states, own.seconds)));
     let promises = match task.questions {
-        Some(own) => own.promises((&motions, &random), settings.seed)?,
+        Some(own) => {
+            let motions = [
+                Some((&rows, settings.duration)),
+                task.recorded.map(Recorded::motion),
+            ];
+            own.promises((motions, &random), settings.seed)?
+        }
         None => Vec::new(),
     };
     let (mut sums, mut count) = (information.of(&rows), rows.len as f64);

@@ -10,7 +10,9 @@
 //! Box & Hill 1967 (expected information between models); Chaloner & Verdinelli 1995.
 
 use super::information::{Objective, quadratic};
+use super::load::Loaded;
 use super::sizes;
+use super::structural::OtherRecording;
 use crate::error::{Error, Result};
 use crate::excitation::States;
 use crate::infer::approximate;
@@ -18,6 +20,7 @@ use crate::likelihood::JointNoise;
 use crate::linear_algebra::{Cholesky, product, product_transposed};
 use crate::posterior::{OPEN, Posterior, Problem};
 use crate::random::Random;
+use crate::robot::Robot;
 use crate::term::Library;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -31,15 +34,19 @@ const WORLDS: usize = 64;
 /// Random streams of those worlds and of their noise.
 const STREAM: u64 = 11 << 60;
 const NOISE: u64 = STREAM + (1 << 40);
-/// Rows of random motion that stand for all that the robot can show, and the λ below which even those say nothing.
-const ENDLESS: f64 = 1e6;
+
+/// The motion to come and the recorded one, each with its length in s.
+type Motions<'a> = [Option<(&'a States, f64)>; 2];
 
 /// What is asked of a posterior.
 #[derive(Debug)]
 pub struct Questions<'a> {
     problem: &'a Problem,
     posterior: &'a Posterior,
-    library: &'a Library,
+    pub(super) robot: &'a Robot,
+    pub(super) library: &'a Library,
+    /// The library in the motion to come.
+    pub(super) coming: &'a Library,
     /// What a row of each joint counts, 1/(N·m)² in units of φ.
     factor: Vec<f64>,
     /// Independent rows of each joint per row.
@@ -47,13 +54,13 @@ pub struct Questions<'a> {
     /// Rows per second that a fit keeps.
     rate: f64,
     /// Columns that take part, ascending.
-    active: Vec<usize>,
-    open: Vec<Question>,
+    pub(super) active: Vec<usize>,
+    pub(super) open: Vec<Question>,
 }
 
 /// One effect that may be there or not.
 #[derive(Debug, Clone)]
-struct Question {
+pub(super) struct Question {
     name: String,
     /// Places among the active columns.
     places: Vec<usize>,
@@ -78,6 +85,8 @@ pub struct Promise {
     pub sd: Option<f64>,
     /// No motion of this robot tells it from the others.
     pub structural: bool,
+    /// What does together with such a motion, where it is structural.
+    pub decided_by: Vec<OtherRecording>,
 }
 
 impl<'a> Questions<'a> {
@@ -87,28 +96,18 @@ impl<'a> Questions<'a> {
     /// [`Error::Setting`] for a name that is no effect with a column, and where nothing is open.
     pub fn new(
         (problem, posterior): (&'a Problem, &'a Posterior),
-        library: &'a Library,
+        (robot, library): (&'a Robot, &'a Library),
         (noise, rate): (&[JointNoise], f64),
         names: &[String],
     ) -> Result<Self> {
-        let count = problem.prior.components();
-        let mut name_of = vec![String::new(); count];
-        for (&component, &term) in problem.prior.component.iter().zip(library.columns()) {
-            let own = library.terms()[term].component;
-            name_of[component].clone_from(&library.components()[own].name);
-        }
+        let name_of = names_of(problem, library);
+        let count = name_of.len();
+        require_known(names, &name_of)?;
         let pip = |component: usize| {
             let mut all = posterior.component.iter().zip(&posterior.inclusion);
             all.find(|(own, _)| **own == component)
                 .map_or(0.0, |(_, pip)| *pip)
         };
-        for name in names {
-            if !name_of.contains(name) {
-                let known = crate::robot::did_you_mean(name, name_of.iter().map(String::as_str));
-                let problem = format!("`{name}` is no effect of this twin");
-                return Err(setting(problem, &known));
-            }
-        }
         let is_open = |component: usize| match names.is_empty() {
             true => (OPEN[0]..OPEN[1]).contains(&pip(component)),
             false => names.contains(&name_of[component]),
@@ -151,10 +150,21 @@ impl<'a> Questions<'a> {
             shares,
             problem,
             posterior,
+            robot,
             library,
+            coming: library,
             rate,
             active,
         })
+    }
+
+    /// The same where the robot carries a known load in the motion to come.
+    #[must_use]
+    pub fn carrying(self, loaded: &'a Loaded) -> Self {
+        Self {
+            coming: &loaded.library,
+            ..self
+        }
     }
 
     /// Names of the effects in question.
@@ -180,7 +190,7 @@ impl<'a> Questions<'a> {
     }
 
     /// λ of every question, and ln det A in slab units.
-    fn said(&self, sums: &[f64], scale: f64) -> Option<(Vec<f64>, f64)> {
+    pub(super) fn said(&self, sums: &[f64], scale: f64) -> Option<(Vec<f64>, f64)> {
         let size = self.active.len();
         let factor = Cholesky::new(&self.precision(sums, scale), size).ok()?;
         let inverse = factor.inverse();
@@ -196,13 +206,18 @@ impl<'a> Questions<'a> {
     }
 
     /// Σ f φ φᵀ over states, of some columns.
-    fn sums_of(&self, columns: &[usize], states: &States) -> Vec<f64> {
+    pub(super) fn sums_of(
+        &self,
+        library: &Library,
+        columns: &[usize],
+        states: &States,
+    ) -> Vec<f64> {
         let (len, size) = (states.len, columns.len());
         let mut out = vec![Vec::new(); self.factor.len()];
-        self.library.evaluate(states.motion(), &mut out);
+        library.evaluate(states.motion(), &mut out);
         let mut sums = vec![0.0; size * size];
         for (joint, factor) in self.factor.iter().enumerate() {
-            let own = self.library.columns_of_joint(joint);
+            let own = library.columns_of_joint(joint);
             let still = &states.still[joint * len..(joint + 1) * len];
             let used = |(value, still): (&f64, &bool)| if *still { 0.0 } else { *value };
             let (mut places, mut values) = (Vec::new(), Vec::new());
@@ -225,12 +240,15 @@ impl<'a> Questions<'a> {
     }
 
     /// What motions add to the regression, each with its length in s: sums of all columns, and rows that count as independent.
-    fn added(&self, motions: &[(&States, f64)]) -> (Vec<f64>, f64) {
+    fn added(&self, motions: Motions<'_>) -> (Vec<f64>, f64) {
         let all: Vec<usize> = (0..self.problem.names.len()).collect();
         let (mut gram, mut counted) = (vec![0.0; all.len() * all.len()], 0.0);
-        for &(states, seconds) in motions {
+        for (motion, library) in motions.into_iter().zip([self.coming, self.library]) {
+            let Some((states, seconds)) = motion else {
+                continue;
+            };
             let scale = self.scale(states.len.max(1) as f64, seconds);
-            let own = self.sums_of(&all, states);
+            let own = self.sums_of(library, &all, states);
             (gram.iter_mut().zip(own)).for_each(|(sum, own)| *sum += scale * own);
             let joints = self
                 .shares
@@ -244,13 +262,13 @@ impl<'a> Questions<'a> {
         (gram, counted)
     }
 
-    /// Whether motions decide each question, in worlds drawn from the posterior; each motion with its length in s.
+    /// Whether motions decide each question, in worlds drawn from the posterior.
     ///
     /// # Errors
     /// Those of inference.
     pub(super) fn promises(
         &self,
-        (motions, random): (&[(&States, f64)], &States),
+        (motions, random): (Motions<'_>, &States),
         seed: u64,
     ) -> Result<Vec<Promise>> {
         let (gram, counted) = self.added(motions);
@@ -267,8 +285,7 @@ impl<'a> Questions<'a> {
                 Ok(self.judged(beta, &posterior))
             })
             .collect::<Result<_>>()?;
-        let endless = self.sums_of(&self.active, random);
-        let most = self.said(&endless, ENDLESS).map(|(lambda, _)| lambda);
+        let structural = self.structural(random)?;
         let promise = |(at, question): (usize, &Question)| {
             let own: Vec<&Judged> = judged.iter().map(|world| &world[at]).collect();
             let share = |side: Option<bool>| {
@@ -283,7 +300,8 @@ impl<'a> Questions<'a> {
                 right: share(Some(true)),
                 wrong: share(Some(false)),
                 sd: sds.get(sds.len() / 2).copied(),
-                structural: most.as_ref().is_none_or(|lambda| lambda[at] < 1.0),
+                structural: structural[at].is_some(),
+                decided_by: structural[at].clone().unwrap_or_default(),
             }
         };
         Ok(self.open.iter().enumerate().map(promise).collect())
@@ -332,6 +350,27 @@ impl<'a> Questions<'a> {
         };
         self.open.iter().map(of).collect()
     }
+}
+
+/// Name of every component of a regression.
+fn names_of(problem: &Problem, library: &Library) -> Vec<String> {
+    let mut name_of = vec![String::new(); problem.prior.components()];
+    for (&component, &term) in problem.prior.component.iter().zip(library.columns()) {
+        let own = library.terms()[term].component;
+        name_of[component].clone_from(&library.components()[own].name);
+    }
+    name_of
+}
+
+/// # Errors
+/// Of the first name that is none of those.
+fn require_known(names: &[String], known: &[String]) -> Result<()> {
+    let Some(name) = names.iter().find(|name| !known.contains(name)) else {
+        return Ok(());
+    };
+    let nearest = crate::robot::did_you_mean(name, known.iter().map(String::as_str));
+    let problem = format!("`{name}` is no effect of this twin");
+    Err(setting(problem, &nearest))
 }
 
 /// What a row of each joint counts; a joint that did not move is taken for the one that counts least.
@@ -413,7 +452,11 @@ impl Objective for Questions<'_> {
     }
 
     fn of(&self, states: &States) -> Vec<f64> {
-        self.sums_of(&self.active, states)
+        self.sums_of(self.coming, &self.active, states)
+    }
+
+    fn of_recorded(&self, states: &States) -> Vec<f64> {
+        self.sums_of(self.library, &self.active, states)
     }
 
     fn value(&self, sums: &[f64], rows: f64, duration: f64) -> f64 {
@@ -455,7 +498,7 @@ impl Objective for Questions<'_> {
 
     fn shown(&self, matrix: &[f64], states: &States) -> Vec<f64> {
         let factor = |joint: usize, _| self.factor[joint].sqrt();
-        quadratic(self.library, &self.active, (matrix, states), factor)
+        quadratic(self.coming, &self.active, (matrix, states), factor)
     }
 }
 

@@ -29,6 +29,11 @@ pub struct Recorded {
 }
 
 impl Recorded {
+    /// Its states and their seconds.
+    pub(super) fn motion(&self) -> (&States, f64) {
+        (&self.states, self.seconds)
+    }
+
     /// The motion of logs as a pipeline filters it, and what was found on the way; their torque is not looked at.
     ///
     /// # Errors
@@ -147,7 +152,7 @@ pub(super) struct Following<'a> {
 impl<'a> Following<'a> {
     pub(super) fn new(objective: &'a dyn Objective, recorded: &Recorded) -> Self {
         let len = recorded.states.len.max(1) as f64;
-        let mut sums = objective.of(&recorded.states);
+        let mut sums = objective.of_recorded(&recorded.states);
         sums.iter_mut()
             .for_each(|sum| *sum *= recorded.seconds / len);
         Self {
@@ -176,6 +181,10 @@ impl Objective for Following<'_> {
 
     fn of(&self, states: &States) -> Vec<f64> {
         self.objective.of(states)
+    }
+
+    fn of_recorded(&self, states: &States) -> Vec<f64> {
+        self.objective.of_recorded(states)
     }
 
     fn value(&self, sums: &[f64], rows: f64, duration: f64) -> f64 {
@@ -231,7 +240,7 @@ mod tests {
     fn what_is_recorded_adds_up_with_the_motion() {
         let robot = tree();
         let library = library(&robot);
-        let information = Information::new(&robot, &library);
+        let information = Information::new(&robot, &library, None);
         let all = random_states(&robot, 300);
         let part = |from: usize, to: usize| {
             let of = |values: &[f64]| -> Vec<f64> {
@@ -318,6 +327,7 @@ mod tests {
             let task = Task {
                 robot: &robot,
                 library: &library,
+                loaded: None,
                 questions: None,
                 recorded,
                 limits: &limits,
@@ -331,7 +341,7 @@ mod tests {
         let pipeline = Pipeline::off(robot.dof());
         let (recorded, _) = Recorded::new(&robot, &pipeline, &logs).expect("its motion");
         let after = of(Some(&recorded));
-        let information = Information::new(&robot, &library);
+        let information = Information::new(&robot, &library, None);
         let following = Following::new(&information, &recorded);
         let value = |motion: &DesignedMotion| {
             let states = States {

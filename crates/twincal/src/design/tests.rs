@@ -52,6 +52,7 @@ pub(super) fn designed(
     let task = Task {
         robot,
         library: &library,
+        loaded: None,
         questions: None,
         recorded: None,
         limits,
@@ -142,6 +143,7 @@ fn whoever_ends_the_search_gets_the_best_motion_so_far() {
     let task = Task {
         robot: &robot,
         library: &library,
+        loaded: None,
         questions: None,
         recorded: None,
         limits: &limits,
@@ -210,6 +212,7 @@ fn forbidden_space_is_kept_free() {
     let task = |limits| Task {
         robot: &robot,
         library: &library,
+        loaded: None,
         questions: None,
         recorded: None,
         limits,

@@ -2,6 +2,7 @@
 
 use super::TorqueLimits;
 use super::limits::JointLimits;
+use super::load::Loaded;
 use crate::error::Result;
 use crate::excitation::States;
 use crate::robot::Robot;
@@ -47,19 +48,26 @@ impl TorqueLimits for NominalTorque<'_> {
 /// Torque of the model file with the posterior mean of all effects, and a payload at the far end of its interval.
 #[derive(Debug)]
 pub struct FoundTorque<'a> {
-    twin: &'a Twin,
+    robot: &'a Robot,
     library: Library,
     limits: &'a [JointLimits],
     beta: Vec<f64>,
 }
 
 impl<'a> FoundTorque<'a> {
-    /// Of a twin's robot with these limits.
+    /// Of a twin's robot with these limits, and with what it is known to carry.
     ///
     /// # Errors
     /// Those of [`Twin::library`].
-    pub fn new(twin: &'a Twin, limits: &'a [JointLimits]) -> Result<Self> {
-        let library = twin.library()?;
+    pub fn new(
+        twin: &'a Twin,
+        loaded: Option<&'a Loaded>,
+        limits: &'a [JointLimits],
+    ) -> Result<Self> {
+        let (robot, library) = match loaded {
+            Some(own) => (&own.robot, own.library.clone()),
+            None => (&twin.robot, twin.library()?),
+        };
         let posterior = &twin.posterior;
         let beta = (library.columns().iter().enumerate()).map(|(k, &term)| {
             let mean = posterior.mean[k];
@@ -72,7 +80,7 @@ impl<'a> FoundTorque<'a> {
         });
         Ok(Self {
             beta: beta.collect(),
-            twin,
+            robot,
             library,
             limits,
         })
@@ -82,7 +90,7 @@ impl<'a> FoundTorque<'a> {
 impl FoundTorque<'_> {
     fn torque(&self, states: &States) -> Vec<f64> {
         let motion = states.motion();
-        (self.library).torque_with(&self.twin.robot, motion, true, &self.beta)
+        (self.library).torque_with(self.robot, motion, true, &self.beta)
     }
 }
 

@@ -5,8 +5,8 @@
 //! ```
 //! A wrong sign or a missing q̇-term of the Euler–Lagrange operator shows for any motion; nothing here differentiates φ.
 
-use crate::motion::{SAMPLES, Wave, cycle_work, sampled, variation, wave, work};
-use crate::robots::robot;
+use super::motion::{SAMPLES, Wave, cycle_work, sampled, variation, wave, work};
+use super::robots::robot;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use twincal::robot::{Motion, Robot, kinetic_energy, nominal_torque, potential_energy};

@@ -198,7 +198,7 @@ BUGS = [
 
 
 def caught():
-    command = ["cargo", "test", "-q", "-p", "twincal", "--lib", "--test", "statistics", "--"]
+    command = ["cargo", "test", "-q", "-p", "twincal", "--lib", "--test", "suite", "--"]
     command += ["infer::", "posterior::", "gram::", "diagnostics::", "prior::", "likelihood::"]
     command += ["plug_in::", "validate::", "calibrate::", "enumeration::", "many::", "calibration::"]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)

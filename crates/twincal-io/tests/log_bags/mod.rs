@@ -1,14 +1,6 @@
 //! Bags of ROS: other people's files are read to the numbers that were written, broken ones are refused or told.
 #![allow(clippy::unwrap_used, reason = "a broken test may panic")]
 
-#[path = "../common/refusals.rs"]
-mod refusals;
-#[path = "../common/logs.rs"]
-#[allow(
-    dead_code,
-    reason = "other test files use other parts of these generators"
-)]
-mod logs;
 mod containers;
 mod folders;
 mod mapped;
@@ -17,8 +9,9 @@ mod mutations;
 mod same_as_csv;
 mod write;
 
-use logs::{arm, motion};
-use refusals::{contains, refused};
+use crate::common::logs;
+use crate::common::logs::{arm, motion};
+use crate::common::refusals::{contains, refused};
 use std::path::{Path, PathBuf};
 use twincal::Finding;
 use twincal::signal::Recording;

@@ -1,9 +1,6 @@
 //! The example's study against its closed-form truth, and the twin that comes out of it through JSON and back.
 
-#[path = "../examples/two_link.rs"]
-#[allow(dead_code, reason = "its `main` prints, which a test does not need")]
-mod two_link;
-
+use crate::two_link;
 use std::sync::LazyLock;
 use twincal::calibrate::{Calibration, CalibrationSettings, Status, calibrate};
 use twincal::random::Random;

@@ -1,19 +1,11 @@
 //! Broken logs, one test per numbered case of the fault list: what is refused, what goes on, and what is said.
 
-#[path = "../common/refusals.rs"]
-mod refusals;
-#[path = "../common/logs.rs"]
-#[allow(
-    dead_code,
-    reason = "other test files use other parts of these generators"
-)]
-mod logs;
 mod clock;
 mod text;
 mod values;
 
-use logs::{arm, motion};
-use refusals::{contains, refused};
+use crate::common::logs::{arm, motion};
+use crate::common::refusals::{contains, refused};
 use twincal::Finding;
 use twincal::signal::{Auto, Recording, SignalSettings, Trajectory, align, choose_pipeline};
 use twincal_io::Result;

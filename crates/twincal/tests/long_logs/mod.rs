@@ -1,10 +1,8 @@
 //! A log in chapters says what the same log in memory says: the truth, the same incidents, and what is wrong with single chapters.
 
-#[path = "../../examples/two_link.rs"]
-#[allow(dead_code, reason = "its `main`, log and study are not needed here")]
-mod two_link;
 mod motion;
 
+use crate::two_link;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex};
 use twincal::calibrate::{Calibration, CalibrationSettings, Statistics, calibrate, plan};
