@@ -185,7 +185,8 @@ def verdict(world, found):
 
 
 def limits_text(world):
-    lines = []
+    """limits.toml: narrow ones of every joint, and what the robot is known to carry in the motion."""
+    lines = [f"load = {{ mass = {LOAD[0]}, com = {list(LOAD[1])} }}"] if world.pair == "gain" else []
     for name, start in zip(world.joints, world.start, strict=True):
         lines += [f'[joint."{name}"]', f"position = [{start - REACH}, {start + REACH}]", f"start = {start}", "torque = 1000.0"]
         lines += [f"{key} = {value}" for key, value in LIMITS.items()]

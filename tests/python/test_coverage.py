@@ -2,12 +2,10 @@
 
 import coverage
 import numpy as np
-import pytest
 
 SEEDS = range(1, 9)
 
 
-@pytest.mark.long
 def test_intervals_of_held_out_torque_hold_what_they_promise():
     """Coverage differs by 0.018 from log to log, 0.1 correlated between joints; the mean of 8 logs and 2 joints is within 4.5 standard errors: false alarm 7e-6."""
     runs = [coverage.measure(seed, 0) for seed in SEEDS]

@@ -411,7 +411,7 @@ def test_a_known_load_counts_in_the_torque(tmp_path, names, stated):
     states = (rows[:, 1 + k * n : 1 + (k + 1) * n] for k in range(3))
     needed = np.array([pin.rnea(model, data, *state) for state in zip(*states, strict=True)])
     assert np.abs(needed).max() <= torque
-    assert json.loads((tmp_path / "motion" / "design.json").read_text())["load"] == {"mass": mass, "com": com}
+    assert json.loads((tmp_path / "motion" / "design.json").read_text())["load"] == {"frame": "tool0", "mass": mass, "com": com}
     done = design(tmp_path, *limits(tmp_path, load.replace("1.5", "150") + stated(torque)), code=4)
     assert "at the start joint" in done.stderr
 
@@ -424,29 +424,80 @@ TURNTABLE = """<robot name="turntable"><link name="base"/>
 """
 
 
-def test_what_decides_where_no_motion_does_is_said(tmp_path):
-    """A vertical axis feels no gravity: density and motor inertia of its only joint both are torque along q̈. With the base on a wall the
-    plate's weight tells them apart; a known load does not, since it changes neither. A drive's gain it does: the load is in what it multiplies."""
+def turntable(folder, file, load=0.0):
+    """20 s of a plate on a vertical axis, 8 % harder to turn than its model, with a point mass at a radius of 0.3 m."""
     t = np.arange(0.0, 20.0, 0.004)
     w = np.array([2.1, 4.7, 6.9])
     q = (np.sin(np.outer(t, w)) / w).sum(axis=1)
     qd, qdd = np.cos(np.outer(t, w)).sum(axis=1), -(w * np.sin(np.outer(t, w))).sum(axis=1)
-    inertia = 0.02 + 2 * (0.1**2 + 0.02**2)
-    tau = 1.08 * inertia * qdd + 0.1 * qd + 0.02 * np.random.default_rng(5).normal(size=t.size)
-    pd.DataFrame({"t": t, "turn.q": q, "turn.qd": qd, "turn.qdd": qdd, "turn.tau": tau}).to_csv(tmp_path / "log.csv", index=False)
-    (tmp_path / "turntable.urdf").write_text(TURNTABLE)
+    inertia = 1.08 * (0.02 + 2 * (0.1**2 + 0.02**2)) + load * 0.3**2
+    tau = inertia * qdd + 0.1 * qd + 0.02 * np.random.default_rng(5).normal(size=t.size)
+    pd.DataFrame({"t": t, "turn.q": q, "turn.qd": qd, "turn.qdd": qdd, "turn.tau": tau}).to_csv(folder / file, index=False)
+    (folder / "turntable.urdf").write_text(TURNTABLE)
+
+
+def call(folder, *command, codes=(0,)):
+    command = [program("twincal"), *map(str, command)]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    assert done.returncode in codes, done.stderr
+    return done
+
+
+def test_what_decides_where_no_motion_does_is_said(tmp_path):
+    """A vertical axis feels no gravity: density, gain and motor inertia of its only joint all are torque along q̈. On a wall the plate's
+    weight distinguishes them. A known load does so for the drive's gain, since it is in what the gain multiplies; with that load in the motion
+    to come nothing is structural. Density it leaves as it is."""
+    turntable(tmp_path, "log.csv")
     said = {}
     for other, name in (("density", "plate.density"), ("gain", "turn.gain")):
         (tmp_path / "twincal.toml").write_text(f'[library]\nfamilies = ["viscous", "motor_inertia", "{other}"]\n')
-        given = ("--model", tmp_path / "turntable.urdf", "--config", tmp_path / "twincal.toml")
-        twin, motion = tmp_path / f"twin_{other}", tmp_path / f"motion_{other}"
-        for command in (("fit", tmp_path / "log.csv", *given, "-o", twin), ("design", "--twin", twin, "--decide", "turn.motor_inertia", name, "-o", motion)):
-            done = subprocess.run([program("twincal"), *map(str, command)], capture_output=True, text=True, stdin=subprocess.DEVNULL)
-            assert done.returncode in (0, 3), done.stderr
-        promises = json.loads((motion / "design.json").read_text())["promises"]
-        assert [own["structural"] for own in promises] == [True, True], promises
-        said[other] = [own["decided_by"] for own in promises]
-    assert said == {"density": [["other_base"]] * 2, "gain": [["known_load", "other_base"]] * 2}
+        call(tmp_path, "fit", "log.csv", "--model", "turntable.urdf", "--config", "twincal.toml", "-o", f"twin_{other}", codes=(0, 3))
+        for load in (0.0, 1.5):
+            (tmp_path / "limits.toml").write_text(f"load = {{ mass = {load}, com = [0.3, 0.0, 0.0] }}\n" if load else "")
+            call(tmp_path, "design", "--twin", f"twin_{other}", "--decide", "turn.motor_inertia", name, "--limits", "limits.toml",
+                 "--duration", 6, "-o", "motion", "--force")  # fmt: skip
+            promises = json.loads((tmp_path / "motion" / "design.json").read_text())["promises"]
+            said[other, load] = [own["decided_by"] if own["structural"] else None for own in promises]
+    assert said == {
+        ("density", 0.0): [["other_base"]] * 2,
+        ("density", 1.5): [["other_base"]] * 2,
+        ("gain", 0.0): [["known_load", "other_base"]] * 2,
+        ("gain", 1.5): [None] * 2,
+    }
+
+
+def test_a_twin_holds_its_load_within_its_torque(tmp_path):
+    """On a wall: the plate's 2 kg at 0.1 m and a load of 2 kg at 0.3 m need 7.85 N·m at the start."""
+    t = np.arange(0.0, 20.0, 0.004)
+    q, qd, qdd = 0.9 * np.sin(2 * t), 1.8 * np.cos(2 * t), -3.6 * np.sin(2 * t)
+    gravity = 9.81 * 2 * (0.1 * np.cos(q) - 0.02 * np.sin(q))
+    tau = 0.0408 * qdd + gravity + 0.3 * qd + 0.02 * np.random.default_rng(6).normal(size=t.size)
+    pd.DataFrame({"t": t, "turn.q": q, "turn.qd": qd, "turn.qdd": qdd, "turn.tau": tau}).to_csv(tmp_path / "log.csv", index=False)
+    (tmp_path / "turntable.urdf").write_text(TURNTABLE)
+    (tmp_path / "twincal.toml").write_text('[model]\nbase = { rpy = [1.5707963, 0.0, 0.0] }\n[library]\nfamilies = ["viscous", "payload"]\n')
+    call(tmp_path, "fit", "log.csv", "--model", "turntable.urdf", "--config", "twincal.toml", "-o", "twin", codes=(0, 3))
+    stated = "[joint.turn]\nstart = 0.0\ntorque = {}\n"
+    for torque, code in ((7.5, 4), (20.0, 0)):
+        (tmp_path / "limits.toml").write_text("load = { mass = 2.0, com = [0.3, 0.0, 0.0] }\n" + stated.format(torque))
+        done = call(tmp_path, "design", "--twin", "twin", "--decide", "payload", "--limits", "limits.toml", "--duration", 4, "-o", "motion",
+                    codes=(code,))  # fmt: skip
+    assert "The robot carries 2.00" in done.stdout and "plate. Its shape" in done.stdout
+    done = call(tmp_path, "design", "--twin", "twin", "--config", "twincal.toml", "-o", "other", codes=(2,))
+    assert "--config says nothing of a twin" in done.stderr
+
+
+def test_a_payload_that_acts_elsewhere_and_one_that_is_not_counted(tmp_path):
+    """Beside a known load a payload of logs with an unknown one does not act; what a log of --after carries is not counted, and said so."""
+    turntable(tmp_path, "log.csv")
+    turntable(tmp_path, "other.csv", load=1.0)
+    unknown = '[library]\nfamilies = ["viscous", "payload"]\n[[log]]\nfile = "other.csv"\npayload = "unknown"\n'
+    (tmp_path / "twincal.toml").write_text(unknown)
+    call(tmp_path, "fit", "log.csv", "other.csv", "--model", "turntable.urdf", "--config", "twincal.toml", "-o", "twin", codes=(0, 3))
+    (tmp_path / "limits.toml").write_text("load = { mass = 2.0, com = [0.3, 0.0, 0.0] }\n")
+    done = call(tmp_path, "design", "--twin", "twin", "--decide", "payload", "--limits", "limits.toml", "-o", "motion", codes=(2,))
+    assert 'payload is "unknown"' in done.stderr
+    done = call(tmp_path, "design", "--model", "turntable.urdf", "--config", "twincal.toml", "--after", "other.csv", "--duration", 3, "-o", "motion")
+    assert "other.csv: what it carries is not counted" in done.stderr
 
 
 def test_the_base_of_a_model_stands_as_its_settings_say(tmp_path):

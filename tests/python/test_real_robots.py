@@ -72,7 +72,7 @@ def test_held_out_torque_and_known_effects(split, tmp_path):
 
 
 def test_gear_ripple_becomes_a_candidate_where_the_log_shows_it(tmp_path):
-    """The TX40's fourth joint has one at 30.7 periods per turn, no other joint of these robots. It takes 40 % off that joint's error on the last
+    """The TX40's fourth joint has one at 30.7 periods per turn, no other joint of these robots (the tests above, test_statistics.py). It takes 40 % off that joint's error on the last
     30 %. Where families were chosen it is told with the line that asks for it."""
     chosen = ["viscous", "coulomb", "offset", "motor_inertia", "payload", "mass_moments", "tensor", "tilt", "spring", "potential",
               "quadratic_friction", "load_friction", "coupled_friction"]  # fmt: skip

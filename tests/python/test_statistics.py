@@ -54,6 +54,7 @@ def test_a_fit_to_statistics_is_the_fit_to_the_logs(robot, tmp_path):
             # 1e-11: a centre of mass of -1 mm has an interval of ± 2 m
             assert a == pytest.approx(b, rel=1e-9, abs=1e-11), place
     assert problems(whole) == problems(own) == []
+    assert not [finding for finding in whole["findings"] if finding["code"].startswith("ripple_")]
     assert own["validation"]["split"] == ("heldout_logs" if heldout else "not_tested")
     assert own["assessment"]["answer"] in ("yes", "yes_within_limits", "not_yet", "no")
     if not heldout:

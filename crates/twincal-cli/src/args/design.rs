@@ -41,7 +41,7 @@ pub(crate) struct Design {
     pub(crate) rate: f64,
     /// Limits and start of joints, over those of the model: TOML with
     /// [joint.NAME] position = [a, b], velocity, acceleration, jerk, torque, start;
-    /// load = { mass, com } that is known; margin, floor, [[box]] and ignore for collisions.
+    /// load = { mass, com } that it is known to carry; margin, floor, [[box]] and ignore for collisions.
     #[arg(long, value_name = "FILE")]
     pub(crate) limits: Option<PathBuf>,
     /// Folder of the result.

@@ -19,7 +19,7 @@ use twincal::design::{
     Questions, Recorded, Task, TorqueLimits, design, joint_limits, with_free_start,
 };
 use twincal::robot::{Robot, RobotDescription};
-use twincal::signal::choose_and_prepare;
+use twincal::signal::{Payload, choose_and_prepare};
 use twincal::term::{Family, Library, LibrarySettings};
 use twincal::words::significant as number;
 use twincal_io::artifact::{Artifact, Claim, Inputs, MODEL_MJCF, MODEL_URDF, Maker, Replace};
@@ -27,8 +27,9 @@ use twincal_io::collision::CollisionWorld;
 use twincal_io::config::{Config, Settings};
 use twincal_io::context::FileHash;
 use twincal_io::design::{
-    About, DESIGN, KEYFRAMES, Limits, MOTION, PAGE, TABLE, TRAJECTORY, WARNING, design_json,
-    design_page, joint_trajectory, motion_csv, motion_parquet, mujoco_keyframes, read_limits,
+    About, DESIGN, KEYFRAMES, Limits, MOTION, PAGE, StatedLoad, TABLE, TRAJECTORY, WARNING,
+    design_json, design_page, joint_trajectory, motion_csv, motion_parquet, mujoco_keyframes,
+    read_limits,
 };
 use twincal_io::model::{Geometry, parse_model, read_model};
 use twincal_io::twin_json::StoredTwin;
@@ -108,6 +109,31 @@ impl Known {
         })
     }
 
+    /// What the robot is known to carry, in the payload frame of the twin or of the settings.
+    fn load(&self, stated: StatedLoad, settings: &Settings) -> Outcome<Load> {
+        let (robot, of_settings) = (&self.robot, &settings.calibration.library.payload_frame);
+        let frame = match (&self.stored, of_settings) {
+            (Some(stored), _) => {
+                let twin = &stored.calibration.twin;
+                if twin.payload_where_unknown {
+                    return Err(Failure::usage(
+                        "the twin's payload acts in logs whose payload is \"unknown\", not beside a known load",
+                        "leave `load` out of the limits, or fit logs that state what they carry",
+                    ));
+                }
+                let library = twin.library().map_err(twincal_io::Error::from)?;
+                library.payload_frame(robot).to_owned()
+            }
+            (None, Some(frame)) => frame.clone(),
+            (None, None) => robot.last_link().to_owned(),
+        };
+        Ok(Load {
+            frame,
+            mass: stated.mass,
+            com: stated.com,
+        })
+    }
+
     /// The motion of logs that the twin does not know yet, read as its own were.
     fn recorded(
         &self,
@@ -141,6 +167,16 @@ impl Known {
             }
         };
         require_once(&logs)?;
+        for log in logs
+            .logs
+            .iter()
+            .filter(|own| own.payload() != Payload::None)
+        {
+            terminal.note(&format!(
+                "warning: {}: what it carries is not counted, it counts as recorded without",
+                log.name()
+            ));
+        }
         let recorded = Recorded::new(&self.robot, &pipeline, &logs.logs);
         let (recorded, mut findings) = recorded.map_err(|error| logs.as_given(error))?;
         drop(progress);
@@ -168,12 +204,21 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
         None => Config::default(),
     };
     let from_config = config.settings()?;
-    let known = Known::read(flags, &from_config)?;
-    let recorded = known.recorded(&flags.after, &from_config, terminal)?;
+    if flags.twin.is_some() && flags.config.is_some() && flags.after.is_empty() {
+        return Err(Failure::usage(
+            "--config says nothing of a twin: its base and its settings are those of the fit",
+            "leave it out; with --after it says how those logs are read",
+        ));
+    }
     let stated = match &flags.limits {
         Some(path) => read_limits(path)?,
         None => Limits::default(),
     };
+    let known = Known::read(flags, &from_config)?;
+    let load = (stated.load)
+        .map(|own| known.load(own, &from_config))
+        .transpose()?;
+    let recorded = known.recorded(&flags.after, &from_config, terminal)?;
     let limits = joint_limits(&known.robot, &stated.joints).map_err(twincal_io::Error::from)?;
     let settings = DesignSettings {
         duration: flags.duration,
@@ -187,12 +232,14 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
         limits: &limits,
         world: &world,
         recorded: recorded.as_ref(),
-        load: stated.load,
+        load: load.as_ref(),
     };
     let (found, limits) = match &known.stored {
         None => {
-            let loaded = within.loaded(&known.robot, &body_library(&known.robot)?)?;
-            let robot = loaded.as_ref().map_or(&known.robot, |own| &own.robot);
+            let carrying = |own: &Load| known.robot.carrying(&own.frame, own.mass, own.com);
+            let loaded = load.as_ref().map(carrying).transpose();
+            let loaded = loaded.map_err(twincal_io::Error::from)?;
+            let robot = loaded.as_ref().unwrap_or(&known.robot);
             let torque = NominalTorque::new(robot, &limits);
             searched(&known.robot, &within, (&torque, None), &settings)?
         }
@@ -205,7 +252,7 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
         surroundings: &stated.surroundings,
         world: &world,
         recorded: recorded.as_ref(),
-        load: stated.load,
+        load: load.as_ref(),
         kinds: (0..known.robot.dof())
             .map(|joint| known.robot.joint_kind(joint))
             .collect(),
@@ -262,11 +309,11 @@ struct Within<'a> {
     limits: &'a [JointLimits],
     world: &'a CollisionWorld,
     recorded: Option<&'a Recorded>,
-    load: Option<Load>,
+    load: Option<&'a Load>,
 }
 
 impl Within<'_> {
-    /// The robot and its candidates with what it carries in the motion.
+    /// A twin's robot and its candidates with what it carries in the motion.
     fn loaded(&self, robot: &Robot, library: &Library) -> Outcome<Option<Loaded>> {
         let with = |load| Loaded::new(robot, library, load);
         Ok(self
@@ -295,24 +342,13 @@ fn deciding(
     let library = twin.library().map_err(core)?;
     let loaded = within.loaded(&twin.robot, &library)?;
     let torque = FoundTorque::new(twin, loaded.as_ref(), within.limits).map_err(core)?;
-    let noise = (&twin.noise[..], calibration.kept_rate_hz());
-    let known = (problem, &twin.posterior);
-    let questions = Questions::new(known, (&twin.robot, &library), noise, decide);
+    let rate = calibration.kept_rate_hz();
+    let questions = Questions::new((problem, twin), (&library, rate), decide);
     let mut questions = questions.map_err(core)?;
     if let Some(loaded) = &loaded {
         questions = questions.carrying(loaded);
     }
     searched(&twin.robot, within, (&torque, Some(&questions)), settings)
-}
-
-/// Columns of body, motors and friction.
-fn body_library(robot: &Robot) -> Outcome<Library> {
-    let settings = LibrarySettings {
-        families: FAMILIES.to_vec(),
-        ..LibrarySettings::default()
-    };
-    let (library, _) = Library::propose(robot, &settings).map_err(twincal_io::Error::from)?;
-    Ok(library)
 }
 
 /// The search, with its gain on standard error; Ctrl-C ends it with what it has.
@@ -322,12 +358,14 @@ fn searched(
     (torque, questions): (&dyn TorqueLimits, Option<&Questions<'_>>),
     settings: &DesignSettings,
 ) -> Outcome<Found> {
-    let library = body_library(robot)?;
-    let loaded = within.loaded(robot, &library)?;
+    let library = LibrarySettings {
+        families: FAMILIES.to_vec(),
+        ..LibrarySettings::default()
+    };
+    let (library, _) = Library::propose(robot, &library).map_err(twincal_io::Error::from)?;
     let task = Task {
         robot,
         library: &library,
-        loaded: loaded.as_ref(),
         questions,
         recorded: within.recorded,
         limits: within.limits,
@@ -356,7 +394,7 @@ fn searched(
 }
 
 /// What the motion is expected to say of each question.
-fn print_promises(found: &Design, terminal: &mut Terminal) {
+fn print_promises(found: &Design, loaded: bool, terminal: &mut Terminal) {
     if found.promises.is_empty() {
         return;
     }
@@ -372,7 +410,7 @@ fn print_promises(found: &Design, terminal: &mut Terminal) {
     }
     print_table(&rows, terminal);
     for promise in found.promises.iter().filter(|own| own.structural) {
-        paragraph(&words::undecidable(promise), terminal);
+        paragraph(&words::undecidable(promise, loaded), terminal);
     }
     terminal.say("");
 }
@@ -387,7 +425,7 @@ fn print(found: &Design, about: &About<'_>, output: &Path, terminal: &mut Termin
         paragraph(&words::carried(load), terminal);
     }
     terminal.say("");
-    print_promises(found, terminal);
+    print_promises(found, about.load.is_some(), terminal);
     let mut rows = table(&["joint", "from", "to", "velocity", "acceleration", "jerk"]);
     for used in &found.used {
         let share = |at: usize| words::share(used.share[at]);

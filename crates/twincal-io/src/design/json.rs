@@ -30,7 +30,7 @@ pub struct About<'a> {
     /// What was recorded before.
     pub recorded: Option<&'a Recorded>,
     /// What the robot carries in the motion.
-    pub load: Option<Load>,
+    pub load: Option<&'a Load>,
     /// Kind of each joint: sliders move in m.
     pub kinds: Vec<JointKind>,
 }
@@ -103,7 +103,7 @@ struct DesignJson<'a> {
     /// Logs recorded before, beside those of the twin.
     after: Vec<Before<'a>>,
     /// What the robot is known to carry in the motion; null: nothing that its model does not have.
-    load: Option<Carried>,
+    load: Option<LoadJson<'a>>,
     /// Independent base parameters.
     base_parameters: usize,
     /// ln det of the rows' information on the base parameters, those of `after` included, scaled to torque of size 1; null: not finite.
@@ -135,10 +135,12 @@ struct Before<'a> {
 /// A point mass that is known.
 #[derive(Debug, Serialize, JsonSchema)]
 #[schemars(deny_unknown_fields, rename = "Load")]
-struct Carried {
+struct LoadJson<'a> {
+    /// Link that it is fixed to.
+    frame: &'a str,
     /// Mass, kg.
     mass: f64,
-    /// Centre of mass in the payload frame, m.
+    /// Centre of mass in the frame of that link, m.
     com: [f64; 3],
 }
 
@@ -205,21 +207,22 @@ struct Expected<'a> {
     sd: Option<f64>,
     /// No motion of this robot distinguishes it from the others.
     structural: bool,
-    /// What does together with such a motion, where it is structural.
-    decided_by: Vec<Otherwise>,
+    /// What does, where it is structural.
+    decided_by: Vec<OtherRecordingJson>,
 }
 
-/// A recording of the robot otherwise than it stands.
+/// A recording that is not of the robot as it stands.
 #[derive(Debug, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-enum Otherwise {
-    /// With a load that is known.
+#[schemars(rename = "OtherRecording")]
+enum OtherRecordingJson {
+    /// With a load that is known, in one fit with the logs of the twin.
     KnownLoad,
-    /// With the base in another pose.
+    /// With the base on a wall, fitted by itself.
     OtherBase,
 }
 
-impl From<&OtherRecording> for Otherwise {
+impl From<&OtherRecording> for OtherRecordingJson {
     fn from(own: &OtherRecording) -> Self {
         match own {
             OtherRecording::KnownLoad => Self::KnownLoad,
@@ -246,7 +249,7 @@ impl<'a> From<&'a Promise> for Expected<'a> {
             wrong: *wrong,
             sd: *sd,
             structural: *structural,
-            decided_by: decided_by.iter().map(Otherwise::from).collect(),
+            decided_by: decided_by.iter().map(OtherRecordingJson::from).collect(),
         }
     }
 }
@@ -309,7 +312,8 @@ pub fn design_json(design: &Design, about: &About<'_>) -> Result<Vec<u8>> {
                 seconds: *seconds,
             })
             .collect(),
-        load: about.load.map(|own| Carried {
+        load: about.load.map(|own| LoadJson {
+            frame: &own.frame,
             mass: own.mass,
             com: own.com,
         }),
@@ -389,7 +393,8 @@ mod tests {
             surroundings: &Surroundings::default(),
             world: &super::super::fixture::world(),
             recorded: Some(&recorded),
-            load: Some(Load {
+            load: Some(&Load {
+                frame: "tool0".into(),
                 mass: 2.0,
                 com: [0.0, 0.0, 0.05],
             }),

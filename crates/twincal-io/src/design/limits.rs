@@ -33,7 +33,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;
-use twincal::design::{Load, StatedLimits};
+use twincal::design::StatedLimits;
 
 /// Largest file, bytes.
 const MAX_BYTES: u64 = 1 << 20;
@@ -46,9 +46,18 @@ pub struct Limits {
     /// By name of the joint.
     pub joints: BTreeMap<String, StatedLimits>,
     /// What the robot carries in the motion.
-    pub load: Option<Load>,
+    pub load: Option<StatedLoad>,
     /// What stands around the robot.
     pub surroundings: Surroundings,
+}
+
+/// A point mass that the robot is known to carry.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StatedLoad {
+    /// kg.
+    pub mass: f64,
+    /// Centre of mass in the payload frame, m.
+    pub com: [f64; 3],
 }
 
 /// Limits of a motion, over those of the model file.
@@ -177,16 +186,32 @@ fn parse(name: &str, text: &str) -> Result<Limits> {
     });
     Ok(Limits {
         joints: joints.collect(),
-        load: file.load.map(|own| Load {
-            mass: own.mass,
-            com: own.com,
-        }),
+        load: file.load.map(|own| stated_load(name, own)).transpose()?,
         surroundings: Surroundings {
             margin: file.margin.unwrap_or(Surroundings::default().margin),
             floor: file.floor,
             boxes: boxes.collect(),
             ignore: file.ignore,
         },
+    })
+}
+
+/// # Errors
+/// Of a mass that is not positive, or numbers that are not finite.
+fn stated_load(name: &str, own: LoadTable) -> Result<StatedLoad> {
+    let refused = |key: &str, value: f64, remedy: &str| {
+        let problem = format!("key `load.{key}`: {value} is out of range");
+        Err(Error::content(Place::file(name), problem, remedy))
+    };
+    if !(own.mass > 0.0 && own.mass.is_finite()) {
+        return refused("mass", own.mass, "give a positive mass in kg");
+    }
+    if let Some(value) = own.com.iter().find(|own| !own.is_finite()) {
+        return refused("com", *value, "give three finite numbers in m");
+    }
+    Ok(StatedLoad {
+        mass: own.mass,
+        com: own.com,
     })
 }
 
@@ -219,7 +244,7 @@ mod tests {
         assert_eq!(limits.load, None);
         let text = "load = { mass = 2, com = [0.0, 0.0, 0.05] }\n";
         let load = parse("limits.toml", text).expect("a load").load;
-        let stated = Load {
+        let stated = StatedLoad {
             mass: 2.0,
             com: [0.0, 0.0, 0.05],
         };
@@ -246,6 +271,15 @@ mod tests {
             ("velocity = ", ":1:"),
             ("load = { mass = 2 }\n", "com"),
             ("load = 2\n", ":1:"),
+            ("load = { mass = -1, com = [0, 0, 0] }\n", "`load.mass`: -1"),
+            (
+                "load = { mass = nan, com = [0, 0, 0] }\n",
+                "`load.mass`: NaN",
+            ),
+            (
+                "load = { mass = 1, com = [0, inf, 0] }\n",
+                "`load.com`: inf",
+            ),
         ] {
             let error = parse("limits.toml", text).expect_err(text).to_string();
             assert!(

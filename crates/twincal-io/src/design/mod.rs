@@ -12,7 +12,7 @@ mod parquet;
 
 pub use forms::{joint_trajectory, motion_csv, mujoco_keyframes};
 pub use json::{About, design_json, design_schema};
-pub use limits::{Limits, limits_schema, read_limits};
+pub use limits::{Limits, StatedLoad, limits_schema, read_limits};
 #[cfg(feature = "report")]
 pub use page::design_page;
 #[cfg(feature = "tables")]

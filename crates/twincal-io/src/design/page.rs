@@ -33,7 +33,9 @@ pub fn design_page(design: &Design, about: &About<'_>) -> Result<String> {
         numbers: numbers(design, about),
         questions: design.promises.iter().map(question).collect(),
         decided: words::DECIDED,
-        undecidable: structural.map(words::undecidable).collect(),
+        undecidable: structural
+            .map(|own| words::undecidable(own, about.load.is_some()))
+            .collect(),
         joints: (0..design.motion.joints.len())
             .map(|joint| curves(design, about, joint))
             .collect(),

@@ -141,14 +141,15 @@ pub fn clearance(design: &Design, world: &CollisionWorld) -> Vec<String> {
 
 /// An effect that no motion decides, and what does.
 #[must_use]
-pub fn undecidable(promise: &Promise) -> String {
+pub fn undecidable(promise: &Promise, loaded: bool) -> String {
     let others = promise.decided_by.iter().map(|own| match own {
+        OtherRecording::KnownLoad if loaded => "a log with another known load",
         OtherRecording::KnownLoad => "a log with a known load",
-        OtherRecording::OtherBase => "a log with the base in another pose",
+        OtherRecording::OtherBase => "a log with the base on a wall (fitted by itself)",
     });
     let others: Vec<&str> = others.collect();
     let decides = match others.is_empty() {
-        true => "a known load or another pose of the base changes nothing".to_owned(),
+        true => "no known load and no wall that was tried does".to_owned(),
         false => format!("{} does", others.join(" or ")),
     };
     format!(
@@ -159,10 +160,13 @@ pub fn undecidable(promise: &Promise) -> String {
 
 /// What the robot carries in the motion.
 #[must_use]
-pub fn carried(load: Load) -> String {
+pub fn carried(load: &Load) -> String {
+    let [x, y, z] = load.com.map(|own| number(own, 3));
     format!(
-        "The robot carries {}{THIN}kg in this motion, which are known: state them as payload of the log.",
-        number(load.mass, 3)
+        "The robot carries {}{THIN}kg at ({x}, {y}, {z}){THIN}m of {}. Its shape is not in the collision check. \
+         State it as payload of the log.",
+        number(load.mass, 3),
+        shortened(&load.frame)
     )
 }
 
@@ -249,6 +253,45 @@ fn round(x: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_decides_where_no_motion_does_is_named() {
+        let said = |decided_by, loaded| {
+            let promise = Promise {
+                effect: "turn.gain".into(),
+                pip: 0.5,
+                right: 0.0,
+                wrong: 0.0,
+                sd: None,
+                structural: true,
+                decided_by,
+            };
+            undecidable(&promise, loaded)
+        };
+        let (load, base) = (OtherRecording::KnownLoad, OtherRecording::OtherBase);
+        for (text, wanted) in [
+            (said(vec![], false), "others; no known load"),
+            (
+                said(vec![load], false),
+                "others; a log with a known load does",
+            ),
+            (said(vec![load], true), "a log with another known load does"),
+            (
+                said(vec![load, base], false),
+                "load or a log with the base on a wall (fitted by itself) does",
+            ),
+        ] {
+            assert!(text.starts_with("turn.gain: no motion"), "{text}");
+            assert!(text.contains(wanted), "{text}");
+        }
+        let load = Load {
+            frame: "tool0".into(),
+            mass: 2.0,
+            com: [0.0, 0.0, 0.05],
+        };
+        let text = carried(&load);
+        assert!(text.contains("m of tool0. Its shape"), "{text}");
+    }
 
     /// Effects between 0.05 and 0.95, where the regression is at hand and nothing doubts the log.
     #[cfg(feature = "report")]

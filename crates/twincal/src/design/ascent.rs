@@ -437,11 +437,10 @@ mod tests {
         let robot = tree();
         let limits = joint_limits(&robot, &stated(&robot, Some(60.0))).expect("limits");
         let (library, torque) = (library(&robot), NominalTorque::new(&robot, &limits));
-        let information = Information::new(&robot, &library, None);
+        let information = Information::new(&robot, &library);
         let task = Task {
             robot: &robot,
             library: &library,
-            loaded: None,
             questions: None,
             recorded: None,
             limits: &limits,

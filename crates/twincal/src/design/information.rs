@@ -1,6 +1,5 @@
 //! What rows of a motion say of independent columns: M = Σ Φᵀ W Φ.
 
-use super::load::Loaded;
 use super::spline::{Spline, StateWeights};
 use crate::excitation::{Reference, STATES, States, random_states, reference};
 use crate::linear_algebra::{Cholesky, product, symmetric_eigen};
@@ -23,7 +22,9 @@ pub(super) trait Objective: Sync {
     fn of(&self, states: &States) -> Vec<f64>;
 
     /// Sums over states that are recorded: without what the robot carries in the motion.
-    fn of_recorded(&self, states: &States) -> Vec<f64>;
+    fn of_recorded(&self, states: &States) -> Vec<f64> {
+        self.of(states)
+    }
 
     /// What is to be large, of sums over so many rows of a motion that lasts so long, s.
     fn value(&self, sums: &[f64], rows: f64, duration: f64) -> f64;
@@ -77,15 +78,13 @@ pub(super) fn quadratic(
 /// Independent columns of a library, each of size 1 at random states, in torque of size 1 per joint.
 pub(super) struct Information<'a> {
     library: &'a Library,
-    /// The library in the motion.
-    coming: &'a Library,
     reference: Reference<'a>,
     /// The independent columns, ascending.
     pub(super) columns: Vec<usize>,
 }
 
 impl<'a> Information<'a> {
-    pub(super) fn new(robot: &'a Robot, library: &'a Library, loaded: Option<&'a Loaded>) -> Self {
+    pub(super) fn new(robot: &'a Robot, library: &'a Library) -> Self {
         let all = random_states(robot, STATES);
         let reference = reference(robot, library, &all);
         let shown: Vec<usize> = (0..library.columns().len())
@@ -98,16 +97,9 @@ impl<'a> Information<'a> {
             .collect();
         Self {
             library,
-            coming: loaded.map_or(library, |own| &own.library),
             reference,
             columns,
         }
-    }
-
-    fn sums(&self, library: &Library, states: &States) -> Vec<f64> {
-        let mut sums = self.reference.power(library, &self.columns, states);
-        sums.iter_mut().for_each(|x| *x *= states.len as f64);
-        sums
     }
 
     /// ln det(M/n + ε): 0 for n rows that show every column like random states do, and none together with another.
@@ -135,11 +127,9 @@ impl Objective for Information<'_> {
     }
 
     fn of(&self, states: &States) -> Vec<f64> {
-        self.sums(self.coming, states)
-    }
-
-    fn of_recorded(&self, states: &States) -> Vec<f64> {
-        self.sums(self.library, states)
+        let mut sums = (self.reference).power(self.library, &self.columns, states);
+        sums.iter_mut().for_each(|x| *x *= states.len as f64);
+        sums
     }
 
     fn value(&self, sums: &[f64], rows: f64, _duration: f64) -> f64 {
@@ -159,7 +149,7 @@ impl Objective for Information<'_> {
         let reference = &self.reference;
         let factor =
             |joint: usize, column: usize| reference.weight[joint].sqrt() / reference.size[column];
-        quadratic(self.coming, &self.columns, (matrix, states), factor)
+        quadratic(self.library, &self.columns, (matrix, states), factor)
     }
 }
 

@@ -5,11 +5,13 @@ use crate::robot::Robot;
 use crate::term::Library;
 
 /// What a robot is known to carry: a point mass.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Load {
+    /// Link that it is fixed to.
+    pub frame: String,
     /// kg.
     pub mass: f64,
-    /// Centre of mass in the payload frame, m.
+    /// Centre of mass in the frame of that link, m.
     pub com: [f64; 3],
 }
 
@@ -27,8 +29,8 @@ impl Loaded {
     ///
     /// # Errors
     /// Those of [`Robot::carrying`].
-    pub fn new(robot: &Robot, library: &Library, load: Load) -> Result<Self> {
-        let robot = robot.carrying(library.payload_frame(robot), load.mass, load.com)?;
+    pub fn new(robot: &Robot, library: &Library, load: &Load) -> Result<Self> {
+        let robot = robot.carrying(&load.frame, load.mass, load.com)?;
         Ok(Self {
             library: library.in_log(&robot, true),
             robot,

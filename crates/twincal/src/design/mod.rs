@@ -113,8 +113,6 @@ pub struct Task<'a> {
     pub robot: &'a Robot,
     /// Candidates: their columns are what the motion is to show where nothing is asked, and what its condition number is of.
     pub library: &'a Library,
-    /// The same with what the robot is known to carry in the motion; [`Questions::carrying`] and the torque are to have it, too.
-    pub loaded: Option<&'a Loaded>,
     /// `None`: the motion is to show the candidates.
     pub questions: Option<&'a Questions<'a>>,
     /// Motion that is recorded already, and that a fit will have beside this one.
@@ -173,7 +171,7 @@ pub fn design(
 ) -> Result<Design> {
     let (spans, span) = spans(settings)?;
     require_start(task)?;
-    let information = Information::new(task.robot, task.library, task.loaded);
+    let information = Information::new(task.robot, task.library);
     let objective: &dyn Objective = match task.questions {
         Some(questions) => questions,
         None => &information,

@@ -20,8 +20,8 @@ use crate::likelihood::JointNoise;
 use crate::linear_algebra::{Cholesky, product, product_transposed};
 use crate::posterior::{OPEN, Posterior, Problem};
 use crate::random::Random;
-use crate::robot::Robot;
 use crate::term::Library;
+use crate::twin::Twin;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -43,7 +43,7 @@ type Motions<'a> = [Option<(&'a States, f64)>; 2];
 pub struct Questions<'a> {
     problem: &'a Problem,
     posterior: &'a Posterior,
-    pub(super) robot: &'a Robot,
+    pub(super) twin: &'a Twin,
     pub(super) library: &'a Library,
     /// The library in the motion to come.
     pub(super) coming: &'a Library,
@@ -83,9 +83,9 @@ pub struct Promise {
     pub wrong: f64,
     /// Median sd of its first coefficient afterwards, where it is there.
     pub sd: Option<f64>,
-    /// No motion of this robot tells it from the others.
+    /// No motion of this robot distinguishes it from the others.
     pub structural: bool,
-    /// What does together with such a motion, where it is structural.
+    /// What does, where it is structural.
     pub decided_by: Vec<OtherRecording>,
 }
 
@@ -95,11 +95,11 @@ impl<'a> Questions<'a> {
     /// # Errors
     /// [`Error::Setting`] for a name that is no effect with a column, and where nothing is open.
     pub fn new(
-        (problem, posterior): (&'a Problem, &'a Posterior),
-        (robot, library): (&'a Robot, &'a Library),
-        (noise, rate): (&[JointNoise], f64),
+        (problem, twin): (&'a Problem, &'a Twin),
+        (library, rate): (&'a Library, f64),
         names: &[String],
     ) -> Result<Self> {
+        let (posterior, noise) = (&twin.posterior, &twin.noise);
         let name_of = names_of(problem, library);
         let count = name_of.len();
         require_known(names, &name_of)?;
@@ -150,7 +150,7 @@ impl<'a> Questions<'a> {
             shares,
             problem,
             posterior,
-            robot,
+            twin,
             library,
             coming: library,
             rate,
@@ -172,8 +172,8 @@ impl<'a> Questions<'a> {
         self.open.iter().map(|own| own.name.as_str())
     }
 
-    /// A over the active columns, in units of 1/φ.
-    fn precision(&self, sums: &[f64], scale: f64) -> Vec<f64> {
+    /// A over the active columns, in units of 1/φ; the rows of the twin's logs count `logs` times.
+    fn precision(&self, logs: f64, sums: &[f64], scale: f64) -> Vec<f64> {
         let (size, all) = (self.active.len(), self.problem.names.len());
         let mut matrix = Vec::with_capacity(size * size);
         for (i, &a) in self.active.iter().enumerate() {
@@ -183,16 +183,28 @@ impl<'a> Questions<'a> {
                 } else {
                     0.0
                 };
-                matrix.push(self.problem.gram[a * all + b] + slab + scale * sums[i * size + j]);
+                matrix.push(
+                    logs * self.problem.gram[a * all + b] + slab + scale * sums[i * size + j],
+                );
             }
         }
         matrix
     }
 
     /// λ of every question, and ln det A in slab units.
-    pub(super) fn said(&self, sums: &[f64], scale: f64) -> Option<(Vec<f64>, f64)> {
+    fn said(&self, sums: &[f64], scale: f64) -> Option<(Vec<f64>, f64)> {
+        self.said_beside(1.0, sums, scale)
+    }
+
+    /// The same where the rows of the twin's logs count `logs` times.
+    pub(super) fn said_beside(
+        &self,
+        logs: f64,
+        sums: &[f64],
+        scale: f64,
+    ) -> Option<(Vec<f64>, f64)> {
         let size = self.active.len();
-        let factor = Cholesky::new(&self.precision(sums, scale), size).ok()?;
+        let factor = Cholesky::new(&self.precision(logs, sums, scale), size).ok()?;
         let inverse = factor.inverse();
         let of = |question: &Question| question.lambda(&inverse, size, self.posterior.noise);
         let lambda: Option<Vec<f64>> = self.open.iter().map(of).collect();
@@ -469,7 +481,7 @@ impl Objective for Questions<'_> {
     /// ∂λ/∂A = A⁻¹ Pᵀ S B S P A⁻¹ / φ with P the places of the effect, S its Schur complement and B = E[β βᵀ | in].
     fn gradient(&self, sums: &[f64], rows: f64, duration: f64) -> Option<Vec<f64>> {
         let (size, scale) = (self.active.len(), self.scale(rows, duration));
-        let factor = Cholesky::new(&self.precision(sums, scale), size).ok()?;
+        let factor = Cholesky::new(&self.precision(1.0, sums, scale), size).ok()?;
         let inverse = factor.inverse();
         let mut gradient: Vec<f64> = inverse.iter().map(|x| REST * scale * x).collect();
         for question in &self.open {

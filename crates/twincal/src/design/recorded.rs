@@ -240,7 +240,7 @@ mod tests {
     fn what_is_recorded_adds_up_with_the_motion() {
         let robot = tree();
         let library = library(&robot);
-        let information = Information::new(&robot, &library, None);
+        let information = Information::new(&robot, &library);
         let all = random_states(&robot, 300);
         let part = |from: usize, to: usize| {
             let of = |values: &[f64]| -> Vec<f64> {
@@ -327,7 +327,6 @@ mod tests {
             let task = Task {
                 robot: &robot,
                 library: &library,
-                loaded: None,
                 questions: None,
                 recorded,
                 limits: &limits,
@@ -341,7 +340,7 @@ mod tests {
         let pipeline = Pipeline::off(robot.dof());
         let (recorded, _) = Recorded::new(&robot, &pipeline, &logs).expect("its motion");
         let after = of(Some(&recorded));
-        let information = Information::new(&robot, &library, None);
+        let information = Information::new(&robot, &library);
         let following = Following::new(&information, &recorded);
         let value = |motion: &DesignedMotion| {
             let states = States {

@@ -52,7 +52,6 @@ pub(super) fn designed(
     let task = Task {
         robot,
         library: &library,
-        loaded: None,
         questions: None,
         recorded: None,
         limits,
@@ -143,7 +142,6 @@ fn whoever_ends_the_search_gets_the_best_motion_so_far() {
     let task = Task {
         robot: &robot,
         library: &library,
-        loaded: None,
         questions: None,
         recorded: None,
         limits: &limits,
@@ -212,7 +210,6 @@ fn forbidden_space_is_kept_free() {
     let task = |limits| Task {
         robot: &robot,
         library: &library,
-        loaded: None,
         questions: None,
         recorded: None,
         limits,

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 impl Robot {
     /// Where a tool is mounted: the last of the links that move with the last body of the longest chain. Frames without
     /// inertia (`tool0`, `flange`) come behind the link that carries them; what hangs from a locked joint is a finger, and holds no tool.
-    pub(crate) fn last_link(&self) -> &str {
+    pub fn last_link(&self) -> &str {
         let last = self.bodies().len().saturating_sub(1);
         let links = self.links_of_body(last);
         let mount = links.iter().rfind(|link| !self.hangs_from_locked(link));
