@@ -69,10 +69,10 @@ def test_ctrl_c_ends_a_fit_within_a_second(arm):
     code = FIT + textwrap.dedent(
         """
         import os, signal, threading, time
-        threading.Timer(0.1, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
         logs = [twincal.Log.read(path) for path in sys.argv[2:5]]
         began = time.monotonic()
         try:
+            threading.Timer(0.1, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
             twincal.fit(robot, logs, method="gibbs", draws=400000, chains=4)
         except KeyboardInterrupt:
             print(time.monotonic() - began)
