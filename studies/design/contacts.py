@@ -97,12 +97,15 @@ class Robot:
         return best, len(pairs)
 
     def around(self, q, clearance):
-        """Smallest height above the floor and distance from the boxes over all samples, by the corners of the meshes."""
+        """Smallest height above the floor and distance from the boxes over all samples, by the corners of meshes and boxes."""
         best = np.inf
         model = self.mujoco
         moving = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] != 0]
         corners = {}
         for g in moving:
+            if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_BOX:
+                corners[g] = model.geom_size[g] * np.array(list(itertools.product((-1, 1), repeat=3)))
+                continue
             mesh = model.geom_dataid[g]
             first = model.mesh_vertadr[mesh]
             corners[g] = model.mesh_vert[first : first + model.mesh_vertnum[mesh]]
