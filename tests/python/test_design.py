@@ -466,6 +466,27 @@ def test_what_decides_where_no_motion_does_is_said(tmp_path):
     }
 
 
+def test_a_load_decides_in_the_motion_to_come_and_not_in_what_is_recorded(tmp_path):
+    """Gain and motor inertia are open alike. A motion with the load decides between them; one without does not, nor does a motion that hardly
+    moves, whatever the robot did before without the load."""
+    turntable(tmp_path, "log.csv")
+    prior = '[library]\nfamilies = ["viscous", "motor_inertia", "gain"]\n[prior.families]\ngain = 0.2\nmotor_inertia = 0.3\n'
+    (tmp_path / "twincal.toml").write_text(prior)
+    call(tmp_path, "fit", "log.csv", "--model", "turntable.urdf", "--config", "twincal.toml", "-o", "twin", codes=(0, 3))
+    load, still = "load = { mass = 1.5, com = [0.3, 0.0, 0.0] }\n", "[joint.turn]\nposition = [-0.002, 0.002]\nvelocity = 0.01\n"
+    right = {}
+    for name, text in (("loaded", load), ("empty", ""), ("still", load + still)):
+        (tmp_path / "limits.toml").write_text(text)
+        after = ("--after", tmp_path / "empty" / "motion.csv") if name == "still" else ()
+        call(tmp_path, "design", "--twin", "twin", "--decide", "turn.gain", "--limits", "limits.toml", *after, "-o", name)
+        (promise,) = json.loads((tmp_path / name / "design.json").read_text())["promises"]
+        assert 0.05 < promise["pip"] < 0.95, promise
+        right[name] = promise["right"]
+    assert right["loaded"] > 0.9 and right["empty"] < 0.5 and right["still"] < 0.5, right
+    motions = [(tmp_path / name / "motion.csv").read_text() for name in ("loaded", "empty")]
+    assert motions[0] != motions[1]
+
+
 def test_a_twin_holds_its_load_within_its_torque(tmp_path):
     """On a wall: the plate's 2 kg at 0.1 m and a load of 2 kg at 0.3 m need 7.85 N·m at the start."""
     t = np.arange(0.0, 20.0, 0.004)

@@ -189,27 +189,9 @@ impl Known {
 }
 
 pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
-    let mut inputs = Inputs::default();
-    let given = [&flags.model, &flags.twin, &flags.limits, &flags.config];
-    let given = given.into_iter().flatten().chain(&flags.after);
-    given.for_each(|path| inputs.add(path));
-    let replace = match flags.force {
-        true => Replace::Artifact,
-        false => Replace::Never,
-    };
-    let claim = Claim::new(&flags.output, replace, &inputs)?;
+    let claim = claimed(flags)?;
     start_threads(flags.threads.map(|threads| threads as usize))?;
-    let config = match &flags.config {
-        Some(path) => Config::read(path)?,
-        None => Config::default(),
-    };
-    let from_config = config.settings()?;
-    if flags.twin.is_some() && flags.config.is_some() && flags.after.is_empty() {
-        return Err(Failure::usage(
-            "--config says nothing of a twin: its base and its settings are those of the fit",
-            "leave it out; with --after it says how those logs are read",
-        ));
-    }
+    let from_config = settings_of(flags)?;
     let stated = match &flags.limits {
         Some(path) => read_limits(path)?,
         None => Limits::default(),
@@ -235,14 +217,7 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
         load: load.as_ref(),
     };
     let (found, limits) = match &known.stored {
-        None => {
-            let carrying = |own: &Load| known.robot.carrying(&own.frame, own.mass, own.com);
-            let loaded = load.as_ref().map(carrying).transpose();
-            let loaded = loaded.map_err(twincal_io::Error::from)?;
-            let robot = loaded.as_ref().unwrap_or(&known.robot);
-            let torque = NominalTorque::new(robot, &limits);
-            searched(&known.robot, &within, (&torque, None), &settings)?
-        }
+        None => showing(&known, &within, &settings)?,
         Some(stored) => deciding(stored, &flags.decide, &within, &settings)?,
     };
     let about = About {
@@ -267,6 +242,34 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
         print(&found, &about, &flags.output, terminal);
     }
     Ok(0)
+}
+
+/// The folder of the result, which none of the inputs is in.
+fn claimed(flags: &Flags) -> Outcome<Claim> {
+    let mut inputs = Inputs::default();
+    let given = [&flags.model, &flags.twin, &flags.limits, &flags.config];
+    let given = given.into_iter().flatten().chain(&flags.after);
+    given.for_each(|path| inputs.add(path));
+    let replace = match flags.force {
+        true => Replace::Artifact,
+        false => Replace::Never,
+    };
+    Ok(Claim::new(&flags.output, replace, &inputs)?)
+}
+
+/// What --config says; of a twin it says how logs of --after are read, and nothing else.
+fn settings_of(flags: &Flags) -> Outcome<Settings> {
+    let Some(path) = &flags.config else {
+        return Ok(Config::default().settings()?);
+    };
+    let settings = Config::read(path)?.settings()?;
+    if flags.twin.is_some() && flags.after.is_empty() {
+        return Err(Failure::usage(
+            "--config says nothing of a twin: its base and its settings are those of the fit",
+            "leave it out; with --after it says how those logs are read",
+        ));
+    }
+    Ok(settings)
 }
 
 /// # Errors
@@ -322,6 +325,16 @@ impl Within<'_> {
             .transpose()
             .map_err(twincal_io::Error::from)?)
     }
+}
+
+/// A motion that shows body, motors and friction of a model.
+fn showing(known: &Known, within: &Within<'_>, settings: &DesignSettings) -> Outcome<Found> {
+    let carrying = |own: &Load| known.robot.carrying(&own.frame, own.mass, own.com);
+    let loaded = within.load.map(carrying).transpose();
+    let loaded = loaded.map_err(twincal_io::Error::from)?;
+    let robot = loaded.as_ref().unwrap_or(&known.robot);
+    let torque = NominalTorque::new(robot, within.limits);
+    searched(&known.robot, within, (&torque, None), settings)
 }
 
 /// A motion that decides what a twin leaves open.
