@@ -108,11 +108,11 @@ def small(number, robot, folder):
     pq.write_table(pa.table({"t": t + 60 * number, **named}), file)
 
 
-def merged(files, folder):
+def merged(files, folder, fan):
     """The tree: wall time in s and the largest memory of one `twincal merge` in MB."""
     began, peak, level = time.perf_counter(), 0.0, 0
     while len(files) > 1:
-        groups = [files[start : start + FAN] for start in range(0, len(files), FAN)]
+        groups = [files[start : start + fan] for start in range(0, len(files), fan)]
         files = []
         for number, group in enumerate(groups):
             files.append(folder / f"{level}-{number}.arrow")
@@ -123,7 +123,7 @@ def merged(files, folder):
     return time.perf_counter() - began, peak, files[0].stat().st_size / 1e6
 
 
-def merging(counts, folder):
+def merging(counts, fan, folder):
     """Table of numbers of files."""
     model = folder / "two.urdf"
     (folder / "small").mkdir(parents=True, exist_ok=True)
@@ -143,7 +143,7 @@ def merging(counts, folder):
     print("files    s      largest process, MB   merged file, MB")
     for count in counts:
         with tempfile.TemporaryDirectory(dir=folder) as tree:
-            seconds, peak, size = merged(files[:count], Path(tree))
+            seconds, peak, size = merged(files[:count], Path(tree), fan)
         print(f"{count:<8} {seconds:<6.1f} {peak:<21.0f} {size:.0f}")
 
 
@@ -153,13 +153,14 @@ def main():
     arguments.add_argument("--minutes", type=float, default=2)
     arguments.add_argument("--logs", type=int, default=4)
     arguments.add_argument("--merge", type=int, nargs="+", metavar="N", help="merge so many files of statistics instead")
+    arguments.add_argument("--fan", type=int, default=FAN, metavar="N", help="so many at a time, as a tree")
     arguments.add_argument("--folder", type=Path, help="keep the logs here and use them again")
     given = arguments.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
         folder = given.folder or Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
         if given.merge:
-            merging(given.merge, folder)
+            merging(given.merge, given.fan, folder)
         else:
             scaling(given, folder)
 

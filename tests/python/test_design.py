@@ -146,10 +146,9 @@ def test_the_page_fits_a_desk_and_a_phone(made, names, tmp_path):
         chromium.close()
 
 
-def test_more_is_shown_than_by_random_motion(made, names):
-    """ln det of the rows of Pinocchio's regressor in base coordinates: more than the best of twenty random motions in the limits of motion."""
-    folder, _ = made
-    _, rows = table(folder)
+@pytest.fixture(scope="module")
+def shown(names):
+    """ln det and condition number of the rows of Pinocchio's regressor in base coordinates, each column of size 1 at random states."""
     model = pin.buildModelFromUrdf(str(ARM))
     data, n = model.createData(), len(names)
     rng = np.random.default_rng(5)
@@ -161,12 +160,24 @@ def test_more_is_shown_than_by_random_motion(made, names):
     _, values, basis = np.linalg.svd(general[:, kept] / scale[kept], full_matrices=False)
     basis = basis[values > 1e-8 * values[0]]
 
-    def log_determinant(q, qd, qdd):
+    def of(q, qd, qdd):
         own = stack(zip(q[::10], qd[::10], qdd[::10], strict=True))[:, kept] / scale[kept] @ basis.T
-        return np.linalg.slogdet(own.T @ own / len(own))[1]
+        return np.linalg.slogdet(own.T @ own / len(own))[1], np.linalg.cond(own)
 
-    designed = log_determinant(*(rows[:, 1 + k * n : 1 + (k + 1) * n] for k in range(3)))
-    t = rows[:, 0]
+    return of
+
+
+def states(folder):
+    _, rows = table(folder)
+    return np.split(rows[:, 1:], 3, axis=1)
+
+
+def test_more_is_shown_than_by_random_motion(made, names, shown):
+    """ln det: more than the best of twenty random motions in the limits of motion."""
+    folder, _ = made
+    designed, _ = shown(*states(folder))
+    t, n = table(folder)[1][:, 0], len(names)
+    rng = np.random.default_rng(6)
     others = []
     for _ in range(20):
         w = 2 * np.pi * np.arange(1, 9) / t[-1]
@@ -176,8 +187,22 @@ def test_more_is_shown_than_by_random_motion(made, names):
         qdd = np.gradient(qd, t, axis=0)
         parts = [(q, 0.9), (qd, 1.1), (qdd, 4.0), (np.gradient(qdd, t, axis=0)[5:-5], 50.0)]
         largest = np.maximum.reduce([np.abs(x).max(0) / most for x, most in parts])
-        others.append(log_determinant(q / largest - 0.1, qd / largest, qdd / largest))
+        others.append(shown(q / largest - 0.1, qd / largest, qdd / largest)[0])
     assert designed > max(others) + 1.0, (designed, others)
+
+
+def test_a_criterion_is_what_is_made_large(made, tmp_path, stated, shown):
+    """A smaller condition number by `condition`, more information by `determinant`, by Pinocchio's rows and by what the result says."""
+    folder, torque = made
+    design(tmp_path, "--duration", 10, "--rate", 250, "--criterion", "condition", *limits(tmp_path, stated(torque)))
+    both = {"determinant": folder, "condition": tmp_path}
+    said = {name: json.loads((own / "motion" / "design.json").read_text()) for name, own in both.items()}
+    by_pinocchio = {name: shown(*states(own)) for name, own in both.items()}
+    assert all(own["criterion"] == name for name, own in said.items())
+    assert said["condition"]["condition"] < 0.5 * said["determinant"]["condition"], said
+    assert by_pinocchio["condition"][1] < 0.8 * by_pinocchio["determinant"][1], by_pinocchio
+    assert said["condition"]["log_determinant"] < said["determinant"]["log_determinant"]
+    assert by_pinocchio["condition"][0] < by_pinocchio["determinant"][0]
 
 
 def test_the_same_bytes_for_a_seed_on_any_number_of_threads(tmp_path, stated):
@@ -205,6 +230,30 @@ def test_what_is_wrong_is_said(tmp_path, stated, names, change, code, says):
     assert says in done.stderr and not (tmp_path / "motion").exists()
     if code == 4:
         assert names[0] in done.stderr or names[1] in done.stderr
+
+
+def test_what_is_used_is_what_the_motion_has(made):
+    """By the samples: range, shares of velocity and acceleration, and of torque by Pinocchio."""
+    folder, torque = made
+    said = json.loads((folder / "motion" / "design.json").read_text())
+    model = pin.buildModelFromUrdf(str(ARM))
+    q, qd, qdd = states(folder)
+    tau = np.array([pin.rnea(model, model.createData(), *state) for state in zip(q, qd, qdd, strict=True)])
+    for joint, used in enumerate(said["used"]):
+        assert used["position"] == pytest.approx([q[:, joint].min(), q[:, joint].max()], abs=1e-6)
+        for own, limit, share in ((qd, 1.1, used["share"][0]), (qdd, 4.0, used["share"][1]), (tau, torque, used["torque"])):
+            assert np.abs(own[:, joint]).max() / limit == pytest.approx(share, rel=1e-3, abs=1e-5)
+        jerk = np.abs(np.diff(qdd[:, joint])).max() * 250
+        assert jerk / 50 == pytest.approx(used["share"][2], rel=1e-3) and used["share"][2] <= 1.0
+
+
+def test_a_limit_beyond_that_of_the_model_is_named(tmp_path, names):
+    stated = f'[joint."{names[0]}"]\nvelocity = 57.3\nacceleration = 300.0\n'
+    done = design(tmp_path, "--duration", 4, "--rate", 100, *limits(tmp_path, stated))
+    said = f"warning: the velocity limit of {names[0]} is beyond that of the model file; check its unit"
+    assert said in " ".join(done.stderr.split()), done.stderr
+    found = json.loads((tmp_path / "motion" / "design.json").read_text())
+    assert [own["beyond_model"] for own in found["limits"]] == [["velocity"]] + [[]] * (len(names) - 1)
 
 
 def test_a_joint_without_a_velocity_limit_is_named(tmp_path, names):

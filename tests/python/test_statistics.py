@@ -1,9 +1,11 @@
 """Statistics of real logs: a fit to them is the fit to the logs. Truth: the fit to the logs themselves, and the schema."""
 
 import json
+import subprocess
 
+import pyarrow as pa
 import pytest
-from conftest import ROOT, SHARED, twincal
+from conftest import ROOT, SHARED, program, twincal
 from test_result_schema import problems
 
 CASES = {
@@ -59,3 +61,63 @@ def test_a_fit_to_statistics_is_the_fit_to_the_logs(robot, tmp_path):
     assert own["assessment"]["answer"] in ("yes", "yes_within_limits", "not_yet", "no")
     if not heldout:
         assert (own["assessment"]["answer"], own["assessment"]["reason"]) == ("not_yet", "not_tested")
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Statistics of two logs of the example arm."""
+    folder, arm = tmp_path_factory.mktemp("files"), ROOT / "examples" / "arm"
+    (folder / "few.toml").write_text('[library]\ngeneric = false\nfamilies = ["payload", "viscous", "coulomb"]\n')
+    logs = [arm / "run.csv", arm / "monday.csv"]
+    twincal("statistics", *logs, "--model", arm / "arm.urdf", "--config", folder / "few.toml", "-o", folder)
+    return [folder / f"{log.name}.arrow" for log in logs]
+
+
+def test_other_programs_read_the_files(files, tmp_path):
+    """By Arrow's own reader: a row per log in the order of names, and as many numbers as its text says."""
+    merged = tmp_path / "merged.arrow"
+    twincal("merge", *files, "-o", merged)
+    read = pa.ipc.open_file(merged)
+    metadata = json.loads(read.schema.metadata[b"twincal.statistics"])
+    assert metadata["format"] == 2 and read.num_record_batches == 2
+    names = ["monday.csv", "run.csv"]
+    assert [log["name"] for log in metadata["logs"]] == names
+    for number, name in enumerate(names):
+        [row] = read.get_batch(number).to_pylist()
+        text = json.loads(row["log"])
+        assert text["header"]["about"]["facts"]["summary"]["name"] == name
+        assert sum(record[-1] for record in text["records"]) == len(row["value"]) > 1000
+
+
+@pytest.mark.parametrize(
+    ("write", "says"),
+    [
+        (lambda table, to: pa.ipc.new_file(to, table.schema, options=pa.ipc.IpcWriteOptions(compression="zstd")), "row 0 is compressed"),
+        (lambda table, to: pa.ipc.new_file(to, table.schema), None),
+        (lambda table, to: pa.ipc.new_stream(to, table.schema), "is no Arrow file"),
+    ],
+)
+def test_files_that_another_program_wrote(files, tmp_path, write, says):
+    """The same rows are the same statistics, another form is refused by its name."""
+    table = pa.ipc.open_file(files[0]).read_all()
+    other = tmp_path / "other.arrow"
+    with other.open("wb") as to, write(table, to) as writer:
+        writer.write_table(table)
+    command = [program("twincal"), "merge", other, files[1], "-o", tmp_path / "merged.arrow"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if says:
+        assert done.returncode == 2 and says in done.stderr and "other.arrow" in done.stderr, done.stderr
+        return
+    twincal("merge", *files, "-o", tmp_path / "own.arrow")
+    assert (tmp_path / "merged.arrow").read_bytes() == (tmp_path / "own.arrow").read_bytes(), done.stderr
+
+
+def test_logs_in_one_record_batch_are_refused(files, tmp_path):
+    merged = tmp_path / "merged.arrow"
+    twincal("merge", *files, "-o", merged)
+    table, together = pa.ipc.open_file(merged).read_all().combine_chunks(), tmp_path / "together.arrow"
+    with together.open("wb") as to, pa.ipc.new_file(to, table.schema) as writer:
+        writer.write_table(table)
+    command = [program("twincal"), "merge", together, "-o", tmp_path / "no.arrow"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 2 and "has 1 rows, its metadata name 2" in done.stderr, done.stderr

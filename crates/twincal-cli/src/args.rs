@@ -4,7 +4,7 @@ mod design;
 mod fleet;
 mod schema;
 
-pub(crate) use design::Design;
+pub(crate) use design::{Criterion, Design};
 pub(crate) use fleet::Fleet;
 pub(crate) use schema::{Described, Schema};
 

@@ -3,7 +3,7 @@
 use crate::two_link;
 use twincal::Code;
 use twincal::calibrate::{
-    Calibration, CalibrationSettings, Plan, Quantity, Record, Statistics, calibrate,
+    Calibration, CalibrationSettings, FromTables, Plan, Quantity, Record, Statistics, calibrate,
     calibrate_statistics, plan,
 };
 use twincal::prelude::*;
@@ -182,7 +182,10 @@ fn the_order_of_merging_changes_no_bit() {
 fn records_hold_everything() {
     let study = study(2);
     let sum = study.merged(&study.plan(), 0..2);
-    let back = Statistics::from_records(sum.header(), sum.records()).expect("statistics");
+    let mut back = FromTables::new(sum.header()).expect("the same version");
+    let tables = sum.tables().collect::<Vec<_>>().into_iter().rev();
+    tables.for_each(|table| back.add(table).expect("a table"));
+    let back = back.finish().expect("statistics");
     assert_eq!(back, sum);
 }
 
@@ -295,15 +298,20 @@ fn damaged_tables_and_odd_logs_are_refused() {
     let plan = study.plan();
     let sum = study.merged(&plan, 0..2);
     let with = |change: &dyn Fn(&mut Vec<Record>)| {
-        let mut records = sum.records();
-        change(&mut records);
-        Statistics::from_records(sum.header(), records)
+        let mut tables = FromTables::new(sum.header())?;
+        for mut table in sum.tables() {
+            if table.header.name() == "log0" {
+                change(&mut table.records);
+            }
+            tables.add(table)?;
+        }
+        tables.finish()
     };
     refused(
         with(&|all| drop(all.remove(5))),
         "the table of log `log0` has no",
     );
-    refused(with(&|all| all[5].log = 7), "has no");
+    refused(with(&|all| all[5].joint = 7), "has no");
     refused(
         with(&|all| all.push(all[0].clone())),
         "holds a record twice",
@@ -313,12 +321,23 @@ fn damaged_tables_and_odd_logs_are_refused() {
         "numbers that are none",
     );
     refused(with(&|all| all[0].values.push(1.0)), "of another size");
+    let with_states = |all: &mut Vec<Record>| {
+        let mut states = all.iter_mut().rev();
+        let own = states.find(|own| own.quantity == Quantity::Velocities);
+        own.expect("velocities").values.push(1.0);
+    };
+    refused(with(&with_states), "another number of states");
     let more = |all: &mut Vec<Record>| {
         let mut more = all[0].clone();
         more.block = 77;
         all.push(more);
     };
     refused(with(&more), "more records than its header says");
+    let mut twice = FromTables::new(sum.header()).expect("the same version");
+    for table in sum.tables().chain(sum.tables()) {
+        twice.add(table).expect("a table");
+    }
+    refused(twice.finish(), "log `log0` is there twice");
     assert_eq!(Quantity::of_name("power"), Some(Quantity::Power));
     // A million times the torque of the others.
     let mut loud = study.logs[3].clone();

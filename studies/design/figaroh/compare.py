@@ -48,6 +48,7 @@ WAYS = {
     "0.6 s, all, det": (0.625, 8, 4, 16, 25, True, "determinant"),
     "0.6 s, long": (0.625, 8, 4, 16, 100, False, "condition"),
 }
+OWN = {"twincal": "determinant", "twincal, condition": "condition"}  # criteria of twincal
 STEEPEST = 10.0 / 3.0**0.5 / 1.875  # peak acceleration over peak velocity of a quintic from rest to rest in 1 s, 1/s
 
 
@@ -235,12 +236,12 @@ def figaroh_motion(way, seed, folder, limits):
     Path(f"{path}.json").write_text(json.dumps(notes))
 
 
-def twincal_motion(program, seed, folder, limits, names):
+def twincal_motion(program, way, seed, folder, limits, names):
     """One run of twincal; its motion and notes become files."""
     (folder / "limits.toml").write_text(limits.toml(names))
     before, clock = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     options = ["--duration", str(SECONDS), "--rate", str(RATE), "--seed", str(seed), "--threads", "1", "-o", folder / "motion", "--force"]
-    command = [program, "design", "--model", model_file(), "--limits", folder / "limits.toml", *options]
+    command = [program, "design", "--model", model_file(), "--criterion", OWN[way], "--limits", folder / "limits.toml", *options]
     subprocess.run(command, check=True, capture_output=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     table = np.loadtxt(folder / "motion" / "motion.csv", delimiter=",", skiprows=1)
@@ -248,8 +249,8 @@ def twincal_motion(program, seed, folder, limits, names):
     notes = {"cpu": after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, "wall": time.perf_counter() - clock,
              "base": found["base_parameters"], "objective": [found["log_determinant"], found["condition"]]}  # fmt: skip
     n = len(names)
-    np.save(folder / f"{named('twincal', seed)}.npy", np.array([table[:, 1 + k * n : 1 + (k + 1) * n] for k in range(3)]))
-    (folder / f"{named('twincal', seed)}.json").write_text(json.dumps(notes))
+    np.save(folder / f"{named(way, seed)}.npy", np.array([table[:, 1 + k * n : 1 + (k + 1) * n] for k in range(3)]))
+    (folder / f"{named(way, seed)}.json").write_text(json.dumps(notes))
 
 
 # ---- the table
@@ -312,7 +313,7 @@ def tables(found, judges):
         cells = [f"{100 * max((line['used'][kind] for line in made), default=np.nan):.2f} %" for kind in KINDS]
         beyond = sum(not line["within"] for line in made)
         print(f"| {way} | {len(lines) - len(made)} | {beyond} | " + " | ".join(cells) + " |")
-    segments = [done for way in list(found)[1:] for notes, _ in found[way] for done in notes["converged"]]
+    segments = [done for way in list(found)[len(OWN):] for notes, _ in found[way] for done in notes["converged"]]
     print(f"\nFIGAROH: IPOPT converged in {sum(segments)} of {len(segments)} segments; the others end at its iteration limit, feasible.")
 
 
@@ -337,13 +338,13 @@ def main():
     judges = {weights: Judge(model, limits, weights) for weights in ("limits", "ordinary", "none")}
     print(", ".join(f"{kind}: {len(columns)} base parameters" for kind, columns in judges["limits"].columns.items()), flush=True)
     found = {}
-    for way in ["twincal", *given.ways]:
+    for way in [*OWN, *given.ways]:
         found[way] = []
-        for seed in range(1, (given.seeds if way == "twincal" else given.runs) + 1):
+        for seed in range(1, (given.seeds if way in OWN else given.runs) + 1):
             name = named(way, seed)
             if not (folder / f"{name}.json").exists():
-                if way == "twincal":
-                    twincal_motion(given.program.resolve(), seed, folder, limits, names)
+                if way in OWN:
+                    twincal_motion(given.program.resolve(), way, seed, folder, limits, names)
                 else:
                     command = [sys.executable, __file__, "--folder", given.folder, "--acceleration-time", str(given.acceleration_time), "--one", way, str(seed)]
                     with (folder / f"{name}.log").open("w") as log:

@@ -1,6 +1,6 @@
 //! Flags of `twincal design`.
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -15,6 +15,9 @@ pub(crate) struct Design {
     /// Effects to decide; without it those with a probability of 0.05 to 0.95.
     #[arg(long, value_name = "NAME", num_args = 1.., requires = "twin")]
     pub(crate) decide: Vec<String>,
+    /// What the motion maximises without a twin.
+    #[arg(long, value_enum, default_value_t = Criterion::Determinant, conflicts_with = "twin")]
+    pub(crate) criterion: Criterion,
     /// Logs that are recorded already, beside those of the twin: what they show the motion need
     /// not show again. Their torque is not looked at.
     #[arg(long, value_name = "LOG", num_args = 1..)]
@@ -59,4 +62,13 @@ pub(crate) struct Design {
     /// Print the result as JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// A criterion by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Criterion {
+    /// Information on all base parameters: the narrowest intervals.
+    Determinant,
+    /// A smaller condition number, at the price of wider intervals.
+    Condition,
 }

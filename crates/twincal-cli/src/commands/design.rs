@@ -5,7 +5,7 @@ use super::inputs::{LogInput, Long, RobotInput};
 use super::start_threads;
 use super::summary::paragraph;
 use super::table::{print_table, table};
-use crate::args::Design as Flags;
+use crate::args::{Criterion as OfFlags, Design as Flags};
 use crate::failure::{Failure, Outcome};
 use crate::interrupts::Caught;
 use crate::names::display_names;
@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use twincal::Severity;
 use twincal::design::{
-    Design, DesignSettings, DesignStage, FoundTorque, JointLimits, Load, Loaded, NominalTorque,
-    Questions, Recorded, Task, TorqueLimits, design, joint_limits, with_free_start,
+    Criterion, Design, DesignSettings, DesignStage, FoundTorque, JointLimits, Load, Loaded,
+    NominalTorque, Questions, Recorded, Task, TorqueLimits, design, joint_limits, with_free_start,
 };
 use twincal::robot::{Robot, RobotDescription};
 use twincal::signal::{Payload, choose_and_prepare};
@@ -202,10 +202,17 @@ pub(super) fn run(flags: &Flags, terminal: &mut Terminal) -> Outcome<u8> {
         .transpose()?;
     let recorded = known.recorded(&flags.after, &from_config, terminal)?;
     let limits = joint_limits(&known.robot, &stated.joints).map_err(twincal_io::Error::from)?;
+    for text in words::beyond_model(&limits) {
+        terminal.note(&format!("warning: {text}"));
+    }
     let settings = DesignSettings {
         duration: flags.duration,
         rate: flags.rate,
         seed: flags.seed,
+        criterion: match flags.criterion {
+            OfFlags::Determinant => Criterion::Determinant,
+            OfFlags::Condition => Criterion::Condition,
+        },
         ..DesignSettings::default()
     };
     let geometry = (&known.geometry, known.path.as_path());
@@ -430,6 +437,7 @@ fn print_promises(found: &Design, loaded: bool, terminal: &mut Terminal) {
 
 fn print(found: &Design, about: &About<'_>, output: &Path, terminal: &mut Terminal) {
     terminal.heading(&words::headline(found));
+    paragraph(&words::purpose(found, about.settings.criterion), terminal);
     paragraph(&words::information(found), terminal);
     if let Some(recorded) = about.recorded {
         paragraph(&words::before(recorded), terminal);
@@ -439,7 +447,16 @@ fn print(found: &Design, about: &About<'_>, output: &Path, terminal: &mut Termin
     }
     terminal.say("");
     print_promises(found, about.load.is_some(), terminal);
-    let mut rows = table(&["joint", "from", "to", "velocity", "acceleration", "jerk"]);
+    let heads = [
+        "joint",
+        "from",
+        "to",
+        "velocity",
+        "acceleration",
+        "jerk",
+        "torque",
+    ];
+    let mut rows = table(&heads);
     for used in &found.used {
         let share = |at: usize| words::share(used.share[at]);
         rows.add_row([
@@ -449,6 +466,8 @@ fn print(found: &Design, about: &About<'_>, output: &Path, terminal: &mut Termin
             share(0),
             share(1),
             share(2),
+            used.torque
+                .map_or_else(|| words::NOT_LIMITED.into(), words::share),
         ]);
     }
     print_table(&rows, terminal);

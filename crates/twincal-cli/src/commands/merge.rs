@@ -7,18 +7,19 @@ use crate::names::display_names;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 use serde::Serialize;
-use std::io::BufWriter;
+use std::fs::File;
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 use twincal_io::artifact::{Inputs, OutputFile, sha256_of_file};
 use twincal_io::context::FileHash;
-use twincal_io::statistics::StatisticsFile;
+use twincal_io::statistics::{StatisticsFile, StatisticsFiles};
 
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Merged<'a> {
     output: String,
     robot: &'a str,
-    logs: Vec<&'a str>,
+    logs: Vec<String>,
 }
 
 pub(super) fn run(flags: &Merge, terminal: &mut Terminal) -> Outcome<u8> {
@@ -26,25 +27,25 @@ pub(super) fn run(flags: &Merge, terminal: &mut Terminal) -> Outcome<u8> {
     flags.files.iter().for_each(|path| inputs.add(path));
     let output = OutputFile::create(&flags.output, flags.force, &inputs)?;
     let progress = Progress::new();
-    let (file, _) = read(&flags.files, &progress)?;
-    write(&file, output)?;
+    let mut seen = |path: &Path| progress.step(&format!("reading {}", path.to_string_lossy()));
+    let files = StatisticsFiles::open(&flags.files, &mut seen)?;
+    let robot = files.robot_name().to_owned();
+    let logs: Vec<String> = files.log_names().map(str::to_owned).collect();
+    progress.step("writing");
+    write(output, |to| files.write_to(to))?;
     terminal.complete(&flags.output);
     drop(progress);
-    let logs: Vec<&str> = file.statistics.log_names().collect();
     let place = flags.output.to_string_lossy().into_owned();
     if flags.json {
         let merged = Merged {
             output: place,
-            robot: &file.statistics.robot_name,
+            robot: &robot,
             logs,
         };
         print_json(terminal, &merged)?;
     } else {
-        terminal.say(&format!(
-            "statistics of {} of robot `{}`",
-            count_of_logs(logs.len()),
-            file.statistics.robot_name
-        ));
+        let count = count_of_logs(logs.len());
+        terminal.say(&format!("statistics of {count} of robot `{robot}`"));
         terminal.say(&place);
     }
     Ok(0)
@@ -55,27 +56,13 @@ pub(super) fn read(
     paths: &[PathBuf],
     progress: &Progress,
 ) -> Outcome<(StatisticsFile, Vec<FileHash>)> {
-    let mut sum: Option<StatisticsFile> = None;
-    let mut files = Vec::new();
-    for (path, name) in paths.iter().zip(display_names(paths)) {
-        progress.step(&format!("reading {}", path.to_string_lossy()));
-        let file = StatisticsFile::read(path)?;
-        files.push(FileHash {
-            name,
-            sha256: sha256_of_file(path)?,
-        });
-        match &mut sum {
-            None => sum = Some(file),
-            Some(sum) => add(sum, &file, path)?,
-        }
-    }
-    let sum = sum.ok_or_else(|| {
-        Failure::usage(
-            "no file of statistics",
-            "give files that `twincal statistics` wrote",
-        )
-    })?;
-    Ok((sum, files))
+    let mut seen = |path: &Path| progress.step(&format!("reading {}", path.to_string_lossy()));
+    let sum = StatisticsFiles::open(paths, &mut seen)?.read()?;
+    let files = paths.iter().zip(display_names(paths)).map(|(path, name)| {
+        let sha256 = sha256_of_file(path)?;
+        Ok(FileHash { name, sha256 })
+    });
+    Ok((sum, files.collect::<Outcome<_>>()?))
 }
 
 /// Adds statistics of more logs.
@@ -91,9 +78,12 @@ pub(super) fn add(sum: &mut StatisticsFile, file: &StatisticsFile, path: &Path) 
 }
 
 /// Writes statistics to a file, complete or not at all.
-pub(super) fn write(file: &StatisticsFile, mut output: OutputFile) -> Outcome<()> {
+pub(super) fn write(
+    mut output: OutputFile,
+    content: impl FnOnce(BufWriter<&mut File>) -> twincal_io::Result<io::Result<()>>,
+) -> Outcome<()> {
     let written = match output.file() {
-        Some(to) => file.write_to(BufWriter::new(to))?,
+        Some(to) => content(BufWriter::new(to))?,
         None => Ok(()),
     };
     Ok(output.commit(written)?)

@@ -257,7 +257,7 @@ impl Road<'_> {
             statistics: statistics.with_findings(read.findings),
             model: self.robot.model_file(),
         };
-        merge::write(&file, output)?;
+        merge::write(output, |to| file.write_to(to))?;
         Ok(entry(true))
     }
 }

@@ -50,6 +50,7 @@ pub(crate) fn design(joints: &[&str], effects: &[&str], len: usize) -> Design {
         joint: (*name).to_owned(),
         position: [-0.5, 0.5],
         share: [0.97, 0.42, 0.083],
+        torque: Some(0.66),
     };
     Design {
         motion: motion(joints, len),
@@ -96,6 +97,7 @@ pub(crate) fn limits(joints: &[&str]) -> Vec<JointLimits> {
             0 => vec!["acceleration", "jerk"],
             _ => Vec::new(),
         },
+        beyond_model: Vec::new(),
     });
     own.collect()
 }

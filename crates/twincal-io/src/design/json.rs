@@ -6,8 +6,8 @@ use crate::error::{Error, Result};
 use schemars::JsonSchema;
 use serde::Serialize;
 use twincal::design::{
-    Approach, Design, DesignSettings, JointLimits, JointUse, Load, OtherRecording, Promise,
-    Recorded,
+    Approach, Criterion, Design, DesignSettings, JointLimits, JointUse, Load, OtherRecording,
+    Promise, Recorded,
 };
 use twincal::robot::JointKind;
 
@@ -104,6 +104,8 @@ struct DesignJson<'a> {
     after: Vec<Before<'a>>,
     /// What the robot is known to carry in the motion; null: nothing that its model does not have.
     load: Option<LoadJson<'a>>,
+    /// What was maximised: `determinant` or `condition` of the base parameters' information; null: what decides the open effects of a twin.
+    criterion: Option<&'static str>,
     /// Independent base parameters.
     base_parameters: usize,
     /// ln det of the rows' information on the base parameters, those of `after` included, scaled to torque of size 1; null: not finite.
@@ -164,6 +166,8 @@ struct InForce<'a> {
     start: f64,
     /// Keys of limits that nobody stated.
     assumed: &'a [&'static str],
+    /// Keys whose stated limit is beyond that of the model file.
+    beyond_model: &'a [&'static str],
 }
 
 impl<'a> From<&'a JointLimits> for InForce<'a> {
@@ -177,6 +181,7 @@ impl<'a> From<&'a JointLimits> for InForce<'a> {
             torque,
             start,
             assumed,
+            beyond_model,
         } = own;
         Self {
             joint,
@@ -187,6 +192,7 @@ impl<'a> From<&'a JointLimits> for InForce<'a> {
             torque: *torque,
             start: *start,
             assumed,
+            beyond_model,
         }
     }
 }
@@ -254,7 +260,7 @@ impl<'a> From<&'a Promise> for Expected<'a> {
     }
 }
 
-/// How much of its limits one joint uses, by the control points that bound them.
+/// How much of its limits one joint uses, at the samples.
 #[derive(Debug, Serialize, JsonSchema)]
 #[schemars(deny_unknown_fields, rename = "Use")]
 struct Used<'a> {
@@ -262,8 +268,10 @@ struct Used<'a> {
     joint: &'a str,
     /// Smallest and largest position.
     position: [f64; 2],
-    /// Largest velocity, acceleration and jerk as a share of their limits.
+    /// Largest velocity, acceleration and jerk as a share of their limits; jerk as differences of acceleration.
     share: [f64; 3],
+    /// Largest torque as a share of its limit; null: not limited.
+    torque: Option<f64>,
 }
 
 impl<'a> From<&'a JointUse> for Used<'a> {
@@ -272,11 +280,13 @@ impl<'a> From<&'a JointUse> for Used<'a> {
             joint,
             position,
             share,
+            torque,
         } = own;
         Self {
             joint,
             position: *position,
             share: *share,
+            torque: *torque,
         }
     }
 }
@@ -317,6 +327,13 @@ pub fn design_json(design: &Design, about: &About<'_>) -> Result<Vec<u8>> {
             mass: own.mass,
             com: own.com,
         }),
+        criterion: design
+            .promises
+            .is_empty()
+            .then_some(match about.settings.criterion {
+                Criterion::Determinant => "determinant",
+                Criterion::Condition => "condition",
+            }),
         base_parameters: design.columns,
         log_determinant: design.log_determinant,
         condition: design.condition,

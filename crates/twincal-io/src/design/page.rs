@@ -15,6 +15,7 @@ use twincal::design::{Design, JointLimits, JointUse, Promise};
 /// [`crate::Error::Internal`] if the template and the values that fill it do not fit together.
 pub fn design_page(design: &Design, about: &About<'_>) -> Result<String> {
     let structural = design.promises.iter().filter(|own| own.structural);
+    let purpose = words::purpose(design, about.settings.criterion);
     let page = DesignPage {
         headline: words::headline(design),
         about: format!(
@@ -27,8 +28,8 @@ pub fn design_page(design: &Design, about: &About<'_>) -> Result<String> {
         warning: WARNING.into(),
         clearance: words::clearance(design, about.world),
         purpose: match about.load {
-            Some(load) => format!("{} {}", words::purpose(design), words::carried(load)),
-            None => words::purpose(design),
+            Some(load) => format!("{purpose} {}", words::carried(load)),
+            None => purpose,
         },
         numbers: numbers(design, about),
         questions: design.promises.iter().map(question).collect(),
@@ -45,7 +46,11 @@ pub fn design_page(design: &Design, about: &About<'_>) -> Result<String> {
             .map(|(joint, (limits, used))| row(limits, used, units(about, joint)))
             .collect(),
         shares: words::SHARES.into(),
-        assumed: words::assumed(about.limits),
+        assumed: [
+            words::beyond_model(about.limits),
+            words::assumed(about.limits),
+        ]
+        .concat(),
     };
     render(&page)
 }
@@ -153,7 +158,7 @@ fn row(limits: &JointLimits, used: &JointUse, units: Units) -> Row {
                     Some(torque) => most(torque, units.torque),
                     None => words::NOT_LIMITED.into(),
                 },
-                String::new(),
+                used.torque.map_or_else(String::new, words::used),
             ),
             cell(
                 "start and end",

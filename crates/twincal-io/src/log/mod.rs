@@ -39,7 +39,7 @@ pub(crate) mod stamps;
 mod torque;
 
 #[cfg(feature = "tables")]
-pub(crate) use arrow::numbers as arrow_numbers;
+pub(crate) use arrow::{Row, Rows, fits};
 pub(crate) use assemble::assemble;
 pub(crate) use cells::Cells;
 pub(crate) use columns::has_columns;

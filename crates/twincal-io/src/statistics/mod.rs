@@ -1,29 +1,34 @@
-//! Statistics of logs as files: an Arrow IPC file of one column of numbers, with what they are in its metadata.
+//! Statistics of logs as files: an Arrow IPC file of one row per log, in the order of their names.
 //!
 //! ```text
-//! schema metadata    key `twincal.statistics` → JSON: format, checksum, model, header, records
-//! column `value`     float64; records one after the other, each [log, joint, quantity, block, rows, runs, numbers]
+//! schema metadata    key `twincal.statistics` → JSON: format, checksum, model, header, logs
+//! column `log`       text: JSON: header, records, each [joint, quantity, block, rows, runs, numbers]
+//! column `value`     list of float64: the numbers of these records, one after the other
 //! ```
-//! The checksum is SHA-256 of the JSON with an empty checksum, and of all numbers as little-endian bytes.
+//! Every row is a record batch by itself, so that files are merged row by row. The metadata hold SHA-256 of the text and of the numbers of each
+//! row (doubles, little-endian), and of themselves with an empty checksum.
 
+mod files;
+mod reader;
 mod write;
 
+pub use files::StatisticsFiles;
+
 use crate::artifact::sha256;
-use crate::error::{Error, Place, Result};
-use crate::log::arrow_numbers;
-use crate::open::InputFile;
+use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
-use std::io::Cursor;
 use std::path::Path;
-use twincal::calibrate::{Header, Quantity, Record, Statistics};
+use twincal::calibrate::{Header, Identity, LogHeader, Quantity, Statistics};
 
 /// What this version writes.
-const FORMAT: u32 = 1;
-/// Key of the schema's metadata, and the name of the only column.
+const FORMAT: u32 = 2;
+/// Key of the schema's metadata, and the names of the columns.
 const KEY: &str = "twincal.statistics";
-const COLUMN: &str = "value";
+const COLUMNS: [&str; 2] = ["log", "value"];
 /// Largest file, bytes: some thousand logs of ten minutes.
 const MAX_BYTES: u64 = 16 << 30;
+/// What helps where a file is not as it was written.
+const REMEDY: &str = "make it anew with `twincal statistics --force`";
 
 /// Statistics with the model file that their robot was read from.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,86 +59,92 @@ struct Metadata {
     checksum: String,
     model: ModelFile,
     header: Header,
+    logs: Vec<Entry>,
+}
+
+/// The only key that all formats have.
+#[derive(Deserialize)]
+struct Format {
+    format: u32,
+}
+
+/// What distinguishes logs, and the checksums of a row.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Entry {
+    name: String,
+    /// SHA-256 of the log, or empty.
+    source: String,
+    ends: [f64; 2],
+    /// See [`Identity::sums`].
+    sums: u64,
+    /// SHA-256 of the row's text.
+    text: String,
+    /// SHA-256 of its numbers.
+    numbers: String,
+}
+
+/// The JSON of a row.
+#[derive(Debug, Serialize, Deserialize)]
+struct RowText {
+    header: LogHeader,
     records: Vec<Layout>,
 }
 
-/// `[log, joint, quantity, block, rows, runs, numbers]`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-struct Layout(u32, u32, Quantity, u32, f64, f64, u64);
+/// `[joint, quantity, block, rows, runs, numbers]`.
+#[derive(Debug, Serialize, Deserialize)]
+struct Layout(u32, Quantity, u32, f64, f64, u64);
 
 impl StatisticsFile {
-    /// Reads a file that [`StatisticsFile::write_to`] wrote.
+    /// Reads a file that [`StatisticsFile::write_to`] or [`StatisticsFiles::write_to`] wrote.
     ///
     /// # Errors
-    /// [`Error::Content`] for another file, format or checksum; those of [`Statistics::from_records`].
+    /// Those of [`StatisticsFiles`].
     pub fn read(path: &Path) -> Result<Self> {
-        let name = path.display().to_string();
-        let remedy = "make it anew with `twincal statistics`";
-        let bytes = InputFile::new(path, MAX_BYTES)
-            .read()
-            .map_err(|refusal| refusal.into_error(&name, remedy))?;
-        let refuse = |problem: String| Error::content(Place::file(&name), problem, remedy);
-        let (text, numbers) = arrow_numbers(Cursor::new(&bytes[..]), &name, (KEY, COLUMN))?;
-        let text = text.ok_or_else(|| {
-            Error::content(
-                Place::file(&name),
-                "holds no statistics of twincal",
-                "give a file that `twincal statistics` wrote",
-            )
-        })?;
-        let mut metadata: Metadata = serde_json::from_str(&text)
-            .map_err(|e| refuse(format!("its metadata cannot be read: {e}")))?;
-        if metadata.format != FORMAT {
-            return Err(refuse(format!(
-                "has format {}, this program reads {FORMAT}",
-                metadata.format
-            )));
-        }
-        let said = std::mem::take(&mut metadata.checksum);
-        if said != checksum(&metadata, &numbers)? {
-            return Err(refuse("is damaged: its checksum is another one".into()));
-        }
-        let mut left = &numbers[..];
-        let mut records = Vec::with_capacity(metadata.records.len());
-        for Layout(log, joint, quantity, block, rows, runs, count) in metadata.records {
-            let count = usize::try_from(count).ok();
-            let Some((own, rest)) = count.and_then(|count| left.split_at_checked(count)) else {
-                return Err(refuse("holds fewer numbers than it declares".into()));
-            };
-            left = rest;
-            records.push(Record {
-                log,
-                joint,
-                quantity,
-                block,
-                rows,
-                runs,
-                values: own.to_vec(),
-            });
-        }
-        if !left.is_empty() {
-            return Err(refuse("holds more numbers than it declares".into()));
-        }
-        Ok(Self {
-            statistics: Statistics::from_records(metadata.header, records)
-                .map_err(|e| refuse(e.to_string()))?,
-            model: metadata.model,
-        })
+        StatisticsFiles::open(&[path.to_owned()], &mut |_| {})?.read()
     }
 }
 
-/// Of the metadata with an empty checksum, and the numbers.
-fn checksum(metadata: &Metadata, numbers: &[f64]) -> Result<String> {
-    let mut bytes = json(metadata)?.into_bytes();
-    bytes.reserve(8 * numbers.len());
-    for number in numbers {
-        bytes.extend(number.to_le_bytes());
+impl Metadata {
+    /// SHA-256 of the metadata with an empty checksum.
+    fn own_checksum(&self) -> Result<String> {
+        let without = Self {
+            checksum: String::new(),
+            ..self.clone()
+        };
+        Ok(sha256(json(&without)?.as_bytes()))
     }
-    Ok(sha256(&bytes))
 }
 
-fn json(metadata: &Metadata) -> Result<String> {
-    serde_json::to_string(metadata).map_err(|e| Error::Internal {
+impl Entry {
+    fn new(header: &LogHeader, [text, numbers]: [String; 2]) -> Self {
+        let Identity {
+            name,
+            source,
+            ends,
+            sums,
+        } = header.identity();
+        Self {
+            name: name.to_owned(),
+            source: source.to_owned(),
+            ends,
+            sums,
+            text,
+            numbers,
+        }
+    }
+
+    fn identity(&self) -> Identity<'_> {
+        Identity {
+            name: &self.name,
+            source: &self.source,
+            ends: self.ends,
+            sums: self.sums,
+        }
+    }
+}
+
+fn json(value: &impl Serialize) -> Result<String> {
+    serde_json::to_string(value).map_err(|e| Error::Internal {
         what: "statistics as JSON".into(),
         problem: e.to_string(),
     })

@@ -80,8 +80,8 @@ mod tests {
     use crate::words::tests::judged;
     use twincal::validate::Split;
 
-    /// The elbow beyond on so many rows, within on as many; new motion where its held-out velocity is `speed` times what it is.
-    fn limits(beyond: (u64, f64), within: (u64, f64), split: Split, speed: f64) -> Vec<String> {
+    /// The elbow beyond on so many rows, within on as many; all of them new motion or none.
+    fn limits(beyond: (u64, f64), within: (u64, f64), split: Split, is_new: bool) -> Vec<String> {
         let verdict = judged(|c| {
             c.validation.split = split.clone();
             c.validation.beyond = c.validation.within.clone();
@@ -92,10 +92,7 @@ mod tests {
             ] {
                 (scores.joints[1].rows, scores.joints[1].coverage95) = (rows, coverage95);
             }
-            let traces = c.validation.traces.iter_mut();
-            for trace in traces.filter(|trace| trace.joint == "elbow") {
-                trace.qd.iter_mut().for_each(|qd| *qd *= speed);
-            }
+            c.validation.new_motion = vec![0, if is_new { beyond.0 } else { 0 }];
         });
         let told = verdict.limits.into_iter();
         told.filter(|limit| limit.contains("beyond the") || limit.contains(" open"))
@@ -106,21 +103,21 @@ mod tests {
     fn rows_of_new_motion_are_told_as_that_and_others_by_what_training_leaves_open() {
         let (beyond, within) = ((41, 0.93), (40, 0.95));
         assert_eq!(
-            limits(beyond, within, Split::HeldoutLogs, 10.0),
+            limits(beyond, within, Split::HeldoutLogs, true),
             ["Tested mostly beyond the training motion: elbow (41 of 81 moving rows)."]
         );
         // So is a joint that is no better within.
         assert_eq!(
-            limits((41, 0.95), (40, 0.93), Split::HeldoutLogs, 10.0),
+            limits((41, 0.95), (40, 0.93), Split::HeldoutLogs, true),
             ["Tested mostly beyond the training motion: elbow (41 of 81 moving rows)."]
         );
         let open = "Training leaves the torque open, known less well than its noise, on most tested rows: elbow (41 of 81 moving rows).";
-        assert_eq!(limits(beyond, within, Split::HeldoutLogs, 1.0), [open]);
+        assert_eq!(limits(beyond, within, Split::HeldoutLogs, false), [open]);
         // Of later parts of the same logs the motion is in the training range by definition.
-        assert_eq!(limits(beyond, within, Split::LastThirty, 10.0), [open]);
-        assert!(limits((40, 0.93), within, Split::LastThirty, 1.0).is_empty());
+        assert_eq!(limits(beyond, within, Split::LastThirty, true), [open]);
+        assert!(limits((40, 0.93), within, Split::LastThirty, false).is_empty());
         // No excuse where it is not worse there.
-        assert!(limits((41, 0.95), (40, 0.93), Split::LastThirty, 1.0).is_empty());
+        assert!(limits((41, 0.95), (40, 0.93), Split::LastThirty, false).is_empty());
     }
 
     #[test]
@@ -148,22 +145,22 @@ mod tests {
 
     #[test]
     fn what_is_too_narrow_there_is_said_with_what_holds_elsewhere() {
-        let of = |beyond, within, speed| limits(beyond, within, Split::HeldoutLogs, speed);
+        let of = |beyond, within, is_new| limits(beyond, within, Split::HeldoutLogs, is_new);
         assert_eq!(
-            of((34, 0.24), (46, 0.93), 10.0),
+            of((34, 0.24), (46, 0.93), true),
             [
                 "Joint elbow: beyond the training motion (34 of 80 moving rows) its 95 % intervals hold 24.0\u{202f}%, within it 93.0\u{202f}%."
             ]
         );
         assert_eq!(
-            of((34, 0.24), (46, 0.93), 1.0),
+            of((34, 0.24), (46, 0.93), false),
             [
                 "Joint elbow: where training leaves its torque open (34 of 80 moving rows) its 95 % intervals hold 24.0\u{202f}%, elsewhere 93.0\u{202f}%."
             ]
         );
         // Nothing of it where the cause does not explain it, nor of a handful of rows.
-        assert!(of((34, 0.24), (46, 0.2), 1.0).is_empty());
-        assert!(of((5, 0.8), (46, 0.93), 1.0).is_empty());
-        assert!(of((34, 0.94), (46, 0.95), 1.0).is_empty());
+        assert!(of((34, 0.24), (46, 0.2), false).is_empty());
+        assert!(of((5, 0.8), (46, 0.93), false).is_empty());
+        assert!(of((34, 0.94), (46, 0.95), false).is_empty());
     }
 }

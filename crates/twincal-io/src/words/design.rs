@@ -7,12 +7,12 @@ use crate::collision::CollisionWorld;
 use twincal::assess::open_effects;
 use twincal::calibrate::Calibration;
 use twincal::design::{
-    Design, JERK_TIME, JointLimits, Load, OtherRecording, Promise, Recorded, SPEED_UP,
+    Criterion, Design, JERK_TIME, JointLimits, Load, OtherRecording, Promise, Recorded, SPEED_UP,
 };
 use twincal::words::{listed, shortened};
 
 /// What shares of limits are.
-pub const SHARES: &str = "Shares are of the limits, by the control points that bound them.";
+pub const SHARES: &str = "Shares of the limits at the samples; between them position, velocity, acceleration and jerk stay within the limits, too.";
 
 /// What it means that a motion decides an effect.
 pub const DECIDED: &str = "Decided: the PIP leaves 0.05 to 0.95 in logs simulated from the posterior. \
@@ -52,8 +52,11 @@ pub fn headline(design: &Design) -> String {
 
 /// What the motion was designed for.
 #[must_use]
-pub fn purpose(design: &Design) -> String {
+pub fn purpose(design: &Design, criterion: Criterion) -> String {
     match design.promises.len() {
+        0 if criterion == Criterion::Condition => {
+            "Designed to show body, motors and friction with a small condition number.".into()
+        }
         0 => "Designed to show body, motors and friction.".into(),
         1 => "Designed to decide 1 effect of the twin.".into(),
         n => format!("Designed to decide {n} effects of the twin."),
@@ -188,19 +191,39 @@ pub fn assumed(limits: &[JointLimits]) -> Vec<String> {
         (
             "start",
             "start",
-            "0, the middle, or a position that is free".to_owned(),
+            "0, the middle, or near to it where that is not free".to_owned(),
         ),
     ];
     let said = rules.into_iter().filter_map(|(key, what, rule)| {
         let joints = limits.iter().filter(|own| own.assumed.contains(&key));
-        let names: Vec<_> = joints.map(|own| shortened(&own.joint)).collect();
+        let is_start = key == "start";
+        let named = |own: &JointLimits| match is_start {
+            true => format!("{} {}", shortened(&own.joint), number(own.start, 3)),
+            false => shortened(&own.joint).into_owned(),
+        };
+        let names: Vec<String> = joints.map(named).collect();
         let names = match names.len() {
             0 => return None,
-            n if n == limits.len() && n > 1 => "all joints".to_owned(),
+            n if n == limits.len() && n > 1 && !is_start => "all joints".to_owned(),
             _ => listed(&names, ", "),
         };
         Some(format!("{what} assumed: {rule} ({names})"))
     });
+    said.collect()
+}
+
+/// Stated limits that the model file does not allow.
+#[must_use]
+pub fn beyond_model(limits: &[JointLimits]) -> Vec<String> {
+    let said = ["position", "velocity", "torque"]
+        .into_iter()
+        .filter_map(|key| {
+            let joints = limits.iter().filter(|own| own.beyond_model.contains(&key));
+            let names: Vec<_> = joints.map(|own| shortened(&own.joint)).collect();
+            let beyond = "is beyond that of the model file; check its unit";
+            (!names.is_empty())
+                .then(|| format!("the {key} limit of {} {beyond}", listed(&names, ", ")))
+        });
     said.collect()
 }
 
@@ -351,8 +374,9 @@ mod tests {
             acceleration: 5.0,
             jerk: 50.0,
             torque: None,
-            start: 0.0,
+            start: 0.25,
             assumed: assumed.to_vec(),
+            beyond_model: Vec::new(),
         }
     }
 
@@ -366,17 +390,26 @@ mod tests {
     fn an_assumed_limit_has_its_rule_and_its_joints() {
         let both = [
             limits("a", &["acceleration", "jerk"]),
-            limits("b", &["jerk", "position"]),
+            limits("b", &["jerk", "position", "start"]),
         ];
         assert_eq!(
             assumed(&both),
             [
                 "acceleration limit assumed: velocity / 0.2 s (a)",
                 "jerk limit assumed: acceleration / 0.1 s (all joints)",
-                "position limit assumed: ±π (b)"
+                "position limit assumed: ±π (b)",
+                "start assumed: 0, the middle, or near to it where that is not free (b 0.250)"
             ]
         );
         assert!(assumed(&[limits("a", &[])]).is_empty());
+        let mut fast = limits("a", &[]);
+        assert!(beyond_model(std::slice::from_ref(&fast)).is_empty());
+        fast.beyond_model = vec!["velocity"];
+        let said = beyond_model(&[fast]);
+        assert!(
+            said[0].starts_with("the velocity limit of a is beyond"),
+            "{said:?}"
+        );
     }
 
     #[test]

@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -57,6 +57,7 @@ def design(
     model: str | os.PathLike[str] | None = None,
     twin: str | os.PathLike[str] | None = None,
     decide: Iterable[str] = (),
+    criterion: Literal["determinant", "condition"] = "determinant",
     after: Iterable[str | os.PathLike[str]] = (),
     config: str | os.PathLike[str] | None = None,
     duration: float = 20.0,
@@ -78,6 +79,9 @@ def design(
         meshes of that file are checked for collisions.
     decide : iterable of str
         Effects to decide; without them those with a probability of 0.05 to 0.95.
+    criterion : {"determinant", "condition"}
+        What the motion maximises without a twin: information on all base parameters, or, at the
+        price of wider intervals, the same with a smaller condition number.
     after : iterable of path
         Logs that are recorded already, beside those of the twin: what they show the motion need
         not show again. Their torque is not looked at.
@@ -114,6 +118,8 @@ def design(
     for flag, path in (("--model", model), ("--twin", twin), ("--limits", limits), ("--config", config)):
         if path is not None:
             arguments += [flag, os.fspath(path)]
+    if criterion != "determinant":
+        arguments += ["--criterion", criterion]
     names = list(decide)
     arguments += ["--decide", *names] if names else []
     logs = [os.fspath(path) for path in after]

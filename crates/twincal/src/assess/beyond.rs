@@ -7,8 +7,6 @@ use crate::calibrate::Calibration;
 use crate::error::Code;
 use crate::validate::{JointScore, Split, Validation};
 
-/// Share of its range by which a joint may leave the training motion.
-const MARGIN: f64 = 0.05;
 /// Share of a joint's rows from which the error there is told.
 const MANY: f64 = 0.1;
 /// Ratio of errors there and elsewhere from which they are told.
@@ -19,42 +17,16 @@ const MOSTLY: f64 = 0.5;
 /// Why [`Validation::beyond`] has a joint's rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Cause {
-    /// Its position or velocity leaves the training range.
+    /// Its position, velocity or acceleration leaves the training range.
     NewMotion,
     /// What is not known of its torque is more than the noise.
     OpenTorque,
 }
 
 impl Cause {
-    /// New motion is only where whole logs were held out: of other splits the range is that of all logs.
-    fn of(calibration: &Calibration, joint: &str, rows: f64) -> Self {
-        if calibration.validation.split != Split::HeldoutLogs {
-            return Self::OpenTorque;
-        }
-        let index = calibration
-            .noise
-            .iter()
-            .position(|noise| noise.joint == joint);
-        let hull = index.and_then(|index| calibration.twin.hull.get(index));
-        let Some(hull) = hull else {
-            return Self::NewMotion;
-        };
-        let leaves = |x: f64, low: f64, high: f64| {
-            let margin = MARGIN * (high - low);
-            x < low - margin || x > high + margin
-        };
-        let (mut new, mut all) = (0.0, 0.0);
-        let traces = calibration.validation.traces.iter();
-        for trace in traces.filter(|trace| trace.joint == joint) {
-            for ((q, qd), still) in trace.q.iter().zip(&trace.qd).zip(&trace.standstill) {
-                if !still {
-                    all += 1.0;
-                    let outside = leaves(*q, hull[0], hull[1]) || leaves(*qd, hull[2], hull[3]);
-                    new += f64::from(u8::from(outside));
-                }
-            }
-        }
-        match new > MOSTLY * rows * all {
+    /// Of rows beyond, of which so many are new motion. That is only where whole logs were held out: of other splits the range is that of all logs.
+    fn of(split: &Split, new_motion: u64, rows: u64) -> Self {
+        match *split == Split::HeldoutLogs && new_motion as f64 > MOSTLY * rows as f64 {
             true => Self::NewMotion,
             false => Self::OpenTorque,
         }
@@ -77,14 +49,18 @@ pub(super) struct Beyond<'a> {
 }
 
 impl<'a> Beyond<'a> {
-    fn of(calibration: &Calibration, within: &'a JointScore, beyond: &'a JointScore) -> Self {
+    fn of(
+        calibration: &Calibration,
+        (within, beyond): (&'a JointScore, &'a JointScore),
+        new_motion: u64,
+    ) -> Self {
         let all = within.rows + beyond.rows;
         let share = beyond.rows as f64 / all as f64;
         let narrow = too_narrow(beyond, memory(&calibration.noise, &beyond.joint));
         Self {
             within,
             beyond,
-            cause: Cause::of(calibration, &beyond.joint, share),
+            cause: Cause::of(&calibration.validation.split, new_motion, beyond.rows),
             narrow: narrow && (within.rows == 0 || within.coverage95 > beyond.coverage95),
             further_off: within.rows > 0
                 && share >= MANY
@@ -108,11 +84,19 @@ impl<'a> Beyond<'a> {
 
 /// Joints that have held-out rows there.
 pub(super) fn beyond(calibration: &Calibration) -> impl Iterator<Item = Beyond<'_>> {
-    let Validation { within, beyond, .. } = &calibration.validation;
+    let Validation {
+        within,
+        beyond,
+        new_motion,
+        ..
+    } = &calibration.validation;
     let pairs = within.joints.iter().zip(&beyond.joints);
+    // Validations without rows have no counts.
+    let new_motion = new_motion.iter().copied().chain(std::iter::repeat(0));
     pairs
-        .filter(|(_, beyond)| beyond.rows > 0)
-        .map(|(within, beyond)| Beyond::of(calibration, within, beyond))
+        .zip(new_motion)
+        .filter(|((_, beyond), _)| beyond.rows > 0)
+        .map(|(pair, new_motion)| Beyond::of(calibration, pair, new_motion))
 }
 
 /// Joints of which training says less on a tenth of the held-out moving rows or more, mostly because their motion is new.

@@ -4,6 +4,7 @@ use super::data::all_logs::{spread, within};
 use super::data::facts::LogFacts;
 use super::data::log::Log;
 use super::data::reader::{Reader, Role};
+use super::distinct::{Fnv, Identity, require_distinct};
 use super::plan::{Plan, VERSION};
 use crate::cross_check::stuck_encoders;
 use crate::error::{Error, Finding, Result};
@@ -161,77 +162,52 @@ impl Statistics {
     /// [`Error::Statistics`] for another plan, version or robot, for a log that is there already, under this or another name, and for logs of
     /// one robot that overlap in time (by absolute stamps); then nothing was added.
     pub fn try_merge(&mut self, other: &Self) -> Result<()> {
-        let refused = |problem: String, remedy: &str| {
-            Err(Error::Statistics {
-                problem,
-                remedy: remedy.into(),
-            })
-        };
-        if self.plan.version != other.plan.version {
-            let versions = (other.plan.version, self.plan.version);
-            return refused(
-                format!(
-                    "made with version {} of the plan, the others with {}",
-                    versions.0, versions.1
-                ),
-                "make all of them with one version of the program",
-            );
-        }
-        if self.robot_name != other.robot_name || self.robot != other.robot {
-            return refused(
-                format!(
-                    "of robot `{}`, the others of `{}`, or of another model file",
-                    other.robot_name, self.robot_name
-                ),
-                "merge statistics of one robot; say with --robot which one was logged",
-            );
-        }
-        if self.plan != other.plan {
-            return refused(
-                "made with another plan than the others".into(),
-                "make all of them with one plan: twincal statistics --plan FILE",
-            );
-        }
-        for log in &other.logs {
-            self.require_new(log)?;
-        }
+        require_same(self.common(), other.common())?;
+        let logs = self.logs.iter().chain(&other.logs);
+        require_distinct(&logs.map(LogStatistics::identity).collect::<Vec<_>>())?;
         self.logs.extend_from_slice(&other.logs);
         self.logs.sort_by(|a, b| a.name().cmp(b.name()));
         Ok(())
     }
 
-    fn require_new(&self, log: &LogStatistics) -> Result<()> {
-        let refused = |problem: String| {
-            Err(Error::Statistics {
-                problem,
-                remedy: "give every log once".into(),
-            })
-        };
-        for own in &self.logs {
-            if own.name() == log.name() {
-                return refused(format!("log `{}` is there twice", own.name()));
-            }
-            let same_file = !own.about.source.is_empty() && own.about.source == log.about.source;
-            if same_file || own.sums == log.sums {
-                return refused(format!(
-                    "log `{}` is log `{}` under another name",
-                    log.name(),
-                    own.name()
-                ));
-            }
-            let [a, b] = [own, log].map(|log| log.about.facts.ends);
-            let absolute = a[0] > ABSOLUTE && b[0] > ABSOLUTE;
-            if absolute && a[0] < b[1] && b[0] < a[1] {
-                return refused(format!(
-                    "logs `{}` and `{}` overlap in time by {:.1} s",
-                    own.name(),
-                    log.name(),
-                    a[1].min(b[1]) - a[0].max(b[0])
-                ));
-            }
-        }
-        Ok(())
+    /// What is the same in statistics that add.
+    fn common(&self) -> Common<'_> {
+        (&self.robot_name, &self.robot, &self.plan)
     }
+}
+
+/// What is the same in statistics that add: name of the robot, its model, the plan.
+pub(super) type Common<'a> = (&'a str, &'a Robot, &'a Plan);
+
+/// # Errors
+/// [`Error::Statistics`] for another plan, version or robot.
+pub(super) fn require_same(own: Common<'_>, other: Common<'_>) -> Result<()> {
+    let ((name, robot, plan), (other_name, other_robot, other_plan)) = (own, other);
+    let (problem, remedy) = if plan.version != other_plan.version {
+        (
+            format!(
+                "made with version {} of the plan, the others with {}",
+                other_plan.version, plan.version
+            ),
+            "make all of them with one version of the program",
+        )
+    } else if name != other_name || robot != other_robot {
+        (
+            format!("of robot `{other_name}`, the others of `{name}`, or of another model file"),
+            "merge statistics of one robot; say with --robot which one was logged",
+        )
+    } else if plan != other_plan {
+        (
+            "made with another plan than the others".into(),
+            "make all of them with one plan: twincal statistics --plan FILE",
+        )
+    } else {
+        return Ok(());
+    };
+    Err(Error::Statistics {
+        problem,
+        remedy: remedy.into(),
+    })
 }
 
 /// Numbers of a long log that could not be read back are behind whatever was made of it.
@@ -254,12 +230,26 @@ fn as_recorded(robot: &Robot, log: &signal::Log<'_>) -> Result<Vec<Finding>> {
     Ok(findings)
 }
 
-/// Stamps behind it are seconds since 1970, s: September 2001.
-const ABSOLUTE: f64 = 1e9;
-
 impl LogStatistics {
     pub(crate) fn name(&self) -> &str {
         &self.about.facts.summary.name
+    }
+
+    /// What distinguishes it from others.
+    pub(crate) fn identity(&self) -> Identity<'_> {
+        let mut sum = Fnv::new();
+        (self.sums.rows.iter()).for_each(|rows| sum.add(*rows as u64));
+        for block in self.sums.joints.iter().flat_map(|joint| &joint.blocks) {
+            let residual = block.gram.s0.values.last().copied().unwrap_or(0.0);
+            let numbers = [block.torque, block.gram.n, residual];
+            (numbers.iter()).for_each(|number| sum.add(number.to_bits()));
+        }
+        Identity {
+            name: self.name(),
+            source: &self.about.source,
+            ends: self.about.facts.ends,
+            sums: sum.sum(),
+        }
     }
 
     /// The same with stretches twice as long.

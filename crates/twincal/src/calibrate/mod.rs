@@ -3,6 +3,7 @@
 mod attempts;
 mod checks;
 mod data;
+mod distinct;
 mod exit;
 mod fit;
 mod from_statistics;
@@ -24,6 +25,7 @@ pub use checks::left_out::{LeftOutData, LeftOutError};
 pub use checks::sweep::SweepPoint;
 pub(crate) use data::all_logs::hardly_act;
 pub use data::log_summary::LogSummary;
+pub use distinct::{Clash, Identity, clash};
 pub(crate) use fit::columns::columns_of;
 pub use fit::compact::{Compact, CompactTerm};
 pub(crate) use from_statistics::calibrate_pooled;
@@ -34,7 +36,7 @@ pub use outlook::{LookedAt, Outlook, outlook};
 pub use plan::{About, Plan, VERSION as PLAN_VERSION};
 pub(crate) use pooled::Pooled;
 pub use progress::Stage;
-pub use records::{Header, Quantity, Record};
+pub use records::{FromTables, Header, LogHeader, LogTable, Quantity, Record};
 pub use result::calibration::{
     Along, Calibration, ComponentSummary, Curve, Draws, Group, LikelihoodUsed, ParameterSummary,
     PriorUsed, TermSummary,

@@ -1,8 +1,10 @@
 //! Statistics as a header and a table of numbers, which files hold, and back; what does not fit together is refused.
 
-use super::log_statistics::{About, LogStatistics, Statistics};
+use super::distinct::{Identity, require_distinct};
+use super::log_statistics::{About, LogStatistics, Statistics, require_same};
 use super::plan::Plan;
 use crate::error::{Error, Result};
+use crate::excitation::States;
 use crate::gram::{JointGram, Symmetric};
 use crate::likelihood::NoiseModel;
 use crate::robot::Robot;
@@ -14,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// What statistics are of.
+/// What statistics are of, whatever their logs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// The robot that was logged.
@@ -23,12 +25,20 @@ pub struct Header {
     pub robot: Robot,
     /// How the logs were read.
     pub plan: Plan,
-    /// Log by log.
-    logs: Vec<LogHeader>,
 }
 
+/// Statistics of one log as a header and numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LogTable {
+    /// What is known of the log.
+    pub header: LogHeader,
+    /// All numbers, in the order of joints, quantities and stretches.
+    pub records: Vec<Record>,
+}
+
+/// What is known of a log beside its numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct LogHeader {
+pub struct LogHeader {
     about: About,
     /// Rows of each stretch.
     rows: Vec<usize>,
@@ -36,13 +46,32 @@ struct LogHeader {
     cutoff: f64,
     /// Rows of the longest run of each joint.
     longest: Vec<usize>,
+    /// See [`Identity::sums`].
+    sums: u64,
+}
+
+impl LogHeader {
+    /// Name of the log.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.about.facts.summary.name
+    }
+
+    /// What distinguishes the log from others.
+    #[must_use]
+    pub fn identity(&self) -> Identity<'_> {
+        Identity {
+            name: self.name(),
+            source: &self.about.source,
+            ends: self.about.facts.ends,
+            sums: self.sums,
+        }
+    }
 }
 
 /// One list of numbers of one joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
-    /// Number of the log in the header.
-    pub log: u32,
     /// Number of the joint.
     pub joint: u32,
     /// What the numbers are.
@@ -81,11 +110,19 @@ pub enum Quantity {
     Logged,
     /// Σ x xᵀ of the filtered rows at the same times.
     Filtered,
+    /// Positions of the joint in some rows, evenly taken; rad, m.
+    Positions,
+    /// Its velocities there.
+    Velocities,
+    /// Its accelerations there.
+    Accelerations,
+    /// 1 where the joint stands still there, else 0.
+    Still,
 }
 
 impl Quantity {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 14] = [
         Self::Products,
         Self::Differences,
         Self::First,
@@ -96,6 +133,10 @@ impl Quantity {
         Self::Power,
         Self::Logged,
         Self::Filtered,
+        Self::Positions,
+        Self::Velocities,
+        Self::Accelerations,
+        Self::Still,
     ];
 
     /// Its name in files.
@@ -112,6 +153,10 @@ impl Quantity {
             Self::Power => "power",
             Self::Logged => "logged",
             Self::Filtered => "filtered",
+            Self::Positions => "positions",
+            Self::Velocities => "velocities",
+            Self::Accelerations => "accelerations",
+            Self::Still => "still",
         }
     }
 
@@ -122,111 +167,156 @@ impl Quantity {
     }
 }
 
-impl Statistics {
-    /// What the numbers of [`Statistics::records`] are of.
-    #[must_use]
-    pub fn header(&self) -> Header {
-        let of_log = |log: &LogStatistics| LogHeader {
-            about: log.about.clone(),
-            rows: log.sums.rows.clone(),
-            cutoff: log.sums.cutoff,
-            longest: (log.sums.joints.iter())
+impl Header {
+    /// # Errors
+    /// [`Error::Statistics`] for another plan, version or robot: sums of the two do not add.
+    pub fn require_same(&self, other: &Self) -> Result<()> {
+        let [own, other] = [self, other].map(|own| (&*own.robot_name, &own.robot, &own.plan));
+        require_same(own, other)
+    }
+}
+
+impl LogStatistics {
+    fn table(&self) -> LogTable {
+        let header = LogHeader {
+            about: self.about.clone(),
+            rows: self.sums.rows.clone(),
+            cutoff: self.sums.cutoff,
+            longest: (self.sums.joints.iter())
                 .map(|joint| joint.bands.longest)
                 .collect(),
+            sums: self.identity().sums,
         };
+        let mut records = Vec::new();
+        for (joint, sums) in (0..).zip(&self.sums.joints) {
+            records.extend(of_joint(joint, sums, self.raw.get(joint as usize)));
+            records.extend(of_states(joint, &self.about.facts.states));
+        }
+        LogTable { header, records }
+    }
+}
+
+impl Statistics {
+    /// What the tables of [`Statistics::tables`] have in common.
+    #[must_use]
+    pub fn header(&self) -> Header {
         Header {
             robot_name: self.robot_name.clone(),
             robot: self.robot.clone(),
             plan: self.plan.clone(),
-            logs: self.logs.iter().map(of_log).collect(),
         }
     }
 
-    /// All numbers, in the order of logs, joints, quantities and stretches.
-    #[must_use]
-    pub fn records(&self) -> Vec<Record> {
-        let mut records = Vec::new();
-        for (number, log) in (0..).zip(&self.logs) {
-            for (joint, sums) in (0..).zip(&log.sums.joints) {
-                let raw = log.raw.get(joint as usize);
-                records.extend(of_joint((number, joint), sums, raw));
-            }
-        }
-        records
-    }
-
-    /// Statistics from what [`Statistics::header`] and [`Statistics::records`] gave.
-    ///
-    /// # Errors
-    /// [`Error::Statistics`] for another version, for records that are missing, twice or of another size than the candidates of the plan have,
-    /// for numbers that are none, and for logs that are there twice.
-    pub fn from_records(header: Header, records: Vec<Record>) -> Result<Self> {
-        header.plan.require_version()?;
-        let (library, _) = Library::propose(&header.robot, &header.plan.library)?;
-        let mut by_place = BTreeMap::new();
-        for record in records {
-            let place = (record.log, record.joint, record.quantity, record.block);
-            if !record.values.iter().all(|value| value.is_finite()) {
-                return Err(damaged(&header, record.log, "holds numbers that are none"));
-            }
-            if by_place.insert(place, record).is_some() {
-                return Err(damaged(&header, place.0, "holds a record twice"));
-            }
-        }
-        let mut all = Self {
-            robot_name: header.robot_name.clone(),
-            robot: header.robot.clone(),
-            plan: header.plan.clone(),
-            logs: Vec::new(),
-        };
-        for (number, log) in (0..).zip(&header.logs) {
-            let mut taken = Taken {
-                records: &mut by_place,
-                header: &header,
-                log: number,
-            };
-            let one = Self {
-                logs: vec![taken.log(log, &library)?],
-                ..all.clone_without_logs()
-            };
-            all.try_merge(&one)?;
-        }
-        match by_place.into_keys().next() {
-            Some((log, ..)) => Err(damaged(
-                &header,
-                log,
-                "holds more records than its header says",
-            )),
-            None => Ok(all),
-        }
-    }
-
-    fn clone_without_logs(&self) -> Self {
-        Self {
-            robot_name: self.robot_name.clone(),
-            robot: self.robot.clone(),
-            plan: self.plan.clone(),
-            logs: Vec::new(),
-        }
+    /// Log by log, in the order of their names.
+    pub fn tables(&self) -> impl ExactSizeIterator<Item = LogTable> + '_ {
+        self.logs.iter().map(LogStatistics::table)
     }
 }
 
-fn damaged(header: &Header, log: u32, problem: &str) -> Error {
-    let own = header.logs.get(log as usize);
-    let name = own.map_or("?", |log| log.about.facts.summary.name.as_str());
+/// Statistics that are put together from what [`Statistics::header`] and [`Statistics::tables`] gave, table by table.
+#[derive(Debug)]
+pub struct FromTables {
+    statistics: Statistics,
+    library: Library,
+}
+
+impl FromTables {
+    /// Without a log.
+    ///
+    /// # Errors
+    /// [`Error::Statistics`] for another version; those of [`Library::propose`].
+    pub fn new(header: Header) -> Result<Self> {
+        header.plan.require_version()?;
+        let (library, _) = Library::propose(&header.robot, &header.plan.library)?;
+        let statistics = Statistics {
+            robot_name: header.robot_name,
+            robot: header.robot,
+            plan: header.plan,
+            logs: Vec::new(),
+        };
+        Ok(Self {
+            statistics,
+            library,
+        })
+    }
+
+    /// Adds a log.
+    ///
+    /// # Errors
+    /// [`Error::Statistics`] for records that are missing, twice or of another size than the candidates of the plan have, and for numbers that are
+    /// none.
+    pub fn add(&mut self, table: LogTable) -> Result<()> {
+        let LogTable { header, records } = table;
+        let mut by_place = BTreeMap::new();
+        for record in records {
+            let place = (record.joint, record.quantity, record.block);
+            if !record.values.iter().all(|value| value.is_finite()) {
+                return Err(damaged(&header, "holds numbers that are none"));
+            }
+            if by_place.insert(place, record).is_some() {
+                return Err(damaged(&header, "holds a record twice"));
+            }
+        }
+        let mut taken = Taken {
+            records: by_place,
+            robot: &self.statistics.robot,
+            plan: &self.statistics.plan,
+            header: &header,
+        };
+        let log = taken.log(&self.library)?;
+        if !taken.records.is_empty() {
+            return Err(damaged(&header, "holds more records than its header says"));
+        }
+        if log.identity().sums != header.sums {
+            return Err(damaged(&header, "holds other sums than its header says"));
+        }
+        self.statistics.logs.push(log);
+        Ok(())
+    }
+
+    /// The statistics.
+    ///
+    /// # Errors
+    /// [`Error::Statistics`] for logs that are there twice or overlap in time.
+    pub fn finish(mut self) -> Result<Statistics> {
+        let logs = &mut self.statistics.logs;
+        require_distinct(&logs.iter().map(LogStatistics::identity).collect::<Vec<_>>())?;
+        logs.sort_by(|a, b| a.name().cmp(b.name()));
+        Ok(self.statistics)
+    }
+}
+
+fn damaged(header: &LogHeader, problem: &str) -> Error {
     Error::Statistics {
-        problem: format!("the table of log `{name}` {problem}"),
+        problem: format!("the table of log `{}` {problem}", header.name()),
         remedy: "the file is damaged: make it anew from the log".into(),
     }
 }
 
-fn of_joint(
-    (log, joint): (u32, u32),
-    sums: &JointSums,
-    raw: Option<&[JointGram; 2]>,
-) -> Vec<Record> {
+/// Positions, velocities and accelerations of a joint in some rows, and whether it stands still there.
+fn of_states(joint: u32, states: &States) -> [Record; 4] {
+    let own = joint as usize * states.len..(joint as usize + 1) * states.len;
+    let still = states.still[own.clone()].iter();
+    let still = still.map(|still| f64::from(u8::from(*still))).collect();
+    let of = |values: &[f64]| values[own.clone()].to_vec();
+    [
+        (Quantity::Positions, of(&states.q)),
+        (Quantity::Velocities, of(&states.qd)),
+        (Quantity::Accelerations, of(&states.qdd)),
+        (Quantity::Still, still),
+    ]
+    .map(|(quantity, values)| Record {
+        joint,
+        quantity,
+        block: 0,
+        rows: 0.0,
+        runs: 0.0,
+        values,
+    })
+}
+
+fn of_joint(joint: u32, sums: &JointSums, raw: Option<&[JointGram; 2]>) -> Vec<Record> {
     let record = |quantity, block: usize, counts: [f64; 2], values| Record {
-        log,
         joint,
         quantity,
         block: block as u32,
@@ -292,38 +382,35 @@ fn full(lower: &[f64], size: usize) -> Option<Symmetric> {
     Some(matrix)
 }
 
-/// Records by log, joint, quantity and block.
-type ByPlace = BTreeMap<(u32, u32, Quantity, u32), Record>;
+/// Records by joint, quantity and block.
+type ByPlace = BTreeMap<(u32, Quantity, u32), Record>;
 
 /// The records of one log, as they are taken.
 struct Taken<'a> {
-    records: &'a mut ByPlace,
-    header: &'a Header,
-    log: u32,
+    records: ByPlace,
+    robot: &'a Robot,
+    plan: &'a Plan,
+    header: &'a LogHeader,
 }
 
 impl Taken<'_> {
-    fn log(&mut self, own: &LogHeader, library: &Library) -> Result<LogStatistics> {
-        let joints = self.header.robot.dof();
-        let facts = &own.about.facts;
-        let states = &facts.states;
-        let cells = joints * states.len;
+    fn log(&mut self, library: &Library) -> Result<LogStatistics> {
+        let (joints, own) = (self.robot.dof(), self.header);
+        let mut about = own.about.clone();
+        let facts = &mut about.facts;
         let fits = own.rows.len() == BLOCKS
             && own.longest.len() == joints
             && facts.hull.len() == joints
-            && facts.summary.rows.len() == joints
-            && [&states.q, &states.qd, &states.qdd]
-                .iter()
-                .all(|own| own.len() == cells)
-            && states.still.len() == cells;
+            && facts.summary.rows.len() == joints;
         if !fits {
             return Err(
                 self.damaged("has another number of joints or stretches than its header says")
             );
         }
-        let acts = !self.header.plan.payload_where_unknown || facts.payload == Payload::Unknown;
+        facts.states = self.states(joints)?;
+        let acts = !self.plan.payload_where_unknown || facts.payload == Payload::Unknown;
         let recipes = recipes_of_log(library, acts);
-        let filtered = self.header.plan.pipeline.cutoff_hz != 0.0;
+        let filtered = self.plan.pipeline.cutoff_hz != 0.0;
         let (mut sums, mut raw) = (Vec::new(), Vec::new());
         for (joint, recipes) in recipes.into_iter().enumerate() {
             let size = recipes.parts() + 1;
@@ -337,7 +424,7 @@ impl Taken<'_> {
             sums.push(self.joint(joint, (columns, recipes), own.longest[joint])?);
         }
         Ok(LogStatistics {
-            about: own.about.clone(),
+            about,
             sums: LogSums {
                 cutoff: own.cutoff,
                 rows: own.rows.clone(),
@@ -345,6 +432,29 @@ impl Taken<'_> {
             },
             raw,
         })
+    }
+
+    /// States of all joints, as many of each.
+    fn states(&mut self, joints: usize) -> Result<States> {
+        let mut states = States::default();
+        for joint in 0..joints {
+            let [q, qd, qdd, still] = [
+                self.take(joint, Quantity::Positions, 0)?.values,
+                self.take(joint, Quantity::Velocities, 0)?.values,
+                self.take(joint, Quantity::Accelerations, 0)?.values,
+                self.take(joint, Quantity::Still, 0)?.values,
+            ];
+            let len = if joint == 0 { q.len() } else { states.len };
+            if [&q, &qd, &qdd, &still].iter().any(|own| own.len() != len) {
+                return Err(self.damaged("has another number of states on every joint"));
+            }
+            states.len = len;
+            states.q.extend(q);
+            states.qd.extend(qd);
+            states.qdd.extend(qdd);
+            states.still.extend(still.iter().map(|still| *still != 0.0));
+        }
+        Ok(states)
     }
 
     fn joint(
@@ -361,7 +471,7 @@ impl Taken<'_> {
         let mut blocks = Vec::new();
         for (block, torque) in torque.into_iter().enumerate() {
             let mut gram = self.gram_at(joint, (Quantity::Products, block), size)?;
-            if self.header.plan.noise == NoiseModel::Ar1 {
+            if self.plan.noise == NoiseModel::Ar1 {
                 gram.d = self.matrix(joint, (Quantity::Differences, block), size)?;
                 gram.first = self.matrix(joint, (Quantity::First, block), size)?;
                 gram.last = self.matrix(joint, (Quantity::Last, block), size)?;
@@ -388,7 +498,7 @@ impl Taken<'_> {
 
     /// Of every fifth, which the first of its two stretches has; none where the likelihood asks for none.
     fn decoys(&mut self, joint: usize, block: usize, size: usize) -> Result<JointDecoys> {
-        if self.header.plan.noise == NoiseModel::Ar1 || block % 2 == 1 {
+        if self.plan.noise == NoiseModel::Ar1 || block % 2 == 1 {
             return Ok(JointDecoys::default());
         }
         let cross = self.take(joint, Quantity::Decoys, block)?.values;
@@ -428,7 +538,7 @@ impl Taken<'_> {
     }
 
     fn take(&mut self, joint: usize, quantity: Quantity, block: usize) -> Result<Record> {
-        let place = (self.log, joint as u32, quantity, block as u32);
+        let place = (joint as u32, quantity, block as u32);
         let missing = format!("has no `{}` of joint {}", quantity.name(), joint + 1);
         let record = self.records.remove(&place);
         record.ok_or_else(|| self.damaged(&missing))
@@ -443,6 +553,6 @@ impl Taken<'_> {
     }
 
     fn damaged(&self, problem: &str) -> Error {
-        damaged(self.header, self.log, problem)
+        damaged(self.header, problem)
     }
 }

@@ -317,13 +317,19 @@ impl Names<'_> {
             true => "a sign, ",
             false => "",
         };
+        let load = match code == Code::LogTorqueFactor && factor > 0.0 {
+            true => {
+                "; a load that not all logs carry looks alike: state `payload` of this [[log]], \"unknown\" if nobody knows it"
+            }
+            false => "",
+        };
         Finding::new(
             Severity::Warning,
             code,
             subject,
             format!(
                 "{what}: measured torque is {size} times what {others}: look for {mistake}a gain, gear ratio or torque constant there, and multiply \
-                 {columns} by {}",
+                 {columns} by {}{load}",
                 significant(1.0 / factor, 3)
             ),
             0,

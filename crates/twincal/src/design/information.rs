@@ -1,8 +1,9 @@
 //! What rows of a motion say of independent columns: M = Σ Φᵀ W Φ.
 
+use super::criterion::Criterion;
 use super::spline::{Spline, StateWeights};
 use crate::excitation::{Reference, STATES, States, random_states, reference};
-use crate::linear_algebra::{Cholesky, product, symmetric_eigen};
+use crate::linear_algebra::{product, symmetric_eigen};
 use crate::robot::Robot;
 use crate::term::Library;
 
@@ -79,6 +80,7 @@ pub(super) fn quadratic(
 pub(super) struct Information<'a> {
     library: &'a Library,
     reference: Reference<'a>,
+    criterion: Criterion,
     /// The independent columns, ascending.
     pub(super) columns: Vec<usize>,
 }
@@ -98,16 +100,27 @@ impl<'a> Information<'a> {
         Self {
             library,
             reference,
+            criterion: Criterion::Determinant,
             columns,
         }
     }
 
+    /// The same columns with another criterion.
+    pub(super) fn maximising(self, criterion: Criterion) -> Self {
+        Self { criterion, ..self }
+    }
+
     /// ln det(M/n + ε): 0 for n rows that show every column like random states do, and none together with another.
     pub(super) fn log_determinant(&self, sums: &[f64], rows: f64) -> f64 {
+        Criterion::Determinant.value(&self.of_a_row(sums, rows), self.size())
+    }
+
+    /// M/n + ε.
+    fn of_a_row(&self, sums: &[f64], rows: f64) -> Vec<f64> {
         let size = self.size();
         let mut matrix: Vec<f64> = sums.iter().map(|x| x / rows).collect();
         (0..size).for_each(|k| matrix[k * size + k] += BEFORE);
-        Cholesky::new(&matrix, size).map_or(f64::NEG_INFINITY, |factor| factor.log_determinant())
+        matrix
     }
 
     /// Largest over smallest singular value of the rows.
@@ -133,16 +146,15 @@ impl Objective for Information<'_> {
     }
 
     fn value(&self, sums: &[f64], rows: f64, _duration: f64) -> f64 {
-        self.log_determinant(sums, rows)
+        self.criterion
+            .value(&self.of_a_row(sums, rows), self.size())
     }
 
     fn gradient(&self, sums: &[f64], rows: f64, _duration: f64) -> Option<Vec<f64>> {
-        let size = self.size();
-        let mut matrix: Vec<f64> = sums.iter().map(|x| x / rows).collect();
-        (0..size).for_each(|k| matrix[k * size + k] += BEFORE);
-        let mut inverse = Cholesky::new(&matrix, size).ok()?.inverse();
-        inverse.iter_mut().for_each(|x| *x /= rows);
-        Some(inverse)
+        let matrix = self.of_a_row(sums, rows);
+        let mut gradient = self.criterion.gradient(&matrix, self.size())?;
+        gradient.iter_mut().for_each(|x| *x /= rows);
+        Some(gradient)
     }
 
     fn shown(&self, matrix: &[f64], states: &States) -> Vec<f64> {

@@ -50,6 +50,8 @@ pub struct JointLimits {
     /// Keys that nobody stated: `acceleration` is velocity / 0.2 s, `jerk` acceleration / 0.1 s, `position` of a joint that turns without end
     /// ±π, `start` 0, the middle, or another one where the robot cannot rest there.
     pub assumed: Vec<&'static str>,
+    /// Keys whose stated limit is beyond that of the model file: `position`, `velocity`, `torque`.
+    pub beyond_model: Vec<&'static str>,
 }
 
 /// Limits of every joint: stated ones, those of the model file, and what is assumed.
@@ -138,6 +140,14 @@ fn of_joint(robot: &Robot, joint: usize, stated: StatedLimits) -> Result<JointLi
         );
         return Err(refused(name, problem, "give a start within the limits"));
     }
+    let beyond = |own: f64, file: Option<f64>| file.is_some_and(|file| file > 0.0 && own > file);
+    let further = of_file.is_some_and(|[low, high]| position[0] < low || position[1] > high);
+    let more = [
+        ("position", further),
+        ("velocity", beyond(velocity, file.velocity)),
+        ("torque", torque.is_some_and(|own| beyond(own, file.effort))),
+    ];
+    let more = more.into_iter().filter(|(_, is_beyond)| *is_beyond);
     Ok(JointLimits {
         joint: name.to_owned(),
         position,
@@ -147,6 +157,7 @@ fn of_joint(robot: &Robot, joint: usize, stated: StatedLimits) -> Result<JointLi
         torque,
         start,
         assumed,
+        beyond_model: more.map(|(key, _)| key).collect(),
     })
 }
 

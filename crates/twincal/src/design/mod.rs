@@ -3,7 +3,7 @@
 //! ```text
 //! maximise ln det(M/n),  M = Σ Φᵀ W Φ over n rows of the motion, Φ the independent columns of the candidates
 //! ```
-//! or, with a posterior, what decides its open questions ([`Questions`]).
+//! or another [`Criterion`] of M; with a posterior, what decides its open questions ([`Questions`]).
 //!
 //! Columns are of size 1 and joints of torque 1 at random states, as in [`crate::excitation`]. A motion is a B-spline of degree five for
 //! each joint; the search changes some control points at a time, within what position, velocity, acceleration and jerk allow everywhere, and
@@ -14,6 +14,7 @@
 
 mod ascent;
 mod clearance;
+mod criterion;
 mod information;
 mod limits;
 mod load;
@@ -30,6 +31,7 @@ mod torque;
 mod tests;
 
 pub use clearance::{Approach, Clearance, NearSlope, Path};
+pub use criterion::Criterion;
 pub use limits::{JERK_TIME, JointLimits, SPEED_UP, StatedLimits, joint_limits, spread_positions};
 pub use load::{Load, Loaded};
 pub use motion::{DesignedMotion, JointUse};
@@ -81,6 +83,8 @@ pub struct DesignSettings {
     pub proposals: usize,
     /// Steps uphill that each makes then.
     pub steps: usize,
+    /// What is maximised where nothing is asked.
+    pub criterion: Criterion,
 }
 
 impl Default for DesignSettings {
@@ -92,6 +96,7 @@ impl Default for DesignSettings {
             chains: 2,
             proposals: 1500,
             steps: 180,
+            criterion: Criterion::Determinant,
         }
     }
 }
@@ -132,7 +137,7 @@ pub struct DesignStage {
     pub done: usize,
     /// Of so many.
     pub all: usize,
-    /// What is maximised, of the best motion so far: ln det(M/n), or that of [`Questions`].
+    /// What is maximised, of the best motion so far: the [`Criterion`], or that of [`Questions`].
     pub gain: f64,
 }
 
@@ -171,7 +176,7 @@ pub fn design(
 ) -> Result<Design> {
     let (spans, span) = spans(settings)?;
     require_start(task)?;
-    let information = Information::new(task.robot, task.library);
+    let information = Information::new(task.robot, task.library).maximising(settings.criterion);
     let objective: &dyn Objective = match task.questions {
         Some(questions) => questions,
         None => &information,

@@ -5,7 +5,8 @@ use super::information::{Information, Objective as _, states_of};
 use super::recorded::{Following, Recorded};
 use super::search::Found;
 use super::spline::{Spline, StateWeights};
-use super::{Design, DesignSettings, Task};
+use super::torque::TORQUE_SHARE;
+use super::{Design, DesignSettings, JointLimits, Task};
 use crate::error::{Error, Result};
 use crate::excitation::{STATES, States, random_states};
 use serde::Serialize;
@@ -41,8 +42,10 @@ pub struct JointUse {
     pub joint: String,
     /// Smallest and largest position.
     pub position: [f64; 2],
-    /// Largest velocity, acceleration and jerk as a share of their limits.
+    /// Largest velocity, acceleration and jerk as a share of their limits; jerk as differences of acceleration.
     pub share: [f64; 3],
+    /// Largest torque as a share of its limit; `None`: not limited.
+    pub torque: Option<f64>,
 }
 
 /// The found motion at its rate; made smaller about its start until every sample is within torque and clearance.
@@ -110,6 +113,7 @@ fn described(
     Ok(Design {
         closest: task.clearance.and_then(|own| own.closest(&path())),
         promises,
+        used: used(task, &states, settings.rate),
         motion: DesignedMotion {
             joints: task.limits.iter().map(|own| own.joint.clone()).collect(),
             rate: settings.rate,
@@ -121,7 +125,6 @@ fn described(
         columns: information.size(),
         log_determinant: information.log_determinant(&sums, count),
         condition: information.condition(&sums),
-        used: used(task, splines),
         stopped,
     })
 }
@@ -194,26 +197,31 @@ pub(super) fn in_words(approach: &Approach) -> String {
     )
 }
 
-fn used(task: &Task<'_>, splines: &[Spline]) -> Vec<JointUse> {
-    let own = task.limits.iter().zip(splines);
-    own.map(|(limits, spline)| {
-        let most = |order: usize, limit: f64| {
-            let points = spline.derivative(order);
-            points.iter().fold(0.0_f64, |most, x| most.max(x.abs())) / limit
-        };
-        let positions = spline.points.iter().copied();
+/// What the samples use of the limits.
+fn used(task: &Task<'_>, states: &States, rate: f64) -> Vec<JointUse> {
+    let torques = task.torque.map(|own| own.shares(states));
+    let most = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0_f64, |a, b| a.max(b.abs()));
+    let of_joint = |(joint, limits): (usize, &JointLimits)| {
+        let own = joint * states.len..(joint + 1) * states.len;
+        let q = || states.q[own.clone()].iter().copied();
+        let (qd, qdd) = (&states.qd[own.clone()], &states.qdd[own.clone()]);
+        let jerk = &mut qdd.windows(2).map(|pair| (pair[1] - pair[0]) * rate);
+        let torque = torques.as_ref().map(|own_shares| &own_shares[own.clone()]);
         JointUse {
             joint: limits.joint.clone(),
             position: [
-                positions.clone().fold(f64::INFINITY, f64::min),
-                positions.fold(f64::NEG_INFINITY, f64::max),
+                q().fold(f64::INFINITY, f64::min),
+                q().fold(f64::NEG_INFINITY, f64::max),
             ],
             share: [
-                most(1, limits.velocity),
-                most(2, limits.acceleration),
-                most(3, limits.jerk),
+                most(&mut qd.iter().copied()) / limits.velocity,
+                most(&mut qdd.iter().copied()) / limits.acceleration,
+                most(jerk) / limits.jerk,
             ],
+            torque: torque
+                .filter(|_| limits.torque.is_some())
+                .map(|shares| TORQUE_SHARE * most(&mut shares.iter().copied())),
         }
-    })
-    .collect()
+    };
+    task.limits.iter().enumerate().map(of_joint).collect()
 }

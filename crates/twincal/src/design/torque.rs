@@ -10,7 +10,7 @@ use crate::term::{Family, Library};
 use crate::twin::Twin;
 
 /// Share of a torque limit that is used: what stands between samples may be a little more.
-const TORQUE_SHARE: f64 = 0.97;
+pub(super) const TORQUE_SHARE: f64 = 0.97;
 /// Half of a central 95 % interval of a normal distribution, in standard deviations.
 const HALF_OF_95: f64 = 1.96;
 

@@ -54,7 +54,8 @@ pub struct LogLag {
     pub log: String,
     /// Sampling interval, s.
     pub interval: f64,
-    /// Lag and standard deviation over all joints, s; `None` where the log does not say it.
+    /// Lag and standard deviation over all joints, s; `None` where the log does not say it. What joints disagree by, alike in all logs, is not
+    /// in the standard deviation: it compares logs.
     pub common: Option<[f64; 2]>,
     /// Whether it clearly differs from that of the other logs.
     pub differs: bool,

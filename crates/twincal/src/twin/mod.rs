@@ -59,6 +59,8 @@ pub struct JointTorque {
     /// The row lies outside the data: position, velocity or acceleration of the joint is outside the training range by
     /// more than 5 % of it, or the epistemic variance exceeds that of the noise.
     pub extrapolating: Vec<bool>,
+    /// The motion is why: position, velocity or acceleration of the joint is outside the training range by more than 5 % of it.
+    pub new_motion: Vec<bool>,
     /// Probability that the predictive distribution gives to torques up to the measured one; empty without measurement.
     /// On rows that stand still the measured torque first moves by up to ± the Coulomb coefficient towards the median, so
     /// that `|pit − ½| ≤ 0.475` is the same as lying inside `low … high`.
@@ -79,6 +81,7 @@ impl JointTorque {
         self.high.extend(other.high);
         self.epistemic.extend(other.epistemic);
         self.extrapolating.extend(other.extrapolating);
+        self.new_motion.extend(other.new_motion);
         self.pit.extend(other.pit);
         self.log_density.extend(other.log_density);
         self.noise.extend(other.noise);

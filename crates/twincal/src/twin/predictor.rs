@@ -314,9 +314,9 @@ impl Predictor {
                 torque.epistemic.push(epistemic[lane].sqrt());
                 let noise = noise(spread[lane]);
                 torque.noise.push(noise.sqrt());
-                torque
-                    .extrapolating
-                    .push(epistemic[lane] > noise || joint.leaves_hull(input, row));
+                let new_motion = joint.leaves_hull(input, row);
+                torque.new_motion.push(new_motion);
+                (torque.extrapolating).push(new_motion || epistemic[lane] > noise);
                 if residual.is_some() {
                     torque.pit.push(pit[lane]);
                     torque.log_density.push(density[lane].ln());

@@ -291,6 +291,11 @@ fn rows_outside_the_training_motion_or_with_more_doubt_than_noise_are_extrapolat
         torque.extrapolating,
         [false, false, true, false, true, true, true]
     );
+    // The last row has more doubt than noise, in motion that training had.
+    assert_eq!(
+        torque.new_motion,
+        [false, false, true, false, true, true, false]
+    );
     assert_eq!(torque.epistemic[0], 0.0);
 }
 

@@ -25,6 +25,8 @@ pub struct HeldOut {
     /// Moving rows that the training data speak of, and those beyond, see [`Validation::beyond`].
     within: ScoreKeeper,
     beyond: ScoreKeeper,
+    /// Of each joint, rows beyond whose motion is new.
+    new_motion: Vec<u64>,
     raw: ScoreKeeper,
     raw_moving: ScoreKeeper,
     /// Per joint.
@@ -74,6 +76,7 @@ impl HeldOut {
         let keeper = ScoreKeeper::new(names.clone());
         Self {
             pit: vec![PitKeeper::default(); names.len()],
+            new_motion: vec![0; names.len()],
             names,
             filtered: keeper.clone(),
             moving: keeper.clone(),
@@ -301,6 +304,9 @@ impl HeldOut {
             self.beyond.push_where(joint, measured, torque, |row| {
                 !standstill[row] && outside[row]
             });
+            let moves = torque.new_motion.iter().zip(standstill);
+            let new = moves.filter(|(new, still)| **new && !**still);
+            self.new_motion[joint] += new.count() as u64;
             if let Some(compact) = &compact {
                 self.rivals
                     .push(measured, torque, &compact[joint], |row| !standstill[row]);
@@ -346,6 +352,7 @@ impl HeldOut {
             moving: self.moving.scores(),
             within: self.within.scores(),
             beyond: self.beyond.scores(),
+            new_motion: self.new_motion,
             raw: self.raw.scores(),
             raw_moving: self.raw_moving.scores(),
             coverage_levels: pooled.levels(),
@@ -385,6 +392,9 @@ impl AddAssign for HeldOut {
         self.moving += &other.moving;
         self.within += &other.within;
         self.beyond += &other.beyond;
+        for (own, more) in self.new_motion.iter_mut().zip(&other.new_motion) {
+            *own += more;
+        }
         self.raw += &other.raw;
         self.raw_moving += &other.raw_moving;
         for (own, more) in self.pit.iter_mut().zip(&other.pit) {

@@ -170,6 +170,9 @@ pub struct Validation {
     /// could be there, not what no candidate describes.
     #[serde(default)]
     pub beyond: Scores,
+    /// Of these, rows whose motion leaves its training range, joint by joint.
+    #[serde(default)]
+    pub new_motion: Vec<u64>,
     /// Unfiltered torque.
     pub raw: Scores,
     /// Of this, rows of moving joints only.

@@ -84,7 +84,11 @@ pub(super) fn print(diagnosis: &Diagnosis, terminal: &mut Terminal) {
         terminal.say(&format!("  {notes} notes are in the output of --json"));
         terminal.say("");
     }
-    terminal.heading("A twincal.toml to begin with (twincal init writes it)");
+    // Of logs of which nothing could be read `init` writes none.
+    terminal.heading(match diagnosis.logs.is_empty() {
+        true => "A twincal.toml to begin with",
+        false => "A twincal.toml to begin with (twincal init writes it)",
+    });
     for line in diagnosis.config.lines() {
         terminal.say(line);
     }
@@ -134,10 +138,13 @@ fn print_log(log: &LogRow, lags: Option<&Lags>, terminal: &mut Terminal) {
 
 /// What a log says of its lag, and what becomes of it.
 fn lag_words(log: &LogLag, lags: Option<&Lags>) -> String {
-    let Some([lag, sd]) = log
-        .common
-        .filter(|_| lags.is_some_and(|lags| lags.common.is_some()))
-    else {
+    // What all logs agree on is what is applied; that of one log counts where it differs, its error without what joints disagree by.
+    let common = lags.and_then(|lags| lags.common);
+    let own = match log.differs {
+        true => log.common.filter(|_| common.is_some()),
+        false => common.filter(|_| log.common.is_some()),
+    };
+    let Some([lag, sd]) = own else {
         return "the lag between motion and torque is inconclusive: no more than half of the joints agree on one, so that torque stays as logged".into();
     };
     let found = format!(

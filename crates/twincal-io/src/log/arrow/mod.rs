@@ -4,6 +4,7 @@
 //! whole log, and panics where a buffer ends beyond its batch.
 
 mod layout;
+mod rows;
 
 use super::cells::{Sink, disk_failure};
 use super::{ARROW_FILE, ARROW_MESSAGE, Cells, MAX_COLUMNS, Request, assemble};
@@ -13,6 +14,7 @@ use arrow_ipc::{
     root_as_footer, root_as_message,
 };
 use layout::{Form, Numbers, Position};
+pub(crate) use rows::{Row, Rows, fits};
 use std::io::{self, Read, Seek, SeekFrom};
 use twincal::signal::Log as GivenLog;
 use twincal::{Code, Finding, Severity};
@@ -65,35 +67,6 @@ pub(super) fn read(
     Ok((log, findings))
 }
 
-/// All numbers of one column of an uncompressed Arrow IPC file, and a text of its schema's metadata.
-pub(crate) fn numbers(
-    source: impl Read + Seek,
-    name: &str,
-    (key, column): (&str, &str),
-) -> Result<(Option<String>, Vec<f64>)> {
-    let mut log = Log::open(source, name)?;
-    let metadata = log.schema()?.custom_metadata().unwrap_or_default();
-    let own = metadata.iter().find(|pair| pair.key() == Some(key));
-    let Some(text) = own.and_then(|pair| pair.value()).map(str::to_owned) else {
-        return Ok((None, Vec::new()));
-    };
-    let index = log.header()?.iter().position(|own| own == column);
-    let index = index.ok_or_else(|| log.refuse(format!("has no column `{column}`")))?;
-    let columns = log.columns(&[index], &mut Vec::new())?;
-    let mut numbers = Vec::new();
-    for at in log.batches.clone() {
-        let batch = log.batch(at, &columns)?;
-        if batch.compression.is_some() {
-            return Err(log.refuse("is compressed, which statistics are not".into()));
-        }
-        let form = columns[0].numbers.form;
-        let mut sink = Sink::Memory(&mut numbers);
-        let appended = log.append(&batch, batch.chunks[0], form, &mut sink);
-        appended.map_err(|error| log.refuse(format!("column `{column}`: {}", reason(&error))))?;
-    }
-    Ok((Some(text), numbers))
-}
-
 /// Column names of an Arrow IPC file or stream.
 pub(super) fn header(source: impl Read + Seek, name: &str) -> Result<Vec<String>> {
     Log::open(source, name)?.header()
@@ -108,9 +81,10 @@ fn reason(error: &io::Error) -> String {
 }
 
 /// A file or stream whose schema has been read.
-struct Log<'a, R> {
+#[derive(Debug)]
+struct Log<R> {
     source: R,
-    name: &'a str,
+    name: String,
     length: u64,
     /// Footer of a file, first message of a stream.
     metadata: Vec<u8>,
@@ -154,13 +128,13 @@ struct Message {
     body: u64,
 }
 
-impl<'a, R: Read + Seek> Log<'a, R> {
-    fn open(mut source: R, name: &'a str) -> Result<Self> {
+impl<R: Read + Seek> Log<R> {
+    fn open(mut source: R, name: &str) -> Result<Self> {
         let system = |e: &io::Error| Error::system(name, "read", e, "check the disk");
         let length = source.seek(SeekFrom::End(0)).map_err(|e| system(&e))?;
         let mut log = Self {
             source,
-            name,
+            name: name.to_owned(),
             length,
             metadata: Vec::new(),
             is_file: false,
@@ -184,7 +158,7 @@ impl<'a, R: Read + Seek> Log<'a, R> {
     }
 
     fn refuse(&self, problem: String) -> Error {
-        Error::content(Place::file(self.name), problem, "copy or export it again")
+        Error::content(Place::file(&self.name), problem, "copy or export it again")
     }
 
     fn broken(&self, at: u64) -> Error {
@@ -277,7 +251,7 @@ impl<'a, R: Read + Seek> Log<'a, R> {
     fn check_count(&self) -> Result<()> {
         if self.batches.len() > MAX_BATCHES {
             return Err(Error::content(
-                Place::file(self.name),
+                Place::file(&self.name),
                 format!("more than {MAX_BATCHES} record batches"),
                 "write more rows per batch",
             ));
@@ -322,7 +296,7 @@ impl<'a, R: Read + Seek> Log<'a, R> {
         let fields = self.schema()?.fields().unwrap_or_default();
         if fields.len() > MAX_COLUMNS {
             return Err(Error::content(
-                Place::file(self.name),
+                Place::file(&self.name),
                 format!("{} columns, the limit is {MAX_COLUMNS}", fields.len()),
                 "export only the columns that are needed",
             ));
@@ -340,7 +314,7 @@ impl<'a, R: Read + Seek> Log<'a, R> {
             let name = field.name().unwrap_or_default().to_owned();
             let numbers = layout::numbers(field).map_err(|what| {
                 Error::content(
-                    Place::file(self.name),
+                    Place::file(&self.name),
                     format!("column `{name}` {what}"),
                     "store it as float64, or map another column in [columns]",
                 )
@@ -352,7 +326,7 @@ impl<'a, R: Read + Seek> Log<'a, R> {
                 findings.push(Finding::new(
                     Severity::Note,
                     Code::TimestampType,
-                    self.name,
+                    &self.name,
                     message,
                     0,
                 ));
@@ -393,7 +367,7 @@ impl<'a, R: Read + Seek> Log<'a, R> {
             .filter(|c| !matches!(*c, CompressionType::LZ4_FRAME | CompressionType::ZSTD))
         {
             return Err(Error::content(
-                Place::file(self.name),
+                Place::file(&self.name),
                 format!("is compressed by method {}, which is not known", other.0),
                 "write it with lz4, zstd or no compression",
             ));

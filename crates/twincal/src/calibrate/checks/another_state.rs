@@ -64,6 +64,7 @@ mod tests {
             pit: zeros(),
             log_density: zeros(),
             extrapolating: vec![false; rows],
+            new_motion: vec![false; rows],
         };
         let first_outside = (inside * rows as f64).round() as usize;
         let outside = |row: usize| f64::from(u8::from(row >= first_outside));

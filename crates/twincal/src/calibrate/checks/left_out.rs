@@ -162,6 +162,8 @@ impl LeftOut {
     /// ```text
     /// Δ_block = e(b₀) − e(b₁),   e(b) = yy − 2 b'xy + b'Gb of the block,   b = (G + V⁻¹)⁻¹ xy of what was kept, b ≥ lower
     /// ```
+    /// What the left-out fold alone shows and is not judged has its coefficients of all data: no other fold can teach them, and without them the
+    /// fold's error would be theirs.
     pub(in crate::calibrate) fn lowered(
         &self,
         rest: &[bool],
@@ -177,10 +179,25 @@ impl LeftOut {
             folds.kind == LeftOutData::Fifths || folds.shown.iter().filter(shows).count() >= 2
         })?;
         let (with, nothing) = (vec![true; without.len()], vec![0.0; without.len()]);
+        let alone = self.shown_by_one(folds, &judged);
+        let all = match alone.iter().all(Vec::is_empty) {
+            true => [nothing.clone(), nothing.clone()],
+            false => {
+                let sums = self.total();
+                [
+                    self.coefficients(&sums, &with)?,
+                    self.coefficients(&sums, &without)?,
+                ]
+            }
+        };
         let (mut gained, mut error) = (vec![0.0; self.blocks.len()], 0.0);
         for (fold, kept) in folds.kept.iter().enumerate() {
-            let [b1, b0] = [&with, &without].map(|inside| self.coefficients(kept, inside));
-            let (b1, b0) = (b1?, b0?);
+            let own = |inside: &[bool], all: &[f64]| {
+                let mut beta = self.coefficients(kept, inside)?;
+                alone[fold].iter().for_each(|&k| beta[k] = all[k]);
+                Some(beta)
+            };
+            let (b1, b0) = (own(&with, &all[0])?, own(&without, &all[1])?);
             let own = folds.of_block.iter().enumerate();
             for (block, _) in own.filter(|(_, own)| **own == fold) {
                 let sums = &self.blocks[block].sums;
@@ -208,6 +225,32 @@ impl LeftOut {
             },
             needed: folds.needed,
         })
+    }
+
+    /// Fold by fold, the columns of components that it alone shows; those that are judged are none.
+    fn shown_by_one(&self, folds: &Folds, judged: &[usize]) -> Vec<Vec<usize>> {
+        let mut alone = vec![Vec::new(); folds.shown.len()];
+        let count = self.component.len();
+        for k in (0..count).filter(|k| !judged.contains(k)) {
+            let together = |i: &usize| self.component[*i] == self.component[k];
+            let shows = |shown: &[f64]| (0..count).filter(together).any(|i| shown[i] >= SHOWN);
+            let mut those = (0..alone.len()).filter(|&fold| shows(&folds.shown[fold]));
+            if let (Some(fold), None) = (those.next(), those.next()) {
+                alone[fold].push(k);
+            }
+        }
+        alone
+    }
+
+    /// Sums of all blocks.
+    fn total(&self) -> Vec<f64> {
+        let size = self.slab.len() + 1;
+        let mut total = vec![0.0; size * size];
+        for block in &self.blocks {
+            let pairs = total.iter_mut().zip(&block.sums);
+            pairs.for_each(|(sum, own)| *sum += own);
+        }
+        total
     }
 
     /// The likeliest coefficients of the columns `inside` given these sums; a bound that is passed on the way is kept.

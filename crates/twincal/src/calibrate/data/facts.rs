@@ -17,7 +17,8 @@ pub(crate) struct LogFacts {
     pub(crate) payload: Payload,
     /// Range of the motion per joint: `[q_min, q_max, qd_min, qd_max, qdd_min, qdd_max]`.
     pub(crate) hull: Vec<[f64; 6]>,
-    /// Rows evenly taken.
+    /// Rows evenly taken; in files they are numbers, beside this.
+    #[serde(skip)]
     pub(crate) states: States,
 }
 

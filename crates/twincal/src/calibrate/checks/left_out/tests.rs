@@ -253,6 +253,38 @@ fn what_one_log_alone_shows_is_judged_by_fifths() {
     assert_eq!(says([false, true, true], 0), LeftOutData::Logs);
 }
 
+/// A load that one log alone carries: others are judged as if that log did not carry it. Truth: the same rows without what the load adds to the
+/// torque, where its column explains nothing.
+#[test]
+fn what_one_log_alone_shows_is_no_error_of_others() {
+    let judged = |load: f64| {
+        let mut random = Random::new(6, 0);
+        let mut own = [
+            log(&mut random, 400, [0.2, 0.15, 0.3, load]),
+            log(&mut random, 400, [0.2, 0.15, 0.3, 0.0]),
+        ];
+        own[1].joints[1].x[800..].fill(0.0);
+        let logs = own.each_ref().map(|log| log.whole());
+        let fit = fit(&logs, f64::NEG_INFINITY);
+        let sums = Sums::of(&logs, Runs::Apart, Purpose::Result);
+        LeftOut::new(&sums, &fit, &[true; 3])
+            .lowered(&[false, true, true], &[0])
+            .unwrap()
+    };
+    let (none, heavy) = (judged(0.0), judged(30.0));
+    assert_eq!(heavy.left_out, LeftOutData::Logs);
+    assert!(none.is_clear() && heavy.is_clear(), "{none:?} {heavy:?}");
+    // The noise weights are given, so that only the shrinkage of the load's coefficient by its slab differs.
+    assert!(
+        (heavy.lowered / none.lowered - 1.0).abs() < 0.1,
+        "{none:?} {heavy:?}"
+    );
+    assert!(
+        (heavy.standard_errors / none.standard_errors - 1.0).abs() < 0.1,
+        "{none:?} {heavy:?}"
+    );
+}
+
 #[test]
 fn blocks_are_the_rows_of_every_log_in_order_fifths_of_about_the_same_length() {
     let mut random = Random::new(6, 0);
