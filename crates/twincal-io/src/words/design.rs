@@ -12,7 +12,7 @@ use twincal::design::{
 use twincal::words::{listed, shortened};
 
 /// What shares of limits are.
-pub const SHARES: &str = "Shares of the limits at the samples; between them position, velocity, acceleration and jerk stay within the limits, too.";
+pub const SHARES: &str = "Shares are of the limits, at the samples.";
 
 /// What it means that a motion decides an effect.
 pub const DECIDED: &str = "Decided: the PIP leaves 0.05 to 0.95 in logs simulated from the posterior. \

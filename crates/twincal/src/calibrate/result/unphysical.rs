@@ -125,8 +125,8 @@ fn finding(link: &str, share: f64) -> Finding {
     let (severity, remedy) = if share < CONTRADICTS {
         (
             Severity::Warning,
-            "torque is predicted as measured, but do not read these numbers as a body: look for an effect that is missing \
-             among the candidates, or for wrong inertias in the model",
+            "torque is predicted as measured, but do not read these numbers as a body: either these logs show its tensor \
+             too little (faster motion of that joint would), or an effect is missing among the candidates, or inertias of the model are wrong",
         )
     } else {
         (
