@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import pickle
 import re
 import shutil
 import signal
@@ -19,7 +20,7 @@ import twincal
 from conftest import ROOT, run
 from twincal import fleet
 from twincal._engine import _logs
-from twincal._store import Item
+from twincal._store import Item, LocalStore
 
 LOGS = ["one/day1/run1.csv", "one/day2/run1.csv", "two/run2.csv", "two/run3.csv"]
 
@@ -140,6 +141,24 @@ def test_a_log_that_is_written_meanwhile_is_a_fault(shared, tmp_path):
     result = shared.make(tmp_path / "out", logs, workers=1, progress=write)
     assert [(own.log, own.code) for own in result.faults] == [(LOGS[-1], "changed")]
     assert not shared.make(tmp_path / "out", logs, workers=1).faults
+
+
+def test_unfinished_files_of_a_run_end_with_it(tmp_path):
+    """Those of another run that goes on stay, until they are an hour old."""
+    store = LocalStore(str(tmp_path))
+    started = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "replace", lambda part, name: started.append(Path(part)))
+        store.put("day1/one", b"1")
+        LocalStore(str(tmp_path)).put("day1/two", b"2")
+    assert [part.exists() for part in started] == [True, True]
+    store.sweep()
+    assert [part.exists() for part in started] == [True, True]
+    pickle.loads(pickle.dumps(store)).sweep(own=True)
+    assert [part.exists() for part in started] == [False, True]
+    os.utime(started[1], (0, 0))
+    store.sweep()
+    assert not started[1].exists()
 
 
 def test_a_killed_worker_costs_nothing(shared, made, tmp_path, own_temporary):

@@ -426,7 +426,7 @@ fn refuse_missing_joints(
             quoted(header.names)
         );
         remedy = format!(
-            "name columns `q1`, `qd1`, `tau1` … or `{}.q` …, or map them in [columns]",
+            "name columns `q1`, `qd1`, `tau1` … or `{}.q` …, or map them in [columns], as in q = \"axis*_pos\"",
             joints[first]
         );
     } else {

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 from twincal._job import Fault, File, Job, Task, run, sweep
+from twincal._store import LocalStore
 
 # Not multiprocessing: its children import the caller's script anew, which fails without a guard.
 _START = "import sys; sys.path[:] = sys.argv[1:]; from twincal._engine_local import serve; serve()"
@@ -56,6 +57,8 @@ def results(
             for worker in (*busy, *idle):
                 worker.end()
             sweep()
+            if isinstance(job.output, LocalStore):
+                job.output.sweep(own=True)
 
 
 def died(log: str, times: int, how: str) -> Fault:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import posixpath
+import secrets
 import time
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol, TypeVar
@@ -80,6 +81,8 @@ class LocalStore:
 
     def __init__(self, root: str) -> None:
         self.root = os.path.abspath(root)
+        # In the names of unfinished files: which run they are of. Its processes get it with the store.
+        self._token = secrets.token_hex(8)
 
     def shown(self, name: str) -> str:
         return os.path.join(self.root, name) if name else self.root
@@ -109,7 +112,8 @@ class LocalStore:
 
         folder, file = os.path.split(os.path.join(self.root, name))
         os.makedirs(folder, exist_ok=True)
-        handle, part = tempfile.mkstemp(prefix=".twincal-", suffix=".part", dir=folder)
+        prefix = f".twincal-{self._token}-"
+        handle, part = tempfile.mkstemp(prefix=prefix, suffix=".part", dir=folder)
         try:
             with os.fdopen(handle, "wb") as to:
                 to.write(data)
@@ -121,13 +125,15 @@ class LocalStore:
             os.unlink(part)
             raise
 
-    def sweep(self) -> None:
-        """Removes unfinished files of processes that were killed."""
+    def sweep(self, *, own: bool = False) -> None:
+        """Removes unfinished files of processes that were killed; `own`: of this run, when none of its processes writes any more."""
+        mine = f".twincal-{self._token}-"
         for folder, _, files in os.walk(self.root):
             for file in files:
                 if file.startswith(".twincal-") and file.endswith(".part"):
                     path = os.path.join(folder, file)
-                    if time.time() - os.stat(path).st_mtime > _LEFTOVER:
+                    old = time.time() - os.stat(path).st_mtime > _LEFTOVER
+                    if old or (own and file.startswith(mine)):
                         os.unlink(path)
 
 

@@ -156,7 +156,7 @@ impl Recording {
             Some((_, name)) => Err(Error::Log {
                 log: self.name.clone(),
                 problem: format!("has no torque of joint `{name}`"),
-                remedy: "measured torque is needed here; name its column in [columns] tau".into(),
+                remedy: "measured torque is needed here; name its column in [columns] tau, and say torque = \"current\" in [[log]] if it is a current".into(),
             }),
             None => Ok(()),
         }
