@@ -98,8 +98,8 @@ impl Reader {
             let problem = format!("row {number} is another log than the metadata name");
             return Err(self.refuse(problem));
         }
-        let counts = text.records.iter().map(|own| own.5);
-        let count = counts.fold(Some(0_u64), |sum, own| sum?.checked_add(own));
+        let mut counts = text.records.iter().map(|own| own.5);
+        let count = counts.try_fold(0_u64, u64::checked_add);
         if count.and_then(|count| count.checked_mul(8)) != Some(row.numbers.len() as u64) {
             let problem = format!("row {number} has another count of numbers than its text says");
             return Err(self.refuse(problem));
