@@ -162,8 +162,8 @@ impl LeftOut {
     /// ```text
     /// Δ_block = e(b₀) − e(b₁),   e(b) = yy − 2 b'xy + b'Gb of the block,   b = (G + V⁻¹)⁻¹ xy of what was kept, b ≥ lower
     /// ```
-    /// What the left-out fold alone shows and is not judged has its coefficients of all data: no other fold can teach them, and without them the
-    /// fold's error would be theirs.
+    /// What is in without the judged and the left-out fold alone shows has its coefficients of all data: no other fold can teach them, and without
+    /// them the fold's error would be theirs.
     pub(in crate::calibrate) fn lowered(
         &self,
         rest: &[bool],
@@ -179,7 +179,7 @@ impl LeftOut {
             folds.kind == LeftOutData::Fifths || folds.shown.iter().filter(shows).count() >= 2
         })?;
         let (with, nothing) = (vec![true; without.len()], vec![0.0; without.len()]);
-        let alone = self.shown_by_one(folds, &judged);
+        let alone = self.shown_by_one(folds, &without);
         let all = match alone.iter().all(Vec::is_empty) {
             true => [nothing.clone(), nothing.clone()],
             false => {
@@ -227,11 +227,11 @@ impl LeftOut {
         })
     }
 
-    /// Fold by fold, the columns of components that it alone shows; those that are judged are none.
-    fn shown_by_one(&self, folds: &Folds, judged: &[usize]) -> Vec<Vec<usize>> {
+    /// Fold by fold, the columns `inside` whose component it alone shows.
+    fn shown_by_one(&self, folds: &Folds, inside: &[bool]) -> Vec<Vec<usize>> {
         let mut alone = vec![Vec::new(); folds.shown.len()];
         let count = self.component.len();
-        for k in (0..count).filter(|k| !judged.contains(k)) {
+        for k in (0..count).filter(|&k| inside[k]) {
             let together = |i: &usize| self.component[*i] == self.component[k];
             let shows = |shown: &[f64]| (0..count).filter(together).any(|i| shown[i] >= SHOWN);
             let mut those = (0..alone.len()).filter(|&fold| shows(&folds.shown[fold]));

@@ -253,6 +253,20 @@ fn what_one_log_alone_shows_is_judged_by_fifths() {
     assert_eq!(says([false, true, true], 0), LeftOutData::Logs);
 }
 
+/// What falls out with the judged is learned from what was kept alone, like the judged: by explicit refits.
+#[test]
+fn what_needs_the_judged_is_not_known_either() {
+    let mut random = Random::new(7, 0);
+    let mut own = [200, 300].map(|rows| log(&mut random, rows, [0.6, 0.4, 0.3, 2.0]));
+    own[1].joints[1].x[600..].fill(0.0);
+    let logs = own.each_ref().map(|log| log.whole());
+    let fit = fit(&logs, f64::NEG_INFINITY);
+    let sums = Sums::of(&logs, Runs::Apart, Purpose::Result);
+    let found = LeftOut::new(&sums, &fit, &[true; 3]).lowered(&[false, true, false], &[0]);
+    let wanted = by_rows(&logs, &fit, LeftOutData::Logs, &[0, 1, 2, 3], &[2]);
+    near(&found.unwrap(), wanted);
+}
+
 /// A load that one log alone carries: others are judged as if that log did not carry it. Truth: the same rows without what the load adds to the
 /// torque, where its column explains nothing.
 #[test]
