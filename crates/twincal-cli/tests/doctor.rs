@@ -76,9 +76,29 @@ fn a_good_log_needs_no_remedy_and_everything_is_told() {
         "shoulder",
         "tau1",
         "[model]",
+        "A twincal.toml to begin with (twincal init writes it)",
     ] {
         assert!(printed.out.contains(word), "{word}:\n{}", printed.out);
     }
+}
+
+/// What `doctor` says of `init` is what `init` does.
+#[test]
+fn of_a_log_without_known_columns_init_writes_nothing_and_doctor_does_not_say_it_does() {
+    let folder = folder(GOOD);
+    let at = folder.path();
+    fs::write(at.join("foreign.csv"), "stamp,a,b\n0,1,2\n0.01,1,2\n").unwrap();
+    let line = |command: &str| format!("{command} foreign.csv --model arm.urdf --no-config");
+    let told = run(at, line("doctor").split(' ')).expect(2);
+    assert!(
+        told.out.contains("A twincal.toml to begin with\n"),
+        "{}",
+        told.out
+    );
+    run(at, line("init").split(' '))
+        .expect(2)
+        .says(&["map them in [columns], as in q"]);
+    assert!(!at.join("twincal.toml").exists());
 }
 
 #[test]
@@ -95,6 +115,11 @@ fn case_17_torque_that_is_late_is_moved_back_and_said() {
     let lag = diagnosis["logs"][0]["lag"]["common"][0].as_f64().unwrap();
     assert!((lag - 0.02).abs() < 0.3 / RATE, "{lag}");
     assert!(diagnosis["config"].as_str().unwrap().contains("lag = 0.0"));
+    // What is printed of the only log is what is applied, with what joints disagree by in its error.
+    let [lag, sd] = [0, 1].map(|k| diagnosis["lags"]["common"][k].as_f64().unwrap());
+    let printed = with_config(folder.path(), "doctor", "look.toml", &[]).expect(0);
+    let said = format!("torque is logged {:.2} ± {:.2} ms", 1e3 * lag, 1e3 * sd);
+    assert!(printed.out.contains(&said), "{said}:\n{}", printed.out);
 
     let auto = fitted(&folder, "look.toml", 0);
     assert!(

@@ -56,7 +56,7 @@ pub struct Clash {
 }
 
 /// Two of these logs of one robot that are one log, under one name or two, or that overlap in time (by absolute stamps), in n ln n steps for n
-/// logs; the same two for any order of them.
+/// logs; two of the same names for any order of them.
 #[must_use]
 pub fn clash(logs: &[Identity<'_>]) -> Option<Clash> {
     let mut all: Vec<(usize, Identity<'_>)> = logs.iter().copied().enumerate().collect();
