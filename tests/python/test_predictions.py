@@ -3,6 +3,8 @@
 import csv
 import math
 
+import numpy as np
+import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
@@ -78,3 +80,42 @@ def test_time_that_mcap_cannot_hold_is_refused(predicted, tmp_path):
         assert float(next(csv.DictReader(file))["t"]) < 0
     # Rows that filters take are not written: their times do not count.
     predict(earlier(tmp_path, "border.parquet", 0.05), "border.mcap", None)
+
+
+PENDULUM = """<robot name="pendulum"><link name="base"/><link name="rod"><inertial><origin xyz="0.3 0 0"/><mass value="2"/>
+<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>
+<link name="tip"/><joint name="hand" type="fixed"><parent link="rod"/><child link="tip"/><origin xyz="0.6 0 0"/></joint>
+<joint name="turn" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>
+"""
+
+
+def swing(folder, name, seed, load):
+    """The pendulum in motion with so many kg at its tip: its torque is (0.02 + 2 · 0.3² + load · 0.6²) q̈ − 9.81 (0.6 + 0.6 load) cos q + friction."""
+    rng = np.random.default_rng(seed)
+    t, (a, b) = np.arange(0.0, 20.0, 0.01), rng.uniform(1.0, 2.0, 2)
+    q, qd = 0.9 * np.sin(a * t) + 0.4 * np.sin(3 * b * t), 0.9 * a * np.cos(a * t) + 1.2 * b * np.cos(3 * b * t)
+    qdd = -0.9 * a * a * np.sin(a * t) - 3.6 * b * b * np.sin(3 * b * t)
+    tau = (0.2 + 0.36 * load) * qdd - 9.81 * 0.6 * (1.0 + load) * np.cos(q) + 0.4 * qd + rng.normal(scale=0.05, size=t.size)
+    table = {"t": t, "turn.q": q, "turn.qd": qd, "turn.qdd": qdd, "turn.tau": tau}
+    pq.write_table(pa.table(table), folder / name)
+
+
+def test_an_unknown_payload_acts_where_the_settings_say_so(tmp_path):
+    """Half a kilogram carried in some logs: predicted and checked with it where `[[log]]` says `payload = "unknown"`, without it elsewhere."""
+    (tmp_path / "pendulum.urdf").write_text(PENDULUM)
+    logs = [tmp_path / name for name in ("bare.parquet", "loaded.parquet", "other.parquet")]
+    for seed, (log, load) in enumerate(zip(logs, (0.0, 0.5, 0.5))):
+        swing(tmp_path, log.name, seed, load)
+    unknown = "".join(f'[[log]]\nfile = "{log.name}"\npayload = "unknown"\n' for log in logs[1:])
+    (tmp_path / "twincal.toml").write_text('[library]\nfamilies = ["payload", "viscous"]\n' + unknown)
+    settings = ("--config", tmp_path / "twincal.toml")
+    twincal("fit", *logs[:2], "--model", tmp_path / "pendulum.urdf", *settings, "-o", tmp_path / "out", expect=None)
+    errors = {}
+    for name, given, code in (("with", settings, 0), ("without", (), 1)):
+        out = tmp_path / f"{name}.csv"
+        twincal("predict", logs[2], "--twin", tmp_path / "out", *given, "-o", out, expect=None)
+        with open(out, newline="") as file:
+            rows = [(float(row["turn.tau"]), float(row["turn.tau_meas"])) for row in csv.DictReader(file)]
+        errors[name] = np.sqrt(np.mean(np.subtract(*zip(*rows)) ** 2))
+        twincal("check", logs[2], "--twin", tmp_path / "out", *given, expect=code)
+    assert errors["with"] < 0.1 and errors["without"] > 0.9, errors

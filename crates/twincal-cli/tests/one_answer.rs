@@ -107,6 +107,45 @@ fn check_follows_its_answer(folder: &Path) {
     };
     assert_eq!(checked.code, Some(code), "{told}");
     assert_eq!(told["passed"], told["verdict"] == "passed");
+    verdict_is_the_answer(folder, "run.csv");
+}
+
+/// The first line of `check` and its verdict are those of its answer, which is returned.
+fn verdict_is_the_answer(folder: &Path, log: &str) -> String {
+    let [text, json] = [&[][..], &["--json"]].map(|more| {
+        let command = ["check", log, "--twin", "out"];
+        run(folder, [&command[..], more].concat())
+    });
+    let told: Value = serde_json::from_str(&json.out).unwrap();
+    let answer = told["assessment"]["answer"].as_str().unwrap();
+    let verdict = match answer {
+        "yes" | "yes_within_limits" => "passed",
+        "no" => "failed",
+        _ => "inconclusive",
+    };
+    assert_eq!(told["verdict"], verdict);
+    assert_eq!(text.out.lines().next(), Some(verdict), "{}", text.out);
+    answer.to_owned()
+}
+
+/// An encoder that is stuck for a second: the gates hold on the other rows, but the log is none that a verdict rests on.
+#[test]
+fn a_check_of_a_log_with_a_mistake_is_inconclusive() {
+    let folder = folder();
+    fs::write(folder.path().join("run.csv"), csv(2000, &|_, row| row)).unwrap();
+    fit(folder.path(), &["-o", "out"]);
+    let held = std::cell::RefCell::new(String::new());
+    let stuck = csv(2000, &|k, mut row| {
+        match k {
+            700 => *held.borrow_mut() = row[1].clone(),
+            701..800 => row[1] = held.borrow().clone(),
+            _ => (),
+        }
+        row
+    });
+    fs::write(folder.path().join("stuck.csv"), stuck).unwrap();
+    let answer = verdict_is_the_answer(folder.path(), "stuck.csv");
+    assert_eq!(answer, "not_yet");
 }
 
 #[test]

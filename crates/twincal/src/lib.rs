@@ -17,6 +17,7 @@ pub mod diagnostics;
 pub mod robot;
 pub mod signal;
 pub mod self_check;
+mod rigid_body;
 mod rigid_fit;
 pub mod lag;
 pub mod incidents;

@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use twincal::assess::{Answer, Assessment, Claim, RequestCode, Subject, assess, of_gates};
 use twincal::prelude::*;
 use twincal::random::Random;
+use twincal::signal::{Auto, Recording};
 use twincal::validate::Split;
 use twincal::{Code, Finding, Severity};
 
@@ -189,10 +190,22 @@ fn gates_decide_before_what_new_logs_are_said_to_be() {
         "",
         0,
     )];
+    let twin = twin();
     let of = |gates: Vec<Claim>, findings: &[Finding]| {
-        let own = of_gates(gates, findings);
+        let own = of_gates(gates, findings, (&twin, &["new.csv"]));
         (own.answer, own.reason)
     };
+    let subjects = ["", "new.csv", "elbow"].map(|subject| {
+        let found = [Finding::new(Severity::Note, Code::SignFlip, subject, "", 0)];
+        of_gates(Vec::new(), &found, (&twin, &["new.csv"])).claims[0]
+            .subject
+            .clone()
+    });
+    let log = Subject::Log("new.csv".into());
+    assert_eq!(
+        subjects,
+        [Subject::Run, log, Subject::Joint("elbow".into())]
+    );
     assert_eq!(
         of(vec![above()], &flipped),
         (Answer::No, Code::ErrorAboveGate)
@@ -227,4 +240,47 @@ fn traces_have_the_torque_as_it_was_logged() {
             assert!(of.is_some_and(|(_, away)| away <= least + 1e-9), "{time}");
         }
     }
+}
+
+/// A held-out log that goes on getting faster where training ends: its rows beyond the range of training's position, velocity or
+/// acceleration, widened by a twentieth, are counted joint by joint.
+#[test]
+fn rows_beyond_the_training_motion_are_counted() -> twincal::Result<()> {
+    let robot = two_link::arm(2.0)?;
+    let mut noise = Random::new(3, 0);
+    let mut training = two_link::log("slow", 0.3, &robot, &mut noise);
+    let long = two_link::log("faster", 0.7, &robot, &mut noise);
+    training.time.truncate(1000);
+    for joint in &mut training.joints {
+        joint.q.truncate(1000);
+        for column in [&mut joint.qd, &mut joint.qdd, &mut joint.tau] {
+            column.as_mut().expect("a column").truncate(1000);
+        }
+    }
+    let beyond = |joint: usize| {
+        let columns = |log: &Recording| {
+            let own = &log.joints[joint];
+            let [qd, qdd] = [&own.qd, &own.qdd].map(|own| own.clone().expect("a column"));
+            [own.q.clone(), qd, qdd]
+        };
+        let (trained, tested) = (columns(&training), columns(&long));
+        let outside = |k: usize, value: f64| {
+            let low = trained[k].iter().copied().fold(f64::INFINITY, f64::min);
+            let high = trained[k].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let margin = 0.05 * (high - low);
+            value < low - margin || value > high + margin
+        };
+        let rows = 0..tested[0].len();
+        rows.filter(|row| (0..3).any(|k| outside(k, tested[k][*row])))
+            .count() as u64
+    };
+    let wanted = [beyond(0), beyond(1)];
+    let mut settings = Settings::default();
+    settings.library.families = vec![Family::Payload, Family::Viscous];
+    settings.signal.cutoff_hz = Auto::Value(0.0); // every sample a row
+    let calibrate = Calibrate::new(&robot).logs([training]).heldout([long]);
+    let found = calibrate.settings(settings).run()?;
+    assert!(wanted.iter().all(|rows| *rows > 200), "{wanted:?}");
+    assert_eq!(found.validation.new_motion, wanted);
+    Ok(())
 }

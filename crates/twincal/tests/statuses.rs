@@ -130,5 +130,5 @@ fn what_no_rigid_body_has_is_not_established() {
     assert_eq!(less.status, Status::Established, "{less:?}");
     assert!(none.pip > Some(0.99));
     assert_eq!(none.status, Status::Tentative);
-    assert!(matches!(none.reason, StatusReason::NoRigidBody { share } if share < 0.05));
+    assert!(matches!(none.reason, StatusReason::NoRigidBody { chance } if chance < 0.01));
 }

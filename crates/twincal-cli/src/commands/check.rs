@@ -15,7 +15,8 @@ use crate::terminal::{Terminal, clean};
 use gates::{ALL, ENOUGH, Gate, Own, judge};
 use serde::Serialize;
 use twincal::Code;
-use twincal::assess::{Assessment, Claim, of_gates};
+use twincal::assess::{Answer, Assessment, Claim, of_gates};
+use twincal::calibrate::Calibration;
 use twincal::twin::Twin;
 use twincal::validate::{
     Change, Changes, FALSE_ALARM, HeldOut, Scores, Split, Validation, least_share,
@@ -80,8 +81,9 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     let mut gates = judge(&validation, &own);
     gates.extend(changes::gates(&changes, least));
     found.splice(0..0, known.iter().cloned());
-    let verdict = Verdict::of(&gates);
-    let assessment = assessment(&gates, &found);
+    let names: Vec<&str> = logs.logs.iter().map(|log| log.name()).collect();
+    let assessment = assessment(&gates, &found, (&stored.calibration, &names));
+    let verdict = Verdict::of(assessment.answer);
     let code = exit::of_check(assessment.answer, &found);
     if settings.json {
         let Validation {
@@ -111,12 +113,17 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
         return Ok(code);
     }
     terminal.heading(verdict.word());
-    match verdict {
-        Verdict::Inconclusive => paragraph(&too_short(&validation, twin), terminal),
-        _ => {
-            let failed = gates.iter().filter(|gate| !gate.passed);
-            failed.for_each(|gate| paragraph(&gate.words, terminal));
-        }
+    if assessment.reason == Code::TooShortToCheck {
+        paragraph(&too_short(&validation, twin), terminal);
+    } else {
+        let failed = gates.iter().filter(|gate| !gate.passed);
+        failed.for_each(|gate| paragraph(&gate.words, terminal));
+        // The gates hold: what is wrong with the log decides.
+        let decides = |finding: &&Finding| finding.code == assessment.reason;
+        let first = found.iter().find(decides);
+        first
+            .into_iter()
+            .for_each(|finding| paragraph(&finding.message, terminal));
     }
     known
         .iter()
@@ -138,26 +145,22 @@ pub(super) fn run(flags: &Check, terminal: &mut Terminal) -> Outcome<u8> {
     Ok(code)
 }
 
-/// What all gates say together.
+/// The answer as a gate says it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Verdict {
     Passed,
     Failed,
-    /// Too few rows to say either.
+    /// Too few rows to say either, or a log that is not what it is said to be.
     Inconclusive,
 }
 
 impl Verdict {
-    /// A gate fails on rows that are enough; otherwise too few of them say nothing.
-    fn of(gates: &[Gate]) -> Self {
-        let fails = |gate: &&Gate| !gate.passed;
-        if gates.iter().filter(fails).any(|gate| gate.enough) {
-            Self::Failed
-        } else if gates.iter().any(|gate| fails(&gate)) || !gates.iter().any(|gate| gate.enough) {
-            Self::Inconclusive
-        } else {
-            Self::Passed
+    fn of(answer: Answer) -> Self {
+        match answer {
+            Answer::Yes | Answer::YesWithinLimits => Self::Passed,
+            Answer::No => Self::Failed,
+            Answer::NotYet => Self::Inconclusive,
         }
     }
 
@@ -170,13 +173,14 @@ impl Verdict {
     }
 }
 
-/// What the gates say of the twin.
-fn assessment(gates: &[Gate], found: &[Finding]) -> Assessment {
+/// What the gates say of the twin. One fails on rows that are enough; otherwise too few of them say nothing.
+fn assessment(gates: &[Gate], found: &[Finding], known: (&Calibration, &[&str])) -> Assessment {
     let mut claims: Vec<Claim> = gates.iter().filter_map(Gate::claim).collect();
-    if claims.is_empty() && Verdict::of(gates) == Verdict::Inconclusive {
+    let fails = gates.iter().any(|gate| !gate.passed);
+    if claims.is_empty() && (fails || !gates.iter().any(|gate| gate.enough)) {
         claims.push(Claim::of_run(Code::TooShortToCheck));
     }
-    of_gates(claims, found)
+    of_gates(claims, found, known)
 }
 
 /// Where rows are too few: how many there are, and what to record.

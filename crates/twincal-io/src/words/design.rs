@@ -20,7 +20,8 @@ pub const DECIDED: &str = "Decided: the PIP leaves 0.05 to 0.95 in logs simulate
 /// Stands where a limit would.
 pub const NOT_LIMITED: &str = "not limited";
 
-/// The line that designs a motion for what a fit leaves open; `folder`: that of the twin. `None` where nothing is open.
+/// The line that designs a motion for what a fit leaves open; `folder`: that of the twin. `None` where nothing is open. With a file of
+/// limits where the model has no velocity limit of a joint.
 #[must_use]
 pub fn command(calibration: &Calibration, folder: &str) -> Option<String> {
     let open = open_effects(calibration).into_iter().map(str::to_owned);
@@ -29,8 +30,15 @@ pub fn command(calibration: &Calibration, folder: &str) -> Option<String> {
         return None;
     }
     let names = list(&first_of(open, NAMED));
+    let robot = &calibration.twin.robot;
+    let unlimited = (0..robot.joint_names().len())
+        .any(|joint| robot.joint(joint).limits.velocity.is_none_or(|v| v <= 0.0));
+    let limits = match unlimited {
+        true => " --limits limits.toml",
+        false => "",
+    };
     Some(format!(
-        "twincal design --twin {folder} -o motion designs a motion to decide {names}."
+        "twincal design --twin {folder}{limits} -o motion designs a motion to decide {names}."
     ))
 }
 
@@ -321,6 +329,8 @@ mod tests {
     #[test]
     fn the_line_names_what_is_open_and_stands_only_where_a_design_can_begin() {
         use crate::report::fixture;
+        use twincal::assess::{RequestCode, assess};
+        use twincal::calibrate::{Alike, Group};
         use twincal::posterior::Problem;
         use twincal::prior::{Inclusion, Prior};
         use twincal::{Code, Finding, Severity};
@@ -356,6 +366,24 @@ mod tests {
             name(3)
         );
         assert_eq!(command(&own, "out"), Some(said));
+        let asked = assess(&own).next;
+        let asked = asked.iter().map(|own| (own.code, own.subject.name()));
+        let designed = |at: &usize| {
+            (
+                RequestCode::DesignedMotion,
+                own.components[*at].name.as_str(),
+            )
+        };
+        assert!(asked.eq([1, 2, 3, 4].iter().map(designed)));
+        let mut structural = own.clone();
+        structural.groups.push(Group {
+            members: [1, 2, 3, 4].map(name).to_vec(),
+            pip: 0.9,
+            alike: Alike::EveryMotion,
+            settled: false,
+            words: String::new(),
+        });
+        assert_eq!(command(&structural, "out"), None, "no motion decides");
         let code = Code::SignFlip;
         own.findings = vec![Finding::new(Severity::Warning, code, "log", "", 1)];
         assert_eq!(command(&own, "out"), None, "a doubtful log");

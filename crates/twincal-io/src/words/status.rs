@@ -27,11 +27,8 @@ pub fn reason(component: &ComponentSummary) -> String {
             let (others, pip) = (list(&others), probability(*pip));
             format!("same torque as {others}, {kind}; P(at least one) {pip}")
         }
-        StatusReason::NoRigidBody { share } => {
-            format!(
-                "physically inconsistent in {} of the draws",
-                percent(1.0 - share)
-            )
+        StatusReason::NoRigidBody { chance } => {
+            format!("physically inconsistent (p-value {})", probability(*chance))
         }
         StatusReason::WideAsPrior => "as wide as the prior".into(),
         StatusReason::NoTorqueInLogs => "no torque in these logs".into(),
@@ -107,8 +104,8 @@ mod tests {
         );
         assert!(of(same(Alike::TheseLogs)).contains(", in these logs only;"));
         assert_eq!(
-            of(StatusReason::NoRigidBody { share: 0.028 }),
-            "physically inconsistent in 97.2\u{202f}% of the draws"
+            of(StatusReason::NoRigidBody { chance: 0.002 }),
+            "physically inconsistent (p-value <\u{202f}0.01)"
         );
         assert_eq!(of(StatusReason::Probability), "");
     }

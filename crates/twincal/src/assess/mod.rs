@@ -66,16 +66,20 @@ impl Assessment {
     }
 }
 
-/// What gates on new logs mean for a twin: they decide, and where they hold a mistake in those logs does.
+/// What gates on new `logs` mean for a twin: they decide, and where they hold a mistake in those logs does.
 #[must_use]
-pub fn of_gates(gates: Vec<Claim>, findings: &[Finding]) -> Assessment {
+pub fn of_gates(
+    gates: Vec<Claim>,
+    findings: &[Finding],
+    (calibration, logs): (&Calibration, &[&str]),
+) -> Assessment {
     let (answer, reason) = decide(&gates);
     let found = findings.iter().map(|finding| {
-        let subject = match finding.subject.as_str() {
-            "" => Subject::Run,
-            name => Subject::Other(name.to_owned()),
-        };
-        Claim::found(finding, subject)
+        let name = finding.subject.as_str();
+        match logs.contains(&name) {
+            true => Claim::found(finding, Subject::Log(name.to_owned())),
+            false => Claim::of_finding(finding, calibration),
+        }
     });
     let mut claims = gates;
     let decided = answer > Answer::YesWithinLimits;

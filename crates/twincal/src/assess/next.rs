@@ -42,6 +42,8 @@ pub enum RequestCode {
     AnotherMotion,
     /// The full resolution of an encoder.
     FullResolution,
+    /// A motion designed to decide whether a component is there ([`crate::design`]).
+    DesignedMotion,
 }
 
 /// What would show more. A log that is no measurement of this model has to be corrected first: then nothing is asked for.
@@ -63,8 +65,8 @@ pub(super) fn requests(calibration: &Calibration, claims: &[Claim]) -> Vec<Reque
     out
 }
 
-/// Names of the effects that are open questions, which a designed motion may decide ([`crate::design::Questions`]); none where the log or
-/// the model is doubtful, or the regression is not at hand.
+/// Names of the effects that are open questions, which a designed motion may decide ([`crate::design::Questions`]): none that others have
+/// the torque of in every motion, and none where the log or the model is doubtful or the regression is not at hand.
 #[must_use]
 pub fn open_effects(calibration: &Calibration) -> Vec<&str> {
     let doubtful = calibration.findings.iter().any(Finding::doubts_the_log);
@@ -72,8 +74,12 @@ pub fn open_effects(calibration: &Calibration) -> Vec<&str> {
         return Vec::new();
     }
     let is_open = |pip: f64| (OPEN[0]..OPEN[1]).contains(&pip);
+    let structural = |name: &String| {
+        let mut groups = calibration.groups.iter();
+        groups.any(|group| group.alike == Alike::EveryMotion && group.members.contains(name))
+    };
     let all = calibration.components.iter();
-    all.filter(|own| own.pip.is_some_and(is_open))
+    all.filter(|own| own.pip.is_some_and(is_open) && !structural(&own.name))
         .map(|own| own.name.as_str())
         .collect()
 }
@@ -104,6 +110,8 @@ fn to_fit(calibration: &Calibration) -> Vec<Request> {
     out.extend(apart.map(|name| of(RequestCode::AnotherMotion, Subject::Component(name.clone()))));
     let coarse = findings().filter(|f| f.code == Code::QuantisedEncoder);
     out.extend(coarse.map(|f| of(RequestCode::FullResolution, joint(&f.subject))));
+    let open = open_effects(calibration).into_iter();
+    out.extend(open.map(|name| of(RequestCode::DesignedMotion, Subject::Component(name.into()))));
     out
 }
 

@@ -4,9 +4,10 @@ use super::claim::{Claim, Subject};
 use super::scores::{
     FEW, converged, decisive, friction_only, has_standstill, independent_rows, rows_of,
 };
-use crate::calibrate::{Calibration, Status};
+use crate::calibrate::{Calibration, Status, StatusReason};
 use crate::error::{Code, Severity};
 use crate::validate::{JointScore, Scores, WORSE};
+use std::collections::BTreeSet;
 
 /// Ratio of errors from which calibration counts as an improvement.
 const BETTER: f64 = 0.95;
@@ -228,14 +229,28 @@ fn raw_is_worse(raw: &Scores) -> Option<Claim> {
 pub(super) fn of_effects(calibration: &Calibration) -> Vec<Claim> {
     let all = || calibration.components.iter();
     let found = all().filter(|own| own.is_in()).count();
-    let claimed = |status: Status| matches!(status, Status::Established | Status::Equivalent);
-    let sure = all().filter(|own| claimed(own.status)).count();
+    let with = |status: Status| all().filter(move |own| own.status == status);
+    let established = with(Status::Established).count();
+    let sets: BTreeSet<&[String]> = with(Status::Equivalent)
+        .filter_map(|own| match &own.reason {
+            StatusReason::SameTorque { members, .. } => Some(members.as_slice()),
+            _ => None,
+        })
+        .collect();
+    let sure = established + sets.len();
     let findings = calibration.findings.iter();
     let warned = findings.filter(|f| f.severity == Severity::Warning);
     let no_bodies = warned
         .filter(|f| f.code == Code::UnphysicalInertiaFound)
         .count();
-    let numbers = [("found", found as f64), ("established", sure as f64)];
+    let tentative = with(Status::Tentative).filter(|own| own.is_in()).count();
+    let numbers = [
+        ("found", found),
+        ("established", established),
+        ("equivalent_sets", sets.len()),
+        ("tentative", tentative),
+    ]
+    .map(|(name, count)| (name, count as f64));
     let mut out = Vec::new();
     if found > 0 && sure == 0 {
         out.push(Claim::new(Code::NothingEstablished, Subject::Run, numbers));

@@ -1,9 +1,9 @@
 //! Inertias of links: from coefficients of bodies to mass, centre of mass and tensor of the link that a file names.
 
 use super::metric::torque_metric;
-use super::projection::{Link, project};
 use super::{Place, Projection, Writer};
 use crate::error::Result;
+use crate::rigid_body::{Link, project};
 use crate::robot::spatial::{apply, scale, transpose};
 use crate::robot::{Inertia, Placement, Robot, body_parameters, inertia_of, to_body_frame};
 use crate::term::Family;

@@ -1,7 +1,7 @@
 //! How far two sets of inertias are apart: by the torque between them.
 
-use super::projection::Link;
 use crate::likelihood::JointNoise;
+use crate::rigid_body::Link;
 use crate::robot::{
     BLOCK, Motion, Regressor, RegressorBlock, Robot, nominal_torque, to_body_frame,
 };

@@ -7,18 +7,16 @@ mod joints;
 mod linear_part;
 mod links;
 mod metric;
-mod pseudo_inertia;
-mod projection;
 mod lost;
 mod dropped;
 mod torque_error;
 #[cfg(test)]
 mod tests;
 
+pub use crate::rigid_body::Projection;
 pub use dropped::{Dropped, dropped};
 pub use joints::JointChange;
 pub use links::LinkChange;
-pub use projection::Projection;
 pub use torque_error::JointTorqueError;
 
 use crate::calibrate::{Alike, Calibration, ComponentSummary, Status, StatusReason};

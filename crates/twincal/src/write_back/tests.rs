@@ -1,10 +1,10 @@
 //! Projection against a long brute-force search; pseudo-inertia against integrals; its metric against the recursion.
 
 use super::metric::torque_metric;
-use super::projection::{Link, project};
-use super::pseudo_inertia::{factor, inverse, pseudo_inertia, times};
 use crate::likelihood::{JointNoise, Spread};
 use crate::linear_algebra::Cholesky;
+use crate::rigid_body::pseudo_inertia::{factor, inverse, pseudo_inertia, times};
+use crate::rigid_body::{Link, project};
 use crate::robot::testing::tree;
 use crate::robot::{
     Motion, Placement, Robot, body_parameters, inertia_of, nominal_torque, random_states,

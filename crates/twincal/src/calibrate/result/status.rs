@@ -56,8 +56,8 @@ pub enum StatusReason {
     },
     /// No rigid body has the inertia found of its link.
     NoRigidBody {
-        /// Share of the posterior draws in which its link is a rigid body.
-        share: f64,
+        /// Chance that the rigid body nearest to it is found as far from every rigid body.
+        chance: f64,
     },
     /// The data leave its coefficients as wide as the prior.
     WideAsPrior,

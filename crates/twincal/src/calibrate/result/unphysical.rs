@@ -4,15 +4,19 @@ use super::calibration::Calibration;
 use super::status::{Status, StatusReason};
 use crate::error::{Code, Finding, Severity};
 use crate::posterior::draws::Drawer;
-use crate::robot::{Robot, base_parameters, inertia_of, principal_axes};
+use crate::random::Random;
+use crate::rigid_body::Found;
+use crate::robot::{PARAMETERS, Robot, base_parameters, inertia_of, principal_axes};
 use crate::term::{Library, ModelColumn};
 
 /// Draws that are looked at.
 const DRAWS: usize = 1000;
 /// Random stream of those draws.
 const STREAM: u64 = (1 << 32) + 2;
-/// Share of consistent draws below which the found inertia contradicts every rigid body; above, it is uncertain.
-const CONTRADICTS: f64 = 0.05;
+/// The first of those of the chances, one per body.
+const CHANCES: u64 = 3 << 60;
+/// Chance below which the found inertia contradicts every rigid body; above, it is uncertain.
+const CONTRADICTS: f64 = 0.01;
 /// Share below which it is worth telling.
 const WORTH_TELLING: f64 = 0.5;
 /// Behind the words of a component that contradicts every rigid body.
@@ -27,6 +31,8 @@ pub(in crate::calibrate) struct Unphysical {
     finding: Finding,
     /// Share of the draws that are those of a rigid body.
     share: f64,
+    /// Chance that a rigid body is found as far from every one; `None` where rounding hides it.
+    chance: Option<f64>,
     /// What was found of it.
     components: Vec<usize>,
 }
@@ -35,6 +41,10 @@ pub(in crate::calibrate) struct Unphysical {
 /// rigid body: positive mass and a positive semidefinite pseudo-inertia, which is that the principal moments about the
 /// centre of mass obey the triangle inequality. Where torque shows nothing of the moments across the joint's axis, only
 /// the mass and the moment about the axis are judged.
+///
+/// Few such draws are no contradiction: a point mass lies at a corner of what bodies can be, and whoever knows its tensor poorly draws
+/// hardly ever a body. The found inertia contradicts every body where even the nearest one would be found as far off with a chance of less
+/// than a hundredth ([`Found::chance`]).
 ///
 /// # Source
 /// Wensing, Kim, Slotine 2018 (linear matrix inequalities for physically consistent inertial parameters).
@@ -45,7 +55,7 @@ pub(in crate::calibrate) fn findings(
     drawer: &Drawer<'_>,
     seed: u64,
 ) -> Vec<Unphysical> {
-    let found = |column: usize| {
+    let is_found = |column: usize| {
         let term = &library.terms()[library.columns()[column]];
         calibration.components[term.component].is_in()
     };
@@ -54,7 +64,7 @@ pub(in crate::calibrate) fn findings(
     for column in 0..library.columns().len() {
         if let Some(ModelColumn::Inertia { body, weights }) = library.model_column(column) {
             columns[*body].push((column, *weights));
-            asked[*body] |= found(column);
+            asked[*body] |= is_found(column);
         }
     }
     if !asked.contains(&true) {
@@ -81,9 +91,13 @@ pub(in crate::calibrate) fn findings(
             }
             parameters
         };
-        let bodies = (0..count).filter(|row| is_physical(&parameters(*row), whole, NEARLY));
+        let drawn: Vec<[f64; 10]> = (0..count).map(parameters).collect();
+        let bodies = drawn.iter().filter(|own| is_physical(own, whole, NEARLY));
         let share = bodies.count() as f64 / count.max(1) as f64;
         if share < WORTH_TELLING {
+            let hidden = PARAMETERS.map(|own| !whole && hidden.contains(&format!("{name}.{own}")));
+            let mut random = Random::new(seed, CHANCES + body as u64);
+            let chance = found(&drawn, nominal, hidden).chance(&mut random);
             let of_column = |(column, _): &(usize, [f64; 10])| {
                 library.terms()[library.columns()[*column]].component
             };
@@ -91,8 +105,9 @@ pub(in crate::calibrate) fn findings(
             components.dedup();
             components.retain(|component| calibration.components[*component].is_in());
             all.push(Unphysical {
-                finding: finding(name, share),
+                finding: finding(name, share, chance),
                 share,
+                chance,
                 components,
             });
         }
@@ -105,15 +120,17 @@ pub(in crate::calibrate) fn tell(calibration: &mut Calibration, unphysical: Vec<
     for Unphysical {
         finding,
         share,
+        chance,
         components,
     } in unphysical
     {
         for component in components {
             let own = &mut calibration.components[component];
             own.rigid_share = Some(share);
-            own.no_rigid_body = share < CONTRADICTS;
-            if own.no_rigid_body {
-                (own.status, own.reason) = (Status::Tentative, StatusReason::NoRigidBody { share });
+            if let Some(chance) = contradicts(chance) {
+                own.no_rigid_body = true;
+                (own.status, own.reason) =
+                    (Status::Tentative, StatusReason::NoRigidBody { chance });
                 own.words.push_str(NO_BODY);
             }
         }
@@ -121,8 +138,33 @@ pub(in crate::calibrate) fn tell(calibration: &mut Calibration, unphysical: Vec<
     }
 }
 
-fn finding(link: &str, share: f64) -> Finding {
-    let (severity, remedy) = if share < CONTRADICTS {
+/// The chance where it is one that contradicts.
+fn contradicts(chance: Option<f64>) -> Option<f64> {
+    chance.filter(|chance| *chance < CONTRADICTS)
+}
+
+/// What the draws say of the body's parameters.
+fn found(drawn: &[[f64; 10]], nominal: [f64; 10], hidden: [bool; 10]) -> Found {
+    let count = drawn.len().max(1) as f64;
+    let mean: [f64; 10] =
+        std::array::from_fn(|k| drawn.iter().map(|own| own[k]).sum::<f64>() / count);
+    let mut covariance = vec![0.0; 100];
+    for own in drawn {
+        for (at, value) in covariance.iter_mut().enumerate() {
+            let (i, j) = (at / 10, at % 10);
+            *value += (own[i] - mean[i]) * (own[j] - mean[j]) / count;
+        }
+    }
+    Found {
+        nominal,
+        mean,
+        covariance,
+        hidden,
+    }
+}
+
+fn finding(link: &str, share: f64, chance: Option<f64>) -> Finding {
+    let (severity, remedy) = if contradicts(chance).is_some() {
         (
             Severity::Warning,
             "torque is predicted as measured, but do not read these numbers as a body: either these logs show its tensor \

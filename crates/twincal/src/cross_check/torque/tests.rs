@@ -90,6 +90,9 @@ fn a_log_that_is_scaled_or_turned_is_named_with_its_factor() {
                     "{factor}: {found:?}"
                 );
                 assert!((said_factor(&found[0]) - factor).abs() < 0.02, "{found:?}");
+                // What a load would look like; no load turns torque round.
+                let load = found[0].message.contains("a load that not all logs carry");
+                assert_eq!(load, factor > 0.0, "{found:?}");
             }
         }
     }
@@ -123,6 +126,7 @@ fn a_joint_whose_torque_is_scaled_is_named_with_its_factor() {
                 "{found:?}"
             );
             assert!((said_factor(&found[0]) - 1.3).abs() < 0.06, "{found:?}");
+            assert!(!found[0].message.contains("a load that"), "{found:?}");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The pseudo-inertia of a body: positive semidefinite exactly for what mass can do.
 
 /// A symmetric 4 × 4 matrix.
-pub(super) type Four = [[f64; 4]; 4];
+pub(crate) type Four = [[f64; 4]; 4];
 
 /// Pseudo-inertia of ten parameters about the same origin.
 ///
@@ -10,7 +10,7 @@ pub(super) type Four = [[f64; 4]; 4];
 /// ```
 /// # Source
 /// Wensing, Kim, Slotine 2018: linear matrix inequalities for physically consistent inertial parameters.
-pub(super) fn pseudo_inertia(p: &[f64; 10]) -> Four {
+pub(crate) fn pseudo_inertia(p: &[f64; 10]) -> Four {
     let half = 0.5 * (p[4] + p[7] + p[9]);
     [
         [half - p[4], -p[5], -p[6], p[1]],
@@ -21,7 +21,7 @@ pub(super) fn pseudo_inertia(p: &[f64; 10]) -> Four {
 }
 
 /// Lower Cholesky factor; `None` if the matrix is not positive definite.
-pub(super) fn factor(a: &Four) -> Option<Four> {
+pub(crate) fn factor(a: &Four) -> Option<Four> {
     let mut lower = [[0.0; 4]; 4];
     for i in 0..4 {
         for j in 0..=i {
@@ -41,7 +41,7 @@ pub(super) fn factor(a: &Four) -> Option<Four> {
 }
 
 /// Inverse from a lower Cholesky factor.
-pub(super) fn inverse(lower: &Four) -> Four {
+pub(crate) fn inverse(lower: &Four) -> Four {
     let mut columns = [[0.0; 4]; 4];
     for (k, x) in columns.iter_mut().enumerate() {
         x[k] = 1.0;
@@ -59,18 +59,18 @@ pub(super) fn inverse(lower: &Four) -> Four {
 }
 
 /// A B.
-pub(super) fn times(a: &Four, b: &Four) -> Four {
+pub(crate) fn times(a: &Four, b: &Four) -> Four {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..4).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
 /// tr(A B) of symmetric matrices.
-pub(super) fn inner(a: &Four, b: &Four) -> f64 {
+pub(crate) fn inner(a: &Four, b: &Four) -> f64 {
     let rows = a.iter().zip(b);
     rows.map(|(x, y)| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>())
         .sum()
 }
 
 /// ln |A| from a lower Cholesky factor.
-pub(super) fn log_determinant(lower: &Four) -> f64 {
+pub(crate) fn log_determinant(lower: &Four) -> f64 {
     2.0 * (0..4).map(|i| lower[i][i].ln()).sum::<f64>()
 }

@@ -3,7 +3,7 @@
 //! ```text
 //! minimise ½ (π − π̂)ᵀ T (π − π̂) + ½ Σ ((π − π°)/unit)²   subject to   P(π_l) ⪰ ε   for every link l
 //! ```
-//! π holds the ten parameters of every link, π̂ what was found. T is the square of the torque between them ([`super::metric`]). The
+//! π holds the ten parameters of every link, π̂ what was found. T is the square of the torque between them (`write_back::metric`). The
 //! second part is weak: it draws what no torque shows towards π°, which for a link that was found to be no body is its nominal
 //! tensor about the centre of mass that was found. ε is 1e-6 in the link's own units.
 //!
@@ -25,12 +25,12 @@ use serde::Serialize;
 
 /// A link whose inertia changes: ten parameters in its own frame.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Link<'a> {
-    pub(super) name: &'a str,
+pub(crate) struct Link<'a> {
+    pub(crate) name: &'a str,
     /// As the nominal model has them.
-    pub(super) nominal: [f64; 10],
+    pub(crate) nominal: [f64; 10],
     /// As they were found.
-    pub(super) found: [f64; 10],
+    pub(crate) found: [f64; 10],
 }
 
 /// How inertias were made physical.
@@ -64,7 +64,7 @@ const LIGHT: f64 = 1e-3;
 ///
 /// # Errors
 /// Those of `torque`; [`Error::Refused`] where rounding lets no point be found or proven.
-pub(super) fn project(
+pub(crate) fn project(
     links: &[Link<'_>],
     torque: impl FnOnce() -> Result<Vec<f64>>,
 ) -> Result<(Vec<[f64; 10]>, Option<Projection>)> {
@@ -118,14 +118,14 @@ pub(super) fn project(
 
 /// Units in which a link's pseudo-inertia is about 1.
 #[derive(Debug, Clone, Copy)]
-struct Scale {
+pub(crate) struct Scale {
     mass: f64,
     length: f64,
 }
 
 impl Scale {
     /// The length: the nominal radius of gyration or how far out mass was found, whichever is larger.
-    fn of(link: &Link<'_>) -> Self {
+    pub(crate) fn of(link: &Link<'_>) -> Self {
         let (p, found) = (&link.nominal, &link.found);
         let mass = p[0].max(found[0].abs()).max(LEAST_MASS);
         let turning = 0.5 * (p[4] + p[7] + p[9]).max(0.0);
@@ -156,7 +156,7 @@ impl Scale {
         body_parameters(&Inertia { mass, com, tensor }, &Placement::IDENTITY)
     }
 
-    fn units(&self) -> [f64; 10] {
+    pub(crate) fn units(&self) -> [f64; 10] {
         std::array::from_fn(|k| {
             let length = [1.0, self.length, self.length * self.length];
             self.mass * length[usize::from(k > 0) + usize::from(k > 3)]
