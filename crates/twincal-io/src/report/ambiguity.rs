@@ -1,34 +1,18 @@
-//! "A or B, the data cannot tell": pairs of effects that stand in for each other, joints that hardly moved.
+//! "A or B, the data cannot tell": sets of effects that are not distinguishable, joints that hardly moved.
 
 use super::view::Joint;
 use crate::words::list::list;
-use crate::words::number::{fixed, percent};
+use crate::words::number::percent;
 use twincal::Code;
 use twincal::assess::standstill;
 use twincal::calibrate::Calibration;
 
-/// Two coefficients whose draws correlate this much are known as a combination.
-const CORRELATED: f64 = 0.95;
 /// A joint that stood still for more than this share of the rows hardly moved.
 const STOOD: f64 = 0.5;
 
 /// One sentence for each thing that the data leave open.
 pub(super) fn sentences(calibration: &Calibration, joints: &[Joint<'_>]) -> Vec<String> {
     let mut out = either_or(calibration);
-    let draws = &calibration.draws;
-    for (i, j, r) in super::figures::pairs::correlations(&draws.values) {
-        if let (true, Some(one), Some(other)) = (
-            r.abs() >= CORRELATED,
-            draws.terms.get(i),
-            draws.terms.get(j),
-        ) {
-            out.push(format!(
-                "{one} and {other} are known as a combination only (correlation {}): a motion that separates them would tell \
-                 them apart.",
-                fixed(r, 3)
-            ));
-        }
-    }
     let still: Vec<String> = joints
         .iter()
         .enumerate()
@@ -109,6 +93,35 @@ mod tests {
             open == ["elbow.spring or elbow.potential, with probability 0.98."],
             "{open:?}"
         );
+    }
+
+    /// The demo's payload correlates by −0.955 with its first moment, and both are known to a percent.
+    #[test]
+    fn correlated_coefficients_alone_leave_nothing_open() {
+        let mut calibration = fixture::two_joints();
+        calibration.draws.values[1] = calibration.draws.values[0].clone();
+        let joints = view::joints(&calibration);
+        let said = sentences(&calibration, &joints);
+        assert!(!said.iter().any(|s| s.contains("correlation")), "{said:?}");
+    }
+
+    #[test]
+    fn a_page_without_dropped_columns_keeps_its_sets() {
+        let mut calibration = fixture::two_joints();
+        for own in &mut calibration.terms {
+            own.term.status = twincal::term::Status::Candidate;
+        }
+        calibration.groups.push(Group {
+            members: vec!["payload".into(), "elbow.tensor".into()],
+            pip: 0.98,
+            alike: Alike::EveryMotion,
+            settled: true,
+            words: String::new(),
+        });
+        let html = crate::report::render(&calibration, &crate::report::ReportContext::default());
+        let html = html.expect("a page");
+        assert!(html.contains("Not distinguishable in every motion"));
+        assert!(!html.contains("No two candidates make the same torque"));
     }
 
     #[test]

@@ -449,7 +449,7 @@ fn shade_of(n: usize, most: usize) -> usize {
 }
 
 /// Correlation of every pair (i < j) of sets of draws.
-pub(in crate::report) fn correlations(values: &[Vec<f64>]) -> Vec<(usize, usize, f64)> {
+fn correlations(values: &[Vec<f64>]) -> Vec<(usize, usize, f64)> {
     let pairs = (0..values.len()).flat_map(|i| (i + 1..values.len()).map(move |j| (i, j)));
     pairs
         .map(|(i, j)| (i, j, correlation(&values[i], &values[j])))
