@@ -227,13 +227,14 @@ fn friction_that_the_file_states_goes_to_what_was_found() {
     let elbow = rms(&|t| 0.9 * (0.6 * (2.1 * t).sin()).cos());
     let error =
         |joint: usize, key: &str| said["torque_error"]["joints"][joint][key].as_f64().unwrap();
+    assert_eq!(said["torque_error"]["held_out"], false);
     assert!((error(0, "rms_before") - shoulder).abs() < 0.01, "{said}");
     assert!(error(0, "rms") < 0.03, "{said}");
     assert!((error(1, "rms") - elbow).abs() < 0.01, "{said}");
     let done = run(folder.path(), export(&["--to", "urdf", "-o", "b.urdf"])).expect(0);
     let table = done
         .out
-        .split("Torque error on held-out rows")
+        .split("Torque error on rows that were fitted")
         .nth(1)
         .unwrap();
     let row = table
@@ -316,6 +317,8 @@ fn a_file_that_is_worse_than_the_model_is_refused() {
     let allowed = export(&["--to", "urdf", "-o", "a.urdf", WORSE[0], WORSE[1]]);
     let done = run(folder.path(), allowed).expect(0);
     assert!(done.out.contains("WORSE"), "{}", done.out);
+    let heading = "Torque error on held-out rows (RMSE)";
+    assert!(done.out.contains(heading), "{}", done.out);
 }
 
 /// Every parameter of every candidate has a row, and the numbers are those of result.json.

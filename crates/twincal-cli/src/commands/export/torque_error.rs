@@ -45,9 +45,22 @@ impl<'a> TorqueErrors<'a> {
             rms_twin: twin(scores, number),
         });
         Self {
-            held_out: calibration.validation.split == Split::HeldoutLogs,
+            held_out: is_held_out(calibration),
             joints: joints.collect(),
         }
+    }
+}
+
+/// Whether the file, which comes from all logs of the fit, was fitted without the rows of its errors.
+fn is_held_out(calibration: &Calibration) -> bool {
+    calibration.validation.split == Split::HeldoutLogs
+}
+
+/// What the errors are of.
+fn rows(calibration: &Calibration) -> &'static str {
+    match is_held_out(calibration) {
+        true => "held-out rows",
+        false => "rows that were fitted",
     }
 }
 
@@ -70,10 +83,7 @@ pub(super) fn require_no_worse(
     let Some(joints) = worse_joints(&change.torque_error, calibration) else {
         return Ok(());
     };
-    let rows = match calibration.validation.split {
-        Split::HeldoutLogs => "held-out rows",
-        _ => "rows that were fitted",
-    };
+    let rows = rows(calibration);
     Err(twincal::Error::Refused {
         problem: format!("the exported {format} predicts torque worse than your model: {joints} (RMSE on {rows})"),
         remedy: format!(
@@ -104,7 +114,7 @@ fn worse(error: &JointTorqueError) -> Option<(f64, f64)> {
     both.filter(|(before, after)| *after > WORSE * *before)
 }
 
-/// Torque error of the file on held-out rows, before and after, beside that of the twin.
+/// Torque error of the file, before and after, beside that of the twin on rows that it was not fitted to.
 pub(super) fn print(
     change: &WriteBack,
     calibration: &Calibration,
@@ -112,9 +122,9 @@ pub(super) fn print(
     terminal: &mut Terminal,
 ) {
     let format = holds.format;
-    terminal.heading("Torque error on held-out rows (RMSE)");
+    terminal.heading(&format!("Torque error on {} (RMSE)", rows(calibration)));
     let this = format!("this {format}");
-    let mut rows = table(&["joint", "your file", &this, "twin"]);
+    let mut table = table(&["joint", "your file", &this, "twin"]);
     let scores = decisive(&calibration.validation);
     for (joint, own) in change.torque_error.iter().enumerate() {
         let number = |value: Option<f64>| {
@@ -122,21 +132,21 @@ pub(super) fn print(
             value.map_or("–".into(), short)
         };
         let twin = twin(scores, joint);
-        rows.add_row([
+        table.add_row([
             &*clean(&own.joint),
             &*number(own.rms_before),
             &number(own.rms),
             &number(twin),
         ]);
     }
-    print_table(&rows, terminal);
+    print_table(&table, terminal);
     if let Some(text) = worse_alone(&change.torque_error, format) {
         warn(&format!("warning: {text}"), terminal);
     }
     let seen = match calibration.validation.split {
         Split::HeldoutLogs | Split::NotTested => "",
         Split::LeaveOneLogOut | Split::LeaveLogGroupsOut | Split::LastThirty => {
-            " The file comes from all logs: these rows are among those that it was fitted to."
+            " The file comes from all logs; the twin's errors are of fits without these rows."
         }
     };
     let text = format!(
