@@ -1,27 +1,28 @@
 //! The effects found, the ones that cannot be excluded, the ones that are absent, and the terms that were dropped. An
 //! effect is a component: one physical story with all its columns.
 
-use super::MENTIONED;
 use super::remarks::remarks;
 use crate::words::number::plus_minus;
 use crate::words::number::{interval, probability, with_ends};
 use crate::words::{family_name, reason as status_reason};
 use serde::Serialize;
-use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary, TermSummary};
+use twincal::calibrate::{
+    Calibration, ComponentSummary, ParameterSummary, Status as Said, TermSummary,
+};
 use twincal::term::{Estimate, Family, Status, is_place, told};
 
 /// The effects as a reader wants them: by kind, in the order of the library, joints in the order of the model.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(super) struct Effects {
-    /// PIP ≥ 0.5.
+    /// Established, or equivalent or tentative and in.
     pub(super) found: Vec<Kind>,
-    /// 0.05 ≤ PIP < 0.5.
+    /// Tentative, and likelier out than in.
     pub(super) possible: Vec<Kind>,
-    /// PIP < 0.05: names alone.
+    /// Absent: names alone.
     pub(super) absent: Vec<Absent>,
-    /// Unlikely beside what says the same in these logs, which is likelier.
+    /// Equivalent to a likelier one: names alone.
     pub(super) rivals: Vec<Absent>,
-    /// Whatever their PIP, these data say nothing about them: names alone.
+    /// Unidentifiable, whatever their PIP: names alone.
     pub(super) unseen: Vec<Absent>,
     /// Not columns of the regression.
     pub(super) dropped: Vec<Dropped>,
@@ -91,39 +92,40 @@ pub(super) struct Dropped {
     pub(super) reason: String,
 }
 
-/// Probability of a group from which one of its members is likely there.
-const LIKELY: f64 = 0.5;
+/// The list on which an effect stands: its status decides, and of what is open whether it is in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum List {
+    Found,
+    Possible,
+    Rivals,
+    Absent,
+    Unseen,
+}
+
+impl List {
+    fn of(component: &ComponentSummary) -> Self {
+        match component.status {
+            Said::Unidentifiable => Self::Unseen,
+            Said::Absent => Self::Absent,
+            Said::Established => Self::Found,
+            Said::Equivalent | Said::Tentative if component.is_in() => Self::Found,
+            Said::Equivalent => Self::Rivals,
+            Said::Tentative => Self::Possible,
+        }
+    }
+}
 
 /// Sorts the components of `calibration`.
 pub(super) fn sort(calibration: &Calibration) -> Effects {
-    let live = || {
-        let all = calibration.components.iter();
-        all.filter_map(|c| Some((c, c.pip?)))
+    let on = |list: List| -> Vec<&ComponentSummary> {
+        let candidates = calibration.components.iter().filter(|c| c.pip.is_some());
+        candidates.filter(|c| List::of(c) == list).collect()
     };
-    let pick = |keep: &dyn Fn(&ComponentSummary, f64) -> bool| -> Vec<&ComponentSummary> {
-        live()
-            .filter(|(c, p)| keep(c, *p))
-            .map(|(c, _)| c)
-            .collect()
-    };
+    let [found, possible, rivals] = [List::Found, List::Possible, List::Rivals].map(on);
+    let [absent, unseen] = [List::Absent, List::Unseen].map(on);
     let dropped = dropped(&calibration.terms);
-    let unseen: Vec<&ComponentSummary> = calibration.unseen().collect();
-    let seen = |c: &ComponentSummary| !c.is_in() && calibration.sees(c);
-    let possible = pick(&|c, p| seen(c) && p >= MENTIONED);
-    let unlikely = |c: &ComponentSummary, p: f64| seen(c) && (p < MENTIONED || p.is_nan());
-    // Not only where the data leave it open: what the prior alone tells apart is not excluded either.
-    let likely = calibration
-        .groups
-        .iter()
-        .filter(|group| group.pip >= LIKELY);
-    let mut alike: Vec<&String> = likely.flat_map(|group| &group.members).collect();
-    let found = calibration.components.iter().filter(|c| c.is_in());
-    alike.extend(found.flat_map(|component| component.names_beside()));
-    let is_alike = |c: &ComponentSummary| c.is_unseen() || alike.contains(&&c.name);
-    let rivals = pick(&|c, p| unlikely(c, p) && is_alike(c));
-    let absent = pick(&|c, p| unlikely(c, p) && !is_alike(c));
     Effects {
-        found: kinds(&pick(&|c, _| c.is_in()), calibration),
+        found: kinds(&found, calibration),
         counts: Counts {
             possible: possible.len(),
             absent: absent.len(),
@@ -292,7 +294,7 @@ fn reason(status: &Status) -> Option<String> {
 mod tests {
     use super::*;
     use crate::report::fixture;
-    use twincal::calibrate::{Status as Said, StatusReason};
+    use twincal::calibrate::StatusReason;
 
     fn unsee(own: &mut ComponentSummary, pip: f64) {
         (own.pip, own.status) = (Some(pip), Said::Unidentifiable);
@@ -325,67 +327,59 @@ mod tests {
         }
     }
 
-    #[test]
-    fn what_is_seen_as_another_effect_is_listed_by_its_probability() {
-        use twincal::calibrate::{Alike, Group};
-        let of = |pip: f64, alike: bool| {
-            let mut calibration = fixture::two_joints();
-            let found = calibration.components.iter().find(|own| own.is_in());
-            let found = found.unwrap().name.clone();
-            let mut all = calibration.components.iter_mut();
-            let own = all.find(|own| !own.is_in() && own.pip.is_some()).unwrap();
-            unsee(own, pip);
-            let members = vec![found, own.name.clone()];
-            let groups = alike.then(|| Group {
-                members: members.clone(),
-                pip: 0.98,
-                alike: Alike::EveryMotion,
-                settled: false,
-                words: String::new(),
-            });
-            calibration.groups = groups.into_iter().collect();
-            let effects = sort(&calibration);
-            let names = |all: &[Absent]| all.iter().any(|kind| kind.names.contains(&members[1]));
-            let possible = flat(effects.possible).iter().any(|e| e.name == members[1]);
-            [possible, names(&effects.rivals), names(&effects.unseen)]
-        };
-        assert_eq!(of(0.39, true), [true, false, false]);
-        assert_eq!(of(0.01, true), [false, true, false]);
-        assert_eq!(of(0.39, false), [false, false, true]);
+    /// Names on each list: found, possible, absent, rivals, unseen.
+    fn lists(effects: Effects) -> [Vec<String>; 5] {
+        let rows = |kinds: Vec<Kind>| flat(kinds).into_iter().map(|e| e.name).collect();
+        let names = |kinds: Vec<Absent>| kinds.into_iter().flat_map(|kind| kind.names).collect();
+        [
+            rows(effects.found),
+            rows(effects.possible),
+            names(effects.absent),
+            names(effects.rivals),
+            names(effects.unseen),
+        ]
     }
 
+    /// Statuses of fits to a UR10: absent with a PIP of 0.07, unidentifiable with one of 0.39.
     #[test]
-    fn what_says_the_same_as_something_likelier_is_not_absent() {
-        use twincal::calibrate::{Alike, Group};
-        let mut calibration = fixture::two_joints();
-        let before = sort(&calibration).counts.absent;
-        let own = calibration.components.iter_mut();
-        let own = own
-            .filter(|c| !c.is_in())
-            .find(|c| c.pip.is_some())
-            .unwrap();
-        (own.pip, own.status) = (Some(0.02), Said::Absent);
-        let name = own.name.clone();
-        let group = |settled, pip| Group {
-            members: vec!["elbow.coulomb".into(), name.clone()],
-            pip,
-            alike: Alike::TheseLogs,
-            settled,
-            words: String::new(),
-        };
-        let rivals = |settled, pip| {
-            let mut calibration = calibration.clone();
-            calibration.groups = vec![group(settled, pip)];
-            let effects = sort(&calibration);
-            let names: Vec<String> = effects.rivals.into_iter().flat_map(|r| r.names).collect();
-            (names, effects.counts.absent)
-        };
-        let (open, absent) = rivals(false, 1.0);
-        assert_eq!(open, std::slice::from_ref(&name));
-        // Told apart by the prior alone, or none of them there.
-        assert_eq!(rivals(true, 1.0), (open, absent));
-        assert_eq!(rivals(true, 0.1), (vec![], absent + 1));
-        assert!(absent <= before);
+    fn every_list_has_the_statuses_that_it_names() {
+        let mut open = fixture::two_joints();
+        let changed = [
+            ("q2^2", Said::Equivalent),
+            ("qd1^2", Said::Tentative),
+            ("qd1^2*cos(q2)", Said::Unidentifiable),
+            ("elbow.coulomb", Said::Equivalent),
+        ];
+        for (name, status) in changed {
+            let mut all = open.components.iter_mut();
+            all.find(|c| c.name == name).expect("a component").status = status;
+        }
+        let calibrations = [
+            open,
+            fixture::two_joints(),
+            fixture::seven_joints(),
+            fixture::nothing_found(),
+        ];
+        for calibration in calibrations {
+            let lists = lists(sort(&calibration));
+            let of = |names: &[String], wanted: &[Said], is_in: bool| {
+                for name in names {
+                    let mut all = calibration.components.iter();
+                    let own = all.find(|c| c.name == *name).expect("a component");
+                    assert!(wanted.contains(&own.status), "{name}: {:?}", own.status);
+                    assert_eq!(own.is_in(), is_in, "{name}");
+                }
+            };
+            let [found, possible, absent, rivals, unseen] = &lists;
+            let claimed = [Said::Established, Said::Equivalent, Said::Tentative];
+            of(found, &claimed, true);
+            of(possible, &[Said::Tentative], false);
+            of(absent, &[Said::Absent], false);
+            of(rivals, &[Said::Equivalent], false);
+            of(unseen, &[Said::Unidentifiable], false);
+            let live = calibration.components.iter().filter(|c| c.pip.is_some());
+            assert_eq!(lists.iter().flatten().count(), live.count());
+        }
     }
 
     #[test]
@@ -407,7 +401,10 @@ mod tests {
                 .all(|e| e.name != "qd1^2*cos(q2)")
         );
         let html = crate::report::render(&calibration, &crate::report::ReportContext::default());
-        assert!(html.unwrap().contains("2 not seen by these data"));
+        assert!(
+            html.unwrap()
+                .contains("2 unidentifiable: not seen by these data")
+        );
     }
 
     #[test]

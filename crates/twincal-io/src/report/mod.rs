@@ -36,7 +36,7 @@ use crate::context::ReportContext;
 use crate::error::{Error, Result};
 use twincal::calibrate::Calibration;
 
-/// Probability from which an effect that was not kept is worth a line: below it, it is absent.
+/// Probability from which an effect that was not kept is worth a line.
 pub const MENTIONED: f64 = 0.05;
 
 /// The report as HTML.

@@ -33,8 +33,6 @@ const LONG: usize = 24;
 #[derive(Debug, Serialize)]
 struct Page<'a> {
     run: &'a ReportContext,
-    /// Probability from which an effect that was not kept has a line.
-    mentioned: f64,
     /// Files and amount of data, in one line.
     about: String,
     verdict: Verdict,
@@ -151,7 +149,6 @@ fn gather<'a>(
     let script = script::text();
     Ok(Page {
         run,
-        mentioned: super::MENTIONED,
         about: tables::about(calibration, run),
         numbers: first_screen::numbers(calibration),
         use_of: first_screen::use_of(verdict.answer),
