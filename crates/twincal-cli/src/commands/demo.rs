@@ -9,10 +9,9 @@ use super::open::{OPENER, open};
 use super::start_threads;
 use crate::args::Demo;
 use crate::clock::Stopwatch;
-use crate::failure::{Failure, Outcome};
+use crate::failure::Outcome;
 use crate::terminal::Terminal;
 use std::path::{Path, PathBuf};
-use twincal_io::Error;
 use twincal_io::artifact::{Claim, Inputs, Maker, REPORT, Replace};
 use twincal_io::config::Config;
 use twincal_io::model::parse_model;
@@ -62,7 +61,7 @@ pub(super) fn run(flags: &Demo, terminal: &mut Terminal) -> Outcome<u8> {
     let output = Path::new(FOLDER);
     // Its model and logs are in the program: it reads no file.
     let replace = Replace::MadeBy(Maker::Demo);
-    let claim = Claim::new(output, replace, &Inputs::default()).map_err(elsewhere)?;
+    let claim = Claim::new(output, replace, &Inputs::default())?;
     start_threads(settings.threads)?;
     let print = Print::of(flags.print, settings.json);
     if print != Print::Answer {
@@ -99,10 +98,7 @@ pub(super) fn run(flags: &Demo, terminal: &mut Terminal) -> Outcome<u8> {
     let inputs = carried
         .map(|(name, bytes)| (*name, bytes.to_vec()))
         .collect();
-    let done = (job.run(claim, inputs, progress, terminal)).map_err(|failure| match failure {
-        Failure::Error(error) => elsewhere(error).into(),
-        other => other,
-    })?;
+    let done = job.run(claim, inputs, progress, terminal)?;
     let truth = truth::beside(&done.stored.calibration, terminal.width())?;
     let end = end(output);
     let around = Around {
@@ -131,21 +127,4 @@ fn end(output: &Path) -> [String; 2] {
         format!("Open the page:  {OPENER} {}", report_of(output)),
         "Your own log:   twincal doctor run.csv --model arm.urdf".into(),
     ]
-}
-
-/// The error in words for a command without -o: its folder lies where it runs.
-fn elsewhere(mut error: Error) -> Error {
-    if let Error::Content { remedy, .. } | Error::System { remedy, .. } = &mut error {
-        for (given, instead) in [
-            ("give another output with -o", "run in another folder"),
-            ("give the folder itself with -o", "run in another folder"),
-            (
-                "give an output that you may write with -o",
-                "run in a folder that you may write",
-            ),
-        ] {
-            *remedy = remedy.replace(given, instead);
-        }
-    }
-    error
 }

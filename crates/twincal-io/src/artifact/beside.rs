@@ -17,19 +17,20 @@ pub(super) struct Beside {
     pub(super) lock: PathBuf,
     pub(super) staging: PathBuf,
     pub(super) old: PathBuf,
+    /// What to do where the target cannot be written.
+    pub(super) remedy: &'static str,
 }
 
 impl Beside {
     /// # Errors
     /// A target without a name of its own (`.`, `..`, `/`).
-    pub(super) fn new(target: &Path) -> Result<Self> {
+    pub(super) fn new(target: &Path, remedy: &'static str) -> Result<Self> {
         let shown = target.to_string_lossy();
         let Some(name) = target.file_name() else {
-            let remedy = "give the name of a folder or file of its own, such as `twincal-out`";
             return Err(Error::content(
                 Place::file(shown),
                 "cannot be replaced as a whole",
-                remedy,
+                "give the name of a folder or file of its own, such as `twincal-out`",
             ));
         };
         let parent = match target.parent() {
@@ -45,6 +46,7 @@ impl Beside {
             staging,
             old,
             parent,
+            remedy,
         })
     }
 
@@ -71,14 +73,14 @@ impl Beside {
             return Err(Error::content(
                 Place::file(shown),
                 "is not a folder",
-                "give another output with -o",
+                self.remedy,
             ));
         }
         if metadata.permissions().readonly() {
             return Err(Error::content(
                 Place::file(shown),
                 "the folder is read-only",
-                "give another output with -o",
+                self.remedy,
             ));
         }
         Ok(())
@@ -95,14 +97,7 @@ pub(super) struct Lock {
 impl Lock {
     pub(super) fn take(beside: &Beside) -> Result<Self> {
         let shown = beside.target.to_string_lossy();
-        let denied = |e: &std::io::Error| {
-            Error::system(
-                &*shown,
-                "write",
-                e,
-                "give an output that you may write with -o",
-            )
-        };
+        let denied = |e: &std::io::Error| Error::system(&*shown, "write", e, beside.remedy);
         loop {
             let file = OpenOptions::new()
                 .create(true)
@@ -118,7 +113,7 @@ impl Lock {
                     return Err(Error::content(
                         Place::file(shown),
                         "another twincal is writing to it",
-                        "wait for it or give another output with -o",
+                        format!("wait for it or {}", beside.remedy),
                     ));
                 }
                 Err(TryLockError::Error(e)) => return Err(denied(&e)),

@@ -1,5 +1,6 @@
 //! What a command reads, and what belongs to the twin it reads: no output takes its place, whatever `--force` says.
 
+use super::OTHER_OUTPUT;
 use super::manifest::sha256_of_file;
 use crate::context::FileHash;
 use crate::error::{Error, Place, Result};
@@ -114,5 +115,5 @@ pub(super) fn refuse_original(target: &Path, original: &FileHash) -> Error {
 
 fn refusal(target: &Path, problem: String) -> Error {
     let place = Place::file(target.to_string_lossy());
-    Error::content(place, problem, "give another output with -o")
+    Error::content(place, problem, OTHER_OUTPUT)
 }

@@ -44,5 +44,8 @@ pub const MANIFEST: &str = "manifest.json";
 /// Names that an artefact holds; a manifest may name more.
 const NAMES: [&str; 5] = [RESULT, REPORT, TWIN, RUN_LOG, MANIFEST];
 
+/// What to do where an output cannot be written.
+const OTHER_OUTPUT: &str = "give another output with -o";
+
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,6 @@
 //! One output file (predictions): written beside its place and renamed into it, complete or absent.
 
+use super::OTHER_OUTPUT;
 use super::beside::{Beside, Lock};
 use super::inputs::{Inputs, refuse_original};
 use super::manifest::sha256_of_file;
@@ -30,7 +31,7 @@ impl OutputFile {
         let shown = target.to_string_lossy().into_owned();
         let refuse =
             |problem: &str, remedy: &str| Err(Error::content(Place::file(&shown), problem, remedy));
-        let beside = Beside::new(target)?;
+        let beside = Beside::new(target, OTHER_OUTPUT)?;
         inputs.refuse(target)?;
         beside.check_parent()?;
         match fs::symlink_metadata(&beside.target) {
@@ -38,23 +39,22 @@ impl OutputFile {
                 return refuse("is a symbolic link", "give the file itself");
             }
             Ok(metadata) if !metadata.is_file() => {
-                return refuse("is not a file", "give another output with -o");
+                return refuse("is not a file", OTHER_OUTPUT);
             }
             Ok(_) if !force => {
                 return refuse(
                     "exists already",
-                    "replace it with --force or give another output with -o",
+                    &format!("replace it with --force or {OTHER_OUTPUT}"),
                 );
             }
             _ => {}
         }
         let original = inputs.original(&beside.target)?;
         let lock = Lock::take(&beside)?;
-        let remedy = "give an output that you may write with -o";
         // A new file: a link that lies there leads nowhere.
         let file = remove(&beside.staging)
             .and_then(|()| File::create_new(&beside.staging))
-            .map_err(|e| Error::system(&shown, "write", &e, remedy))?;
+            .map_err(|e| Error::system(&shown, "write", &e, OTHER_OUTPUT))?;
         Ok(Self {
             original,
             beside,
@@ -86,7 +86,7 @@ impl OutputFile {
             fs::rename(&self.beside.staging, &self.beside.target)?;
             sync_folder(&self.beside.parent)
         });
-        let remedy = "free space or give another output with -o; nothing was written";
+        let remedy = format!("free space or {OTHER_OUTPUT}; nothing was written");
         done.map_err(|e| Error::system(&self.shown, "write", &e, remedy))
     }
 }

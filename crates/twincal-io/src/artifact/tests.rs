@@ -77,7 +77,7 @@ fn case_97_killed_after_each_step_the_artefact_is_whole() {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("out");
         write(&target, "old", Replace::Never).unwrap();
-        step(&Beside::new(&target).unwrap());
+        step(&Beside::new(&target, OTHER_OUTPUT).unwrap());
         if number < 3 {
             assert_eq!(word(&target), "{\"is\":\"old\"}", "step {number}");
         }
@@ -94,7 +94,7 @@ fn both_kinds_of_exchange_swap_the_folders() {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("out");
         write(&target, "old", Replace::Never).unwrap();
-        let beside = Beside::new(&target).unwrap();
+        let beside = Beside::new(&target, OTHER_OUTPUT).unwrap();
         stage(&beside, &files("new")).unwrap();
         swap(&beside).unwrap();
         assert_eq!(fs::read(target.join(RESULT)).unwrap(), b"{\"is\":\"new\"}");
@@ -125,6 +125,13 @@ fn case_99_file_symlink_read_only_and_foreign_folders_are_refused() {
             .unwrap_err()
             .to_string();
         assert!(error.contains(words), "{name}: {error}");
+        // A command with one name for its output has no -o.
+        let error = write(&at(name), "x", Replace::MadeBy(Maker::Demo)).expect_err(name);
+        let (crate::Error::Content { remedy, .. } | crate::Error::System { remedy, .. }) = error
+        else {
+            panic!("{name}: another error");
+        };
+        assert!(!remedy.contains("-o "), "{name}: {remedy}");
     }
     assert_eq!(fs::read(at("foreign/notes.txt")).unwrap(), b"mine");
     // A folder that is missing is made.

@@ -4,7 +4,7 @@ use super::beside::{Beside, Lock};
 use super::inputs::Inputs;
 use super::manifest::{Maker, Manifest};
 use super::read::MAX_MANIFEST;
-use super::{MANIFEST, NAMES};
+use super::{MANIFEST, NAMES, OTHER_OUTPUT};
 use crate::error::{Error, Place, Result};
 use crate::open::InputFile;
 use rustix::fs::{CWD, RenameFlags, renameat_with};
@@ -24,6 +24,16 @@ pub enum Replace {
     MadeBy(Maker),
 }
 
+impl Replace {
+    /// What to do where the output cannot be written; a maker that replaces only its own output has one name for it.
+    fn remedy(self) -> &'static str {
+        match self {
+            Self::Never | Self::Artifact => OTHER_OUTPUT,
+            Self::MadeBy(_) => "run in another folder",
+        }
+    }
+}
+
 /// An output folder that is ours until this value is dropped.
 #[derive(Debug)]
 pub struct Claim {
@@ -41,7 +51,7 @@ impl Claim {
     /// read-only, holds files that are not ours, or is being written by another program.
     pub fn new(target: &Path, replace: Replace, inputs: &Inputs) -> Result<Self> {
         let shown = target.to_string_lossy().into_owned();
-        let beside = Beside::new(target)?;
+        let beside = Beside::new(target, replace.remedy())?;
         inputs.refuse(target)?;
         beside.check_parent()?;
         // A wrong target is said before the lock, which may have no place (a read-only disk).
@@ -82,7 +92,7 @@ impl Claim {
         });
         // After the exchange the staging folder holds the old artefact, after a failure what was written so far.
         let cleaned = remove(&self.beside.staging);
-        let remedy = "free space or give another output with -o; nothing was changed";
+        let remedy = format!("free space or {}; nothing was changed", self.beside.remedy);
         done.map_err(|e| Error::system(&self.shown, "write", &e, remedy))?;
         let remedy = "the new result is in place; remove the leftovers beside it";
         cleaned.map_err(|e| Error::system(&self.shown, "clean up after writing", &e, remedy))
@@ -93,14 +103,14 @@ impl Claim {
 fn check(target: &Path, shown: &str, replace: Replace) -> Result<bool> {
     let refuse =
         |problem: &str, remedy: &str| Err(Error::content(Place::file(shown), problem, remedy));
-    let other = "give another output with -o";
+    let other = replace.remedy();
     let metadata = match fs::symlink_metadata(target) {
         Ok(metadata) => metadata,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(false),
         Err(e) => return Err(Error::system(shown, "look at", &e, other)),
     };
     if metadata.is_symlink() {
-        return refuse("is a symbolic link", "give the folder itself with -o");
+        return refuse("is a symbolic link", other);
     }
     if !metadata.is_dir() {
         return refuse("is a file, not a folder", other);
@@ -108,7 +118,7 @@ fn check(target: &Path, shown: &str, replace: Replace) -> Result<bool> {
     if replace == Replace::Never {
         return refuse(
             "exists already",
-            "replace it with --force or give another output with -o",
+            &format!("replace it with --force or {other}"),
         );
     }
     if metadata.permissions().readonly() {
@@ -135,7 +145,7 @@ fn check(target: &Path, shown: &str, replace: Replace) -> Result<bool> {
                 "holds `{}`, which twincal did not write",
                 name.to_string_lossy()
             );
-            return refuse(&problem, "move it away or give another output with -o");
+            return refuse(&problem, &format!("move it away or {other}"));
         }
     }
     if let Replace::MadeBy(maker) = replace
@@ -143,7 +153,7 @@ fn check(target: &Path, shown: &str, replace: Replace) -> Result<bool> {
     {
         return refuse(
             "exists and was not written by this command",
-            "move it away or run in another folder",
+            &format!("move it away or {other}"),
         );
     }
     Ok(true)
