@@ -10,13 +10,14 @@ import subprocess
 import time
 
 import browser
+import numpy as np
 import pytest
 from conftest import ASSETS, ROOT, SHARED, program, twincal
 
 pytestmark = pytest.mark.skipif(browser.installed() is None, reason="no browser: install chromium")
 ATTACK = "</script><img src=x onerror=alert(1)>"
 DESK, PHONE = (1280, 900), (390, 844)
-SPECIMENS = ["demo", "double_pendulum", "last_third", "hostile"]
+SPECIMENS = ["demo", "double_pendulum", "last_third", "hostile", "many_joints"]
 # Positions on the page and what its reader sees, sections closed.
 MEASURE = """(() => {
   const box = id => { const b = document.getElementById(id).getBoundingClientRect(); return [b.top, b.bottom]; };
@@ -59,6 +60,27 @@ def hostile(folder):
     log = folder / (ATTACK.replace("/", "") + ".parquet")
     log.write_bytes((ASSETS / "heldout1.parquet").read_bytes())
     return fitted(folder, folder / "arm.urdf", [ASSETS / "train1.parquet"], "--no-config", "--heldout", log)
+
+
+def many_joints(folder, joints=44):
+    """A right model of many joints about vertical axes, each with a link of its own on the base: nothing is found."""
+    link = (
+        '<link name="l{0}"><inertial><origin xyz="0.1 0 0"/><mass value="1"/>'
+        '<inertia ixx="0.05" ixy="0" ixz="0" iyy="0.05" iyz="0" izz="0.05"/></inertial></link>'
+        '<joint name="axis_{0}_of_the_arm" type="continuous"><parent link="base"/><child link="l{0}"/>'
+        '<origin xyz="{0} 0 0"/><axis xyz="0 0 1"/></joint>'
+    )
+    links = "".join(link.format(joint) for joint in range(joints))
+    (folder / "robot.urdf").write_text(f'<robot name="many"><link name="base"/>{links}</robot>')
+    (folder / "twincal.toml").write_text('[library]\nfamilies = ["viscous"]\n')
+    t, rng = np.arange(0, 20, 0.02), np.random.default_rng(1)
+    speed = rng.uniform(1, 3, (joints, 1))
+    q, qd, qdd = np.sin(speed * t), speed * np.cos(speed * t), -(speed**2) * np.sin(speed * t)
+    torque = (0.05 + 0.1**2) * qdd + rng.normal(0, 0.05, q.shape)
+    names = [f"{kind}{joint + 1}" for kind in ("q", "qd", "qdd", "tau") for joint in range(joints)]
+    table = np.vstack([t, q, qd, qdd, torque]).T
+    np.savetxt(folder / "run.csv", table, "%.6g", ",", header=",".join(["t", *names]), comments="")
+    return fitted(folder, folder / "robot.urdf", [folder / "run.csv"], "--config", folder / "twincal.toml")
 
 
 @pytest.fixture(scope="module")

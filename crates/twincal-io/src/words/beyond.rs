@@ -1,6 +1,7 @@
 //! Rows on which the training data say less than on others: motion that training did not have, or torque that it leaves open.
 
-use super::list::{list, subject};
+use super::NAMED;
+use super::list::{first_of, list, subject};
 use super::number::{number, percent};
 use super::units::unit_of;
 use twincal::Code;
@@ -71,7 +72,7 @@ pub(super) fn mostly(assessment: &Assessment) -> Vec<String> {
     };
     let each = each.map(|(code, words)| (told(code), words)).into_iter();
     each.filter(|(names, _)| !names.is_empty())
-        .map(|(names, words)| format!("{words}: {}.", list(&names)))
+        .map(|(names, words)| format!("{words}: {}.", list(&first_of(names, NAMED))))
         .collect()
 }
 

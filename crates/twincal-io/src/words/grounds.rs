@@ -99,7 +99,7 @@ fn as_logged(assessment: &Assessment, calibration: &Calibration) -> Option<Strin
     };
     let lost = match lost.is_empty() {
         true => String::new(),
-        false => format!("; there {}", list(&lost)),
+        false => format!("; there {}", list(&first_of(lost, NAMED))),
     };
     Some(format!(
         "Unfiltered, as it was logged and as `twincal predict` gives it (noise of torque and motion included{ends}): {} → {} {}{lost}.",
@@ -219,7 +219,7 @@ pub(super) fn other_shares(assessment: &Assessment) -> Option<String> {
             let share = percent(own.number("coverage95"));
             format!("{} {share}", own.subject.name())
         });
-        (words, shares.collect::<Vec<_>>())
+        (words, first_of(shares.collect(), NAMED))
     });
     let told = each.iter().filter(|(_, shares)| !shares.is_empty());
     let told: Vec<String> = told

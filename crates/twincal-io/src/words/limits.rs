@@ -1,9 +1,9 @@
 //! Where a twin does not hold, in sentences: the claims against it, what matters most first.
 
-use super::list::{list, subject};
+use super::list::{each_or_range, first_of, list, subject};
 use super::number::{THIN, number, percent};
 use super::units::{pooled_unit, unit_of};
-use super::{beyond, rest, shape};
+use super::{NAMED, beyond, rest, shape};
 use twincal::assess::{Assessment, has_standstill};
 use twincal::calibrate::Calibration;
 use twincal::{Code, Finding, Severity};
@@ -93,8 +93,8 @@ fn limits_of_torque(assessment: &Assessment, calibration: &Calibration) -> Vec<S
     ];
     for (code, words) in widths {
         let claims = assessment.claims(code);
-        let held: Vec<String> = claims.map(|c| percent(c.number("coverage95"))).collect();
-        let held = list(&held);
+        let held: Vec<f64> = claims.map(|c| c.number("coverage95")).collect();
+        let held = each_or_range(&held, percent);
         let held = format!("({LEVEL_WORDS} hold {held} of the{moving} rows)");
         out.extend(of_joints(
             &named(assessment, code),
@@ -116,13 +116,17 @@ fn above_torque(assessment: &Assessment, calibration: &Calibration) -> Option<St
     let claims = || assessment.claims(Code::JointErrorAboveTorque);
     let share = |(error, sd): (f64, f64)| error / sd;
     let numbers = || claims().map(|c| (c.number("rms_calibrated"), c.number("torque_sd")));
-    let shares: Vec<String> = numbers().map(|n| whole_percent(share(n))).collect();
+    let shares: Vec<f64> = numbers().map(share).collect();
     let deviations: Vec<String> = claims()
         .map(|claim| {
             let unit = unit_of(calibration, claim.subject.name());
             format!("{} {unit}", number(claim.number("torque_sd"), 3))
         })
         .collect();
+    let deviations = match deviations.len() {
+        0..=NAMED => format!(" ({})", deviations.join(", ")),
+        _ => String::new(),
+    };
     let better = numbers().all(|n| share(n) > CLEARLY_LOST);
     let names = named(assessment, Code::JointErrorAboveTorque);
     let unseen = match claims().any(|claim| claim.has("hardly_driven_held_out")) {
@@ -130,9 +134,8 @@ fn above_torque(assessment: &Assessment, calibration: &Calibration) -> Option<St
         false => "",
     };
     let words = format!(
-        "the error left is {} of the torque's standard deviation ({}): a constant would do {}{}",
-        list(&shares),
-        deviations.join(", "),
+        "the error left is {} of the torque's standard deviation{deviations}: a constant would do {}{}",
+        each_or_range(&shares, whole_percent),
         if better { "better" } else { "as well" },
         unseen
     );
@@ -169,7 +172,7 @@ fn friction_does_as_well(assessment: &Assessment, calibration: &Calibration) -> 
     (!named.is_empty()).then(|| {
         format!(
             "Friction and an offset alone do about as well or better on {}.",
-            list(&named)
+            list(&first_of(named, NAMED))
         )
     })
 }
@@ -308,6 +311,22 @@ mod tests {
         let said = "Friction and an offset alone do about as well or better on elbow (0.104 instead of 0.100 N·m).";
         assert_eq!(of(0.104).as_deref(), Some(said));
         assert_eq!(of(0.106), None);
+    }
+
+    #[test]
+    fn of_many_joints_three_are_named() {
+        let mut calibration = crate::report::fixture::seven_joints();
+        let validation = &mut calibration.validation;
+        for scores in [&mut validation.filtered, &mut validation.moving] {
+            for joint in &mut scores.joints {
+                (joint.rmse_calibrated, joint.rmse_friction) = (0.1, Some(0.1));
+            }
+        }
+        let answer = crate::words::answer(&calibration);
+        let mut limits = answer.limits.iter().chain(&answer.folded);
+        let friction = limits.find(|limit| limit.starts_with("Friction"));
+        let friction = friction.expect("a limit of seven joints");
+        assert!(friction.ends_with(" and 4 more."), "{friction}");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Have the predicted distributions the right shape: what the PIT of held-out rows says, joint by joint.
 
-use super::list::subject;
+use super::NAMED;
+use super::list::{first_of, subject};
 use super::number::{number, percent};
 use super::units::unit_of;
 use twincal::Code;
@@ -124,7 +125,7 @@ fn off_to_sides(own: &[(Code, &str, String)], slightly: bool) -> Option<String> 
         (false, Code::ShapeAbove) => format!("{name} above: {shown}"),
         (false, _) => format!("{name} below: {shown}"),
     });
-    let each: Vec<String> = each.collect();
+    let each = first_of(each.collect(), NAMED);
     let words = match (same, slightly) {
         (true, _) => words(*first, slightly),
         (false, false) => "predictions are biased",
