@@ -24,8 +24,7 @@ fn words(answer: &Answer) -> String {
         0 | 1 => String::new(),
         n => format!(" ({} more in its report)", n - 1),
     };
-    let headline = answer.headline.replace(" below.", ":");
-    format!("can this twin be used? {headline} {reason}{more}")
+    format!("can this twin be used? {} {reason}{more}", answer.lead)
 }
 
 #[cfg(test)]
@@ -34,11 +33,12 @@ mod tests {
 
     #[test]
     fn the_first_reason_stands_behind_the_answer() {
-        let told = |headline: &str, limits: &[&str]| {
+        let told = |lead: &str, limits: &[&str]| {
             words(&Answer {
                 answer: assess::Answer::NotYet,
                 reason: Code::NothingEstablished,
-                headline: headline.into(),
+                headline: String::new(),
+                lead: lead.into(),
                 grounds: vec!["Torque error: 1 → 2 N·m.".into()],
                 limits: limits.iter().map(|&limit| limit.into()).collect(),
                 folded: Vec::new(),
@@ -51,7 +51,7 @@ mod tests {
         );
         assert_eq!(
             told(
-                "Yes, to predict torque, with the exceptions below.",
+                "Yes, to predict torque, with the exceptions:",
                 &["Joint a: one.", "Joint b: two."]
             ),
             "can this twin be used? Yes, to predict torque, with the exceptions: Joint a: one. (1 more in its report)"

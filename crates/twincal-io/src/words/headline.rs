@@ -5,8 +5,21 @@ use twincal::assess::{Assessment, has_standstill};
 use twincal::calibrate::Calibration;
 use twincal::{Code, Mistake, Severity};
 
+/// Where the exceptions stand to which a headline leads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Exceptions {
+    /// Below it, in a list.
+    Below,
+    /// Behind it, in the same line.
+    Behind,
+}
+
 /// The answer in one sentence, by what decides; of joints that move, and of torque that the filter lets pass.
-pub(super) fn headline(assessment: &Assessment, calibration: &Calibration) -> String {
+pub(super) fn headline(
+    assessment: &Assessment,
+    calibration: &Calibration,
+    exceptions: Exceptions,
+) -> String {
     let reason = assessment.reason;
     if let Some(mistake) = Mistake::of(reason, Severity::Degraded) {
         return mistake_words(mistake).into();
@@ -30,10 +43,11 @@ pub(super) fn headline(assessment: &Assessment, calibration: &Calibration) -> St
             format!("{torque}, its intervals not: they lie off to one side.")
         }
         Code::Passed => format!("{predict} on motions like the ones it was tested on."),
-        _ => fixed(reason).map_or_else(
-            || format!("{predict}, with the exceptions below."),
-            str::to_owned,
-        ),
+        _ => match (fixed(reason), exceptions) {
+            (Some(words), _) => words.to_owned(),
+            (None, Exceptions::Below) => format!("{predict}, with the exceptions below."),
+            (None, Exceptions::Behind) => format!("{predict}, with the exceptions:"),
+        },
     }
 }
 
@@ -97,5 +111,19 @@ fn mistake_words(mistake: Mistake) -> &'static str {
         Mistake::AnotherState => {
             "Not yet: a held-out log is of another robot, or of another state of it."
         }
+    }
+}
+
+#[cfg(all(test, feature = "report"))]
+mod tests {
+    use crate::words::tests::{judged, pit};
+
+    #[test]
+    fn exceptions_are_below_or_behind() {
+        let answer = judged(|c| c.validation.reliability[1].pit = pit(0.5, 4.0));
+        assert!(answer.headline.ends_with(", with the exceptions below."));
+        assert!(answer.lead.ends_with(", with the exceptions:"));
+        let plain = judged(|_| ());
+        assert_eq!(plain.headline, plain.lead);
     }
 }

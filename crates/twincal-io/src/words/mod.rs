@@ -35,6 +35,7 @@ pub use status::reason;
 pub(crate) use status::with;
 pub use units::pooled_unit;
 
+use headline::Exceptions;
 use twincal::Code;
 use twincal::assess::{Assessment, assess};
 use twincal::calibrate::Calibration;
@@ -51,6 +52,8 @@ pub struct Answer {
     pub reason: Code,
     /// One sentence.
     pub headline: String,
+    /// The headline before a limit in the same line.
+    pub lead: String,
     /// What it rests on.
     pub grounds: Vec<String>,
     /// What log, sampler, held-out torque and the effects say against it: what matters most.
@@ -77,6 +80,7 @@ pub fn answer(calibration: &Calibration) -> Answer {
 /// The words of an assessment; the calibration has the names, units and effects.
 pub(crate) fn of_assessment(assessment: &Assessment, calibration: &Calibration) -> Answer {
     let (answer, reason) = (assessment.answer, assessment.reason);
+    let headline = |exceptions| headline::headline(assessment, calibration, exceptions);
     let (limits, folded) = match reason {
         Code::NotTested => Default::default(),
         _ => limits::fold(limits::limits(assessment, calibration)),
@@ -84,7 +88,8 @@ pub(crate) fn of_assessment(assessment: &Assessment, calibration: &Calibration) 
     Answer {
         answer,
         reason,
-        headline: headline::headline(assessment, calibration),
+        headline: headline(Exceptions::Below),
+        lead: headline(Exceptions::Behind),
         grounds: grounds::grounds(assessment, calibration),
         limits,
         folded,

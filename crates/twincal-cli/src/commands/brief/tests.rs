@@ -132,6 +132,7 @@ fn answer() -> Answer {
         answer: twincal::assess::Answer::YesWithinLimits,
         reason: Code::JointIntervalsNarrow,
         headline: "Yes, to predict torque below 5 Hz, with the exceptions below.".into(),
+        lead: String::new(),
         grounds: Vec::new(),
         limits: (0..3).map(limit).collect(),
         folded: (3..9).map(limit).collect(),
