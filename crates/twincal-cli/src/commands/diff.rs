@@ -1,7 +1,7 @@
 //! `twincal diff`: what changed between two twins of the same robot.
 
 use super::print_json;
-use super::summary::{Notes, findings, indented, paragraph, pip};
+use super::summary::{Notes, findings, indented, paragraph};
 use super::verdict::doubt;
 use crate::args::Diff;
 use crate::failure::Outcome;
@@ -12,6 +12,7 @@ use twincal::Finding;
 use twincal::compare::{Became, Change, ParameterChange, compare, hindrances, surest};
 use twincal_io::artifact::Artifact;
 use twincal_io::twin_json::StoredTwin;
+use twincal_io::words::probability;
 
 /// What stands before and after the arrows.
 const VALUES: &str = "values: medians over all models, 0 in those without the effect; `fit` prints medians given that it is in";
@@ -153,7 +154,7 @@ fn is_weak(change: &Change) -> bool {
 
 /// "0.032 → >0.999".
 fn pips(change: &Change) -> String {
-    let [before, after] = change.pip.map(pip);
+    let [before, after] = (change.pip).map(|pip| probability(pip.unwrap_or(f64::NAN)));
     format!("{before} → {after}")
 }
 

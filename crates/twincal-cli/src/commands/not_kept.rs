@@ -1,12 +1,13 @@
 //! What was weighed and not kept, and what could not be weighed.
 
-use super::summary::{ENDS, has_ends, paragraph, pip, tells_ends};
+use super::summary::{ENDS, has_ends, paragraph, tells_ends};
 use super::table::{print_table, table};
 use crate::terminal::{Terminal, clean};
 use twincal::calibrate::{Calibration, ComponentSummary, TermSummary};
 use twincal::term::Status;
 use twincal_io::report::MENTIONED;
 use twincal_io::result_json::status_word;
+use twincal_io::words::probability;
 
 /// Dropped columns up to this number are named.
 const FEW: usize = 4;
@@ -94,7 +95,8 @@ fn terms_of<'a>(
 }
 
 fn row(component: &ComponentSummary, terms: &[TermSummary]) -> [String; 5] {
-    let (name, p) = (clean(&component.name), pip(component.pip));
+    let name = clean(&component.name);
+    let p = probability(component.pip.unwrap_or(f64::NAN));
     let own: Vec<&TermSummary> = terms_of(component, terms).collect();
     match own[..] {
         [term] => {

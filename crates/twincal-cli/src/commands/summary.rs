@@ -8,7 +8,7 @@ use twincal::calibrate::{Calibration, ParameterSummary};
 use twincal::validate::{Scores, Split};
 use twincal::words::significant;
 use twincal::{Code, Finding, Severity};
-use twincal_io::words::{self, percent};
+use twincal_io::words::{self, percent, probability};
 
 /// What to do about a log that contradicts the model.
 pub(super) const HOW_TO_FIX: &str = "`twincal init` with this log and model writes a twincal.toml that fixes it, where it is a mistake of columns, signs or units";
@@ -48,7 +48,8 @@ fn effects(calibration: &Calibration, terminal: &mut Terminal) {
     }
     for component in all.iter().filter(|component| component.is_in()) {
         let status = component.status.word();
-        let mut said = vec![format!("{status}, PIP {}", pip(component.pip))];
+        let pip = probability(component.pip.unwrap_or(f64::NAN));
+        let mut said = vec![format!("{status}, PIP {pip}")];
         said.extend(Some(words::reason(component)).filter(|why| !why.is_empty()));
         let text = format!("{} ({})", component.words, said.join(": "));
         paragraph(&text, terminal);
@@ -400,27 +401,9 @@ pub(crate) fn wrapped(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// A probability; never rounded to certainty.
-pub(super) fn pip(pip: Option<f64>) -> String {
-    match pip {
-        None => "–".into(),
-        Some(p) if p > 0.999 => ">0.999".into(),
-        Some(p) if p < 0.001 => "<0.001".into(),
-        Some(p) => format!("{p:.3}"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn probabilities_are_never_rounded_to_certainty() {
-        assert_eq!(
-            (pip(Some(1.0)), pip(Some(0.0)), pip(Some(0.5))),
-            (">0.999".into(), "<0.001".into(), "0.500".into())
-        );
-    }
 
     const WARNING: (Severity, &str) = (Severity::Warning, "warning");
 

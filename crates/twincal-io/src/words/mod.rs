@@ -29,7 +29,7 @@ pub(crate) use family::family_name;
 pub use intervals::drawn_alike;
 #[cfg(feature = "report")]
 pub(crate) use intervals::guarantee;
-pub use number::percent;
+pub use number::{percent, probability};
 pub use remedy::{Remedy, When, remedy};
 pub use status::reason;
 pub(crate) use status::with;

@@ -60,13 +60,14 @@ pub(crate) fn with_ends(x: f64, ends: [f64; 2]) -> String {
     format!("{x} ({low} … {high})")
 }
 
-/// A probability with two decimals that never rounds to certainty: 0.999 and 1 are "> 0.99".
-pub(crate) fn probability(p: f64) -> String {
+/// A probability with three decimals that never rounds to certainty: 0.9991 and 1 are ">0.999".
+#[must_use]
+pub fn probability(p: f64) -> String {
     match p {
         _ if !p.is_finite() => "–".into(),
-        _ if p > 0.995 => format!(">{THIN}0.99"),
-        _ if p < 0.005 => format!("<{THIN}0.01"),
-        _ => format!("{p:.2}"),
+        _ if p > 0.999 => ">0.999".into(),
+        _ if p < 0.001 => "<0.001".into(),
+        _ => format!("{p:.3}"),
     }
 }
 
@@ -158,10 +159,8 @@ mod tests {
             (fixed(-0.001, 2), fixed(-0.126, 2)),
             ("0.00".into(), "−0.13".into())
         );
-        assert_eq!(probability(0.999_9), ">\u{202f}0.99");
-        assert_eq!(probability(1.0), ">\u{202f}0.99");
-        assert_eq!(probability(1e-6), "<\u{202f}0.01");
-        assert_eq!(probability(0.0), "<\u{202f}0.01");
+        let pips = [1.0, 0.999_1, 0.999, 0.5, 0.0, f64::NAN].map(probability);
+        assert_eq!(pips, [">0.999", ">0.999", "0.999", "0.500", "<0.001", "–"]);
         assert_eq!(with_ends(293.9, [284.5, 378.1]), "294 (284 … 378)");
         assert_eq!(percent(0.946_4), "94.6\u{202f}%");
         assert_eq!(count(1_048_576), "1\u{202f}048\u{202f}576");

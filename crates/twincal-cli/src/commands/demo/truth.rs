@@ -1,13 +1,13 @@
 //! What is true of the simulated arm, beside what was found: `truth.json` of the study, in the parameters of the effects.
 
 use super::super::brief::{unit, value};
-use super::super::summary::pip;
 use crate::failure::Outcome;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary, Status};
 use twincal::words::significant;
 use twincal_io::Error;
+use twincal_io::words::probability;
 
 const TRUTH: &str = include_str!("../../../../../studies/planar_arm/assets/truth.json");
 /// Distance of a number from the truth, in spreads, that is said.
@@ -161,7 +161,8 @@ fn found(truth: &Truth, component: Option<&ComponentSummary>) -> (String, bool) 
     match component.filter(claimed).and_then(parameter) {
         Some(own) => (with_distance(&own, truth.value), false),
         None => {
-            let probability = pip(component.and_then(|own| own.pip));
+            let pip = component.and_then(|own| own.pip);
+            let probability = probability(pip.unwrap_or(f64::NAN));
             (format!("missed (PIP {probability})"), true)
         }
     }

@@ -1,11 +1,12 @@
 //! What an export says on the terminal: what went into the file, what stays out and why.
 
-use super::super::summary::{self, paragraph, wrapped};
+use super::super::summary::{paragraph, wrapped};
 use super::file::ModelFile;
 use super::short;
 use crate::terminal::{Terminal, clean};
 use twincal::robot::Inertia;
 use twincal::write_back::{Dropped, Holds, LinkChange, Residual, WriteBack, Written};
+use twincal_io::words::probability;
 
 /// Probability above which the model average is the component's own number, as words round it.
 const CERTAIN: f64 = 0.98;
@@ -95,7 +96,7 @@ pub(super) fn change(change: &WriteBack, holds: Holds, terminal: &mut Terminal) 
             Some(value) => format!(
                 "{words} ({place}; in the file {}, the average over models with and without it, PIP {})",
                 short(value),
-                summary::pip(Some(*pip))
+                probability(*pip)
             ),
             None if *pip > CERTAIN => format!("{words} ({place})"),
             None => format!(
