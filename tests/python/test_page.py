@@ -125,6 +125,7 @@ def test_first_screen_of_a_desk(page):
         for part in ("answer", "plot"):
             assert 0 <= seen[part][0] and seen[part][1] <= DESK[1], (part, seen)
         assert seen["use"][0] < DESK[1] / 2 and seen["useText"] <= DESK[1], seen
+        assert seen["wide"] <= DESK[0], seen
         assert seen["words"] <= 1500 and seen["open"] == 0 and seen["images"] == 0, seen
         quiet(chromium)
 
@@ -170,6 +171,15 @@ def test_plots_answer(page):
     labels = "[...document.querySelectorAll('.plot')].every(plot => plot.getAttribute('aria-label').length > 20)"
     assert chromium.value(labels) and chromium.value("document.getElementById('joint').labels.length") == 1
     quiet(chromium)
+
+
+def test_torque_as_logged_lies_behind_the_filtered_one(page):
+    chromium, path = page
+    chromium.open(path, *DESK)
+    logged = chromium.value("(d => d.traces[d.first].logged.length)(JSON.parse(document.getElementById('traces').textContent))")
+    labels = chromium.value("[...document.querySelectorAll('#plot-torque .u-label')].map(label => label.textContent)")
+    assert ("as logged" in labels) == (logged > 0), (logged, labels)
+    assert logged > 0 or path.parent.name != "twincal-demo"
 
 
 def test_csv_is_the_shown_trace(page, tmp_path):

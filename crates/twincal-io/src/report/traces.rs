@@ -231,6 +231,24 @@ mod tests {
     }
 
     #[test]
+    fn torque_as_it_was_logged_lies_behind_the_filtered_one() {
+        let calibration = fixture::two_joints();
+        let joints = view::joints(&calibration);
+        let mut trace = long();
+        assert!(plotted(&joints[0], &trace, 600).logged.is_empty());
+        let logged = trace.measured.iter().map(|tau| Some(tau + 0.5));
+        trace.logged = logged.collect();
+        trace.logged[0] = None;
+        let plotted = plotted(&joints[0], &trace, 600);
+        assert_eq!(plotted.logged.len(), plotted.measured.len());
+        assert_eq!(plotted.logged[0], None);
+        let both = plotted.logged.iter().zip(&plotted.measured);
+        let mut apart =
+            both.filter_map(|(logged, measured)| Some(logged.as_ref()? - measured.as_ref()?));
+        assert!(apart.all(|apart| (apart - 0.5).abs() < 1e-2));
+    }
+
+    #[test]
     fn values_that_are_not_numbers_are_no_extremes() {
         let values = [f64::NAN, 2.0, f64::NAN, 1.0];
         assert_eq!(extremes(0..4, |row| values[row]), [3, 1]);

@@ -224,4 +224,4 @@ fn next(
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

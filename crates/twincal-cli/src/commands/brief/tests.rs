@@ -14,7 +14,7 @@ use twincal::{Code, Finding, Mistake, Severity};
 use twincal_io::model::{ModelSettings, parse_model};
 
 /// A fit in a moment, of which the tests change what they are about.
-fn fitted() -> Calibration {
+pub(in crate::commands) fn fitted() -> Calibration {
     let robot = two_link::arm(2.0).expect("an arm");
     let mut noise = Random::new(1, 0);
     let mut log = |name: &str, phase: f64| two_link::log(name, phase, &robot, &mut noise);

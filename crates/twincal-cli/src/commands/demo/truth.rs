@@ -4,7 +4,7 @@ use super::super::brief::{unit, value};
 use crate::failure::Outcome;
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary, Status};
+use twincal::calibrate::{Calibration, ComponentSummary, ParameterSummary, Status, StatusReason};
 use twincal::words::significant;
 use twincal_io::Error;
 use twincal_io::words::probability;
@@ -159,13 +159,26 @@ fn found(truth: &Truth, component: Option<&ComponentSummary>) -> (String, bool) 
             .cloned()
     };
     match component.filter(claimed).and_then(parameter) {
-        Some(own) => (with_distance(&own, truth.value), false),
+        Some(own) => {
+            let set = component.and_then(in_a_set).unwrap_or_default();
+            (format!("{}{set}", with_distance(&own, truth.value)), false)
+        }
         None => {
             let pip = component.and_then(|own| own.pip);
             let probability = probability(pip.unwrap_or(f64::NAN));
             (format!("missed (PIP {probability})"), true)
         }
     }
+}
+
+/// ", in a set with elbow.offset": at least one of the set is in, and which one is open.
+fn in_a_set(component: &ComponentSummary) -> Option<String> {
+    let StatusReason::SameTorque { members, .. } = &component.reason else {
+        return None;
+    };
+    let others = members.iter().filter(|name| **name != component.name);
+    let others: Vec<&str> = others.map(String::as_str).collect();
+    Some(format!(", in a set with {}", others.join(", ")))
 }
 
 /// "+0.3988 ± 0.0021 N·m·s/rad", with its distance from the truth where that is large.
@@ -182,6 +195,69 @@ fn with_distance(number: &ParameterSummary, truth: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::commands::brief::tests::fitted;
+    use twincal::calibrate::Alike;
+    use twincal::term::Family;
+
+    /// A tilt of gravity along x by 0.40 ± 0.02 m/s², of this status.
+    fn tilt(status: Status, reason: StatusReason) -> ComponentSummary {
+        let parameter = ParameterSummary {
+            name: "x".into(),
+            unit: "m/s²".into(),
+            mean: 0.4,
+            sd: 0.02,
+            interval95: [0.36, 0.44],
+            median: 0.4,
+            interval68: [0.38, 0.42],
+            seen: true,
+        };
+        ComponentSummary {
+            name: "base.tilt".into(),
+            family: Family::Tilt,
+            story: "tilt of the base".into(),
+            columns: Vec::new(),
+            pip: Some(0.31),
+            pip_mcse: None,
+            status,
+            reason,
+            alias_of: Vec::new(),
+            told_as: None,
+            no_rigid_body: false,
+            rigid_share: None,
+            words: String::new(),
+            parameters: vec![parameter],
+        }
+    }
+
+    #[test]
+    fn an_effect_is_found_found_in_a_set_or_missed() {
+        let truth = truth("base tilt, gravity x", ["base.tilt", "x"], 0.41);
+        let of = |status, reason| found(&truth, Some(&tilt(status, reason)));
+        let value = "+0.400 ± 0.020 m/s²";
+        let established = of(Status::Established, StatusReason::Probability);
+        assert_eq!(established, (value.into(), false));
+        let same = StatusReason::SameTorque {
+            members: ["elbow.offset", "base.tilt"].map(str::to_owned).to_vec(),
+            pip: 0.99,
+            alike: Alike::TheseLogs,
+        };
+        let set = format!("{value}, in a set with elbow.offset");
+        assert_eq!(of(Status::Equivalent, same), (set, false));
+        let missed = of(Status::Tentative, StatusReason::Probability);
+        assert_eq!(missed, ("missed (PIP 0.310)".into(), true));
+        assert_eq!(found(&truth, None), ("missed (PIP –)".into(), true));
+    }
+
+    #[test]
+    fn missed_effects_are_counted() {
+        let mut calibration = fitted();
+        calibration.components.clear();
+        let lines = beside(&calibration, 80).expect("a table");
+        let missed = lines.iter().filter(|line| line.contains("missed (PIP –)"));
+        assert_eq!(missed.count(), 10);
+        let last = "  0 of 10 found; nothing else is established";
+        assert_eq!(lines.last().map(String::as_str), Some(last));
+    }
 
     /// First moments by the coefficients of the Lagrangian that the study's own script wrote, which are worked out otherwise.
     #[test]
