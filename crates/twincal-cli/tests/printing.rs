@@ -44,6 +44,17 @@ fn the_answer_stands_first_and_the_report_last() {
     let all = at_width(folder.path(), 80, &format!("{FIT} --verbose")).expect(0);
     assert_eq!(all.out.lines().next(), quiet.out.lines().next());
     assert!(all.out.contains("What the model misses"), "{}", all.out);
+    assert!(!all.out.contains("the report"), "{}", all.out);
+    let result = fs::read_to_string(folder.path().join("out/result.json")).unwrap();
+    let result: serde_json::Value = serde_json::from_str(&result).unwrap();
+    let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let printed = words(&all.out);
+    let findings = result["findings"].as_array().unwrap();
+    assert!(findings.iter().any(|own| own["severity"] == "note"));
+    for finding in findings {
+        let message = words(finding["message"].as_str().unwrap());
+        assert!(printed.contains(&message), "{message}: {printed}");
+    }
 }
 
 #[test]

@@ -71,7 +71,7 @@ impl Done {
         let calibration = &self.stored.calibration;
         match print {
             Print::Json => terminal.data(&self.stored.result_json()?),
-            Print::All => summary::print(calibration, terminal),
+            Print::All => summary::print(calibration, around.output, terminal),
             Print::Brief => brief::print(calibration, around, terminal),
             Print::Answer => {
                 terminal.answer(&twincal_io::words::answer(calibration).headline);

@@ -9,8 +9,6 @@ use twincal_io::report::MENTIONED;
 use twincal_io::result_json::status_word;
 use twincal_io::words::probability;
 
-/// Dropped columns up to this number are named.
-const FEW: usize = 4;
 /// What the table of components that were not kept holds.
 const VALUE: &str = "value: median, given that it is in; ±: half of the central 68 % interval";
 
@@ -54,12 +52,7 @@ pub(super) fn others(calibration: &Calibration, terminal: &mut Terminal) {
         let more = if table.is_empty() { "" } else { "more " };
         terminal.say(&format!("  {rare} {more}below PIP {MENTIONED}"));
     }
-    if dropped.len() > FEW {
-        terminal.say(&format!(
-            "  {} columns left out: no torque, or that of others (see the report)",
-            dropped.len()
-        ));
-    } else if !dropped.is_empty() {
+    if !dropped.is_empty() {
         paragraph(&format!("left out: {}", left_out(&dropped)), terminal);
     }
     terminal.say("");

@@ -1,8 +1,10 @@
 //! Everything that a person can read of a fit on the terminal: physical sentences, terms, held-out scores, findings.
 
+use super::calibration::quoted;
 use super::not_kept::others;
 use super::table::{print_table, table};
 use crate::terminal::{Terminal, clean};
+use std::path::Path;
 use twincal::assess::{decisive, friction_only, has_standstill};
 use twincal::calibrate::{Calibration, ParameterSummary};
 use twincal::validate::{Scores, Split};
@@ -15,16 +17,16 @@ pub(super) const HOW_TO_FIX: &str = "`twincal init` with this log and model writ
 /// What stands where ± does not describe a number.
 pub(super) const ENDS: &str =
     "a (b … c): median and both ends of the 95 % interval, where ± would mislead";
-/// Prints the whole summary, the answer first.
-pub(super) fn print(calibration: &Calibration, terminal: &mut Terminal) {
+/// Prints the whole summary of what lies in `output`, the answer first.
+pub(super) fn print(calibration: &Calibration, output: &Path, terminal: &mut Terminal) {
     terminal.answer(&words::answer(calibration).headline);
     terminal.say("");
     mistakes(calibration, terminal);
     effects(calibration, terminal);
     others(calibration, terminal);
     validation(calibration, terminal);
-    verdict(calibration, terminal);
-    findings(&calibration.findings, Notes::In("the report"), terminal);
+    verdict(calibration, output, terminal);
+    findings(&calibration.findings, Notes::Shown, terminal);
 }
 
 /// What forbids a "Yes" stands before any number.
@@ -119,25 +121,23 @@ fn validation(calibration: &Calibration, terminal: &mut Terminal) {
 }
 
 /// What the answer rests on, and what limits it.
-fn verdict(calibration: &Calibration, terminal: &mut Terminal) {
+fn verdict(calibration: &Calibration, output: &Path, terminal: &mut Terminal) {
     let answer = words::answer(calibration);
     terminal.heading("What the answer rests on");
     // Findings follow in full.
-    let limits = answer.limits.iter().filter(|limit| {
+    let limits = answer.limits.iter().chain(&answer.folded);
+    let limits = limits.filter(|limit| {
         let mut findings = calibration.findings.iter();
         !findings.any(|finding| limit.contains(&finding.message))
     });
     let told = answer.grounds.iter().chain(limits);
     told.for_each(|text| paragraph(text, terminal));
-    if !answer.folded.is_empty() {
-        let text = format!("{} more to mind in the report.", answer.folded.len());
-        paragraph(&text, terminal);
-    }
     if let Some(next) = &answer.next {
         paragraph(&format!("Next recording: {next}"), terminal);
     }
-    if let Some(motion) = words::design::command(calibration, "DIR") {
-        paragraph(&motion, terminal);
+    let output = quoted(&output.to_string_lossy());
+    if let Some(motion) = words::next_motion(calibration, &output) {
+        paragraph(&motion.sentence(), terminal);
     }
     terminal.say("");
 }

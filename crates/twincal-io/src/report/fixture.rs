@@ -12,8 +12,8 @@ use twincal::calibrate::{
     Along, Calibration, Curve, Draws, LikelihoodUsed, LogSummary, PriorUsed, TermSummary,
 };
 use twincal::likelihood::{JointNoise, NoiseModel, PayloadSize};
-use twincal::posterior::{Method, Model, Posterior};
-use twincal::prior::Inclusion;
+use twincal::posterior::{Method, Model, Posterior, Problem};
+use twincal::prior::{Inclusion, Prior};
 use twincal::robot::{
     Inertia, JointDescription, JointKind, LinkDescription, Robot, RobotDescription,
 };
@@ -87,6 +87,27 @@ pub(crate) fn nothing_found() -> Calibration {
     for trace in &mut calibration.validation.traces {
         trace.calibrated = trace.nominal.clone();
     }
+    calibration
+}
+
+/// What `twincal design` may decide: a fit that keeps its regression, and a log that is not in doubt.
+pub(crate) fn with_open_effects() -> Calibration {
+    let mut calibration = two_joints();
+    calibration.findings.clear();
+    calibration.problem = Some(Problem {
+        gram: Vec::new(),
+        xy: Vec::new(),
+        yy: 0.0,
+        n: 0.0,
+        log_constant: 0.0,
+        prior: Prior::single(
+            Vec::new(),
+            Vec::new(),
+            Inclusion::Probability(0.5),
+            (1.0, 1.0),
+        ),
+        names: Vec::new(),
+    });
     calibration
 }
 

@@ -52,7 +52,7 @@ pub(super) struct Verdict {
     pub(super) pointers: Vec<String>,
     /// What to record next; `None` where nothing more would be learnt from it that is known of.
     pub(super) next: Option<String>,
-    /// The line that designs its motion.
+    /// The command that designs its motion, in a sentence.
     pub(super) motion: Option<String>,
 }
 
@@ -73,7 +73,7 @@ pub(super) fn judge(calibration: &Calibration) -> Verdict {
             _ => pointers(calibration),
         },
         next: words.next,
-        motion: words::design::command(calibration, "DIR"),
+        motion: words::next_motion(calibration, words::PAGE_FOLDER).map(|motion| motion.on_page()),
     }
 }
 

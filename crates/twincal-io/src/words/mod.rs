@@ -14,6 +14,7 @@ mod headline;
 mod intervals;
 mod limits;
 pub(crate) mod list;
+mod motion;
 mod next;
 pub(crate) mod number;
 mod remedy;
@@ -29,6 +30,9 @@ pub(crate) use family::family_name;
 pub use intervals::drawn_alike;
 #[cfg(feature = "report")]
 pub(crate) use intervals::guarantee;
+#[cfg(feature = "report")]
+pub(crate) use motion::PAGE_FOLDER;
+pub use motion::{NextMotion, next_motion};
 pub use number::{percent, probability};
 pub use remedy::{Remedy, When, remedy};
 pub use status::reason;

@@ -203,8 +203,8 @@ fn next(
         page.paragraph(&text, begin, width, detail.step);
     }
     let output = quoted(&around.output.to_string_lossy());
-    if let Some(motion) = words::design::command(calibration, &output) {
-        page.paragraph(&motion, begin, width, detail.step);
+    if let Some(motion) = words::next_motion(calibration, &output) {
+        page.paragraph(&motion.sentence(), begin, width, detail.step);
     }
     let format = around.format;
     let command = match answer.answer {
