@@ -125,12 +125,8 @@ fn verdict(calibration: &Calibration, output: &Path, terminal: &mut Terminal) {
     let answer = words::answer(calibration);
     terminal.heading("What the answer rests on");
     // Findings follow in full.
-    let limits = answer.limits.iter().chain(&answer.folded);
-    let limits = limits.filter(|limit| {
-        let mut findings = calibration.findings.iter();
-        !findings.any(|finding| limit.contains(&finding.message))
-    });
-    let told = answer.grounds.iter().chain(limits);
+    let limits = words::limits_beside_findings(calibration);
+    let told = answer.grounds.iter().chain(&limits);
     told.for_each(|text| paragraph(text, terminal));
     if let Some(next) = &answer.next {
         paragraph(&format!("Next recording: {next}"), terminal);

@@ -15,17 +15,34 @@ const LEVEL_WORDS: &str = "95 % intervals";
 
 /// Where the twin does not hold and what to mind, in the order of the report.
 pub(super) fn limits(assessment: &Assessment, calibration: &Calibration) -> Vec<String> {
-    let mistakes = calibration.findings.iter().filter(|f| f.forbids_yes());
-    let mut out: Vec<String> = mistakes.map(|f| said(f, calibration)).collect();
-    if assessment.claims(Code::NotConverged).next().is_some() {
-        out.push("The sampler has not converged: run it with more draws before relying on the probabilities.".into());
-    }
-    let degraded = calibration
-        .findings
-        .iter()
-        .filter(|f| f.severity == Severity::Degraded && !f.forbids_yes());
-    out.extend(degraded.map(|f| said(f, calibration)));
-    out.extend(too_few(assessment));
+    let of_findings = |keep: fn(&&Finding) -> bool| {
+        let findings = calibration.findings.iter().filter(keep);
+        findings.map(|f| said(f, calibration)).collect::<Vec<_>>()
+    };
+    let mut out = of_findings(|f| f.forbids_yes());
+    out.extend(not_converged(assessment));
+    out.extend(of_findings(|f| {
+        f.severity == Severity::Degraded && !f.forbids_yes()
+    }));
+    out.extend(of_the_fit(assessment, calibration));
+    out
+}
+
+/// The limits that no finding says.
+pub(super) fn beside_findings(assessment: &Assessment, calibration: &Calibration) -> Vec<String> {
+    let mut out: Vec<String> = not_converged(assessment).into_iter().collect();
+    out.extend(of_the_fit(assessment, calibration));
+    out
+}
+
+fn not_converged(assessment: &Assessment) -> Option<String> {
+    assessment.claims(Code::NotConverged).next()?;
+    Some("The sampler has not converged: run it with more draws before relying on the probabilities.".into())
+}
+
+/// What held-out torque says against the twin.
+fn of_the_fit(assessment: &Assessment, calibration: &Calibration) -> Vec<String> {
+    let mut out: Vec<String> = too_few(assessment).into_iter().collect();
     out.extend(limits_of_torque(assessment, calibration));
     let worse = [Code::WorseAtRest, Code::WorseInFewPauses];
     out.extend(rest::error(assessment, calibration, &worse));
@@ -327,6 +344,21 @@ mod tests {
         let friction = limits.find(|limit| limit.starts_with("Friction"));
         let friction = friction.expect("a limit of seven joints");
         assert!(friction.ends_with(" and 4 more."), "{friction}");
+    }
+
+    #[test]
+    fn limits_that_a_finding_says_are_told_apart() {
+        let calibration = crate::words::tests::changed(|c| {
+            c.validation.filtered.joints[1].rmse_calibrated = 9.0;
+            let (code, words) = (Code::SignFlip, "torque has the other sign");
+            c.findings = vec![Finding::new(Severity::Degraded, code, "elbow", words, 1)];
+        });
+        let assessment = twincal::assess::assess(&calibration);
+        let all = limits(&assessment, &calibration);
+        let beside = beside_findings(&assessment, &calibration);
+        assert_eq!(all[0], "torque has the other sign");
+        assert_eq!(all[1..], beside);
+        assert!(beside.iter().any(|limit| limit.contains("got worse")));
     }
 
     #[test]

@@ -81,6 +81,16 @@ pub fn answer(calibration: &Calibration) -> Answer {
     of_assessment(&assess(calibration), calibration)
 }
 
+/// The limits of [`answer`] that none of the calibration's findings says, where those are listed beside them.
+#[must_use]
+pub fn limits_beside_findings(calibration: &Calibration) -> Vec<String> {
+    let assessment = assess(calibration);
+    match assessment.reason {
+        Code::NotTested => Vec::new(),
+        _ => limits::beside_findings(&assessment, calibration),
+    }
+}
+
 /// The words of an assessment; the calibration has the names, units and effects.
 pub(crate) fn of_assessment(assessment: &Assessment, calibration: &Calibration) -> Answer {
     let (answer, reason) = (assessment.answer, assessment.reason);

@@ -1,5 +1,6 @@
 //! What to fix, the most important first, each with a number and a line to type or to write.
 
+use super::super::summary::about;
 use super::columns::{is_axis, sign_line};
 use super::examine::Examination;
 use serde::Serialize;
@@ -126,11 +127,7 @@ fn of_finding(finding: &Finding, examination: &Examination) -> Advice {
     let doubtful = usize::from(finding.severity < Severity::Degraded);
     let place = known.map_or(LAST, |(place, _)| place);
     Advice {
-        problem: if finding.subject.is_empty() || finding.message.contains(&finding.subject) {
-            finding.message.clone()
-        } else {
-            format!("{}: {}", finding.subject, finding.message)
-        },
+        problem: about(&[finding.subject.as_str()], &finding.message) + &finding.message,
         how,
         wrong: true,
         when,
